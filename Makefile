@@ -1,0 +1,31 @@
+# Two commands do everything: `make reports` and `make test`. Both set up what they need first.
+
+export OPENBLAS_NUM_THREADS := 1
+export PATH := $(CURDIR)/.venv/bin:$(PATH)
+
+.PHONY: reports test setup lint lock clean
+
+reports: setup
+	snakemake
+
+test: lint
+	pytest -n 2 --dist loadgroup $(PYTEST_ARGS)
+
+lint: setup
+	ruff check .
+	ruff format --check .
+	mypy
+	snakefmt --check Snakefile workflow
+	snakemake --lint
+
+setup:
+	@scripts/setup.sh
+
+# Pins what pyproject.toml asks for, with hashes and without addresses. Needs pip-tools.
+lock:
+	CUSTOM_COMPILE_COMMAND="make lock" pip-compile pyproject.toml --output-file requirements.lock --extra dev \
+	    --build-deps-for editable --allow-unsafe --strip-extras --generate-hashes \
+	    --no-emit-options --no-emit-index-url --no-emit-find-links --no-emit-trusted-host
+
+clean:
+	rm -rf data/processed reports logs .snakemake

@@ -1,0 +1,39 @@
+"""What can be asked for: the report of every batch, and the summary of all of them."""
+
+from snakemake.utils import min_version
+
+from metro.batch.layout import OBSERVED
+from metro.workflow import Plan, only_one_at_work, remove_leftovers
+
+min_version("9.0")
+
+plan = Plan.read(Path(workflow.basedir), overrides=config)
+shell.prefix(plan.shell_prefix)
+
+
+wildcard_constraints:
+    batch=plan.any_batch,
+
+
+onstart:
+    only_one_at_work(Path.cwd())
+    remove_leftovers(Path("data/processed"), Path("reports"))
+
+
+rule all:
+    default_target: True
+    input:
+        expand("reports/{batch}/report.pdf", batch=plan.batches),
+        expand("reports/{batch}/identified.json", batch=plan.batches),
+        expand("reports/{batch}/verdict.json", batch=plan.batches),
+        "reports/summary.pdf",
+    message:
+        "all reports are up to date"
+
+
+include: "workflow/rules/ingest.smk"
+include: "workflow/rules/identify.smk"
+include: "workflow/rules/predict.smk"
+include: "workflow/rules/loop.smk"
+include: "workflow/rules/report.smk"
+include: "workflow/rules/campaign.smk"

@@ -1,0 +1,37 @@
+"""A batch as every stage after ingest sees it: manifest, cell, run table and hold-out plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+from metro.units import JSON
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What describes a batch, validated, with defaults filled in; units as the keys name them.
+
+    Attributes
+    ----------
+    name : the folder's name.
+    manifest : batch.yaml.
+    cell : cell.yaml or config/cells/<cell>.yaml; ``{"cell": name}`` alone for a machine of which nothing is
+        known.
+    runs : one row per cutting run, indexed by run id, all columns of the contract present (NaN or "" where
+        blank), and ``cut_before_m``: metres cut since ``order`` 1 before the run began. ``role`` is resolved:
+        identify, validate, or "" for a cut that was made but not recorded.
+    plan : how the hold-out was made: ``{"identify": [...], "validate": [...], "how": "...", "seed": n}``.
+    """
+
+    name: str
+    manifest: JSON
+    cell: JSON
+    runs: pd.DataFrame
+    plan: JSON
+
+    def instrument(self, name: str) -> JSON:
+        """Return an instrument's entry in the manifest; empty where it has none."""
+        entry: JSON = (self.manifest.get("instruments") or {}).get(name) or {}
+        return entry

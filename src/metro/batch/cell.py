@@ -1,0 +1,56 @@
+"""cell.yaml: the machine, as the batch itself, or the folder of shared cells, describes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from metro.batch.documents import read_yaml, schema_findings
+from metro.batch.findings import Finding, Severity
+from metro.units import JSON
+
+FILE = "cell.yaml"
+
+
+def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, list[Finding]]:
+    """Read and validate the description of a batch's machine.
+
+    Parameters
+    ----------
+    folder : the batch, whose own ``cell.yaml`` goes before.
+    cells : folder of the shared cells, with files ``<cell>.yaml``.
+    name : the cell that the manifest names.
+
+    Returns
+    -------
+    cell : the description; ``{"cell": name}`` for a machine of which nothing is known.
+    source : the file that it comes from; None where nothing is known.
+    findings : what is wrong, missing or assumed.
+    """
+    own, shared = folder / FILE, cells / f"{name}.yaml"
+    source = own if own.is_file() else shared if shared.is_file() else None
+    if source is None:
+        note = f"nothing is known of cell {name} (rigid): neither {FILE} nor {shared} is there"
+        return {"cell": name}, None, [Finding("note", "batch.yaml", note, column="cell")]
+    file = FILE if source is own else str(shared)
+    content, findings = read_yaml(source, file)
+    if findings:
+        return {"cell": name}, source, findings
+    findings = schema_findings(content, "cell", file, _unknown_key)
+    if content.get("cell", name) != name:
+        message = f'found "{content["cell"]}", expected the cell that batch.yaml names, "{name}"'
+        findings.append(Finding("error", file, message, column="cell"))
+    if content.get("joint_stiffness_nm_rad") and not content.get("arm"):
+        message = "is of no use without arm.dh, which says where the joints are"
+        findings.append(Finding("warning", file, message, column="joint_stiffness_nm_rad"))
+    return content, source, findings
+
+
+def stations_path(cell: JSON, source: Path | None) -> Path | None:
+    """Return where a cell's table of stations is, beside the file that names it; None where it has none."""
+    stations = cell.get("stations")
+    return source.parent / stations if source is not None and isinstance(stations, str) else None
+
+
+def _unknown_key(_path: tuple[str, ...], resembles: bool) -> Severity:
+    """Say how bad an unknown key is: the contract lets fields be added, but a misspelt one must not pass."""
+    return "error" if resembles else "warning"

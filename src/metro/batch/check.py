@@ -1,0 +1,194 @@
+"""The check of a batch against the contract, and the batch that comes out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from metro.batch import rules
+from metro.batch.batch import Batch
+from metro.batch.capabilities import Capability, capabilities
+from metro.batch.cell import read_cell, stations_path
+from metro.batch.discover import NAME, NAME_IN_WORDS
+from metro.batch.files import file_findings
+from metro.batch.findings import BatchError, Finding, errors
+from metro.batch.holdout import plan
+from metro.batch.manifest import FILE, read_manifest, with_defaults
+from metro.batch.runs import design_findings, filled, recorded, run_findings
+from metro.batch.tables import Table, read_table
+from metro.units import JSON
+
+HOLDOUT: JSON = {"share": 0.34, "seed": 1}
+CELLS = Path("config/cells")
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A batch that follows the contract, and its tables, without rows where it has none."""
+
+    batch: Batch
+    impacts: pd.DataFrame
+    loads: pd.DataFrame
+    mass: pd.DataFrame
+    published: pd.DataFrame
+    stations: pd.DataFrame
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """What a check says: what is there, what can be computed, and what is wrong."""
+
+    folder: Path
+    there: tuple[str, ...]
+    plan: JSON
+    capabilities: tuple[Capability, ...]
+    problems: tuple[Finding, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether the batch can be run."""
+        return not errors(self.problems)
+
+
+@dataclass(frozen=True)
+class _Read:
+    """All that was read of a batch, sound or not."""
+
+    manifest: JSON
+    cell: JSON
+    tables: Mapping[str, Table]
+    runs: pd.DataFrame
+    plan: JSON
+    findings: tuple[Finding, ...]
+
+
+def check(folder: Path, cells: Path = CELLS, holdout: JSON = HOLDOUT) -> CheckReport:
+    """Check a batch in seconds: manifest, cell, every table, and the first rows of every file that they name.
+
+    Parameters
+    ----------
+    folder : the batch.
+    cells : folder of the shared cells.
+    holdout : share and seed of the hold-out plan, as in config.yaml.
+    """
+    found = _read(folder, cells, holdout)
+    frames = {name: table.frame for name, table in found.tables.items()}
+    can = capabilities(found.manifest, found.cell, found.runs, frames)
+    counts = [f"{len(table.frame)} rows in {table.file}" for table in found.tables.values() if table.file]
+    instruments = sorted(found.manifest.get("instruments") or {})
+    there = [f"cell {found.cell.get('cell', '')}", *counts]
+    there += [f"instruments: {', '.join(instruments)}"] if instruments else []
+    return CheckReport(folder, tuple(there), found.plan, can, found.findings)
+
+
+def load(folder: Path, cells: Path = CELLS, holdout: JSON = HOLDOUT) -> Loaded:
+    """Check a batch and return it, defaults filled in and every recorded run with a role.
+
+    Raises
+    ------
+    BatchError
+        With every error that the check found.
+    """
+    found = _read(folder, cells, holdout)
+    if errors(found.findings):
+        raise BatchError(errors(found.findings))
+    batch = Batch(folder.resolve().name, found.manifest, found.cell, found.runs.set_index("run"), found.plan)
+    frames: dict[str, Any] = {name: table.frame for name, table in found.tables.items() if name != "runs"}
+    return Loaded(batch, findings=found.findings, **frames)
+
+
+def check_command(folder: Path, cells: Path = CELLS) -> int:
+    """Print the check of a batch; return the exit code, 1 where there is an error."""
+    from rich.console import Console
+
+    from metro.batch.show import render
+
+    report = check(folder, cells)
+    Console(highlight=False).print(render(report))
+    return 0 if report.ok else 1
+
+
+def _read(folder: Path, cells: Path, holdout: JSON) -> _Read:
+    """Read and check all of a batch; go on after an error as far as makes sense."""
+    manifest, findings = read_manifest(folder)
+    if not NAME.fullmatch(folder.resolve().name):
+        findings.append(Finding("error", str(folder), f"the name of a batch is made of {NAME_IN_WORDS}"))
+    cell, source, more = _cell(folder, cells, manifest)
+    findings += more
+    tables: dict[str, Table] = {}
+    for name in ("runs", "impacts", "loads", "mass", "published"):
+        tables[name], more = read_table(folder, name)
+        findings += more
+    tables["stations"], more = _stations(cell, source)
+    findings += more
+    sound = manifest if not errors(findings) else _without_faults(manifest, findings)
+    findings += [*run_findings(tables["runs"], sound), *rules.impact_findings(tables["impacts"])]
+    findings += [*rules.load_findings(tables["loads"]), *rules.mass_findings(tables["mass"])]
+    findings += [*rules.published_findings(tables["published"]), *rules.station_findings(tables["stations"])]
+    findings += file_findings(folder, tables["runs"], tables["impacts"])
+    runs = filled(tables["runs"].frame, sound)
+    findings += [*design_findings(runs, tables["runs"].file), *_about_the_whole(manifest, tables, runs)]
+    roles = plan(runs, holdout["share"], holdout["seed"])
+    given = {run: role for role in ("identify", "validate") for run in roles[role]}
+    runs["role"] = pd.Series([given.get(run, "") for run in runs["run"]], runs.index, dtype=str)
+    if not errors(findings):
+        manifest = with_defaults(_with_dynamometer(manifest, runs))
+        impacts = tables["impacts"].frame
+        impacts["response_unit"] = impacts["response_unit"].mask(impacts["response_unit"] == "", "m")
+    return _Read(manifest, cell, tables, runs, roles, tuple(findings))
+
+
+def _cell(folder: Path, cells: Path, manifest: JSON) -> tuple[JSON, Path | None, list[Finding]]:
+    """Read the cell that the manifest names."""
+    name = manifest.get("cell")
+    return read_cell(folder, cells, name) if isinstance(name, str) else ({}, None, [])
+
+
+def _stations(cell: JSON, source: Path | None) -> tuple[Table, list[Finding]]:
+    """Read the stations of the cell, where it names a table of them."""
+    path = stations_path(cell, source)
+    if path is None or source is None:
+        return read_table(Path(), "stations", "")
+    table, findings = read_table(path.parent, "stations", path.stem)
+    if not table.file:
+        message = f'"{cell["stations"]}" is not there, expected a table beside {source.name}'
+        findings.append(Finding("error", source.name, message, column="stations"))
+    return table, findings
+
+
+def _without_faults(manifest: JSON, findings: list[Finding]) -> JSON:
+    """Return the manifest without the sections that have an error, for the checks that rest on it."""
+    faulty = {finding.column.split(".")[0] for finding in errors(findings) if finding.file == FILE}
+    return {key: value for key, value in manifest.items() if key not in faulty}
+
+
+def _about_the_whole(manifest: JSON, tables: Mapping[str, Table], runs: pd.DataFrame) -> list[Finding]:
+    """Say what the batch as a whole leaves open."""
+    found = []
+    if not any(table.file for name, table in tables.items() if name != "stations"):
+        found.append(
+            Finding("warning", "", "no table is there: nothing was measured (runs.csv, impacts.csv, …)")
+        )
+    silent = int((~recorded(runs)).sum())
+    if silent:
+        message = (
+            f"{silent} of {len(runs)} rows have neither role nor files: cuts that were made but not recorded"
+        )
+        found.append(Finding("note", tables["runs"].file, message))
+    declared = manifest.get("instruments") or {}
+    if (runs["dynamometer"] != "").any() and "dynamometer" not in declared:
+        message = "is missing: taken to read the force on the work, its axes those of the work"
+        found.append(Finding("warning", FILE, message, column="instruments.dynamometer"))
+    return found
+
+
+def _with_dynamometer(manifest: JSON, runs: pd.DataFrame) -> JSON:
+    """Return the manifest with a dynamometer among its instruments where the runs have its files."""
+    if not (runs["dynamometer"] != "").any():
+        return manifest
+    return {**manifest, "instruments": {"dynamometer": {}, **(manifest.get("instruments") or {})}}

@@ -1,0 +1,160 @@
+"""YAML files that people write: read, checked against a JSON Schema, and their faults in plain words."""
+
+from __future__ import annotations
+
+import functools
+import importlib.resources
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from metro.batch.findings import Finding, Severity, resembling, shown, suggestion
+from metro.units import JSON
+
+if TYPE_CHECKING:
+    from jsonschema.exceptions import ValidationError
+
+# How bad an unknown key is: called with the keys that lead to it, and whether it resembles a known one.
+UnknownKey = Callable[[tuple[str, ...], bool], Severity]
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's safe loader, with numbers as everybody writes them (1e6), dates as text, and no key twice."""
+
+
+def _mapping(loader: _Loader, node: yaml.MappingNode) -> JSON:
+    """Construct a mapping whose keys are text and stand once."""
+    loader.flatten_mapping(node)
+    content: JSON = {}
+    for key_node, value_node in node.value:
+        key = str(key_node.value)
+        if key in content:
+            raise yaml.constructor.ConstructorError(
+                None, None, f'key "{key}" stands twice', key_node.start_mark
+            )
+        content[key] = loader.construct_object(value_node, deep=True)
+    return content
+
+
+def _finite(loader: _Loader, node: yaml.ScalarNode) -> float:
+    """Construct a number, and refuse the infinite and the undefined."""
+    value = loader.construct_yaml_float(node)
+    if not math.isfinite(value):
+        message = f'found "{node.value}", expected a finite number'
+        raise yaml.constructor.ConstructorError(None, None, message, node.start_mark)
+    return value
+
+
+def _text(loader: _Loader, node: yaml.ScalarNode) -> str:
+    """Construct the text as written."""
+    return str(loader.construct_scalar(node))
+
+
+_Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
+_Loader.add_constructor("tag:yaml.org,2002:float", _finite)
+_Loader.add_constructor("tag:yaml.org,2002:timestamp", _text)
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+"), list("-+.0123456789")
+)
+
+
+def read_yaml(path: Path, file: str) -> tuple[JSON, list[Finding]]:
+    """Read a YAML file that holds a mapping; empty, with the reason, where it cannot be read.
+
+    Parameters
+    ----------
+    path : where the file is.
+    file : its name in messages.
+    """
+    try:
+        content = yaml.load(path.read_bytes().decode("utf-8-sig"), _Loader)
+    except OSError:
+        return {}, [Finding("error", file, "is not there, or cannot be read")]
+    except UnicodeDecodeError as fault:
+        return {}, [Finding("error", file, f"is not UTF-8 text (byte {fault.start + 1}): save it as UTF-8")]
+    except yaml.MarkedYAMLError as fault:
+        mark = fault.problem_mark or fault.context_mark
+        return {}, [
+            Finding("error", file, fault.problem or "is not YAML", row=mark.line + 1 if mark else None)
+        ]
+    except yaml.YAMLError as fault:
+        return {}, [Finding("error", file, f"is not YAML: {fault}")]
+    if not isinstance(content, dict):
+        return {}, [Finding("error", file, f"found {shown(content)}, expected keys with values")]
+    return content, []
+
+
+@functools.cache
+def schema(name: str) -> JSON:
+    """Return the JSON Schema (draft 2020-12) ``name`` of this package: batch, cell or config."""
+    text = importlib.resources.files("metro.batch").joinpath("schemas", f"{name}.json").read_text()
+    content: JSON = json.loads(text)
+    return content
+
+
+def schema_findings(content: JSON, name: str, file: str, unknown: UnknownKey) -> list[Finding]:
+    """Check a document against a schema of this package; one finding a fault, each once."""
+    from jsonschema import Draft202012Validator
+
+    faults = Draft202012Validator(schema(name)).iter_errors(content)
+    found = (finding for fault in faults for finding in _in_words(fault, file, unknown))
+    return list(dict.fromkeys(found))
+
+
+def expectation(rule: Mapping[str, Any]) -> str:
+    """Say in words what a schema asks for, e.g. "an integer ≥ 1", "a list of 3 numbers"."""
+    if "const" in rule or "enum" in rule:
+        return " or ".join(shown(choice) for choice in rule.get("enum", [rule.get("const")]))
+    if "description" in rule:
+        return str(rule["description"])
+    kind = rule.get("type", "value")
+    if kind == "array":
+        return f"a {_plural(rule).replace('lists', 'list', 1)}"
+    if kind == "object":
+        return "keys with values"
+    words = "text" if kind == "string" else f"an {kind}" if kind == "integer" else f"a {kind}"
+    return words + _bounds(rule)
+
+
+def _plural(rule: Mapping[str, Any]) -> str:
+    """Say in words what several of a schema's values are."""
+    if rule.get("type") == "array":
+        size = f"{rule['minItems']} " if rule.get("minItems") == rule.get("maxItems", -1) else ""
+        return f"lists of {size}{_plural(rule.get('items', {}))}"
+    kind = str(rule.get("type", "value")).replace("string", "text")
+    return f"{kind}s{_bounds(rule)}"
+
+
+def _bounds(rule: Mapping[str, Any]) -> str:
+    """Say in words in what range a schema's numbers lie."""
+    signs = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+    return " and".join(f" {sign} {rule[key]}" for key, sign in signs.items() if key in rule)
+
+
+def _in_words(fault: ValidationError, file: str, unknown: UnknownKey) -> Iterator[Finding]:
+    """Turn a fault of the validator into findings: path, what was found, what was expected."""
+    path = tuple(str(part) for part in fault.absolute_path)
+    rule = fault.schema if isinstance(fault.schema, dict) else {}
+    given: Any = fault.instance
+    if fault.validator == "additionalProperties":
+        known = list(rule.get("properties", {}))
+        for key in given:
+            if key not in known:
+                message = f"is not a known key{suggestion(key, known)}"
+                severity = unknown(path, resembling(key, known) is not None)
+                yield Finding(severity, file, message, column=".".join((*path, key)))
+    elif fault.validator == "required":
+        for key in rule["required"]:
+            if key not in given:
+                expected = expectation(rule.get("properties", {}).get(key, {}))
+                yield Finding(
+                    "error", file, f"is missing, expected {expected}", column=".".join((*path, key))
+                )
+    else:
+        message = f"found {shown(given)}, expected {expectation(rule)}"
+        yield Finding("error", file, message, column=".".join(path))

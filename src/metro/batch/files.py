@@ -1,0 +1,82 @@
+"""The data files that the tables name: inside the batch, not empty, and by their head what they should be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from metro.batch.findings import Finding, shown
+from metro.batch.tables import Table
+
+# Column of runs.csv → what kind of file it names, in the words of metro.formats.registry.
+RUN_FILES = {
+    "dynamometer": "force",
+    "robot_log": "robot",
+    "idle_log": "robot",
+    "path": "path",
+    "scan": "cloud",
+    "profile": "profile",
+}
+OWN_TO_A_RUN = ("dynamometer", "robot_log", "scan", "profile")
+
+
+def file_findings(folder: Path, runs: Table, impacts: Table) -> Iterator[Finding]:
+    """Check every file that ``runs.csv`` and ``impacts.csv`` name; the head of each is read once."""
+    opened: dict[tuple[str, str], str | None] = {}
+    for table, position, column, name, kind in _named(runs, impacts):
+        if (name, kind) not in opened:
+            opened[name, kind] = _path_fault(folder, name) or _content_fault(folder / name, kind)
+        fault = opened[name, kind]
+        if fault:
+            yield table.finding(position, column, f"{shown(name)} {fault}")
+    yield from _shared(runs)
+
+
+def _named(runs: Table, impacts: Table) -> Iterator[tuple[Table, int, str, str, str]]:
+    """Yield every file that is named: table, position of the row, column, path and kind."""
+    for column, kind in RUN_FILES.items():
+        for position, name in enumerate(runs.frame[column]):
+            if name:
+                yield runs, position, column, name, kind
+    for position, (name, kind) in enumerate(zip(impacts.frame["file"], impacts.frame["kind"], strict=True)):
+        if name:
+            yield impacts, position, "file", name, kind or "frf"
+
+
+def _path_fault(folder: Path, name: str) -> str | None:
+    """Say what is wrong with a path that a table names; None where it is a file of the batch, not empty."""
+    inside = "expected a path relative to the batch folder, inside it"
+    if "\\" in name:
+        return f"is written with backslashes, {inside}, with /"
+    if Path(name).is_absolute() or ".." in Path(name).parts:
+        return f"leads outside the batch, {inside}"
+    path = folder / name
+    if not path.exists():
+        return f"is not there, {inside}"
+    if not path.resolve().is_relative_to(folder.resolve()):
+        return f"is a link that leads outside the batch, {inside}"
+    if not path.is_file():
+        return "is a folder, expected a file"
+    return None if path.stat().st_size else "is empty, expected data"
+
+
+def _content_fault(path: Path, kind: str) -> str | None:
+    """Say what is wrong with the head of a data file, by the reader of its format."""
+    from metro.formats import FormatError
+    from metro.formats.registry import sniff
+
+    try:
+        sniff(path, kind)
+    except FormatError as fault:
+        return f"cannot be read: {fault.message}"
+    return None
+
+
+def _shared(runs: Table) -> Iterator[Finding]:
+    """Warn of a recording that two runs name: it belongs to one of them."""
+    for column in OWN_TO_A_RUN:
+        first: dict[str, str] = {}
+        for position, (run, name) in enumerate(zip(runs.frame["run"], runs.frame[column], strict=True)):
+            if name and first.setdefault(name, run) != run:
+                message = f"{shown(name)} is named by run {first[name]} too"
+                yield runs.finding(position, column, message, "warning")

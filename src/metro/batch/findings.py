@@ -1,0 +1,86 @@
+"""What a check finds in a batch or a configuration: where it is, what was found and what was expected."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Severity = Literal["error", "warning", "note"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a check has to say.
+
+    Attributes
+    ----------
+    severity : an error stops the batch, a warning asks for a look, a note states what was assumed.
+    file : path relative to the batch folder, or as the user wrote it.
+    message : what was found and what was expected.
+    row : row of the table as a spreadsheet counts it (the header is row 1), or line of a YAML file.
+    run : id of the run (or test, pose, …) that the row describes.
+    column : column of the table, or key of the YAML file (``tool.teeth``).
+    """
+
+    severity: Severity
+    file: str
+    message: str
+    row: int | None = None
+    run: str = ""
+    column: str = ""
+
+    @property
+    def place(self) -> str:
+        """Where in the file it is, in words."""
+        yaml = self.file.endswith((".yaml", ".yml"))
+        row = "" if self.row is None else f"line {self.row}" if yaml else f"row {self.row}"
+        label = f"{row} ({self.run})" if self.run else row
+        column = self.column if yaml or not self.column else f"column {self.column}"
+        return ": ".join(part for part in (label, column) if part)
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.file, self.place, self.message) if part)
+
+
+class ContractError(Exception):
+    """Input that does not follow the contract; carries every problem that was found, not the first alone."""
+
+    def __init__(self, problems: Iterable[Finding]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class BatchError(ContractError):
+    """A batch, or the folders that hold batches, break the contract."""
+
+
+class ConfigError(ContractError):
+    """The configuration breaks its schema."""
+
+
+def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return the findings that stop a batch."""
+    return tuple(finding for finding in findings if finding.severity == "error")
+
+
+def shown(value: Any) -> str:
+    """Return a value as it is shown in a message, shortened where it is long."""
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= 60 else f"{text[:56]} …"
+
+
+def resembling(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that ``name`` is most likely a misspelling of; None where it resembles none."""
+    by_lower = {entry.lower(): entry for entry in known}
+    without_unit = [entry for entry in by_lower if entry.startswith(f"{name.lower()}_")]
+    matches = without_unit or difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)
+    return by_lower[matches[0]] if matches else None
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return the words that name the nearest known name; "" where ``name`` resembles none."""
+    near = resembling(name, known)
+    return f' (did you mean "{near}"?)' if near else ""

@@ -1,0 +1,170 @@
+"""batch.yaml: what the batch is, the cell, the tool, the work and the instruments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from metro.batch.documents import read_yaml, schema_findings
+from metro.batch.findings import Finding, Severity, shown
+from metro.units import JSON, Array
+
+FILE = "batch.yaml"
+AXES = ("x", "y", "z")
+CLOSED_DEG = 0.1  # printed pitch angles are rounded
+ORTHONORMAL = 1e-3  # printed direction cosines are rounded
+
+
+def read_manifest(folder: Path) -> tuple[JSON, list[Finding]]:
+    """Read and validate ``batch.yaml`` as written (no defaults); what is wrong comes with it.
+
+    Parameters
+    ----------
+    folder : the batch.
+    """
+    content, findings = read_yaml(folder / FILE, FILE)
+    if findings:
+        return content, findings
+    findings = schema_findings(content, "batch", FILE, _unknown_key)
+    faulty = [finding.column for finding in findings if finding.severity == "error"]
+    for path, rule in RULES.items():
+        value = entry(content, path)
+        if value is not None and not any(_overlap(path, column) for column in faulty):
+            message = rule(value)
+            findings += [Finding("error", FILE, message, column=path)] if message else []
+    return content, findings + _about_the_folder(content, folder)
+
+
+def entry(content: JSON, path: str) -> Any:
+    """Return the value under a dotted path of keys; None where any of them is absent."""
+    value: Any = content
+    for key in path.split("."):
+        value = value.get(key) if isinstance(value, dict) else None
+    return value
+
+
+def with_defaults(manifest: JSON) -> JSON:
+    """Return a valid manifest with the contract's defaults filled in; what has no default stays absent."""
+    filled = {"title": manifest["batch"], "coefficients": {}, "known": {}, **manifest}
+    filled["tool"] = dict(manifest.get("tool") or {})
+    filled["work"] = dict(manifest.get("work") or {})
+    filled["work_in_base"] = {
+        "xyz_mm": [0, 0, 0],
+        "rpy_deg": [0, 0, 0],
+        **(manifest.get("work_in_base") or {}),
+    }
+    teeth = filled["tool"].get("teeth")
+    if teeth:
+        filled["tool"].setdefault("pitch_deg", [360 / teeth] * teeth)
+    if filled["coefficients"]:
+        filled["coefficients"] = {"edge_length": "axial", **filled["coefficients"]}
+    instruments = {name: dict(value or {}) for name, value in (manifest.get("instruments") or {}).items()}
+    for name, defaults in INSTRUMENT_DEFAULTS.items():
+        if name in instruments:
+            instruments[name] = {**defaults, **instruments[name]}
+    if "dynamometer" in instruments:
+        axes = instruments["dynamometer"].get("axes") or {}
+        instruments["dynamometer"]["axes"] = {axis: axes.get(axis, axis) for axis in AXES}
+    filled["instruments"] = instruments
+    return filled
+
+
+def signed_axes(axes: JSON) -> Array:
+    """Return the (3, 3) matrix whose column k is the direction of sensor axis k in the work frame."""
+    columns = np.zeros((3, 3))
+    for k, axis in enumerate(AXES):
+        direction = str(axes.get(axis, axis))
+        columns[AXES.index(direction[-1]), k] = -1.0 if direction.startswith("-") else 1.0
+    return columns
+
+
+INSTRUMENT_DEFAULTS: dict[str, JSON] = {
+    "dynamometer": {"reads": "work", "rotation_deg": 0},
+    "profiler": {"cutoff_mm": 8},
+    "hammer": {"window": "none"},
+}
+
+
+def _unknown_key(path: tuple[str, ...], resembles: bool) -> Severity:
+    """Say how bad an unknown key is: the contract lets fields be added, but a misspelt one must not pass."""
+    may_be_added = not path or path[0] == "instruments"
+    return "error" if resembles and not may_be_added else "warning"
+
+
+def _overlap(path: str, column: str) -> bool:
+    """Tell whether one of two dotted paths contains the other."""
+    return f"{path}.".startswith(f"{column}.") or f"{column}.".startswith(f"{path}.")
+
+
+def _about_the_folder(content: JSON, folder: Path) -> list[Finding]:
+    """Check what the manifest says against the folder it lies in."""
+    found = []
+    name = content.get("batch")
+    if isinstance(name, str) and name != folder.resolve().name and name != folder.name:
+        message = f'found "{name}", expected the folder\'s name, "{folder.name}"'
+        found.append(Finding("error", FILE, message, column="batch"))
+    if content.get("source") == "published":
+        if not content.get("citation"):
+            message = "is missing, expected where the published values are printed"
+            found.append(Finding("error", FILE, message, column="citation"))
+        if not any((folder / f"published{suffix}").is_file() for suffix in (".csv", ".parquet")):
+            message = "is not there: a batch with source: published needs its table of printed values"
+            found.append(Finding("error", "published.csv", message))
+    return found
+
+
+def _tool(tool: JSON) -> str | None:
+    """Check that there is a pitch angle for each tooth, and that they close the circle."""
+    pitch, teeth = tool.get("pitch_deg"), tool.get("teeth")
+    if pitch is None:
+        return None
+    if len(pitch) != teeth:
+        return f"pitch_deg has {len(pitch)} angles, expected as many as teeth ({shown(teeth)})"
+    if abs(sum(pitch) - 360) > CLOSED_DEG:
+        return f"pitch_deg adds up to {sum(pitch):g}, expected 360 (degrees from each tooth to the next)"
+    return None
+
+
+def _axes(axes: JSON) -> str | None:
+    """Check that the sensor's axes are a right-handed set."""
+    columns = signed_axes(axes)
+    expected = "expected each of x, y, z once, as a right-handed set"
+    if np.abs(columns).sum(axis=1).max() > 1:
+        return f"found {shown(axes)}, which names one direction twice (a blank axis is itself), {expected}"
+    if np.linalg.det(columns) < 0:
+        return f"found {shown(axes)}, which is left-handed, {expected}"
+    return None
+
+
+def _rotation_fault(matrix: Array) -> str | None:
+    """Say what keeps a (3, 3) matrix from being a rotation."""
+    if np.abs(matrix.T @ matrix - np.eye(3)).max() > ORTHONORMAL:
+        return "its columns are not perpendicular unit vectors"
+    return "it is left-handed (a mirror)" if np.linalg.det(matrix) < 0 else None
+
+
+def _directions(rows: list[list[float]]) -> str | None:
+    """Check that the tool's axes are the columns of a rotation."""
+    fault = _rotation_fault(np.array(rows, dtype=float))
+    return f"found {shown(rows)}, expected the tool's x, y, z axes as columns: {fault}" if fault else None
+
+
+def _motion(rows: list[list[float]]) -> str | None:
+    """Check that a 4×4 matrix is a rigid motion."""
+    matrix = np.array(rows, dtype=float)
+    fault = _rotation_fault(matrix[:3, :3])
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        fault = "its last row is not 0 0 0 1"
+    return f"expected a rigid motion (rotation and translation in mm): {fault}" if fault else None
+
+
+# Semantic checks of what a schema cannot say: path of keys → rule(value) → message or None.
+RULES: dict[str, Callable[[Any], str | None]] = {
+    "tool": _tool,
+    "tool_axes_in_flange": _directions,
+    "instruments.dynamometer.axes": _axes,
+    "instruments.scanner.to_work": _motion,
+}

@@ -1,0 +1,121 @@
+"""The canonical tables of a batch: written whole or not at all, with their provenance in the metadata."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import IO
+
+import pandas as pd
+
+from metro import __version__
+from metro.batch.batch import Batch
+from metro.units import JSON
+
+# Every table that ingest writes, always, with these columns (no rows where the batch has no such data).
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "force": ("run", "t_s", "fx_n", "fy_n", "fz_n", "spindle_deg"),
+    "robot": (
+        "run",
+        "log",
+        "t_s",
+        *(f"q{i}_set_deg" for i in range(1, 7)),
+        *(f"q{i}_deg" for i in range(1, 7)),
+        *(f"tau{i}_nm" for i in range(1, 7)),
+    ),
+    "path": ("run", "point", "pass", "x_mm", "y_mm", "z_mm"),
+    "scan": ("run", "x_mm", "y_mm", "z_mm"),
+    "profile": ("run", "x_mm", "z_mm"),
+    "hit": (
+        "test",
+        "position",
+        "reference",
+        "response",
+        "replicate",
+        "response_unit",
+        "t_s",
+        "force_n",
+        "response_si",
+    ),
+    "frf": (
+        "test",
+        "position",
+        "reference",
+        "response",
+        "replicate",
+        "frequency_hz",
+        "real_m_n",
+        "imag_m_n",
+        "coherence",
+    ),
+    "loads": (
+        "pose",
+        "point",
+        *(f"q{i}_deg" for i in range(1, 7)),
+        *("x_mm", "y_mm", "z_mm", "fx_n", "fy_n", "fz_n", "dx_mm", "dy_mm", "dz_mm", "replicate"),
+    ),
+    "mass": ("pose", "point", "x_mm", "y_mm", "z_mm", "mxx", "mxy", "mxz", "myy", "myz", "mzz"),
+    "stations": ("position", "x_mm", "y_mm", "z_mm", "kx_n_um", "ky_n_um", "kz_n_um"),
+    "published": (
+        *("table", "row", "observable", "quantity", "axis", "measured", "predicted", "unit"),
+        *("printed_error_percent", "note"),
+    ),
+    "qc": ("file", "run", "check", "value", "limit", "ok", "message"),
+}
+
+
+def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Write ``path`` through a unique temporary file beside it, so that it is there whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            write(stream)
+            stream.flush()
+            os.fsync(stream.fileno())
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def write_json(path: Path, content: JSON) -> None:
+    """Write a JSON file atomically, keys in the order given; NaN is not JSON and is refused."""
+    text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    write_atomically(path, lambda stream: stream.write(text.encode()))
+
+
+def write_table(path: Path, table: pd.DataFrame, provenance: Mapping[str, str]) -> None:
+    """Write a Parquet table atomically, with ``provenance`` and the code's version in its schema metadata."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    content = pa.Table.from_pandas(table, preserve_index=False)
+    metadata = {**(content.schema.metadata or {}), b"metro.version": __version__.encode()}
+    metadata |= {f"metro.{key}".encode(): value.encode() for key, value in provenance.items()}
+    content = content.replace_schema_metadata(metadata)
+    write_atomically(path, lambda stream: pq.write_table(content, stream, compression="zstd"))
+
+
+def read_table(path: Path, run: str | None = None) -> pd.DataFrame:
+    """Read a processed table, or the rows of one run of it."""
+    filters = None if run is None else [("run", "==", run)]
+    return pd.read_parquet(path, filters=filters)
+
+
+def write_batch(folder: Path, batch: Batch, provenance: Mapping[str, str]) -> None:
+    """Write what describes the batch: ``runs.parquet``, then ``batch.json`` (manifest, cell, plan)."""
+    write_table(folder / "runs.parquet", batch.runs.reset_index(), provenance)
+    content = {"batch": batch.name, "manifest": batch.manifest, "cell": batch.cell, "plan": batch.plan}
+    write_json(folder / "batch.json", content)
+
+
+def read_batch(folder: Path) -> Batch:
+    """Read what :func:`write_batch` wrote."""
+    content = json.loads((folder / "batch.json").read_text())
+    runs = pd.read_parquet(folder / "runs.parquet").set_index("run")
+    return Batch(content["batch"], content["manifest"], content["cell"], runs, content["plan"])

@@ -1,0 +1,59 @@
+"""How the check of a batch is shown in a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from metro.batch.check import CheckReport
+from metro.batch.findings import Finding
+
+if TYPE_CHECKING:
+    from rich.console import Group, RenderableType
+    from rich.table import Table
+
+COLOURS = {"error": "red", "warning": "yellow", "note": "cyan"}
+
+
+def render(report: CheckReport) -> Group:
+    """Return what a check says, to be printed by rich: what is there, what can be computed, what is wrong."""
+    from rich.console import Group
+
+    return Group(*_parts(report))
+
+
+def _parts(report: CheckReport) -> Iterator[RenderableType]:
+    """Yield the parts in their order; errors come last, where the eye is when the printing stops."""
+    from rich.padding import Padding
+    from rich.text import Text
+
+    yield Text(f"{report.folder}", style="bold")
+    yield Padding(Text("\n".join((*report.there, f"hold-out: {report.plan['how']}"))), (0, 0, 1, 2))
+    yield _can(report)
+    for severity in ("note", "warning", "error"):
+        for finding in (finding for finding in report.problems if finding.severity == severity):
+            yield Text.assemble((f"{severity:8}", COLOURS[severity]), str(finding))
+    yield Text(_verdict(report.problems), style="bold green" if report.ok else "bold red")
+
+
+def _can(report: CheckReport) -> Table:
+    """Return the table of what can be computed, from what, and what is missing."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(show_edge=False, pad_edge=False, header_style="bold")
+    for title in ("observable", "computed from", "missing"):
+        table.add_column(title, overflow="fold")
+    for can in report.capabilities:
+        source = Text(can.source, style="green") if can.source else Text("cannot be computed", style="yellow")
+        table.add_row(can.name, source, Text("\n".join(can.missing)))
+    return table
+
+
+def _verdict(problems: tuple[Finding, ...]) -> str:
+    """Count what was found, in words."""
+    counts = {severity: sum(finding.severity == severity for finding in problems) for severity in COLOURS}
+    words = [f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items() if count]
+    return f"\n{', '.join(words) or 'nothing to complain of'}: " + (
+        "the batch cannot be run until the errors are mended" if counts["error"] else "the batch can be run"
+    )

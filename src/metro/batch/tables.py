@@ -1,0 +1,223 @@
+"""The tables of a batch, CSV or Parquet: read with strict types, every fault with its row and column."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import date, datetime
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from metro.batch.columns import TABLES, Column
+from metro.batch.findings import Finding, Severity, shown, suggestion
+
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+BLANK_NUMBERS = {"nan", "na", "null", "none"}  # what other programs write for "does not apply"
+DECIMAL = "a decimal takes a point, not a comma"
+Row = tuple[int, dict[str, str]]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table as read.
+
+    Attributes
+    ----------
+    file : its name in messages; "" where there is none.
+    frame : all columns of the contract (NaN or "" where blank), one row per row of the file.
+    rows : the file's own row number of each.
+    faulty : positions of the rows with a cell that could not be read.
+    """
+
+    file: str
+    frame: pd.DataFrame
+    rows: tuple[int, ...] = ()
+    faulty: frozenset[int] = field(default=frozenset())
+
+    def finding(self, position: int, column: str, message: str, severity: Severity = "error") -> Finding:
+        """Return a finding about the cell in ``column`` of the row at ``position``."""
+        label = str(self.frame.iloc[position, 0])
+        return Finding(severity, self.file, message, self.rows[position], label, column)
+
+    def sound(self) -> Iterator[tuple[int, Mapping[str, Any]]]:
+        """Yield position and content of the rows whose cells could all be read."""
+        for position, row in enumerate(self.frame.to_dict("records")):
+            if position not in self.faulty:
+                yield position, {str(name): value for name, value in row.items()}
+
+
+def read_table(folder: Path, name: str, stem: str | None = None) -> tuple[Table, list[Finding]]:
+    """Read a table of the contract; without rows where the folder has no such file.
+
+    Parameters
+    ----------
+    folder : where the file is.
+    name : runs, impacts, loads, mass, published or stations.
+    stem : the file's name without suffix, where it is not ``name``.
+
+    Returns
+    -------
+    The table, and all that is wrong with it.
+    """
+    columns = TABLES[name]
+    there = [folder / f"{stem or name}{suffix}" for suffix in (".csv", ".parquet")]
+    there = [path for path in there if path.is_file()]
+    if not there:
+        return Table("", _frame([], columns)), []
+    file = there[0].name
+    if len(there) > 1:
+        return Table(file, _frame([], columns)), [
+            Finding("error", file, f"there is {there[1].name} too: keep one")
+        ]
+    header, rows, findings = _read_csv(there[0]) if there[0].suffix == ".csv" else _read_parquet(there[0])
+    findings += _header_findings(file, header, columns) if header else []
+    if any(finding.severity == "error" for finding in findings):
+        return Table(file, _frame([], columns)), findings
+    return _typed(file, rows, columns, findings)
+
+
+def _read_csv(path: Path) -> tuple[list[str], list[Row], list[Finding]]:
+    """Read header and rows of a CSV file as text, without blank lines and stray spaces."""
+    file, findings, rows = path.name, [], []
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as fault:
+        return (
+            [],
+            [],
+            [Finding("error", file, f"is not UTF-8 text (byte {fault.start + 1}): save it as UTF-8")],
+        )
+    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
+    header: list[str] = []
+    try:
+        for cells in ([cell.strip() for cell in line] for line in reader):
+            row = reader.line_num
+            if not any(cells):
+                continue
+            if not header:
+                header = cells
+                continue
+            extra = [cell for cell in cells[len(header) :] if cell]
+            if extra:
+                message = f"found {len(cells)} values, expected {len(header)} ({DECIMAL})"
+                findings.append(Finding("error", file, message, row, cells[0]))
+            elif len(cells) < len(header):
+                message = f"found {len(cells)} values, expected {len(header)}: the rest is taken as blank"
+                findings.append(Finding("warning", file, message, row, cells[0]))
+            rows.append((row, dict(zip(header, cells + [""] * len(header), strict=False))))
+    except csv.Error as fault:
+        findings.append(Finding("error", file, f"cannot be read as CSV: {fault}", reader.line_num))
+    if not header:
+        findings.append(Finding("error", file, "is empty, expected a header and rows"))
+    return header, rows, findings
+
+
+def _read_parquet(path: Path) -> tuple[list[str], list[Row], list[Finding]]:
+    """Read header and rows of a Parquet file as text; the first row is row 1."""
+    try:
+        frame = pd.read_parquet(path)
+    except (OSError, ValueError) as fault:
+        return [], [], [Finding("error", path.name, f"cannot be read as Parquet: {fault}")]
+    header = [str(name) for name in frame.columns]
+    cells = zip(*([_as_text(value) for value in frame[name]] for name in frame.columns), strict=True)
+    return header, [(row, dict(zip(header, values, strict=True))) for row, values in enumerate(cells, 1)], []
+
+
+def _as_text(value: Any) -> str:
+    """Write a value of a Parquet table as a CSV file would hold it, without loss."""
+    if value is None or value is pd.NA or value is pd.NaT or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float) and value.is_integer():
+        return str(int(value))
+    return value.isoformat() if isinstance(value, date | datetime) else str(value).strip()
+
+
+def _header_findings(file: str, header: list[str], columns: tuple[Column, ...]) -> Iterator[Finding]:
+    """Check the header: separators, columns that stand twice, are unknown, or are missing."""
+    known = [column.name for column in columns]
+    for mark, word in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and mark in header[0]:
+            message = f"its columns are separated by {word}, expected commas (and decimals with a point)"
+            yield Finding("error", file, message)
+            return
+    for name in dict.fromkeys(name for name in header if header.count(name) > 1 and name):
+        yield Finding("error", file, "stands twice", column=name)
+    for name in header:
+        if name and name not in known:
+            message = f"is not a known column and is not read{suggestion(name, known)}"
+            yield Finding("warning", file, message, column=name)
+    for column in columns:
+        if column.required and column.name not in header:
+            yield Finding("error", file, f"is missing, expected {column.expected}", column=column.name)
+
+
+def _typed(
+    file: str, rows: list[Row], columns: tuple[Column, ...], findings: list[Finding]
+) -> tuple[Table, list[Finding]]:
+    """Turn text into values, column by column; a cell that is not what it should be is left blank."""
+    values: list[dict[str, Any]] = []
+    faulty = set()
+    for position, (row, cells) in enumerate(rows):
+        values.append({})
+        for column in columns:
+            text = cells.get(column.name, "")
+            value, fault = _value(text, column)
+            values[-1][column.name] = value
+            if fault:
+                findings.append(
+                    Finding("error", file, fault, row, cells.get(columns[0].name, ""), column.name)
+                )
+                faulty.add(position)
+    if not rows:
+        findings.append(Finding("warning", file, "has a header but no rows"))
+    frame = _frame(values, columns)
+    return Table(file, frame, tuple(row for row, _ in rows), frozenset(faulty)), findings
+
+
+def _frame(values: list[dict[str, Any]], columns: tuple[Column, ...]) -> pd.DataFrame:
+    """Return the values as a table with the contract's columns and types."""
+    frame = pd.DataFrame(values, columns=[column.name for column in columns])
+    return frame.astype({column.name: float if column.numeric else str for column in columns})
+
+
+def _value(text: str, column: Column) -> tuple[Any, str | None]:
+    """Return a cell's value, blank where it has none, and what is wrong with it."""
+    blank: Any = math.nan if column.numeric else ""
+    if not text or (column.numeric and text.lower() in BLANK_NUMBERS):
+        return blank, f"is blank, expected {column.expected}" if column.required else None
+    value = _number(text) if column.numeric else text
+    if value is not None and _allowed(value, column):
+        return value, None
+    comma = NUMBER.fullmatch(text.replace(",", ".", 1)) if column.numeric and "," in text else None
+    hint = f" ({DECIMAL})" if comma else suggestion(text, column.choices)
+    return blank, f"found {shown(text)}, expected {column.expected}{hint}"
+
+
+def _number(text: str) -> float | None:
+    """Return a number as people and programs write it; None where the text is something else."""
+    value = float(text) if NUMBER.fullmatch(text) else math.inf
+    return value if math.isfinite(value) else None
+
+
+def _allowed(value: Any, column: Column) -> bool:
+    """Tell whether a value is one that the column may hold."""
+    if column.choices:
+        return value in column.choices
+    if column.numeric:
+        low = column.above is not None and value <= column.above
+        low = low or (column.at_least is not None and value < column.at_least)
+        return not low and (column.kind == "number" or float(value).is_integer())
+    if column.kind == "time":
+        try:
+            datetime.fromisoformat(value)
+        except ValueError:
+            return False
+    return not column.pattern or re.fullmatch(column.pattern, value) is not None

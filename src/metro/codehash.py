@@ -1,0 +1,156 @@
+"""Which code a stage runs, as one hash: changed code re-runs the stages that it belongs to and no others.
+
+Snakemake does not see that a function of an installed package was edited. So each rule has among its params
+the hash of its stage's code: SHA-256 over the syntax trees of the stage's module and of all that it imports
+inside the package. Comments, layout and docstrings are not in the tree that is hashed.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+
+ROOT = Path(__file__).parent
+PACKAGE = "metro"
+PLUGINS = "metro.effects"  # finds its modules by itself, so that no import statement names them
+
+
+class ChangedCodeError(RuntimeError):
+    """The code is not the one that the workflow was planned with."""
+
+
+def code_hash(stage: str) -> str:
+    """Return the hash of the code of ``metro.stages.<stage>`` and of all that it uses inside the package.
+
+    Parameters
+    ----------
+    stage : name of the stage's module.
+
+    Returns
+    -------
+    64 hexadecimal digits.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such stage.
+    """
+    start = f"{PACKAGE}.stages.{stage}"
+    if _file(start) is None:
+        raise FileNotFoundError(f"no stage {stage!r}: {PACKAGE}/stages/{stage}.py is not there")
+    modules = imported_modules(start)
+    parts = [f"{name} {_module(path).digest}" for name, path in sorted(modules.items())]
+    folders = sorted({path.parent for path in modules.values()})
+    parts += [f"{path.relative_to(ROOT)} {_sha256(path.read_bytes())}" for path in _data_files(folders)]
+    if PLUGINS in modules:
+        parts += _installed_plugins()
+    return _sha256("\n".join(parts).encode())
+
+
+def require_code(stage: str, planned: str) -> None:
+    """Refuse to run code that is not the one the workflow was planned with.
+
+    Raises
+    ------
+    ChangedCodeError
+        The stage's own hash differs from ``planned``.
+    """
+    if code_hash(stage) != planned:
+        raise ChangedCodeError("the code changed since the workflow was planned: call snakemake again")
+
+
+def imported_modules(start: str) -> dict[str, Path]:
+    """Return the modules of the package that ``start`` needs, itself included: dotted name → file.
+
+    Imports inside functions count. Importing a module counts the packages that hold it, and ``metro.effects``
+    is counted whole as soon as anything of it is imported.
+    """
+    found: dict[str, Path] = {}
+    waiting = [start]
+    while waiting:
+        name = waiting.pop()
+        path = _file(name)
+        if name in found or path is None:
+            continue
+        found[name] = path
+        waiting += [*_parents(name), *_imports(path, name)]
+        if name == PLUGINS:
+            waiting += [_dotted(module) for module in sorted(path.parent.rglob("*.py"))]
+    return found
+
+
+@dataclass(frozen=True)
+class _Module:
+    """A module's syntax, without its docstrings, as a hash; and what it imports, as written."""
+
+    digest: str
+    imports: tuple[ast.Import | ast.ImportFrom, ...]
+
+
+@cache
+def _module(path: Path) -> _Module:
+    tree = ast.parse(path.read_bytes(), filename=str(path))
+    nodes = list(ast.walk(tree))
+    imports = tuple(node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom))
+    for node in nodes:
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            del node.body[: int(ast.get_docstring(node, clean=False) is not None)]
+    return _Module(_sha256(ast.dump(tree).encode()), imports)
+
+
+def _imports(path: Path, name: str) -> Iterator[str]:
+    """Yield every dotted name that a module may be importing, modules and attributes alike."""
+    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    for node in _module(path).imports:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        else:
+            above = package[: len(package) + 1 - node.level] if node.level else []
+            source = ".".join([*above, *([node.module] if node.module else [])])
+            yield from (source, *(f"{source}.{alias.name}" for alias in node.names))
+
+
+def _parents(name: str) -> Iterator[str]:
+    while "." in name:
+        name = name.rpartition(".")[0]
+        yield name
+
+
+def _file(name: str) -> Path | None:
+    """Return the file of a dotted name; None where it names no module of the package but, say, a function."""
+    package, *rest = name.split(".")
+    if package != PACKAGE:
+        return None
+    base = ROOT.joinpath(*rest)
+    candidates = (base / "__init__.py", base.with_suffix(".py"))
+    return next((path for path in candidates if path.is_file()), None)
+
+
+def _dotted(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join([PACKAGE, *(parts[:-1] if parts[-1] == "__init__" else parts)])
+
+
+def _data_files(folders: list[Path]) -> Iterator[Path]:
+    """Yield the files of these packages that are not Python: schemas, templates."""
+    for folder in folders:
+        for path in sorted(folder.iterdir()):
+            if path.is_dir() and path.name != "__pycache__" and not (path / "__init__.py").exists():
+                yield from sorted(file for file in path.rglob("*") if file.is_file())
+            elif path.is_file() and path.suffix != ".py":
+                yield path
+
+
+def _installed_plugins() -> list[str]:
+    """Name the effects that other installed packages bring, by entry point and version."""
+    points = entry_points(group=PLUGINS)
+    return sorted(f"{point.name} {point.value} {point.dist and point.dist.version}" for point in points)
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,1 @@
+"""Engagement, chip thickness and force law: the mechanistic model of milling forces."""

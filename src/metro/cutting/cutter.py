@@ -1,0 +1,61 @@
+"""The rotating tool: teeth, helix, and how far its axis is from the axis of rotation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from metro.units import Array
+
+
+@dataclass(frozen=True)
+class Cutter:
+    """A cylindrical cutter (SI).
+
+    Attributes
+    ----------
+    radius : m.
+    helix : rad.
+    tooth_angles : angle of each tooth from tooth 0, clockwise, rad. Tooth j+1 cuts before tooth j.
+    runout_radius, runout_angle : offset of the tool's axis, m, and its direction from tooth 0, clockwise,
+    rad.
+    """
+
+    radius: float
+    helix: float
+    tooth_angles: tuple[float, ...]
+    runout_radius: float = 0.0
+    runout_angle: float = 0.0
+
+    @property
+    def teeth(self) -> int:
+        """Number of teeth."""
+        return len(self.tooth_angles)
+
+    @property
+    def lag_per_depth(self) -> float:
+        """Angle by which the edge lags per metre of height, rad/m: tan(helix)/radius."""
+        return math.tan(self.helix) / self.radius
+
+    def pitch(self, steps: int) -> Array:
+        """Angle from each tooth clockwise to the one ``steps`` on, (N,) rad: that tooth cut here before
+        it.
+        """
+        angles = np.asarray(self.tooth_angles)
+        turns, _ = np.divmod(np.arange(self.teeth) + steps, self.teeth)
+        ahead = np.roll(angles, -(steps % self.teeth))
+        return ahead + 2.0 * math.pi * turns - angles
+
+    def radius_deviation(self, height: Array) -> Array:
+        """Distance of each tooth from the axis of rotation less the radius, (N, heights) m (physics.md
+        §2).
+        """
+        angles = np.asarray(self.tooth_angles)[:, None]
+        return self.runout_radius * np.cos(self.runout_angle - angles + self.lag_per_depth * height[None, :])
+
+
+def evenly_pitched(teeth: int) -> tuple[float, ...]:
+    """Tooth angles of a cutter with equal pitch, rad."""
+    return tuple(2.0 * math.pi * j / teeth for j in range(teeth))

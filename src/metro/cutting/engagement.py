@@ -1,0 +1,44 @@
+"""Where around the cutter the teeth are in the work: entry and exit immersion angles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Engagement:
+    """Immersion from ``entry`` to ``exit``, rad, clockwise from +y of the feed frame (towards the feed
+    +x).
+    """
+
+    entry: float
+    exit: float
+
+
+def engagement(operation: str, direction: str, radial_depth: float, radius: float) -> Engagement:
+    """Return the immersion interval of a cut (physics.md §1).
+
+    Parameters
+    ----------
+    operation : ``slot``, ``side``, ``face`` or ``helical`` (from the solid: the front half of the cutter).
+    direction : ``up``, ``down`` or ``slot``; a face cut narrower than the cutter in direction ``slot`` is
+    symmetric.
+    radial_depth, radius : m.
+
+    Raises
+    ------
+    ValueError
+        If the radial depth is not within the cutter's diameter.
+    """
+    if operation in ("slot", "helical"):
+        return Engagement(0.0, math.pi)
+    if not 0.0 < radial_depth <= 2.0 * radius * (1.0 + 1e-9):
+        raise ValueError(f"radial depth {radial_depth} m is not within the diameter {2 * radius} m")
+    swept = math.acos(max(-1.0, 1.0 - radial_depth / radius))
+    if direction == "up":
+        return Engagement(0.0, swept)
+    if direction == "down":
+        return Engagement(math.pi - swept, math.pi)
+    half = math.asin(min(1.0, radial_depth / (2.0 * radius)))
+    return Engagement(math.pi / 2.0 - half, math.pi / 2.0 + half)

@@ -1,0 +1,1 @@
+"""Frequency responses, modes and stability lobes."""

@@ -1,0 +1,192 @@
+"""The regenerative cut as an integral equation over the cutting arc, collocated at Gauss points.
+
+With the modes' impulse response ``g``, the tooth period ``T`` and a Floquet multiplier ``mu``, the
+displacement along the chip thickness obeys
+
+    h(t) = w * integral over the arc of u(t)·[g(t - s) 1(s < t) + sum_p R_p c_p exp(p (t - s))] v(s) h(s) ds,
+
+``c_p = exp(p T) / (mu - exp(p T))`` and ``w = a (1 - 1/mu)`` for an axial depth ``a``: free flight and every
+mode are exact, and the unknown lives on the arc alone, however many modes there are. Teeth that cut at the
+same time are folded onto one tooth period. In matrices: ``1/w`` is an eigenvalue of ``volterra + states @
+diag(c) @ drive``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from metro.dynamics.system import Cut, Structure, chip_direction
+from metro.units import Array, ComplexArray
+
+
+@dataclass(frozen=True)
+class Arc:
+    """Collocation points of the cutting arc within one tooth period; all in fractions of that period.
+
+    Attributes
+    ----------
+    time : (n,) places of the points; a point occurs once per channel (see ``chip``).
+    weight : (n,) Gauss weights.
+    chip : (n, 2) direction in which the unknown is measured: the chip thickness where one tooth cuts, the
+        displacements in x and in y (two channels) where several do.
+    force : (n, 2) force on the tool per depth and unit of the unknown, N/m².
+    panels : slices of points in which everything is smooth, one per panel and channel, and the panel's
+        (start, length).
+    """
+
+    time: Array
+    weight: Array
+    chip: Array
+    force: Array
+    panels: tuple[tuple[slice, int, float, float], ...]
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """The discretised equation at k speeds, for p poles (both of each conjugate pair) and n points.
+
+    Attributes
+    ----------
+    period : (k,) tooth period, s.
+    volterra : (k, n, n) response to what was cut since the period began.
+    states : (k, n, p) the points' displacement per modal state at the period's begin.
+    drive : (k, p, n) modal state, carried back to the period's begin, per unit of the unknown and of depth.
+    decay : (k, p) exp(pole * period).
+    """
+
+    period: Array
+    volterra: Array
+    states: ComplexArray
+    drive: ComplexArray
+    decay: ComplexArray
+
+
+def panels_of(cut: Cut) -> list[tuple[float, float, int]]:
+    """Panels (start, end, teeth cutting) of a tooth period, in fractions of it."""
+    arc = (cut.exit - cut.entry) / cut.pitch
+    whole = math.floor(arc + 1e-9)
+    rest = max(arc - whole, 0.0)
+    panels = [(0.0, rest, whole + 1), (rest, 1.0, whole)] if rest > 1e-9 else [(0.0, 1.0, whole)]
+    return [panel for panel in panels if panel[2] > 0]
+
+
+def collocate(structure: Structure, cut: Cut, points: tuple[int, ...]) -> Arc:
+    """Place ``points[i]`` Gauss points in panel i of the tooth period and evaluate the cut there."""
+    flexible = [axis for axis in (0, 1) if np.any(structure.axis == axis)]
+    time, weight, chip, force, panels = [], [], [], [], []
+    first = 0
+    for (start, end, teeth), n in zip(panels_of(cut), points, strict=True):
+        x, w = gauss(n)
+        tau = start + (end - start) * x
+        phi = cut.entry + cut.pitch * (tau[:, None] + np.arange(teeth))
+        directions, forces = chip_direction(phi), cut.force_direction(phi)
+        if teeth == 1:
+            channels = [(directions[:, 0], forces[:, 0])]
+        else:
+            total = np.einsum("nji,njk->nki", forces, directions)  # (n, chip axis, force axis)
+            channels = [(np.tile(np.eye(2)[axis], (n, 1)), total[:, axis]) for axis in flexible]
+        for unit, density in channels:
+            time.append(tau)
+            weight.append((end - start) * w)
+            chip.append(unit)
+            force.append(density)
+            panels.append((slice(first, first + n), n, start, end - start))
+            first += n
+    joined = [np.concatenate(part) for part in (time, weight, chip, force)]
+    return Arc(joined[0], joined[1], joined[2], joined[3], tuple(panels))
+
+
+def kernel(structure: Structure, arc: Arc, period: Array) -> Kernel:
+    """Assemble the equation at tooth periods ``period`` (k,), s."""
+    responses = np.zeros((2, len(period), len(arc.time), len(arc.time)))
+    for axis in (0, 1):
+        if np.any(structure.axis == axis):
+            responses[axis] = _volterra(structure, axis, arc, period)
+    volterra = np.einsum("ia,akij,ja->kij", arc.chip, responses, arc.force, optimize=True)
+    poles = np.concatenate([structure.poles, structure.poles.conj()])
+    residues = np.concatenate([structure.residues, structure.residues.conj()])
+    direction = np.concatenate([structure.axis, structure.axis])
+    growth = np.exp(period[:, None, None] * arc.time[:, None] * poles)
+    states = arc.chip[:, direction] * growth
+    drive = (
+        residues * arc.force[:, direction] * arc.weight[:, None] * period[:, None, None] / growth
+    ).transpose(0, 2, 1)
+    return Kernel(period, volterra, states, drive, np.exp(period[:, None] * poles))
+
+
+def _volterra(structure: Structure, axis: int, arc: Arc, period: Array) -> Array:
+    """(k, n, n) displacement along ``axis`` per unit force along it, from forces since the period began."""
+    result = np.zeros((len(period), len(arc.time), len(arc.time)))
+    for row, n, start, length in arc.panels:
+        nodes, inner = gauss(n)[0], gauss(n)[0]
+        lag = length * nodes[:, None] * (1.0 - inner)
+        own = _impulse_response(structure, axis, period[:, None, None] * lag)
+        same = np.einsum("kiq,iqj->kij", own, _product_weights(n), optimize=True)
+        same *= length * period[:, None, None]
+        for column, _, other, _ in arc.panels:
+            if other == start:
+                result[:, row, column] = same
+            elif other < start:
+                lag = arc.time[row, None] - arc.time[column]
+                response = _impulse_response(structure, axis, period[:, None, None] * lag)
+                result[:, row, column] = response * arc.weight[column] * period[:, None, None]
+    return result
+
+
+def _impulse_response(structure: Structure, axis: int, time: Array) -> Array:
+    """Displacement (m) along ``axis`` a ``time`` (s, ≥ 0) after a unit impulse along it."""
+    total = np.zeros(time.shape)
+    for mode in np.flatnonzero(structure.axis == axis):
+        pole, residue = structure.poles[mode], structure.residues[mode]
+        # 1 / (2i m omega_d) is imaginary: the pair adds up to a damped sine
+        total += 2.0 * abs(residue) * np.exp(pole.real * time) * np.sin(pole.imag * time)
+    return total
+
+
+@lru_cache(maxsize=256)
+def gauss(n: int) -> tuple[Array, Array]:
+    """Gauss–Legendre points and weights on (0, 1)."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    return 0.5 * (x + 1.0), 0.5 * w
+
+
+@lru_cache(maxsize=64)
+def _product_weights(n: int) -> Array:
+    """Weights (n, n, n) of the integral of f(x_i - s) p(s) over s from 0 to x_i.
+
+    It is sum_qj f(x_i (1 - x_q)) weights_iqj p(x_j).
+
+    Exact for a polynomial p of degree n - 1 through the points, with f p integrated by Gauss' rule on (0,
+    x_i).
+    """
+    x, w = gauss(n)
+    degree = np.arange(n)
+    at_points = np.polynomial.legendre.legvander(2.0 * x - 1.0, n - 1)
+    to_coefficients = (2.0 * degree[:, None] + 1.0) * at_points.T * w
+    inner = np.polynomial.legendre.legvander(2.0 * x[:, None] * x - 1.0, n - 1)
+    weights: Array = (x[:, None] * w)[:, :, None] * (inner @ to_coefficients)
+    return weights
+
+
+def spectral_radius(equation: Kernel, depth: Array) -> Array:
+    """(k,) largest modulus of the Floquet multipliers at axial depths (k,) in metres.
+
+    The period map acts on the modal states at the period's begin and the displacements of the period before.
+    """
+    n, p = equation.states.shape[1:]
+    depth = depth[:, None, None]
+    solve = np.linalg.inv(np.eye(n) - depth * equation.volterra)
+    from_states = solve @ equation.states
+    from_before = np.eye(n) - solve  # equals -solve @ (depth * volterra)
+    top = np.concatenate([from_states, from_before], axis=2)
+    change = top.copy()
+    change[:, :, p:] -= np.eye(n)
+    moved = depth * equation.drive @ change
+    moved[:, :, :p] += np.eye(p)
+    period_map = np.concatenate([equation.decay[:, :, None] * moved, top], axis=1)
+    radius: Array = np.abs(np.linalg.eigvals(period_map)).max(axis=1)
+    return radius

@@ -1,0 +1,111 @@
+"""What the stability of milling depends on: a structure of modes at the tool tip, and a cut.
+
+Feed frame: x feed, z from tip to spindle, y = z × x, immersion from +y clockwise towards +x.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from metro.units import Array, ComplexArray
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Modes of the tool tip against the work, each in one direction of the feed frame.
+
+    Attributes
+    ----------
+    axis : (m,) 0 for a mode in x, 1 for a mode in y.
+    omega : (m,) undamped angular frequencies, rad/s.
+    zeta : (m,) damping ratios, 0 < zeta < 1.
+    stiffness : (m,) modal stiffnesses for unit displacement of the tip, N/m.
+
+    A direction without modes is rigid.
+    """
+
+    axis: np.ndarray
+    omega: Array
+    zeta: Array
+    stiffness: Array
+
+    @property
+    def poles(self) -> ComplexArray:
+        """(m,) poles with positive imaginary part, rad/s."""
+        return self.omega * (-self.zeta + 1j * np.sqrt(1.0 - self.zeta**2))
+
+    @property
+    def residues(self) -> ComplexArray:
+        """(m,) residues of the receptance at :attr:`poles`: 1 / (2 i m omega_d), m/(N s)."""
+        return self.omega**2 / (2j * self.stiffness * self.poles.imag)
+
+    def receptance(self, omega: Array) -> ComplexArray:
+        """Receptance of x and y at angular frequencies of shape (...): (..., 2), m/N."""
+        ratio = np.asarray(omega)[..., None] / self.omega
+        modal = 1.0 / (self.stiffness * (1.0 - ratio**2 + 2j * self.zeta * ratio))
+        return np.stack([modal[..., self.axis == a].sum(axis=-1) for a in (0, 1)], axis=-1)
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Engagement and cutting coefficients.
+
+    Attributes
+    ----------
+    teeth : number of equally spaced teeth.
+    entry, exit : immersion angles between which a tooth cuts, rad.
+    ktc, krc : tangential and radial cutting coefficients, N/m².
+    """
+
+    teeth: int
+    entry: float
+    exit: float
+    ktc: float
+    krc: float
+
+    @property
+    def pitch(self) -> float:
+        """Angle between teeth, rad."""
+        return 2.0 * math.pi / self.teeth
+
+    def tooth_period(self, rpm: Array) -> Array:
+        """Tooth period in seconds at spindle speeds in rev/min."""
+        return 60.0 / (self.teeth * np.asarray(rpm, dtype=float))
+
+    def force_direction(self, phi: Array) -> Array:
+        """(..., 2) force on the tool per chip area times thickness, N/m²: ``F = a * force_direction * h``."""
+        s, c = np.sin(phi), np.cos(phi)
+        return np.stack([-(self.ktc * c + self.krc * s), self.ktc * s - self.krc * c], axis=-1)
+
+
+def chip_direction(phi: Array) -> Array:
+    """(..., 2) direction along which a displacement of the tool thickens the chip."""
+    return np.stack([np.sin(phi), np.cos(phi)], axis=-1)
+
+
+def immersion(direction: str, radial_depth: float, diameter: float) -> tuple[float, float]:
+    """Entry and exit angles (rad) of a tooth.
+
+    Parameters
+    ----------
+    direction : up, down (climb) or slot.
+    radial_depth, diameter : same unit; a full radial depth is a slot.
+
+    Raises
+    ------
+    ValueError
+        When the radial depth is not in (0, diameter], or the direction is none of these.
+    """
+    if direction == "slot":
+        return 0.0, math.pi
+    if not 0.0 < radial_depth <= diameter:
+        raise ValueError(
+            f"radial depth {radial_depth:g}: expected more than 0 and at most the diameter {diameter:g}"
+        )
+    if direction not in ("up", "down"):
+        raise ValueError(f"direction {direction!r}: expected up, down or slot")
+    swept = math.acos(1.0 - 2.0 * radial_depth / diameter)
+    return (0.0, swept) if direction == "up" else (math.pi - swept, math.pi)

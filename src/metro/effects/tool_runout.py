@@ -1,0 +1,43 @@
+"""Runout: the tool's axis is not the axis of rotation, so the teeth cut chips of different thickness."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from metro.effects.effect import Effect, EffectParameter
+from metro.units import DEG, UM
+
+
+def apply(model: Any, values: Mapping[str, float]) -> Any:
+    """Put the cutter of a force model off its axis by ``radius_um`` in the direction ``angle_deg`` from tooth
+    0.
+    """
+    radius, angle = values["radius_um"] * UM, values["angle_deg"] * DEG
+    return replace(model, cutter=replace(model.cutter, runout_radius=radius, runout_angle=angle))
+
+
+EFFECT = Effect(
+    name="tool_runout",
+    observables=("force",),
+    parameters=(
+        EffectParameter("radius_um", "um", 0.0, 200.0, 5.0, starts=(4.0, 20.0), plausible=20.0),
+        EffectParameter(
+            "angle_deg",
+            "deg",
+            0.0,
+            360.0,
+            30.0,
+            starts=tuple(15.0 + 30.0 * i for i in range(12)),
+            period=360.0,
+        ),
+    ),
+    apply=apply,
+    signature=(
+        "Force at spindle orders that are no multiple of the number of teeth; the first order does not depend on the feed, and "
+        "the mean stays while every tooth cuts. A chipped tooth or unequal pitch look alike, but grow with the feed."
+    ),
+    literature="Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983) 123; physics.md §2 for teeth that clear several cuts",
+    experiment="runs at two feeds that differ by a factor of two or more, at a sampling rate above ten tooth passings",
+)

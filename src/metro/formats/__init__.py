@@ -1,0 +1,5 @@
+"""One reader per file format, each giving a table with the contract's columns."""
+
+from metro.formats.errors import FormatError
+
+__all__ = ["FormatError"]

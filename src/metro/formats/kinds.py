@@ -1,0 +1,151 @@
+"""What a data file may hold: the columns of each kind of table, and the checks that each must pass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from metro.formats.errors import FormatError
+
+JOINTS = range(1, 7)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of table of the data contract.
+
+    Attributes
+    ----------
+    title : what to call such a file in a message.
+    required, optional : column names, units in the names.
+    rising : the column that grows strictly from row to row, or "".
+    whole : columns that hold whole numbers.
+    least : the smallest number of rows.
+    """
+
+    title: str
+    required: tuple[str, ...]
+    optional: tuple[str, ...] = ()
+    rising: str = ""
+    whole: tuple[str, ...] = ()
+    least: int = 8
+
+
+KINDS: dict[str, Kind] = {
+    "force": Kind("a force record", ("t_s", "fx_n", "fy_n", "fz_n"), ("spindle_deg",), rising="t_s"),
+    "robot": Kind(
+        "a robot log",
+        (
+            "t_s",
+            *(f"q{i}_set_deg" for i in JOINTS),
+            *(f"q{i}_deg" for i in JOINTS),
+            *(f"tau{i}_nm" for i in JOINTS),
+        ),
+        rising="t_s",
+    ),
+    "path": Kind("a path", ("point", "pass", "x_mm", "y_mm", "z_mm"), whole=("point", "pass"), least=1),
+    "profile": Kind("a profile", ("x_mm", "z_mm")),
+    "cloud": Kind("a point cloud", ("x_mm", "y_mm", "z_mm"), least=3),
+    "record": Kind("a hammer record", ("t_s", "force_n", "response"), rising="t_s"),
+    "frf": Kind("an FRF", ("frequency_hz", "real", "imag"), ("coherence",), rising="frequency_hz"),
+}
+
+
+@dataclass(frozen=True)
+class Raw:
+    """What a reader found: numeric columns by contract name, and what the place of a row is called."""
+
+    frame: pd.DataFrame
+    place: Callable[[int], str]
+
+
+def columns_to_read(path: Path, kind: Kind, names: Sequence[str]) -> list[str]:
+    """Pick the kind's columns out of those a file has (lower case, stripped); the rest is ignored.
+
+    Raises
+    ------
+    FormatError
+        Where a required column is missing or a wanted one stands there twice.
+    """
+    missing = [name for name in kind.required if name not in names]
+    if missing:
+        found = ", ".join(name for name in names if name) or "none"
+        message = f"lacks the column {', '.join(missing)} of {kind.title}: found the columns {found}"
+        raise FormatError(path, f"{message}, expected {', '.join(kind.required)}")
+    wanted = [name for name in (*kind.required, *kind.optional) if name in names]
+    for name in wanted:
+        if list(names).count(name) > 1:
+            raise FormatError(path, f"column {name}: found {list(names).count(name)} times, expected once")
+    return wanted
+
+
+def checked(path: Path, kind: Kind, raw: Raw, least: int) -> pd.DataFrame:
+    """Check a table and return it as the contract has it.
+
+    A cloud's rows without coordinates are dropped, their number is in ``attrs["dropped"]``. Everywhere else a
+    value that is not finite is an error, but for the 0 Hz line of an FRF, where integration divides by zero.
+
+    Raises
+    ------
+    FormatError
+        With the place of the first offending row, or where fewer than ``least`` rows are left.
+    """
+    frame = raw.frame
+    blank = [name for name in kind.optional if name in frame and frame[name].isna().all()]
+    frame = frame.drop(columns=blank)
+    if kind.title == KINDS["cloud"].title:
+        frame = _without_missing(frame)
+    else:
+        _check_finite(path, frame, raw.place)
+    if len(frame) < least:
+        raise FormatError(path, f"found {len(frame)} rows, expected at least {least} in {kind.title}")
+    if kind.rising:
+        _check_rising(path, frame, kind.rising, raw.place)
+    for name in kind.whole:
+        _check_whole(path, frame, name, raw.place)
+    return frame.astype(dict.fromkeys(kind.whole, np.int64)) if kind.whole else frame
+
+
+def _without_missing(frame: pd.DataFrame) -> pd.DataFrame:
+    finite = np.ones(len(frame), dtype=bool)
+    for name in frame:
+        finite &= np.isfinite(frame[name].to_numpy())
+    dropped = int(len(frame) - np.count_nonzero(finite))
+    kept = frame[finite].reset_index(drop=True) if dropped else frame
+    kept.attrs["dropped"] = dropped
+    return kept
+
+
+def _check_finite(path: Path, frame: pd.DataFrame, place: Callable[[int], str]) -> None:
+    for name in frame:
+        wrong = ~np.isfinite(frame[name].to_numpy())
+        if "frequency_hz" in frame and name != "frequency_hz":
+            wrong &= frame["frequency_hz"].to_numpy() != 0.0
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            value = frame[name].iloc[row]
+            found = "nothing or NaN" if np.isnan(value) else f"{value}"
+            raise FormatError(path, f"{place(row)}, column {name}: found {found}, expected a finite number")
+
+
+def _check_rising(path: Path, frame: pd.DataFrame, name: str, place: Callable[[int], str]) -> None:
+    values = frame[name].to_numpy()
+    falls = np.diff(values) <= 0.0
+    if falls.any():
+        row = int(np.argmax(falls)) + 1
+        found = f"found {values[row]:.9g} after {values[row - 1]:.9g}"
+        raise FormatError(path, f"{place(row)}, column {name}: {found}, expected a larger value in every row")
+
+
+def _check_whole(path: Path, frame: pd.DataFrame, name: str, place: Callable[[int], str]) -> None:
+    values = frame[name].to_numpy()
+    broken = values != np.round(values)
+    if broken.any():
+        row = int(np.argmax(broken))
+        raise FormatError(
+            path, f"{place(row)}, column {name}: found {values[row]:g}, expected a whole number"
+        )

@@ -1,0 +1,103 @@
+"""Point clouds in PLY: ascii and binary of either byte order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from metro.formats.cloud import points
+from metro.formats.errors import FormatError
+from metro.formats.kinds import Kind, Raw
+from metro.formats.text import SPACES, Layout, numbers
+
+_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
+    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
+_LONGEST_HEADER = 1000
+
+
+@dataclass(frozen=True)
+class Header:
+    """Encoding, number of vertices, their properties (name, NumPy type), and the header's length."""
+
+    encoding: str
+    vertices: int
+    properties: tuple[tuple[str, str], ...]
+    lines: int
+    size: int
+
+
+def read_ply(path: Path, kind: Kind, rows: int | None) -> Raw:
+    """Read the coordinates of the vertices; other properties and other elements are ignored.
+
+    Raises
+    ------
+    FormatError
+        Where the header is not one of a PLY file, the vertices do not come first, have no x, y, z or hold a
+        list, or where the file ends before its last vertex.
+    """
+    header = read_header(path)
+    names = [name for name, _ in header.properties]
+    count = header.vertices if rows is None else min(rows, header.vertices)
+    if header.encoding == "ascii":
+        layout = Layout(tuple(names), SPACES, header.lines)
+        raw = points(path, kind, names, lambda use: numbers(path, layout, use, count))
+        found = len(raw.frame)
+    else:
+        order = _BYTE_ORDERS[header.encoding]
+        record = np.dtype([(name, order + code) for name, code in header.properties])
+        found = min((path.stat().st_size - header.size) // record.itemsize, count)
+        # a map of the file, so that a large cloud is in memory once and not twice
+        vertices = np.memmap(path, record, "r", header.size, (found,)) if found else np.empty(0, record)
+        raw = points(path, kind, names, lambda use: {name: vertices[name] for name in use})
+    if found < count:
+        raise FormatError(path, f"ends early: found {found} vertices, expected {header.vertices}")
+    return raw
+
+
+def read_header(path: Path) -> Header:
+    """Read the header of a PLY file up to ``end_header``."""
+    encoding, elements, properties = "", [], []
+    with path.open("rb") as stream:
+        for number in range(1, _LONGEST_HEADER):
+            words = stream.readline(4096).decode("ascii", errors="replace").split()
+            match words:
+                case ["format", name, "1.0"]:
+                    encoding = name
+                case ["element", name, count] if count.isdigit():
+                    elements.append((name, int(count)))
+                case ["property", *rest] if len(elements) == 1:
+                    properties.append(_property(path, number, rest))
+                case ["end_header"]:
+                    break
+                case ["ply"] | ["comment", *_] | ["obj_info", *_] | ["property", *_]:
+                    pass
+                case _:
+                    found = " ".join(words)[:60]
+                    raise FormatError(path, f"line {number}: found {found!r} in the header of a PLY file")
+        size = stream.tell()
+    if encoding != "ascii" and encoding not in _BYTE_ORDERS:
+        expected = ", ".join(("ascii", *_BYTE_ORDERS))
+        raise FormatError(path, f"found the PLY format {encoding!r}, expected {expected} 1.0")
+    if not elements or elements[0][0] != "vertex":
+        found = elements[0][0] if elements else "none"
+        raise FormatError(path, f"first element: found {found}, expected vertex before any other")
+    names = [name for name, _ in properties]
+    if not names or len(set(names)) < len(names):
+        raise FormatError(path, f"found the vertex properties {names}, expected each once")
+    return Header(encoding, elements[0][1], tuple(properties), number, size)
+
+
+def _property(path: Path, number: int, words: list[str]) -> tuple[str, str]:
+    match words:
+        case [code, name] if code in _TYPES:
+            return name, _TYPES[code]
+    found = " ".join(words)
+    raise FormatError(
+        path, f"line {number}: found the vertex property {found!r}, expected a number type and a name"
+    )

@@ -1,0 +1,121 @@
+"""The readers by content and suffix: what a file is, and which function reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from metro.formats.dynoware import read_dynoware
+from metro.formats.errors import FormatError
+from metro.formats.kinds import KINDS, Kind, Raw, checked
+from metro.formats.pcd import read_pcd
+from metro.formats.ply import read_ply
+from metro.formats.signals import read_csv, read_npz, read_parquet
+from metro.formats.xyz import read_xyz
+
+_HEAD = 512
+_FIRST_ROWS = 32
+_TABLES = tuple(KINDS)
+_ANY: tuple[bytes, ...] = (b"",)
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file format.
+
+    Attributes
+    ----------
+    title : its name in messages.
+    suffixes : the suffixes of its files.
+    starts : what the content starts with; plain text starts with anything.
+    kinds : the kinds of table it can hold.
+    read : ``(path, kind, rows) -> Raw``; reads all rows where ``rows`` is None.
+    """
+
+    title: str
+    suffixes: tuple[str, ...]
+    starts: tuple[bytes, ...]
+    kinds: tuple[str, ...]
+    read: Callable[[Path, Kind, int | None], Raw]
+
+
+# Content is asked first, in this order; plain text comes last because it has no mark of its own.
+FORMATS = (
+    Format("Parquet", (".parquet", ".pq"), (b"PAR1",), _TABLES, read_parquet),
+    Format("NumPy archive", (".npz",), (b"PK\x03\x04",), ("frf",), read_npz),
+    Format("PLY", (".ply",), (b"ply\n", b"ply\r"), ("cloud",), read_ply),
+    Format("PCD", (".pcd",), (b"# .PCD", b"#.PCD", b"VERSION"), ("cloud",), read_pcd),
+    Format("DynoWare text export", (".txt", ".csv"), (b"DynoWare",), ("force",), read_dynoware),
+    Format("point list", (".xyz", ".txt", ".asc", ".csv"), _ANY, ("cloud",), read_xyz),
+    Format("CSV", (".csv", ".txt"), _ANY, tuple(kind for kind in _TABLES if kind != "cloud"), read_csv),
+)
+
+# Formats of the contract that have no reader, with what to export instead.
+UNREAD = {
+    ".tdms": "CSV or Parquet",
+    ".mat": "CSV, Parquet or (for an FRF) npz",
+    ".xml": "CSV or Parquet",
+    ".uff": "npz or a table frequency_hz, real, imag",
+    ".unv": "npz or a table frequency_hz, real, imag",
+    ".pts": "PLY, PCD or XYZ",
+    ".e57": "PLY, PCD or XYZ",
+    ".stl": "PLY, PCD or XYZ",
+    ".x3p": "CSV or Parquet",
+}
+
+
+def read(path: Path, kind: str) -> pd.DataFrame:
+    """Read a data file.
+
+    Parameters
+    ----------
+    kind : ``force``, ``robot``, ``path``, ``profile``, ``cloud``, ``record`` or ``frf``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The columns of :data:`metro.formats.kinds.KINDS`, float64 (whole numbers int64), checked.
+
+    Raises
+    ------
+    FormatError
+        Naming file, place, column, what was found and what was expected.
+    """
+    return checked(path, KINDS[kind], _format_of(path, kind).read(path, KINDS[kind], None), KINDS[kind].least)
+
+
+def sniff(path: Path, kind: str) -> None:
+    """Check header and first rows of a data file, quickly; raises FormatError as :func:`read` would."""
+    checked(path, KINDS[kind], _format_of(path, kind).read(path, KINDS[kind], _FIRST_ROWS), 1)
+
+
+def _format_of(path: Path, kind: str) -> Format:
+    """Find the format by content, then by suffix; a file named as one and holding another is an error."""
+    suffix = path.suffix.lower()
+    if suffix in UNREAD:
+        raise FormatError(path, f"{suffix} files are not read yet; export it as {UNREAD[suffix]}")
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(_HEAD).removeprefix(b"\xef\xbb\xbf").lstrip()
+    except OSError as error:
+        raise FormatError(path, f"cannot be opened: {error.strerror}") from error
+    title = KINDS[kind].title
+    if not head:
+        raise FormatError(path, f"is empty, expected {title}")
+    known = [each for each in FORMATS if each.starts != _ANY and head.startswith(each.starts)]
+    named = [each for each in FORMATS if suffix in each.suffixes and each.starts == _ANY]
+    for each in known or named:
+        if kind in each.kinds:
+            return each
+    if known or named:
+        raise FormatError(path, f"found a {(known or named)[0].title} file, expected {title}")
+    marked = [each.title for each in FORMATS if suffix in each.suffixes]
+    if marked:
+        raise FormatError(
+            path, f"is named {suffix} but does not start as a {marked[0]} file, expected {title}"
+        )
+    suffixes = sorted({s for each in FORMATS if kind in each.kinds for s in each.suffixes})
+    raise FormatError(path, f"found the suffix {suffix!r}, expected one of {', '.join(suffixes)} for {title}")

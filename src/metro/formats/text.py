@@ -1,0 +1,148 @@
+"""Columns of numbers in a text file: the one parser behind every text format."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from metro.formats.errors import FormatError
+from metro.formats.kinds import Raw
+
+SPACES = r"\s+"
+DECIMAL_COMMA = "numbers need a decimal point: export again with '.' as decimal sign"
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+def lines(path: Path, skip: int = 0) -> Iterator[tuple[int, str]]:
+    """Yield the lines after the first ``skip`` that hold something, stripped, with their number from 1.
+
+    Blank lines and lines that start with ``#`` hold nothing. Text is UTF-8, with or without byte order mark;
+    what is not UTF-8 (a degree sign of another code page) is replaced, since no number is written with it.
+    """
+    with path.open("rb") as stream:
+        if stream.read(2) in _UTF16:
+            raise FormatError(path, "found text in UTF-16, expected UTF-8: save it again as UTF-8 or ASCII")
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+        for number, line in enumerate(stream, start=1):
+            text = line.strip("\r\n ")
+            if number > skip and text and not text.startswith("#"):
+                yield number, text
+
+
+def separator(path: Path, number: int, header: str) -> str:
+    """Tell what parts the columns of a header line: commas or tabs; semicolons are refused."""
+    if ";" in header:
+        message = f"line {number}: found columns parted by semicolons, expected commas; {DECIMAL_COMMA}"
+        raise FormatError(path, f"{message} and ',' between columns")
+    return "\t" if "\t" in header and "," not in header else ","
+
+
+def fields(text: str, parted_by: str) -> list[str]:
+    """Split a line into its fields, stripped, quotes taken off."""
+    if parted_by == SPACES:
+        return text.split()
+    return [field.strip() for field in next(csv.reader([text], delimiter=parted_by, skipinitialspace=True))]
+
+
+def is_number(text: str) -> bool:
+    """Tell whether a field is a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text file holds its columns.
+
+    Attributes
+    ----------
+    names : the file's columns in order.
+    parted_by : what stands between columns: a character, or ``SPACES``.
+    skip : how many lines of the file, comments included, come before the first row.
+    """
+
+    names: tuple[str, ...]
+    parted_by: str
+    skip: int
+
+
+def numbers(path: Path, layout: Layout, use: Sequence[str], rows: int | None) -> Raw:
+    """Read the columns ``use`` of a text file as floats, and no more than so many rows; None reads all.
+
+    The other columns may hold anything.
+
+    Raises
+    ------
+    FormatError
+        With line and column where a field is not a number, or a line has more fields than the header.
+    """
+
+    def place(row: int) -> str:
+        number, _ = next(islice(lines(path, layout.skip), row, None))
+        return f"line {number}"
+
+    try:
+        return Raw(_parse(path, layout, use, rows, np.float64), place)
+    except pd.errors.ParserError as error:
+        raise FormatError(path, _ragged(str(error))) from error
+    except ValueError as error:
+        row, column, found = _not_a_number(_parse(path, layout, use, rows, str))
+        hint = f"; {DECIMAL_COMMA}" if re.match(r"[-+]?\d+,\d", found) else ""
+        message = f"{place(row)}, column {column}: found {found!r}, expected a number{hint}"
+        raise FormatError(path, message) from error
+
+
+def _parse(path: Path, layout: Layout, use: Sequence[str], rows: int | None, dtype: type) -> pd.DataFrame:
+    frame = pd.read_csv(
+        path,
+        sep=layout.parted_by,
+        header=None,
+        names=_labels(path, layout, use),
+        index_col=False,
+        dtype=dict.fromkeys(use, dtype),
+        skiprows=layout.skip,
+        nrows=rows,
+        comment="#",
+        skipinitialspace=True,
+        low_memory=False,
+        encoding="utf-8-sig",
+        encoding_errors="replace",
+    )
+    return frame[list(use)]
+
+
+def _labels(path: Path, layout: Layout, use: Sequence[str]) -> list[str]:
+    """Give every field of the first row a unique label; a row of more fields than names is an error."""
+    number, first = next(lines(path, layout.skip), (0, ""))
+    names = layout.names
+    spare = fields(first.split("#")[0], layout.parted_by)[len(names) :] if first else []
+    if any(spare):
+        found = f"found {len(names) + len(spare)} fields, expected {len(names)} as in the header"
+        raise FormatError(path, f"line {number}: {found}; {DECIMAL_COMMA}")
+    padded = [*names, *spare]
+    return [name if name in use else f"field {index}" for index, name in enumerate(padded)]
+
+
+def _ragged(message: str) -> str:
+    match = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", message)
+    if match is None:
+        return f"cannot be split into columns: {message}"
+    expected, line, saw = match.groups()
+    return f"line {line}: found {saw} fields, expected {expected} as in the header; {DECIMAL_COMMA}"
+
+
+def _not_a_number(text: pd.DataFrame) -> tuple[int, str, str]:
+    """Find row, column and content of the first field that is not a number."""
+    wrong = text.apply(pd.to_numeric, errors="coerce").isna().to_numpy() & text.notna().to_numpy()
+    row, column = divmod(int(np.argmax(wrong)), wrong.shape[1])
+    return row, str(text.columns[column]), str(text.iloc[row, column])

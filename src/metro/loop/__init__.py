@@ -1,0 +1,1 @@
+"""The closed loop: noise, joint fits, the search for effects, the verdict."""

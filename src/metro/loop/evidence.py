@@ -1,0 +1,148 @@
+"""What speaks for an effect: evidence on the runs of the fit, on conditions left out, and the size of the
+change.
+
+The unit of evidence is the run, and for generality the condition; never the sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from metro.loop.fit import Candidate, Fit, linearised, refit, score
+from metro.loop.noise import PRIOR_RUNS, Noise
+from metro.observables.problem import Block
+from metro.units import Array
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How a larger candidate compares with a smaller one.
+
+    Attributes
+    ----------
+    statistic : twice the gain in log-likelihood. p_value : of it, by F with run-level degrees of freedom.
+    held_out : gain in log-likelihood of each condition when it is left out of both fits; empty where that was not
+        worth computing.
+    size : rms change of the prediction over the rms of the signal.
+    """
+
+    statistic: float
+    p_value: float
+    held_out: dict[str, float]
+    size: float
+
+    @property
+    def gain(self) -> float:
+        """Sum of the held-out gains."""
+        return sum(self.held_out.values())
+
+    @property
+    def better_share(self) -> float:
+        """Share of the left-out conditions that the larger candidate predicts better."""
+        return float(np.mean([value > 0 for value in self.held_out.values()])) if self.held_out else 0.0
+
+
+def compare(smaller: Fit, larger: Fit) -> Evidence:
+    """Compare two fits of the same blocks; nothing is left out yet (:func:`hold_out` does that)."""
+    runs = sum(block.role != "calibrate" for block in larger.blocks)
+    statistic = 2.0 * (larger.total - smaller.total)
+    parameters = len(larger.theta) - len(smaller.theta)
+    return Evidence(statistic, _tail(statistic, parameters, runs), {}, change(smaller, larger))
+
+
+def hold_out(evidence: Evidence, smaller_out: Mapping[str, float], larger: Fit, prior: Noise) -> Evidence:
+    """Add the gain of each condition when left out; ``smaller_out`` is :func:`leave_out` of the smaller fit."""
+    out = leave_out(larger, prior)
+    return replace(evidence, held_out={name: out[name] - value for name, value in smaller_out.items()})
+
+
+def _tail(statistic: float, parameters: int, runs: int) -> float:
+    from scipy.stats import f
+
+    return float(f.sf(max(statistic, 0.0) / parameters, parameters, runs + PRIOR_RUNS))
+
+
+def change(smaller: Fit, larger: Fit) -> float:
+    """Rms difference of two fits' predictions over the rms of what was measured, over the runs (not the load
+    tests).
+    """
+    difference, signal = 0.0, 0.0
+    for block in larger.blocks:
+        if block.role != "calibrate":
+            difference += float(np.sum((larger.predict(block) - smaller.predict(block)) ** 2))
+            signal += float(np.sum(block.measured**2))
+    return math.sqrt(difference / signal)
+
+
+def leave_out(fitted: Fit, prior: Noise) -> dict[str, float]:
+    """Log-likelihood of each condition under the fit of all others, by condition; by run where there is one
+    condition only.
+    """
+    cut = [block for block in fitted.blocks if block.role != "calibrate"]
+    by_condition = len({block.condition for block in cut}) > 1
+    groups: dict[str, list[Block]] = {}
+    for block in cut:
+        groups.setdefault(block.condition if by_condition else block.run, []).append(block)
+    result = {}
+    for name, held in groups.items():
+        left_out = {block.run for block in held}
+        rest = [block for block in fitted.blocks if block.run not in left_out]
+        result[name] = score(refit(fitted, rest, prior), held).total if len(groups) > 1 else -math.inf
+    return result
+
+
+def weights(held_out: Sequence[dict[str, float]], seed: int, draws: int = 2000) -> Array:
+    """Pseudo-BMA weights of candidates by Bayesian bootstrap over conditions, (candidates,).
+
+    Parameters
+    ----------
+    held_out : for each candidate, its held-out log-likelihood (or gain over a common reference) by condition.
+    """
+    names = list(held_out[0])
+    table = np.array([[candidate[name] for name in names] for candidate in held_out])
+    table = (
+        np.maximum(table, table[np.isfinite(table)].min() - 100.0)
+        if np.isfinite(table).any()
+        else table * 0.0
+    )
+    share = np.random.default_rng(seed).dirichlet(np.ones(len(names)), size=draws) * len(names)
+    total = share @ table.T
+    likelihood = np.exp(total - total.max(axis=1, keepdims=True))
+    return np.asarray((likelihood / likelihood.sum(axis=1, keepdims=True)).mean(axis=0))
+
+
+def surviving_share(candidate: Candidate, base: Fit) -> float:
+    """Share of an effect's signature that the base parameters and the runs' unknowns cannot imitate (0…1).
+
+    The signature is the change of the prediction with the effect's first parameter, its size, near the first
+    start. Near zero,
+    the data cannot speak of the effect: the base absorbs it.
+    """
+    theta = np.concatenate([base.theta, [p.starts[0] for p in candidate.parameters[len(base.theta) :]]])
+    total, left = linearised_signature(candidate, base, theta)
+    return left / total if total > 0 else 0.0
+
+
+def linearised_signature(candidate: Candidate, base: Fit, theta: Array) -> tuple[float, float]:
+    """Whitened sum of squares of the last effect's first column, before and after projection on everything
+    else.
+    """
+    system = linearised(candidate, base.blocks, base.noise, theta, base.beta, base.nuisance)
+    first = len(base.theta)
+    size, total = [], 0.0
+    columns = []
+    for _, matrix, effect, own in system.rows:
+        signature, others = effect[:, first], np.hstack([matrix, effect[:, :first]])
+        total += float(signature @ signature)
+        if own.shape[1]:
+            basis = np.linalg.qr(own)[0]
+            signature, others = signature - basis @ (basis.T @ signature), others - basis @ (basis.T @ others)
+        size.append(signature)
+        columns.append(others)
+    stacked, target = np.vstack(columns), np.concatenate(size)
+    rest = target - stacked @ np.linalg.lstsq(stacked, target, rcond=None)[0]
+    return total, float(rest @ rest)

@@ -1,0 +1,169 @@
+"""How far a run may be from a right model: within-run error, model-form budget, run-to-run scatter.
+
+The covariance of a block is ``D + U Uᵀ``. ``D`` is diagonal: the standard error within the run, and the
+declared budget for
+what a simple model never gets exactly right. ``U`` holds what a whole run shares: each base parameter a
+little off (its column
+of the design times the scatter), and the zeros. Without ``U``, 10^5 samples make everything significant
+(loop.md).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+
+from metro.observables.problem import Block
+from metro.units import Array
+
+PRIOR_RUNS = 4
+MISFIT_CORRELATION = 12.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of an observable.
+
+    Attributes
+    ----------
+    budget : relative model-form budget.
+    scatter : (p,) relative run-to-run standard deviation of each base parameter.
+    zero_factor : estimated size of the zeros in units of each block's ``zero_sd``.
+    repeats : runs per condition: the budget is shared by the repeats of a condition, so it does not average
+    out over them.
+    misfit : by axis, relative rms of what the model at hand misses, spread evenly over the elements. It is
+    estimated with each
+        fit, so that a model that misses much does not bend its parameters to please the elements that are
+        measured best. What is
+        missed is a smooth shape, the same in every run: about twelve neighbouring elements count as one piece
+        of evidence.
+    """
+
+    budget: float
+    scatter: Array
+    repeats: dict[str, float]
+    zero_factor: float = 1.0
+    misfit: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """The inverse square root of a block's covariance, in factored form.
+
+    ``log_shared`` is what the shared directions add to the logarithm of its determinant.
+    """
+
+    inverse_sd: Array
+    vectors: Array
+    shrink: Array
+    log_shared: float
+
+    def __call__(self, values: Array) -> Array:
+        """Apply to a vector (n,) or to the columns of a matrix (n, k)."""
+        scaled = (values.T * self.inverse_sd).T
+        weights = self.vectors.T @ scaled
+        return np.asarray(scaled - self.vectors @ (weights.T * self.shrink).T)
+
+
+def first_noise(budget: float, scatter: Array, blocks: Sequence[Block]) -> Noise:
+    """Return the noise before anything is known of the repeats."""
+    return Noise(budget, np.asarray(scatter, dtype=float), {**Counter(block.condition for block in blocks)})
+
+
+@lru_cache(maxsize=1024)
+def _axes(block: Block) -> tuple[tuple[str, ...], np.ndarray, Array]:
+    """Names of a block's axes, the number of each element's axis, and the rms of its axis."""
+    names, number = np.unique(block.axis.astype(str), return_inverse=True)
+    power = np.bincount(number, block.measured**2) / np.bincount(number)
+    return tuple(names.tolist()), number, np.sqrt(power)[number]
+
+
+def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION) -> Array:
+    """Variance of each element that nothing else shares, (n,).
+
+    The misfit counts ``correlation`` times, so that that many elements weigh as one.
+    """
+    names, number, rms = _axes(block)
+    scale = rms if block.scale is None else block.scale
+    missed = np.array([noise.misfit.get(name, 0.0) for name in names])[number] * rms
+    repeats = noise.repeats.get(block.condition, 1) * block.repeats
+    return np.asarray(block.sigma**2 + repeats * ((noise.budget * scale) ** 2 + correlation * missed**2))
+
+
+def log_scale(block: Block, noise: Noise) -> float:
+    """Logarithm of the determinant of the unshared variance, elements counted as in :func:`diagonal`."""
+    once = diagonal(block, noise, correlation=1.0)
+    return float(np.sum(once / diagonal(block, noise) * np.log(once)))
+
+
+def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
+    """Directions in which the whole block may be off together, (n, k), each of one standard deviation."""
+    zeros = block.zeros * (block.zero_sd * noise.zero_factor)
+    if block.role == "calibrate":
+        return zeros
+    return np.hstack([design * (beta * noise.scatter), zeros])
+
+
+def whitener(variance: Array, directions: Array) -> Whitener:
+    """Factor the covariance ``diag(variance) + directions @ directionsᵀ``."""
+    inverse_sd = 1.0 / np.sqrt(variance)
+    left, size, _ = np.linalg.svd(inverse_sd[:, None] * directions, full_matrices=False)
+    return Whitener(inverse_sd, left, 1.0 - 1.0 / np.sqrt(1.0 + size**2), float(np.log1p(size**2).sum()))
+
+
+def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
+    """Standard deviation of measured less predicted, per row of the comparison table, (m,)."""
+    alone = replace(noise, repeats={block.condition: 1.0 / block.repeats}, misfit={})
+    unshared, directions = diagonal(block, alone), shared(block, noise, design, beta)
+    if block.synthesis is None:
+        return np.asarray(np.sqrt(unshared + (directions**2).sum(axis=1)))
+    spread = block.synthesis**2 @ unshared + ((block.synthesis @ directions) ** 2).sum(axis=1)
+    return np.asarray(np.sqrt(spread))
+
+
+def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Array]]) -> Noise:
+    """One step of expectation–maximisation for scatter, zeros and misfit; the first two are drawn towards the
+    prior.
+
+    Parameters
+    ----------
+    parts : for each run: block, residual (n,), and directions (n, k) under ``noise``. The first p directions
+    of a run are
+        those of the base parameters, the rest its zeros.
+    """
+    p = len(noise.scatter)
+    amplitudes = {"scatter": [1.0] * PRIOR_RUNS, "zero": [1.0] * PRIOR_RUNS}
+    size = float(np.mean(noise.scatter / prior.scatter)) if p else 1.0
+    pull: dict[str, float] = {}
+    weight: dict[str, float] = {}
+    for block, residual, directions in parts:
+        if block.role == "calibrate":
+            continue
+        variance = diagonal(block, noise)
+        scaled = directions / np.sqrt(variance)[:, None]
+        inverse = np.linalg.inv(np.eye(scaled.shape[1]) + scaled.T @ scaled)
+        amplitude = inverse @ (scaled.T @ (residual / np.sqrt(variance)))
+        expected = amplitude**2 + np.diag(inverse)
+        amplitudes["scatter"] += [float(size**2 * expected[:p].mean())] if p else []
+        amplitudes["zero"] += (
+            [float(noise.zero_factor**2 * expected[p:].mean())] if block.zeros.shape[1] else []
+        )
+        left = residual - directions @ amplitude
+        spread = left**2 + np.einsum("ij,jk,ik->i", directions, inverse, directions)
+        excess = spread - diagonal(block, replace(noise, misfit={}))
+        names, number, rms = _axes(block)
+        share = noise.repeats.get(block.condition, 1) * block.repeats * rms**2
+        pulled = np.bincount(number, share * excess / variance**2)
+        weighed = np.bincount(number, (share / variance) ** 2)
+        for name, one, other in zip(names, pulled, weighed, strict=True):
+            pull[name] = pull.get(name, 0.0) + float(one)
+            weight[name] = weight.get(name, 0.0) + float(other)
+    factor = {key: float(np.sqrt(np.mean(values))) for key, values in amplitudes.items()}
+    misfit = {key: float(np.sqrt(max(0.0, pull[key]) / weight[key])) if weight[key] else 0.0 for key in pull}
+    return replace(
+        noise, scatter=prior.scatter * factor["scatter"], zero_factor=factor["zero"], misfit=misfit
+    )

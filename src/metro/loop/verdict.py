@@ -1,0 +1,211 @@
+"""The verdict on an observable: what was found, how sure, and the error before and after on runs that no fit
+has seen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from metro.effects.effect import EffectParameter
+from metro.loop import signature as rest
+from metro.loop.fit import Fit, score
+from metro.loop.noise import block_sigma
+from metro.loop.search import Gates, Outcome, Trial
+from metro.observables.problem import BaseFit, Problem
+from metro.observables.quantity import quantity
+from metro.units import JSON, Array
+
+COMPARISON = (
+    *("observable", "run", "axis", "t_s", "angle_deg", "s_mm", "x_mm", "y_mm"),
+    *("measured", "before", "after", "sigma", "unit"),
+)
+LEAST_RUNS = 2
+DRAWS = 2000
+
+
+@dataclass(frozen=True)
+class Held:
+    """The held-out runs under a fit: rows of the comparison, in the problem's unit, by run."""
+
+    predicted: dict[str, Array]
+    sigma: dict[str, Array]
+
+
+def held_out(problem: Problem, fitted: Fit) -> Held:
+    """Predict the validation runs; only their own unknowns (start phase) are estimated from them."""
+    blocks = problem.role("validate")
+    if not blocks:
+        return Held({}, {})
+    scored = score(fitted, blocks)
+    model = scored.candidate.model(scored.theta)
+    predicted, sigma = {}, {}
+    for block in blocks:
+        matrix, offset = model.design(block, scored.nuisance[block.run])
+        predicted[block.run] = block.to_rows(offset + matrix @ scored.beta) / problem.si
+        sigma[block.run] = block_sigma(block, fitted.noise, matrix, fitted.beta) / problem.si
+    return Held(predicted, sigma)
+
+
+def comparison(problem: Problem, before: Held, after: Held | None = None) -> pd.DataFrame:
+    """Return the rows of comparison.parquet for the held-out runs; ``after`` is left out before the loop has
+    run.
+    """
+    parts = []
+    for block in problem.role("validate"):
+        measured = block.to_rows(block.measured) / problem.si
+        rows: dict[str, object] = dict.fromkeys(COMPARISON)
+        rows |= {
+            "observable": problem.observable,
+            "run": block.run,
+            "unit": problem.unit,
+            **block.coordinates,
+        }
+        rows |= {
+            "measured": measured,
+            "before": before.predicted[block.run],
+            "sigma": before.sigma[block.run],
+        }
+        if after is not None:
+            rows |= {"after": after.predicted[block.run], "sigma": after.sigma[block.run]}
+        parts.append(pd.DataFrame(rows, index=range(len(measured))))
+    table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(COMPARISON))
+    return typed(table)
+
+
+def typed(table: pd.DataFrame) -> pd.DataFrame:
+    """Give the columns of a comparison table their types, in the contract's order."""
+    text = ("observable", "run", "axis", "unit")
+    return table.reindex(columns=list(COMPARISON)).astype(
+        {name: "str" if name in text else "float64" for name in COMPARISON}
+    )
+
+
+def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
+    """Rms and relative rms of measured less predicted, the interval by bootstrap over runs (not samples)."""
+    square = (rows["measured"] - rows[column]) ** 2
+    by_run = square.groupby(rows["run"]).mean().to_numpy()
+    signal = float(np.sqrt((rows["measured"] ** 2).mean()))
+    drawn = np.random.default_rng(seed).integers(0, len(by_run), size=(DRAWS, len(by_run)))
+    low, high = np.quantile(np.sqrt(by_run[drawn].mean(axis=1)), [0.025, 0.975])
+    rms = float(np.sqrt(square.mean()))
+    return {"rms": rms, "nrmse": rms / signal if signal > 0 else 0.0, "ci95": [float(low), float(high)]}
+
+
+def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) -> JSON:
+    """Return the observable's entry of verdict.json."""
+    runs = problem.role("identify")
+    floor = float(np.sqrt((rows["sigma"] ** 2).mean())) if len(rows) else math.nan
+    remaining = [line for line in outcome.lines if line.significant]
+    enough = len(runs) >= LEAST_RUNS and len(rows) > 0
+    before = error(rows, "before", gates.seed) if len(rows) else None
+    after = error(rows, "after", gates.seed) if len(rows) else None
+    return {
+        "status": _status(outcome, bool(remaining), enough),
+        "unit": problem.unit,
+        "noise_floor": floor if math.isfinite(floor) else None,
+        "held_out_runs": [block.run for block in problem.role("validate")],
+        "before": before,
+        "after": after,
+        "effects": [_effect(outcome, effect.name) for effect in outcome.final.candidate.effects],
+        "candidates": [
+            _candidate(trial) for trial in outcome.trials if trial.effect.name not in outcome.names
+        ],
+        "indistinguishable": [list(pair) for pair in outcome.rivals],
+        "next_experiment": _next_experiment(outcome, enough),
+        "unexplained": _unexplained(problem, outcome, after, floor) if remaining else None,
+    }
+
+
+def _status(outcome: Outcome, remaining: bool, enough: bool) -> str:
+    if not enough:
+        return "insufficient"
+    if outcome.rivals:
+        return "undetermined"
+    if outcome.names:
+        return "partly_explained" if remaining else "explained"
+    return "unexplained" if remaining else "clean"
+
+
+def _effect(outcome: Outcome, name: str) -> JSON:
+    trial = next(trial for trial in outcome.trials if trial.effect.name == name)
+    return {"effect": name, "probability": trial.weight, "parameters": parameters(outcome.final, name)}
+
+
+def parameters(fitted: Fit, name: str) -> JSON:
+    """Parameters of one effect of a fit with their intervals, in the contract's units."""
+    p, dof = len(fitted.beta), run_dof(fitted)
+    deviation = np.sqrt(np.maximum(np.diag(fitted.covariance)[p:], 0.0) * fitted.dispersion)
+    values: JSON = {}
+    position = 0
+    for effect in fitted.candidate.effects:
+        for parameter in effect.parameters:
+            if effect.name == name:
+                values[parameter.name] = _bounded(
+                    parameter, float(fitted.theta[position]), float(deviation[position]), dof
+                )
+            position += 1
+    return values
+
+
+def _bounded(parameter: EffectParameter, value: float, deviation: float, dof: float) -> JSON:
+    entry = quantity(value, deviation, parameter.unit, dof)
+    if parameter.period is None and entry["ci95"][0] is not None:
+        low, high = entry["ci95"]
+        entry["ci95"] = [max(low, parameter.lower), min(high, parameter.upper)]
+    return entry
+
+
+def identified_fit(problem: Problem, fitted: Fit) -> BaseFit:
+    """Return the base parameters of a fit, with the unknowns of the held-out runs beside those of its own."""
+    held = problem.role("validate")
+    nuisance = {**fitted.nuisance, **(score(fitted, held).nuisance if held else {})}
+    p = len(fitted.beta)
+    covariance = fitted.covariance[:p, :p] * fitted.dispersion
+    return BaseFit(fitted.beta, covariance, run_dof(fitted), nuisance)
+
+
+def run_dof(fitted: Fit) -> float:
+    """Degrees of freedom of intervals: runs (and load tests) less one; a sample is not evidence of its
+    own.
+    """
+    return float(max(1, len(fitted.blocks) - 1))
+
+
+def _candidate(trial: Trial) -> JSON:
+    return {
+        "effect": trial.effect.name,
+        "probability": trial.weight,
+        "held_out_gain": finite(trial.evidence.gain),
+        "p_value": trial.evidence.p_value,
+        "size": trial.evidence.size,
+        "why_not": trial.why_not,
+    }
+
+
+def finite(value: float) -> float | None:
+    """Return the value, or None where it is not a finite number (JSON has none)."""
+    return value if math.isfinite(value) else None
+
+
+def _next_experiment(outcome: Outcome, enough: bool) -> str | None:
+    if not enough:
+        return "more runs: at least two conditions to identify on and one to validate on, each repeated"
+    if outcome.rivals:
+        names = sorted({name for pair in outcome.rivals for name in pair})
+        wanted = {t.effect.name: t.effect.experiment for t in outcome.trials if t.effect.name in names}
+        return "; ".join(f"for {name}: {experiment}" for name, experiment in wanted.items())
+    unseen = [t.effect for t in outcome.trials if t.effect.name in outcome.not_visible]
+    if unseen:
+        return "; ".join(f"to see {effect.name}: {effect.experiment}" for effect in unseen)
+    if any(line.significant for line in outcome.lines):
+        return f"repeats spread over the session, to describe what is left: {rest.in_words(list(outcome.lines), 2)}"
+    return None
+
+
+def _unexplained(problem: Problem, outcome: Outcome, after: JSON | None, floor: float) -> JSON:
+    over = math.sqrt(max(0.0, after["rms"] ** 2 - floor**2)) if after else None
+    return {"rms": over, "unit": problem.unit, "signature": rest.in_words(list(outcome.lines))}

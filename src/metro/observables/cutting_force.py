@@ -1,0 +1,105 @@
+"""The cutting conditions of a batch's runs in SI, and the mean force that the other observables start
+from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from metro.batch.batch import Batch
+from metro.cutting.cutter import Cutter, evenly_pitched
+from metro.cutting.engagement import engagement
+from metro.cutting.force import COEFFICIENTS, Cut, mean_force
+from metro.cutting.law import EdgeLaw
+from metro.observables.problem import Refusal
+from metro.units import DEG, JSON, MM, N_MM, N_MM2, UM, Array
+
+TO_SI = np.array([N_MM2] * 3 + [N_MM] * 3)
+
+
+def cutter(batch: Batch) -> Cutter | Refusal:
+    """Return the tool of the batch, with the runout that the manifest declares."""
+    tool = batch.manifest.get("tool") or {}
+    missing = [key for key in ("diameter_mm", "teeth") if key not in tool]
+    if missing:
+        return Refusal(f"batch.yaml: tool.{missing[0]} is not given")
+    pitch = tool.get("pitch_deg")
+    angles = tuple(np.cumsum([0.0, *pitch[:-1]]) * DEG) if pitch else evenly_pitched(tool["teeth"])
+    runout = (batch.manifest.get("known") or {}).get("tool_runout", {})
+    return Cutter(
+        radius=tool["diameter_mm"] * MM / 2,
+        helix=tool.get("helix_deg", 0.0) * DEG,
+        tooth_angles=tuple(float(angle) for angle in angles),
+        runout_radius=runout.get("radius_um", 0.0) * UM,
+        runout_angle=runout.get("angle_deg", 0.0) * DEG,
+    )
+
+
+def cut(batch: Batch, run: str, radius: float) -> Cut:
+    """Return the nominal settings of a run in SI; ``radius`` of the cutter in m."""
+    row = batch.runs.loc[run]
+    radial = row["radial_depth_mm"] * MM if row["radial_depth_mm"] == row["radial_depth_mm"] else 2 * radius
+    return Cut(
+        feed_per_tooth=row["feed_per_tooth_mm"] * MM,
+        axial_depth=row["axial_depth_mm"] * MM,
+        engagement=engagement(row["operation"], row["direction"], radial, radius),
+    )
+
+
+def work_from_feed(batch: Batch, run: str) -> Array:
+    """Return the rotation (3, 3) from the feed frame of a run to the work frame: a turn about z."""
+    degrees = batch.runs.loc[run, "feed_direction_deg"]
+    return turn_about_z(degrees * DEG if degrees == degrees else 0.0)
+
+
+def turn_about_z(angle: float) -> Array:
+    """Rotation matrix (3, 3) about z, counter-clockwise, rad."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def coefficients(batch: Batch, identified: JSON) -> dict[str, float] | Refusal:
+    """Return the cutting coefficients in the contract's units: declared, else identified from this batch's
+    forces.
+    """
+    declared = batch.manifest.get("coefficients") or {}
+    given = {
+        key.removesuffix("_n_mm2").removesuffix("_n_mm"): float(value)
+        for key, value in declared.items()
+        if key != "edge_length"
+    }
+    if all(name in given for name in COEFFICIENTS):
+        return given | _per_axial_depth(batch, given)
+    found = (identified.get("force") or {}).get("waveform") or {}
+    if all(name in found for name in COEFFICIENTS):
+        return {name: float(entry["value"]) for name, entry in found.items()}
+    lacking = [name for name in COEFFICIENTS if name not in given]
+    return Refusal(
+        f"no cutting coefficients: batch.yaml lacks {', '.join(lacking)} and no force run identifies them"
+    )
+
+
+def _per_axial_depth(batch: Batch, given: Mapping[str, float]) -> dict[str, float]:
+    """Return the edge coefficients per axial depth where they are declared per arc of edge: 1/cos(helix) more."""
+    if batch.manifest["coefficients"].get("edge_length", "axial") == "axial":
+        return {}
+    helix = batch.manifest["tool"].get("helix_deg", 0.0) * DEG
+    return {name: given[name] / math.cos(helix) for name in ("kte", "kre", "kae")}
+
+
+def mean_force_on_tool(batch: Batch, run: str, values: Mapping[str, float]) -> Array:
+    """Mean cutting force of a run on the tool, (3,) N, work frame; ``values`` as from :func:`coefficients`.
+
+    Raises
+    ------
+    ValueError
+        If the manifest does not describe the tool.
+    """
+    tool = cutter(batch)
+    if isinstance(tool, Refusal):
+        raise ValueError(tool.reason)
+    si = np.array([values[name] for name in COEFFICIENTS]) * TO_SI
+    return work_from_feed(batch, run) @ mean_force(tool, EdgeLaw(), cut(batch, run, tool.radius), si)

@@ -1,0 +1,213 @@
+"""Flatness: scans of milled faces at the points of the path, and the tip compliance that predicts them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.observables import cutting_force
+from metro.observables.face_blocks import (
+    LOADS,
+    Pose,
+    face_block,
+    load_arrays,
+    plane_directions,
+    pose_of_loads,
+)
+from metro.observables.face_scan import FACE_TABLES, measured_run
+from metro.observables.flatness_model import FlatnessModel
+from metro.observables.problem import BaseFit, Problem, Refusal
+from metro.observables.quantity import quantity
+from metro.surface.plane import fit_plane
+from metro.surface.tip_stiffness import point_compliance
+from metro.units import JSON, MM, UM
+
+OBSERVABLE = "flatness"
+SCATTER = 0.02
+SYSTEMATIC = 0.02  # of the mean force, which the coefficients and the load cells share among all runs
+
+Read = Callable[..., pd.DataFrame]
+
+
+def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
+    """Measure each scanned face: indices, deviation map, heights at the path points; and keep the load tests.
+
+    Tables ``face_indices``, ``face_map``, ``face_points``, ``face_loads``, ``face_mass``, ``face_refused``.
+    """
+    runs = scanned(batch)
+    if not runs:
+        return Refusal("runs.csv names no scan")
+    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in FACE_TABLES}
+    refused = []
+    for run in runs:
+        tables, reason = measured_run(batch, run, read("scan", run), read("path", run))
+        for name, table in tables.items():
+            parts[name].append(table)
+        if reason:
+            refused.append((run, reason))
+    if not parts["face_indices"]:
+        return Refusal("; ".join(f"run {run}: {reason}" for run, reason in refused))
+    joined = {
+        name: pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=[*FACE_TABLES[name]])
+        for name, tables in parts.items()
+    }
+    return joined | {
+        "face_loads": read("loads")[["pose", "point", *LOADS]],
+        "face_mass": read("mass"),
+        "face_refused": pd.DataFrame(refused, columns=["run", "reason"], dtype=str),
+    }
+
+
+def scanned(batch: Batch) -> list[str]:
+    """Return the runs with a scan, in the order of cutting."""
+    table = batch.runs.sort_values("order", kind="stable")
+    return [str(run) for run, file in table["scan"].items() if isinstance(file, str) and file]
+
+
+def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON) -> Problem | Refusal:
+    """Return blocks of load tests (calibrate) and faces (identify, validate), and the compliance model."""
+    coefficients = _what_it_needs(batch, observed, identified)
+    if isinstance(coefficients, Refusal):
+        return coefficients
+    notes = [f"Run {row.run} is left out: {row.reason}." for row in observed["face_refused"].itertuples()]
+    faces = {str(run): table for run, table in observed["face_points"].groupby("run", sort=False)}
+    poses, blocks = {}, []
+    for run, table in faces.items():
+        name = _pose_name(batch, run, observed["face_loads"])
+        if name not in poses:
+            poses[name] = _pose(name, observed)
+        pose = poses[name]
+        found = pose if isinstance(pose, Refusal) else face_block(batch, run, table, pose, coefficients)
+        if isinstance(found, Refusal):
+            notes.append(f"Run {run} is left out: {found.reason}.")
+        else:
+            blocks.append(found[0])
+            notes += found[1]
+    if not blocks:
+        return Refusal(" ".join(notes))
+    known = [pose for pose in poses.values() if isinstance(pose, Pose)]
+    notes += [note for pose in known for note in pose.notes] + _limits(batch)
+    model = FlatnessModel(tuple(pose.field for pose in known))
+    scatter = np.full(len(model.parameters), SCATTER)
+    evidence = (*(pose.block for pose in known), *blocks)
+    return Problem(
+        OBSERVABLE, "mm", MM, model, evidence, scatter, SYSTEMATIC, notes=tuple(dict.fromkeys(notes))
+    )
+
+
+def _what_it_needs(
+    batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
+) -> dict[str, float] | Refusal:
+    """Return the cutting coefficients, or which of the things that a prediction takes are lacking."""
+    if "face_points" not in observed:
+        return Refusal("no face was measured")
+    if observed["face_points"].empty:
+        reasons = observed["face_refused"].itertuples()
+        return Refusal("; ".join(f"run {row.run}: {row.reason}" for row in reasons))
+    if observed["face_loads"].empty:
+        return Refusal("no loads.csv: the compliance of the arm at the tip is not known")
+    tool = cutting_force.cutter(batch)
+    return tool if isinstance(tool, Refusal) else cutting_force.coefficients(batch, identified)
+
+
+def _pose_name(batch: Batch, run: str, loads: pd.DataFrame) -> str:
+    """Pose of a run; where only one pose was loaded, blank means that one."""
+    named = batch.runs.loc[run, "pose"]
+    known = loads["pose"].astype(str).unique()
+    return str(named) if isinstance(named, str) and named else (str(known[0]) if len(known) == 1 else "")
+
+
+def _pose(name: str, observed: Mapping[str, pd.DataFrame]) -> Pose | Refusal:
+    loads, mass = (
+        table[table["pose"].astype(str) == name] for table in (observed["face_loads"], observed["face_mass"])
+    )
+    if loads.empty:
+        return Refusal(f"loads.csv has no tests at its pose {name!r}")
+    return pose_of_loads(name, loads, mass)
+
+
+def _limits(batch: Batch) -> list[str]:
+    placed = "to_work" in batch.instrument("scanner")
+    return [
+        "The face is compared where the cutter is fully engaged (one radius from entry and exit); the "
+        "spindle stands square to it, and the modes of the arm share one damping ratio, fitted to each face.",
+        "Scans are placed by the declared scanner-to-work transform (offset and tilts known to 10 µm)."
+        if placed
+        else "No scanner-to-work transform is declared: offset and tilt are free, only the shape counts.",
+    ]
+
+
+def report(
+    _batch: Batch,
+    observed: Mapping[str, pd.DataFrame],
+    _identified: JSON,
+    task: Problem | Refusal,
+    fit: BaseFit | None,
+) -> JSON:
+    """Return each face's indices (as read, and less the bias), X_m as predicted, and the compliance."""
+    predicted = {} if isinstance(task, Refusal) or fit is None else _predicted_xm(task, fit)
+    faces: JSON = {}
+    for run, table in observed["face_indices"].groupby("run", sort=False):
+        faces[str(run)] = _face_json(table) | predicted.get(str(run), {})
+    blocks: JSON = {"faces": faces}
+    if len(observed["face_loads"]):
+        blocks["tip_compliance"] = _compliance_json(observed["face_loads"])
+    return blocks
+
+
+def _face_json(table: pd.DataFrame) -> JSON:
+    first = table.iloc[0]
+    read, corrected, sd = (table[name].to_numpy(dtype=float) for name in ("value_um", "corrected_um", "u_um"))
+    names = table["index_name"].astype(str)
+    entry: JSON = {n: quantity(v, u, "um") for n, v, u in zip(names, read, sd, strict=True)}
+    entry["noise_corrected"] = {
+        n: quantity(v, u, "um")
+        for n, v, u in zip(names, corrected, sd, strict=True)
+        if n != "percentile_range"
+    }
+    entry["sigma"] = quantity(float(first["sigma_um"]), math.nan, "um")
+    entry["sigma_source"] = str(first["sigma_source"])
+    nesting = float(first["nesting_index_mm"])
+    entry["filter"] = (
+        {"name": "areal Gaussian (ISO 16610-61)", "nesting_index_mm": nesting}
+        if math.isfinite(nesting)
+        else None
+    )
+    return entry | {"points": int(first["points"]), "outliers": int(first["outliers"])}
+
+
+def _predicted_xm(task: Problem, fit: BaseFit) -> dict[str, JSON]:
+    """Range of the predicted heights at the compared points about their plane, interval by the base fit."""
+    result = {}
+    for block in task.role("identify", "validate"):
+        if block.run not in fit.nuisance:
+            continue
+        design, offset = task.base.design(block, fit.nuisance[block.run])
+        heights = offset + design @ fit.beta
+        x, y = block.coordinates["x_mm"] * MM, block.coordinates["y_mm"] * MM
+        points = np.column_stack([x, y, heights])
+        deviations = fit_plane(points).deviations(points)
+        basis = plane_directions(x, y)
+        shape = design - basis @ np.linalg.lstsq(basis, design, rcond=None)[0]
+        across = shape[deviations.argmax()] - shape[deviations.argmin()]
+        sd = math.sqrt(max(0.0, float(across @ fit.covariance @ across)))
+        result[block.run] = {"xm_predicted": quantity(float(np.ptp(deviations)) / UM, sd / UM, "um", fit.dof)}
+    return result
+
+
+def _compliance_json(loads: pd.DataFrame) -> JSON:
+    """Entries of C at each load point, pose → point → entry, those that the loads determine."""
+    result: JSON = {}
+    for (pose, point), table in loads.groupby(["pose", "point"], sort=False):
+        found = point_compliance(*load_arrays(table)[1:])
+        result.setdefault(str(pose), {})[str(point)] = {
+            "xyz"[i] + "xyz"[j]: quantity(found.matrix[i, j] / UM, found.sd[i, j] / UM, "um/N")
+            for i in range(3)
+            for j in range(i, 3)
+            if math.isfinite(found.matrix[i, j])
+        }
+    return result

@@ -1,0 +1,317 @@
+"""Cutting force: dynamometer records as order averages, and the mechanistic model that predicts them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.cutting.cutter import Cutter
+from metro.cutting.law import EdgeLaw
+from metro.observables import cutting_force
+from metro.observables.force_model import ForceModel, ForceSetting, Helix
+from metro.observables.problem import BaseFit, Block, Problem, Refusal
+from metro.observables.quantity import quantity
+from metro.signals import orders, steady
+from metro.units import DEG, JSON, MM, RPM, Array
+
+OBSERVABLE = "force"
+AXES = ("x", "y", "z")
+ANGLES = 120
+TIME_BLOCKS = 4
+SCATTER = 0.01
+ZERO_SHARE = 0.003
+
+Read = Callable[..., pd.DataFrame]
+
+
+def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
+    """Turn each dynamometer record into order averages: table ``orders``, and ``spindle`` with the speed of
+    each run.
+    """
+    runs = recorded(batch)
+    if not runs:
+        return Refusal("runs.csv names no dynamometer file")
+    tool = cutting_force.cutter(batch)
+    if isinstance(tool, Refusal):
+        return tool
+    results = [_observed(batch, run, read("force", run), tool) for run in runs]
+    tables = [result for result in results if not isinstance(result, Refusal)]
+    refused = [result.reason for result in results if isinstance(result, Refusal)]
+    if not tables:
+        return Refusal("; ".join(refused))
+    return {
+        "orders": pd.concat([table for table, _ in tables], ignore_index=True),
+        "spindle": pd.DataFrame([row for _, row in tables]),
+        "force_refused": pd.DataFrame({"reason": refused}, dtype=str),
+    }
+
+
+def recorded(batch: Batch) -> list[str]:
+    """Runs with a dynamometer record, in the order of cutting."""
+    table = batch.runs.sort_values("order", kind="stable")
+    return [str(run) for run, file in table["dynamometer"].items() if isinstance(file, str) and file]
+
+
+def _observed(
+    batch: Batch, run: str, record: pd.DataFrame, tool: Cutter
+) -> tuple[pd.DataFrame, JSON] | Refusal:
+    """Order averages of a run's steady cut, and what was found on the way."""
+    time, signal = record["t_s"].to_numpy(), record[["fx_n", "fy_n", "fz_n"]].to_numpy()
+    row = batch.runs.loc[run]
+    rate = (len(time) - 1) / (time[-1] - time[0])
+    nominal = row["spindle_rpm"] / 60.0
+    try:
+        found = steady.segments(signal, rate / nominal, round(rate * _settling(row, tool)))
+    except ValueError as error:
+        return Refusal(f"run {run}: {error}")
+    zero = signal[found.air].mean(axis=0) if found.air.any() else np.zeros(3)
+    time, signal = time[found.steady], signal[found.steady] - zero
+    orbit = _orbit_rate(row) / (2.0 * math.pi)
+    signal = _with_orbit(time, signal, orbit)
+    highest = orders.highest_order(rate, nominal, tool.teeth)
+    tacho = record["spindle_deg"].to_numpy()[found.steady]
+    if np.isfinite(tacho).all():
+        angle = np.unwrap(tacho * DEG) + 2.0 * math.pi * orbit * time
+        speed, deviation = (angle[-1] - angle[0]) / (2.0 * math.pi * (time[-1] - time[0])), 0.0
+    else:
+        speed, deviation = orders.spindle_speed(time, signal, nominal + orbit, highest)
+        angle = 2.0 * math.pi * speed * time
+    averages = orders.order_averages(time, angle, signal, highest, TIME_BLOCKS)
+    summary = {
+        "run": run,
+        "spindle_rpm": (speed - orbit) * 60.0,
+        "spindle_rpm_sd": deviation * 60.0,
+        "steady_from_s": float(time[0]),
+        "steady_to_s": float(time[-1]),
+        "air_s": float(found.air.sum() / rate),
+        **{f"zero_{axis}_n": float(value) for axis, value in zip(AXES, zero, strict=True)},
+        **{
+            f"mean_{axis}_n": float(value)
+            for axis, value in zip(AXES, _whole_mean(angle, signal), strict=True)
+        },
+    }
+    return pd.concat(
+        [_long(run, i, average) for i, average in enumerate(averages)], ignore_index=True
+    ), summary
+
+
+def _whole_mean(angle: Array, signal: Array) -> Array:
+    """Mean force over whole revolutions, (3,) N; a last one that lacks less than 2 % counts as whole."""
+    turned = angle - angle[0]
+    whole = math.floor(turned[-1] / (2.0 * math.pi) * (1.0 + 1.0 / len(angle)) + 0.02)
+    mean: Array = signal[turned < 2.0 * math.pi * whole].mean(axis=0)
+    return mean
+
+
+def _settling(row: pd.Series, tool: Cutter) -> float:
+    """Time from the first contact to the full engagement, s: one radius of travel, or one orbit of a
+    helix.
+    """
+    if row["operation"] == "helical":
+        return 60.0 / abs(float(row["orbit_rpm"]))
+    return tool.radius / (
+        float(row["feed_per_tooth_mm"]) * MM * tool.teeth * float(row["spindle_rpm"]) / 60.0
+    )
+
+
+def _orbit_rate(row: pd.Series) -> float:
+    """Orbit speed of a run, rad/s, positive counter-clockwise seen from +z; zero unless helical."""
+    return float(row["orbit_rpm"]) * RPM if row["operation"] == "helical" else 0.0
+
+
+def _with_orbit(time: Array, signal: Array, orbit: float) -> Array:
+    """Turn the force into a frame that turns with the orbit, where helical milling is periodic with the
+    tool.
+    """
+    if orbit == 0.0:
+        return signal
+    c, s = np.cos(2.0 * math.pi * orbit * time), np.sin(2.0 * math.pi * orbit * time)
+    x, y = signal[:, 0], signal[:, 1]
+    return np.column_stack([c * x + s * y, c * y - s * x, signal[:, 2]])
+
+
+def _long(run: str, block: int, average: orders.OrderAverage) -> pd.DataFrame:
+    """One row per axis and element of the order coefficients."""
+    channels, elements = average.value.shape
+    return pd.DataFrame(
+        {
+            "run": run,
+            "block": block,
+            "t_s": average.middle,
+            "axis": np.repeat(AXES, elements),
+            "order": np.tile((np.arange(elements) + 1) // 2, channels),
+            "part": np.tile(["mean"] + ["cosine", "sine"] * (elements // 2), channels),
+            "force_n": average.value.ravel(),
+            "variance_n2": average.variance.ravel(),
+        }
+    )
+
+
+def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) -> Problem | Refusal:
+    """Blocks of evidence from the order averages, and the base model told of what the manifest declares."""
+    tool = cutting_force.cutter(batch)
+    if isinstance(tool, Refusal) or "orders" not in observed:
+        return tool if isinstance(tool, Refusal) else Refusal("no order averages")
+    by_run = dict(tuple(observed["orders"].groupby("run", sort=False)))
+    blocks = tuple(_block(batch, run, by_run[run], tool) for run in recorded(batch) if run in by_run)
+    helical = any(block.setting.helix is not None for block in blocks)
+    model = ForceModel(cutter=tool, law=EdgeLaw(), bottom_edges=helical)
+    notes = (
+        "The chip thickness is that of the true tooth paths, the force law linear in it; "
+        "tool, machine and dynamometer are rigid in the base model.",
+        f"Forces are compared per revolution up to spindle order {blocks[0].setting.highest}, in the work frame"
+        + (" (helical runs: in the frame that turns with the orbit)." if helical else "."),
+    )
+    notes += tuple(f"Left out: {reason}." for reason in observed["force_refused"]["reason"])
+    return Problem(OBSERVABLE, "N", 1.0, model, blocks, np.full(len(model.parameters), SCATTER), notes=notes)
+
+
+def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter) -> Block:
+    row = batch.runs.loc[run]
+    middles = tuple(float(t) for t in table.groupby("block")["t_s"].first())
+    highest = int(table["order"].max())
+    values = table["force_n"].to_numpy()
+    setting = ForceSetting(
+        cut=cutting_force.cut(batch, run, tool.radius),
+        feed_direction=_degrees(row["feed_direction_deg"]) * DEG,
+        highest=highest,
+        middles=middles,
+        cut_length=float(row["cut_before_m"]) + 0.5 * _degrees(row["cut_length_mm"]) * MM,
+        helix=_helix(batch, row),
+    )
+    axis = table["axis"].to_numpy().astype(str)
+    mean = (table["part"] == "mean").to_numpy()
+    zeros = np.column_stack([(axis == name) & mean for name in AXES]).astype(float)
+    rms = math.sqrt(float(np.sum(values**2)) / len(middles))
+    return Block(
+        run=run,
+        condition=str(row["condition"]),
+        role="validate" if row["role"] == "validate" else "identify",
+        order=int(row["order"]),
+        measured=values,
+        sigma=np.sqrt(table["variance_n2"].to_numpy()),
+        setting=setting,
+        axis=axis,
+        zeros=zeros,
+        zero_sd=np.full(3, ZERO_SHARE * rms),
+        coordinates=_coordinates(middles),
+        synthesis=_synthesis(len(middles), highest),
+        scale=_scale(table),
+        repeats=len(middles),
+        symmetries=_tooth_shifts(tool, 1 if setting.helix is None else 2),
+        labels=np.where(mean, "mean", "order " + table["order"].astype(str)).astype(str),
+    )
+
+
+def _degrees(value: float) -> float:
+    """Return a number of the run table, or 0 where it is blank."""
+    return float(value) if value == value else 0.0
+
+
+def _helix(batch: Batch, row: pd.Series) -> Helix | None:
+    if row["operation"] != "helical":
+        return None
+    tool = batch.manifest["tool"]
+    orbits_per_tooth = abs(row["orbit_rpm"]) / (row["spindle_rpm"] * tool["teeth"])
+    radius = 0.5 * (batch.manifest["hole_diameter_mm"] - tool["diameter_mm"]) * MM
+    return Helix(radius, row["axial_depth_mm"] * MM, row["axial_depth_mm"] * MM * orbits_per_tooth)
+
+
+def _tooth_shifts(tool: Cutter, unknowns: int) -> Array:
+    """Shifts of a run's unknowns, (N, unknowns), that make another tooth the first one."""
+    shifts = np.zeros((tool.teeth, unknowns))
+    shifts[:, 0] = tool.tooth_angles
+    return shifts
+
+
+def _scale(table: pd.DataFrame) -> Array:
+    """Signal around each element: half from its own order, half spread evenly over its axis's orders."""
+    power = table["force_n"] ** 2
+    own = power.groupby([table["block"], table["axis"], table["order"]]).transform("mean")
+    axis = power.groupby([table["block"], table["axis"]]).transform("mean")
+    return np.sqrt(0.5 * (own + axis)).to_numpy()
+
+
+def _synthesis(blocks: int, highest: int) -> Array:
+    """Map from (block, axis, order element) to (block, axis, angle)."""
+    angle = 2.0 * math.pi * np.arange(ANGLES) / ANGLES
+    return np.kron(np.eye(blocks * len(AXES)), orders.order_matrix(angle, highest))
+
+
+def _coordinates(middles: tuple[float, ...]) -> dict[str, np.ndarray]:
+    blocks = len(middles)
+    return {
+        "axis": np.tile(np.repeat(AXES, ANGLES), blocks),
+        "t_s": np.repeat(middles, len(AXES) * ANGLES),
+        "angle_deg": np.tile(np.arange(ANGLES) * 360.0 / ANGLES, len(AXES) * blocks),
+    }
+
+
+def report(
+    batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON, task: Problem, fit: BaseFit
+) -> JSON:
+    """Coefficients by means (identification runs, all runs) and by waveform, and the spindle speed of each
+    run.
+    """
+    deviation = np.sqrt(np.diag(fit.covariance))
+    waveform = {
+        parameter.name: quantity(value / parameter.si, sd / parameter.si, parameter.unit, fit.dof)
+        for parameter, value, sd in zip(task.base.parameters, fit.beta, deviation, strict=True)
+    }
+    speeds = {
+        row.run: quantity(row.spindle_rpm, row.spindle_rpm_sd, "rpm")
+        for row in observed["spindle"].itertuples()
+    }
+    block: JSON = {"waveform": waveform, "spindle_rpm": speeds, "edge_length": "axial"}
+    for name, blocks in (("mean", task.role("identify")), ("mean_all_runs", task.blocks)):
+        fitted = mean_coefficients(task.base, blocks, observed["spindle"])
+        if isinstance(fitted, Refusal):
+            block.setdefault("not_identified", {})[name] = fitted.reason
+        else:
+            block[name] = fitted
+    return {"force": block}
+
+
+def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.DataFrame) -> JSON | Refusal:
+    """Classical identification: least squares of the mean forces of runs over the feed ([T] §4.1).
+
+    The mean over a revolution does not depend on the start phase, so it needs no waveform. Its intervals come
+    from the scatter of
+    the runs about the line.
+
+    Parameters
+    ----------
+    blocks : runs to use; helical ones are left out. spindle : the observed table, with the mean force of each
+    run.
+    """
+    means = spindle.set_index("run")[[f"mean_{axis}_n" for axis in AXES]]
+    straight = [block for block in blocks if block.setting.helix is None]
+    rows = [_mean_design(model, block) for block in straight]
+    matrix = np.concatenate(rows) if rows else np.zeros((0, 6))
+    target = means.loc[[block.run for block in straight]].to_numpy().ravel()
+    size = np.linalg.norm(matrix, axis=0)
+    if len(target) < 6 or np.linalg.matrix_rank(matrix / np.maximum(size, 1e-300), tol=1e-6) < 6:
+        return Refusal(
+            "the mean forces of one feed cannot part shear from edge coefficients: cut a second feed"
+        )
+    beta, residual, _, _ = np.linalg.lstsq(matrix / size, target, rcond=None)
+    dof = len(target) - 6
+    covariance = np.linalg.inv((matrix / size).T @ (matrix / size))
+    variance = float(residual[0]) / dof if dof else math.nan
+    sd = np.sqrt(np.diag(covariance) * variance) / size
+    return {
+        parameter.name: quantity(value / parameter.si, error / parameter.si, parameter.unit, max(dof, 1))
+        for parameter, value, error in zip(model.parameters[:6], beta / size, sd, strict=True)
+    }
+
+
+def _mean_design(model: ForceModel, block: Block) -> Array:
+    """Mean force per unit of each coefficient on circular paths, (3, 6), in the frame of the comparison."""
+    matrix, _ = replace(model, true_path=False).design(block, np.zeros(1))
+    first = matrix[: len(matrix) // block.repeats, :6]
+    return np.stack([first[zero[: len(first)] > 0].sum(axis=0) for zero in block.zeros.T])

@@ -1,0 +1,147 @@
+"""The force model of a batch: what is known of the tool and the law, and the coefficients that are not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from metro.cutting.cutter import Cutter
+from metro.cutting.force import COEFFICIENTS, Cut, force_basis
+from metro.cutting.law import EdgeLaw
+from metro.observables.problem import Block, Parameter
+from metro.signals.orders import advance, to_orders
+from metro.units import N_MM, N_MM2, Array
+
+PHASES_PER_PITCH = 12
+ORBIT_PHASES = 12
+
+
+@dataclass(frozen=True)
+class Helix:
+    """Helical milling: the tool travels on a helix of given radius (m), at ``orbit_rate`` rad/s, sinking
+    ``pitch`` m per orbit.
+
+    ``axial_feed`` is the axial feed per tooth, m, which the bottom edges cut.
+    """
+
+    radius: float
+    pitch: float
+    axial_feed: float
+
+    @property
+    def ramp(self) -> float:
+        """Ramp angle of the path, rad."""
+        return math.atan(self.pitch / (2.0 * math.pi * self.radius))
+
+
+@dataclass(frozen=True)
+class ForceSetting:
+    """What the force of a run depends on (SI): its cut, and how its record was averaged.
+
+    ``feed_direction`` is the turn of the feed frame about z, rad; ``blocks`` the number of time blocks,
+    ``middles`` their times
+    (s from the start of the steady cut); ``cut_length`` metres cut before the run's middle since the tool was
+    new.
+    """
+
+    cut: Cut
+    feed_direction: float
+    highest: int
+    middles: tuple[float, ...]
+    cut_length: float
+    helix: Helix | None = None
+
+
+@dataclass(frozen=True)
+class ForceModel:
+    """Mechanistic milling force: cutter geometry, force law; linear in the cutting coefficients (physics.md
+    §2).
+
+    ``true_path`` takes the chip from the trochoidal paths of the teeth; else from circles (feed × sine of the
+    immersion). A block's
+    nuisance is the angle of tooth 0 at the record's start, rad, and in helical milling also the direction of
+    feed
+    there. ``bottom_edges`` adds K_Fac and K_Fae to the coefficients.
+    """
+
+    cutter: Cutter
+    law: EdgeLaw
+    true_path: bool = True
+    bottom_edges: bool = False
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The cutting coefficients."""
+        names = COEFFICIENTS + (("kfac", "kfae") if self.bottom_edges else ())
+        return tuple(
+            Parameter(name, "N/mm2", N_MM2) if name.endswith("c") else Parameter(name, "N/mm", N_MM)
+            for name in names
+        )
+
+    def nuisance_starts(self, block: Block) -> Array:
+        """Start phases over the whole revolution: which tooth is first matters once teeth differ."""
+        setting: ForceSetting = block.setting
+        count = PHASES_PER_PITCH * self.cutter.teeth
+        phases = 2.0 * math.pi * np.arange(count) / count
+        if setting.helix is None:
+            return phases[:, None]
+        directions = 2.0 * math.pi * np.arange(ORBIT_PHASES) / ORBIT_PHASES
+        return np.stack(np.meshgrid(phases, directions, indexing="ij"), axis=-1).reshape(-1, 2)
+
+    def design(self, block: Block, nuisance: Array) -> tuple[Array, Array]:
+        """Order coefficients of the force per unit of each coefficient, laid out (time block, axis,
+        order).
+        """
+        setting: ForceSetting = block.setting
+        basis = advance(
+            _order_basis(self.cutter, self.law, setting.cut, setting.highest, self.true_path),
+            float(nuisance[0]),
+        )
+        basis = basis * np.repeat([1.0, self.law.edge(setting.cut_length)], 3)
+        if self.bottom_edges:
+            basis = np.concatenate([basis, self._bottom(setting, len(basis))], axis=2)
+        turn = setting.feed_direction
+        if setting.helix is not None:
+            basis = _ramped(basis, setting.helix.ramp)
+            turn = float(nuisance[1])
+        basis = _turned(basis, turn).transpose(1, 0, 2).reshape(-1, basis.shape[2])
+        matrix = np.tile(basis, (len(setting.middles), 1))
+        return matrix, np.zeros(len(matrix))
+
+    def _bottom(self, setting: ForceSetting, orders: int) -> Array:
+        """Thrust of the bottom edges, N R (K_Fac s_ta + K_Fae): constant over the revolution, along z ([T]
+        eq. 7–8).
+        """
+        columns = np.zeros((orders, 3, 2))
+        if setting.helix is not None:
+            reach = self.cutter.teeth * self.cutter.radius
+            columns[0, 2] = reach * setting.helix.axial_feed, reach
+        return columns
+
+
+@lru_cache(maxsize=4096)
+def _order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path: bool) -> Array:
+    basis = to_orders(force_basis(cutter, law, cut, true_path), highest)
+    basis.flags.writeable = False
+    return basis
+
+
+def _turned(basis: Array, angle: float) -> Array:
+    """Turn (orders, axis, p) about z, counter-clockwise."""
+    if angle == 0.0:
+        return basis
+    turned = np.array(basis)
+    c, s = math.cos(angle), math.sin(angle)
+    turned[:, 0], turned[:, 1] = c * basis[:, 0] - s * basis[:, 1], s * basis[:, 0] + c * basis[:, 1]
+    return turned
+
+
+def _ramped(basis: Array, ramp: float) -> Array:
+    """Incline the feed frame downwards by the ramp angle: its x and z axes turn about y."""
+    inclined = np.array(basis)
+    c, s = math.cos(ramp), math.sin(ramp)
+    inclined[:, 0], inclined[:, 2] = c * basis[:, 0] + s * basis[:, 2], c * basis[:, 2] - s * basis[:, 0]
+    return inclined

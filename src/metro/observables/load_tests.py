@@ -1,0 +1,106 @@
+"""What is known of the joints apart from any cut: load tests, and the cell file where these do not tell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.observables.deformation_model import DeformationModel, KnownJoints, LoadTest
+from metro.observables.problem import Block, Refusal
+from metro.robot.stiffness import Compliances, joint_compliances
+from metro.units import DEG, MM, UM, Array
+
+KNOWN = 0.02  # assumed relative uncertainty of joint stiffnesses that the cell file states without one
+GAUGE = 0.1 * UM
+ANGLES = [f"q{i}_deg" for i in range(1, 7)]
+LOAD_FORCE, MOVED = ["fx_n", "fy_n", "fz_n"], ["dx_mm", "dy_mm", "dz_mm"]
+
+
+def usable(loads: pd.DataFrame) -> pd.DataFrame:
+    """Return the load tests that an arm's model can use: with joint angles and the whole force."""
+    return loads.dropna(subset=[*ANGLES, *LOAD_FORCE]).reset_index(drop=True)
+
+
+def calibration(
+    batch: Batch, model: DeformationModel, loads: pd.DataFrame
+) -> tuple[list[Block], tuple[str, ...]] | Refusal:
+    """Gather the evidence on the joints: load tests, and the cell file for joints that these do not tell.
+
+    A joint of which neither says anything is rigid, give or take the compliance of the softest joint.
+    """
+    known = batch.cell.get("joint_stiffness_nm_rad")
+    tests = fitted_loads(model, loads)
+    if isinstance(tests, Refusal):
+        if known is None:
+            return Refusal(f"{tests.reason}, and cell.yaml gives no joint_stiffness_nm_rad")
+        value = 1.0 / np.asarray(known, dtype=float)
+        note = f"Joint stiffnesses are those of the cell file, taken to be within {KNOWN:.0%}."
+        return [_known_block(np.arange(len(value)), value, KNOWN * value)], (note,)
+    sigma = max(tests.scatter, GAUGE)
+    blocks = [
+        _load_block(str(pose), rows, sigma) for pose, rows in loads.groupby("pose", sort=False, dropna=False)
+    ]
+    notes = [f"Load tests scatter by {tests.scatter / UM:.2g} µm about linear joints ({tests.dof} dof)."]
+    weak = np.flatnonzero(tests.sd > tests.value.max())
+    if len(weak):
+        names = ", ".join(str(i + 1) for i in weak)
+        if known is None:
+            value, sd = np.zeros(len(weak)), np.full(len(weak), tests.value.max())
+            notes.append(
+                f"The load tests do not tell joint {names}: taken as rigid, give or take the softest joint."
+            )
+        else:
+            value = 1.0 / np.asarray(known, dtype=float)[weak]
+            sd = KNOWN * value
+            notes.append(f"The load tests do not tell joint {names}: from the cell file, within {KNOWN:.0%}.")
+        blocks.append(_known_block(weak, value, sd))
+    return blocks, tuple(notes)
+
+
+def best_compliance(batch: Batch, model: DeformationModel, loads: pd.DataFrame) -> Array:
+    """Joint compliances (6,) before any cut: of the load tests, else the cell file, else a rigid arm's."""
+    tests = fitted_loads(model, loads)
+    if not isinstance(tests, Refusal):
+        return tests.value
+    known = batch.cell.get("joint_stiffness_nm_rad")
+    return np.zeros(len(model.parameters)) if known is None else 1.0 / np.asarray(known, dtype=float)
+
+
+def fitted_loads(model: DeformationModel, loads: pd.DataFrame) -> Compliances | Refusal:
+    """Joint compliances from the load tests alone."""
+    if loads.empty:
+        return Refusal("loads.csv has no test with joint angles and force")
+    joints, force, moved = _load_arrays(loads)
+    try:
+        return joint_compliances(model.contributions(joints, force), moved)
+    except ValueError as error:
+        return Refusal(f"loads.csv: {error}")
+
+
+def _load_arrays(loads: pd.DataFrame) -> tuple[Array, Array, Array]:
+    angles, force, moved = (loads[names].to_numpy(dtype=float) for names in (ANGLES, LOAD_FORCE, MOVED))
+    return angles * DEG, force, moved * MM
+
+
+def _load_block(pose: str, loads: pd.DataFrame, sigma: float) -> Block:
+    joints, force, moved = _load_arrays(loads)
+    measured = np.isfinite(moved)
+    axis = np.broadcast_to(["load x", "load y", "load z"], moved.shape)[measured]
+    name = f"load tests {pose}"
+    return _evidence(
+        name, moved[measured], np.full(int(measured.sum()), sigma), LoadTest(joints, force, measured), axis
+    )
+
+
+def _known_block(joints: np.ndarray, value: Array, sd: Array) -> Block:
+    axis = np.array([f"joint {i + 1}" for i in joints])
+    return _evidence("known joints", value, sd, KnownJoints(joints), axis)
+
+
+def _evidence(
+    name: str, measured: Array, sigma: Array, setting: LoadTest | KnownJoints, axis: np.ndarray
+) -> Block:
+    """Return a block that calibrates: no cut, no zero, never compared."""
+    zeros = np.zeros((len(measured), 0))
+    return Block(name, name, "calibrate", 0, measured, sigma, setting, axis, zeros, np.zeros(0), {})

@@ -1,0 +1,177 @@
+"""Stability: modes from impact tests, the lobes that follow, and the probability that a run chatters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.observables import stability
+from metro.observables.modal_test import Read, observe_modes
+from metro.observables.problem import Refusal
+from metro.observables.quantity import quantity
+from metro.units import JSON, MM, Array
+
+OBSERVABLE = "lobes"
+_COLUMNS = ("position", "rpm", "depth_mm", "depth_lo_mm", "depth_hi_mm", "chatter_hz", "kind")
+_RUN_COLUMNS = ("run", "position", "rpm", "depth_mm", "boundary_mm", "unstable", "probability_unstable")
+
+
+@dataclass(frozen=True)
+class LabelProblem:
+    """Tests that are stable or not, and the base model's probability that they are not.
+
+    Attributes
+    ----------
+    runs, conditions, roles : (n,) identity of the runs.
+    unstable : (n,) whether the run chattered.
+    rpm, depth : (n,) rev/min and m.
+    probability_unstable : (n,) of the base model.
+    notes : what was assumed or left out.
+    """
+
+    observable: str
+    runs: tuple[str, ...]
+    conditions: tuple[str, ...]
+    roles: tuple[str, ...]
+    unstable: np.ndarray
+    rpm: Array
+    depth: Array
+    probability_unstable: Array
+    notes: tuple[str, ...]
+
+
+def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
+    """Identify the modes of every position and solve the lobes of the cuts that were made there.
+
+    Tables ``modes``, ``frf_used``, ``lobes`` (diagram per position), ``lobe_runs`` (probability per run with
+    a depth), ``lobes_refused`` (reasons and notes).
+    """
+    modes, used, notes = observe_modes(read)
+    if modes.empty:
+        return Refusal("; ".join(notes) or "no impacts.csv: no hammer record and no FRF")
+    tables = {"modes": modes, "frf_used": used}
+    found = stability.cutting(batch, identified)
+    tips = stability.tips(modes, notes)
+    diagrams, runs, reason = [], [], ""
+    if isinstance(found, Refusal):
+        reason = found.reason
+    else:
+        notes += stability.assumptions(batch)
+        for rows, tip in stability.pairs(batch, tips, notes):
+            cuts = sorted(stability.same_cut(rows), key=len, reverse=True)
+            for place, same in enumerate(cuts):
+                # one boundary per position: of the cut that most of its runs share
+                diagram, at_runs = stability.diagram(batch, found, tip, same, whole=place == 0)
+                runs.append(at_runs)
+                diagrams += [diagram] if place == 0 and len(diagram) else []
+    reason = reason or ("" if diagrams else "no run with a depth of cut at a position whose modes are known")
+    tables["lobes"] = (
+        pd.concat(diagrams, ignore_index=True) if diagrams else pd.DataFrame(columns=list(_COLUMNS))
+    )
+    tables["lobe_runs"] = (
+        pd.concat(runs, ignore_index=True) if runs else pd.DataFrame(columns=list(_RUN_COLUMNS))
+    )
+    said = [("refusal", reason)] if reason else []
+    tables["lobes_refused"] = pd.DataFrame(
+        [*said, *(("note", n) for n in notes)], columns=["kind", "reason"], dtype=str
+    )
+    return tables
+
+
+def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON) -> LabelProblem | Refusal:
+    """Return the labelled runs with their predicted probabilities."""
+    if "lobe_runs" not in observed:
+        return Refusal((identified.get("not_identified") or {}).get(OBSERVABLE, "no impacts.csv: no modes"))
+    said = observed["lobes_refused"]
+    refusals = said["reason"][said["kind"] == "refusal"]
+    if len(refusals):
+        return Refusal(str(refusals.iloc[0]))
+    rows = observed["lobe_runs"]
+    rows = rows[rows["unstable"] >= 0]
+    if rows.empty:
+        return Refusal("no run of runs.csv says whether it was stable")
+    table = batch.runs.loc[rows["run"]]
+    return LabelProblem(
+        OBSERVABLE,
+        tuple(rows["run"]),
+        tuple(table["condition"].astype(str)),
+        tuple(table["role"].astype(str)),
+        rows["unstable"].to_numpy() > 0,
+        rows["rpm"].to_numpy(float),
+        rows["depth_mm"].to_numpy(float) * MM,
+        rows["probability_unstable"].to_numpy(float),
+        tuple(said["reason"][said["kind"] == "note"]),
+    )
+
+
+def comparison(problem: LabelProblem) -> pd.DataFrame:
+    """Rows of the comparison table: measured 1 = unstable, before and after the probability of that."""
+    held = np.array([role == "validate" for role in problem.roles], dtype=bool)
+    probability = problem.probability_unstable[held]
+    return pd.DataFrame(
+        {
+            "observable": OBSERVABLE,
+            "run": np.array(problem.runs, dtype=object)[held],
+            **dict.fromkeys(("axis", "t_s", "angle_deg", "s_mm", "x_mm", "y_mm")),
+            "measured": problem.unstable[held].astype(float),
+            "before": probability,
+            "after": probability,
+            "sigma": None,
+            "unit": "1",
+        },
+        index=range(int(held.sum())),
+    )
+
+
+def report(
+    batch: Batch,
+    observed: Mapping[str, pd.DataFrame],
+    _identified: JSON,
+    _problem: LabelProblem | Refusal,
+    _fit: object,
+) -> JSON:
+    """Blocks ``modes`` and ``lobes`` of identified.json."""
+    modes = [
+        {
+            "position": _number(row["position"]),
+            "direction": row["direction"],
+            "frequency": quantity(row["frequency_hz"], row["frequency_sd_hz"], "Hz"),
+            "damping": quantity(row["damping"], row["damping_sd"], "1"),
+            "stiffness": quantity(row["stiffness_n_m"], row["stiffness_sd"], "N/m"),
+            "mass": quantity(row["mass_kg"], _mass_sd(row), "kg"),
+        }
+        for _, row in observed["modes"].iterrows()
+    ]
+    lobes = [
+        {
+            "position": _number(position),
+            "boundary": f"data/processed/{batch.name}/lobes.parquet",
+            "lowest_mm": _lowest(rows),
+        }
+        for position, rows in observed["lobes"].groupby("position", sort=False)
+    ]
+    return {"modes": modes, "lobes": lobes} if lobes else {"modes": modes}
+
+
+def _number(position: object) -> int | str:
+    """Positions that are numbers are written as numbers, as in the contract."""
+    text = str(position)
+    return int(text) if text.isdigit() else text
+
+
+def _mass_sd(row: pd.Series) -> float:
+    relative = math.hypot(
+        row["stiffness_sd"] / row["stiffness_n_m"], 2 * row["frequency_sd_hz"] / row["frequency_hz"]
+    )
+    return float(row["mass_kg"] * relative)
+
+
+def _lowest(rows: pd.DataFrame) -> JSON:
+    best = rows.iloc[int(rows["depth_mm"].argmin())]
+    interval = [float(best["depth_lo_mm"]), float(best["depth_hi_mm"])]
+    return {"value": float(best["depth_mm"]), "ci95": interval, "unit": "mm"}

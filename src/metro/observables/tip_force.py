@@ -1,0 +1,172 @@
+"""The force on the tip along the path: from joint torques, else a dynamometer, else the cutting law."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.observables import cutting_force
+from metro.observables.problem import Refusal
+from metro.observables.wall import Wall
+from metro.robot.kinematics import Arm
+from metro.robot.sensorless import LEAST_INDEX, observability, tip_force
+from metro.robot.statics import tip_jacobian
+from metro.signals import align, kalman, steady
+from metro.units import DEG, JSON, MM, Array
+
+Read = Callable[..., pd.DataFrame]
+JOINTS = range(1, 7)
+SET = [f"q{i}_set_deg" for i in JOINTS]
+ACTUAL = [f"q{i}_deg" for i in JOINTS]
+TORQUE = [f"tau{i}_nm" for i in JOINTS]
+FORCE = ["fx_n", "fy_n", "fz_n"]
+BIN = 1 * MM
+LEAST_BINS = 5
+ITERATIONS = 6
+LEAST_NOISE = 1e-3  # N m: a log that is written to fewer digits than it has noise
+
+# Relative error that all runs may share, by where the force comes from: friction that is not that of the idle
+# run; the dynamometer's calibration; a radial depth that is not the nominal one because the tool yields.
+SYSTEMATIC = {"torque": 0.05, "dynamometer": 0.01, "coefficients": 0.03}
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """The moving part of a robot log: joint angles (n, 6) rad, torques (n, 6) N m, commanded tip (n, 3) m."""
+
+    commanded: Array
+    actual: Array
+    torque: Array
+    tip: Array
+
+
+def logs(table: pd.DataFrame, arm: Arm) -> tuple[Log, Log]:
+    """Return the log of the cut and that of the idle run, either of them empty where there is none."""
+    idle = (table["log"] == "idle").to_numpy()
+    return _log(table[~idle], arm), _log(table[idle], arm)
+
+
+def _log(table: pd.DataFrame, arm: Arm) -> Log:
+    commanded = table[SET].to_numpy(dtype=float) * DEG
+    tip = arm.tip(commanded)
+    moves = align.moving(tip) if len(tip) > 2 else np.zeros(len(tip), dtype=bool)
+    actual, torque = table[ACTUAL].to_numpy(dtype=float) * DEG, table[TORQUE].to_numpy(dtype=float)
+    return Log(commanded[moves], actual[moves], torque[moves], tip[moves])
+
+
+def from_torques(
+    cut: Log, idle: Log, arm: Arm, wall: Wall
+) -> tuple[pd.DataFrame | Refusal, pd.DataFrame | None]:
+    """Force along the path from the torques of the cut less those of the idle run, and observability.
+
+    Returns
+    -------
+    tuple
+        The force, ``s_mm, x_mm, fx_n … sd_fz_n, condition_number`` per bin, or why there is none; and as far
+        as the logs could be aligned ``joint, index, used, noise_nm, drift_nm`` per joint.
+    """
+    if not len(cut.tip) or not len(idle.tip):
+        return Refusal(f"no {'idle_log' if len(cut.tip) else 'robot_log'}"), None
+    step = float(np.median(np.linalg.norm(np.diff(cut.tip, axis=0), axis=1)))
+    places = [align.along_path(log.tip, cut.tip) for log in (cut, idle)]
+    channels = [
+        np.column_stack([log.torque, log.commanded, log.tip @ wall.along - wall.start]) for log in (cut, idle)
+    ]
+    try:
+        pair = align.align(places[0], channels[0], places[1], channels[1], max(BIN, 3 * step))
+    except ValueError as error:
+        return Refusal(str(error)), None
+    x, joints = pair.first[:, 12], pair.first[:, 6:12]
+    working = wall.steady(x)
+    if working.sum() < LEAST_BINS:
+        return Refusal(
+            f"the logs hold {int(working.sum())} mm of the cut; at least {LEAST_BINS} are needed"
+        ), None
+    difference, idling = pair.first[:, :6] - pair.second[:, :6], pair.second[:, :6]
+    noise = np.maximum(2.0 * kalman.noise_variance(idling), LEAST_NOISE**2)
+    drift = kalman.likeliest_drift(difference, noise)
+    level, variance = kalman.smooth(difference, noise, drift)
+    index = observability(difference[working], idling[working])
+    per_joint = pd.DataFrame(
+        {
+            "joint": list(JOINTS),
+            "index": index,
+            "used": index >= LEAST_INDEX,
+            "noise_nm": np.sqrt(noise),
+            "drift_nm": np.sqrt(drift),
+        }
+    )
+    try:
+        found = tip_force(level, variance, tip_jacobian(arm, joints), index)
+    except ValueError as error:
+        return Refusal(str(error)), per_joint
+    sd = np.sqrt(np.einsum("maa->ma", found.covariance))
+    return _table(pair.s, x, found.force, sd, found.condition), per_joint
+
+
+def from_dynamometer(batch: Batch, run: str, record: pd.DataFrame, wall: Wall) -> pd.DataFrame | Refusal:
+    """Mean force of the steady cut, about the zero of the air where there is any; constant along the wall."""
+    row: Any = batch.runs.loc[run]
+    signal, time = record[FORCE].to_numpy(dtype=float), record["t_s"].to_numpy(dtype=float)
+    if len(time) < 2:
+        return Refusal("no dynamometer record")
+    rate = (len(time) - 1) / (time[-1] - time[0])
+    teeth = (batch.manifest.get("tool") or {}).get("teeth", 1)
+    feed = row["feed_per_tooth_mm"] * MM * teeth * row["spindle_rpm"] / 60.0
+    try:
+        found = steady.segments(signal, rate * 60.0 / row["spindle_rpm"], round(rate * wall.leaving / feed))
+    except ValueError as error:
+        return Refusal(str(error))
+    zero = signal[found.air].mean(axis=0) if found.air.any() else np.zeros(3)
+    cut = signal[found.steady]
+    return _constant(
+        cut.mean(axis=0) - zero, cut.std(axis=0) / math.sqrt(len(cut) * 60.0 / row["spindle_rpm"]), wall
+    )
+
+
+def from_coefficients(
+    batch: Batch, run: str, identified: JSON, wall: Wall, give: Callable[[Array], float]
+) -> pd.DataFrame | Refusal:
+    """Mean force by the cutting law, constant along the wall.
+
+    A tool that yields cuts less: the radial depth is the nominal one less ``give(force)``, how far (m) the
+    wall stands
+    proud under a force (3,) N, by fixed-point iteration (it converges as the give is a small part of the
+    depth).
+    """
+    values = cutting_force.coefficients(batch, identified)
+    if isinstance(values, Refusal):
+        return values
+    try:
+        force = cutting_force.mean_force_on_tool(batch, run, values)
+        for _ in range(ITERATIONS):
+            force = cutting_force.mean_force_on_tool(_shallower(batch, run, give(force)), run, values)
+    except ValueError as error:
+        return Refusal(str(error))
+    return _constant(force, SYSTEMATIC["coefficients"] * np.abs(force), wall)
+
+
+def _shallower(batch: Batch, run: str, give: float) -> Batch:
+    """Return the batch with the radial depth of a run lowered by ``give`` (m), to a tenth at least."""
+    depth = batch.runs["radial_depth_mm"].astype(float)
+    lowered = (depth - give / MM).clip(lower=0.1 * depth)
+    depth = depth.where(depth.index != run, lowered)
+    return replace(batch, runs=batch.runs.assign(radial_depth_mm=depth))
+
+
+def _constant(force: Array, sd: Array, wall: Wall) -> pd.DataFrame:
+    end = wall.length - wall.leaving if math.isfinite(wall.length) else 1.0
+    x = np.array([0.0, end])
+    return _table(x, x, np.tile(force, (2, 1)), np.tile(sd, (2, 1)), np.full(2, np.nan))
+
+
+def _table(s: Array, x: Array, force: Array, sd: Array, condition: Array) -> pd.DataFrame:
+    columns = {"s_mm": s / MM, "x_mm": x / MM, **dict(zip(FORCE, force.T, strict=True))}
+    columns |= {f"sd_{name}": values for name, values in zip(FORCE, sd.T, strict=True)}
+    return pd.DataFrame({**columns, "condition_number": condition})

@@ -1,0 +1,1 @@
+"""Figures, report templates and the campaign summary."""

@@ -1,0 +1,29 @@
+"""The report of one batch: its sections in their order."""
+
+from __future__ import annotations
+
+from metro import __version__
+from metro.report.document import Cover, compile_pdf
+from metro.report.results import Results
+from metro.report.sections.comparison import comparison
+from metro.report.sections.identification import identification
+from metro.report.sections.loop import loop
+from metro.report.sections.provenance import provenance
+from metro.report.sections.published import published
+from metro.report.sections.quality import quality
+from metro.report.sections.verdict import summary
+
+
+def batch_report(results: Results) -> bytes:
+    """Return the report as a PDF; the same bytes for the same results."""
+    sections = [
+        summary(results),
+        quality(results),
+        published(results),
+        identification(results),
+        comparison(results),
+        loop(results),
+        provenance(results),
+    ]
+    cover = Cover(results.title, results.batch.name, f"metro {__version__}")
+    return compile_pdf(cover, [section for section in sections if section is not None])

@@ -1,0 +1,164 @@
+"""The campaign: all batches in one table and one PDF."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pandas as pd
+
+from metro import __version__
+from metro.report.content import Bullets, Item, Paragraph, Picture, Section, Table
+from metro.report.document import Cover, compile_pdf
+from metro.report.figures import verdicts as figures
+from metro.report.numbers import listing, number, unit, words
+from metro.report.results import OBSERVABLES, title
+from metro.report.sections.verdict import STATUS, change, effect_words, error_text
+from metro.units import JSON
+
+PER_FIGURE = 24
+TEXT = (
+    "batch",
+    "observable",
+    "status",
+    "unit",
+    "effects",
+    "parameters",
+    "rivals",
+    "unexplained",
+    "next_experiment",
+)
+NUMBERS = (
+    *("noise_floor", "before_rms", "before_lo", "before_hi", "before_nrmse"),
+    *("after_rms", "after_lo", "after_hi", "after_nrmse"),
+)
+
+
+def campaign_table(verdicts: Mapping[str, JSON]) -> pd.DataFrame:
+    """Return one row per batch and observable: status, errors before and after with intervals, effects.
+
+    Parameters
+    ----------
+    verdicts : content of ``verdict.json`` by batch.
+    """
+    rows = [_row(batch, name, entry) for batch, name, entry in _entries(verdicts)]
+    table = pd.DataFrame(rows, columns=[*TEXT[:4], *NUMBERS, *TEXT[4:]])
+    return table.astype({**dict.fromkeys(TEXT, str), **dict.fromkeys(NUMBERS, float)})
+
+
+def campaign_report(verdicts: Mapping[str, JSON], identified: Mapping[str, JSON]) -> bytes:
+    """Return the campaign's summary as a PDF; the same bytes for the same results."""
+    entries = _entries(verdicts)
+    sections = [
+        Section(
+            "Verdicts", [Paragraph(_overview(verdicts), "verdict"), *_verdicts(entries), *_pictures(entries)]
+        ),
+        Section("What could not be told", _untold(entries, identified)),
+    ]
+    nexts = [f"{b}, {title(n)}: {e['next_experiment']}" for b, n, e in entries if e.get("next_experiment")]
+    if nexts:
+        sections.append(Section("What to measure next", [Bullets(nexts)]))
+    return compile_pdf(
+        Cover("Campaign summary", f"{len(verdicts)} batches", f"metro {__version__}"), sections
+    )
+
+
+def _entries(verdicts: Mapping[str, JSON]) -> list[tuple[str, str, JSON]]:
+    order = {name: i for i, name in enumerate(OBSERVABLES)}
+    return [
+        (batch, name, entry)
+        for batch, verdict in sorted(verdicts.items())
+        for name, entry in sorted(
+            (verdict.get("observables") or {}).items(), key=lambda item: order.get(item[0], len(order))
+        )
+    ]
+
+
+def _row(batch: str, observable: str, entry: JSON) -> JSON:
+    effects = entry.get("effects") or []
+    rivals = [" or ".join(words(str(n)) for n in group) for group in entry.get("indistinguishable") or []]
+    row = {
+        "batch": batch,
+        "observable": observable,
+        "status": entry.get("status", ""),
+        "unit": entry.get("unit") or "",
+        "noise_floor": entry.get("noise_floor"),
+        "effects": ", ".join(str(e["effect"]) for e in effects),
+        "parameters": "; ".join(effect_words(e) for e in effects),
+        "rivals": "; ".join(rivals),
+        "unexplained": str((entry.get("unexplained") or {}).get("signature") or ""),
+        "next_experiment": entry.get("next_experiment") or "",
+    }
+    for when in ("before", "after"):
+        error = entry.get(when) or {}
+        low, high = error.get("ci95") or (None, None)
+        values = {"rms": error.get("rms"), "lo": low, "hi": high, "nrmse": error.get("nrmse")}
+        row |= {f"{when}_{key}": value for key, value in values.items()}
+    return row
+
+
+def _overview(verdicts: Mapping[str, JSON]) -> str:
+    counts: dict[str, int] = {}
+    for _, _, entry in _entries(verdicts):
+        name = STATUS.get(str(entry.get("status")), "other")
+        counts[name] = counts.get(name, 0) + 1
+    silent = [batch for batch, verdict in sorted(verdicts.items()) if not verdict.get("observables")]
+    total = sum(counts.values())
+    text = f"{len(verdicts)} batches, {total} verdicts"
+    text += f": {listing([f'{n} {name}' for name, n in counts.items()])}." if counts else "."
+    return text + (f" Nothing could be compared in {listing(silent)}." if silent else "")
+
+
+def _verdicts(entries: list[tuple[str, str, JSON]]) -> list[Item]:
+    rows = [
+        [
+            batch,
+            title(name),
+            STATUS.get(str(entry.get("status")), "–"),
+            error_text(entry.get("before"), None),
+            error_text(entry.get("after"), None),
+            unit(entry.get("unit")) or "1",
+            number(entry.get("noise_floor")),
+            "; ".join(effect_words(e) for e in entry.get("effects") or []) or "none",
+        ]
+        for batch, name, entry in entries
+    ]
+    header = ["batch", "observable", "verdict", "before", "after", "unit", "noise", "effects added"]
+    caption = (
+        "Errors on held-out runs (rms, with 95 % intervals) before and after the effects that were found."
+    )
+    return [Table(header, rows, caption, [1.5, 1.3, 1, 1.25, 1.25, 0.5, 0.75, 2.1])] if rows else []
+
+
+def _pictures(entries: list[tuple[str, str, JSON]]) -> list[Item]:
+    told = [c for b, n, e in entries if (c := change(f"{b}: {title(n)}", e)) is not None]
+    items: list[Item] = []
+    for start in range(0, len(told), PER_FIGURE):
+        part = told[start : start + PER_FIGURE]
+        alt = "; ".join(f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in part)
+        figure = figures.changes(part, "error on held-out runs (% of the signal)")
+        items.append(
+            Picture(figure, "Held-out error of every batch, with 95 % intervals and the noise floor.", alt)
+        )
+    return items
+
+
+def _untold(entries: list[tuple[str, str, JSON]], identified: Mapping[str, JSON]) -> list[Item]:
+    told = []
+    for batch, name, entry in entries:
+        row = _row(batch, name, entry)
+        if row["rivals"]:
+            told.append(f"{batch}, {title(name)}: {row['rivals']} cannot be told apart.")
+        if row["unexplained"]:
+            told.append(f"{batch}, {title(name)}: unexplained rest, {row['unexplained']}.")
+        if row["status"] == "insufficient":
+            told.append(f"{batch}, {title(name)}: too few runs to tell.")
+    missing = [
+        [batch, words(str(name)), str(reason)]
+        for batch, content in sorted(identified.items())
+        for name, reason in (content.get("not_identified") or {}).items()
+    ]
+    items: list[Item] = [Bullets(told)] if told else [Paragraph("Every residual was told.")]
+    if missing:
+        caption = "What was not identified, and why."
+        items.append(Table(["batch", "quantity", "reason"], missing, caption, [1.4, 1.2, 4]))
+    return items

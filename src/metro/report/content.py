@@ -1,0 +1,84 @@
+"""What a report is made of: sections of paragraphs, tables and figures. The template knows how they look."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """Running text. ``look``: ``plain``, ``verdict`` (set off, large), ``note`` (small), or ``warning``."""
+
+    text: str
+    look: str = "plain"
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """A list of sentences."""
+
+    items: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of strings.
+
+    Attributes
+    ----------
+    header : one title per column.
+    rows : strings, as many per row as the header has.
+    caption : one sentence.
+    widths : relative widths of the columns; 0 for "as wide as the text".
+    numeric : columns that are set flush right.
+    strong : rows that stand out.
+    small : set in small type (hashes, long lists).
+    """
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str
+    widths: Sequence[float] = ()
+    numeric: Sequence[int] = ()
+    strong: Sequence[int] = ()
+    small: bool = False
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure with its caption, and in words what it shows for those who do not see it."""
+
+    figure: Figure
+    caption: str
+    alt: str
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Key numbers, side by side: (label, value, remark)."""
+
+    items: Sequence[tuple[str, str, str]]
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading inside a section."""
+
+    text: str
+
+
+Item = Paragraph | Bullets | Table | Picture | Facts | Heading
+
+
+@dataclass(frozen=True)
+class Section:
+    """A titled part of the report; ``page`` starts it on a page of its own."""
+
+    title: str
+    items: Sequence[Item]
+    page: bool = False

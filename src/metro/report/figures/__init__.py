@@ -1,0 +1,1 @@
+"""Figures: small pure functions, a frame in and a matplotlib Figure out."""

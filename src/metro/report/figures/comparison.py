@@ -1,0 +1,216 @@
+"""Predicted against measured: overlay, residual and parity of one observable of comparison.parquet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from metro.report import style
+from metro.report.numbers import unit as shown_unit
+from metro.units import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COORDINATES = {
+    "angle_deg": "spindle angle (°)",
+    "s_mm": "path length (mm)",
+    "x_mm": "x (mm)",
+    "t_s": "time (s)",
+}
+ROWS, BINS, POINTS = 4, 60, 1200
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A column of predictions and how it is drawn, in every figure alike."""
+
+    column: str
+    colour: str
+    line: str
+    mark: str
+    label: str
+
+
+BEFORE = Prediction("before", style.BEFORE, "--", "x", "base model")
+AFTER = Prediction("after", style.AFTER, "-", "o", "with effects found")
+ONLY = Prediction("before", style.BEFORE, "--", "x", "base model (nothing added)")
+
+
+def predictions(frame: pd.DataFrame) -> tuple[Prediction, ...]:
+    """Return before and after, or the one of them where nothing was added."""
+    return (ONLY,) if np.allclose(frame["before"], frame["after"], rtol=1e-12, atol=0) else (BEFORE, AFTER)
+
+
+def overlay(frame: pd.DataFrame, title: str) -> Figure:
+    """Draw measured values with their 95 % band and the predictions: a panel per run and axis.
+
+    Of a quantity that repeats (force per revolution) the block in the middle of the record is drawn; of many
+    runs the first few, see :func:`shown_runs`.
+    """
+    panels = [(run, axis) for run in shown_runs(frame) for axis in axes_of(frame)]
+    columns = len(axes_of(frame)) if len(axes_of(frame)) > 1 else min(2, len(panels))
+    rows = -(-len(panels) // columns)
+    column, drawn = coordinate(frame), predictions(frame)
+    with style.style():
+        figure, grid = style.new_figure(
+            0.75 + 1.2 * rows, rows, columns, sharey="col" if len(axes_of(frame)) > 1 else "all"
+        )
+        flat = [axes for row in grid for axes in row]
+        for axes, (run, axis) in zip(flat, panels, strict=False):
+            part = _middle_block(frame[(frame["run"] == run) & (axis_labels(frame) == axis)])
+            _draw(axes, part.iloc[:: max(1, len(part) // POINTS)], column, drawn)
+            axes.set_title(f"{run}{f', {axis}' if axis else ''}", loc="left")
+        for axes in flat[len(panels) :]:
+            axes.set_visible(False)
+        for axes in flat[max(0, len(panels) - columns) : len(panels)]:
+            _abscissa(axes, column)
+        figure.supylabel(_label(title, frame), fontsize="medium")
+        style.legend_above(figure, flat[0])
+    return figure
+
+
+def _draw(axes: Axes, part: pd.DataFrame, column: str, drawn: tuple[Prediction, ...]) -> None:
+    part = part.sort_values(column, kind="stable") if column else part
+    x = _places(part, column)
+    measured, sigma = part["measured"].to_numpy(float), part["sigma"].to_numpy(float)
+    if np.isfinite(sigma).any():
+        band = (measured - 1.96 * sigma, measured + 1.96 * sigma)
+        axes.fill_between(x, *band, color=style.GREY, alpha=0.35, lw=0, label="measured, 95 % band")
+    axes.plot(
+        x, measured, color=style.MEASURED, lw=0.9, marker="." if len(part) <= 60 else "", label="measured"
+    )
+    for kind in drawn:
+        axes.plot(x, part[kind.column], color=kind.colour, ls=kind.line, label=kind.label)
+
+
+def residuals(frame: pd.DataFrame, title: str) -> Figure:
+    """Draw the residuals over the coordinate: median and 10–90 % band of all held-out runs."""
+    column, axes_names = coordinate(frame), axes_of(frame)
+    with style.style():
+        figure, (row,) = style.new_figure(1.95, 1, len(axes_names), sharey=True)
+        for axes, axis in zip(row, axes_names, strict=True):
+            part = frame[axis_labels(frame) == axis]
+            x = _places(part, column)
+            for kind in predictions(frame):
+                at, low, middle, high = _bands(x, (part["measured"] - part[kind.column]).to_numpy(float))
+                axes.fill_between(at, low, high, color=kind.colour, alpha=0.22, lw=0)
+                axes.plot(at, middle, color=kind.colour, ls=kind.line, label=kind.label)
+            axes.axhline(0, color=style.MEASURED, lw=0.6)
+            axes.set_title(axis or title, loc="left")
+            _abscissa(axes, column)
+        row[0].set_ylabel(_label("measured − predicted", frame))
+        style.legend_above(figure, row[0])
+    return figure
+
+
+def parity(frame: pd.DataFrame, title: str) -> Figure:
+    """Draw predicted over measured, and the distribution of the residuals beside that of the noise."""
+    thin = frame.sample(min(len(frame), POINTS), random_state=0)
+    with style.style():
+        figure, ((left, right),) = style.new_figure(2.2, 1, 2)
+        for kind in predictions(frame):
+            values = thin[kind.column]
+            left.scatter(
+                thin["measured"],
+                values,
+                s=7,
+                c=kind.colour,
+                marker=kind.mark,
+                lw=0.5,
+                alpha=0.6,
+                label=kind.label,
+            )
+        span = frame[["measured", "before", "after"]].to_numpy(float)
+        ends = [float(span.min()), float(span.max())]
+        left.plot(ends, ends, color=style.MEASURED, lw=0.7, label="equal")
+        left.set(
+            title="Parity", xlabel=_label(f"{title}, measured", frame), ylabel=_label("predicted", frame)
+        )
+        left.legend(loc="upper left", handletextpad=0.3, markerscale=2)
+        _histogram(right, frame)
+        right.set(
+            title="Residual", xlabel=_label("measured − predicted", frame), ylabel="share of values per bin"
+        )
+        right.legend(loc="upper right", handlelength=1.4)
+    return figure
+
+
+def _histogram(axes: Axes, frame: pd.DataFrame) -> None:
+    """Histograms of the residuals; above them room for the legend."""
+    drawn = predictions(frame)
+    rest = [(frame["measured"] - frame[kind.column]).to_numpy(float) for kind in drawn]
+    edge = max(float(np.quantile(np.abs(r), 0.995)) for r in rest) or 1.0
+    bins = np.linspace(-edge, edge, 1 + min(40, max(8, 2 * round(len(frame) ** 0.5))))
+    shares = [np.histogram(r, bins)[0] / len(frame) for r in rest]
+    for kind, share in zip(drawn, shares, strict=True):
+        axes.stairs(share, bins, color=kind.colour, ls=kind.line, lw=1.1, label=kind.label)
+    top = max(float(share.max()) for share in shares)
+    sigma = frame["sigma"].dropna().to_numpy(float)
+    if sigma.size and sigma.any():
+        at, sd = np.linspace(-edge, edge, 401), float(np.sqrt(np.mean(sigma**2)))
+        normal = np.exp(-0.5 * (at / sd) ** 2) / (sd * np.sqrt(2 * np.pi)) * (bins[1] - bins[0])
+        axes.plot(at, np.minimum(normal, 1.2 * top), color=style.GREY, lw=0.9, label="noise alone")
+    axes.set_ylim(0, 1.8 * top)
+
+
+def _places(part: pd.DataFrame, column: str) -> Array:
+    places: Array = part[column].to_numpy(float) if column else np.arange(1.0, len(part) + 1)
+    return places
+
+
+def _abscissa(axes: Axes, column: str) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    axes.set_xlabel(COORDINATES.get(column, "place in the table"))
+    if not column:
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def shown_runs(frame: pd.DataFrame) -> list[str]:
+    """Return the runs that the overlay shows: the first few in the order of the table."""
+    return [str(run) for run in frame["run"].drop_duplicates()][:ROWS]
+
+
+def axes_of(frame: pd.DataFrame) -> list[str]:
+    """Return the axes that occur, in alphabetical order; one empty name where the observable has none."""
+    return sorted(axis_labels(frame).unique())
+
+
+def axis_labels(frame: pd.DataFrame) -> pd.Series:
+    """Return the axis of each row as text, empty where it has none."""
+    return frame["axis"].fillna("").astype(str)
+
+
+def coordinate(frame: pd.DataFrame) -> str:
+    """Return the column that the rows are drawn over: the first that is given and varies; none: empty."""
+    for column in COORDINATES:
+        if frame[column].notna().all() and frame[column].nunique() > 1:
+            return column
+    return ""
+
+
+def _middle_block(part: pd.DataFrame) -> pd.DataFrame:
+    times = np.unique(part["t_s"].dropna())
+    if part["angle_deg"].isna().any() or times.size == 0:
+        return part
+    middle: pd.DataFrame = part[part["t_s"] == times[times.size // 2]]
+    return middle
+
+
+def _bands(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+    """Place and quantiles 0.1, 0.5, 0.9 of y in bins of x that hold anything."""
+    place = np.minimum((BINS * (x - x.min()) / (np.ptp(x) or 1.0)).astype(int), BINS - 1)
+    filled = np.unique(place)
+    at = np.array([x[place == p].mean() for p in filled])
+    low, middle, high = np.array([np.quantile(y[place == p], (0.1, 0.5, 0.9)) for p in filled]).T
+    return at, low, middle, high
+
+
+def _label(text: str, frame: pd.DataFrame) -> str:
+    unit = shown_unit(str(frame["unit"].iloc[0]))
+    return f"{text} ({unit})" if unit else text

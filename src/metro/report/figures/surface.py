@@ -1,0 +1,175 @@
+"""Faces and stability charts: what is drawn over a plane rather than along a line."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from metro.report import style
+from metro.report.figures.comparison import predictions
+from metro.report.numbers import unit as shown_unit
+from metro.units import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RUNS = 2
+
+
+def face_points(frame: pd.DataFrame) -> Figure:
+    """Draw deviations at path points: measured, and what is left by each prediction, one row per run.
+
+    Parameters
+    ----------
+    frame : rows of comparison.parquet of flatness, with ``x_mm`` and ``y_mm``.
+    """
+    runs = [str(run) for run in frame["run"].drop_duplicates()][:RUNS]
+    unit = shown_unit(str(frame["unit"].iloc[0]))
+    kinds = predictions(frame)
+    with style.style():
+        figure, grid = style.new_figure(
+            0.5 + 1.6 * len(runs), len(runs), 1 + len(kinds), sharex=True, sharey=True
+        )
+        for row, run in zip(grid, runs, strict=True):
+            part = frame[frame["run"] == run]
+            values = [part["measured"] - part["measured"].mean()]
+            values += [part["measured"] - part[kind.column] for kind in kinds]
+            limit = float(np.nanquantile(np.abs(np.array(values)), 0.99)) or 1.0
+            titles = [f"{run}: measured, less its mean", *(f"left by: {kind.label}" for kind in kinds)]
+            for axes, value, title in zip(row, values, titles, strict=True):
+                dots = axes.scatter(
+                    *(part["x_mm"], part["y_mm"]),
+                    c=value,
+                    s=9,
+                    marker="s",
+                    cmap=style.DIVERGING,
+                    vmin=-limit,
+                    vmax=limit,
+                )
+                axes.set_title(title, loc="left")
+            row[0].set_ylabel("y (mm)")
+            figure.colorbar(dots, ax=row, label=f"deviation ({unit})", fraction=0.03, pad=0.01)
+        for axes in grid[-1]:
+            axes.set_xlabel("x (mm)")
+    return figure
+
+
+def face_maps(frame: pd.DataFrame) -> Figure:
+    """Draw the deviation of whole faces from their least-squares planes.
+
+    Parameters
+    ----------
+    frame : ``face_map`` rows: ``run, x_mm, y_mm, deviation_um``.
+    """
+    runs = [str(run) for run in frame["run"].drop_duplicates()][: 3 * RUNS]
+    rows = -(-len(runs) // 2)
+    limit = float(np.nanquantile(np.abs(frame["deviation_um"]), 0.995)) or 1.0
+    shape = float(np.ptp(frame["y_mm"]) / (np.ptp(frame["x_mm"]) or 1.0))
+    with style.style():
+        figure, grid = style.new_figure(0.3 + rows * (0.6 + 2.6 * min(max(shape, 0.2), 1.2)), rows, 2)
+        flat = [axes for row in grid for axes in row]
+        for axes, run in zip(flat, runs, strict=False):
+            x, y, z = _raster(frame[frame["run"] == run])
+            image = axes.pcolormesh(
+                x, y, z, cmap=style.DIVERGING, vmin=-limit, vmax=limit, shading="nearest", rasterized=True
+            )
+            axes.set_title(run, loc="left")
+            axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
+            axes.grid(visible=False)
+        for axes in flat[len(runs) :]:
+            axes.set_visible(False)
+        figure.colorbar(image, ax=flat[: len(runs)], label="deviation (µm)", fraction=0.04, pad=0.02)
+    return figure
+
+
+def _raster(part: pd.DataFrame) -> tuple[Array, Array, Array]:
+    table = part.pivot_table(index="y_mm", columns="x_mm", values="deviation_um")
+    return table.columns.to_numpy(float), table.index.to_numpy(float), table.to_numpy(float)
+
+
+def lobes_chart(boundary: pd.DataFrame, tests: pd.DataFrame) -> Figure:
+    """Draw stability boundaries with their 95 % band, and the test cuts on them.
+
+    Parameters
+    ----------
+    boundary : ``position, rpm, depth_mm, depth_lo_mm, depth_hi_mm``.
+    tests : ``position, rpm, depth_mm, measured`` (1 = unstable), ``before``, ``after``; may be empty.
+    """
+    positions = list(boundary["position"].drop_duplicates())[:4]
+    columns = min(2, len(positions))
+    with style.style():
+        figure, grid = style.new_figure(
+            0.6 + 2.3 * -(-len(positions) // columns), -(-len(positions) // columns), columns
+        )
+        flat = [axes for row in grid for axes in row]
+        for axes, position in zip(flat, positions, strict=False):
+            line = boundary[boundary["position"] == position].sort_values("rpm")
+            axes.fill_between(
+                line["rpm"],
+                line["depth_lo_mm"],
+                line["depth_hi_mm"],
+                color=style.SKY,
+                alpha=0.35,
+                lw=0,
+                label="95 % band",
+            )
+            axes.plot(line["rpm"], line["depth_mm"], color=style.AFTER, label="stability boundary")
+            here = tests[tests["position"].astype(str) == str(position)]
+            for unstable, mark, label in ((0, "o", "stable cut"), (1, "X", "chatter")):
+                part = here[here["measured"].round() == unstable]
+                axes.scatter(
+                    part["rpm"],
+                    part["depth_mm"],
+                    marker=mark,
+                    s=28,
+                    c=style.BEFORE if unstable else style.GREEN,
+                    edgecolors="white",
+                    lw=0.5,
+                    zorder=3,
+                    label=label,
+                )
+            axes.set_title(f"position {position}", loc="left")
+            axes.set(xlabel="spindle speed (rpm)", ylabel="depth of cut (mm)")
+            axes.set_ylim(0, 1.15 * _top(line, here))
+        for axes in flat[len(positions) :]:
+            axes.set_visible(False)
+        style.legend_above(figure, flat[0])
+    return figure
+
+
+def _top(line: pd.DataFrame, tests: pd.DataFrame) -> float:
+    """Upper end of the depth axis: what the tests reach, and the lower lobes; not the peaks between them."""
+    depths = [2.5 * float(line["depth_mm"].min()), float(line["depth_mm"].median())]
+    return max([*depths, float(tests["depth_mm"].max())] if len(tests) else depths)
+
+
+def responses(frf: pd.DataFrame) -> Figure:
+    """Draw measured frequency responses and their modal reconstruction, magnitude over frequency.
+
+    Parameters
+    ----------
+    frf : ``position, reference, response, frequency_hz, measured_m_n, modal_m_n`` (magnitudes).
+    """
+    pairs = list(frf.groupby(["position", "reference", "response"], sort=False))[:6]
+    columns = min(2, len(pairs))
+    with style.style():
+        figure, grid = style.new_figure(
+            0.6 + 1.7 * -(-len(pairs) // columns), -(-len(pairs) // columns), columns, sharex=True
+        )
+        flat = [axes for row in grid for axes in row]
+        for axes, ((position, reference, response), part) in zip(flat, pairs, strict=False):
+            thin = part.iloc[:: max(1, len(part) // 800)]
+            axes.semilogy(
+                thin["frequency_hz"], thin["measured_m_n"], color=style.MEASURED, lw=0.8, label="measured"
+            )
+            axes.semilogy(
+                thin["frequency_hz"], thin["modal_m_n"], color=style.BEFORE, ls="--", label="modal model"
+            )
+            axes.set_title(f"position {position}: {reference} → {response}", loc="left")
+            axes.set(xlabel="frequency (Hz)", ylabel="receptance (m/N)")
+        for axes in flat[len(pairs) :]:
+            axes.set_visible(False)
+        style.legend_above(figure, flat[0])
+    return figure

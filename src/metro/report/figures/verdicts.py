@@ -1,0 +1,155 @@
+"""Before and after: of observables and batches, of runs; and what is left, by its signature."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from metro.report import style
+from metro.report.numbers import unit as shown_unit
+from metro.units import JSON
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PATTERNS = 16
+
+
+@dataclass(frozen=True)
+class Change:
+    """An error before and after, with 95 % intervals (low, high) or None, and the floor that noise sets."""
+
+    label: str
+    before: float
+    after: float
+    before_ci95: tuple[float, float] | None
+    after_ci95: tuple[float, float] | None
+    floor: float | None
+
+
+def changes(rows: Sequence[Change], xlabel: str) -> Figure:
+    """Draw a line from before to after for each row, with intervals and the noise floor."""
+    with style.style():
+        figure, ((axes,),) = style.new_figure(0.85 + 0.3 * len(rows))
+        y = np.arange(len(rows))[::-1]
+        for at, row in zip(y, rows, strict=True):
+            axes.plot([row.before, row.after], [at, at], color=style.GREY, lw=1.4, zorder=1)
+            if row.floor is not None:
+                axes.plot(
+                    [row.floor] * 2, [at - 0.32, at + 0.32], color=style.MEASURED, lw=1.1, label="noise floor"
+                )
+            _whisker(axes, at + 0.12, row.before_ci95, style.BEFORE)
+            _whisker(axes, at - 0.12, row.after_ci95, style.AFTER)
+        axes.scatter(
+            [r.before for r in rows], y + 0.12, c=style.BEFORE, marker="D", s=22, zorder=3, label="base model"
+        )
+        axes.scatter(
+            [r.after for r in rows], y - 0.12, c=style.AFTER, s=26, zorder=3, label="with effects found"
+        )
+        axes.set_yticks(y, [row.label for row in rows])
+        axes.set(xlabel=xlabel, ylim=(-0.6, len(rows) - 0.4), title="Held-out error, before and after")
+        axes.set_xlim(left=0)
+        axes.grid(visible=False, axis="y")
+        handles, labels = axes.get_legend_handles_labels()
+        unique = dict(zip(labels, handles, strict=True))
+        figure.legend(unique.values(), unique.keys(), loc="outside upper center", ncols=3)
+    return figure
+
+
+def _whisker(axes: Axes, at: float, ci95: tuple[float, float] | None, colour: str) -> None:
+    if ci95 is not None:
+        axes.plot(ci95, [at, at], color=colour, lw=1.2, solid_capstyle="butt", zorder=2)
+
+
+def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
+    """Draw each run's residual before and after: held-out runs full, identification runs hollow.
+
+    Parameters
+    ----------
+    blocks : ``{"run", "role", "order", "rms_before", "rms_after"}`` of ``loop.json``.
+    """
+    rows = [
+        b for b in blocks if b.get("role") in {"identify", "validate"} and b.get("rms_before") is not None
+    ]
+    rows = sorted(rows, key=lambda b: b.get("order") or 0)
+    x = np.arange(1, len(rows) + 1)
+    with style.style():
+        figure, ((axes,),) = style.new_figure(2.5)
+        changed = any(b.get("rms_after") not in {None, b["rms_before"]} for b in rows)
+        series = [
+            ("rms_before", style.BEFORE, "D", "base model"),
+            ("rms_after", style.AFTER, "o", "with effects"),
+        ]
+        for role, filled, words in (("identify", False, "identification"), ("validate", True, "held out")):
+            at = [i for i, b in enumerate(rows) if b["role"] == role]
+            for key, colour, mark, name in series[: 1 + changed] if at else []:
+                value = [float(v) if (v := rows[i].get(key)) is not None else np.nan for i in at]
+                face, label = (colour if filled else "white"), f"{name}, {words}"
+                axes.scatter(x[at], value, marker=mark, s=22, facecolors=face, edgecolors=colour, label=label)
+        if floor is not None:
+            axes.axhline(floor, color=style.MEASURED, lw=0.8, ls=":", label="noise floor")
+        axes.margins(y=0.12)
+        axes.set_ylim(bottom=0)
+        axes.set(
+            ylabel=f"rms residual ({shown_unit(unit)})" if shown_unit(unit) else "rms residual",
+            xlabel="run, in the order of cutting",
+        )
+        step = max(1, len(rows) // 24)
+        rotation = 90 if len(rows) > 10 or max((len(str(b["run"])) for b in rows), default=0) > 12 else 0
+        axes.set_xticks(x[::step], [str(b["run"]) for b in rows][::step], rotation=rotation)
+        handles, labels = axes.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    return figure
+
+
+def _largest(entries: Sequence[JSON]) -> list[str]:
+    """Labels of the largest entries, in their natural order (order 2 before order 10)."""
+    size: dict[str, float] = {}
+    for entry in entries:
+        label = str(entry["label"])
+        size[label] = max(size.get(label, 0.0), float(entry.get("amplitude") or 0.0))
+    chosen = sorted(size, key=lambda label: -size[label])[:PATTERNS]
+    return sorted(
+        chosen, key=lambda label: [int(x) if x.isdigit() else -1 for x in re.split(r"(\d+)", label)]
+    )
+
+
+def signature(entries: Sequence[JSON], unit: str) -> Figure:
+    """Draw what is left after the effects, by axis and pattern; full bars are significant.
+
+    Parameters
+    ----------
+    entries : ``{"axis", "label", "amplitude", "significant", "p_value"}`` of ``loop.json``.
+    """
+    axes_names = list(dict.fromkeys(str(e.get("axis") or "") for e in entries))
+    labels = _largest(entries)
+    with style.style():
+        figure, (row,) = style.new_figure(
+            1.1 + 0.2 * len(labels), 1, len(axes_names), sharey=True, sharex=True
+        )
+        for axes, axis in zip(row, axes_names, strict=True):
+            mine = {str(e["label"]): e for e in entries if str(e.get("axis") or "") == axis}
+            for i, label in enumerate(labels):
+                entry = mine.get(label)
+                if entry is None or entry.get("amplitude") is None:
+                    continue
+                full = bool(entry.get("significant"))
+                axes.barh(
+                    -i,
+                    entry["amplitude"],
+                    height=0.7,
+                    color=style.AFTER if full else "white",
+                    edgecolor=style.AFTER,
+                    lw=0.7,
+                )
+            axes.set_title(axis or "all axes", loc="left")
+            axes.set_xlabel(f"amplitude ({shown_unit(unit)})" if shown_unit(unit) else "amplitude")
+            axes.grid(visible=False, axis="y")
+        row[0].set_ylim(-len(labels) + 0.3, 0.7)
+        row[0].set_yticks([-i for i in range(len(labels))], labels)
+    return figure

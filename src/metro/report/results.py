@@ -1,0 +1,78 @@
+"""All that a report is written from: a batch's description, tables, and what the stages found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.units import JSON
+
+OBSERVABLES = ("force", "joint_force", "deformation", "waviness", "flatness", "lobes")
+TITLES = {
+    "force": "cutting force",
+    "joint_force": "tip force from joint torques",
+    "deformation": "deformation of the wall",
+    "waviness": "waviness of the wall",
+    "flatness": "flatness of the face",
+    "lobes": "stability",
+}
+
+
+@dataclass(frozen=True)
+class Results:
+    """What the stages before wrote about one batch.
+
+    Attributes
+    ----------
+    batch : its description.
+    tables : processed tables by name; a table that is absent or has no rows is not there.
+    identified, verdict, loop : content of the JSON files of the same names.
+    sources : SHA-256 by source file.
+    settings, code : settings of this stage, and the hash of its code.
+    """
+
+    batch: Batch
+    tables: Mapping[str, pd.DataFrame]
+    identified: JSON
+    verdict: JSON
+    loop: JSON
+    sources: Mapping[str, str] = field(default_factory=dict)
+    settings: JSON = field(default_factory=dict)
+    code: str = ""
+
+    @property
+    def title(self) -> str:
+        """The batch's title, or its name."""
+        return str(self.batch.manifest.get("title") or self.batch.name)
+
+    def verdicts(self) -> dict[str, JSON]:
+        """Verdict by observable, in the contract's order."""
+        found = self.verdict.get("observables") or {}
+        return {
+            name: found[name]
+            for name in [*OBSERVABLES, *sorted(set(found) - set(OBSERVABLES))]
+            if name in found
+        }
+
+    def told(self, observable: str) -> JSON:
+        """Return what the loop tells of an observable; empty where it tells nothing."""
+        entry: JSON = (self.loop.get("observables") or {}).get(observable) or {}
+        return entry
+
+    def compared(self, observable: str) -> pd.DataFrame | None:
+        """Rows of the comparison table of an observable that have a measured and a predicted value."""
+        table = self.tables.get("comparison")
+        if table is None:
+            return None
+        rows = table[
+            (table["observable"] == observable) & table["measured"].notna() & table["before"].notna()
+        ]
+        return None if rows.empty else rows.fillna({"after": rows["before"]}).reset_index(drop=True)
+
+
+def title(observable: str) -> str:
+    """Name of an observable as an engineer says it."""
+    return TITLES.get(observable, observable.replace("_", " "))

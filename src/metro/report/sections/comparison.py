@@ -1,0 +1,143 @@
+"""Predicted against measured on the held-out runs: every figure and number from comparison.parquet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from metro.report.content import Heading, Item, Paragraph, Picture, Section, Table
+from metro.report.figures import comparison as figures
+from metro.report.figures import surface
+from metro.report.numbers import listing, number, percent, probability, unit
+from metro.report.results import OBSERVABLES, Results, title
+
+LONGEST = 30
+FEWEST = 3  # values of a run along an axis that make a curve
+
+
+def comparison(results: Results) -> Section:
+    """Write for each observable overlay, residual, parity plot and the error of each run and axis."""
+    items: list[Item] = []
+    for observable in OBSERVABLES:
+        frame = results.compared(observable)
+        if frame is not None:
+            name = title(observable)
+            items.append(Heading(name[0].upper() + name[1:]))
+            items += _labels(results, frame) if observable == "lobes" else _values(frame, name)
+    if not items:
+        nothing = "No held-out run has both a measurement and a prediction: there is nothing to compare."
+        return Section("Predicted against measured", [Paragraph(nothing)])
+    return Section("Predicted against measured", items, page=True)
+
+
+def _values(frame: pd.DataFrame, name: str) -> list[Item]:
+    rms = {k: float(np.sqrt(np.mean((frame["measured"] - frame[k]) ** 2))) for k in ("before", "after")}
+    shown = unit(str(frame["unit"].iloc[0]))
+    words = f"rms residual {number(rms['before'])} {shown} before and {number(rms['after'])} {shown} after"
+    parity = Picture(
+        figures.parity(frame, name),
+        "Parity on held-out runs, and distribution of the residual beside the measurement noise alone.",
+        f"Scatter of predicted over measured {name} and histogram of both residuals; {words}.",
+    )
+    if frame.groupby(["run", figures.axis_labels(frame)]).size().max() < FEWEST:
+        return [errors(frame), parity]
+    return [errors(frame), *_curves(frame, name, words), parity]
+
+
+def _curves(frame: pd.DataFrame, name: str, words: str) -> list[Item]:
+    """Overlay, maps where there are places on a face, and residual."""
+    runs, shown = frame["run"].nunique(), figures.shown_runs(frame)
+    part = f" Runs {listing(shown)} of {runs}." if runs > len(shown) else ""
+    blocks = frame["angle_deg"].notna().all() and frame["t_s"].nunique() > 1
+    repeats = " One time block of each run is drawn." if blocks else ""
+    items: list[Item] = [
+        Picture(
+            figures.overlay(frame, name),
+            f"Measured {name}, base model, and model with the effects found, held-out runs.{part}{repeats}",
+            f"Measured and predicted {name} for {len(shown)} held-out runs; {words}.",
+        )
+    ]
+    if frame[["x_mm", "y_mm"]].notna().all().all():
+        items.append(
+            Picture(
+                surface.face_points(frame),
+                "Deviation at path points of the first held-out runs, and what each prediction leaves.",
+                f"Maps of measured deviation and of both residuals; {words}.",
+            )
+        )
+    residual = Picture(
+        figures.residuals(frame, name),
+        "Residual of all held-out runs: median and the band that holds 80 % of the values.",
+        f"Residual of the base model and of the model with effects; {words}.",
+    )
+    return [*items, residual]
+
+
+def errors(frame: pd.DataFrame) -> Table:
+    """Tabulate the rms of signal and residuals by run and axis."""
+    shown = unit(str(frame["unit"].iloc[0]))
+    rows = []
+    for (run, axis), part in frame.assign(axis=figures.axis_labels(frame)).groupby(
+        ["run", "axis"], sort=False
+    ):
+        measured = part["measured"].to_numpy(float)
+        before, after = (float(np.sqrt(np.mean((measured - part[k]) ** 2))) for k in ("before", "after"))
+        signal = float(np.sqrt(np.mean(measured**2)))
+        gain = percent(1 - after / before) if before > 0 and after != before else "–"
+        rows.append(
+            [str(run), str(axis) or "–", number(signal), number(before), number(after), gain, str(len(part))]
+        )
+    caption = f"Errors on held-out runs, rms{f' ({shown})' if shown else ''}."
+    if len(rows) > LONGEST:
+        caption += f" The first {LONGEST} of {len(rows)} rows; comparison.parquet has all."
+    header = ["run", "axis", "measured", "base model", "with effects", "gain", "values"]
+    return Table(header, rows[:LONGEST], caption, [2, 0.6, 1, 1, 1, 0.8, 0.8], numeric=[2, 3, 4, 5, 6])
+
+
+def _labels(results: Results, frame: pd.DataFrame) -> list[Item]:
+    tests = _tests(results, frame)
+    items: list[Item] = []
+    boundary = results.tables.get("lobes")
+    if boundary is not None:
+        right = {k: int(((frame[k] > 0.5) == (frame["measured"] > 0.5)).sum()) for k in ("before", "after")}
+        caption = (
+            f"Stability boundary and held-out test cuts. On the right side of it: {right['before']} of "
+            f"{len(frame)} with the base model, {right['after']} with the effects found."
+        )
+        items.append(Picture(surface.lobes_chart(boundary, tests), caption, caption))
+    rows = [
+        [
+            str(r["run"]),
+            number(r["rpm"]),
+            number(r["depth_mm"]),
+            "chatter" if r["measured"] > 0.5 else "stable",
+            probability(r["before"]),
+            probability(r["after"]),
+        ]
+        for _, r in tests.head(LONGEST).iterrows()
+    ]
+    header = [
+        "run",
+        "speed (rpm)",
+        "depth (mm)",
+        "found",
+        "P(chatter), base model",
+        "P(chatter), with effects",
+    ]
+    more = f" The first {LONGEST} of {len(tests)}." if len(tests) > LONGEST else ""
+    items.append(
+        Table(header, rows, f"Held-out test cuts.{more}", [1.4, 1, 1, 1, 1.4, 1.4], numeric=[1, 2, 4, 5])
+    )
+    return items
+
+
+def _tests(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
+    """Join the held-out labels to where they were cut."""
+    runs = results.batch.runs
+    at = runs.reindex(frame["run"])
+    position = at["pose"].astype(str).to_numpy() if "pose" in runs else [""] * len(frame)
+    return frame.assign(
+        position=position,
+        rpm=at["spindle_rpm"].to_numpy(float),
+        depth_mm=at["axial_depth_mm"].to_numpy(float),
+    )

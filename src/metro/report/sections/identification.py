@@ -1,0 +1,234 @@
+"""What was identified, with 95 % intervals, and what was not and why."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
+from metro.report.figures import surface as figures
+from metro.report.numbers import number, quantity, unit, words
+from metro.report.results import Results
+from metro.units import JSON
+
+COEFFICIENTS = {
+    "ktc": "K_tc", "krc": "K_rc", "kac": "K_ac", "kte": "K_te", "kre": "K_re", "kae": "K_ae",
+    "kfac": "K_Fac", "kfae": "K_Fae",
+}  # fmt: skip
+FORCE_SETS = {
+    "mean": "mean forces, identification runs",
+    "mean_all_runs": "mean forces, all runs",
+    "waveform": "waveform, identification runs",
+}
+FACES = {
+    "xm": "X_m", "xa": "X_a", "xg": "X_g", "fltt": "FLTt", "fltp": "FLTp", "fltv": "FLTv", "fltq": "FLTq",
+    "minimum_zone": "minimum zone", "xm_predicted": "X_m predicted", "points": "points",
+}  # fmt: skip
+RUN_BLOCKS = {
+    "clock_offset_s": "clock offset",
+    "tip_force": "tip force",
+    "deformation": "deformation",
+    "waviness": "waviness",
+    "observability": "observability of the joints",
+}
+LONGEST = 30
+
+
+def identification(results: Results) -> Section:
+    """Write every block of ``identified.json``, and the reasons why others are missing."""
+    found = results.identified
+    items: list[Item] = [
+        *_force(found.get("force") or {}),
+        *_modes(found.get("modes") or [], results.tables.get("frf_used")),
+        *_lobes(found.get("lobes") or []),
+        *_arm(found.get("arm") or {}),
+        *_tip(found.get("tip") or {}),
+        *_faces(found.get("faces") or {}, results.tables.get("face_map")),
+    ]
+    if not items:
+        items.append(Paragraph("Nothing could be identified from this batch."))
+    missing = _reasons(found)
+    if missing:
+        items.append(Heading("Not identified"))
+        items.append(Bullets([f"{name}: {reason.rstrip('.')}." for name, reason in missing.items()]))
+    return Section("Identification", items)
+
+
+def _reasons(found: JSON) -> dict[str, str]:
+    """Return why blocks, and parts of blocks, are missing, by name."""
+    own = {words(str(name)): str(reason) for name, reason in (found.get("not_identified") or {}).items()}
+    for block, content in found.items():
+        if isinstance(content, dict) and block != "not_identified":
+            parts = content.get("not_identified") or {}
+            own |= {
+                f"{words(block)}, {RUN_BLOCKS.get(name, words(name))}": str(reason)
+                for name, reason in parts.items()
+            }
+    return own
+
+
+def _force(force: JSON) -> list[Item]:
+    sets = {key: force[key] for key in FORCE_SETS if force.get(key)}
+    if not sets:
+        return []
+    names = [name for name in COEFFICIENTS if any(name in block for block in sets.values())]
+    rows = []
+    for name in names:
+        cells = [block.get(name) for block in sets.values()]
+        known = next(cell for cell in cells if cell)
+        rows.append(
+            [
+                COEFFICIENTS[name],
+                unit(known.get("unit")),
+                *(quantity(c, with_unit=False) if c else "–" for c in cells),
+            ]
+        )
+    edge = force.get("edge_length", "axial")
+    caption = f"Cutting coefficients with 95 % intervals; the edge terms count along the {edge} edge length."
+    header = ["coefficient", "unit", *(FORCE_SETS[key] for key in sets)]
+    items: list[Item] = [Heading("Cutting force"), Table(header, rows, caption, [1, 0.8, *([2] * len(sets))])]
+    speeds = force.get("spindle_rpm") or {}
+    if speeds:
+        items.append(_by_run(speeds, "spindle speed", "Spindle speed from each record."))
+    return items
+
+
+def _modes(modes: list[JSON], frf: pd.DataFrame | None) -> list[Item]:
+    if not modes:
+        return []
+    keys = [
+        ("frequency", "frequency (Hz)"),
+        ("damping", "damping ratio"),
+        ("stiffness", "stiffness (N/m)"),
+        ("mass", "mass (kg)"),
+    ]
+    rows = [
+        [
+            str(mode.get("position", "–")),
+            str(mode.get("direction", "–")),
+            *(quantity(mode[k], with_unit=False) if mode.get(k) else "–" for k, _ in keys),
+        ]
+        for mode in modes[:LONGEST]
+    ]
+    header = ["position", "direction", *(name for _, name in keys)]
+    caption = "Modes with 95 % intervals; the frequency is the undamped one." + _more(len(modes))
+    items: list[Item] = [Heading("Modes"), Table(header, rows, caption, [0.7, 0.8, 1.3, 1.5, 1.8, 1.4])]
+    drawn = None if frf is None else _magnitudes(frf)
+    if drawn is not None:
+        alt = f"Measured frequency responses ({len(drawn)} lines) with the modal model over them."
+        caption = "Measured frequency responses and what the modes reconstruct."
+        items.append(Picture(figures.responses(drawn), caption, alt))
+    return items
+
+
+def _magnitudes(frf: pd.DataFrame) -> pd.DataFrame | None:
+    """Magnitudes of measured and reconstructed receptance, where the table has both."""
+    pairs = {"measured_m_n": ("real_m_n", "imag_m_n"), "modal_m_n": ("modal_real_m_n", "modal_imag_m_n")}
+    if not {c for pair in pairs.values() for c in pair} <= set(frf.columns):
+        return None
+    return frf.assign(**{name: (frf[re] ** 2 + frf[im] ** 2) ** 0.5 for name, (re, im) in pairs.items()})
+
+
+def _lobes(lobes: list[JSON]) -> list[Item]:
+    if not lobes:
+        return []
+    rows = [[str(b.get("position", "–")), _cell(b.get("lowest_mm"), "mm")] for b in lobes]
+    return [
+        Heading("Stability"),
+        Table(["position", "lowest limit of the depth of cut"], rows, "Stability boundaries.", [1, 2]),
+    ]
+
+
+def _cell(value: Any, unit_name: str) -> str:
+    return quantity(value) if isinstance(value, dict) else f"{number(value)} {unit_name}"
+
+
+def _arm(arm: JSON) -> list[Item]:
+    items: list[Item] = []
+    joints = arm.get("joint_stiffness") or []
+    if joints:
+        rows = [[str(i), quantity(q, with_unit=False) if q else "–"] for i, q in enumerate(joints, start=1)]
+        items.append(
+            Table(["joint", "stiffness (N m/rad)"], rows, "Joint stiffness with 95 % intervals.", [1, 3])
+        )
+    for key, name in RUN_BLOCKS.items():
+        if arm.get(key):
+            items.append(_by_run(arm[key], name, f"{name.capitalize()}, run by run."))
+    return [Heading("Robot"), *items] if items else []
+
+
+def _tip(tip: JSON) -> list[Item]:
+    rows = [[words(name), quantity(q)] for name, q in tip.items() if isinstance(q, dict) and "value" in q]
+    return (
+        [
+            Heading("Damping at the tip"),
+            Table(["quantity", "value"], rows, "Proportional damping, C = a0 M + a1 K.", [1, 2]),
+        ]
+        if rows
+        else []
+    )
+
+
+def _faces(faces: JSON, face_map: pd.DataFrame | None) -> list[Item]:
+    if not faces:
+        return []
+    shown = {
+        run: {key: face[key] for key in FACES if face.get(key) is not None} for run, face in faces.items()
+    }
+    items: list[Item] = [
+        Heading("Faces"),
+        _by_run(shown, "face", "Flatness, with 95 % intervals where known."),
+    ]
+    told = {f"{words(k)}: {v}" for face in faces.values() for k, v in face.items() if isinstance(v, str)}
+    if told:
+        items.append(Paragraph("; ".join(sorted(told)) + ".", "note"))
+    if face_map is not None:
+        caption = "Deviation of the faces from their least-squares planes."
+        alt = f"Maps of the deviation of {face_map['run'].nunique()} faces."
+        items.append(Picture(figures.face_maps(face_map), caption, alt))
+    return items
+
+
+def _by_run(blocks: JSON, name: str, caption: str) -> Table:
+    """Tabulate ``{run: quantity}``, ``{run: {name: quantity}}`` or ``{run: [quantities]}``, a row per run."""
+    rows = {run: _flat(value, name) for run, value in blocks.items()}
+    columns = list(dict.fromkeys(key for row in rows.values() for key in row))
+    body = [
+        [str(run), *(row.get(column, "–") for column in columns)] for run, row in list(rows.items())[:LONGEST]
+    ]
+    return Table(
+        ["run", *columns],
+        body,
+        caption + _more(len(rows)),
+        [1, *([1.2] * len(columns))],
+        small=len(columns) > 5,
+    )
+
+
+def _flat(value: Any, name: str) -> dict[str, str]:
+    if isinstance(value, list):
+        return {f"joint {i}": _text(v) for i, v in enumerate(value, start=1)}
+    if isinstance(value, dict) and "value" not in value:
+        return {_column(k, v): _text(v) for k, v in value.items()}
+    return {_column(name, value): _text(value)}
+
+
+def _column(name: str, value: Any) -> str:
+    shown = unit(value.get("unit")) if isinstance(value, dict) else ""
+    title = FACES.get(name, words(name))
+    return f"{title} ({shown})" if shown else title
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, dict):
+        return quantity(value, with_unit=False)
+    return (
+        number(value)
+        if isinstance(value, int | float) and not isinstance(value, bool)
+        else str(value if value is not None else "–")
+    )
+
+
+def _more(count: int) -> str:
+    return f" The first {LONGEST} of {count} are shown; identified.json has all." if count > LONGEST else ""

@@ -1,0 +1,153 @@
+"""The closed loop: noise, what was tried and why not, what was added, what is left, what cannot be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
+from metro.report.figures import verdicts as figures
+from metro.report.numbers import number, percent, probability, quantity, unit, words
+from metro.report.results import Results, title
+from metro.report.sections.verdict import STATUS, error_text, parameter_name, sentence
+from metro.units import JSON
+
+LONGEST = 16
+
+
+def loop(results: Results) -> Section:
+    """Write the loop of each observable that has a verdict."""
+    items: list[Item] = []
+    for observable, entry in results.verdicts().items():
+        name = title(observable)
+        items.append(Heading(f"{name[0].upper()}{name[1:]}: {STATUS.get(str(entry.get('status')), '–')}"))
+        items += _observable(observable, entry, results.told(observable))
+    if not items:
+        nothing = "There was no residual to trace: no held-out run has both a measurement and a prediction."
+        return Section("The closed loop", [Paragraph(nothing)])
+    return Section("The closed loop", items, page=True)
+
+
+def _observable(observable: str, entry: JSON, told: JSON) -> list[Item]:
+    shown = entry.get("unit") or told.get("unit")
+    noise = told.get("noise") or {}
+    items: list[Item] = [Paragraph(str(told.get("words") or sentence(observable, entry)))]
+    if noise:
+        items.append(Paragraph(_noise_words(noise, shown)))
+    items += _added(entry)
+    items += _candidates(told.get("candidates") or entry.get("candidates") or [], shown)
+    items += _path(told.get("path") or [], entry, shown)
+    blocks = [b for b in told.get("blocks") or [] if b.get("rms_before") is not None]
+    if blocks:
+        alt = f"rms residual of {len(blocks)} runs before and after, in the order of cutting."
+        items.append(
+            Picture(
+                figures.runs(blocks, shown or "", noise.get("floor")),
+                "Residual of every run, in the order of cutting.",
+                alt,
+            )
+        )
+    return [*items, *_rest(entry, told, shown)]
+
+
+def _noise_words(noise: JSON, shown: str | None) -> str:
+    return f"Noise floor {number(noise.get('floor'))} {unit(shown)}. {noise.get('words') or ''}".strip()
+
+
+def _added(entry: JSON) -> list[Item]:
+    rows = [
+        [
+            words(str(effect["effect"])) if i == 0 else "",
+            parameter_name(name, value),
+            quantity(value),
+            probability(effect.get("probability")) if i == 0 else "",
+        ]
+        for effect in entry.get("effects") or []
+        for i, (name, value) in enumerate((effect.get("parameters") or {"": {"value": None}}).items())
+    ]
+    if not rows:
+        return []
+    header = ["effect added", "parameter", "value", "probability"]
+    return [
+        Table(header, rows, "Effects added to the model, with 95 % intervals.", [1.5, 1.5, 2, 1], numeric=[3])
+    ]
+
+
+def _candidates(candidates: list[JSON], shown: str | None) -> list[Item]:
+    if not candidates:
+        return []
+    keys = {key for c in candidates for key in c}
+    optional: list[tuple[str, str, Callable[[JSON], str]]] = [
+        ("p_value", "p", lambda c: probability(c.get("p_value"))),
+        ("q_value", "q", lambda c: probability(c.get("q_value"))),
+        ("held_out_gain", "held-out gain", lambda c: number(c.get("held_out_gain"), 2)),
+        ("held_out_rms", f"held-out rms ({unit(shown)})", lambda c: number(c.get("held_out_rms"))),
+        ("size", "size", lambda c: percent(c.get("size"))),
+        ("weight", "weight", lambda c: number(c.get("weight"), 2)),
+        ("probability", "probability", lambda c: probability(c.get("probability"))),
+    ]
+    columns = [(name, write) for key, name, write in optional if key in keys]
+    rows = [
+        [words(str(c["effect"])), *(write(c) for _, write in columns), _why(c)] for c in candidates[:LONGEST]
+    ]
+    strong = [i for i, c in enumerate(candidates[:LONGEST]) if c.get("verdict") == "added"]
+    header = ["effect tried", *(name for name, _ in columns), "outcome"]
+    caption = (
+        "Every candidate, refitted jointly with the base model. Gain: log-likelihood on conditions left out; "
+        "size: share of the signal that it changes."
+    )
+    numeric = list(range(1, len(columns) + 1))
+    return [Table(header, rows, caption, [1.6, *([0.8] * len(columns)), 2.6], numeric=numeric, strong=strong)]
+
+
+def _why(candidate: JSON) -> str:
+    verdict, why = candidate.get("verdict"), candidate.get("why_not")
+    return ": ".join(str(x) for x in (verdict, why) if x) or "–"
+
+
+def _path(path: list[JSON], entry: JSON, shown: str | None) -> list[Item]:
+    """Table of the model's growth: base, then each effect added, with the errors of each step."""
+    if len(path) < 2:
+        return []
+    rms = [("before_rms", "rms, identification runs"), ("held_out_rms", "rms, held-out runs")]
+    known = [(key, f"{name} ({unit(shown)})") for key, name in rms if any(step.get(key) for step in path)]
+    rows = [
+        [
+            " + ".join(["base model", *(words(str(e)) for e in step.get("added") or [])]),
+            *(number(step.get(key)) for key, _ in known),
+            percent(step.get("nrmse")),
+        ]
+        for step in path
+    ]
+    header = ["model", *(name for _, name in known), "of the signal"]
+    caption = f"How the model grew. Final held-out error {error_text(entry.get('after'), shown)}."
+    numeric = list(range(1, len(header)))
+    return [Table(header, rows, caption, [2.4, *([1.4] * len(known)), 1], numeric=numeric)]
+
+
+def _rest(entry: JSON, told: JSON, shown: str | None) -> list[Item]:
+    items: list[Item] = []
+    entries = [e for e in told.get("signature") or [] if e.get("amplitude") is not None]
+    if entries:
+        full = [f"{e.get('axis') or ''} {e['label']}".strip() for e in entries if e.get("significant")]
+        alt = "Significant: " + (", ".join(full[:6]) if full else "nothing") + "."
+        caption = "Signature of what is left, by axis and pattern; full bars are significant."
+        items.append(Picture(figures.signature(entries, shown or ""), caption, alt))
+    rest = entry.get("unexplained") or {}
+    if rest.get("signature"):
+        items.append(
+            Paragraph(
+                f"Unexplained: {number(rest.get('rms'))} {unit(shown)} rms, {rest['signature']}.", "warning"
+            )
+        )
+    groups = [" and ".join(words(str(n)) for n in group) for group in entry.get("indistinguishable") or []]
+    if groups:
+        items.append(Paragraph("Cannot be told apart with these data: " + "; ".join(groups) + "."))
+    hidden = [
+        f"{words(str(c['effect']))}: {c.get('why', '')}".rstrip(": ")
+        for c in told.get("cannot_be_seen") or []
+    ]
+    if hidden:
+        items += [Paragraph("Cannot be seen in this batch:"), Bullets(hidden)]
+    if entry.get("next_experiment"):
+        items.append(Paragraph(f"Measure next: {entry['next_experiment']}"))
+    return items

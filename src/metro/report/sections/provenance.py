@@ -1,0 +1,89 @@
+"""Where everything came from: hold-out plan, limits of the models, settings, code, source files."""
+
+from __future__ import annotations
+
+import json
+
+from metro import __version__
+from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
+from metro.report.numbers import listing
+from metro.report.results import Results, title
+
+LONGEST = 400
+LIMITS = {
+    "force": "The force model is mechanistic and linear in its coefficients: one edge force, one pressure, "
+    "no dependence on temperature or speed; the tool is rigid unless an effect says otherwise.",
+    "joint_force": "Tip forces come from motor torques above those of the idle run: friction that differs "
+    "between the two runs is read as force.",
+    "deformation": "The arm deforms at its joints alone, linearly; links, base and tool holder are rigid.",
+    "waviness": "Waviness is predicted from the tracking error of the joints; vibration faster than the "
+    "controller's log is not in it.",
+    "flatness": "The face is the static answer of the tip to the mean force at each path point; transients "
+    "at entry and exit are not in the base model.",
+    "lobes": "Stability is that of the linear delay equation with the identified modes; process damping and "
+    "modes that change with speed are not in the base model.",
+}
+
+
+def provenance(results: Results) -> Section:
+    """Write hold-out plan, limits of the models, settings, versions and the hash of every source file."""
+    return Section(
+        "Provenance", [*_plan(results), *_limits(results), *_code(results), *_sources(results)], page=True
+    )
+
+
+def _plan(results: Results) -> list[Item]:
+    plan = results.batch.plan
+    if not plan.get("identify") and not plan.get("validate"):
+        reason = str(plan.get("how") or "no run was recorded").rstrip(".")
+        printed = "; which printed rows were held out is said below" if results.verdicts() else ""
+        return [Heading("Hold-out plan"), Paragraph(f"No run was held out: {reason}{printed}.")]
+    rows = [
+        [words, _runs(plan.get(key) or [])]
+        for key, words in (("identify", "identification"), ("validate", "held out"))
+    ]
+    how = f"Made from the manifest before any signal was read: {plan.get('how', 'not stated')}"
+    seed = f" Seed {plan['seed']}." if plan.get("seed") is not None else ""
+    return [
+        Heading("Hold-out plan"),
+        Paragraph(how.rstrip(".") + "." + seed),
+        Table(["role", "runs"], rows, "Who identifies and who judges.", [1, 5]),
+    ]
+
+
+def _runs(names: list[str]) -> str:
+    return f"{len(names)}: {listing([str(n) for n in names])}" if names else "none"
+
+
+def _limits(results: Results) -> list[Item]:
+    notes = []
+    for observable in results.verdicts():
+        own = [str(note) for note in results.told(observable).get("notes") or []]
+        limit = [] if results.batch.manifest.get("source") == "published" else [LIMITS.get(observable, "")]
+        text = " ".join(note.rstrip(".") + "." for note in [*limit, *own] if note)
+        name = title(observable)
+        notes.append(f"{name[0].upper()}{name[1:]}: {text}")
+    return [Heading("Limits of the models"), Bullets(notes)] if notes else []
+
+
+def _code(results: Results) -> list[Item]:
+    rows = [
+        ["metro", __version__],
+        ["code of this stage", results.code or "–"],
+        ["batch", results.batch.name],
+    ]
+    rows += [[key, json.dumps(value, ensure_ascii=False)] for key, value in sorted(results.settings.items())]
+    return [
+        Heading("Code and settings"),
+        Table(["what", "value"], rows, "Versions and settings.", [1, 4], small=True),
+    ]
+
+
+def _sources(results: Results) -> list[Item]:
+    if not results.sources:
+        return [Heading("Source files"), Paragraph("The processed tables name no source files.")]
+    rows = [[name, digest] for name, digest in sorted(results.sources.items())[:LONGEST]]
+    caption = f"The {len(results.sources)} source files and their SHA-256."
+    if len(results.sources) > LONGEST:
+        caption += f" The first {LONGEST}; the Parquet tables' metadata hold all."
+    return [Heading("Source files"), Table(["file", "SHA-256"], rows, caption, [1, 1.35], small=True)]

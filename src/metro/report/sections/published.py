@@ -1,0 +1,152 @@
+"""Published tables: printed errors recomputed, errata, modal tables against themselves, load tests."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
+from metro.report.numbers import number, unit
+from metro.report.results import Results
+
+CONVENTION = {"measured": "(m − p)/m", "predicted": "(m − p)/p"}
+
+
+def published(results: Results) -> Section | None:
+    """Write what the printed tables say and whether it holds together; None for other batches."""
+    table = results.tables.get("published_errors")
+    if table is None:
+        return None
+    items: list[Item] = [*_errata(table)]
+    for name, rows in table.groupby("table", sort=False):
+        pairs = rows[rows["predicted"].notna()]
+        items += _pairs(str(name), pairs) if len(pairs) else []
+    items += _single(table[table["predicted"].isna()], results)
+    items += _modes(results.tables.get("published_modes"))
+    items += _loads(results.tables.get("published_loads"))
+    return Section("Published tables", items)
+
+
+def _errata(table: pd.DataFrame) -> list[Item]:
+    flagged = table[table["flag"].fillna("") != ""]
+    found = [f"Table {r['table']}, {r['row']}, {r['quantity']}: {r['flag']}." for _, r in flagged.iterrows()]
+    noted = table[table["note"].fillna("").str.contains("erratum: ")]
+    rest = noted[~noted.index.isin(flagged.index)]
+    texts = [f"Table {r['table']}: {str(r['note']).partition('erratum: ')[2]}." for _, r in rest.iterrows()]
+    stated = list(dict.fromkeys(texts))
+    if not found and not stated:
+        return [Paragraph("Every printed error follows from the printed values, within rounding.")]
+    return [Heading("Errata"), Bullets([*found, *stated])]
+
+
+def _pairs(name: str, pairs: pd.DataFrame) -> list[Item]:
+    clear = pairs["convention"][pairs["convention"].isin(list(CONVENTION))]
+    most = str(clear.mode().iloc[0]) if len(clear) else ""
+    fits = int(pairs["convention"].isin([most, "both"]).sum())
+    printed = int(pairs["printed_error_percent"].notna().sum())
+    says = f" Printed errors: {fits} of {printed} follow from {CONVENTION[most]}." if most else ""
+    columns = [_as_printed(pairs[c]) for c in ("measured", "predicted", "printed_error_percent")]
+    rows = [
+        [
+            str(r["row"]),
+            " ".join(filter(None, [str(r["quantity"]), str(r["axis"] or "") if pd.notna(r["axis"]) else ""])),
+            *(column[i] for column in columns),
+            number(r["of_measured_percent"], 4),
+            number(r["of_predicted_percent"], 4),
+        ]
+        for i, (_, r) in enumerate(pairs.iterrows())
+    ]
+    shown = unit(str(pairs["unit"].iloc[0]))
+    header = [
+        "row",
+        "quantity",
+        f"measured ({shown})",
+        f"predicted ({shown})",
+        "printed error (%)",
+        "(m − p)/m (%)",
+        "(m − p)/p (%)",
+    ]
+    strong = [i for i, flag in enumerate(pairs["flag"].fillna("")) if flag]
+    bold = " Rows in bold cannot be right as printed." if strong else ""
+    caption = f"Table {name}: printed pairs and recomputed errors.{says}{bold}"
+    return [Table(header, rows, caption, [1, 1.5, 1, 1, 1, 1, 1], numeric=[2, 3, 4, 5, 6], strong=strong)]
+
+
+def _single(rows: pd.DataFrame, results: Results) -> list[Item]:
+    """Tabulate printed values without a prediction that no other table of this section shows."""
+    derived = [t for n in ("published_modes", "published_loads") if (t := results.tables.get(n)) is not None]
+    elsewhere = {str(name) for t in derived for name in t["table"]}
+    rest = rows[~rows["table"].astype(str).isin(elsewhere)]
+    items: list[Item] = []
+    for name, part in rest.groupby("table", sort=False):
+        body = [
+            [
+                str(r["row"]),
+                str(r["quantity"]),
+                f"{r['measured']:.10g}",
+                unit(str(r["unit"])),
+            ]
+            for _, r in part.iterrows()
+        ]
+        items.append(
+            Table(
+                ["row", "quantity", "printed", "unit"],
+                body,
+                f"Table {name}: printed values.",
+                [1, 2, 1, 1],
+                numeric=[2],
+            )
+        )
+    return items
+
+
+def _as_printed(values: pd.Series) -> list[str]:
+    """Write values to the decimals of the most precise of them, as a printed column has them."""
+    decimals = max((len(f"{v:.10g}".partition(".")[2]) for v in values.dropna()), default=0)
+    return [f"{v:.{decimals}f}".replace("-", "−") if pd.notna(v) else "–" for v in values]
+
+
+def _modes(modes: pd.DataFrame | None) -> list[Item]:
+    if modes is None or modes.empty:
+        return []
+    rows = [
+        [
+            f"{r['axis']}, {r['row']}",
+            f"{r['printed_hz']:.4f}",
+            f"{r['undamped_hz']:.4f}",
+            f"{r['damped_hz']:.4f}",
+            str(r["agrees_with"]),
+        ]
+        for _, r in modes.sort_values(["axis", "row"], kind="stable").iterrows()
+    ]
+    header = ["mode", "printed (Hz)", "undamped (Hz)", "damped (Hz)", "the print is"]
+    caption = "Printed frequencies against those of the printed stiffness, mass and damping ratio."
+    return [Table(header, rows, caption, [1, 1, 1, 1, 1], numeric=[1, 2, 3])]
+
+
+def _loads(loads: pd.DataFrame | None) -> list[Item]:
+    if loads is None or loads.empty:
+        return []
+    rows = [
+        [
+            str(r["quantity"]),
+            str(r["axis"]),
+            number(r["load_n"]),
+            str(int(r["points"])),
+            number(r["compliance_um_n"]),
+            number(r["sd_um_n"], 2),
+        ]
+        for _, r in loads.sort_values(["axis", "load_n"], kind="stable").iterrows()
+    ]
+    header = [
+        "quantity",
+        "axis",
+        "load (N)",
+        "points",
+        "displacement over load (µm/N)",
+        "scatter over points",
+    ]
+    caption = (
+        "Compliance of the printed load tests. A linear structure has the same at every load; where it "
+        "differs, no one stiffness describes the machine."
+    )
+    return [Table(header, rows, caption, [2.6, 0.6, 0.8, 0.7, 1.5, 1.2], numeric=[2, 3, 4, 5])]

@@ -1,0 +1,269 @@
+"""The verdict in words that an engineer understands, and the first page."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from metro.report.content import Facts, Item, Paragraph, Picture, Section, Table
+from metro.report.figures import verdicts as figures
+from metro.report.figures.verdicts import Change
+from metro.report.numbers import listing, number, percent, quantity, unit, with_interval, words
+from metro.report.results import Results, title
+from metro.units import JSON
+
+STATUS = {
+    "clean": "clean",
+    "explained": "explained",
+    "partly_explained": "partly explained",
+    "undetermined": "undetermined",
+    "unexplained": "unexplained",
+    "insufficient": "insufficient data",
+}
+
+
+def sentence(observable: str, entry: JSON) -> str:
+    """Say the verdict on an observable in a few sentences, with its numbers."""
+    name, status = title(observable), str(entry.get("status"))
+    start = name[0].upper() + name[1:]
+    floor = entry.get("noise_floor")
+    noise = f" (noise floor {number(floor)}{_unit(entry)})" if floor is not None else ""
+    found = listing([effect_words(effect) for effect in entry.get("effects") or []])
+    says = {
+        "clean": f"{start}: the base model holds. What it leaves on held-out runs is within the "
+        f"noise{noise} or the declared accuracy of the model; nothing was added.",
+        "explained": f"{start}: the difference from the base model is traced to {found}. {_fall(entry)} "
+        f"What is left is within the noise{noise}.",
+        "partly_explained": f"{start}: part of the difference is traced to {found}. {_fall(entry)} "
+        f"A significant rest remains{noise}. {_rest(entry)}",
+        "undetermined": f"{start}: something is missing from the base model; these data cannot tell what. "
+        f"{_rivals(entry)}{_fall(entry)}",
+        "unexplained": f"{start}: the base model leaves a significant error{noise}, and no effect of the "
+        f"library accounts for it. {_rest(entry)}",
+        "insufficient": f"{start}: too few runs to tell. {_fall(entry)}",
+    }
+    return says.get(status, f"{start}: {words(status)}.").strip()
+
+
+def effect_words(effect: JSON) -> str:
+    """Name an effect with its parameters: tool runout (radius 9.80 ± 0.30 µm, angle 112.0 ± 3.0°)."""
+    told = [
+        f"{parameter_name(k, v)} {quantity(v)}".strip() for k, v in (effect.get("parameters") or {}).items()
+    ]
+    return f"{words(str(effect['effect']))} ({', '.join(told)})" if told else words(str(effect["effect"]))
+
+
+def parameter_name(name: str, entry: Any) -> str:
+    """Name of a parameter without the unit that its key ends in: radius_um → radius."""
+    if not isinstance(entry, dict):
+        return words(name)
+    tail = str(entry.get("unit") or "").replace("/", "_").replace(" ", "_").lower()
+    short = name[: -len(tail) - 1] if tail and name.lower().endswith("_" + tail) else name
+    return words(short)
+
+
+def error_text(error: JSON | None, unit_name: str | None) -> str:
+    """Write an error of the verdict: rms with its interval and unit."""
+    if not error or error.get("rms") is None:
+        return "–"
+    text = with_interval(error["rms"], error.get("ci95"))
+    shown = unit(unit_name)
+    return f"{text} {shown}" if shown else text
+
+
+def change(label: str, entry: JSON) -> Change | None:
+    """Errors relative to the signal (%), before and after, for the figures; None where they are not known."""
+    before, after = entry.get("before") or {}, entry.get("after") or {}
+    if before.get("nrmse") is None or after.get("nrmse") is None or _dimensionless(entry):
+        return None
+    scale = 100 * before["nrmse"] / before["rms"] if before.get("rms") else None
+    floor = entry.get("noise_floor")
+    return Change(
+        label,
+        100 * before["nrmse"],
+        100 * after["nrmse"],
+        _scaled(before),
+        _scaled(after),
+        floor * scale if floor is not None and scale is not None else None,
+    )
+
+
+def _scaled(error: JSON) -> tuple[float, float] | None:
+    ci95, rms = error.get("ci95"), error.get("rms")
+    if not ci95 or None in ci95 or not rms:
+        return None
+    scale = 100 * error["nrmse"] / rms
+    return scale * ci95[0], scale * ci95[1]
+
+
+def _dimensionless(entry: JSON) -> bool:
+    """Tell whether the value is a probability, whose error has no signal to be relative to."""
+    return entry.get("unit") == "1"
+
+
+def _unit(entry: JSON) -> str:
+    shown = unit(entry.get("unit"))
+    return f" {shown}" if shown else ""
+
+
+def _fall(entry: JSON) -> str:
+    before, after = entry.get("before") or {}, entry.get("after") or {}
+    if before.get("rms") is None or after.get("rms") is None:
+        return ""
+    runs = entry.get("held_out_runs") or []
+    where = (
+        f"On held-out {'run' if len(runs) == 1 else 'runs'} {listing([str(r) for r in runs])}"
+        if 0 < len(runs) <= 6
+        else (f"On {len(runs)} held-out runs" if runs else "On held-out runs")
+    )
+    old, new = error_text(before, entry.get("unit")), error_text(after, entry.get("unit"))
+    share_before, share_after = percent(before.get("nrmse")), percent(after.get("nrmse"))
+    if before["rms"] == after["rms"]:
+        share = "" if _dimensionless(entry) else f" ({share_before} of the signal)"
+        return f"{where} the error is {old}{share}."
+    share = "" if _dimensionless(entry) else f" ({share_before} → {share_after} of the signal)"
+    return f"{where} the error goes from {old} to {new}{share}."
+
+
+def _rest(entry: JSON) -> str:
+    rest = entry.get("unexplained") or {}
+    if not rest.get("signature"):
+        return ""
+    size = f" ({number(rest['rms'])}{_unit(entry)} rms)" if rest.get("rms") is not None else ""
+    return f"What is left{size}: {rest['signature']}."
+
+
+def _rivals(entry: JSON) -> str:
+    groups = [
+        " or ".join(words(str(name)) for name in group) for group in entry.get("indistinguishable") or []
+    ]
+    return f"It may be {'; or '.join(groups)}. " if groups else ""
+
+
+def summary(results: Results) -> Section:
+    """Write the first page: what was measured, the verdicts, the key numbers."""
+    items: list[Item] = [Paragraph(measured_words(results))]
+    verdicts = results.verdicts()
+    items += [Paragraph(sentence(name, entry), "verdict") for name, entry in verdicts.items()]
+    if not verdicts:
+        nothing = "No held-out measurement could be compared with a prediction in this batch: no verdict."
+        items.append(Paragraph(f"{nothing} {_identified_words(results.identified)}".strip(), "verdict"))
+    items += _print_check(results) + _key_numbers(verdicts)
+    told = [c for c in (change(title(name), entry) for name, entry in verdicts.items()) if c is not None]
+    if told:
+        items.append(
+            Picture(
+                figures.changes(told, "error on held-out runs (% of the signal)"),
+                "Error on held-out runs before and after what was found is added, with 95 % intervals.",
+                "; ".join(f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in told),
+            )
+        )
+    nexts = [f"{title(n)}: {e['next_experiment']}" for n, e in verdicts.items() if e.get("next_experiment")]
+    if nexts:
+        items.append(Paragraph("Measure next: " + "; ".join(nexts).rstrip(".") + "."))
+    return Section("Summary", items)
+
+
+def _identified_words(found: JSON) -> str:
+    """Name what was identified, for a batch that has nothing else to show."""
+    modes = len(found.get("modes") or [])
+    named = [
+        f"{modes} mode{'s' if modes > 1 else ''}" if modes else "",
+        "cutting coefficients" if found.get("force") else "",
+        "joint stiffness" if (found.get("arm") or {}).get("joint_stiffness") else "",
+        "flatness of faces" if found.get("faces") else "",
+    ]
+    told = listing([name for name in named if name])
+    return f"Identified: {told}." if told else ""
+
+
+def _print_check(results: Results) -> list[Item]:
+    """Say on the first page of a published batch what became of its printed errors."""
+    table = results.tables.get("published_errors")
+    if table is None:
+        return []
+    pairs, flagged = int(table["predicted"].notna().sum()), int((table["flag"].fillna("") != "").sum())
+    errata = int(table["note"].fillna("").str.contains("erratum: ").sum())
+    text = (
+        f"{len(table)} printed values were transcribed, {pairs} of them with a prediction beside them; "
+        f"every printed error was recomputed. {flagged} cannot be right as printed; {errata} have an erratum."
+    )
+    return [Paragraph(text)]
+
+
+def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
+    if len(verdicts) == 1:
+        ((_, entry),) = verdicts.items()
+        before, after = entry.get("before") or {}, entry.get("after") or {}
+        return [
+            Facts(
+                [
+                    (
+                        "verdict",
+                        STATUS.get(str(entry.get("status")), "–"),
+                        f"{len(entry.get('held_out_runs') or [])} held-out runs",
+                    ),
+                    (
+                        "error before",
+                        error_text(before, entry.get("unit")),
+                        f"{percent(before.get('nrmse'))} of the signal",
+                    ),
+                    (
+                        "error after",
+                        error_text(after, entry.get("unit")),
+                        f"{percent(after.get('nrmse'))} of the signal",
+                    ),
+                    (
+                        "noise floor",
+                        f"{number(entry.get('noise_floor'))}{_unit(entry)}",
+                        "rms of the compared value",
+                    ),
+                ]
+            )
+        ]
+    rows = [
+        [
+            title(name),
+            STATUS.get(str(entry.get("status")), "–"),
+            error_text(entry.get("before"), entry.get("unit")),
+            error_text(entry.get("after"), entry.get("unit")),
+            f"{number(entry.get('noise_floor'))}{_unit(entry)}",
+            listing([words(str(e["effect"])) for e in entry.get("effects") or []]) or "none",
+        ]
+        for name, entry in verdicts.items()
+    ]
+    header = ["observable", "verdict", "rms before", "rms after", "noise floor", "effects added"]
+    return (
+        [Table(header, rows, "Errors on held-out runs, with 95 % intervals.", [1.7, 1.1, 1.6, 1.6, 1.1, 1.4])]
+        if rows
+        else []
+    )
+
+
+def measured_words(results: Results) -> str:
+    """Say what the batch is and what was measured in it."""
+    manifest, runs = results.batch.manifest, results.batch.runs
+    origin = {"measured": "Measured on", "simulated": "Simulated for", "published": "Published values of"}
+    cell = results.batch.cell.get("cell", manifest.get("cell", "unknown"))
+    parts = [f"{origin.get(str(manifest.get('source')), 'Values of')} cell {cell}"]
+    tool, work = manifest.get("tool") or {}, manifest.get("work") or {}
+    if tool.get("diameter_mm"):
+        teeth = f", {tool['teeth']} teeth" if tool.get("teeth") else ""
+        parts.append(f"tool ⌀{tool['diameter_mm']} mm{teeth}")
+    if work.get("material"):
+        parts.append(f"work {work['material']}")
+    text = "; ".join(parts) + "." + _run_words(runs)
+    return f"{text} Source: {manifest['citation']}" if manifest.get("citation") else text
+
+
+def _run_words(runs: pd.DataFrame) -> str:
+    if runs.empty:
+        return ""
+    operations = listing([str(o) for o in runs["operation"].dropna().unique() if str(o)])
+    made = f" {len(runs)} cutting runs ({operations or 'operation not stated'})"
+    recorded = int(runs["role"].isin(["identify", "validate"]).sum())
+    held = int((runs["role"] == "validate").sum())
+    if not recorded:
+        return f"{made} were made; none of their records is in the batch."
+    return f"{made}, {recorded} recorded, {held} of them held out: no model saw those before it was judged."

@@ -1,0 +1,1 @@
+"""Kinematics, statics and stiffness of an arm; forces from joint torques."""

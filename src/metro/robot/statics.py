@@ -1,0 +1,76 @@
+"""Static forces and deflections of an arm whose joints are the springs (physics.md §4).
+
+A force on the tip acts on the flange as the wrench W f, with W = [I; [p]×] and p from the flange to the tip;
+the same W turned over gives what the tip moves when the flange does: δ_tip = Wᵀ δ_flange.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from metro.robot.kinematics import Arm, jacobian
+from metro.units import Array
+
+
+def wrench_map(lever: Array) -> Array:
+    """W = [I; [p]×], (..., 6, 3): the wrench at the flange of a unit force at the end of ``lever`` (..., 3).
+
+    From geometry, in whatever frame the lever is given. (Printed eq. 13 of [K] exchanges two rows' lever
+    arms.)
+    """
+    x, y, z = np.moveaxis(lever, -1, 0)
+    zero = 0 * x
+    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
+    identity = np.broadcast_to(np.eye(3), (*lever.shape[:-1], 3, 3))
+    return np.concatenate([identity, np.moveaxis(cross, (0, 1), (-2, -1))], axis=-2)
+
+
+def tip_jacobian(arm: Arm, q: Array) -> Array:
+    """Tip velocity in the work frame per joint rate, (..., 3, n), for ``q`` (..., n) in rad."""
+    in_base = np.swapaxes(wrench_map(arm.lever(q)), -1, -2) @ jacobian(arm.dh, q)
+    return np.asarray(arm.work[:3, :3].T @ in_base)
+
+
+def flange_jacobian(arm: Arm, q: Array) -> Array:
+    """Velocity of the flange's origin in the work frame per joint rate, (..., 3, n): a tip with no lever."""
+    return np.asarray(arm.work[:3, :3].T @ jacobian(arm.dh, q)[..., :3, :])
+
+
+def joint_torque(jacobian_at_tip: Array, force: Array) -> Array:
+    """Rise of the motor torques, N m, (..., n), that a force on the tip (..., 3) asks for: τ = −Jᵀ f.
+
+    The motors carry the reaction: a force that pushes the tool is seen with the opposite sign.
+    """
+    return np.asarray(-np.einsum("...ai,...a->...i", jacobian_at_tip, force))
+
+
+def joint_contributions(arm: Arm, q: Array, force: Array, *, flange_rotation: bool = True) -> Array:
+    """Return what each joint adds to the deflection of the tip under a force there, per unit of compliance.
+
+    The deflection is this times the compliances: δ = Σ_i c_i j_i (j_iᵀ f), j_i the columns of the tip's
+    Jacobian.
+
+    Parameters
+    ----------
+    q : (..., n) rad. force : (..., 3) N, work frame.
+    flange_rotation : False leaves out that the flange turns: the tip moves as the flange's origin does.
+
+    Returns
+    -------
+    Array
+        (..., 3, n), work frame, m per rad/(N m).
+    """
+    at_tip = tip_jacobian(arm, q)
+    moved = at_tip if flange_rotation else flange_jacobian(arm, q)
+    return moved * -joint_torque(at_tip, force)[..., None, :]
+
+
+def tip_compliance(arm: Arm, q: Array, compliance: Array, *, flange_rotation: bool = True) -> Array:
+    """Compliance of the tip, m/N, (..., 3, 3), work frame, from joint compliances (n,) in rad/(N m).
+
+    Symmetric with ``flange_rotation``: C = Wᵀ J diag(c) Jᵀ W.
+    """
+    unit_forces = np.eye(3)
+    spread = np.asarray(q)[..., None, :]
+    columns = joint_contributions(arm, spread, unit_forces, flange_rotation=flange_rotation) @ compliance
+    return np.swapaxes(columns, -1, -2)

@@ -1,0 +1,1 @@
+"""Time series: speed, order-tracked averages, alignment, filters."""

@@ -1,0 +1,159 @@
+"""Is a record fit for use? Findings in the words of a process engineer, as rows of the quality table."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from metro.units import MS, Array
+
+RATE_TOLERANCE = 0.01
+JITTER_LIMIT = 0.1
+GAP = 1.5
+FLAT_TOP_SAMPLES = 5
+AIR_BLOCKS = 50
+AIR_ACTIVITY = 0.1
+OFFSET_LIMIT = 0.02
+
+
+class Finding(NamedTuple):
+    """A check's value against its limit (NaN where it has none); not ``ok``: somebody should look."""
+
+    check: str
+    value: float
+    limit: float
+    ok: bool
+    message: str
+
+
+def sampling(time_s: Array, declared_hz: float | None = None) -> list[Finding]:
+    """Check rate, jitter and gaps of the time stamps (n,), s, strictly rising, n ≥ 2.
+
+    The rate is one over the mean step, gaps left out; a median would inherit the rounding of time stamps.
+    """
+    steps = np.diff(time_s)
+    typical = float(np.median(steps))
+    gaps = steps > GAP * typical
+    regular = steps[~gaps]
+    rate = 1.0 / float(np.mean(regular))
+    return [_rate(rate, declared_hz), _jitter(float(np.std(regular)) * rate), _gaps(steps, gaps, typical)]
+
+
+def _rate(rate: float, declared_hz: float | None) -> Finding:
+    if declared_hz is None:
+        message = f"sampled at {rate:.6g} Hz; batch.yaml declares no rate"
+        return Finding("sampling rate", rate, np.nan, True, message)
+    ok = abs(rate / declared_hz - 1.0) <= RATE_TOLERANCE
+    found = f"sampled at {rate:.6g} Hz, declared {declared_hz:.6g} Hz"
+    hint = "" if ok else ": the time stamps are used; correct the rate in batch.yaml or the time column"
+    return Finding("sampling rate", rate, declared_hz, ok, found + hint)
+
+
+def _jitter(jitter: float) -> Finding:
+    ok = jitter <= JITTER_LIMIT
+    message = f"time steps scatter by {100.0 * jitter:.2g} % of the step"
+    hint = "" if ok else ": time stamps are rounded or samples came late; log with more digits"
+    return Finding("jitter", jitter, JITTER_LIMIT, ok, message + hint)
+
+
+def _gaps(steps: Array, gaps: np.ndarray, typical: float) -> Finding:
+    count = int(np.count_nonzero(gaps))
+    if count == 0:
+        return Finding("gaps", 0.0, 0.0, True, "no samples are missing")
+    lost = float(np.sum(steps[gaps] - typical))
+    longest = float(np.max(steps)) / MS
+    message = f"{count} gaps, the longest {longest:.3g} ms, {lost / typical:.0f} samples missing in all"
+    return Finding("gaps", float(count), 0.0, False, f"{message}: the logger lost data")
+
+
+def flat_tops(name: str, values: Array, full_scale: float | None = None) -> Finding:
+    """Check a channel (n,) for clipping: five or more samples in a row at full scale or at an extreme.
+
+    An extreme of zero is a gate (a hammer's force window) and not a clip; nor is one that is reached in steps
+    of the converter's resolution: the top of a slow wave, sampled coarsely.
+    """
+    stands = [(_flat_at(values, level), level) for level in (float(np.min(values)), float(np.max(values)))]
+    if full_scale is not None:
+        start, stop = _longest_run(np.abs(values) >= full_scale)
+        stands.append((stop - start, full_scale))
+    longest, level = max(stands)
+    ok = longest < FLAT_TOP_SAMPLES
+    message = f"{name} is not clipped"
+    if not ok:
+        found = f"{name} stands at {level:.5g} for {longest} samples in a row"
+        message = f"{found}: the amplifier's range was exceeded; measure again with a larger range"
+    return Finding("clipping", float(longest), float(FLAT_TOP_SAMPLES), ok, message)
+
+
+def _flat_at(values: Array, level: float) -> int:
+    """Return how many samples in a row stand at an extreme that the channel was cut off at, else 0."""
+    start, stop = _longest_run(values == level)
+    if level == 0.0 or stop - start < FLAT_TOP_SAMPLES:
+        return 0
+    neighbours = np.concatenate((values[max(start - 1, 0) : start], values[stop : stop + 1]))
+    resolution = float(np.min(np.diff(np.unique(values)), initial=np.inf))
+    jump = float(np.max(np.abs(neighbours - level), initial=0.0))
+    return stop - start if jump > 2.0 * resolution else 0
+
+
+def _longest_run(true: np.ndarray) -> tuple[int, int]:
+    """Return start and stop of the longest run of True; (0, 0) where there is none."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], true.astype(np.int8), [0]))))
+    if edges.size == 0:
+        return 0, 0
+    longest = 2 * int(np.argmax(edges[1::2] - edges[::2]))
+    return int(edges[longest]), int(edges[longest + 1])
+
+
+def dead(name: str, values: Array) -> Finding:
+    """Check that a channel moves at all."""
+    span = float(np.ptp(values))
+    ok = span > 0.0
+    found = f"{name} stands at {values[0]:.5g} throughout: is the channel connected?"
+    message = f"{name} moves" if ok else found
+    return Finding("dead channel", span, 0.0, ok, message)
+
+
+def air_offset(names: tuple[str, ...], values: Array) -> list[Finding]:
+    """Check the zero of force channels (n, k) where the tool cuts air at the record's start or end.
+
+    The record is parted into blocks; air is the run of blocks at either end whose scatter is below a tenth of
+    the cut's. A record that has no such part tells nothing of its zero, and gives no finding.
+    """
+    blocks = values[: len(values) // AIR_BLOCKS * AIR_BLOCKS].reshape(AIR_BLOCKS, -1, values.shape[1])
+    if blocks.shape[1] < 2:
+        return []
+    activity = np.sqrt(np.sum(np.var(blocks, axis=1), axis=1))
+    quiet = activity < AIR_ACTIVITY * float(np.quantile(activity, 0.9))
+    air = np.logical_and.accumulate(quiet) | np.logical_and.accumulate(quiet[::-1])[::-1]
+    if not air.any() or air.all():
+        return []
+    zero = blocks[air].mean(axis=(0, 1))
+    limit = OFFSET_LIMIT * float(np.max(np.abs(values)))
+    return [_offset(name, float(value), limit) for name, value in zip(names, zero, strict=True)]
+
+
+def _offset(name: str, value: float, limit: float) -> Finding:
+    ok = abs(value) <= limit
+    message = f"{name} reads {value:.3g} while the tool cuts air"
+    hint = "" if ok else f", more than {limit:.3g}: reset the charge amplifier before the cut"
+    return Finding("zero in air", value, limit, ok, message + hint)
+
+
+def missing_points(dropped: int, kept: int) -> Finding:
+    """Report the points of a cloud that had no coordinates and were dropped."""
+    share = dropped / max(dropped + kept, 1)
+    message = f"{kept} points, {dropped} without coordinates were dropped"
+    hint = "" if share <= 0.5 else ": most of the face gave no reading; check the scanner's exposure"
+    return Finding("missing points", share, 0.5, share <= 0.5, message + hint)
+
+
+def conjugated(sign: float) -> Finding:
+    """Report a driving-point FRF whose imaginary part has the sign of a structure that gives out power."""
+    ok = sign <= 0.0
+    message = "the driving point takes in power, as it must"
+    if not ok:
+        found = "the driving point's imaginary part is positive: the FRF is conjugated (e^{-iωt})"
+        message = f"{found} or one sensor points the other way; export it with e^{{+iωt}}"
+    return Finding("FRF convention", sign, 0.0, ok, message)

@@ -1,0 +1,43 @@
+"""What identify, predict and loop share: the observables of a batch, and its problems rebuilt from observed
+tables.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.batch.layout import OBSERVED
+from metro.observables import deformation, flatness, force, lobes, published
+from metro.observables.lobes import LabelProblem
+from metro.observables.problem import Problem, Refusal
+from metro.units import JSON
+
+# Force first: the others may need its coefficients.
+MODULES: tuple[ModuleType, ...] = (force, deformation, flatness, lobes)
+
+
+def read_observed(processed: Path) -> dict[str, pd.DataFrame]:
+    """Read the observed tables that the batch has."""
+    tables = {name: pd.read_parquet(processed / f"{name}.parquet") for name in OBSERVED}
+    return {name: table for name, table in tables.items() if len(table.columns)}
+
+
+def read_json(path: Path) -> JSON:
+    """Read a JSON file that a stage wrote."""
+    content: JSON = json.loads(path.read_text(encoding="utf-8"))
+    return content
+
+
+def problems(
+    batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
+) -> dict[str, Problem | LabelProblem | Refusal]:
+    """Return the problem of each observable, or why the batch has none."""
+    if "published_errors" in observed:
+        return {task.observable: task for task in published.problems(batch, observed, identified)}
+    return {module.OBSERVABLE: module.problem(batch, observed, identified) for module in MODULES}

@@ -1,0 +1,62 @@
+"""Report: everything that was found about a batch becomes one PDF."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from metro.batch.processed import read_batch, write_atomically
+from metro.report.batch_report import batch_report
+from metro.report.results import Results
+from metro.units import JSON
+
+TABLES = (
+    "qc",
+    "comparison",
+    "lobes",
+    "frf_used",
+    "face_map",
+    "published_errors",
+    "published_modes",
+    "published_loads",
+)
+
+
+def report(processed: Path, reports: Path, settings: JSON, code: str) -> None:
+    """Write ``report.pdf`` of a batch from its processed tables, identified quantities and verdict."""
+    pdf = batch_report(read_results(processed, reports, settings, code))
+    write_atomically(reports / "report.pdf", lambda stream: stream.write(pdf))
+
+
+def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> Results:
+    """Read what the stages before left; tables that are absent or empty are left out."""
+    tables = {name: pd.read_parquet(p) for name in TABLES if (p := processed / f"{name}.parquet").exists()}
+    return Results(
+        batch=read_batch(processed),
+        tables={name: table for name, table in tables.items() if len(table)},
+        identified=_json(reports / "identified.json"),
+        verdict=_json(reports / "verdict.json"),
+        loop=_json(processed / "loop.json"),
+        sources=_sources(processed),
+        settings=settings,
+        code=code,
+    )
+
+
+def _json(path: Path) -> JSON:
+    content: JSON = json.loads(path.read_text(encoding="utf-8"))
+    return content
+
+
+def _sources(processed: Path) -> dict[str, str]:
+    """SHA-256 by source file, from the provenance in the metadata of all processed tables."""
+    import pyarrow.parquet as pq
+
+    found: dict[str, Any] = {}
+    for path in sorted(processed.glob("*.parquet")):
+        metadata = pq.read_schema(path).metadata or {}
+        found |= json.loads(metadata.get(b"metro.sources", b"{}"))
+    return {str(name): str(digest) for name, digest in found.items()}

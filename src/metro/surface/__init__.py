@@ -1,0 +1,1 @@
+"""Planes, flatness and profiles from point clouds and stylus traces."""

@@ -1,0 +1,26 @@
+"""The factors between the units of files and manifests and SI: the one place where they are written down.
+
+A value from a file times its factor is SI; an SI value divided by its factor is what a file holds.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+JSON = dict[str, Any]
+
+MM = 1e-3
+UM = 1e-6
+MS = 1e-3
+DEG = math.pi / 180.0
+MRAD = 1e-3
+RPM = 2.0 * math.pi / 60.0
+N_MM2 = 1e6
+N_MM = 1e3
+N_UM = 1e6

@@ -1,0 +1,146 @@
+"""What the Snakefile asks for when it is read: the batches, and the inputs and params of each job.
+
+It is read at every call of snakemake, so nothing heavy is imported here.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import re
+import shlex
+import shutil
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import reduce
+from operator import getitem
+from pathlib import Path
+from typing import Protocol
+
+from metro.batch.config import load_config
+from metro.batch.discover import FoundBatch, discover
+from metro.batch.findings import BatchError, Finding
+from metro.codehash import code_hash
+from metro.units import JSON
+
+# What a stage reads of config.yaml besides the section of its own name: the setting's name → where it stands.
+SHARED: dict[str, dict[str, tuple[str, ...]]] = {
+    "ingest": {"holdout": ("holdout",)},
+    "identify": {"model_form_budget": ("loop", "model_form_budget")},
+    "predict": {"model_form_budget": ("loop", "model_form_budget")},
+}
+
+
+class Wildcards(Protocol):
+    """Snakemake's wildcards of a job that belongs to one batch."""
+
+    batch: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The batches found and the settings in force.
+
+    Attributes
+    ----------
+    found : name of a batch → where it is and what it consists of, in alphabetical order.
+    config : config.yaml with the sections that the command line replaces.
+    cells : folder of the cells' descriptions.
+    """
+
+    found: Mapping[str, FoundBatch]
+    config: JSON
+    cells: str
+
+    @classmethod
+    def read(cls, checkout: Path, overrides: JSON) -> Plan:
+        """Read the settings and find the batches.
+
+        ``config/config.yaml`` is taken from the working directory, else from the checkout; so is the folder
+        of cells. ``overrides`` are the sections given to snakemake by ``--config`` or ``--configfile``.
+        """
+        config = load_config(_here_or(checkout, Path("config/config.yaml")), overrides)
+        cells = _here_or(checkout, Path(config["cells"]))
+        roots = [Path(root) for root in config["raw_roots"]]
+        found = {batch.name: batch for batch in discover(roots, cells)}
+        problems = list(_unnameable(found.values()))
+        if not found:
+            where = ", ".join(map(str, roots))
+            problems.append(Finding("error", where, "holds no batch: no folder with a batch.yaml"))
+        if problems:
+            raise BatchError(problems)
+        return cls(found, config, str(cells))
+
+    @property
+    def batches(self) -> list[str]:
+        """Names of all batches."""
+        return list(self.found)
+
+    @property
+    def any_batch(self) -> str:
+        """Regular expression that matches the known batches and nothing else."""
+        return "|".join(re.escape(name) for name in self.found)
+
+    @property
+    def shell_prefix(self) -> str:
+        """Shell code that puts the ``metro`` command of the Python that runs this first in the path."""
+        return f'export PATH={shlex.quote(str(Path(sys.executable).parent))}:"$PATH"; '
+
+    def folder(self, wildcards: Wildcards) -> str:
+        """Folder of a batch."""
+        return str(self.found[wildcards.batch].folder)
+
+    def raw_files(self, wildcards: Wildcards) -> list[str]:
+        """Every file that a batch consists of, one by one: a changed file in a folder would not be seen."""
+        return [str(path) for path in self.found[wildcards.batch].inputs]
+
+    def settings(self, stage: str) -> str:
+        """Return the settings that a stage uses, as JSON, so that changing any of them re-runs it."""
+        shared = {name: reduce(getitem, path, self.config) for name, path in SHARED.get(stage, {}).items()}
+        return json.dumps({**self.config.get(stage, {}), **shared}, sort_keys=True)
+
+    def code(self, stage: str) -> str:
+        """Return the hash of the code that a stage runs."""
+        return code_hash(stage)
+
+
+def only_one_at_work(folder: Path) -> None:
+    """Take a working folder for this process until it ends.
+
+    In place of snakemake's own lock, which a killed run leaves behind for a person to remove: this one ends
+    with the process, in whatever way.
+
+    Raises
+    ------
+    RuntimeError
+        Another process has taken the folder.
+    """
+    descriptor = os.open(folder / ".snakemake" / "metro.lock", os.O_CREAT | os.O_RDWR)  # never closed
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise RuntimeError(
+            f"another snakemake is at work in {folder.resolve()}: wait until it ends"
+        ) from None
+
+
+def remove_leftovers(*roots: Path) -> None:
+    """Remove what jobs of a killed run were writing: files and folders named ``.<name>.<8 letters>``."""
+    for path in [path for root in roots for path in root.rglob(".*.????????")]:
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _unnameable(found: Iterable[FoundBatch]) -> Iterator[Finding]:
+    """Find files that no rule can name, because snakemake reads braces in a path as wildcards."""
+    for path in (str(path) for batch in found for path in batch.inputs):
+        if "{" in path or "}" in path:
+            yield Finding("error", path, "has a brace in its name, which snakemake cannot handle: rename it")
+
+
+def _here_or(checkout: Path, path: Path) -> Path:
+    return path if path.exists() or path.is_absolute() else checkout / path

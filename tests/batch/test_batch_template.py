@@ -1,0 +1,58 @@
+import re
+
+import pytest
+import yaml
+
+from metro.batch.check import check
+from metro.batch.columns import RUNS
+from metro.batch.documents import schema
+from metro.batch.findings import BatchError
+from metro.batch.template import new_batch
+
+
+def test_the_template_passes_its_own_check_and_says_what_to_fill_in(tmp_path):
+    report = check(new_batch(tmp_path, "my-cut"), tmp_path)
+    assert report.ok
+    assert not any(problem.severity == "warning" for problem in report.problems)
+    missing = [entry for can in report.capabilities for entry in can.missing]
+    assert "dynamometer files in runs.csv" in missing
+    assert "tool.diameter_mm in batch.yaml" in missing
+
+
+def test_every_key_of_the_contract_stands_in_the_template_and_is_valid_when_uncommented(tmp_path):
+    folder = new_batch(tmp_path, "my-cut")
+    text = (folder / "batch.yaml").read_text()
+    for key in schema("batch")["properties"]:
+        assert re.search(rf"^(# )?{key}:", text, re.MULTILINE), key
+    for key in schema("batch")["properties"]["instruments"]["properties"]:
+        assert re.search(rf"^#   {key}:", text, re.MULTILINE), key
+    options = re.findall(r"^# ((?:  (?:# )?)?[a-z_]+: ?.*)$", text, re.MULTILINE)
+    plain = [line for line in text.splitlines() if line and not line.startswith("#")]
+    (folder / "batch.yaml").write_text("\n".join([*plain, *options]))
+    assert set(yaml.safe_load("\n".join([*plain, *options]))) == set(schema("batch")["properties"])
+    assert [str(problem) for problem in check(folder, tmp_path).problems if problem.severity != "note"] == []
+
+
+def test_the_run_table_has_every_column_and_repeats_spread_at_random(tmp_path):
+    lines = (new_batch(tmp_path, "my-cut") / "runs.csv").read_text().splitlines()
+    assert lines[0].split(",") == [column.name for column in RUNS]
+    conditions = [line.split(",")[2] for line in lines[1:]]
+    assert sorted(conditions[:4]) == sorted(conditions[4:])
+    assert len(set(conditions)) == 4
+    orders = {
+        tuple((new_batch(tmp_path, f"b{i}") / "runs.csv").read_text().splitlines()[1:]) for i in range(10)
+    }
+    assert len(orders) > 5
+
+
+@pytest.mark.parametrize("name", ["My Cut", "../out", ""])
+def test_a_name_that_is_not_allowed_is_an_error(tmp_path, name):
+    with pytest.raises(BatchError, match="lower-case letters"):
+        new_batch(tmp_path, name)
+
+
+def test_a_folder_that_is_there_is_left_alone(tmp_path):
+    (tmp_path / "b").mkdir()
+    with pytest.raises(BatchError, match="is there already"):
+        new_batch(tmp_path, "b")
+    assert list((tmp_path / "b").iterdir()) == []

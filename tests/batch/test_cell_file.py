@@ -1,0 +1,70 @@
+from pathlib import Path
+
+import pytest
+
+from metro.batch.cell import read_cell, stations_path
+
+CELLS = Path(__file__).parents[2] / "config/cells"
+
+
+def faults(folder):
+    return "\n".join(
+        str(finding) for finding in read_cell(folder, folder, "kr160")[2] if finding.severity == "error"
+    )
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in CELLS.glob("*.yaml")))
+def test_every_cell_of_the_repository_is_valid(tmp_path, name):
+    cell, source, findings = read_cell(tmp_path, CELLS, name)
+    assert (cell["cell"], source, findings) == (name, CELLS / f"{name}.yaml", [])
+
+
+def test_a_cell_that_nobody_describes_is_rigid_and_said_to_be(tmp_path):
+    cell, source, findings = read_cell(tmp_path, tmp_path, "kr160")
+    assert (cell, source) == ({"cell": "kr160"}, None)
+    assert findings[0].severity == "note"
+    assert "nothing is known of cell kr160 (rigid)" in findings[0].message
+
+
+def test_the_batch_s_own_cell_goes_before_the_shared_one(tmp_path):
+    (tmp_path / "cells").mkdir()
+    (tmp_path / "cells/kr160.yaml").write_text("cell: kr160\nstations: shared.csv\n")
+    (tmp_path / "cell.yaml").write_text("cell: kr160\nstations: own.csv\n")
+    cell, source, _ = read_cell(tmp_path, tmp_path / "cells", "kr160")
+    assert stations_path(cell, source) == tmp_path / "own.csv"
+    cell, source, _ = read_cell(tmp_path / "cells", tmp_path / "cells", "kr160")
+    assert stations_path(cell, source) == tmp_path / "cells/shared.csv"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("cell: other", 'cell: found "other", expected the cell that batch.yaml names, "kr160"'),
+        ("stations: a.csv", "cell: is missing"),
+        (
+            "cell: kr160\narm: {dh: [[0, 90, 500]]}",
+            "arm.dh.0: found [0, 90, 500], expected a list of 4 numbers",
+        ),
+        ("cell: kr160\narm: {dh: [[0, 90, 500, 250]]}", "expected a list of 6 lists of 4 numbers"),
+        (
+            "cell: kr160\njoint_stiffness_nm_rad: [1, 2, 3, 4, 5, 0]",
+            "joint_stiffness_nm_rad.5: found 0, expected a num",
+        ),
+        ("cell: kr160\njoint_stifness_nm_rad: [1]", 'did you mean "joint_stiffness_nm_rad"?'),
+        ("cell: [", "cell.yaml: line 1:"),
+    ],
+)
+def test_an_error_is_said_with_its_key(tmp_path, text, message):
+    (tmp_path / "cell.yaml").write_text(text)
+    assert message in faults(tmp_path)
+
+
+def test_joint_stiffness_without_an_arm_is_of_no_use(tmp_path):
+    (tmp_path / "cell.yaml").write_text(
+        "cell: kr160\njoint_stiffness_nm_rad: [1, 2, 3, 4, 5, 6]\nmaker: unknown"
+    )
+    findings = read_cell(tmp_path, tmp_path, "kr160")[2]
+    assert [(finding.severity, finding.column) for finding in findings] == [
+        ("warning", "maker"),
+        ("warning", "joint_stiffness_nm_rad"),
+    ]

@@ -1,0 +1,84 @@
+import pytest
+
+from metro.batch import rules
+from metro.batch.tables import read_table
+
+IMPACTS = "test,position,reference,response,replicate,kind,file,response_unit\n"
+LOADS = "pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,fx_n,fy_n,fz_n,dx_mm,dy_mm,dz_mm\n"
+MASS = "pose,mxx,mxy,mxz,myy,myz,mzz\n"
+PUBLISHED = "table,row,observable,quantity,measured,predicted,unit\n"
+STATIONS = "position,x_mm,y_mm,z_mm,kx_n_um,ky_n_um,kz_n_um\n"
+CHECKS = {
+    "impacts": rules.impact_findings,
+    "loads": rules.load_findings,
+    "mass": rules.mass_findings,
+    "published": rules.published_findings,
+    "stations": rules.station_findings,
+}
+
+
+def faults(folder, name, text):
+    (folder / f"{name}.csv").write_text(text)
+    table, findings = read_table(folder, name)
+    return "\n".join(map(str, [*findings, *CHECKS[name](table)]))
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("impacts", IMPACTS + "t,1,1x,7z,1,record,a.csv,m/s2\nt,1,1x,7z,1,frf,b.csv,\n,,,,,,c.uff,\n"),
+        ("loads", LOADS + "p1,0,90,-90,0,45,0,,,,100,0,0,0.1,,\np2,,,,,,,1,2,3,0,0,-50,,,-0.2\n"),
+        ("mass", MASS + "p25,654.58,0,382.51,903.38,0,269.57\n"),
+        ("published", PUBLISHED + "4,Ktc,force,coefficient,10145,,N/mm2\n"),
+        ("stations", STATIONS + "1,0,0,0,1,2,3\n2,0,0,-320,1,2,3\n"),
+    ],
+)
+def test_rows_that_follow_the_contract_pass(tmp_path, name, text):
+    assert faults(tmp_path, name, text) == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        (
+            "impacts",
+            IMPACTS + "t,1,1x,7z,1,record,a.csv,\n",
+            "row 2 (t): column response_unit: is blank, expected m/s2",
+        ),
+        ("impacts", IMPACTS + "t,1,,7z,1,frf,a.csv,\n", "column reference: is blank"),
+        ("impacts", IMPACTS + "t,1,1x,7z,1,,a.csv,m\n", "column kind: is blank"),
+        ("impacts", IMPACTS + "t,1,x1,7z,1,frf,a.csv,m\n", 'found "x1", expected a point and an axis, as 1x'),
+        (
+            "impacts",
+            IMPACTS + "t,1,1x,7z,1,frf,a.csv,mm\n",
+            'column response_unit: found "mm", expected m/s2 or',
+        ),
+        ("impacts", IMPACTS + "t,1,1x,7z,1,frf,,m\n", "column file: is blank"),
+        (
+            "impacts",
+            IMPACTS + "t,1,1x,7z,1,frf,a.csv,m\nt,1,2x,7z,1,frf,a.csv,m\n",
+            '"a.csv" stands in row 2 too',
+        ),
+        ("loads", LOADS + "p1,0,90,,0,45,0,,,,100,0,0,0.1,,\n", "column q3_deg: is blank, expected all six"),
+        ("loads", LOADS + "p1,,,,,,,,,,100,0,0,0.1,,\n", "neither joint angles nor x_mm, y_mm, z_mm"),
+        ("loads", LOADS + "p1,,,,,,,1,2,3,0,0,0,0.1,,\n", "column fx_n: the load is zero"),
+        ("loads", LOADS + "p1,,,,,,,1,2,3,9,0,,0.1,,\n", "column fz_n: is blank, expected a number"),
+        ("loads", LOADS + "p1,,,,,,,1,2,3,9,0,0,,,\n", "dx_mm, dy_mm, dz_mm are all blank"),
+        ("mass", MASS + "p,1,2,0,1,0,1\n", "is not positive definite"),
+        ("mass", MASS + "p,-1,0,0,1,0,1\n", 'column mxx: found "-1", expected a number > 0'),
+        (
+            "published",
+            PUBLISHED + "4,Ktc,force,coefficient,,,N/mm2\n",
+            "measured and predicted are both blank",
+        ),
+        ("published", PUBLISHED + "4,Ktc,force,coefficient,1,,\n", "column unit: is blank"),
+        ("stations", STATIONS + "1,0,0,0,1,2,0\n", 'column kz_n_um: found "0", expected a number > 0'),
+        (
+            "stations",
+            STATIONS + "1,0,0,0,1,2,3\n1,0,0,9,1,2,3\n",
+            'row 3 (1): column position: position "1" stands',
+        ),
+    ],
+)
+def test_a_row_that_cannot_be_used_is_named(tmp_path, name, text, message):
+    assert message in faults(tmp_path, name, text)

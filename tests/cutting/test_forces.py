@@ -1,0 +1,217 @@
+"""The mechanistic force model against closed forms, limits and a brute-force slice integration."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from metro.cutting.cutter import Cutter, evenly_pitched
+from metro.cutting.engagement import Engagement, engagement
+from metro.cutting.force import ANGLES, Cut, force_basis, mean_force
+from metro.cutting.law import EdgeLaw
+
+SLOT = Engagement(0.0, math.pi)
+# [T] table 4, N/m² and N/m
+TITANIUM = np.array([10145e6, 11036.5e6, 5000e6, 591.92e3, 100.03e3, 214.32e3])
+
+
+def cutter(teeth=4, helix=40.0, radius=6e-3, **runout):
+    return Cutter(radius, math.radians(helix), evenly_pitched(teeth), **runout)
+
+
+def test_mean_slot_force_is_the_closed_form():
+    a, c, n = 0.2e-3, 0.06e-3, 4
+    ktc, krc, kac, kte, kre, kae = TITANIUM
+    expected = [
+        -n * a / 4 * krc * c - n * a / math.pi * kre,
+        n * a / 4 * ktc * c + n * a / math.pi * kte,
+        n * a / math.pi * kac * c + n * a / 2 * kae,
+    ]
+    assert expected[1] == pytest.approx(272.47, abs=0.01)
+    assert mean_force(cutter(), EdgeLaw(), Cut(c, a, SLOT), TITANIUM) == pytest.approx(expected, rel=5e-6)
+
+
+@pytest.mark.parametrize(("direction", "sign"), [("up", -1.0), ("down", 1.0)])
+def test_mean_force_at_any_immersion_is_the_integral_over_the_arc(direction, sign):
+    engaged = engagement("side", direction, 2e-3, 6e-3)
+    phi = np.linspace(engaged.entry, engaged.exit, 200001)
+    h = 0.05e-3 * np.sin(phi)
+    tangential, radial = TITANIUM[0] * h + TITANIUM[3], TITANIUM[1] * h + TITANIUM[4]
+    fx, fy = -tangential * np.cos(phi) - radial * np.sin(phi), tangential * np.sin(phi) - radial * np.cos(phi)
+    expected = [np.trapezoid(f, phi) * 4 * 1e-3 / (2 * math.pi) for f in (fx, fy)]
+    found = mean_force(cutter(), EdgeLaw(), Cut(0.05e-3, 1e-3, engaged), TITANIUM)
+    assert found[:2] == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+    assert math.copysign(1.0, found[0]) == sign  # climb milling pulls the tool along the feed, up milling holds it back
+
+
+def test_mean_torque_times_speed_is_the_tangential_power():
+    cut = Cut(0.05e-3, 2e-3, SLOT)
+    basis = force_basis(cutter(), EdgeLaw(), cut)
+    fx_fy = basis @ TITANIUM
+    # For one tooth without helix the tangential force is recovered from x and y at its immersion.
+    one = Cutter(6e-3, 0.0, (0.0,))
+    force = force_basis(one, EdgeLaw(), Cut(0.2e-3, 2e-3, SLOT)) @ TITANIUM
+    phi = 2 * math.pi * np.arange(ANGLES) / ANGLES
+    tangential = -force[:, 0] * np.cos(phi) + force[:, 1] * np.sin(phi)
+    energy_per_turn = tangential.mean() * 2 * math.pi * 6e-3
+    chip_volume = 0.2e-3 * 2 * 6e-3 * 2e-3
+    edge_work = TITANIUM[3] * 2e-3 * math.pi * 6e-3
+    assert energy_per_turn == pytest.approx(TITANIUM[0] * chip_volume + edge_work, rel=1e-4)
+    assert fx_fy.shape == (ANGLES, 3)
+
+
+def test_a_helix_that_spans_one_pitch_makes_the_force_constant():
+    tool = cutter(teeth=4, helix=40.0)
+    depth = 2 * math.pi / 4 / tool.lag_per_depth
+    force = force_basis(tool, EdgeLaw(), Cut(0.02e-3, depth, SLOT)) @ TITANIUM
+    assert np.ptp(force, axis=0).max() < 2e-3 * np.abs(force.mean(axis=0)).max()
+
+
+def test_without_helix_a_tooth_cuts_only_inside_the_engagement():
+    force = force_basis(Cutter(6e-3, 0.0, (0.0,)), EdgeLaw(), Cut(0.1e-3, 1e-3, SLOT)) @ TITANIUM
+    degrees = np.arange(ANGLES) * 360 / ANGLES
+    assert np.all(force[(degrees > 181) & (degrees < 359)] == 0.0)
+    phi = np.radians(degrees)
+    tangential = -force[:, 0] * np.cos(phi) + force[:, 1] * np.sin(phi)
+    assert np.all(tangential[(degrees > 1) & (degrees < 179)] > 0.0)
+
+
+def test_runout_leaves_the_mean_alone_while_every_tooth_cuts():
+    cut = Cut(0.1e-3, 1e-3, engagement("side", "down", 4e-3, 6e-3))
+    without = mean_force(cutter(), EdgeLaw(), cut, TITANIUM)
+    shear_only = TITANIUM * [1, 1, 1, 0, 0, 0]
+    within = mean_force(cutter(runout_radius=3e-6, runout_angle=0.7), EdgeLaw(), cut, shear_only)
+    assert within == pytest.approx(mean_force(cutter(), EdgeLaw(), cut, shear_only), rel=2e-3)
+    assert not np.allclose(without, within)
+
+
+def test_first_order_of_runout_does_not_depend_on_the_feed():
+    tool = cutter(runout_radius=3e-6, runout_angle=0.7)
+    shear_only = TITANIUM * [1, 1, 1, 0, 0, 0]
+    engaged = Engagement(0.6, 2.4)  # where the chip is never thinner than the runout
+
+    def first_order(feed):
+        return np.abs(np.fft.rfft(force_basis(tool, EdgeLaw(), Cut(feed, 1e-3, engaged)) @ shear_only, axis=0)[1])
+
+    assert first_order(0.2e-3) == pytest.approx(first_order(0.1e-3), rel=1e-3)
+
+
+def test_teeth_of_equal_radius_make_no_order_but_their_own():
+    spectrum = np.abs(np.fft.rfft(force_basis(cutter(), EdgeLaw(), Cut(0.05e-3, 1e-3, SLOT)) @ TITANIUM, axis=0))
+    orders = np.arange(len(spectrum))
+    assert spectrum[orders % 4 != 0].max() < 1e-9 * spectrum.max()
+
+
+def brute_force(tool, cut, coefficients, angle, slices=400):
+    """Slice the edge and step through the teeth one by one, with the chip thickness written out."""
+    force = np.zeros(3)
+    dz = cut.axial_depth / slices
+    for i in range(slices):
+        z = (i + 0.5) * dz
+        lag = z * math.tan(tool.helix) / tool.radius
+        offset = [
+            tool.runout_radius * math.cos(tool.runout_angle - a + lag) for a in tool.tooth_angles
+        ]
+        for j, tooth in enumerate(tool.tooth_angles):
+            phi = (angle + tooth - lag) % (2 * math.pi)
+            if not cut.engagement.entry < phi < cut.engagement.exit:
+                continue
+            n = tool.teeth
+            h = min(
+                m * cut.feed_per_tooth * math.sin(phi) + offset[j] - offset[(j + m) % n] for m in range(1, n + 1)
+            )
+            if h <= 0:
+                continue
+            ft, fr, fa = (coefficients[k] * h + coefficients[k + 3] for k in range(3))
+            force += dz * np.array(
+                [-ft * math.cos(phi) - fr * math.sin(phi), ft * math.sin(phi) - fr * math.cos(phi), fa]
+            )
+    return force
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.integers(1, 5),
+    st.floats(0.0, 50.0),
+    st.floats(0.0, 30e-6),
+    st.floats(0.0, 6.28),
+    st.integers(0, ANGLES - 1),
+)
+def test_force_is_that_of_a_brute_force_slice_integration(teeth, helix, runout, direction, step):
+    tool = cutter(teeth=teeth, helix=helix, runout_radius=runout, runout_angle=direction)
+    cut = Cut(0.03e-3, 3e-3, engagement("side", "up", 5e-3, 6e-3))
+    table = force_basis(tool, EdgeLaw(), cut) @ TITANIUM
+    expected = brute_force(tool, cut, TITANIUM, 2 * math.pi * step / ANGLES)
+    # A tooth enters or leaves within one angular step and one slice of the table.
+    tooth = np.abs(table).max() + np.abs(expected).max()
+    if helix < 1.0:
+        near = table[[step - 1, step, (step + 1) % ANGLES]]
+        assert np.all(expected >= near.min(axis=0) - 0.02 * tooth)
+        assert np.all(expected <= near.max(axis=0) + 0.02 * tooth)
+    else:
+        assert table[step] == pytest.approx(expected, abs=0.02 * tooth)
+
+
+def true_chip(tool, feed, phi_now, tooth, height=0.0):
+    """Chip thickness by following the tooth that cut before, back along its trochoid, until it crosses the ray."""
+    n = tool.teeth
+    per_radian = feed * n / (2 * math.pi)
+    lag = height * math.tan(tool.helix) / tool.radius
+
+    def radius(j):
+        return tool.radius + tool.runout_radius * math.cos(tool.runout_angle - tool.tooth_angles[j % n] + lag)
+
+    best = math.inf
+    for m in range(1, n + 1):
+        pitch = 2 * math.pi * m / n
+
+        def off_ray(turned, pitch=pitch, m=m):
+            phi = phi_now + pitch - turned
+            x = -per_radian * turned + radius(tooth + m) * math.sin(phi)
+            y = radius(tooth + m) * math.cos(phi)
+            return x * math.cos(phi_now) - y * math.sin(phi_now), x * math.sin(phi_now) + y * math.cos(phi_now)
+
+        low, high = pitch - 0.3, pitch + 0.3
+        for _ in range(80):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if off_ray(middle)[0] > 0 else (low, middle)
+        best = min(best, radius(tooth) - off_ray(low)[1])
+    return best
+
+
+@pytest.mark.parametrize("degrees", [5.0, 40.0, 90.0, 140.0, 175.0])
+@pytest.mark.parametrize("runout", [0.0, 8e-6])
+def test_true_chip_thickness_is_that_of_intersected_trochoids(degrees, runout):
+    from metro.cutting.force import chip_thickness
+
+    tool = cutter(runout_radius=runout, runout_angle=0.4)
+    phi = math.radians(degrees)
+    cut = Cut(0.1e-3, 1e-3, SLOT)
+    found = chip_thickness(tool, cut, np.full((1, 1, 4), phi), np.zeros(1), true_path=True)
+    expected = [true_chip(tool, 0.1e-3, phi, j) for j in range(4)]
+    assert found[0, 0] == pytest.approx(expected, abs=2e-9)
+
+
+def test_up_and_down_milling_mirror_each_other():
+    assert engagement("side", "up", 2e-3, 6e-3).exit == pytest.approx(math.acos(1 - 2 / 6))
+    assert engagement("side", "down", 2e-3, 6e-3).entry == pytest.approx(math.pi - math.acos(1 - 2 / 6))
+
+
+def test_a_cut_wider_than_the_tool_is_refused():
+    with pytest.raises(ValueError, match="not within the diameter"):
+        engagement("side", "up", 13e-3, 6e-3)
+
+
+def test_size_effect_without_exponent_is_the_linear_law():
+    h = np.linspace(0.0, 1e-4, 11)
+    assert EdgeLaw().shear(h) == pytest.approx(h)
+    power = EdgeLaw(size_exponent=0.2, reference_thickness=5e-5)
+    assert power.shear(np.array([5e-5])) == pytest.approx([5e-5])
+    assert power.shear(np.array([2.5e-5])) == pytest.approx([2.5e-5 * 2**0.2])
+
+
+def test_pitch_over_all_teeth_is_one_turn():
+    tool = Cutter(6e-3, 0.0, (0.0, 1.5, 3.3, 4.9))
+    assert tool.pitch(4) == pytest.approx(np.full(4, 2 * math.pi))
+    assert tool.pitch(1) == pytest.approx([1.5, 1.8, 1.6, 2 * math.pi - 4.9])

@@ -1,0 +1,159 @@
+"""Automatic modal identification against exact synthetic sets, published modes and noise."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from metro.dynamics.modal import identify_modes, roughness
+from metro.dynamics.plscf import normal_equations, poles
+
+REAL = Path(os.environ.get("METRO_REAL_DATA", "../shared/real"))
+needs_real = pytest.mark.skipif(not REAL.exists(), reason="METRO_REAL_DATA is not there")
+
+ALTINTAS = {
+    "x": "262.16/.048 503.60/.096 667.92/.057 886.78/.074 2201.5/.015 2799.4/.027 3837.7/.007 4923.6/.019 "
+    "6038.7/.025",
+    "y": "285.53/.021 587.8/.089 749.6/.027 804.9/.075 1573.7/.027 2038.1/.016 2303.3/.220 2681.0/.019 "
+    "2870.5/.014 3838.8/.006 4928.9/.017 6073.4/.016",
+}
+# [T] table 6, x: the printed frequencies are the damped ones
+DAMPED = np.array([21.3257, 34.6937, 56.6075, 65.5141])
+ZETA = np.array([0.0608951, 0.0707726, 0.035692, 0.0633944])
+STIFFNESS = np.array([7.25548e6, 4.05902e6, 4.18385e6, 2.21663e6])
+MASS = np.array([402.61, 84.9923, 33.0305, 13.0291])
+UNDAMPED = DAMPED / np.sqrt(1 - ZETA**2)
+
+
+def receptance(frequency, f=UNDAMPED, zeta=ZETA, k=STIFFNESS):
+    ratio = frequency[:, None] / f
+    return (1 / (k * (1 - ratio**2 + 2j * zeta * ratio))).sum(axis=1)
+
+
+def noise(rng, shape):
+    return (rng.normal(size=shape) + 1j * rng.normal(size=shape)) / np.sqrt(2)
+
+
+@needs_real
+@pytest.mark.parametrize("direction", ["x", "y"])
+@pytest.mark.parametrize("start", [20, 40])
+def test_every_mode_of_the_noise_free_tool_is_recovered(direction, start):
+    table = pd.read_parquet(REAL / "reference" / "modal" / f"altintas-{direction}.parquet")
+    table = table[table["frequency_hz"] >= start]
+    frf = (table["real"] + 1j * table["imag"]).to_numpy()[:, None]
+    model = identify_modes(table["frequency_hz"].to_numpy(), frf, driving=0)
+    expected = np.array([[float(v) for v in pair.split("/")] for pair in ALTINTAS[direction].split()])
+    np.testing.assert_allclose([mode.frequency for mode in model.modes], expected[:, 0], rtol=1e-6)
+    np.testing.assert_allclose([mode.damping for mode in model.modes], expected[:, 1], rtol=1e-5)
+
+
+@pytest.mark.parametrize("level", [0.002, 0.01])
+def test_published_modes_are_found_in_noise_within_their_stated_errors(level):
+    frequency = np.arange(5.0, 120.0, 0.5)
+    exact = receptance(frequency)
+    errors = []
+    for seed in range(6):
+        sd = level * np.sqrt(np.mean(np.abs(exact) ** 2))
+        frf = exact + sd * noise(np.random.default_rng(seed), exact.shape)
+        model = identify_modes(frequency, frf[:, None], np.full((len(frequency), 1), sd**2), driving=0)
+        assert len(model.modes) == 4
+        for mode, f, zeta, k, m in zip(model.modes, UNDAMPED, ZETA, STIFFNESS, MASS, strict=True):
+            errors.append((mode.frequency - f) / mode.frequency_sd)
+            errors.append((mode.damping - zeta) / mode.damping_sd)
+            errors.append((mode.stiffness - k) / mode.stiffness_sd)
+            assert mode.mass == pytest.approx(m, rel=5 * mode.stiffness_sd / mode.stiffness)
+    errors = np.abs(errors)
+    assert errors.max() < 4.5
+    assert np.mean(errors < 2) > 0.85
+    assert np.mean(errors) > 0.3  # the errors stated are not idle
+
+
+def test_the_damped_frequency_is_not_reported_as_the_natural_one():
+    frequency = np.arange(5.0, 120.0, 0.25)
+    model = identify_modes(frequency, receptance(frequency)[:, None], driving=0)
+    natural = np.sqrt(STIFFNESS / MASS) / (2 * np.pi)
+    np.testing.assert_allclose([mode.frequency for mode in model.modes], natural, rtol=3e-6)
+
+
+def test_a_close_pair_is_kept_apart():
+    f, zeta, k = np.array([100.0, 104.0]), np.array([0.02, 0.03]), np.array([1e7, 8e6])
+    frequency = np.arange(60.0, 160.0, 0.25)
+    exact = receptance(frequency, f, zeta, k)
+    sd = 0.002 * np.abs(exact).max()
+    frf = exact + sd * noise(np.random.default_rng(0), exact.shape)
+    model = identify_modes(frequency, frf[:, None], np.full((len(frequency), 1), sd**2), driving=0)
+    np.testing.assert_allclose([mode.frequency for mode in model.modes], f, rtol=3e-3)
+    np.testing.assert_allclose([mode.damping for mode in model.modes], zeta, rtol=0.06)
+
+
+def test_shapes_come_with_their_signs_and_sizes():
+    frequency = np.arange(5.0, 120.0, 0.5)
+    shapes = np.array([[1.0, 1.0, 1.0, 1.0], [0.5, -0.8, 0.3, -0.2]])
+    ratio = frequency[:, None] / UNDAMPED
+    modal = 1 / (STIFFNESS * (1 - ratio**2 + 2j * ZETA * ratio))
+    frf = modal @ shapes.T
+    frf = frf + 2e-3 * np.abs(frf).mean() * noise(np.random.default_rng(1), frf.shape)
+    model = identify_modes(frequency, frf, driving=0)
+    found = np.array([mode.shape[1].real for mode in model.modes])
+    np.testing.assert_allclose(found, shapes[1], atol=0.03)
+
+
+def test_modes_outside_the_band_go_into_the_residual_terms():
+    frequency = np.arange(45.0, 120.0, 0.25)
+    exact = receptance(frequency)
+    sd = 0.002 * np.sqrt(np.mean(np.abs(exact) ** 2))
+    frf = exact + sd * noise(np.random.default_rng(2), exact.shape)
+    model = identify_modes(frequency, frf[:, None], np.full((len(frequency), 1), sd**2), driving=0)
+    np.testing.assert_allclose([mode.frequency for mode in model.modes], UNDAMPED[2:], rtol=2e-3)
+
+
+def test_without_a_driving_point_there_is_no_stiffness():
+    frequency = np.arange(5.0, 120.0, 0.5)
+    model = identify_modes(frequency, receptance(frequency)[:, None])
+    assert all(np.isnan(mode.stiffness) for mode in model.modes)
+
+
+def test_conjugated_data_are_detected():
+    frequency = np.arange(5.0, 120.0, 0.5)
+    with pytest.raises(ValueError, match="imaginary part is positive"):
+        identify_modes(frequency, receptance(frequency).conj()[:, None], driving=0)
+
+
+def test_values_that_are_not_finite_are_refused():
+    frequency = np.arange(5.0, 120.0, 0.5)
+    frf = receptance(frequency)[:, None]
+    frf[3] = np.nan
+    with pytest.raises(ValueError, match="not finite"):
+        identify_modes(frequency, frf)
+
+
+def test_roughness_is_the_variance_of_white_noise():
+    values = noise(np.random.default_rng(3), (4000, 1)) * 0.3
+    assert roughness(values).mean() == pytest.approx(0.09, rel=0.05)
+
+
+def test_the_matrix_fraction_of_two_inputs_has_the_poles_of_the_system():
+    frequency = np.arange(1.0, 120.0, 0.5)
+    rng = np.random.default_rng(4)
+    left, right = rng.normal(size=(3, 4)), rng.normal(size=(2, 4))
+    ratio = frequency[:, None] / UNDAMPED
+    modal = 1 / (1 - ratio**2 + 2j * ZETA * ratio)
+    frf = np.einsum("nr,or,ir->noi", modal, left, right)
+    found = poles(normal_equations(frequency, frf, np.ones((len(frequency), 3)), 8), 8)
+    expected = 2 * np.pi * UNDAMPED * (-ZETA + 1j * np.sqrt(1 - ZETA**2))
+    for pole in expected:
+        assert np.min(np.abs(found - pole)) < 2e-3 * abs(pole)
+
+
+@needs_real
+def test_five_receptances_of_a_real_tool_are_reconstructed():
+    folder = REAL / "batches" / "tool-impact" / "impacts"
+    tables = [pd.read_csv(folder / f"frf-p{i}.csv") for i in range(1, 6)]
+    frequency = tables[0]["frequency_hz"].to_numpy()
+    frf = np.stack([(t["real"] + 1j * t["imag"]).to_numpy() for t in tables], axis=1)
+    band = (frequency >= 600) & (frequency <= 3200)
+    model = identify_modes(frequency[band], frf[band], driving=0)
+    assert model.error.max() < 0.03
+    assert 9 <= len(model.modes) <= 18

@@ -1,0 +1,189 @@
+"""From hammer records and labels to lobes and probabilities, on a batch made in the test."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from metro.batch.batch import Batch
+from metro.dynamics.lobes import stability_boundary
+from metro.dynamics.system import Cut, Structure
+from metro.observables import lobes, stability
+from metro.observables.problem import Refusal
+
+HZ, ZETA, K = np.array([40.0, 70.0]), np.array([0.05, 0.04]), np.array([4e6, 6e6])
+BATCH = {
+    "tool": {"diameter_mm": 12, "teeth": 4, "helix_deg": 0},
+    "coefficients": {
+        "ktc_n_mm2": 2000, "krc_n_mm2": 800, "kac_n_mm2": 300, "kte_n_mm": 20, "kre_n_mm": 20, "kae_n_mm": 2,
+    },
+}  # fmt: skip
+RUNS = ["stable", "chatter", "beside", "unlabelled"]
+COLUMNS = ["test", "position", "reference", "response", "replicate"]
+
+
+def receptance(frequency):
+    ratio = frequency[:, None] / HZ
+    return (1 / (K * (1 - ratio**2 + 2j * ZETA * ratio))).sum(axis=1)
+
+
+def tables(directions=("x", "y")):
+    """FRF files of a driving point in each direction, with 0.5 % noise."""
+    rng = np.random.default_rng(0)
+    frequency = np.arange(0.0, 150.0, 0.5)
+    parts = []
+    for d in directions:
+        frf = receptance(frequency)
+        scale = 0.005 * np.abs(frf).mean() / np.sqrt(2)
+        frf = frf + scale * (rng.normal(size=len(frf)) + 1j * rng.normal(size=len(frf)))
+        part = pd.DataFrame({"frequency_hz": frequency, "real_m_n": frf.real, "imag_m_n": frf.imag})
+        parts.append(part.assign(test="tip", position="1", reference=f"1{d}", response=f"1{d}", replicate=1))
+    hit = pd.DataFrame(columns=[*COLUMNS, "response_unit", "t_s", "force_n", "response_si"])
+    return {"hit": hit, "frf": pd.concat(parts, ignore_index=True)}
+
+
+def batch(**changes):
+    runs = pd.DataFrame(
+        {
+            "role": ["validate", "validate", "identify", "validate"],
+            "condition": RUNS,
+            "operation": "side",
+            "direction": "down",
+            "spindle_rpm": [700.0, 700.0, 900.0, 1200.0],
+            "axial_depth_mm": [0.05, 20.0, 0.3, 0.3],
+            "radial_depth_mm": 3.0,
+            "feed_direction_deg": np.nan,
+            "pose": "1",
+            "stable": ["yes", "no", "yes", ""],
+        },
+        index=pd.Index(RUNS, name="run"),
+    )
+    return Batch("press", {**BATCH, **changes}, {"cell": "c"}, runs, {})
+
+
+def observe(made=None, directions=("x", "y")):
+    source = tables(directions)
+    return lobes.observe(made or batch(), lambda name: source[name], {})
+
+
+@pytest.fixture(scope="module")
+def observed():
+    return observe()
+
+
+def test_the_modes_of_both_directions_are_found(observed):
+    modes = observed["modes"]
+    assert list(modes["direction"]) == ["x", "x", "y", "y"]
+    np.testing.assert_allclose(modes["frequency_hz"], np.tile(HZ, 2), rtol=5e-3)
+    np.testing.assert_allclose(modes["stiffness_n_m"], np.tile(K, 2), rtol=0.03)
+
+
+def test_the_diagram_is_that_of_the_true_structure(observed):
+    diagram = observed["lobes"]
+    true = Structure(np.repeat([0, 1], 2), 2 * np.pi * np.tile(HZ, 2), np.tile(ZETA, 2), np.tile(K, 2))
+    cut = Cut(4, np.pi - np.arccos(1 - 3.0 / 6.0), np.pi, 2000e6, 800e6)
+    some = diagram.iloc[::12]
+    exact = stability_boundary(true, cut, some["rpm"].to_numpy()).depth * 1e3
+    np.testing.assert_allclose(some["depth_mm"], exact, rtol=0.06)
+    inside = (exact > some["depth_lo_mm"]) & (exact < some["depth_hi_mm"])
+    assert inside.all()
+
+
+def test_reconstruction_follows_the_measured_receptance(observed):
+    used = observed["frf_used"]
+    measured = used["real_m_n"] + 1j * used["imag_m_n"]
+    modal = used["modal_real_m_n"] + 1j * used["modal_imag_m_n"]
+    assert np.linalg.norm(modal - measured) < 0.02 * np.linalg.norm(measured)
+
+
+def test_shallow_cuts_are_predicted_stable_and_deep_ones_not(observed):
+    problem = lobes.problem(batch(), observed, {})
+    probability = dict(zip(problem.runs, problem.probability_unstable, strict=True))
+    assert probability["stable"] < 0.02
+    assert probability["chatter"] > 0.98
+    assert set(problem.runs) == {"stable", "chatter", "beside"}
+
+
+def test_the_comparison_holds_the_validation_runs_with_labels(observed):
+    table = lobes.comparison(lobes.problem(batch(), observed, {}))
+    assert list(table["run"]) == ["stable", "chatter"]
+    assert list(table["measured"]) == [0.0, 1.0]
+    assert (table["before"] == table["after"]).all()
+    assert set(table["unit"]) == {"1"}
+    assert table["sigma"].isna().all()
+
+
+def test_the_label_never_changes_the_prediction(observed):
+    made = batch()
+    flipped = replace(made, runs=made.runs.assign(stable=["no", "yes", "no", ""]))
+    again = observe(flipped)
+    pd.testing.assert_series_equal(
+        observed["lobe_runs"]["probability_unstable"], again["lobe_runs"]["probability_unstable"]
+    )
+
+
+def test_the_report_has_the_blocks_of_the_contract(observed):
+    blocks = lobes.report(batch(), observed, {}, Refusal(""), None)
+    assert set(blocks["modes"][0]) == {"position", "direction", "frequency", "damping", "stiffness", "mass"}
+    assert blocks["modes"][0]["position"] == 1
+    assert blocks["lobes"][0]["boundary"] == "data/processed/press/lobes.parquet"
+    lowest = blocks["lobes"][0]["lowest_mm"]
+    assert lowest["ci95"][0] < lowest["value"] < lowest["ci95"][1]
+
+
+def test_modes_in_x_and_z_use_z_as_the_second_direction(observed):
+    in_z = observe(directions=("x", "z"))
+    assert in_z["lobes_refused"]["reason"].str.contains("z is taken as the second direction").any()
+    np.testing.assert_allclose(in_z["lobes"]["depth_mm"], observed["lobes"]["depth_mm"], rtol=1e-9)
+
+
+def test_one_direction_alone_is_rigid_in_the_other_and_says_so():
+    alone = observe(directions=("y",))
+    assert alone["lobes_refused"]["reason"].str.contains("no modes in x: rigid there").any()
+    assert len(alone["lobes"])
+
+
+def test_turning_feed_and_structure_together_changes_nothing(observed):
+    made = batch()
+    turned = replace(made, runs=made.runs.assign(feed_direction_deg=180.0))
+    np.testing.assert_allclose(observe(turned)["lobes"]["depth_mm"], observed["lobes"]["depth_mm"], rtol=1e-6)
+
+
+def test_a_feed_across_exchanges_the_directions():
+    made = batch()
+    turned = replace(made, runs=made.runs.assign(feed_direction_deg=90.0))
+    along_x, across_y = observe(directions=("x",)), observe(turned, directions=("y",))
+    np.testing.assert_allclose(across_y["lobes"]["depth_mm"], along_x["lobes"]["depth_mm"], rtol=0.05)
+
+
+def test_modes_are_identified_even_without_coefficients():
+    found = observe(batch(coefficients={}))
+    assert len(found["modes"]) == 4
+    refusal = lobes.problem(batch(coefficients={}), found, {})
+    assert isinstance(refusal, Refusal)
+    assert "no cutting coefficients" in refusal.reason
+    assert "lobes" not in lobes.report(batch(), found, {}, refusal, None)
+
+
+def test_without_runs_the_lobes_are_refused_and_the_modes_kept():
+    made = batch()
+    empty = replace(made, runs=made.runs.iloc[:0])
+    found = observe(empty)
+    assert len(found["modes"]) == 4
+    assert isinstance(lobes.problem(empty, found, {}), Refusal)
+
+
+def test_without_impacts_there_is_nothing():
+    source = {name: table.iloc[:0] for name, table in tables().items()}
+    refused = lobes.observe(batch(), lambda name: source[name], {})
+    assert isinstance(refused, Refusal)
+    assert "impacts.csv" in refused.reason
+
+
+def test_probability_is_a_half_at_the_boundary_and_grows_with_depth():
+    samples = np.full((50, 3), 1e-3)
+    low, middle, high = stability.probability_unstable(np.array([0.7e-3, 1e-3, 1.4e-3]), samples)
+    assert middle == pytest.approx(0.5)
+    assert low == pytest.approx(1 - high, abs=0.02)
+    assert stability.probability_unstable(np.array([1e-6]), samples[:, :1])[0] == stability.LABEL_ERROR

@@ -1,0 +1,128 @@
+"""The report of a batch: what it says, and that it says it the same way each time."""
+
+from dataclasses import replace
+
+import pypdfium2
+import pytest
+import synthetic_results as synthetic
+
+from metro.report.batch_report import batch_report
+from metro.report.sections.verdict import parameter_name, sentence
+
+
+def text_of(pdf):
+    document = pypdfium2.PdfDocument(pdf)
+    pages = [document[i].get_textpage().get_text_range() for i in range(len(document))]
+    return [" ".join(page.split()) for page in pages]
+
+
+@pytest.fixture(scope="module")
+def pdf():
+    return batch_report(synthetic.results())
+
+
+@pytest.fixture(scope="module")
+def pages(pdf):
+    return text_of(pdf)
+
+
+def test_the_first_page_says_the_verdict_with_its_numbers(pages):
+    for words in (
+        "tool runout",
+        "9.83 ± 0.31 µm",
+        "11.80 ± 0.94 N",
+        "2.10 ± 0.17 N",
+        "r07 and r08",
+        "scan the face clamped and free",
+    ):
+        assert words in pages[0]
+    assert "Data quality" not in pages[0]
+    assert "Data quality" in pages[1]
+
+
+def test_every_part_is_there(pages):
+    text = " ".join(pages)
+    for words in (
+        *("Identification", "Predicted against measured", "The closed loop", "Provenance", "Not identified"),
+        *("3 samples missing", "no impacts.csv", "absorbed", "K_tc", "958.9 ± 6.0", "(7.255 ± 0.040)·10⁶"),
+        *(
+            "Cannot be seen in this batch",
+            f"{7:064x}",
+            "from the column role of runs.csv",
+            "grows along the path",
+        ),
+    ):
+        assert words in text
+
+
+def test_failed_checks_come_before_what_was_checked(pages):
+    page = pages[1]
+    assert page.index("3 samples missing") < page.index("What was checked")
+
+
+def test_the_same_results_give_the_same_bytes(pdf):
+    assert batch_report(synthetic.results()) == pdf
+
+
+def test_the_file_declares_archival_and_accessible_pdf(pdf):
+    assert b"pdfaid:part" in pdf
+    assert b"pdfuaid:part" in pdf
+
+
+def test_errors_by_run_and_axis_come_from_the_comparison_table(pages):
+    frame = synthetic.tables()["comparison"].query("run == 'r07' and axis == 'x'")
+    before = ((frame["measured"] - frame["before"]) ** 2).mean() ** 0.5
+    assert f"{before:.2f}" in " ".join(pages)
+
+
+def test_a_batch_with_nothing_in_it_still_has_a_report_that_says_so():
+    empty = replace(synthetic.results(), tables={}, identified={}, verdict={}, loop={}, sources={})
+    text = " ".join(text_of(batch_report(empty)))
+    assert "no verdict" in text
+    assert "Nothing could be identified" in text
+    assert "nothing to compare" in text
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        ("clean", "the base model holds"),
+        ("explained", "traced to tool runout (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°)"),
+        ("partly_explained", "A significant rest remains"),
+        ("undetermined", "It may be tool wear or charge drift."),
+        ("unexplained", "no effect of the library accounts for it"),
+        ("insufficient", "too few runs to tell"),
+    ],
+)
+def test_every_status_has_its_sentence(status, words):
+    entry = synthetic.observable(
+        status, effects=[synthetic.RUNOUT], indistinguishable=[["tool_wear", "charge_drift"]]
+    )
+    assert words in sentence("force", entry)
+
+
+def test_an_error_that_did_not_change_is_said_once():
+    assert "goes from" not in sentence("force", synthetic.observable("unexplained", 5.0, 5.0))
+
+
+def test_parameters_lose_the_unit_in_their_name():
+    assert parameter_name("radius_um", {"value": 1.0, "unit": "um"}) == "radius"
+    assert parameter_name("slope_n_s", {"value": 1.0, "unit": "N/s"}) == "slope"
+    assert parameter_name("factor", {"value": 1.0, "unit": "1"}) == "factor"
+    assert parameter_name("joint", 3) == "joint"
+
+
+def test_without_a_verdict_the_first_page_says_what_was_identified():
+    silent = replace(synthetic.results(), verdict={}, loop={})
+    assert (
+        "Identified: 1 mode, cutting coefficients, joint stiffness and flatness of faces."
+        in text_of(batch_report(silent))[0]
+    )
+
+
+def test_single_values_per_run_and_axis_are_tabulated_and_not_drawn_as_curves():
+    one = synthetic.tables()["comparison"].query("observable == 'deformation'").iloc[:1]
+    text = " ".join(text_of(batch_report(replace(synthetic.results(), tables={"comparison": one}))))
+    assert "Errors on held-out runs, rms (mm)" in text
+    assert "Parity on held-out runs" in text
+    assert "Residual of all held-out runs" not in text

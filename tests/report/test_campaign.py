@@ -1,0 +1,61 @@
+"""The campaign's summary."""
+
+import json
+
+import pandas as pd
+import pypdfium2
+import pytest
+import synthetic_results as synthetic
+
+from metro.report.campaign import campaign_report, campaign_table
+from metro.stages.campaign import campaign
+
+EMPTY = {"format": 1, "batch": "modes-only", "metro": "0", "observables": {}}
+
+
+@pytest.fixture
+def verdicts():
+    return {"synthetic": synthetic.verdict(), "modes-only": EMPTY}
+
+
+def test_the_table_has_a_row_per_batch_and_observable_with_errors_and_effects(verdicts):
+    table = campaign_table(verdicts).set_index(["batch", "observable"])
+    assert len(table) == 4
+    row = table.loc[("synthetic", "force")]
+    assert (row["before_rms"], row["after_rms"], row["effects"]) == (11.8, 2.1, "tool_runout")
+    assert row["before_lo"] == pytest.approx(0.92 * 11.8)
+    assert table.loc[("synthetic", "flatness"), "rivals"] == "fixture bow or thermal growth"
+
+
+def test_a_campaign_without_verdicts_has_an_empty_table_of_the_same_columns(verdicts):
+    empty = campaign_table({"modes-only": EMPTY})
+    assert empty.empty
+    assert list(empty.columns) == list(campaign_table(verdicts).columns)
+
+
+def test_the_stage_writes_both_files_and_the_pdf_names_what_could_not_be_told(tmp_path, verdicts):
+    folders = []
+    for name, verdict in verdicts.items():
+        folder = tmp_path / "reports" / name
+        folder.mkdir(parents=True)
+        (folder / "verdict.json").write_text(json.dumps(verdict))
+        (folder / "identified.json").write_text(json.dumps({"not_identified": {"force": "no runs.csv"}}))
+        folders.append(folder)
+    campaign(folders, tmp_path / "out", {}, "c0de")
+    assert len(pd.read_parquet(tmp_path / "out" / "summary.parquet")) == 4
+    document = pypdfium2.PdfDocument(tmp_path / "out" / "summary.pdf")
+    text = " ".join(
+        " ".join(document[i].get_textpage().get_text_range() for i in range(len(document))).split()
+    )
+    for words in (
+        "2 batches, 4 verdicts",
+        "fixture bow or thermal growth cannot be told apart",
+        "no runs.csv",
+        "modes-only",
+    ):
+        assert words in text
+
+
+def test_the_summary_is_the_same_whatever_the_order_of_the_batches(verdicts):
+    backwards = dict(reversed(list(verdicts.items())))
+    assert campaign_report(verdicts, {}) == campaign_report(backwards, {})

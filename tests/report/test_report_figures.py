@@ -1,0 +1,81 @@
+"""Figures show what is in the frame, name their units, and are the same for the same data."""
+
+import numpy as np
+import pandas as pd
+import synthetic_results as synthetic
+
+from metro.report.figures import comparison, surface, verdicts
+from metro.report.style import to_svg
+
+
+def rows(observable):
+    frame = synthetic.tables()["comparison"]
+    return frame[frame["observable"] == observable].reset_index(drop=True)
+
+
+def lines(axes):
+    return {line.get_label(): line.get_ydata() for line in axes.get_lines()}
+
+
+def test_overlay_draws_measured_and_both_predictions_with_units():
+    frame = rows("deformation")
+    figure = comparison.overlay(frame, "deformation")
+    axes = figure.axes[0]
+    drawn = lines(axes)
+    assert np.allclose(drawn["measured"], frame["measured"])
+    assert np.allclose(drawn["base model"], frame["before"])
+    assert np.allclose(drawn["with effects found"], frame["after"])
+    assert figure.get_supylabel() == "deformation (mm)"
+    assert axes.get_xlabel().endswith("(mm)")
+
+
+def test_overlay_of_force_has_a_panel_per_run_and_axis_and_one_revolution_in_each():
+    figure = comparison.overlay(rows("force"), "force")
+    assert len(figure.axes) == 6
+    assert all(lines(axes)["measured"].size == 120 for axes in figure.axes)
+
+
+def test_rows_without_coordinates_are_drawn_by_their_place_in_the_table():
+    frame = rows("deformation").assign(s_mm=np.nan)
+    assert comparison.coordinate(frame) == ""
+    axes = comparison.overlay(frame, "deformation").axes[0]
+    assert axes.get_xlabel() == "place in the table"
+
+
+def test_residual_bands_hold_the_median_of_every_bin():
+    axes = comparison.residuals(rows("deformation"), "deformation").axes[0]
+    frame = rows("deformation")
+    assert np.allclose(lines(axes)["base model"], frame["measured"] - frame["before"])
+
+
+def test_a_chart_of_lobes_marks_chatter_and_stable_cuts_apart():
+    tests = pd.DataFrame(
+        {"position": ["1", "1"], "rpm": [2000.0, 3000.0], "depth_mm": [1.5, 0.5], "measured": [1.0, 0.0]}
+    )
+    axes = surface.lobes_chart(synthetic.boundary(), tests).axes[0]
+    points = {
+        c.get_label(): c.get_offsets().tolist()
+        for c in axes.collections
+        if c.get_label() in {"stable cut", "chatter"}
+    }
+    assert points == {"stable cut": [[3000.0, 0.5]], "chatter": [[2000.0, 1.5]]}
+
+
+def test_changes_show_the_errors_they_are_given():
+    change = verdicts.Change("force", 8.3, 1.5, (8.0, 8.6), None, 1.2)
+    axes = verdicts.changes([change], "error (%)").axes[0]
+    marks = sorted(float(c.get_offsets()[0][0]) for c in axes.collections)
+    assert marks == [1.5, 8.3]
+    assert [t.get_text() for t in axes.get_yticklabels()] == ["force"]
+
+
+def test_the_same_data_give_the_same_bytes():
+    first, second = (to_svg(comparison.parity(rows("force"), "force")) for _ in range(2))
+    assert first == second
+    assert b"<dc:date>" not in first
+
+
+def test_maps_have_a_colour_scale_symmetric_about_zero():
+    figure = surface.face_maps(synthetic.tables()["face_map"])
+    low, high = figure.axes[0].collections[0].get_clim()
+    assert low == -high

@@ -1,0 +1,68 @@
+"""Tip forces from joint torques, against the forces that made them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from metro.robot.kinematics import arm_of_cell
+from metro.robot.sensorless import observability, tip_force
+from metro.robot.statics import tip_jacobian
+
+DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
+ARM = arm_of_cell({"arm": {"dh": DH}}, {"tool_in_flange_mm": [212.5, 0.0, 279.91]})
+FORCE = np.array([80.0, -170.0, -35.0])
+
+
+def torques(n):
+    """Torques of FORCE in n poses by differences of the tip's position: τ_i = −f·∂x/∂q_i."""
+    q = np.array([0.1, -0.9, 1.2, 0.3, 0.8, 0.2]) + np.linspace(0, 0.05, n)[:, None]
+    step = 1e-6
+    moves = [(ARM.tip(q + step * e) - ARM.tip(q - step * e)) / (2 * step) for e in np.eye(6)]
+    return q, -np.stack([move @ FORCE for move in moves], axis=1)
+
+
+def test_exact_torques_give_the_exact_force_from_any_three_joints():
+    q, torque = torques(10)
+    for joints in ([0, 1, 2], [0, 3, 4], [1, 4, 5], range(6)):
+        index = np.where(np.isin(np.arange(6), list(joints)), 3.0, 0.5)
+        found = tip_force(torque, np.ones_like(torque), tip_jacobian(ARM, q), index)
+        np.testing.assert_allclose(found.force, np.tile(FORCE, (10, 1)), atol=1e-4)
+
+
+def test_joints_below_the_index_do_not_count_whatever_they_say():
+    q, torque = torques(5)
+    torque[:, 1] = 1e6
+    index = np.array([3.0, 1.99, 4.0, 2.0, 5.0, 2.5])
+    found = tip_force(torque, np.ones_like(torque), tip_jacobian(ARM, q), index)
+    np.testing.assert_allclose(found.force, np.tile(FORCE, (5, 1)), atol=1e-4)
+
+
+def test_the_stated_covariance_is_that_of_the_noise():
+    q, torque = torques(4000)
+    sd = np.array([3.0, 3.0, 2.0, 1.0, 1.0, 0.5])
+    noisy = torque + np.random.default_rng(8).normal(0, sd, torque.shape)
+    q = np.broadcast_to(q[:1], q.shape)
+    torque = torque + (torque[:1] - torque)
+    noisy = torque + np.random.default_rng(8).normal(0, sd, torque.shape)
+    found = tip_force(noisy, np.broadcast_to(sd**2, torque.shape), tip_jacobian(ARM, q), np.full(6, 9.0))
+    np.testing.assert_allclose(np.cov(found.force.T), found.covariance[0], rtol=0.15, atol=0.3)
+
+
+def test_joints_that_pull_alike_are_betrayed_by_the_condition_number():
+    jacobian = np.array([[1.0, 1.001, 0.0], [0.5, 0.5, 1.0], [0.2, 0.2, 0.0]])[None]
+    found = tip_force(np.ones((1, 3)), np.ones((1, 3)), jacobian, np.full(3, 5.0))
+    assert found.condition[0] == pytest.approx(np.linalg.cond(jacobian[0]))
+    assert found.condition[0] > 1000
+
+
+def test_the_index_is_the_mean_of_the_cut_over_the_range_of_the_idle_run():
+    cutting = np.array([[-4.0, 1.0], [-8.0, -1.0]])
+    idle = np.array([[10.0, 5.0], [13.0, 4.5]])
+    np.testing.assert_allclose(observability(cutting, idle), [6 / 3, 0.0])
+
+
+def test_two_joints_are_not_enough():
+    q, torque = torques(3)
+    with pytest.raises(ValueError, match="only 2 of 6 joints reach the observability index 2; at least 3"):
+        tip_force(torque, np.ones_like(torque), tip_jacobian(ARM, q), np.array([3, 1, 1, 1, 9, 0.2]))

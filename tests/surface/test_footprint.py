@@ -1,0 +1,52 @@
+"""Sampling a cloud in discs: brute force, transmission, edges."""
+
+import numpy as np
+import pytest
+
+from metro.surface.footprint import sample
+
+RADIUS = 1.5
+
+
+def lattice(size: float = 60.0, pitch: float = 0.3, seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.arange(0, size, pitch), np.arange(0, size, pitch))
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    points[:, :2] += rng.uniform(-0.1, 0.1, (len(points), 2))
+    return rng.permutation(points)
+
+
+def test_discs_hold_the_points_that_a_search_of_all_finds() -> None:
+    rng, cloud = np.random.default_rng(1), lattice(20.0, 0.5)
+    cloud[:, 2] = rng.normal(size=len(cloud))
+    x, y = rng.uniform(-2, 22, (2, 80))
+    found = sample(cloud, x, y, RADIUS)
+    for i in range(len(x)):
+        inside = cloud[np.hypot(cloud[:, 0] - x[i], cloud[:, 1] - y[i]) <= RADIUS, 2]
+        assert found.count[i] == len(inside)
+        if len(inside) >= 5:
+            assert found.height[i] == pytest.approx(inside.mean(), abs=1e-12)
+        else:
+            assert np.isnan(found.height[i])
+
+
+def test_a_wave_of_twelve_millimetres_keeps_0_925_of_its_height() -> None:
+    cloud = lattice()
+    cloud[:, 2] = np.cos(2 * np.pi * (cloud[:, 0] - 24.0) / 12.0)
+    found = sample(cloud, np.array([24.0, 36.0]), np.array([30.0, 30.0]), RADIUS)
+    assert found.height == pytest.approx(0.925, abs=0.006)
+
+
+def test_noise_about_a_tilted_surface_is_told_from_the_tilt() -> None:
+    cloud = lattice()
+    cloud[:, 2] = 0.5 * cloud[:, 0] - 0.2 * cloud[:, 1] + np.random.default_rng(2).normal(0, 0.02, len(cloud))
+    x = np.linspace(5, 55, 200)
+    found = sample(cloud, x, np.full(200, 30.0), RADIUS)
+    assert np.sqrt(np.mean(found.sd**2)) == pytest.approx(0.02, rel=0.04)
+
+
+def test_coverage_is_whole_inside_half_at_an_edge_and_nothing_outside() -> None:
+    found = sample(lattice(), np.array([30.0, 59.9, 80.0]), np.full(3, 30.0), RADIUS)
+    assert found.coverage[0] == 1.0
+    assert 0.4 <= found.coverage[1] <= 0.65
+    assert (found.coverage[2], found.count[2]) == (0.0, 0)

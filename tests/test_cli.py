@@ -1,0 +1,119 @@
+"""The command line: its help, its messages, its exit codes."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from metro import __version__, cli
+from metro.batch.findings import BatchError, Finding
+from metro.codehash import code_hash
+from metro.formats import FormatError
+
+STAGES = ("ingest", "identify", "predict", "loop", "report", "campaign")
+
+
+def call(*arguments):
+    return CliRunner(env={"COLUMNS": "200", "TERMINAL_WIDTH": "200"}).invoke(
+        cli.app, [str(one) for one in arguments]
+    )
+
+
+def test_it_says_its_version():
+    assert call("--version").output == f"metro {__version__}\n"
+
+
+def test_the_help_shows_every_command_what_people_call_first():
+    output = call("--help").output
+    places = [output.index(f" {name} ") for name in ("check", "new-batch", *STAGES)]
+    assert places == sorted(places)
+
+
+@pytest.mark.parametrize("command", ["check", "new-batch", *STAGES])
+def test_every_command_and_option_has_a_help_text(command):
+    import typer
+
+    group = typer.main.get_command(cli.app)
+    chosen = group.commands[command]
+    assert chosen.help
+    assert all(param.help for param in chosen.params if param.name != "help")
+
+
+def test_a_new_batch_passes_its_own_check(tmp_path):
+    made = call("new-batch", "first-cut", "--root", tmp_path)
+    assert made.exit_code == 0
+    assert f"metro check {tmp_path}/first-cut" in made.output.replace("\n", "")
+    assert call("check", tmp_path / "first-cut").exit_code == 0
+
+
+def test_a_new_batch_of_a_wrong_name_is_refused_in_one_line(tmp_path):
+    result = call("new-batch", "First Cut", "--root", tmp_path)
+    assert result.exit_code == 1
+    assert result.stderr.startswith("First Cut: is no name for a batch")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_check_of_several_batches_fails_when_one_of_them_does(tmp_path):
+    for name in ("good", "bad"):
+        call("new-batch", name, "--root", tmp_path)
+    (tmp_path / "bad/batch.yaml").write_text("format: 2\n")
+    assert call("check", tmp_path / "good", tmp_path / "bad").exit_code == 1
+    assert call("check", tmp_path / "good").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        BatchError([Finding("error", "runs.csv", "found x"), Finding("error", "runs.csv", "found y")]),
+        FormatError("force/r01.csv", "row 3: found x"),
+    ],
+)
+def test_the_users_errors_are_printed_without_a_traceback(error, tmp_path, monkeypatch):
+    def ingest(**arguments):
+        raise error
+
+    monkeypatch.setattr("metro.stages.ingest.ingest", ingest)
+    code = code_hash("ingest")
+    result = call(
+        "ingest", tmp_path, "--cells", tmp_path, "--out", tmp_path, "--settings", "{}", "--code", code
+    )
+    assert result.exit_code == 1
+    assert result.stderr == f"{error}\n"
+
+
+def test_a_bug_keeps_its_traceback(tmp_path, monkeypatch):
+    def ingest(**arguments):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("metro.stages.ingest.ingest", ingest)
+    code = code_hash("ingest")
+    result = call(
+        "ingest", tmp_path, "--cells", tmp_path, "--out", tmp_path, "--settings", "{}", "--code", code
+    )
+    assert isinstance(result.exception, ZeroDivisionError)
+
+
+def test_a_stage_gets_its_folders_settings_and_code(tmp_path, monkeypatch):
+    given = {}
+    monkeypatch.setattr("metro.stages.ingest.ingest", lambda **arguments: given.update(arguments))
+    code, settings = code_hash("ingest"), {"holdout": {"share": 0.5}}
+    call(
+        *("ingest", tmp_path, "--cells", tmp_path / "cells", "--out", tmp_path / "out"),
+        *("--settings", json.dumps(settings), "--code", code),
+    )
+    assert given == {
+        "folder": tmp_path,
+        "cells": tmp_path / "cells",
+        "out": tmp_path / "out",
+        "settings": settings,
+        "code": code,
+    }
+
+
+def test_a_stage_does_nothing_when_the_code_is_not_the_planned_one(tmp_path, monkeypatch):
+    monkeypatch.setattr("metro.stages.ingest.ingest", lambda **_: pytest.fail("it ran"))
+    result = call(
+        "ingest", tmp_path, "--cells", tmp_path, "--out", tmp_path, "--settings", "{}", "--code", "0"
+    )
+    assert result.exit_code == 1
+    assert "call snakemake again" in result.stderr

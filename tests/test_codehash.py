@@ -1,0 +1,136 @@
+"""The hash of a stage's code changes with the code that the stage runs, and with nothing else."""
+
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+
+from metro import codehash
+
+FILES = {
+    "__init__.py": "",
+    "units.py": '"""Factors."""\nMM = 1e-3\n',
+    "stages/__init__.py": "",
+    "stages/weigh.py": "def weigh():\n    from metro.scales import balance\n    return balance.read()\n",
+    "stages/rest.py": "import json\nfrom metro.units import MM\n",
+    "scales/__init__.py": "",
+    "scales/balance.py": "from .spring import read\nfrom metro.effects.effect import Effect\n",
+    "scales/spring.py": "from ..units import MM\n\ndef read():\n    return MM\n",
+    "scales/unused.py": "X = 1\n",
+    "scales/templates/page.typ": "= Weight\n",
+    "effects/__init__.py": "",
+    "effects/effect.py": "class Effect: ...\n",
+    "effects/drift.py": "X = 1\n",
+}
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Return a package of a few modules in which the hash looks for its stages."""
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(codehash, "ROOT", tmp_path)
+    codehash._module.cache_clear()
+    return tmp_path
+
+
+def changed(package, name, text, stage="weigh"):
+    """Tell whether the stage's hash changes when a file gets another text."""
+    before = codehash.code_hash(stage)
+    (package / name).parent.mkdir(parents=True, exist_ok=True)
+    (package / name).write_text(text)
+    codehash._module.cache_clear()
+    return codehash.code_hash(stage) != before
+
+
+def test_it_is_a_sha256_and_the_same_every_time(package):
+    assert codehash.code_hash("weigh") == codehash.code_hash("weigh")
+    assert len(bytes.fromhex(codehash.code_hash("weigh"))) == 32
+
+
+def test_the_stage_itself_counts(package):
+    assert changed(package, "stages/weigh.py", "def weigh():\n    return 1\n")
+
+
+def test_modules_imported_inside_functions_and_relatively_count_however_deep(package):
+    assert changed(package, "units.py", "MM = 2e-3\n")
+
+
+def test_a_renamed_variable_is_a_change(package):
+    assert changed(package, "scales/spring.py", "from ..units import MM as M\n\ndef read():\n    return M\n")
+
+
+def test_the_package_of_an_imported_module_counts(package):
+    assert changed(package, "scales/__init__.py", "X = 1\n")
+
+
+def test_modules_that_are_not_imported_do_not_count(package):
+    assert not changed(package, "scales/unused.py", "X = 2\n")
+    assert not changed(package, "scales/balance.py", "X = 2\n", stage="rest")
+
+
+def test_comments_layout_and_docstrings_do_not_count(package):
+    text = (
+        '"""How to weigh."""\n# a comment\n\ndef weigh():\n    """Weigh."""\n'
+        + FILES["stages/weigh.py"].split("\n", 1)[1]
+    )
+    assert not changed(package, "stages/weigh.py", text)
+
+
+def test_a_string_that_is_no_docstring_counts(package):
+    assert changed(package, "stages/weigh.py", FILES["stages/weigh.py"] + 'X = "text"\n')
+
+
+def test_the_library_of_effects_counts_whole_where_anything_of_it_is_used(package):
+    assert changed(package, "effects/drift.py", "X = 2\n")
+    assert changed(package, "effects/brand_new.py", "X = 1\n")
+    assert not changed(package, "effects/another.py", "X = 1\n", stage="rest")
+
+
+def test_files_that_are_not_python_count_with_the_package_that_holds_them(package):
+    assert changed(package, "scales/templates/page.typ", "= Mass\n")
+    assert not changed(package, "scales/templates/page.typ", "= Force\n", stage="rest")
+
+
+def test_compiled_files_do_not_count(package):
+    assert not changed(package, "scales/__pycache__/balance.cpython-311.pyc", "x")
+
+
+def test_the_name_of_a_module_counts_and_its_place_on_the_disk_does_not(
+    package, tmp_path_factory, monkeypatch
+):
+    before = codehash.code_hash("weigh")
+    elsewhere = tmp_path_factory.mktemp("elsewhere") / "metro"
+    shutil.copytree(package, elsewhere)
+    monkeypatch.setattr(codehash, "ROOT", elsewhere)
+    assert codehash.code_hash("weigh") == before
+
+
+def test_a_stage_that_is_not_there_is_an_error(package):
+    with pytest.raises(FileNotFoundError, match="stages/stand"):
+        codehash.code_hash("stand")
+
+
+def test_code_other_than_planned_is_refused(package):
+    codehash.require_code("weigh", codehash.code_hash("weigh"))
+    with pytest.raises(codehash.ChangedCodeError, match="call snakemake again"):
+        codehash.require_code("weigh", codehash.code_hash("rest"))
+
+
+def real_stages():
+    folder = Path(codehash.__file__).parent / "stages"
+    return [
+        stage
+        for stage in ("ingest", "identify", "predict", "loop", "report", "campaign")
+        if (folder / f"{stage}.py").exists()
+    ]
+
+
+def test_all_stages_of_the_package_are_hashed_fast():
+    codehash._module.cache_clear()
+    start = time.process_time()
+    hashes = {stage: codehash.code_hash(stage) for stage in real_stages()}
+    assert time.process_time() - start < 1.0
+    assert len(set(hashes.values())) == len(hashes)

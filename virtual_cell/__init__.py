@@ -1,0 +1,1 @@
+"""A simulator of raw batches, for demonstration and tests; it imports nothing of metro."""

@@ -1,0 +1,21 @@
+"""The batches that can be made: the bundled ones, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from virtual_cell.recipes import irb6640, kr160, slot, trimule
+from virtual_cell.write import Row
+
+BUNDLED: dict[str, Callable[[Path], Row]] = {
+    "clean-slot": slot.make,
+    "irb6640-face": irb6640.make,
+    "kr160-side": kr160.make,
+    "trimule-helical": trimule.make,
+}
+
+
+def bundled(root: Path) -> list[Row]:
+    """Make every bundled batch under ``root``; return their truths."""
+    return [make(root / name) for name, make in BUNDLED.items()]

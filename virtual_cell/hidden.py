@@ -1,0 +1,116 @@
+"""Effects that a force batch may hide: how large they come, and what each changes in a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from virtual_cell.session import Session
+from virtual_cell.units import DEG, N_UM, UM
+
+Parameters = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """How to draw an effect's parameters, in the contract's units, and how to apply them to a session."""
+
+    draw: Callable[[np.random.Generator, Session], Parameters]
+    apply: Callable[[Session, Parameters], Session]
+
+
+def _size(rng: np.random.Generator, low: float, high: float) -> float:
+    """Log-uniform, three digits."""
+    return float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.3g}")
+
+
+def _angle(rng: np.random.Generator) -> float:
+    return float(round(rng.uniform(0.0, 360.0), 1))
+
+
+def _signed(rng: np.random.Generator, low: float, high: float) -> float:
+    return _size(rng, low, high) * float(rng.choice([-1.0, 1.0]))
+
+
+def _pitch(rng: np.random.Generator, session: Session) -> Parameters:
+    raw = rng.standard_normal(session.tool.teeth)
+    raw -= raw.mean()
+    return {"pitch_deg": [round(float(e), 3) for e in raw / np.abs(raw).max() * _size(rng, 0.3, 2.0)]}
+
+
+def _runout(session: Session, p: Parameters) -> Session:
+    tool = replace(session.tool, runout=p["radius_um"] * UM, runout_angle=p["angle_deg"] * DEG)
+    return replace(session, tool=tool)
+
+
+def _chipped(session: Session, p: Parameters) -> Session:
+    tool = replace(session.tool, chipped_tooth=p["tooth"], chipped_by=p["length_um"] * UM)
+    return replace(session, tool=replace(tool, chipped_height=session.depth / 2.0))
+
+
+def _size_effect(session: Session, p: Parameters) -> Session:
+    k = replace(session.coefficients, size_exponent=p["exponent"], size_reference=session.mean_chip)
+    return replace(session, coefficients=k)
+
+
+def _angles(session: Session, p: Parameters) -> Session:
+    angles = session.tool.angles + np.array(p["pitch_deg"]) * DEG
+    return replace(session, tool=replace(session.tool, angles=angles))
+
+
+def _sensor(session: Session, **changes: Any) -> Session:
+    return replace(session, dynamometer=replace(session.dynamometer, **changes))
+
+
+def _resonance(rng: np.random.Generator, _: Session) -> Parameters:
+    return {
+        "frequency_hz": [_size(rng, 600.0, 1600.0) for _ in range(3)],
+        "damping": [_size(rng, 0.02, 0.08) for _ in range(3)],
+    }
+
+
+def _drift(rng: np.random.Generator, _: Session) -> Parameters:
+    return {"slope_n_s": [_signed(rng, 1.0, 12.0) for _ in range(3)]}
+
+
+EFFECTS: Mapping[str, Hidden] = {
+    "tool_runout": Hidden(lambda r, _: {"radius_um": _size(r, 2.0, 25.0), "angle_deg": _angle(r)}, _runout),
+    "tool_wear": Hidden(
+        lambda r, _: {"edge_growth_per_m": _size(r, 0.02, 0.4)},
+        lambda s, p: replace(s, coefficients=replace(s.coefficients, wear=p["edge_growth_per_m"])),
+    ),
+    "chip_size_effect": Hidden(lambda r, _: {"exponent": _size(r, 0.06, 0.35)}, _size_effect),
+    "tool_deflection": Hidden(
+        lambda r, _: {"kx_n_um": _size(r, 1.5, 12.0), "ky_n_um": _size(r, 1.5, 12.0)},
+        lambda s, p: replace(s, stiffness=(p["kx_n_um"] * N_UM, p["ky_n_um"] * N_UM)),
+    ),
+    "orbit_stiffness": Hidden(
+        lambda r, _: {"amplitude": _size(r, 0.03, 0.25), "phase_deg": _angle(r)},
+        lambda s, p: replace(s, orbit_stiffness=(p["amplitude"], p["phase_deg"] * DEG)),
+    ),
+    "pitch_error": Hidden(_pitch, _angles),
+    "dynamometer_rotation": Hidden(
+        lambda r, _: {"angle_deg": _signed(r, 0.7, 8.0)},
+        lambda s, p: _sensor(s, rotation=s.dynamometer.rotation + p["angle_deg"] * DEG),
+    ),
+    "dynamometer_resonance": Hidden(
+        _resonance,
+        lambda s, p: _sensor(s, resonance=tuple(zip(p["frequency_hz"], p["damping"], strict=True))),
+    ),
+    "charge_drift": Hidden(
+        _drift,
+        lambda s, p: _sensor(
+            s,
+            slope=tuple(p["slope_n_s"]) if "slope_n_s" in p else (0.0, 0.0, 0.0),
+            time_constant=tuple(p["time_constant_s"]) if "time_constant_s" in p else None,
+        ),
+    ),
+    # outside of any library
+    "chipped_tooth": Hidden(
+        lambda r, s: {"tooth": int(r.integers(s.tool.teeth)), "length_um": _size(r, 8.0, 60.0)}, _chipped
+    ),
+    "hard_spot": Hidden(lambda _r, _s: {"ktc_step": 0.08}, lambda s, p: replace(s, hard_spot=p["ktc_step"])),
+}

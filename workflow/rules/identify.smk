@@ -1,0 +1,22 @@
+rule identify:
+    input:
+        rules.ingest.output,
+    output:
+        expand("data/processed/{{batch}}/{table}.parquet", table=OBSERVED),
+        "reports/{batch}/identified.json",
+    log:
+        "logs/identify/{batch}.log",
+    conda:
+        "../envs/metro.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
+    params:
+        processed=subpath(input[0], parent=True),
+        reports=subpath(output[-1], parent=True),
+        settings=plan.settings("identify"),
+        code=plan.code("identify"),
+    message:
+        "{wildcards.batch}: identifying the models"
+    shell:
+        "metro identify --processed {params.processed} --reports {params.reports} --settings {params.settings:q} --code {params.code} > {log} 2>&1"

@@ -1,0 +1,40 @@
+rule ingest:
+    input:
+        plan.raw_files,
+    output:
+        expand(
+            "data/processed/{{batch}}/{table}.parquet",
+            table=[
+                "force",
+                "robot",
+                "path",
+                "scan",
+                "profile",
+                "hit",
+                "frf",
+                "loads",
+                "mass",
+                "stations",
+                "published",
+                "qc",
+                "runs",
+            ],
+        ),
+        "data/processed/{batch}/batch.json",
+    log:
+        "logs/ingest/{batch}.log",
+    conda:
+        "../envs/metro.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
+    params:
+        folder=plan.folder,
+        cells=plan.cells,
+        out=subpath(output[0], parent=True),
+        settings=plan.settings("ingest"),
+        code=plan.code("ingest"),
+    message:
+        "{wildcards.batch}: checking and reading the raw files"
+    shell:
+        "metro ingest {params.folder:q} --cells {params.cells:q} --out {params.out} --settings {params.settings:q} --code {params.code} > {log} 2>&1"

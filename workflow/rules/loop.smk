@@ -1,0 +1,25 @@
+rule loop:
+    input:
+        rules.ingest.output,
+        rules.identify.output,
+        rules.predict.output,
+    output:
+        "data/processed/{batch}/comparison.parquet",
+        "data/processed/{batch}/loop.json",
+        "reports/{batch}/verdict.json",
+    log:
+        "logs/loop/{batch}.log",
+    conda:
+        "../envs/metro.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        processed=subpath(input[0], parent=True),
+        reports=subpath(output[-1], parent=True),
+        settings=plan.settings("loop"),
+        code=plan.code("loop"),
+    message:
+        "{wildcards.batch}: tracing what the prediction leaves over"
+    shell:
+        "metro loop --processed {params.processed} --reports {params.reports} --settings {params.settings:q} --code {params.code} > {log} 2>&1"

@@ -1,0 +1,22 @@
+rule predict:
+    input:
+        rules.ingest.output,
+        rules.identify.output,
+    output:
+        "data/processed/{batch}/prediction.parquet",
+    log:
+        "logs/predict/{batch}.log",
+    conda:
+        "../envs/metro.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        processed=subpath(input[0], parent=True),
+        reports=subpath(input[-1], parent=True),
+        settings=plan.settings("predict"),
+        code=plan.code("predict"),
+    message:
+        "{wildcards.batch}: predicting the held-out runs"
+    shell:
+        "metro predict --processed {params.processed} --reports {params.reports} --settings {params.settings:q} --code {params.code} > {log} 2>&1"

@@ -1,0 +1,24 @@
+rule report:
+    input:
+        rules.ingest.output,
+        rules.identify.output,
+        rules.predict.output,
+        rules.loop.output,
+    output:
+        "reports/{batch}/report.pdf",
+    log:
+        "logs/report/{batch}.log",
+    conda:
+        "../envs/metro.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        processed=subpath(input[0], parent=True),
+        reports=subpath(output[0], parent=True),
+        settings=plan.settings("report"),
+        code=plan.code("report"),
+    message:
+        "{wildcards.batch}: writing the report"
+    shell:
+        "metro report --processed {params.processed} --reports {params.reports} --settings {params.settings:q} --code {params.code} > {log} 2>&1"
