@@ -41,8 +41,10 @@ def acceleration(modes: Modes, force: Array, dt: float) -> Array:
         states[i + 1] = (step @ states[i][:, :, None])[:, :, 0] + push * f
     x, v = states[:-1, :, 0], states[:-1, :, 1]
     per_mass = modes.omega**2 / modes.stiffness
+    # the force is held over each step: at a sample it has just jumped, and acts with the mean of both sides
+    jumping = 0.5 * (force + np.concatenate([[0.0], force[:-1]]))
     total: Array = (
-        per_mass * force[:, None] - 2.0 * modes.damping * modes.omega * v - modes.omega**2 * x
+        per_mass * jumping[:, None] - 2.0 * modes.damping * modes.omega * v - modes.omega**2 * x
     ).sum(axis=1)
     return total
 

@@ -113,15 +113,15 @@ def ingest(
 
 
 @app.command(rich_help_panel=STAGES)
-def identify(processed: Processed, reports: Reports, settings: Settings, code: Code) -> None:
+def identify(processed: Processed, settings: Settings, code: Code) -> None:
     """Identify the models from the identification runs: force coefficients, modes, stiffness."""
-    _run("identify", settings, code, processed=processed, reports=reports)
+    _run("identify", settings, code, processed=processed)
 
 
 @app.command(rich_help_panel=STAGES)
-def predict(processed: Processed, reports: Reports, settings: Settings, code: Code) -> None:
+def predict(processed: Processed, settings: Settings, code: Code) -> None:
     """Predict with the base models what was measured on the held-out runs."""
-    _run("predict", settings, code, processed=processed, reports=reports)
+    _run("predict", settings, code, processed=processed)
 
 
 @app.command(rich_help_panel=STAGES)

@@ -48,6 +48,15 @@ def test_lowest_boundary_of_the_benchmark(share, lowest_mm):
     assert boundary.depth.min() * 1e3 == pytest.approx(lowest_mm, abs=5e-5)
 
 
+def test_semidiscretisation_has_the_error_constant_of_its_first_order_form():
+    # with the weights of the delayed displacement exchanged it is still of second order, but three times as
+    # far off
+    exact = spectral_radius(BENCH, bench_cut(0.5), [5000], [1e-3])[0]
+    error = semidiscretisation.spectral_radius(BENCH, bench_cut(0.5), 5000.0, 1e-3, 80) - exact
+    period, steps = 60 / (2 * 5000), 80
+    assert abs(error) < 0.05 * (BENCH_OMEGA * period / steps) ** 2
+
+
 def test_up_and_down_milling_differ_in_the_benchmark():
     up = stability_boundary(BENCH, bench_cut(0.05, "up"), SPEEDS).depth
     down = stability_boundary(BENCH, bench_cut(0.05, "down"), SPEEDS).depth

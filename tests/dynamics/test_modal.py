@@ -147,6 +147,15 @@ def test_the_matrix_fraction_of_two_inputs_has_the_poles_of_the_system():
         assert np.min(np.abs(found - pole)) < 2e-3 * abs(pole)
 
 
+def test_poles_do_not_alias_where_the_band_begins_far_above_zero():
+    frequency = np.arange(50.0, 80.0, 0.1)
+    f, zeta, k = UNDAMPED[2:], ZETA[2:], STIFFNESS[2:]
+    frf = receptance(frequency, f, zeta, k)[:, None, None]
+    found = poles(normal_equations(frequency, frf, np.ones((len(frequency), 1)), 6), 6)
+    for pole in 2 * np.pi * f * (-zeta + 1j * np.sqrt(1 - zeta**2)):
+        assert np.min(np.abs(found - pole)) < 1e-2 * abs(pole)
+
+
 @needs_real
 def test_five_receptances_of_a_real_tool_are_reconstructed():
     folder = REAL / "batches" / "tool-impact" / "impacts"

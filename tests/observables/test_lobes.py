@@ -127,9 +127,18 @@ def test_the_report_has_the_blocks_of_the_contract(observed):
     blocks = lobes.report(batch(), observed, {}, Refusal(""), None)
     assert set(blocks["modes"][0]) == {"position", "direction", "frequency", "damping", "stiffness", "mass"}
     assert blocks["modes"][0]["position"] == 1
-    assert blocks["lobes"][0]["boundary"] == "data/processed/press/lobes.parquet"
+    assert blocks["lobes"][0]["boundary"] == "data/processed/press/lobes_final.parquet"
     lowest = blocks["lobes"][0]["lowest_mm"]
     assert lowest["ci95"][0] < lowest["value"] < lowest["ci95"][1]
+
+
+def test_cross_receptances_are_not_taken_for_direct_ones(observed):
+    source = tables()
+    cross = source["frf"][source["frf"]["response"] == "1y"]
+    cross = cross.assign(reference="1x", real_m_n=-0.3 * cross["real_m_n"], imag_m_n=0.7 * cross["imag_m_n"])
+    source["frf"] = pd.concat([source["frf"], cross])
+    found = lobes.observe(batch(), lambda name: source[name], {})
+    pd.testing.assert_frame_equal(found["modes"], observed["modes"])
 
 
 def test_modes_in_x_and_z_use_z_as_the_second_direction(observed):

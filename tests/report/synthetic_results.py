@@ -234,7 +234,7 @@ def tables():
     return {
         "qc": qc,
         "comparison": comparison,
-        "lobes": boundary(),
+        "lobes_final": boundary(),
         "face_map": face_map,
         "frf_used": responses(),
     }

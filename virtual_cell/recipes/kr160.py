@@ -253,7 +253,7 @@ def _manifest(name: str) -> Row:
         "work_in_base": {"xyz_mm": list(WORK_MM), "rpy_deg": [0, 0, YAW_DEG]},
         "instruments": {
             "dynamometer": {
-                "rate_hz": 10000,
+                "rate_hz": 4096,
                 "reads": "work",
                 "axes": {"x": "-y", "y": "-x", "z": "-z"},
                 "rotation_deg": 0,

@@ -3,7 +3,7 @@ rule identify:
         rules.ingest.output,
     output:
         expand("data/processed/{{batch}}/{table}.parquet", table=OBSERVED),
-        "reports/{batch}/identified.json",
+        "data/processed/{batch}/identified.json",
     log:
         "logs/identify/{batch}.log",
     conda:
@@ -13,10 +13,9 @@ rule identify:
         mem_mb=4000,
     params:
         processed=subpath(input[0], parent=True),
-        reports=subpath(output[-1], parent=True),
         settings=plan.settings("identify"),
         code=plan.code("identify"),
     message:
         "{wildcards.batch}: identifying the models"
     shell:
-        "metro identify --processed {params.processed} --reports {params.reports} --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        "metro identify --processed {params.processed} --settings {params.settings:q} --code {params.code} > {log} 2>&1"

@@ -5,7 +5,9 @@ rule loop:
         rules.predict.output,
     output:
         "data/processed/{batch}/comparison.parquet",
+        "data/processed/{batch}/lobes_final.parquet",
         "data/processed/{batch}/loop.json",
+        "reports/{batch}/identified.json",
         "reports/{batch}/verdict.json",
     log:
         "logs/loop/{batch}.log",

@@ -13,10 +13,9 @@ rule predict:
         mem_mb=2000,
     params:
         processed=subpath(input[0], parent=True),
-        reports=subpath(input[-1], parent=True),
         settings=plan.settings("predict"),
         code=plan.code("predict"),
     message:
         "{wildcards.batch}: predicting the held-out runs"
     shell:
-        "metro predict --processed {params.processed} --reports {params.reports} --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        "metro predict --processed {params.processed} --settings {params.settings:q} --code {params.code} > {log} 2>&1"

@@ -20,7 +20,7 @@ class Cutter:
     helix : rad.
     tooth_angles : angle of each tooth from tooth 0, clockwise, rad. Tooth j+1 cuts before tooth j.
     runout_radius, runout_angle : offset of the tool's axis, m, and its direction from tooth 0, clockwise,
-    rad.
+        rad.
     """
 
     radius: float
@@ -40,18 +40,14 @@ class Cutter:
         return math.tan(self.helix) / self.radius
 
     def pitch(self, steps: int) -> Array:
-        """Angle from each tooth clockwise to the one ``steps`` on, (N,) rad: that tooth cut here before
-        it.
-        """
+        """Angle from each tooth clockwise to the one ``steps`` on, which cut here before it, (N,) rad."""
         angles = np.asarray(self.tooth_angles)
-        turns, _ = np.divmod(np.arange(self.teeth) + steps, self.teeth)
+        turns = (np.arange(self.teeth) + steps) // self.teeth
         ahead = np.roll(angles, -(steps % self.teeth))
-        return ahead + 2.0 * math.pi * turns - angles
+        return np.asarray(ahead + 2.0 * math.pi * turns - angles)
 
     def radius_deviation(self, height: Array) -> Array:
-        """Distance of each tooth from the axis of rotation less the radius, (N, heights) m (physics.md
-        §2).
-        """
+        """Return how far each tooth is from the axis of rotation, less the radius: (N, heights) m."""
         angles = np.asarray(self.tooth_angles)[:, None]
         return self.runout_radius * np.cos(self.runout_angle - angles + self.lag_per_depth * height[None, :])
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Engagement:
-    """Immersion from ``entry`` to ``exit``, rad, clockwise from +y of the feed frame (towards the feed
-    +x).
-    """
+    """Immersion from ``entry`` to ``exit``, rad, clockwise from +y of the feed frame (towards +x)."""
 
     entry: float
     exit: float
@@ -23,7 +21,7 @@ def engagement(operation: str, direction: str, radial_depth: float, radius: floa
     ----------
     operation : ``slot``, ``side``, ``face`` or ``helical`` (from the solid: the front half of the cutter).
     direction : ``up``, ``down`` or ``slot``; a face cut narrower than the cutter in direction ``slot`` is
-    symmetric.
+        symmetric.
     radial_depth, radius : m.
 
     Raises

@@ -32,13 +32,10 @@ def chip_thickness(cutter: Cutter, cut: Cut, immersion: Array, height: Array, tr
     """Chip thickness of every tooth, (angles, heights, N) m; negative where the tooth is clear of the work.
 
     A tooth clears what the teeth before it left, and some of those may have left more than the last one: the
-    least over
-    m = 1…N counts. On circular paths h_m = s_m sin φ + R_j − R_{j+m}, with s_m the feed between the two
-    passes (physics.md §2). On
-    the true, trochoidal paths tooth j+m crossed the ray of tooth j from a centre d behind, at an immersion
-    larger by δ:
-    sin δ = d cos φ / R_{j+m}, d = (v/ω)(pitch − δ), h_m = d sin φ + R_j − R_{j+m} cos δ; two iterations are
-    exact to rounding.
+    least over m = 1…N counts. On circular paths h_m = s_m sin φ + R_j − R_{j+m}, with s_m the feed between
+    the two passes (physics.md §2). On the true, trochoidal paths tooth j+m crossed the ray of tooth j from a
+    centre d behind, at an immersion larger by δ: sin δ = d cos φ / R_{j+m}, d = (v/ω)(pitch − δ), h_m = d sin
+    φ + R_j − R_{j+m} cos δ; two iterations are exact to rounding.
 
     Parameters
     ----------
@@ -69,8 +66,7 @@ def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False)
     Returns
     -------
     (ANGLES, 3, 6) array: angle of tooth 0's tip from +y, evenly from 0 to 2π; axis; coefficient in the order
-    of
-    ``COEFFICIENTS`` (shear in N per N/m², edge in N per N/m of axial depth). Read-only: it is cached.
+    of ``COEFFICIENTS`` (shear in N per N/m², edge in N per N/m of axial depth). Read-only: it is cached.
     """
     lag = cutter.lag_per_depth * cut.axial_depth
     slices = max(4, math.ceil(SLICES_PER_RADIAN * lag))
@@ -117,8 +113,8 @@ def _covered(immersion: Array, engaged: Engagement, window: float) -> tuple[Arra
     """Share of the window around each immersion angle that is engaged, and the middle of that share.
 
     The window is what a slice spans by its helix: so the edge is integrated over its height, not sampled. An
-    edge without helix enters between two grid points: there the window is the angular step, which keeps the mean
-    over a revolution exact to second order.
+    edge without helix enters between two grid points: there the window is the angular step, which keeps the
+    mean over a revolution exact to second order.
     """
     middle = 0.5 * (engaged.entry + engaged.exit)
     offset = np.mod(immersion - middle + math.pi, 2.0 * math.pi) - math.pi

@@ -14,8 +14,7 @@ class EdgeLaw:
     """Linear edge-force law: dF = (K_c h + K_e) dz for each of tangential, radial, axial (physics.md §2).
 
     A law gives the two functions of the chip thickness that multiply the shear and the edge coefficients;
-    effects
-    replace it by one with other functions.
+    effects replace it by one with other functions.
 
     Attributes
     ----------
@@ -28,7 +27,7 @@ class EdgeLaw:
     reference_thickness: float = 1e-4
 
     def shear(self, thickness: Array) -> Array:
-        """Function of the chip thickness (m) that multiplies K_tc, K_rc, K_ac."""
+        """Return the function of the chip thickness (m) that multiplies K_tc, K_rc, K_ac."""
         if self.size_exponent == 0.0:
             return thickness
         positive = np.maximum(thickness, 1e-9)

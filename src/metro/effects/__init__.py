@@ -13,8 +13,7 @@ def library(observable: str | None = None) -> tuple[Effect, ...]:
     """Return the effects of this package and those that other packages register, by name.
 
     ``observable`` limits them to those that change the model of that observable. Another package offers an
-    effect under the
-    entry point group ``metro.effects``.
+    effect under the entry point group ``metro.effects``.
     """
     own = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
     effects: list[Effect] = [module.EFFECT for module in own if hasattr(module, "EFFECT")]

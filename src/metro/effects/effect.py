@@ -14,13 +14,12 @@ class EffectParameter:
     Attributes
     ----------
     name, unit : as in the contract's table of effects, e.g. ``radius_um`` in ``um``; values are given in this
-    unit.
+        unit.
     lower, upper : bounds of the search.
     scale : a typical size: the step of the search and the yardstick of "not zero".
     starts : values from which the joint refit starts; all combinations over the parameters are tried.
     plausible : standard deviation of a weak prior about zero (None: flat): of two explanations that the data
-    cannot part, the
-        one that a machinist would believe.
+        cannot part, the one that a machinist would believe.
     period : for an angle, the period after which the model is the same; None otherwise.
     """
 

@@ -21,9 +21,11 @@ EFFECT = Effect(
     parameters=(EffectParameter("factor", "1", 0.2, 5.0, 0.05, starts=(0.8, 1.2)),),
     apply=apply,
     signature=(
-        "Deformation or deviation in proportion to the predicted one, over all runs and places. A force that is wrong by the same "
-        "factor looks the same."
+        "Deformation or deviation in proportion to the predicted one, over all runs and places. "
+        "A force that is wrong by the same factor looks the same."
     ),
     literature="Abele et al., Prod. Eng. 1 (2007) 387: stiffness under process load against static tests",
-    experiment="load tests at the force level of the cut, and a dynamometer in one cut to part force from stiffness",
+    experiment=(
+        "load tests at the force level of the cut, and a dynamometer in one cut to part force from stiffness"
+    ),
 )

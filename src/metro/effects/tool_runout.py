@@ -11,9 +11,7 @@ from metro.units import DEG, UM
 
 
 def apply(model: Any, values: Mapping[str, float]) -> Any:
-    """Put the cutter of a force model off its axis by ``radius_um`` in the direction ``angle_deg`` from tooth
-    0.
-    """
+    """Put the cutter of a force model off its axis: ``radius_um``, ``angle_deg`` clockwise from tooth 0."""
     radius, angle = values["radius_um"] * UM, values["angle_deg"] * DEG
     return replace(model, cutter=replace(model.cutter, runout_radius=radius, runout_angle=angle))
 
@@ -35,9 +33,16 @@ EFFECT = Effect(
     ),
     apply=apply,
     signature=(
-        "Force at spindle orders that are no multiple of the number of teeth; the first order does not depend on the feed, and "
-        "the mean stays while every tooth cuts. A chipped tooth or unequal pitch look alike, but grow with the feed."
+        "Force at spindle orders that are no multiple of the number of teeth; the first order does not "
+        "depend on the feed, and the mean stays while every tooth cuts. A chipped tooth or unequal pitch "
+        "look alike, but grow with the feed."
     ),
-    literature="Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983) 123; physics.md §2 for teeth that clear several cuts",
-    experiment="runs at two feeds that differ by a factor of two or more, at a sampling rate above ten tooth passings",
+    literature=(
+        "Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983) 123; "
+        "extended to teeth that clear what several earlier ones left"
+    ),
+    experiment=(
+        "runs at two feeds that differ by a factor of two or more, "
+        "at a sampling rate above ten tooth passings"
+    ),
 )

@@ -1,5 +1,4 @@
-"""What speaks for an effect: evidence on the runs of the fit, on conditions left out, and the size of the
-change.
+"""What speaks for an effect: evidence on the runs of the fit, on conditions left out, and its size.
 
 The unit of evidence is the run, and for generality the condition; never the sample.
 """
@@ -12,7 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from metro.loop.fit import Candidate, Fit, linearised, refit, score
+from metro.loop.candidate import Candidate
+from metro.loop.descent import State, linearised
+from metro.loop.fit import Fit, refit, score
 from metro.loop.noise import PRIOR_RUNS, Noise
 from metro.observables.problem import Block
 from metro.units import Array
@@ -25,8 +26,8 @@ class Evidence:
     Attributes
     ----------
     statistic : twice the gain in log-likelihood. p_value : of it, by F with run-level degrees of freedom.
-    held_out : gain in log-likelihood of each condition when it is left out of both fits; empty where that was not
-        worth computing.
+    held_out : gain in log-likelihood of each condition when it is left out of both fits; empty where that was
+        not worth computing.
     size : rms change of the prediction over the rms of the signal.
     """
 
@@ -55,7 +56,7 @@ def compare(smaller: Fit, larger: Fit) -> Evidence:
 
 
 def hold_out(evidence: Evidence, smaller_out: Mapping[str, float], larger: Fit, prior: Noise) -> Evidence:
-    """Add the gain of each condition when left out; ``smaller_out`` is :func:`leave_out` of the smaller fit."""
+    """Add each condition's gain when left out; ``smaller_out`` is :func:`leave_out` of the smaller fit."""
     out = leave_out(larger, prior)
     return replace(evidence, held_out={name: out[name] - value for name, value in smaller_out.items()})
 
@@ -67,9 +68,7 @@ def _tail(statistic: float, parameters: int, runs: int) -> float:
 
 
 def change(smaller: Fit, larger: Fit) -> float:
-    """Rms difference of two fits' predictions over the rms of what was measured, over the runs (not the load
-    tests).
-    """
+    """Rms difference of two fits' predictions over the rms measured, over the runs, not the load tests."""
     difference, signal = 0.0, 0.0
     for block in larger.blocks:
         if block.role != "calibrate":
@@ -79,9 +78,7 @@ def change(smaller: Fit, larger: Fit) -> float:
 
 
 def leave_out(fitted: Fit, prior: Noise) -> dict[str, float]:
-    """Log-likelihood of each condition under the fit of all others, by condition; by run where there is one
-    condition only.
-    """
+    """Log-likelihood of each condition under the fit of all others; of each run if there is one condition."""
     cut = [block for block in fitted.blocks if block.role != "calibrate"]
     by_condition = len({block.condition for block in cut}) > 1
     groups: dict[str, list[Block]] = {}
@@ -119,8 +116,7 @@ def surviving_share(candidate: Candidate, base: Fit) -> float:
     """Share of an effect's signature that the base parameters and the runs' unknowns cannot imitate (0…1).
 
     The signature is the change of the prediction with the effect's first parameter, its size, near the first
-    start. Near zero,
-    the data cannot speak of the effect: the base absorbs it.
+    start. Near zero, the data cannot speak of the effect: the base absorbs it.
     """
     theta = np.concatenate([base.theta, [p.starts[0] for p in candidate.parameters[len(base.theta) :]]])
     total, left = linearised_signature(candidate, base, theta)
@@ -128,10 +124,9 @@ def surviving_share(candidate: Candidate, base: Fit) -> float:
 
 
 def linearised_signature(candidate: Candidate, base: Fit, theta: Array) -> tuple[float, float]:
-    """Whitened sum of squares of the last effect's first column, before and after projection on everything
-    else.
-    """
-    system = linearised(candidate, base.blocks, base.noise, theta, base.beta, base.nuisance)
+    """Whitened sum of squares of the last effect's first column, before and after projection on the rest."""
+    state = State(theta, base.beta, dict(base.nuisance))
+    system = linearised(candidate, base.blocks, base.noise, state)
     first = len(base.theta)
     size, total = [], 0.0
     columns = []

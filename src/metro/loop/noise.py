@@ -1,11 +1,9 @@
 """How far a run may be from a right model: within-run error, model-form budget, run-to-run scatter.
 
 The covariance of a block is ``D + U Uᵀ``. ``D`` is diagonal: the standard error within the run, and the
-declared budget for
-what a simple model never gets exactly right. ``U`` holds what a whole run shares: each base parameter a
-little off (its column
-of the design times the scatter), and the zeros. Without ``U``, 10^5 samples make everything significant
-(loop.md).
+declared budget for what a simple model never gets exactly right. ``U`` holds what a whole run shares: each
+base parameter a little off (its column of the design times the scatter), and the zeros. Without ``U``, 10^5
+samples make everything significant (loop.md).
 """
 
 from __future__ import annotations
@@ -34,13 +32,11 @@ class Noise:
     scatter : (p,) relative run-to-run standard deviation of each base parameter.
     zero_factor : estimated size of the zeros in units of each block's ``zero_sd``.
     repeats : runs per condition: the budget is shared by the repeats of a condition, so it does not average
-    out over them.
+        out over them.
     misfit : by axis, relative rms of what the model at hand misses, spread evenly over the elements. It is
-    estimated with each
-        fit, so that a model that misses much does not bend its parameters to please the elements that are
-        measured best. What is
-        missed is a smooth shape, the same in every run: about twelve neighbouring elements count as one piece
-        of evidence.
+        estimated with each fit, so that a model that misses much does not bend its parameters to please the
+        elements that are measured best. What is missed is a smooth shape, the same in every run: about twelve
+        neighbouring elements count as one piece of evidence.
     """
 
     budget: float
@@ -94,6 +90,14 @@ def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION
     return np.asarray(block.sigma**2 + repeats * ((noise.budget * scale) ** 2 + correlation * missed**2))
 
 
+def all_alike(noise: Noise) -> Noise:
+    """Return the noise for intervals: what a model gets wrong may be the same in all conditions.
+
+    Then more conditions do not average it out, any more than repeats do.
+    """
+    return replace(noise, repeats={name: count * len(noise.repeats) for name, count in noise.repeats.items()})
+
+
 def log_scale(block: Block, noise: Noise) -> float:
     """Logarithm of the determinant of the unshared variance, elements counted as in :func:`diagonal`."""
     once = diagonal(block, noise, correlation=1.0)
@@ -116,7 +120,7 @@ def whitener(variance: Array, directions: Array) -> Whitener:
 
 
 def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
-    """Standard deviation of measured less predicted, per row of the comparison table, (m,)."""
+    """Return the standard deviation of measured less predicted, per row of the comparison table, (m,)."""
     alone = replace(noise, repeats={block.condition: 1.0 / block.repeats}, misfit={})
     unshared, directions = diagonal(block, alone), shared(block, noise, design, beta)
     if block.synthesis is None:
@@ -126,14 +130,14 @@ def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array
 
 
 def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Array]]) -> Noise:
-    """One step of expectation–maximisation for scatter, zeros and misfit; the first two are drawn towards the
-    prior.
+    """One step of expectation–maximisation for scatter, zeros and misfit.
+
+    Scatter and zeros are drawn towards the prior, as if it were ``PRIOR_RUNS`` runs.
 
     Parameters
     ----------
     parts : for each run: block, residual (n,), and directions (n, k) under ``noise``. The first p directions
-    of a run are
-        those of the base parameters, the rest its zeros.
+        of a run are those of the base parameters, the rest its zeros.
     """
     p = len(noise.scatter)
     amplitudes = {"scatter": [1.0] * PRIOR_RUNS, "zero": [1.0] * PRIOR_RUNS}

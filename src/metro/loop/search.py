@@ -1,8 +1,8 @@
 """The search: which effects, if any, the residual of an observable is traced to.
 
 Forward: each effect of the library is fitted jointly with what the model has already; the best that passes
-every gate is added.
-Backward: an effect that a later one made idle is dropped for good. The validation runs are not read here.
+every gate is added. Backward: an effect that a later one made idle is dropped for good. The validation runs
+are not read here.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from dataclasses import dataclass, field, replace
 
 from metro.effects.effect import Effect
 from metro.loop import signature as rest
+from metro.loop.candidate import Candidate
 from metro.loop.evidence import Evidence, compare, hold_out, leave_out, surviving_share, weights
-from metro.loop.fit import Candidate, Fit, fit
+from metro.loop.fit import Fit, fit
 from metro.loop.noise import Noise, first_noise
 from metro.observables.problem import Problem
 
@@ -25,13 +26,18 @@ NOT_VISIBLE = 0.02
 
 @dataclass(frozen=True)
 class Gates:
-    """Thresholds of the configuration: ``budget`` model-form budget, ``materiality`` least relative change of
-    the prediction,
-    ``false_additions`` rate of false discoveries over the candidates, ``held_out_gain`` least gain in
-    log-likelihood.
+    """Thresholds of the configuration.
+
+    Attributes
+    ----------
+    model_form_budget : relative to the signal.
+    materiality : least relative change of the prediction.
+    false_additions : rate of false discoveries over the candidates.
+    held_out_gain : least gain in log-likelihood on conditions left out.
+    seed : of the bootstraps.
     """
 
-    budget: float
+    model_form_budget: float
     materiality: float
     false_additions: float
     held_out_gain: float
@@ -55,9 +61,8 @@ class Outcome:
     """What the search found, for the verdict and the report.
 
     ``base`` and ``final`` are fits of the identification runs; ``steps`` the fits after each addition;
-    ``trials`` the last
-    trial of each effect; ``rivals`` effects that explain the rest as well as a chosen one; ``lines`` the
-    signature of the rest.
+    ``trials`` the last trial of each effect; ``rivals`` effects that explain the rest as well as a chosen
+    one; ``lines`` the signature of the rest.
     """
 
     base: Fit
@@ -77,7 +82,7 @@ class Outcome:
 def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome:
     """Search the library for the effects that a problem's base model lacks, on identification runs alone."""
     blocks = problem.role("identify", "calibrate")
-    prior = first_noise(gates.budget, problem.scatter, blocks)
+    prior = first_noise(gates.model_form_budget, problem.scatter, blocks)
     base = fit(Candidate(problem.base), blocks, prior)
     least = max(gates.materiality, 2.0 * problem.systematic)
     current, steps = base, []
@@ -166,7 +171,8 @@ def _why_not(evidence: Evidence, found: bool, least: float) -> str:
 
 def _not_held_out(evidence: Evidence, gates: Gates) -> str:
     if evidence.gain < gates.held_out_gain:
-        return f"predicts left-out conditions no better: gain {evidence.gain:.1f}, {gates.held_out_gain:g} needed"
+        needed = gates.held_out_gain
+        return f"predicts left-out conditions no better: gain {evidence.gain:.1f}, {needed:g} needed"
     if evidence.better_share < LEAST_BETTER:
         return f"better in {100 * evidence.better_share:.0f} % of the left-out conditions only"
     return ""

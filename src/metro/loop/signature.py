@@ -1,6 +1,4 @@
-"""What is left after a fit: where it is, how large, and whether it is more than the noise and the declared
-budget.
-"""
+"""What is left after a fit: where, how large, and whether it is more than noise and declared budget."""
 
 from __future__ import annotations
 
@@ -25,7 +23,7 @@ class Line:
     ----------
     axis, label : where. rms : of the rest there over the runs, SI; ``excess`` of it over the noise.
     relative : excess over the rms of the axis's signal. p_value, significant : after correction for all
-    places.
+        places.
     """
 
     axis: str
@@ -46,8 +44,7 @@ def signature(fitted: Fit, least: float) -> list[Line]:
     """Test the rest of a fit, place by place (axis × label), against the noise without the misfit.
 
     A place counts when it is significant by Benjamini–Hochberg at 1 % over all places and its excess over the
-    noise is at
-    least ``least`` of the axis's signal.
+    noise is at least ``least`` of the axis's signal.
     """
     from scipy.stats import chi2
 
@@ -113,7 +110,8 @@ def in_words(lines: list[Line], most: int = 4) -> str:
     """Describe the significant places, largest first."""
     found = sorted((line for line in lines if line.significant), key=lambda line: -line.excess)
     parts = [
-        f"{line.label}, {line.axis} ({100 * line.relative:.1f} % of the axis's signal)"
+        f"{'all along' if line.label == 'all' else line.label} in {line.axis} "
+        f"({100 * line.relative:.2g} % of the signal there)"
         for line in found[:most]
     ]
     more = f" and {len(found) - most} more places" if len(found) > most else ""

@@ -1,6 +1,4 @@
-"""The verdict on an observable: what was found, how sure, and the error before and after on runs that no fit
-has seen.
-"""
+"""The verdict on an observable: what was found, how sure, and the error on runs that no fit has seen."""
 
 from __future__ import annotations
 
@@ -51,9 +49,7 @@ def held_out(problem: Problem, fitted: Fit) -> Held:
 
 
 def comparison(problem: Problem, before: Held, after: Held | None = None) -> pd.DataFrame:
-    """Return the rows of comparison.parquet for the held-out runs; ``after`` is left out before the loop has
-    run.
-    """
+    """Return the held-out runs' rows of comparison.parquet; ``after`` is None before the loop has run."""
     parts = []
     for block in problem.role("validate"):
         measured = block.to_rows(block.measured) / problem.si
@@ -169,9 +165,7 @@ def identified_fit(problem: Problem, fitted: Fit) -> BaseFit:
 
 
 def run_dof(fitted: Fit) -> float:
-    """Degrees of freedom of intervals: runs (and load tests) less one; a sample is not evidence of its
-    own.
-    """
+    """Degrees of freedom of intervals: runs (and load tests) less one; a sample is no evidence of its own."""
     return float(max(1, len(fitted.blocks) - 1))
 
 
@@ -202,7 +196,8 @@ def _next_experiment(outcome: Outcome, enough: bool) -> str | None:
     if unseen:
         return "; ".join(f"to see {effect.name}: {effect.experiment}" for effect in unseen)
     if any(line.significant for line in outcome.lines):
-        return f"repeats spread over the session, to describe what is left: {rest.in_words(list(outcome.lines), 2)}"
+        left = rest.in_words(list(outcome.lines), 2)
+        return f"repeats spread over the session, to describe what is left: {left}"
     return None
 
 

@@ -1,11 +1,10 @@
-"""The cutting conditions of a batch's runs in SI, and the mean force that the other observables start
-from.
-"""
+"""The cutting conditions of a batch's runs in SI, and the mean force that other observables start from."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -40,8 +39,8 @@ def cutter(batch: Batch) -> Cutter | Refusal:
 
 def cut(batch: Batch, run: str, radius: float) -> Cut:
     """Return the nominal settings of a run in SI; ``radius`` of the cutter in m."""
-    row = batch.runs.loc[run]
-    radial = row["radial_depth_mm"] * MM if row["radial_depth_mm"] == row["radial_depth_mm"] else 2 * radius
+    row: Any = batch.runs.loc[run]
+    radial = 2 * radius if math.isnan(row["radial_depth_mm"]) else row["radial_depth_mm"] * MM
     return Cut(
         feed_per_tooth=row["feed_per_tooth_mm"] * MM,
         axial_depth=row["axial_depth_mm"] * MM,
@@ -51,8 +50,13 @@ def cut(batch: Batch, run: str, radius: float) -> Cut:
 
 def work_from_feed(batch: Batch, run: str) -> Array:
     """Return the rotation (3, 3) from the feed frame of a run to the work frame: a turn about z."""
-    degrees = batch.runs.loc[run, "feed_direction_deg"]
-    return turn_about_z(degrees * DEG if degrees == degrees else 0.0)
+    row: Any = batch.runs.loc[run]
+    return turn_about_z(or_zero(row["feed_direction_deg"]) * DEG)
+
+
+def or_zero(value: float) -> float:
+    """Return a number of the run table, or 0 where it is blank."""
+    return 0.0 if math.isnan(value) else float(value)
 
 
 def turn_about_z(angle: float) -> Array:
@@ -62,9 +66,7 @@ def turn_about_z(angle: float) -> Array:
 
 
 def coefficients(batch: Batch, identified: JSON) -> dict[str, float] | Refusal:
-    """Return the cutting coefficients in the contract's units: declared, else identified from this batch's
-    forces.
-    """
+    """Return the cutting coefficients in the contract's units: declared, else of this batch's forces."""
     declared = batch.manifest.get("coefficients") or {}
     given = {
         key.removesuffix("_n_mm2").removesuffix("_n_mm"): float(value)
@@ -83,7 +85,7 @@ def coefficients(batch: Batch, identified: JSON) -> dict[str, float] | Refusal:
 
 
 def _per_axial_depth(batch: Batch, given: Mapping[str, float]) -> dict[str, float]:
-    """Return the edge coefficients per axial depth where they are declared per arc of edge: 1/cos(helix) more."""
+    """Convert edge coefficients that are declared per arc of edge to axial depth: 1/cos(helix) times."""
     if batch.manifest["coefficients"].get("edge_length", "axial") == "axial":
         return {}
     helix = batch.manifest["tool"].get("helix_deg", 0.0) * DEG
@@ -91,7 +93,7 @@ def _per_axial_depth(batch: Batch, given: Mapping[str, float]) -> dict[str, floa
 
 
 def mean_force_on_tool(batch: Batch, run: str, values: Mapping[str, float]) -> Array:
-    """Mean cutting force of a run on the tool, (3,) N, work frame; ``values`` as from :func:`coefficients`.
+    """Mean cutting force of a run on the tool, (3,) N, work frame; ``values`` as of :func:`coefficients`.
 
     Raises
     ------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -30,9 +31,7 @@ Read = Callable[..., pd.DataFrame]
 
 
 def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
-    """Turn each dynamometer record into order averages: table ``orders``, and ``spindle`` with the speed of
-    each run.
-    """
+    """Turn dynamometer records into order averages: tables ``orders`` and ``spindle`` (speed of each run)."""
     runs = recorded(batch)
     if not runs:
         return Refusal("runs.csv names no dynamometer file")
@@ -52,7 +51,7 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
 
 
 def recorded(batch: Batch) -> list[str]:
-    """Runs with a dynamometer record, in the order of cutting."""
+    """Return the runs with a dynamometer record, in the order of cutting."""
     table = batch.runs.sort_values("order", kind="stable")
     return [str(run) for run, file in table["dynamometer"].items() if isinstance(file, str) and file]
 
@@ -62,7 +61,7 @@ def _observed(
 ) -> tuple[pd.DataFrame, JSON] | Refusal:
     """Order averages of a run's steady cut, and what was found on the way."""
     time, signal = record["t_s"].to_numpy(), record[["fx_n", "fy_n", "fz_n"]].to_numpy()
-    row = batch.runs.loc[run]
+    row: Any = batch.runs.loc[run]
     rate = (len(time) - 1) / (time[-1] - time[0])
     nominal = row["spindle_rpm"] / 60.0
     try:
@@ -109,9 +108,7 @@ def _whole_mean(angle: Array, signal: Array) -> Array:
 
 
 def _settling(row: pd.Series, tool: Cutter) -> float:
-    """Time from the first contact to the full engagement, s: one radius of travel, or one orbit of a
-    helix.
-    """
+    """Time from first contact to full engagement, s: one radius of travel, or one orbit of a helix."""
     if row["operation"] == "helical":
         return 60.0 / abs(float(row["orbit_rpm"]))
     return tool.radius / (
@@ -125,9 +122,7 @@ def _orbit_rate(row: pd.Series) -> float:
 
 
 def _with_orbit(time: Array, signal: Array, orbit: float) -> Array:
-    """Turn the force into a frame that turns with the orbit, where helical milling is periodic with the
-    tool.
-    """
+    """Turn the force into a frame that turns with the orbit, where helical milling repeats with the tool."""
     if orbit == 0.0:
         return signal
     c, s = np.cos(2.0 * math.pi * orbit * time), np.sin(2.0 * math.pi * orbit * time)
@@ -161,27 +156,29 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
     blocks = tuple(_block(batch, run, by_run[run], tool) for run in recorded(batch) if run in by_run)
     helical = any(block.setting.helix is not None for block in blocks)
     model = ForceModel(cutter=tool, law=EdgeLaw(), bottom_edges=helical)
-    notes = (
+    notes = [
         "The chip thickness is that of the true tooth paths, the force law linear in it; "
         "tool, machine and dynamometer are rigid in the base model.",
-        f"Forces are compared per revolution up to spindle order {blocks[0].setting.highest}, in the work frame"
+        f"Forces are compared per revolution up to spindle order {blocks[0].setting.highest}, "
+        "in the work frame"
         + (" (helical runs: in the frame that turns with the orbit)." if helical else "."),
-    )
-    notes += tuple(f"Left out: {reason}." for reason in observed["force_refused"]["reason"])
-    return Problem(OBSERVABLE, "N", 1.0, model, blocks, np.full(len(model.parameters), SCATTER), notes=notes)
+        *(f"Left out: {reason}." for reason in observed["force_refused"]["reason"]),
+    ]
+    scatter = np.full(len(model.parameters), SCATTER)
+    return Problem(OBSERVABLE, "N", 1.0, model, blocks, scatter, notes=tuple(notes))
 
 
 def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter) -> Block:
-    row = batch.runs.loc[run]
+    row: Any = batch.runs.loc[run]
     middles = tuple(float(t) for t in table.groupby("block")["t_s"].first())
     highest = int(table["order"].max())
     values = table["force_n"].to_numpy()
     setting = ForceSetting(
         cut=cutting_force.cut(batch, run, tool.radius),
-        feed_direction=_degrees(row["feed_direction_deg"]) * DEG,
+        feed_direction=cutting_force.or_zero(row["feed_direction_deg"]) * DEG,
         highest=highest,
         middles=middles,
-        cut_length=float(row["cut_before_m"]) + 0.5 * _degrees(row["cut_length_mm"]) * MM,
+        cut_length=float(row["cut_before_m"]) + 0.5 * cutting_force.or_zero(row["cut_length_mm"]) * MM,
         helix=_helix(batch, row),
     )
     axis = table["axis"].to_numpy().astype(str)
@@ -208,11 +205,6 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter) -> Block:
     )
 
 
-def _degrees(value: float) -> float:
-    """Return a number of the run table, or 0 where it is blank."""
-    return float(value) if value == value else 0.0
-
-
 def _helix(batch: Batch, row: pd.Series) -> Helix | None:
     if row["operation"] != "helical":
         return None
@@ -234,13 +226,13 @@ def _scale(table: pd.DataFrame) -> Array:
     power = table["force_n"] ** 2
     own = power.groupby([table["block"], table["axis"], table["order"]]).transform("mean")
     axis = power.groupby([table["block"], table["axis"]]).transform("mean")
-    return np.sqrt(0.5 * (own + axis)).to_numpy()
+    return np.asarray(np.sqrt(0.5 * (own + axis)))
 
 
 def _synthesis(blocks: int, highest: int) -> Array:
     """Map from (block, axis, order element) to (block, axis, angle)."""
     angle = 2.0 * math.pi * np.arange(ANGLES) / ANGLES
-    return np.kron(np.eye(blocks * len(AXES)), orders.order_matrix(angle, highest))
+    return np.asarray(np.kron(np.eye(blocks * len(AXES)), orders.order_matrix(angle, highest)), dtype=float)
 
 
 def _coordinates(middles: tuple[float, ...]) -> dict[str, np.ndarray]:
@@ -253,23 +245,25 @@ def _coordinates(middles: tuple[float, ...]) -> dict[str, np.ndarray]:
 
 
 def report(
-    batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON, task: Problem, fit: BaseFit
+    _batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON, task: Problem, fit: BaseFit
 ) -> JSON:
-    """Coefficients by means (identification runs, all runs) and by waveform, and the spindle speed of each
-    run.
-    """
+    """Return coefficients by means and by waveform, and each run's spindle speed, for identified.json."""
+    model = cast("ForceModel", task.base)
     deviation = np.sqrt(np.diag(fit.covariance))
     waveform = {
         parameter.name: quantity(value / parameter.si, sd / parameter.si, parameter.unit, fit.dof)
-        for parameter, value, sd in zip(task.base.parameters, fit.beta, deviation, strict=True)
+        for parameter, value, sd in zip(model.parameters, fit.beta, deviation, strict=True)
     }
+    spindle = observed["spindle"]
     speeds = {
-        row.run: quantity(row.spindle_rpm, row.spindle_rpm_sd, "rpm")
-        for row in observed["spindle"].itertuples()
+        run: quantity(speed, sd, "rpm")
+        for run, speed, sd in zip(
+            spindle["run"], spindle["spindle_rpm"], spindle["spindle_rpm_sd"], strict=True
+        )
     }
     block: JSON = {"waveform": waveform, "spindle_rpm": speeds, "edge_length": "axial"}
     for name, blocks in (("mean", task.role("identify")), ("mean_all_runs", task.blocks)):
-        fitted = mean_coefficients(task.base, blocks, observed["spindle"])
+        fitted = mean_coefficients(model, blocks, observed["spindle"])
         if isinstance(fitted, Refusal):
             block.setdefault("not_identified", {})[name] = fitted.reason
         else:
@@ -281,13 +275,12 @@ def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.
     """Classical identification: least squares of the mean forces of runs over the feed ([T] §4.1).
 
     The mean over a revolution does not depend on the start phase, so it needs no waveform. Its intervals come
-    from the scatter of
-    the runs about the line.
+    from the scatter of the runs about the line.
 
     Parameters
     ----------
     blocks : runs to use; helical ones are left out. spindle : the observed table, with the mean force of each
-    run.
+        run.
     """
     means = spindle.set_index("run")[[f"mean_{axis}_n" for axis in AXES]]
     straight = [block for block in blocks if block.setting.helix is None]

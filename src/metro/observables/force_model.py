@@ -21,8 +21,7 @@ ORBIT_PHASES = 12
 
 @dataclass(frozen=True)
 class Helix:
-    """Helical milling: the tool travels on a helix of given radius (m), at ``orbit_rate`` rad/s, sinking
-    ``pitch`` m per orbit.
+    """Helical milling: the tool travels on a helix of ``radius`` m, sinking ``pitch`` m per orbit.
 
     ``axial_feed`` is the axial feed per tooth, m, which the bottom edges cut.
     """
@@ -42,9 +41,8 @@ class ForceSetting:
     """What the force of a run depends on (SI): its cut, and how its record was averaged.
 
     ``feed_direction`` is the turn of the feed frame about z, rad; ``blocks`` the number of time blocks,
-    ``middles`` their times
-    (s from the start of the steady cut); ``cut_length`` metres cut before the run's middle since the tool was
-    new.
+    ``middles`` their times (s from the start of the steady cut); ``cut_length`` metres cut before the run's
+    middle since the tool was new.
     """
 
     cut: Cut
@@ -57,14 +55,11 @@ class ForceSetting:
 
 @dataclass(frozen=True)
 class ForceModel:
-    """Mechanistic milling force: cutter geometry, force law; linear in the cutting coefficients (physics.md
-    §2).
+    """Mechanistic milling force: cutter geometry and force law; linear in the cutting coefficients.
 
     ``true_path`` takes the chip from the trochoidal paths of the teeth; else from circles (feed × sine of the
-    immersion). A block's
-    nuisance is the angle of tooth 0 at the record's start, rad, and in helical milling also the direction of
-    feed
-    there. ``bottom_edges`` adds K_Fac and K_Fae to the coefficients.
+    immersion). A block's nuisance is the angle of tooth 0 at the record's start, rad, and in helical milling
+    also the direction of feed there. ``bottom_edges`` adds K_Fac and K_Fae to the coefficients.
     """
 
     cutter: Cutter
@@ -92,9 +87,7 @@ class ForceModel:
         return np.stack(np.meshgrid(phases, directions, indexing="ij"), axis=-1).reshape(-1, 2)
 
     def design(self, block: Block, nuisance: Array) -> tuple[Array, Array]:
-        """Order coefficients of the force per unit of each coefficient, laid out (time block, axis,
-        order).
-        """
+        """Order coefficients of the force per unit of each coefficient: rows (time block, axis, order)."""
         setting: ForceSetting = block.setting
         basis = advance(
             _order_basis(self.cutter, self.law, setting.cut, setting.highest, self.true_path),
@@ -112,8 +105,9 @@ class ForceModel:
         return matrix, np.zeros(len(matrix))
 
     def _bottom(self, setting: ForceSetting, orders: int) -> Array:
-        """Thrust of the bottom edges, N R (K_Fac s_ta + K_Fae): constant over the revolution, along z ([T]
-        eq. 7–8).
+        """Thrust of the bottom edges along z, N R (K_Fac s_ta + K_Fae), over the whole revolution.
+
+        Equations 7 and 8 of the source of the helical tests.
         """
         columns = np.zeros((orders, 3, 2))
         if setting.helix is not None:

@@ -150,7 +150,7 @@ def report(
     lobes = [
         {
             "position": _number(position),
-            "boundary": f"data/processed/{batch.name}/lobes.parquet",
+            "boundary": f"data/processed/{batch.name}/lobes_final.parquet",
             "lowest_mm": _lowest(rows),
         }
         for position, rows in observed["lobes"].groupby("position", sort=False)

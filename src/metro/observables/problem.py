@@ -1,9 +1,8 @@
 """What the loop needs to know of an observable: blocks of evidence, and a model that predicts them.
 
 A **block** is what one run says about one observable. It is the unit of evidence: the 10^5 samples of one run
-share its coefficients, its phase and its zero, so they count once. A **model** predicts a block as
-``offset + X @ beta``, linear in the base parameters; everything nonlinear is either a parameter of an effect
-(it made
+share its coefficients, its phase and its zero, so they count once. A **model** predicts a block as ``offset +
+X @ beta``, linear in the base parameters; everything nonlinear is either a parameter of an effect (it made
 the model what it is) or a per-block nuisance (an unknown start phase).
 """
 
@@ -22,9 +21,7 @@ Role = Literal["identify", "validate", "calibrate"]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A quantity that a model or an effect has: its name in the outputs, its unit there, and that unit in
-    SI.
-    """
+    """A quantity that a model has: its name in the outputs, its unit there, and that unit in SI."""
 
     name: str
     unit: str
@@ -44,19 +41,19 @@ class Block:
     sigma : (n,) standard error of ``measured`` from within the run.
     setting : what the model needs to predict the block; the observable's own frozen dataclass.
     axis : (n,) label of the axis that each element belongs to; materiality and the budget are judged per
-    axis.
+        axis.
     zeros : (n, q) directions of run-level additive error (a zero offset per axis, a registration plane).
     zero_sd : (q,) prior standard deviations of the amplitudes of ``zeros``, SI.
     scale : (n,) size of the signal around each element, whose fraction the model-form budget is; None: rms of
-    its axis.
-    symmetries : (k, m) shifts of the nuisance that leave the base model as it is (which tooth is the first one), but not a
-        model with an effect; None: none.
+        its axis.
+    symmetries : (k, m) shifts of the nuisance that leave the base model as it is (which tooth is the first
+        one), but not a model with an effect; None: none.
     labels : (n,) what each element is in the words of the report ("order 1"); the rest is tested per axis and
-    label.
+        label.
     repeats : how many times the block repeats one waveform (its time blocks): what a model gets wrong is the
-    same in each.
+        same in each.
     synthesis : (m, n) map from ``measured`` to the rows of the comparison table; None where they are the
-    same.
+        same.
     coordinates : column of the comparison table (axis, t_s, angle_deg, s_mm, x_mm, y_mm) → its (m,) values.
     """
 
@@ -91,9 +88,7 @@ class Model(Protocol):
         ...
 
     def nuisance_starts(self, block: Block) -> Array:
-        """Starting values (k, m) of the block's m nonlinear unknowns over their whole range; (1, 0) if
-        none.
-        """
+        """Return starts (k, m) of the block's m nonlinear unknowns over their whole range; (1, 0) if none."""
         ...
 
     def design(self, block: Block, nuisance: Array) -> tuple[Array, Array]:
@@ -113,8 +108,7 @@ class Problem:
     blocks : all blocks, in the order of cutting.
     scatter : (p,) relative run-to-run standard deviation of each base parameter: prior of what repeats tell.
     systematic : relative error that all runs may share because the base model's inputs do (a force estimate,
-    a gauge); an
-        effect must change the prediction by more than twice this to be told from it.
+        a gauge); an effect must change the prediction by more than twice this to be told from it.
     notes : sentences on what this problem had to leave out or assume, for the report.
     """
 
@@ -134,12 +128,10 @@ class Problem:
 
 @dataclass(frozen=True)
 class BaseFit:
-    """The base model as identified: what the stages hand to an observable to be written as identified
-    quantities.
+    """The base model as identified, for an observable to write as identified quantities.
 
     ``beta`` (p,) in SI with its ``covariance`` (p, p); ``dof`` are run-level degrees of freedom (for
-    Student's t);
-    ``nuisance`` holds each block's nonlinear unknowns by run.
+    Student's t); ``nuisance`` holds each block's nonlinear unknowns by run.
     """
 
     beta: Array

@@ -1,16 +1,15 @@
 """Order tracking: the true spindle speed, and the part of a signal that repeats with every revolution.
 
 A record is described by its Fourier coefficients at the orders 0…H of the spindle. They are stored per axis
-as
-``[mean, c₁, s₁, c₂, s₂, …]``, the cosine and sine amplitudes divided by √2, so that the sum of their squares
-is the mean
-square of the waveform: a residual has the same size in orders as over angles.
+as ``[mean, c₁, s₁, c₂, s₂, …]``, the cosine and sine amplitudes divided by √2, so that the sum of their
+squares is the mean square of the waveform: a residual has the same size in orders as over angles.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,9 +36,7 @@ class OrderAverage:
 
 
 def order_matrix(angle: Array, highest: int) -> Array:
-    """Matrix (len(angle), 2·highest+1) that makes a waveform from its order coefficients; ``angle`` in
-    rad.
-    """
+    """Matrix (n, 2·highest+1) that makes a waveform from its order coefficients; ``angle`` (n,) in rad."""
     matrix = np.empty((len(angle), 2 * highest + 1))
     matrix[:, 0] = 1.0
     phase = np.exp(1j * angle)
@@ -52,9 +49,7 @@ def order_matrix(angle: Array, highest: int) -> Array:
 
 
 def to_orders(waveform: Array, highest: int) -> Array:
-    """Order coefficients (2·highest+1, …) of a waveform given at even angles over one revolution, (angles,
-    …).
-    """
+    """Order coefficients (2·highest+1, …) of a waveform (angles, …) at even angles over one revolution."""
     spectrum = np.fft.rfft(waveform, axis=0)[: highest + 1] / len(waveform)
     coefficients = np.empty((2 * highest + 1, *waveform.shape[1:]))
     coefficients[0] = spectrum[0].real
@@ -84,7 +79,7 @@ def _segments(time: Array, revolutions_per_s: float, per_segment: float) -> list
     count = max(1, int((time[-1] - time[0]) * revolutions_per_s / per_segment))
     edges = np.searchsorted(time, np.linspace(time[0], time[-1], count + 1))
     edges[-1] = len(time)
-    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(a, b) for a, b in pairwise(edges)]
 
 
 def spindle_speed(time: Array, signal: Array, nominal: float, highest: int) -> tuple[float, float]:
@@ -93,18 +88,18 @@ def spindle_speed(time: Array, signal: Array, nominal: float, highest: int) -> t
     Parameters
     ----------
     time : (n,) s. signal : (n, channels). nominal : revolutions per second, off by up to 0.6 %. highest :
-    order.
+        order.
 
     Returns
     -------
     speed, its standard deviation : revolutions per second; NaN deviation where there are fewer than six
-    segments.
+        segments.
     """
     speed = nominal
     for _ in range(2):
         pieces = _segments(time, speed, REVOLUTIONS_PER_SEGMENT)
         middle = np.array([time[piece].mean() for piece in pieces])
-        order = np.arange(1, highest + 1)
+        order = np.arange(1.0, highest + 1)
         spectra = np.stack(
             [
                 np.exp(-2j * math.pi * speed * order[:, None] * time[None, piece]) @ _centred(signal[piece])
@@ -126,7 +121,7 @@ def spindle_speed(time: Array, signal: Array, nominal: float, highest: int) -> t
 
 
 def _centred(piece: Array) -> Array:
-    return piece - piece.mean(axis=0)
+    return np.asarray(piece - piece.mean(axis=0))
 
 
 def _gathered(spectra: Array, order: Array, middle: Array, shift: float) -> float:
@@ -135,9 +130,7 @@ def _gathered(spectra: Array, order: Array, middle: Array, shift: float) -> floa
 
 
 def _speed_deviation(spectra: Array, order: Array, middle: Array, shift: float) -> float:
-    """Standard deviation of the speed from the scatter of the strongest order's phase about a straight
-    line.
-    """
+    """Return the speed's standard deviation, from the strongest order's phase about a straight line."""
     if len(middle) < 6:
         return math.nan
     power = np.abs(spectra.sum(axis=0)) ** 2
@@ -154,10 +147,8 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
     """Average a record over its revolutions, in time blocks, with the error of each coefficient.
 
     Each block is cut into segments of a few revolutions; the scatter of the segments gives the error of their
-    mean. It is
-    pooled over the blocks (whose means are each taken out) and drawn towards its neighbouring orders, since
-    the scatter
-    of few segments is itself uncertain.
+    mean. It is pooled over the blocks (whose means are each taken out) and drawn towards its neighbouring
+    orders, since the scatter of few segments is itself uncertain.
 
     Parameters
     ----------
@@ -169,8 +160,9 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
     per_s = revolutions / (time[-1] - time[0])
     edges = np.searchsorted(time, np.linspace(time[0], time[-1], blocks + 1))
     edges[-1] = len(time)
-    means, counts, middles, squares, freedom = [], [], [], 0.0, 0
-    for start, end in zip(edges[:-1], edges[1:], strict=True):
+    means, counts, middles, freedom = [], [], [], 0
+    squares = np.zeros((signal.shape[1], 2 * highest + 1))
+    for start, end in pairwise(edges):
         pieces = _segments(
             time[start:end], per_s, max(REVOLUTIONS_PER_SEGMENT, (2 * highest + 20) / len(time) * revolutions)
         )
@@ -178,7 +170,7 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
         means.append(values.mean(axis=0))
         counts.append(len(pieces))
         middles.append(float(time[start:end].mean()))
-        squares = squares + ((values - means[-1]) ** 2).sum(axis=0)
+        squares += ((values - means[-1]) ** 2).sum(axis=0)
         freedom += len(pieces) - 1
     variance = _shrunk(squares / max(freedom, 1), freedom)
     return [
@@ -188,13 +180,11 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
 
 
 def _fit(angle: Array, signal: Array, highest: int) -> Array:
-    return np.linalg.lstsq(order_matrix(angle, highest), signal, rcond=None)[0].T
+    return np.asarray(np.linalg.lstsq(order_matrix(angle, highest), signal, rcond=None)[0].T)
 
 
 def _shrunk(variance: Array, freedom: int, prior_freedom: int = 6) -> Array:
-    """Draw each order's variance, (channels, 2H+1), towards the median of its neighbours (five orders each
-    side).
-    """
+    """Draw each order's variance, (channels, 2H+1), towards the median of five orders on each side."""
     padded = np.pad(variance, ((0, 0), (10, 10)), mode="edge")
     neighbours = np.median(np.lib.stride_tricks.sliding_window_view(padded, 21, axis=1), axis=2)
     return np.asarray((freedom * variance + prior_freedom * neighbours) / (freedom + prior_freedom))

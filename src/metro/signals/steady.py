@@ -13,9 +13,7 @@ IN_AIR, CUTTING = 0.12, 0.5
 
 @dataclass(frozen=True)
 class Segments:
-    """Sample ranges of a record: the steady cut, and the air before and after it (empty where there is
-    none).
-    """
+    """The steady cut of a record, and where it is in the air: (n,) bool."""
 
     steady: slice
     air: np.ndarray
@@ -25,10 +23,8 @@ def segments(signal: Array, samples_per_revolution: float, settling: int) -> Seg
     """Find the steady cut and the air in a record by the level of the force in each revolution.
 
     The level is the rms of all channels about the air's zero. Revolutions below 12 % of the typical level are
-    air; the cut is the
-    longest run above half of it. Where the record shows an end of the cut, what the tool needs to get wholly
-    in or out is
-    left off there: the force looks steady well before the engagement is.
+    air; the cut is the longest run above half of it. Where the record shows an end of the cut, what the tool
+    needs to get wholly in or out is left off there: the force looks steady well before the engagement is.
 
     Parameters
     ----------
@@ -62,7 +58,7 @@ def segments(signal: Array, samples_per_revolution: float, settling: int) -> Seg
 
 
 def _level(turns: Array, zero: Array) -> Array:
-    return np.sqrt(((turns - zero) ** 2).sum(axis=2).mean(axis=1))
+    return np.asarray(np.sqrt(((turns - zero) ** 2).sum(axis=2).mean(axis=1)))
 
 
 def _longest(mask: np.ndarray) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -10,45 +11,45 @@ from metro import __version__
 from metro.batch.batch import Batch
 from metro.batch.layout import OBSERVED
 from metro.batch.processed import read_batch, read_table, write_json, write_table
-from metro.loop.fit import Candidate, fit
+from metro.loop.candidate import Candidate
+from metro.loop.fit import fit
 from metro.loop.noise import first_noise
 from metro.loop.verdict import identified_fit
 from metro.observables import published
 from metro.observables.problem import BaseFit, Problem, Refusal
-from metro.stages.observed import MODULES
+from metro.stages.observed import MODULES, merged
 from metro.units import JSON
 
 
-def identify(processed: Path, reports: Path, settings: JSON, code: str) -> None:
-    """Write the observed tables and ``identified.json`` of a batch.
+def identify(processed: Path, settings: JSON, code: str) -> None:
+    """Write the observed tables of a batch and ``identified.json``: the base models, without any effect.
 
     ``settings``: ``model_form_budget``.
     """
     batch = read_batch(processed)
-
-    def read(name: str, run: str | None = None) -> pd.DataFrame:
-        return read_table(processed / f"{name}.parquet", run)
-
+    read = partial(_read, processed)
     identified: JSON = {"format": 1, "batch": batch.name, "metro": __version__}
     lacking: JSON = {}
     observed: dict[str, pd.DataFrame] = {}
-    for module in (*MODULES, published):
+    for module in MODULES:
         found = module.observe(batch, read, identified)
-        name = getattr(module, "OBSERVABLE", "published")
         if isinstance(found, Refusal):
-            if name != "published":
-                lacking[name] = found.reason
+            lacking[module.OBSERVABLE] = found.reason
             continue
         observed |= found
-        if name != "published":
-            task = module.problem(batch, found, identified)
-            fitted = base_fit(task, settings["model_form_budget"]) if isinstance(task, Problem) else None
-            _merge(identified, module.report(batch, found, identified, task, fitted))
-            if isinstance(task, Refusal):
-                lacking[name] = task.reason
-    identified["not_identified"] = lacking
+        task = module.problem(batch, found, identified)
+        fitted = base_fit(task, settings["model_form_budget"]) if isinstance(task, Problem) else None
+        identified = merged(identified, module.report(batch, found, identified, task, fitted))
+        if isinstance(task, Refusal):
+            lacking[module.OBSERVABLE] = task.reason
+    printed = published.observe(batch, read, identified)
+    observed |= {} if isinstance(printed, Refusal) else printed
     _write(processed, batch, observed, code)
-    write_json(reports / "identified.json", identified)
+    write_json(processed / "identified.json", {**identified, "not_identified": lacking})
+
+
+def _read(processed: Path, name: str, run: str | None = None) -> pd.DataFrame:
+    return read_table(processed / f"{name}.parquet", run)
 
 
 def base_fit(task: Problem, budget: float) -> BaseFit | None:
@@ -57,14 +58,6 @@ def base_fit(task: Problem, budget: float) -> BaseFit | None:
     if not blocks:
         return None
     return identified_fit(task, fit(Candidate(task.base), blocks, first_noise(budget, task.scatter, blocks)))
-
-
-def _merge(identified: JSON, blocks: JSON) -> None:
-    for name, block in blocks.items():
-        if isinstance(block, dict) and isinstance(identified.get(name), dict):
-            identified[name] |= block
-        else:
-            identified[name] = block
 
 
 def _write(processed: Path, batch: Batch, observed: dict[str, pd.DataFrame], code: str) -> None:

@@ -1,68 +1,124 @@
-"""Loop: what the prediction leaves over, traced to effects of the library, and the error before and after."""
+"""Loop: what the prediction leaves over, traced to effects of the library, and the error before and after.
+
+The observables are taken in order. Where effects were found in the cutting force, its coefficients are those refitted with them,
+and the observables that start from the coefficients are predicted anew: their error after includes what was found upstream.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
 from metro import __version__
+from metro.batch.batch import Batch
 from metro.batch.processed import read_batch, read_table, write_json, write_table
 from metro.effects import library
 from metro.loop.labels import judge_labels
-from metro.loop.search import Gates, search
+from metro.loop.search import Gates, Outcome, search
 from metro.loop.story import told
-from metro.loop.verdict import comparison, held_out, judge, typed
+from metro.loop.verdict import COMPARISON, comparison, held_out, identified_fit, judge, typed
+from metro.observables import lobes, published
 from metro.observables.lobes import LabelProblem
-from metro.observables.problem import Problem
-from metro.stages.observed import problems, read_json, read_observed
+from metro.observables.problem import Problem, Refusal
+from metro.stages.observed import (
+    MODULES,
+    OBSERVED_WITH_COEFFICIENTS,
+    Task,
+    merged,
+    read_json,
+    read_observed,
+)
 from metro.units import JSON
 
 
+@dataclass
+class _Closing:
+    """The loop of one batch while its observables are closed one after another."""
+
+    batch: Batch
+    processed: Path
+    gates: Gates
+    prediction: pd.DataFrame
+    identified: JSON
+    observed: dict[str, pd.DataFrame]
+    tables: list[pd.DataFrame] = field(default_factory=list)
+    verdicts: JSON = field(default_factory=dict)
+    stories: JSON = field(default_factory=dict)
+
+    @property
+    def found(self) -> list[JSON]:
+        """Effects that changed the cutting coefficients."""
+        entry: JSON = self.verdicts.get("force") or {}
+        return list(entry.get("effects") or [])
+
+
 def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
-    """Write ``comparison.parquet``, ``loop.json`` and ``verdict.json`` of a batch.
+    """Write ``comparison``, ``lobes_final`` and ``loop.json``, and the batch's ``verdict.json`` and ``identified.json``.
 
     ``settings``: ``model_form_budget``, ``materiality``, ``false_additions``, ``held_out_gain``, ``seed``.
     """
-    batch = read_batch(processed)
-    tasks = problems(batch, read_observed(processed), read_json(reports / "identified.json"))
-    prediction = read_table(processed / "prediction.parquet")
-    gates = Gates(
-        budget=settings["model_form_budget"],
-        materiality=settings["materiality"],
-        false_additions=settings["false_additions"],
-        held_out_gain=settings["held_out_gain"],
-        seed=settings["seed"],
+    state = _Closing(
+        batch=read_batch(processed),
+        processed=processed,
+        gates=Gates(**settings),
+        prediction=read_table(processed / "prediction.parquet"),
+        identified=read_json(processed / "identified.json"),
+        observed=read_observed(processed),
     )
-    tables, verdicts, stories = [], {}, {}
-    for name, task in tasks.items():
-        before = prediction[prediction["observable"] == name].reset_index(drop=True)
-        if isinstance(task, LabelProblem):
-            rows, verdicts[name], stories[name] = judge_labels(task, before, gates)
-        elif isinstance(task, Problem) and task.role("identify"):
-            rows, verdicts[name], stories[name] = _closed(task, before, gates)
-        else:
-            continue
-        tables.append(rows)
-    joined = (
-        pd.concat([table for table in tables if len(table)], ignore_index=True)
-        if any(map(len, tables))
-        else prediction
-    )
+    if "published_errors" in state.observed:
+        for task in published.problems(state.batch, state.observed, state.identified):
+            _close(state, task)
+    else:
+        for module in MODULES:
+            if state.found and module in OBSERVED_WITH_COEFFICIENTS:
+                read = partial(_read, processed)
+                again = module.observe(state.batch, read, state.identified)
+                state.observed |= {} if isinstance(again, Refusal) else again
+            task = module.problem(state.batch, state.observed, state.identified)
+            outcome = _close(state, task)
+            fitted = identified_fit(task, outcome.final) if outcome else None
+            if state.found and (fitted or (module is lobes and "modes" in state.observed)):
+                blocks = module.report(state.batch, state.observed, state.identified, task, fitted)
+                state.identified = merged(state.identified, blocks)
+    _write(state, reports, code)
+
+
+def _read(processed: Path, name: str, run: str | None = None) -> pd.DataFrame:
+    return read_table(processed / f"{name}.parquet", run)
+
+
+def _close(state: _Closing, task: Task) -> Outcome | None:
+    """Close the loop of one observable; the held-out runs are read once, for the figures."""
+    if isinstance(task, LabelProblem):
+        before = state.prediction[state.prediction["observable"] == task.observable].reset_index(drop=True)
+        after = lobes.comparison(task)["before"]
+        rows, verdict, story = judge_labels(task, before.assign(after=after), state.found, state.gates)
+    elif isinstance(task, Problem) and task.role("identify"):
+        before = state.prediction[state.prediction["observable"] == task.observable].reset_index(drop=True)
+        outcome = search(task, library(task.observable), state.gates)
+        rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
+        rows["before"] = before["before"]
+        verdict = judge(task, outcome, rows, state.gates)
+        story = told(task, outcome, verdict, state.gates)
+    else:
+        return None
+    state.tables.append(rows)
+    state.verdicts[task.observable] = verdict
+    state.stories[task.observable] = story
+    return None if isinstance(task, LabelProblem) else outcome
+
+
+def _write(state: _Closing, reports: Path, code: str) -> None:
+    filled = [table for table in state.tables if len(table)]
+    joined = pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(COMPARISON))
+    name, processed = state.batch.name, state.processed
     write_table(processed / "comparison.parquet", typed(joined), {"code": code})
-    write_json(processed / "loop.json", {"format": 1, "batch": batch.name, "observables": stories})
-    write_json(
-        reports / "verdict.json",
-        {"format": 1, "batch": batch.name, "metro": __version__, "observables": verdicts},
-    )
-
-
-def _closed(task: Problem, before: pd.DataFrame, gates: Gates) -> tuple[pd.DataFrame, JSON, JSON]:
-    """Search for the effects that a problem's model lacks; the held-out runs are read once, for the
-    figures.
-    """
-    outcome = search(task, library(task.observable), gates)
-    rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
-    rows["before"] = before["before"]
-    verdict = judge(task, outcome, rows, gates)
-    return rows, verdict, told(task, outcome, verdict, gates)
+    diagram = state.observed.get("lobes", pd.DataFrame())
+    write_table(processed / "lobes_final.parquet", diagram, {"code": code})
+    write_json(processed / "loop.json", {"format": 1, "batch": name, "observables": state.stories})
+    write_json(reports / "identified.json", state.identified)
+    verdict = {"format": 1, "batch": name, "metro": __version__, "observables": state.verdicts}
+    write_json(reports / "verdict.json", verdict)

@@ -1,6 +1,4 @@
-"""What identify, predict and loop share: the observables of a batch, and its problems rebuilt from observed
-tables.
-"""
+"""What identify, predict and loop share: the observables of a batch, in order, and reading what identify wrote."""
 
 from __future__ import annotations
 
@@ -20,6 +18,10 @@ from metro.units import JSON
 
 # Force first: the others may need its coefficients.
 MODULES: tuple[ModuleType, ...] = (force, deformation, flatness, lobes)
+# Those whose observed tables depend on the cutting coefficients.
+OBSERVED_WITH_COEFFICIENTS: tuple[ModuleType, ...] = (deformation, lobes)
+
+Task = Problem | LabelProblem | Refusal
 
 
 def read_observed(processed: Path) -> dict[str, pd.DataFrame]:
@@ -34,10 +36,17 @@ def read_json(path: Path) -> JSON:
     return content
 
 
-def problems(
-    batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
-) -> dict[str, Problem | LabelProblem | Refusal]:
+def problems(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON) -> dict[str, Task]:
     """Return the problem of each observable, or why the batch has none."""
     if "published_errors" in observed:
         return {task.observable: task for task in published.problems(batch, observed, identified)}
     return {module.OBSERVABLE: module.problem(batch, observed, identified) for module in MODULES}
+
+
+def merged(identified: JSON, blocks: JSON) -> JSON:
+    """Return identified.json's content with an observable's blocks put in, block by block."""
+    result = dict(identified)
+    for name, block in blocks.items():
+        known = result.get(name)
+        result[name] = {**known, **block} if isinstance(block, dict) and isinstance(known, dict) else block
+    return result

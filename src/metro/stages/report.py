@@ -16,7 +16,7 @@ from metro.units import JSON
 TABLES = (
     "qc",
     "comparison",
-    "lobes",
+    "lobes_final",
     "frf_used",
     "face_map",
     "published_errors",

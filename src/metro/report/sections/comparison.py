@@ -97,7 +97,7 @@ def errors(frame: pd.DataFrame) -> Table:
 def _labels(results: Results, frame: pd.DataFrame) -> list[Item]:
     tests = _tests(results, frame)
     items: list[Item] = []
-    boundary = results.tables.get("lobes")
+    boundary = results.tables.get("lobes_final")
     if boundary is not None:
         right = {k: int(((frame[k] > 0.5) == (frame["measured"] > 0.5)).sum()) for k in ("before", "after")}
         caption = (

@@ -1,0 +1,184 @@
+"""Gauss–Newton descent in base parameters, effect parameters and every run's unknowns at once.
+
+Each run's nuisance (start phase) touches only its own block and is eliminated there, so the system that is
+solved has only base and effect parameters, however many runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from metro.loop import noise as noise_room
+from metro.loop.candidate import Candidate
+from metro.loop.noise import Noise
+from metro.observables.problem import Block, Model
+from metro.units import Array
+
+ITERATIONS = 25
+ENOUGH = 0.01  # gain in twice the log-likelihood below which a descent ends
+SHARES = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step, tried in turn until the cost falls
+THETA_STEP = 1e-3  # in units of the parameter's scale
+NUISANCE_STEP = 1e-4
+
+Rows = tuple[Array, Array, Array, Array]
+
+
+@dataclass
+class State:
+    """Values of everything that is fitted: effect parameters, base parameters, each run's nuisance."""
+
+    theta: Array
+    beta: Array
+    nuisance: dict[str, Array]
+
+
+@dataclass(frozen=True)
+class System:
+    """What the blocks say at given values of everything.
+
+    Attributes
+    ----------
+    rows : of each block the whitened rest, base columns, effect columns and own (nuisance) columns.
+    log_likelihood, chi2 : by run.
+    pull : distance of the effect parameters from the mean of their weak prior, zero.
+    weight : precision of that prior.
+    """
+
+    rows: list[Rows]
+    log_likelihood: dict[str, float]
+    chi2: dict[str, float]
+    pull: Array
+    weight: Array
+
+    @property
+    def cost(self) -> float:
+        """Twice the negative logarithm of likelihood times prior."""
+        return float(self.pull @ (self.weight * self.pull)) - 2.0 * sum(self.log_likelihood.values())
+
+
+def linearised(
+    candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, *, derivatives: bool = True
+) -> System:
+    """Whitened rest of every block, its likelihood, and (unless not wanted) its derivatives."""
+    model = candidate.model(state.theta)
+    moved = _moved_models(candidate, state.theta) if derivatives else []
+    rows: list[Rows] = []
+    log_likelihood, chi2 = {}, {}
+    for block in blocks:
+        nuisance = state.nuisance[block.run]
+        matrix, offset = model.design(block, nuisance)
+        predicted = offset + matrix @ state.beta
+        directions = noise_room.shared(block, noise, matrix, state.beta)
+        whiten = noise_room.whitener(noise_room.diagonal(block, noise), directions)
+        rest = whiten(block.measured - predicted)
+        chi2[block.run] = float(rest @ rest)
+        log_likelihood[block.run] = -0.5 * (
+            chi2[block.run] + whiten.log_shared + noise_room.log_scale(block, noise)
+        )
+        if derivatives:
+            effect = [
+                (_prediction(other, block, nuisance, state.beta) - predicted) / step for other, step in moved
+            ]
+            own = [
+                (_prediction(model, block, nuisance + NUISANCE_STEP * unit, state.beta) - predicted)
+                / NUISANCE_STEP
+                for unit in np.eye(len(nuisance))
+            ]
+            whitened = whiten(np.column_stack([matrix, *effect, *own]))
+            p, q = matrix.shape[1], matrix.shape[1] + len(effect)
+            rows.append((rest, whitened[:, :p], whitened[:, p:q], whitened[:, q:]))
+    weight = np.array([0.0 if p.plausible is None else p.plausible**-2 for p in candidate.parameters])
+    return System(rows, log_likelihood, chi2, state.theta, weight)
+
+
+def _moved_models(candidate: Candidate, theta: Array) -> list[tuple[Model, float]]:
+    """Return the model with each effect parameter moved a little, within its bounds, and by how much."""
+    models = []
+    for i, parameter in enumerate(candidate.parameters):
+        step = THETA_STEP * parameter.scale
+        if theta[i] + step > parameter.upper:
+            step = -step
+        moved = theta.copy()
+        moved[i] += step
+        models.append((candidate.model(moved), step))
+    return models
+
+
+def _prediction(model: Model, block: Block, nuisance: Array, beta: Array) -> Array:
+    matrix, offset = model.design(block, nuisance)
+    return np.asarray(offset + matrix @ beta)
+
+
+def normal_equations(system: System) -> tuple[Array, Array]:
+    """Return normal matrix and right side of base and effects, each block's own unknowns eliminated."""
+    p, q = (part.shape[1] for part in system.rows[0][1:3])
+    normal, right = np.zeros((p + q, p + q)), np.zeros(p + q)
+    for rest, base, effect, own in system.rows:
+        columns = np.hstack([base, effect])
+        if own.shape[1]:
+            basis = np.linalg.qr(own)[0]
+            columns = columns - basis @ (basis.T @ columns)
+        normal += columns.T @ columns
+        right += columns.T @ rest
+    normal[np.arange(p, p + q), np.arange(p, p + q)] += system.weight
+    right[p:] -= system.weight * system.pull
+    return normal, right
+
+
+def own_step(row: Rows, common: Array) -> Array:
+    """Step of a block's nuisance when base and effect parameters together move by ``common``."""
+    rest, base, effect, own = row
+    if not own.shape[1]:
+        return np.zeros(0)
+    left = rest - np.hstack([base, effect]) @ common
+    return np.asarray(np.linalg.lstsq(own, left, rcond=None)[0])
+
+
+def descend(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> State:
+    """Follow Gauss–Newton steps, shortened until the cost falls, to where they gain next to nothing."""
+    system = linearised(candidate, blocks, noise, state)
+    for _ in range(ITERATIONS):
+        normal, right = normal_equations(system)
+        scaled, scale = _scaled(normal)
+        common = scale * np.linalg.lstsq(scaled, scale * right, rcond=1e-12)[0]
+        own = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
+        for share in SHARES:
+            trial = _moved(candidate, state, share * common, {run: share * own[run] for run in own})
+            reached = linearised(candidate, blocks, noise, trial, derivatives=False)
+            if reached.cost < system.cost:
+                break
+        else:
+            return state
+        gain = system.cost - reached.cost
+        state = trial
+        if gain < ENOUGH:
+            return state
+        system = linearised(candidate, blocks, noise, state)
+    return state
+
+
+def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, Array]) -> State:
+    """Add steps to a state; angles are turned into their period, other effect parameters kept in bounds."""
+    p = len(state.beta)
+    theta = state.theta + common[p:]
+    for i, parameter in enumerate(candidate.parameters):
+        if parameter.period:
+            theta[i] = parameter.lower + (theta[i] - parameter.lower) % parameter.period
+        else:
+            theta[i] = min(max(theta[i], parameter.lower), parameter.upper)
+    nuisance = {run: state.nuisance[run] + step for run, step in own.items()}
+    return State(theta, state.beta + common[:p], nuisance)
+
+
+def inverse(normal: Array) -> Array:
+    """Invert a normal matrix, its columns first brought to one size."""
+    scaled, scale = _scaled(normal)
+    return np.asarray(scale[:, None] * np.linalg.pinv(scaled, rcond=1e-12) * scale[None, :])
+
+
+def _scaled(normal: Array) -> tuple[Array, Array]:
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    return normal * scale[:, None] * scale[None, :], scale

@@ -1,0 +1,130 @@
+"""The noise of the loop against dense linear algebra and against what was injected."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from toy import BETA, POINTS, SIGMA, Wave, block
+
+from metro.loop import noise as noise_room
+from metro.loop.noise import Noise, block_sigma, diagonal, first_noise, shared, updated, whitener
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 12), st.integers(0, 5), st.integers(0, 10_000))
+def test_whitening_is_the_dense_inverse_square_root(size, directions, seed):
+    rng = np.random.default_rng(seed)
+    variance, u = rng.uniform(0.1, 3.0, size), rng.normal(size=(size, directions))
+    covariance = np.diag(variance) + u @ u.T
+    whiten = whitener(variance, u)
+    root = whiten(np.eye(size))
+    assert root @ covariance @ root.T == pytest.approx(np.eye(size), abs=1e-9)
+    rest = rng.normal(size=size)
+    assert np.sum(whiten(rest) ** 2) == pytest.approx(rest @ np.linalg.solve(covariance, rest))
+    determinant = whiten.log_shared + np.sum(np.log(variance))
+    assert determinant == pytest.approx(np.linalg.slogdet(covariance)[1], abs=1e-9)
+
+
+def runs(count, scatter, missed=0.0, zero=0.0, repeats=1):
+    """Blocks and their residuals about the true coefficients."""
+    rng = np.random.default_rng(5)
+    parts = []
+    for i in range(count):
+        one = block(f"r{i}", 1.0 + i % 5, "identify", rng, phased=False, scatter=0.0, condition=f"c{i // repeats}")
+        one = replace(one, zeros=np.ones((POINTS, 1)), zero_sd=np.array([0.02]))
+        matrix, _ = Wave().design(one, np.zeros(0))
+        rest = matrix @ (BETA * scatter * rng.normal(size=2)) + SIGMA * rng.normal(size=POINTS)
+        rest = rest + zero * 0.02 * rng.normal() + missed * np.sqrt(2) * np.cos(5 * np.arange(POINTS))
+        parts.append((replace(one, measured=matrix @ BETA + rest), matrix, rest))
+    return parts
+
+
+def estimated(parts, prior, steps=120):
+    noise = prior
+    for _ in range(steps):
+        noise = updated(
+            noise, prior, [(one, rest, shared(one, noise, matrix, BETA)) for one, matrix, rest in parts]
+        )
+    return noise
+
+
+@pytest.mark.parametrize("scatter", [0.005, 0.03])
+def test_scatter_between_runs_is_recovered_from_repeats(scatter):
+    parts = runs(300, scatter)
+    found = estimated(parts, first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts]))
+    assert found.scatter == pytest.approx(np.full(2, scatter), rel=0.12)
+
+
+def test_few_repeats_leave_the_scatter_near_its_prior():
+    parts = runs(2, 0.0)
+    found = estimated(parts, first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts]))
+    assert np.all(found.scatter > 0.006)
+
+
+def test_size_of_the_zeros_is_recovered():
+    parts = runs(300, 0.01, zero=4.0)
+    found = estimated(parts, first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts]))
+    assert found.zero_factor == pytest.approx(4.0, rel=0.15)
+
+
+def test_nothing_is_missed_by_the_right_model():
+    parts = runs(200, 0.01)
+    found = estimated(parts, first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts]))
+    rms = np.sqrt(np.mean([np.mean(one.measured**2) for one, *_ in parts]))
+    assert found.misfit["x"] * rms < 0.2 * SIGMA
+
+
+def test_what_the_model_misses_is_measured_relative_to_the_signal():
+    parts = [part for part in runs(200, 0.01, missed=0.3) if part[0].setting.feed == 3.0]
+    found = estimated(parts, first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts]))
+    rms = np.sqrt(np.mean([np.mean(one.measured**2) for one, *_ in parts]))
+    # Twelve neighbours weigh as one: an excess of m² is a misfit of m²/12 per element.
+    assert found.misfit["x"] * rms == pytest.approx(0.3, rel=0.35)
+    assert found.misfit["x"] > 5 * estimated(runs(40, 0.01), first_noise(0.0, np.full(2, 0.01), [])).misfit["x"]
+
+
+def test_a_load_test_tells_nothing_of_the_scatter_of_cuts():
+    (one, matrix, rest), *_ = runs(1, 0.05)
+    load = replace(one, role="calibrate")
+    prior = first_noise(0.0, np.full(2, 0.01), [load])
+    assert shared(load, prior, matrix, BETA) == pytest.approx(np.full((POINTS, 1), 0.02))
+    after = updated(prior, prior, [(load, rest, shared(load, prior, matrix, BETA))])
+    assert after.scatter == pytest.approx(prior.scatter)
+    assert after.misfit == {}
+
+
+def test_the_budget_does_not_average_out_over_repeats():
+    one = runs(1, 0.0)[0][0]
+    alone = diagonal(one, Noise(0.01, np.full(2, 0.01), {one.condition: 1})) - SIGMA**2
+    three = diagonal(one, Noise(0.01, np.full(2, 0.01), {one.condition: 3})) - SIGMA**2
+    rms = np.sqrt(np.mean(one.measured**2))
+    assert alone == pytest.approx(np.full(POINTS, (0.01 * rms) ** 2))
+    assert three == pytest.approx(3 * alone)
+
+
+def test_misfit_weighs_many_neighbours_as_one_element():
+    one = runs(1, 0.0)[0][0]
+    noise = Noise(0.0, np.full(2, 0.01), {}, misfit={"x": 1.0})
+    rms2 = np.mean(one.measured**2)
+    assert diagonal(one, noise) - SIGMA**2 == pytest.approx(np.full(POINTS, noise_room.MISFIT_CORRELATION * rms2))
+    # Counted as elements, each still has its own variance, a twelfth as often.
+    assert noise_room.log_scale(one, replace(noise, misfit={})) == pytest.approx(POINTS * np.log(SIGMA**2))
+    once = SIGMA**2 + rms2
+    assert noise_room.log_scale(one, noise) == pytest.approx(
+        POINTS * once / (SIGMA**2 + noise_room.MISFIT_CORRELATION * rms2) * np.log(once)
+    )
+
+
+def test_sigma_of_the_comparison_is_the_spread_of_simulated_runs():
+    rng = np.random.default_rng(3)
+    one, matrix, _ = runs(1, 0.0)[0]
+    synthesis = rng.normal(size=(7, POINTS))
+    one = replace(one, synthesis=synthesis, repeats=4)
+    noise = Noise(0.02, np.array([0.01, 0.03]), {one.condition: 5}, zero_factor=3.0)
+    rms = np.sqrt(np.mean(one.measured**2))
+    draws = 20000
+    values = SIGMA * rng.normal(size=(draws, POINTS)) + 0.02 * rms * rng.normal(size=(draws, POINTS))
+    values += (rng.normal(size=(draws, 2)) * BETA * noise.scatter) @ matrix.T + 0.06 * rng.normal(size=(draws, 1))
+    assert block_sigma(one, noise, matrix, BETA) == pytest.approx((values @ synthesis.T).std(axis=0), rel=0.03)
