@@ -26,7 +26,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Wave:
-    """beta0 · feed · (1+gain)(cos τ + bend cos 3τ) + beta1 (1 + sin 2τ + ripple sin 4τ), τ from an unknown phase."""
+    """beta0 · feed · (1+gain)(cos τ + bend cos 3τ) + beta1 (1 + sin 2τ + sin 5τ / 2 + ripple sin 4τ)."""
 
     bend: float = 0.0
     ripple: float = 0.0
@@ -45,7 +45,7 @@ class Wave:
     def design(self, block, nuisance):
         tau = ANGLE - (nuisance[0] if len(nuisance) else 0.0)
         first = block.setting.feed * (1 + self.gain) * (np.cos(tau) + self.bend * np.cos(3 * tau))
-        second = 1 + np.sin(2 * tau) + self.ripple * np.sin(4 * tau) + self.spike * np.cos(7 * tau)
+        second = 1 + np.sin(2 * tau) + 0.5 * np.sin(5 * tau) + self.ripple * np.sin(4 * tau) + self.spike * np.cos(7 * tau)
         return np.stack([first, second], axis=1), np.zeros(POINTS)
 
 

@@ -22,6 +22,7 @@ ENOUGH = 0.01  # gain in twice the log-likelihood below which a descent ends
 SHARES = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step, tried in turn until the cost falls
 THETA_STEP = 1e-3  # in units of the parameter's scale
 NUISANCE_STEP = 1e-4
+UNSEEN = 1e-9  # smallest eigenvalue of the scaled normal matrix that still tells something
 
 Rows = tuple[Array, Array, Array, Array]
 
@@ -143,7 +144,7 @@ def descend(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: 
     for _ in range(ITERATIONS):
         normal, right = normal_equations(system)
         scaled, scale = _scaled(normal)
-        common = scale * np.linalg.lstsq(scaled, scale * right, rcond=1e-12)[0]
+        common = scale * np.linalg.lstsq(scaled, scale * right, rcond=UNSEEN)[0]
         own = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
         for share in SHARES:
             trial = _moved(candidate, state, share * common, {run: share * own[run] for run in own})
@@ -174,11 +175,19 @@ def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, 
 
 
 def inverse(normal: Array) -> Array:
-    """Invert a normal matrix, its columns first brought to one size."""
+    """Invert a normal matrix; a parameter that it says nothing of has an infinite variance, not a small one."""
     scaled, scale = _scaled(normal)
-    return np.asarray(scale[:, None] * np.linalg.pinv(scaled, rcond=1e-12) * scale[None, :])
+    size, direction = np.linalg.eigh(scaled)
+    seen = size > UNSEEN * size[-1]
+    known = direction[:, seen] * scale[:, None]
+    covariance = (known / size[seen]) @ known.T
+    unknown = (direction[:, ~seen] ** 2).sum(axis=1) > UNSEEN
+    covariance[unknown, unknown] = np.inf
+    return np.asarray(covariance)
 
 
 def _scaled(normal: Array) -> tuple[Array, Array]:
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    """Bring the columns of a normal matrix to one size; those of zero length stay zero."""
+    length = np.sqrt(np.diag(normal))
+    scale = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
     return normal * scale[:, None] * scale[None, :], scale

@@ -163,7 +163,7 @@ def _refined(
     for _ in range(rounds):
         noise = _reestimated(candidate, blocks, prior, noise, state)
         state = descend(candidate, blocks, noise, state)
-    normal, _ = normal_equations(linearised(candidate, blocks, noise, state))
+    normal, _ = normal_equations(linearised(candidate, blocks, noise_room.all_alike(noise), state))
     return _finished(candidate, blocks, noise, state, inverse(normal))
 
 

@@ -148,16 +148,16 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         if block.role == "calibrate":
             continue
         variance = diagonal(block, noise)
-        scaled = directions / np.sqrt(variance)[:, None]
-        inverse = np.linalg.inv(np.eye(scaled.shape[1]) + scaled.T @ scaled)
-        amplitude = inverse @ (scaled.T @ (residual / np.sqrt(variance)))
-        expected = amplitude**2 + np.diag(inverse)
+        amplitude, uncertain = _amplitude(directions, residual, variance)
+        expected = amplitude**2 + np.diag(uncertain)
         amplitudes["scatter"] += [float(size**2 * expected[:p].mean())] if p else []
         amplitudes["zero"] += (
             [float(noise.zero_factor**2 * expected[p:].mean())] if block.zeros.shape[1] else []
         )
+        # The misfit as it is, not as it weighs: else it takes what the shared directions explain.
+        amplitude, uncertain = _amplitude(directions, residual, diagonal(block, noise, correlation=1.0))
         left = residual - directions @ amplitude
-        spread = left**2 + np.einsum("ij,jk,ik->i", directions, inverse, directions)
+        spread = left**2 + np.einsum("ij,jk,ik->i", directions, uncertain, directions)
         excess = spread - diagonal(block, replace(noise, misfit={}))
         names, number, rms = _axes(block)
         share = noise.repeats.get(block.condition, 1) * block.repeats * rms**2
@@ -171,3 +171,10 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
     return replace(
         noise, scatter=prior.scatter * factor["scatter"], zero_factor=factor["zero"], misfit=misfit
     )
+
+
+def _amplitude(directions: Array, residual: Array, variance: Array) -> tuple[Array, Array]:
+    """Return the expected amplitude of each shared direction (k,), and the covariance of that."""
+    scaled = directions / np.sqrt(variance)[:, None]
+    covariance = np.linalg.inv(np.eye(scaled.shape[1]) + scaled.T @ scaled)
+    return covariance @ (scaled.T @ (residual / np.sqrt(variance))), covariance

@@ -9,6 +9,7 @@ import numpy as np
 
 from metro.loop import noise as noise_room
 from metro.loop.fit import Fit
+from metro.observables.problem import Block
 from metro.units import Array
 
 FALSE_DISCOVERY = 0.01
@@ -46,53 +47,55 @@ def signature(fitted: Fit, least: float) -> list[Line]:
     A place counts when it is significant by Benjamini–Hochberg at 1 % over all places and its excess over the
     noise is at least ``least`` of the axis's signal.
     """
-    from scipy.stats import chi2
-
-    strict = replace(fitted.noise, misfit={})
-    square: dict[tuple[str, str], list[Array]] = {}
+    places: dict[tuple[str, str], list[Array]] = {}
     signal: dict[str, float] = {}
-    model = fitted.candidate.model(fitted.theta)
-    for block in fitted.blocks:
-        if block.role == "calibrate":
-            continue
-        matrix, offset = model.design(block, fitted.nuisance[block.run])
-        rest = block.measured - offset - matrix @ fitted.beta
-        directions = noise_room.shared(block, strict, matrix, fitted.beta)
-        variance = noise_room.diagonal(block, strict) + (directions**2).sum(axis=1)
-        labels = np.full(len(rest), "all") if block.labels is None else block.labels
+    cut = [block for block in fitted.blocks if block.role != "calibrate"]
+    for block in cut:
+        seen = _seen_and_expected(fitted, block)
+        labels = np.full(len(block.axis), "all") if block.labels is None else block.labels
         for axis in np.unique(block.axis):
-            here = block.axis == axis
-            signal[str(axis)] = (
-                signal.get(str(axis), 0.0) + float(np.sum(block.measured[here] ** 2)) / block.repeats
-            )
-            for label in np.unique(labels[here]):
-                chosen = here & (labels == label)
-                mean = rest[chosen].reshape(block.repeats, -1).mean(axis=0)
-                spread = variance[chosen].reshape(block.repeats, -1).mean(axis=0) / block.repeats
-                square.setdefault((str(axis), str(label)), []).append(np.array([mean**2, spread]))
-    lines = []
-    for (axis, label), parts in square.items():
-        seen, expected = np.concatenate(parts, axis=1)
-        p_value = float(chi2.sf(np.sum(seen / expected), len(seen)))
-        excess = math.sqrt(max(0.0, float(np.sum(seen - expected))))
-        relative = excess / math.sqrt(signal[axis]) if signal[axis] > 0 else 0.0
-        count = len(parts)
-        lines.append(
-            Line(
-                axis,
-                label,
-                math.sqrt(seen.sum() / count),
-                excess / math.sqrt(count),
-                relative,
-                p_value,
-                False,
-            )
-        )
+            power = float(np.sum(block.measured[block.axis == axis] ** 2)) / block.repeats
+            signal[str(axis)] = signal.get(str(axis), 0.0) + power
+            for label in np.unique(labels[block.axis == axis]):
+                chosen = (block.axis == axis) & (labels == label)
+                places.setdefault((str(axis), str(label)), []).append(seen[:, chosen[: seen.shape[1]]])
+    freedom = len(cut) + noise_room.PRIOR_RUNS
+    lines = [
+        _line(axis, label, parts, signal[axis], freedom) for (axis, label), parts in places.items()
+    ]
     accepted = discoveries([line.p_value for line in lines], FALSE_DISCOVERY)
     return [
         replace(line, significant=bool(found) and line.ratio > LEAST_RATIO and line.relative > least)
         for line, found in zip(lines, accepted, strict=True)
     ]
+
+
+def _seen_and_expected(fitted: Fit, block: Block) -> Array:
+    """Rest of a block averaged over its repeats, squared, and what is expected of it, (3, n / repeats).
+
+    The last row is the part of the expectation that the whole run shares: it does not average out over the repeats.
+    """
+    strict = replace(fitted.noise, misfit={})
+    matrix, offset = fitted.candidate.model(fitted.theta).design(block, fitted.nuisance[block.run])
+    rest = (block.measured - offset - matrix @ fitted.beta).reshape(block.repeats, -1).mean(axis=0)
+    alone = noise_room.diagonal(block, strict).reshape(block.repeats, -1).mean(axis=0) / block.repeats
+    directions = noise_room.shared(block, strict, matrix, fitted.beta)
+    common = (directions**2).sum(axis=1).reshape(block.repeats, -1).mean(axis=0)
+    return np.array([rest**2, alone + common, common])
+
+
+def _line(axis: str, label: str, parts: list[Array], signal: float, freedom: int) -> Line:
+    """Test one place. What the runs share was estimated from as many runs, hence F and not chi-squared."""
+    from scipy.stats import f
+
+    seen, expected, common = np.concatenate(parts, axis=1)
+    total = float(expected.sum())
+    denominator = freedom * (total / max(float(common.sum()), 1e-6 * total)) ** 2
+    p_value = float(f.sf(np.mean(seen / expected), len(seen), denominator))
+    excess = max(0.0, float(seen.sum()) - total)
+    relative = math.sqrt(excess / signal) if signal > 0 else 0.0
+    runs = len(parts)
+    return Line(axis, label, math.sqrt(seen.sum() / runs), math.sqrt(excess / runs), relative, p_value, False)
 
 
 def discoveries(p_values: list[float], rate: float) -> Array:

@@ -25,7 +25,9 @@ AXES = ("x", "y", "z")
 ANGLES = 120
 TIME_BLOCKS = 4
 SCATTER = 0.01
-ZERO_SHARE = 0.003
+ZERO_SHARE = 0.003  # of a run's rms: how far its zero may be off where it was read in the air
+LEAST_FEED_RATIO = 1.1  # between axial feeds that part the shear from the edge term of the bottom edges
+UNZEROED_SHARE = 0.01  # and where the record has no air
 
 Read = Callable[..., pd.DataFrame]
 
@@ -153,9 +155,14 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
     if isinstance(tool, Refusal) or "orders" not in observed:
         return tool if isinstance(tool, Refusal) else Refusal("no order averages")
     by_run = dict(tuple(observed["orders"].groupby("run", sort=False)))
-    blocks = tuple(_block(batch, run, by_run[run], tool) for run in recorded(batch) if run in by_run)
+    air = observed["spindle"].set_index("run")["air_s"]
+    blocks = tuple(
+        _block(batch, run, by_run[run], tool, zeroed=bool(air[run] > 0.0))
+        for run in recorded(batch)
+        if run in by_run
+    )
     helical = any(block.setting.helix is not None for block in blocks)
-    model = ForceModel(cutter=tool, law=EdgeLaw(), bottom_edges=helical)
+    model = ForceModel(cutter=tool, law=EdgeLaw(), bottom_edges=_bottom_edges(blocks))
     notes = [
         "The chip thickness is that of the true tooth paths, the force law linear in it; "
         "tool, machine and dynamometer are rigid in the base model.",
@@ -168,7 +175,15 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
     return Problem(OBSERVABLE, "N", 1.0, model, blocks, scatter, notes=tuple(notes))
 
 
-def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter) -> Block:
+def _bottom_edges(blocks: tuple[Block, ...]) -> tuple[str, ...]:
+    """Coefficients of the bottom edges that the helical runs tell: one axial feed gives their sum alone."""
+    feeds = [block.setting.helix.axial_feed for block in blocks if block.role == "identify" and block.setting.helix]
+    if not feeds:
+        return ()
+    return ("kfac", "kfae") if max(feeds) > LEAST_FEED_RATIO * min(feeds) else ("kfae",)
+
+
+def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, *, zeroed: bool) -> Block:
     row: Any = batch.runs.loc[run]
     middles = tuple(float(t) for t in table.groupby("block")["t_s"].first())
     highest = int(table["order"].max())
@@ -183,7 +198,7 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter) -> Block:
     )
     axis = table["axis"].to_numpy().astype(str)
     mean = (table["part"] == "mean").to_numpy()
-    zeros = np.column_stack([(axis == name) & mean for name in AXES]).astype(float)
+    zeros = _zeros(axis, mean, table["t_s"].to_numpy(), _orbit_rate(row))
     rms = math.sqrt(float(np.sum(values**2)) / len(middles))
     return Block(
         run=run,
@@ -195,7 +210,7 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter) -> Block:
         setting=setting,
         axis=axis,
         zeros=zeros,
-        zero_sd=np.full(3, ZERO_SHARE * rms),
+        zero_sd=np.full(3, (ZERO_SHARE if zeroed else UNZEROED_SHARE) * rms),
         coordinates=_coordinates(middles),
         synthesis=_synthesis(len(middles), highest),
         scale=_scale(table),
@@ -203,6 +218,18 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter) -> Block:
         symmetries=_tooth_shifts(tool, 1 if setting.helix is None else 2),
         labels=np.where(mean, "mean", "order " + table["order"].astype(str)).astype(str),
     )
+
+
+def _zeros(axis: np.ndarray, mean: np.ndarray, time: Array, orbit: float) -> Array:
+    """Directions (n, 3) of a zero offset of the dynamometer along x, y, z.
+
+    In helical milling the frame of the comparison turns with the orbit, and a zero in x and y turns the other way.
+    """
+    along = {name: (axis == name) & mean for name in AXES}
+    c, s = np.cos(orbit * time), np.sin(orbit * time)
+    x = along["x"] * c - along["y"] * s
+    y = along["x"] * s + along["y"] * c
+    return np.column_stack([x, y, along["z"].astype(float)])
 
 
 def _helix(batch: Batch, row: pd.Series) -> Helix | None:
@@ -268,6 +295,9 @@ def report(
             block.setdefault("not_identified", {})[name] = fitted.reason
         else:
             block[name] = fitted
+    if model.bottom_edges == ("kfae",):
+        reason = "the helical runs of the fit have one axial feed: kfae holds the whole thrust of the bottom edges"
+        block.setdefault("not_identified", {})["kfac"] = reason
     return {"force": block}
 
 

@@ -59,18 +59,19 @@ class ForceModel:
 
     ``true_path`` takes the chip from the trochoidal paths of the teeth; else from circles (feed × sine of the
     immersion). A block's nuisance is the angle of tooth 0 at the record's start, rad, and in helical milling
-    also the direction of feed there. ``bottom_edges`` adds K_Fac and K_Fae to the coefficients.
+    also the direction of feed there. ``bottom_edges`` names those of K_Fac and K_Fae that
+    the helical runs can tell.
     """
 
     cutter: Cutter
     law: EdgeLaw
     true_path: bool = True
-    bottom_edges: bool = False
+    bottom_edges: tuple[str, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The cutting coefficients."""
-        names = COEFFICIENTS + (("kfac", "kfae") if self.bottom_edges else ())
+        names = COEFFICIENTS + self.bottom_edges
         return tuple(
             Parameter(name, "N/mm2", N_MM2) if name.endswith("c") else Parameter(name, "N/mm", N_MM)
             for name in names
@@ -109,10 +110,11 @@ class ForceModel:
 
         Equations 7 and 8 of the source of the helical tests.
         """
-        columns = np.zeros((orders, 3, 2))
+        columns = np.zeros((orders, 3, len(self.bottom_edges)))
         if setting.helix is not None:
             reach = self.cutter.teeth * self.cutter.radius
-            columns[0, 2] = reach * setting.helix.axial_feed, reach
+            thrust = {"kfac": reach * setting.helix.axial_feed, "kfae": reach}
+            columns[0, 2] = [thrust[name] for name in self.bottom_edges]
         return columns
 
 

@@ -1,0 +1,148 @@
+"""The search on a small library: what is found, what is not, and what is said of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, problem
+
+from metro.loop import search as search_room
+from metro.loop.candidate import Candidate
+from metro.loop.fit import fit
+from metro.loop.noise import first_noise
+from metro.loop.search import search
+from metro.loop.signature import discoveries, in_words
+from metro.loop.verdict import comparison, held_out, judge
+
+
+def judged(task, library, gates=GATES):
+    outcome = search(task, library, gates)
+    rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
+    return outcome, judge(task, outcome, rows, gates)
+
+
+def test_an_effect_that_is_there_is_found_and_the_held_out_error_falls():
+    outcome, verdict = judged(problem(1, truth=Wave(bend=0.2)), (BEND, RIPPLE))
+    assert outcome.names == ("bend",)
+    assert verdict["status"] == "explained"
+    entry = verdict["effects"][0]["parameters"]["bend"]
+    assert entry["ci95"][0] < 0.2 < entry["ci95"][1]
+    assert verdict["after"]["rms"] < 0.3 * verdict["before"]["rms"]
+
+
+def test_two_effects_are_both_found():
+    outcome, verdict = judged(problem(2, truth=Wave(bend=0.2, ripple=0.15)), (BEND, RIPPLE))
+    assert set(outcome.names) == {"bend", "ripple"}
+    assert verdict["status"] == "explained"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_nothing_is_added_to_a_clean_batch(seed):
+    outcome, verdict = judged(problem(20 + seed), (BEND, RIPPLE))
+    assert outcome.names == ()
+    assert verdict["status"] == "clean"
+    assert all(trial.why_not for trial in outcome.trials)
+
+
+def test_an_immaterial_effect_is_not_added_however_certain():
+    outcome, _ = judged(problem(3, truth=Wave(bend=0.2)), (BEND,), replace(GATES, materiality=0.5))
+    assert outcome.names == ()
+    assert "immaterial" in outcome.trials[0].why_not
+
+
+def test_the_systematic_error_of_the_inputs_raises_the_bar():
+    task = replace(problem(3, truth=Wave(bend=0.2)), systematic=0.3)
+    assert "immaterial" in search(task, (BEND,), GATES).trials[0].why_not
+
+
+def test_an_effect_must_predict_conditions_left_out():
+    outcome = search(problem(4, truth=Wave(bend=0.2)), (BEND,), replace(GATES, held_out_gain=1e6))
+    assert outcome.names == ()
+    assert "left-out" in outcome.trials[0].why_not
+
+
+def test_an_effect_that_the_base_absorbs_is_said_to_be_invisible():
+    outcome, verdict = judged(problem(5, truth=Wave(gain=0.3)), (GAIN, RIPPLE))
+    assert outcome.names == ()
+    assert set(outcome.not_visible) == {"gain"}
+    assert verdict["status"] == "clean"
+    assert "an experiment for gain" in verdict["next_experiment"]
+
+
+def test_two_effects_that_are_the_same_leave_the_cause_undetermined():
+    outcome, verdict = judged(problem(6, truth=Wave(bend=0.2)), (BEND, TWIN))
+    assert len(outcome.names) == 1
+    assert {*outcome.rivals[0]} == {"bend", "twin"}
+    assert verdict["status"] == "undetermined"
+    assert {*verdict["indistinguishable"][0]} == {"bend", "twin"}
+    assert "an experiment for twin" in verdict["next_experiment"]
+
+
+def test_a_structure_outside_the_library_is_left_unexplained():
+    outcome, verdict = judged(problem(7, truth=Wave(spike=0.3)), (BEND, RIPPLE))
+    assert outcome.names == ()
+    assert verdict["status"] == "unexplained"
+    assert "quarter" in verdict["unexplained"]["signature"]
+    assert 0.5 < verdict["unexplained"]["rms"] / (8.0 * 0.3 / np.sqrt(2)) < 1.5
+
+
+def test_an_effect_found_beside_what_is_outside_the_library_explains_in_part():
+    outcome, verdict = judged(problem(8, truth=Wave(bend=0.5, spike=0.2)), (BEND,))
+    assert outcome.names == ("bend",)
+    assert verdict["status"] == "partly_explained"
+
+
+def test_one_run_is_too_few_to_tell():
+    task = problem(9, feeds=(2.0,), repeats=1)
+    _, verdict = judged(task, (BEND,))
+    assert verdict["status"] == "insufficient"
+    assert "more runs" in verdict["next_experiment"]
+
+
+def test_the_search_never_reads_the_validation_runs():
+    task = problem(10, truth=Wave(bend=0.2))
+    poisoned = tuple(
+        replace(block, measured=block.measured * np.nan) if block.role == "validate" else block
+        for block in task.blocks
+    )
+    clean, other = search(task, (BEND, RIPPLE), GATES), search(replace(task, blocks=poisoned), (BEND, RIPPLE), GATES)
+    assert other.names == clean.names == ("bend",)
+    assert other.final.theta == pytest.approx(clean.final.theta, rel=1e-12)
+    assert other.final.total == pytest.approx(clean.final.total, rel=1e-12)
+
+
+def test_an_effect_that_a_later_one_makes_idle_is_dropped():
+    task = problem(11, truth=Wave(bend=0.3))
+    blocks = task.role("identify")
+    prior = first_noise(GATES.model_form_budget, task.scatter, blocks)
+    both = fit(Candidate(task.base, (RIPPLE,)), blocks, prior)
+    both = fit(Candidate(task.base, (RIPPLE, BEND)), blocks, prior, both)
+    kept, dropped = search_room._pruned(both, prior, GATES, GATES.materiality)
+    assert dropped == {"ripple"}
+    assert [effect.name for effect in kept.candidate.effects] == ["bend"]
+    needed = problem(12, truth=Wave(bend=0.3, ripple=0.2))
+    blocks = needed.role("identify")
+    both = fit(Candidate(needed.base, (RIPPLE,)), blocks, prior)
+    both = fit(Candidate(needed.base, (RIPPLE, BEND)), blocks, prior, both)
+    assert search_room._pruned(both, prior, GATES, GATES.materiality)[1] == set()
+
+
+def test_false_discoveries_are_controlled_as_benjamini_and_hochberg_do():
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        p = rng.uniform(size=rng.integers(1, 20)) ** 2
+        ordered = np.sort(p)
+        most = max((k for k in range(1, len(p) + 1) if ordered[k - 1] <= 0.2 * k / len(p)), default=0)
+        expected = p <= (ordered[most - 1] if most else -1.0)
+        assert np.array_equal(discoveries(list(p), 0.2), expected)
+    assert discoveries([], 0.1).size == 0
+
+
+def test_the_rest_of_a_clean_fit_is_nowhere_significant_and_named_in_order_of_size():
+    assert not any(line.significant for line in search(problem(13), (), GATES).lines)
+    lines = list(search(problem(14, truth=Wave(spike=0.3)), (), GATES).lines)
+    found = sorted((line for line in lines if line.significant), key=lambda line: -line.excess)
+    assert len(found) == 4
+    words = in_words(lines, 2)
+    assert words.index(found[0].label) < words.index(found[1].label)
+    assert "2 more places" in words
