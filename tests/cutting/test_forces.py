@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement, engagement
 from metro.cutting.force import ANGLES, Cut, force_basis, mean_force
@@ -42,7 +43,7 @@ def test_mean_force_at_any_immersion_is_the_integral_over_the_arc(direction, sig
     expected = [np.trapezoid(f, phi) * 4 * 1e-3 / (2 * math.pi) for f in (fx, fy)]
     found = mean_force(cutter(), EdgeLaw(), Cut(0.05e-3, 1e-3, engaged), TITANIUM)
     assert found[:2] == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
-    assert math.copysign(1.0, found[0]) == sign  # climb milling pulls the tool along the feed, up milling holds it back
+    assert math.copysign(1.0, found[0]) == sign  # climb milling pulls the tool along
 
 
 def test_mean_torque_times_speed_is_the_tangential_power():
@@ -92,13 +93,17 @@ def test_first_order_of_runout_does_not_depend_on_the_feed():
     engaged = Engagement(0.6, 2.4)  # where the chip is never thinner than the runout
 
     def first_order(feed):
-        return np.abs(np.fft.rfft(force_basis(tool, EdgeLaw(), Cut(feed, 1e-3, engaged)) @ shear_only, axis=0)[1])
+        return np.abs(
+            np.fft.rfft(force_basis(tool, EdgeLaw(), Cut(feed, 1e-3, engaged)) @ shear_only, axis=0)[1]
+        )
 
     assert first_order(0.2e-3) == pytest.approx(first_order(0.1e-3), rel=1e-3)
 
 
 def test_teeth_of_equal_radius_make_no_order_but_their_own():
-    spectrum = np.abs(np.fft.rfft(force_basis(cutter(), EdgeLaw(), Cut(0.05e-3, 1e-3, SLOT)) @ TITANIUM, axis=0))
+    spectrum = np.abs(
+        np.fft.rfft(force_basis(cutter(), EdgeLaw(), Cut(0.05e-3, 1e-3, SLOT)) @ TITANIUM, axis=0)
+    )
     orders = np.arange(len(spectrum))
     assert spectrum[orders % 4 != 0].max() < 1e-9 * spectrum.max()
 
@@ -110,16 +115,15 @@ def brute_force(tool, cut, coefficients, angle, slices=400):
     for i in range(slices):
         z = (i + 0.5) * dz
         lag = z * math.tan(tool.helix) / tool.radius
-        offset = [
-            tool.runout_radius * math.cos(tool.runout_angle - a + lag) for a in tool.tooth_angles
-        ]
+        offset = [tool.runout_radius * math.cos(tool.runout_angle - a + lag) for a in tool.tooth_angles]
         for j, tooth in enumerate(tool.tooth_angles):
             phi = (angle + tooth - lag) % (2 * math.pi)
             if not cut.engagement.entry < phi < cut.engagement.exit:
                 continue
             n = tool.teeth
             h = min(
-                m * cut.feed_per_tooth * math.sin(phi) + offset[j] - offset[(j + m) % n] for m in range(1, n + 1)
+                m * cut.feed_per_tooth * math.sin(phi) + offset[j] - offset[(j + m) % n]
+                for m in range(1, n + 1)
             )
             if h <= 0:
                 continue
@@ -154,7 +158,7 @@ def test_force_is_that_of_a_brute_force_slice_integration(teeth, helix, runout, 
 
 
 def true_chip(tool, feed, phi_now, tooth, height=0.0):
-    """Chip thickness by following the tooth that cut before, back along its trochoid, until it crosses the ray."""
+    """Follow the tooth that cut before, back along its trochoid, until it crosses the ray."""
     n = tool.teeth
     per_radian = feed * n / (2 * math.pi)
     lag = height * math.tan(tool.helix) / tool.radius
@@ -170,7 +174,9 @@ def true_chip(tool, feed, phi_now, tooth, height=0.0):
             phi = phi_now + pitch - turned
             x = -per_radian * turned + radius(tooth + m) * math.sin(phi)
             y = radius(tooth + m) * math.cos(phi)
-            return x * math.cos(phi_now) - y * math.sin(phi_now), x * math.sin(phi_now) + y * math.cos(phi_now)
+            return x * math.cos(phi_now) - y * math.sin(phi_now), x * math.sin(phi_now) + y * math.cos(
+                phi_now
+            )
 
         low, high = pitch - 0.3, pitch + 0.3
         for _ in range(80):
@@ -215,3 +221,9 @@ def test_pitch_over_all_teeth_is_one_turn():
     tool = Cutter(6e-3, 0.0, (0.0, 1.5, 3.3, 4.9))
     assert tool.pitch(4) == pytest.approx(np.full(4, 2 * math.pi))
     assert tool.pitch(1) == pytest.approx([1.5, 1.8, 1.6, 2 * math.pi - 4.9])
+
+
+def test_a_face_cut_in_the_middle_is_symmetric_about_the_feed():
+    engaged = engagement("face", "slot", 6e-3, 6e-3)
+    assert engaged.entry == pytest.approx(math.radians(60))
+    assert engaged.exit == pytest.approx(math.radians(120))

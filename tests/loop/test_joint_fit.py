@@ -41,8 +41,7 @@ def test_without_effects_the_fit_is_generalised_least_squares():
 
     beta, covariance = dense(found.noise)
     assert np.abs(found.beta - beta).max() < 0.02 * np.sqrt(np.diag(covariance)).min()
-    # Its interval allows for a budget that is the same in all conditions.
-    assert found.covariance == pytest.approx(dense(noise_room.all_alike(found.noise))[1], rel=1e-3)
+    assert found.covariance == pytest.approx(covariance, rel=1e-3)
 
 
 def test_log_likelihood_is_that_of_the_dense_gaussian():
@@ -84,7 +83,9 @@ def test_with_effect_and_phases_the_descent_ends_where_a_general_optimiser_does(
     assert np.all(np.abs(np.concatenate([found.beta, found.theta]) - best.x[:4]) < 0.1 * sd)
     wide = optimize.least_squares(rest, best.x, args=(roots(noise_room.all_alike(found.noise)),)).jac
     wide_sd = np.sqrt(np.diag(np.linalg.inv(wide.T @ wide)))[:4]
-    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(wide_sd, rel=0.02)
+    # Only the effects' intervals allow for a model error that is the same in all conditions.
+    told = np.sqrt(np.diag(found.covariance))
+    assert told == pytest.approx([*sd[:2], *wide_sd[2:]], rel=0.02)
     assert found.theta == pytest.approx([0.2, 0.1], abs=4 * sd.max())
 
 
@@ -98,7 +99,9 @@ def test_covariance_is_the_spread_of_repeated_batches():
         values.append([*found.beta, *found.theta])
         sds.append(np.sqrt(np.diag(found.covariance)))
     spread, told = np.std(values, axis=0), np.mean(sds, axis=0)
-    assert spread == pytest.approx(told, rel=0.3)
+    assert spread[:2] == pytest.approx(told[:2], rel=0.3)
+    # A little misfit is always estimated, and weighs on what the noise within a run decides.
+    assert spread[2] < 1.15 * told[2] < 2.1 * spread[2]
     assert np.all(np.abs(np.mean(values, axis=0) - [*BETA, 0.2]) < 4 * spread / np.sqrt(60))
 
 
@@ -116,7 +119,10 @@ def test_what_a_model_misses_does_not_bend_the_parameters_silently():
     blocks = task.role("identify")
     found = fit(Candidate(task.base), blocks, prior_of(task, blocks))
     assert found.noise.misfit["x"] > 0.05
-    assert fit(Candidate(problem(5).base), problem(5).role("identify"), prior_of(task, blocks)).noise.misfit["x"] < 0.005
+    assert (
+        fit(Candidate(problem(5).base), problem(5).role("identify"), prior_of(task, blocks)).noise.misfit["x"]
+        < 0.005
+    )
 
 
 def test_descent_never_raises_the_cost_and_keeps_parameters_in_bounds():
@@ -138,9 +144,13 @@ def test_the_weak_prior_pulls_an_effect_towards_zero_and_only_then():
     prior = prior_of(task, blocks)
     flat = fit(Candidate(task.base, (BEND,)), blocks, prior)
     state = State(flat.theta, flat.beta, dict(flat.nuisance))
-    sd = np.sqrt(np.linalg.inv(normal_equations(linearised(flat.candidate, blocks, flat.noise, state))[0])[2, 2])
+    sd = np.sqrt(
+        np.linalg.inv(normal_equations(linearised(flat.candidate, blocks, flat.noise, state))[0])[2, 2]
+    )
     believed = replace(BEND, parameters=(replace(BEND.parameters[0], plausible=100.0 * float(sd)),))
-    pulled = descend(Candidate(task.base, (believed,)), blocks, flat.noise, replace(state, theta=state.theta + 3 * sd))
+    pulled = descend(
+        Candidate(task.base, (believed,)), blocks, flat.noise, replace(state, theta=state.theta + 3 * sd)
+    )
     # The mean of likelihood and prior, weighted by their precisions.
     assert pulled.theta[0] == pytest.approx(flat.theta[0] / (1.0 + 1e-4), abs=0.15 * sd)
     certain = replace(BEND, parameters=(replace(BEND.parameters[0], plausible=1e-3 * float(sd)),))
@@ -157,7 +167,9 @@ def test_an_angle_is_the_same_after_its_period():
         candidate,
         blocks,
         prior_of(task, blocks),
-        State(np.array([0.14]), BETA, dict(fit(Candidate(task.base), blocks, prior_of(task, blocks)).nuisance)),
+        State(
+            np.array([0.14]), BETA, dict(fit(Candidate(task.base), blocks, prior_of(task, blocks)).nuisance)
+        ),
     )
     assert 0.0 <= found.theta[0] < 0.15
 
@@ -174,8 +186,9 @@ def test_scoring_moves_nothing_but_the_phases():
     model = found.candidate.model(found.theta)
     for block in held:
         covariance = dense_covariance(block, found.noise, model, scored.nuisance[block.run], found.beta)
+        weight = np.linalg.inv(covariance)
 
-        def chi2(phase, block=block, weight=np.linalg.inv(covariance)):
+        def chi2(phase, block=block, weight=weight):
             rest = block.measured - model.design(block, np.array([phase]))[0] @ found.beta
             return rest @ weight @ rest
 
@@ -219,7 +232,9 @@ def test_evidence_of_a_parameter_more_is_its_f_probability():
     larger = fit(Candidate(task.base, (BEND,)), blocks, prior, base)
     evidence = compare(base, larger)
     assert evidence.statistic == pytest.approx(2 * (larger.total - base.total))
-    assert evidence.p_value == pytest.approx(stats.f.sf(evidence.statistic, 1, len(blocks) + noise_room.PRIOR_RUNS))
+    assert evidence.p_value == pytest.approx(
+        stats.f.sf(evidence.statistic, 1, len(blocks) + noise_room.PRIOR_RUNS)
+    )
     waves = [np.concatenate([f.predict(b) for b in blocks]) for f in (base, larger)]
     signal = np.concatenate([b.measured for b in blocks])
     assert evidence.size == pytest.approx(np.linalg.norm(waves[1] - waves[0]) / np.linalg.norm(signal))
@@ -265,4 +280,6 @@ def test_eliminating_the_phases_is_the_schur_complement():
     own = np.zeros((len(shared), 2))
     own[:24, :1], own[24:, 1:] = system.rows[0][3], system.rows[1][3]
     full = np.hstack([shared, own])
-    assert inverse(normal_equations(system)[0]) == pytest.approx(np.linalg.inv(full.T @ full)[:2, :2], rel=1e-8)
+    assert inverse(normal_equations(system)[0]) == pytest.approx(
+        np.linalg.inv(full.T @ full)[:2, :2], rel=1e-8
+    )

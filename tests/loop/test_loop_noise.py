@@ -32,7 +32,9 @@ def runs(count, scatter, missed=0.0, zero=0.0, repeats=1):
     rng = np.random.default_rng(5)
     parts = []
     for i in range(count):
-        one = block(f"r{i}", 1.0 + i % 5, "identify", rng, phased=False, scatter=0.0, condition=f"c{i // repeats}")
+        one = block(
+            f"r{i}", 1.0 + i % 5, "identify", rng, phased=False, scatter=0.0, condition=f"c{i // repeats}"
+        )
         one = replace(one, zeros=np.ones((POINTS, 1)), zero_sd=np.array([0.02]))
         matrix, _ = Wave().design(one, np.zeros(0))
         rest = matrix @ (BETA * scatter * rng.normal(size=2)) + SIGMA * rng.normal(size=POINTS)
@@ -82,7 +84,9 @@ def test_what_the_model_misses_is_measured_relative_to_the_signal():
     rms = np.sqrt(np.mean([np.mean(one.measured**2) for one, *_ in parts]))
     # Twelve neighbours weigh as one: an excess of m² is a misfit of m²/12 per element.
     assert found.misfit["x"] * rms == pytest.approx(0.3, rel=0.35)
-    assert found.misfit["x"] > 5 * estimated(runs(40, 0.01), first_noise(0.0, np.full(2, 0.01), [])).misfit["x"]
+    assert (
+        found.misfit["x"] > 5 * estimated(runs(40, 0.01), first_noise(0.0, np.full(2, 0.01), [])).misfit["x"]
+    )
 
 
 def test_a_load_test_tells_nothing_of_the_scatter_of_cuts():
@@ -108,7 +112,9 @@ def test_misfit_weighs_many_neighbours_as_one_element():
     one = runs(1, 0.0)[0][0]
     noise = Noise(0.0, np.full(2, 0.01), {}, misfit={"x": 1.0})
     rms2 = np.mean(one.measured**2)
-    assert diagonal(one, noise) - SIGMA**2 == pytest.approx(np.full(POINTS, noise_room.MISFIT_CORRELATION * rms2))
+    assert diagonal(one, noise) - SIGMA**2 == pytest.approx(
+        np.full(POINTS, noise_room.MISFIT_CORRELATION * rms2)
+    )
     # Counted as elements, each still has its own variance, a twelfth as often.
     assert noise_room.log_scale(one, replace(noise, misfit={})) == pytest.approx(POINTS * np.log(SIGMA**2))
     once = SIGMA**2 + rms2
@@ -126,5 +132,9 @@ def test_sigma_of_the_comparison_is_the_spread_of_simulated_runs():
     rms = np.sqrt(np.mean(one.measured**2))
     draws = 20000
     values = SIGMA * rng.normal(size=(draws, POINTS)) + 0.02 * rms * rng.normal(size=(draws, POINTS))
-    values += (rng.normal(size=(draws, 2)) * BETA * noise.scatter) @ matrix.T + 0.06 * rng.normal(size=(draws, 1))
-    assert block_sigma(one, noise, matrix, BETA) == pytest.approx((values @ synthesis.T).std(axis=0), rel=0.03)
+    values += (rng.normal(size=(draws, 2)) * BETA * noise.scatter) @ matrix.T + 0.06 * rng.normal(
+        size=(draws, 1)
+    )
+    assert block_sigma(one, noise, matrix, BETA) == pytest.approx(
+        (values @ synthesis.T).std(axis=0), rel=0.03
+    )

@@ -8,6 +8,7 @@ from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, problem
 
 from metro.loop import search as search_room
 from metro.loop.candidate import Candidate
+from metro.loop.evidence import Evidence
 from metro.loop.fit import fit
 from metro.loop.noise import first_noise
 from metro.loop.search import search
@@ -105,7 +106,10 @@ def test_the_search_never_reads_the_validation_runs():
         replace(block, measured=block.measured * np.nan) if block.role == "validate" else block
         for block in task.blocks
     )
-    clean, other = search(task, (BEND, RIPPLE), GATES), search(replace(task, blocks=poisoned), (BEND, RIPPLE), GATES)
+    clean, other = (
+        search(task, (BEND, RIPPLE), GATES),
+        search(replace(task, blocks=poisoned), (BEND, RIPPLE), GATES),
+    )
     assert other.names == clean.names == ("bend",)
     assert other.final.theta == pytest.approx(clean.final.theta, rel=1e-12)
     assert other.final.total == pytest.approx(clean.final.total, rel=1e-12)
@@ -146,3 +150,13 @@ def test_the_rest_of_a_clean_fit_is_nowhere_significant_and_named_in_order_of_si
     words = in_words(lines, 2)
     assert words.index(found[0].label) < words.index(found[1].label)
     assert "2 more places" in words
+
+
+def test_an_effect_that_helps_one_condition_alone_is_not_added():
+    evidence = Evidence(
+        statistic=50.0, p_value=1e-6, held_out={"a": 9.0, "b": -1.0, "c": -1.0, "d": -1.0}, size=0.1
+    )
+    assert evidence.gain > GATES.held_out_gain
+    assert "25 %" in search_room._not_held_out(evidence, GATES)
+    even = replace(evidence, held_out=dict.fromkeys("abcd", 1.5))
+    assert search_room._not_held_out(even, GATES) == ""

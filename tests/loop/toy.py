@@ -1,4 +1,4 @@
-"""A small problem with known truth: a wave of two base parameters, an unknown phase per run, and effects on it."""
+"""A small problem with known truth: a wave of two parameters, a phase per run, and effects on it."""
 
 from dataclasses import dataclass, replace
 
@@ -45,7 +45,13 @@ class Wave:
     def design(self, block, nuisance):
         tau = ANGLE - (nuisance[0] if len(nuisance) else 0.0)
         first = block.setting.feed * (1 + self.gain) * (np.cos(tau) + self.bend * np.cos(3 * tau))
-        second = 1 + np.sin(2 * tau) + 0.5 * np.sin(5 * tau) + self.ripple * np.sin(4 * tau) + self.spike * np.cos(7 * tau)
+        second = (
+            1
+            + np.sin(2 * tau)
+            + 0.5 * np.sin(5 * tau)
+            + self.ripple * np.sin(4 * tau)
+            + self.spike * np.cos(7 * tau)
+        )
         return np.stack([first, second], axis=1), np.zeros(POINTS)
 
 
@@ -67,7 +73,7 @@ BEND, TWIN, RIPPLE, GAIN = (
 )
 
 
-def block(run, feed, role, rng, truth=None, condition=None, phased=True, scatter=SCATTER, order=1):
+def block(run, feed, role, rng, *, truth=None, condition=None, phased=True, scatter=SCATTER, order=1):
     """One run of the truth: coefficients scattered, phase drawn, white noise."""
     empty = Block(
         run=run,
@@ -89,12 +95,16 @@ def block(run, feed, role, rng, truth=None, condition=None, phased=True, scatter
     return replace(empty, measured=matrix @ beta + SIGMA * rng.normal(size=POINTS))
 
 
-def problem(seed, truth=None, phased=True, feeds=(1.0, 2.0, 3.0, 4.0), repeats=3, held=(2.5, 3.5), scatter=SCATTER):
+def problem(
+    seed, *, truth=None, phased=True, feeds=(1.0, 2.0, 3.0, 4.0), repeats=3, held=(2.5, 3.5), scatter=SCATTER
+):
     """Blocks of identification runs (``repeats`` of each feed, in turn) and two validation runs."""
     rng = np.random.default_rng(seed)
-    plan = [(feed, "identify") for _ in range(repeats) for feed in feeds] + [(feed, "validate") for feed in held]
+    plan = [(feed, "identify") for _ in range(repeats) for feed in feeds] + [
+        (feed, "validate") for feed in held
+    ]
     blocks = tuple(
-        block(f"r{i}", feed, role, rng, truth, phased=phased, scatter=scatter, order=i)
+        block(f"r{i}", feed, role, rng, truth=truth, phased=phased, scatter=scatter, order=i)
         for i, (feed, role) in enumerate(plan, start=1)
     )
     return Problem("toy", "N", 1.0, Wave(), blocks, np.full(2, SCATTER))

@@ -178,7 +178,7 @@ def inverse(normal: Array) -> Array:
     """Invert a normal matrix; a parameter that it says nothing of has an infinite variance, not a small one."""
     scaled, scale = _scaled(normal)
     size, direction = np.linalg.eigh(scaled)
-    seen = size > UNSEEN * size[-1]
+    seen = size > UNSEEN * size.max(initial=0.0)
     known = direction[:, seen] * scale[:, None]
     covariance = (known / size[seen]) @ known.T
     unknown = (direction[:, ~seen] ** 2).sum(axis=1) > UNSEEN

@@ -163,8 +163,22 @@ def _refined(
     for _ in range(rounds):
         noise = _reestimated(candidate, blocks, prior, noise, state)
         state = descend(candidate, blocks, noise, state)
-    normal, _ = normal_equations(linearised(candidate, blocks, noise_room.all_alike(noise), state))
-    return _finished(candidate, blocks, noise, state, inverse(normal))
+    return _finished(candidate, blocks, noise, state, _covariance(candidate, blocks, noise, state))
+
+
+def _covariance(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> Array:
+    """Covariance of base and effect parameters, (p + q, p + q).
+
+    The base parameters scatter from run to run, and the runs average that out. What the model gets wrong where
+    an effect shows may be the same in all runs: the variances of the effect parameters allow for that.
+    """
+    alone, alike = (
+        inverse(normal_equations(linearised(candidate, blocks, kind, state))[0])
+        for kind in (noise, noise_room.all_alike(noise))
+    )
+    p = len(state.beta)
+    alone[p:, p:] = alike[p:, p:]
+    return alone
 
 
 def _reestimated(

@@ -60,7 +60,9 @@ def judge_labels(
     status = _status(len(rows), p_after < SIGNIFICANT, explains)
     wrong = rows["run"][np.abs(label - after) > 0.5].tolist()
     left = f"labels against the predicted boundary in {len(wrong)} of {len(rows)} tests: {', '.join(wrong)}"
-    figures = {column: error(rows, column, gates.seed) if len(rows) else None for column in ("before", "after")}
+    figures = {
+        column: error(rows, column, gates.seed) if len(rows) else None for column in ("before", "after")
+    }
     floor = float(np.sqrt(np.mean(after * (1.0 - after)))) if len(rows) else None
     verdict: JSON = {
         "status": status,
@@ -113,7 +115,9 @@ def _noise_words(tests: int, before: float, after: float) -> str:
 def _next_test(rows: pd.DataFrame) -> str:
     """Return what to test next: where the prediction says least."""
     if rows.empty:
-        return "tests with a stable or unstable label, two depths at each of three speeds, half of them held out"
+        return (
+            "tests with a stable or unstable label, two depths at each of three speeds, half of them held out"
+        )
     closest = rows.iloc[int(np.argmin(np.abs(rows["after"].to_numpy() - 0.5)))]
     return (
         f"a test beside run {closest['run']}, where the prediction is least sure "

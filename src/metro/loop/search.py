@@ -110,7 +110,7 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
         steps=tuple(steps),
         trials=tuple(trials.values()),
         rivals=tuple(rivals),
-        lines=tuple(rest.signature(current, least)),
+        lines=tuple(rest.signature(current, max(least, gates.model_form_budget))),
         not_visible={name: share for name, share in visible.items() if share < NOT_VISIBLE},
     )
 

@@ -60,9 +60,7 @@ def signature(fitted: Fit, least: float) -> list[Line]:
                 chosen = (block.axis == axis) & (labels == label)
                 places.setdefault((str(axis), str(label)), []).append(seen[:, chosen[: seen.shape[1]]])
     freedom = len(cut) + noise_room.PRIOR_RUNS
-    lines = [
-        _line(axis, label, parts, signal[axis], freedom) for (axis, label), parts in places.items()
-    ]
+    lines = [_line(axis, label, parts, signal[axis], freedom) for (axis, label), parts in places.items()]
     accepted = discoveries([line.p_value for line in lines], FALSE_DISCOVERY)
     return [
         replace(line, significant=bool(found) and line.ratio > LEAST_RATIO and line.relative > least)

@@ -177,7 +177,9 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
 
 def _bottom_edges(blocks: tuple[Block, ...]) -> tuple[str, ...]:
     """Coefficients of the bottom edges that the helical runs tell: one axial feed gives their sum alone."""
-    feeds = [block.setting.helix.axial_feed for block in blocks if block.role == "identify" and block.setting.helix]
+    feeds = [
+        block.setting.helix.axial_feed for block in blocks if block.role == "identify" and block.setting.helix
+    ]
     if not feeds:
         return ()
     return ("kfac", "kfae") if max(feeds) > LEAST_FEED_RATIO * min(feeds) else ("kfae",)
@@ -272,33 +274,38 @@ def _coordinates(middles: tuple[float, ...]) -> dict[str, np.ndarray]:
 
 
 def report(
-    _batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON, task: Problem, fit: BaseFit
+    _batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON, task: Problem, fit: BaseFit | None
 ) -> JSON:
     """Return coefficients by means and by waveform, and each run's spindle speed, for identified.json."""
     model = cast("ForceModel", task.base)
+    spindle = observed["spindle"]
+    runs = zip(spindle["run"], spindle["spindle_rpm"], spindle["spindle_rpm_sd"], strict=True)
+    block: JSON = {
+        "spindle_rpm": {run: quantity(speed, sd, "rpm") for run, speed, sd in runs},
+        "edge_length": "axial",
+    }
+    found: dict[str, JSON | Refusal] = {
+        "mean": mean_coefficients(model, task.role("identify"), spindle),
+        "mean_all_runs": mean_coefficients(model, task.blocks, spindle),
+        "waveform": _waveform(model, fit),
+    }
+    lacking = {name: value.reason for name, value in found.items() if isinstance(value, Refusal)}
+    if model.bottom_edges == ("kfae",):
+        lacking["kfac"] = (
+            "the helical runs have one axial feed: kfae holds the whole thrust of the bottom edges"
+        )
+    block |= {name: value for name, value in found.items() if not isinstance(value, Refusal)}
+    return {"force": {**block, "not_identified": lacking} if lacking else block}
+
+
+def _waveform(model: ForceModel, fit: BaseFit | None) -> JSON | Refusal:
+    if fit is None:
+        return Refusal("no run has the role identify")
     deviation = np.sqrt(np.diag(fit.covariance))
-    waveform = {
+    return {
         parameter.name: quantity(value / parameter.si, sd / parameter.si, parameter.unit, fit.dof)
         for parameter, value, sd in zip(model.parameters, fit.beta, deviation, strict=True)
     }
-    spindle = observed["spindle"]
-    speeds = {
-        run: quantity(speed, sd, "rpm")
-        for run, speed, sd in zip(
-            spindle["run"], spindle["spindle_rpm"], spindle["spindle_rpm_sd"], strict=True
-        )
-    }
-    block: JSON = {"waveform": waveform, "spindle_rpm": speeds, "edge_length": "axial"}
-    for name, blocks in (("mean", task.role("identify")), ("mean_all_runs", task.blocks)):
-        fitted = mean_coefficients(model, blocks, observed["spindle"])
-        if isinstance(fitted, Refusal):
-            block.setdefault("not_identified", {})[name] = fitted.reason
-        else:
-            block[name] = fitted
-    if model.bottom_edges == ("kfae",):
-        reason = "the helical runs of the fit have one axial feed: kfae holds the whole thrust of the bottom edges"
-        block.setdefault("not_identified", {})["kfac"] = reason
-    return {"force": block}
 
 
 def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.DataFrame) -> JSON | Refusal:

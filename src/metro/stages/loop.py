@@ -1,7 +1,8 @@
 """Loop: what the prediction leaves over, traced to effects of the library, and the error before and after.
 
-The observables are taken in order. Where effects were found in the cutting force, its coefficients are those refitted with them,
-and the observables that start from the coefficients are predicted anew: their error after includes what was found upstream.
+The observables are taken in order. Where effects were found in the cutting force, its coefficients are those
+refitted with them, and the observables that start from the coefficients are predicted anew: their error after
+includes what was found upstream.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class _Closing:
 
 
 def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
-    """Write ``comparison``, ``lobes_final`` and ``loop.json``, and the batch's ``verdict.json`` and ``identified.json``.
+    """Write ``comparison``, ``lobes_final``, ``loop.json``, and the batch's ``verdict.json``, ``identified.json``.
 
     ``settings``: ``model_form_budget``, ``materiality``, ``false_additions``, ``held_out_gain``, ``seed``.
     """

@@ -1,4 +1,4 @@
-"""What identify, predict and loop share: the observables of a batch, in order, and reading what identify wrote."""
+"""What identify, predict and loop share: the observables in their order, and what identify wrote."""
 
 from __future__ import annotations
 

@@ -1,0 +1,119 @@
+"""A tabulated machine: end stiffness at a few stations, and in between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from metro.units import Array
+
+SPLINE_STATIONS = 10  # from here on a spline through the stations; fewer carry no more than a plane
+MARGIN = 0.1  # how far beyond the stations' hull is still answered, as a share of their extent
+SPLINE = "thin-plate spline of log stiffness"
+PLANE = "linear polynomial of log stiffness, least squares"
+
+
+@dataclass(frozen=True, eq=False)
+class Stations:
+    """Where the end stiffness of a machine was tabulated.
+
+    Attributes
+    ----------
+    place : (n, 3) m, base frame.
+    stiffness : (n, 3) N/m along the axes of the base frame.
+    """
+
+    place: Array
+    stiffness: Array
+
+    @property
+    def extent(self) -> float:
+        """Largest distance between two stations, m."""
+        return float(np.linalg.norm(self.place[:, None] - self.place[None, :], axis=2).max())
+
+    @property
+    def method(self) -> str:
+        """How stiffness between the stations is had.
+
+        The thin-plate spline passes through every station. It wants stations enough to be worth it that do
+        not lie in one plane; fewer get a plane in log stiffness, level in directions they do not span.
+        """
+        offset = self.place - self.place.mean(axis=0)
+        solid = np.linalg.matrix_rank(offset, tol=1e-6 * max(self.extent, 1e-12)) == 3
+        return SPLINE if solid and len(self.place) >= SPLINE_STATIONS else PLANE
+
+
+@dataclass(frozen=True, eq=False)
+class EndStiffness:
+    """Stiffness (3,) N/m along base x, y, z at a place; ``beyond`` is how far outside the hull it lies, m."""
+
+    value: Array
+    method: str
+    beyond: float
+
+
+def stiffness_at(stations: Stations, place: Array) -> EndStiffness:
+    """Interpolate the end stiffness at ``place`` (3,), m, base frame.
+
+    The logarithm is what is interpolated: stiffness stays positive, and relative errors count alike
+    everywhere.
+
+    Raises
+    ------
+    ValueError
+        If the place lies beyond the convex hull of the stations by more than ``MARGIN`` of their extent.
+    """
+    beyond, allowed = beyond_hull(stations.place, place), MARGIN * stations.extent
+    if beyond > allowed + 1e-9:
+        raise ValueError(
+            f"({', '.join(f'{1e3 * x:.0f}' for x in place)}) mm lies {1e3 * beyond:.0f} mm beyond the stations, "
+            f"expected at most {1e3 * allowed:.0f} mm"
+        )
+    return EndStiffness(_interpolated(stations, place, stations.method), stations.method, beyond)
+
+
+def leave_one_out(stations: Stations) -> Array:
+    """Return the rms relative error, (3,), of each station's stiffness as told by all others.
+
+    Stations on the hull are extrapolated to, so this is no less than the error between stations. NaN for a
+    single station.
+    """
+    count = len(stations.place)
+    if count < 2:
+        return np.full(3, np.nan)
+    others = [np.arange(count) != i for i in range(count)]
+    told = [
+        _interpolated(
+            Stations(stations.place[rest], stations.stiffness[rest]), stations.place[i], stations.method
+        )
+        for i, rest in enumerate(others)
+    ]
+    return np.asarray(np.sqrt(np.mean((np.stack(told) / stations.stiffness - 1.0) ** 2, axis=0)))
+
+
+def beyond_hull(points: Array, place: Array) -> float:
+    """Distance of ``place`` (3,) from the convex hull of ``points`` (n, 3); zero inside.
+
+    The nearest point of the hull is the mix of points with weights of at least zero and sum one (non-negative
+    least squares, the sum as a row that weighs a thousand times more), whatever dimension they span.
+    """
+    from scipy.optimize import nnls
+
+    offset = points - place
+    heavy = 1e3 * max(float(np.abs(offset).max()), 1e-12)
+    weights, _ = nnls(np.vstack([offset.T, np.full(len(points), heavy)]), np.array([0.0, 0.0, 0.0, heavy]))
+    return float(np.linalg.norm(offset.T @ weights / weights.sum()))
+
+
+def _interpolated(stations: Stations, place: Array, method: str) -> Array:
+    """Stiffness (3,) at ``place`` by a method that the number and spread of the stations chose."""
+    from scipy.interpolate import RBFInterpolator
+
+    log = np.log(stations.stiffness)
+    if method == SPLINE:
+        spline = RBFInterpolator(stations.place, log, kernel="thin_plate_spline")
+        return np.asarray(np.exp(spline(place[None, :])[0]))
+    middle = stations.place.mean(axis=0)
+    gradient, *_ = np.linalg.lstsq(stations.place - middle, log - log.mean(axis=0), rcond=1e-6)
+    return np.asarray(np.exp(log.mean(axis=0) + (place - middle) @ gradient))

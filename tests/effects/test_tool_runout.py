@@ -1,0 +1,71 @@
+"""Runout in the force of an independent simulator: found where it is, not found where it is not."""
+
+import math
+
+import numpy as np
+import pytest
+
+from metro.batch.processed import read_batch, read_table
+from metro.cutting.cutter import Cutter
+from metro.cutting.law import EdgeLaw
+from metro.effects import library
+from metro.effects.tool_runout import EFFECT, apply
+from metro.loop.search import Gates, search
+from metro.loop.verdict import comparison, held_out, judge
+from metro.observables import force
+from metro.observables.force_model import ForceModel
+from metro.stages.ingest import ingest
+from virtual_cell.recipes.force import make
+
+GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
+RADIUS_UM, ANGLE_DEG = 9.0, 40.0
+
+
+def closed(tmp_path, effects, seed):
+    """Make a batch, and let the loop judge its force."""
+    make(tmp_path / "runout-test", effects, seed)
+    ingest(tmp_path / "runout-test", tmp_path, tmp_path / "out", {}, "test")
+    batch = read_batch(tmp_path / "out")
+    observed = force.observe(
+        batch, lambda name, run: read_table(tmp_path / "out" / f"{name}.parquet", run), {}
+    )
+    task = force.problem(batch, observed, {})
+    outcome = search(task, library("force"), GATES)
+    rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
+    return outcome, judge(task, outcome, rows, GATES), batch.manifest["tool"]["teeth"]
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_hidden_runout_is_found_with_its_radius_and_angle(tmp_path, seed):
+    hidden = {"tool_runout": {"radius_um": RADIUS_UM, "angle_deg": ANGLE_DEG}}
+    outcome, verdict, teeth = closed(tmp_path, hidden, seed)
+    assert "tool_runout" in outcome.names
+    found = next(entry for entry in verdict["effects"] if entry["effect"] == "tool_runout")["parameters"]
+    radius, angle = found["radius_um"], found["angle_deg"]
+    assert radius["value"] == pytest.approx(RADIUS_UM, rel=0.05)
+    pitch = 360.0 / teeth
+    off = (angle["value"] - ANGLE_DEG + pitch / 2) % pitch - pitch / 2
+    assert abs(off) < 3.0
+    assert verdict["after"]["rms"] < 0.3 * verdict["before"]["rms"]
+
+
+def test_no_runout_is_found_in_a_batch_without_it(tmp_path):
+    outcome, verdict, _ = closed(tmp_path, {}, 3)
+    assert "tool_runout" not in outcome.names
+    assert verdict["status"] == "clean"
+
+
+def test_applying_sets_the_cutters_offset_and_touches_nothing_else():
+    model = ForceModel(Cutter(6e-3, 0.5, (0.0, math.pi)), EdgeLaw())
+    changed = apply(model, {"radius_um": 7.0, "angle_deg": 90.0})
+    assert changed.cutter.runout_radius == pytest.approx(7e-6)
+    assert changed.cutter.runout_angle == pytest.approx(math.pi / 2)
+    assert changed.law == model.law
+    assert changed.cutter.radius == model.cutter.radius
+
+
+def test_starting_angles_go_round_the_whole_turn():
+    angle = next(parameter for parameter in EFFECT.parameters if parameter.name == "angle_deg")
+    gaps = np.diff([*angle.starts, angle.starts[0] + angle.period])
+    assert gaps.max() <= 45.0
+    assert angle.upper - angle.lower == angle.period

@@ -1,0 +1,160 @@
+"""The verdict: errors by run, statuses, and the entry of verdict.json as the contract has it."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+from toy import BEND, BETA, GATES, POINTS, RIPPLE, TWIN, Wave, problem
+
+from metro.loop.search import search
+from metro.loop.story import SENTENCES, in_words, told
+from metro.loop.verdict import COMPARISON, comparison, error, held_out, identified_fit, judge, run_dof
+
+STATUSES = {"clean", "explained", "partly_explained", "undetermined", "unexplained", "insufficient"}
+
+
+def number(value):
+    return isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value)
+
+
+def check_entry(entry):
+    """The entry of an observable in verdict.json, by the data contract."""
+    assert entry["status"] in STATUSES
+    assert isinstance(entry["unit"], str)
+    assert entry["noise_floor"] is None or entry["noise_floor"] >= 0
+    assert all(isinstance(run, str) for run in entry["held_out_runs"])
+    for column in ("before", "after"):
+        figures = entry[column]
+        if figures is not None:
+            assert set(figures) == {"rms", "nrmse", "ci95"}
+            assert number(figures["rms"])
+            assert number(figures["nrmse"])
+            assert figures["ci95"][0] <= figures["ci95"][1]
+    for effect in entry["effects"]:
+        assert isinstance(effect["effect"], str)
+        assert 0 <= effect["probability"] <= 1
+        for parameter in effect["parameters"].values():
+            assert number(parameter["value"])
+            assert len(parameter["ci95"]) == 2
+            assert isinstance(parameter["unit"], str)
+    for candidate in entry["candidates"]:
+        assert isinstance(candidate["effect"], str)
+        assert 0 <= candidate["probability"] <= 1
+        assert isinstance(candidate["why_not"], str)
+    assert all(len(pair) == 2 for pair in entry["indistinguishable"])
+    assert entry["next_experiment"] is None or isinstance(entry["next_experiment"], str)
+    left = entry["unexplained"]
+    assert left is None or ({"rms", "signature"} <= set(left) and left["signature"])
+    json.dumps(entry, allow_nan=False)
+
+
+def closed(task, library):
+    outcome = search(task, library, GATES)
+    rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
+    return outcome, rows, judge(task, outcome, rows, GATES)
+
+
+CASES = {
+    "clean": (problem(1), (BEND,)),
+    "explained": (problem(2, truth=Wave(bend=0.2)), (BEND, RIPPLE)),
+    "partly_explained": (problem(3, truth=Wave(bend=0.5, spike=0.2)), (BEND,)),
+    "undetermined": (problem(4, truth=Wave(bend=0.2)), (BEND, TWIN)),
+    "unexplained": (problem(5, truth=Wave(spike=0.3)), (BEND,)),
+    "insufficient": (problem(6, feeds=(2.0,), repeats=1), (BEND,)),
+}
+
+
+@pytest.mark.parametrize("status", CASES)
+def test_every_status_has_an_entry_by_the_contract_and_a_sentence(status):
+    task, library = CASES[status]
+    outcome, _, verdict = closed(task, library)
+    assert verdict["status"] == status
+    check_entry(verdict)
+    assert verdict["held_out_runs"] == [block.run for block in task.role("validate")]
+    assert in_words(verdict).startswith(SENTENCES[status].split("{")[0])
+    json.dumps(told(task, outcome, verdict, GATES), allow_nan=False)
+
+
+def test_without_held_out_runs_nothing_is_claimed():
+    task = problem(7, held=())
+    _, rows, verdict = closed(task, ())
+    assert len(rows) == 0
+    assert verdict["status"] == "insufficient"
+    assert verdict["before"] is None
+    check_entry(verdict)
+
+
+def test_error_is_the_rms_and_its_interval_a_bootstrap_over_runs():
+    rng = np.random.default_rng(1)
+    size = np.repeat([1.0, 1.0, 4.0], 50)
+    rows = pd.DataFrame({"run": np.repeat(["a", "b", "c"], 50), "measured": 10 + size, "before": 10.0})
+    found = error(rows, "before", seed=1)
+    assert found["rms"] == pytest.approx(np.sqrt(6.0))
+    assert found["nrmse"] == pytest.approx(np.sqrt(6.0) / np.sqrt(np.mean(rows["measured"] ** 2)))
+    # Three runs: the mean square of a bootstrap draw of them, by enumeration of what is drawn.
+    draws = np.sqrt(rng.choice([1.0, 1.0, 16.0], size=(20000, 3)).mean(axis=1))
+    assert found["ci95"] == pytest.approx(np.quantile(draws, [0.025, 0.975]), rel=1e-6)
+    two = rows[rows["run"] != "a"]  # the middle of three equally likely draws of two runs lies inside
+    assert error(two, "before", seed=1)["ci95"] == pytest.approx([1.0, 4.0])
+    many = pd.concat([rows] * 20)
+    assert error(many, "before", seed=1)["ci95"] == pytest.approx(found["ci95"])
+
+
+def test_comparison_has_the_columns_of_the_contract_in_their_order():
+    task, _ = CASES["explained"]
+    outcome, rows, _ = closed(task, (BEND,))
+    assert tuple(rows.columns) == COMPARISON
+    assert len(rows) == 2 * POINTS
+    held = task.role("validate")[0]
+    own = rows[rows["run"] == held.run]
+    assert own["measured"].to_numpy() == pytest.approx(held.measured)
+    assert own["angle_deg"].to_numpy() == pytest.approx(np.arange(POINTS) * 360 / POINTS)
+    assert own["x_mm"].isna().all()
+    assert (own["observable"] == "toy").all()
+    assert (own["sigma"] > 0).all()
+    before = comparison(task, held_out(task, outcome.base))
+    assert before["after"].isna().all()
+    assert before["before"].to_numpy() == pytest.approx(rows["before"].to_numpy())
+
+
+def test_the_comparison_is_in_the_problems_unit():
+    task = problem(8)
+    outcome = search(task, (), GATES)
+    rows = comparison(task, held_out(task, outcome.base))
+    milli = replace(task, unit="mN", si=1e-3)
+    scaled = comparison(milli, held_out(milli, outcome.base))
+    for column in ("measured", "before", "sigma"):
+        assert scaled[column].to_numpy() == pytest.approx(1e3 * rows[column].to_numpy())
+
+
+def test_of_a_right_model_the_rest_is_as_large_as_sigma_says():
+    z = []
+    for seed in range(25):
+        task = problem(200 + seed)
+        rows = comparison(task, held_out(task, search(task, (), GATES).base))
+        z += ((rows["measured"] - rows["before"]) / rows["sigma"]).tolist()
+    assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.2)
+
+
+def test_intervals_count_runs_not_samples_and_keep_within_bounds():
+    task, library = CASES["explained"]
+    outcome, _, verdict = closed(task, library)
+    entry = verdict["effects"][0]["parameters"]["bend"]
+    sd = np.sqrt(outcome.final.covariance[2, 2] * outcome.final.dispersion)
+    assert run_dof(outcome.final) == 11
+    assert entry["ci95"][1] - entry["value"] == pytest.approx(stats.t.ppf(0.975, 11) * sd)
+    tight = replace(BEND, parameters=(replace(BEND.parameters[0], upper=0.2),))
+    bounded = closed(task, (tight,))[2]["effects"][0]["parameters"]["bend"]
+    assert bounded["ci95"][1] <= 0.2
+
+
+def test_the_identified_fit_hands_over_the_base_parameters_and_every_runs_phase():
+    task = problem(9)
+    outcome = search(task, (), GATES)
+    found = identified_fit(task, outcome.base)
+    assert found.beta == pytest.approx(BETA, rel=0.03)
+    assert found.covariance.shape == (2, 2)
+    assert set(found.nuisance) == {block.run for block in task.blocks}

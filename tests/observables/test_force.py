@@ -1,0 +1,222 @@
+"""Cutting force: identified coefficients and the closed loop, on real, simulated and drawn data."""
+
+import math
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from metro.batch.processed import read_batch, read_table
+from metro.cutting.cutter import Cutter, evenly_pitched
+from metro.cutting.engagement import Engagement
+from metro.cutting.force import COEFFICIENTS, Cut
+from metro.cutting.law import EdgeLaw
+from metro.effects import library
+from metro.loop.candidate import Candidate
+from metro.loop.fit import fit
+from metro.loop.noise import first_noise
+from metro.loop.search import Gates, search
+from metro.loop.verdict import comparison, held_out, identified_fit, judge
+from metro.observables import force
+from metro.observables.force_model import ForceModel, ForceSetting
+from metro.observables.problem import Block, Problem
+from metro.observables.quantity import quantity
+from metro.signals.orders import order_matrix
+from metro.stages.ingest import ingest
+
+ROOT = Path(__file__).parents[2]
+REAL = Path(os.environ.get("METRO_REAL_DATA", ROOT / "../shared/real")) / "batches"
+real = pytest.mark.skipif(not REAL.is_dir(), reason="the real data (METRO_REAL_DATA) are not there")
+GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
+PUBLISHED = {"ktc": 958.86, "krc": 250.86, "kac": 146.36, "kte": 15.758, "kre": 19.434, "kae": 18.208}
+
+
+class Observed:
+    """A batch as the stages see it, up to its force problem."""
+
+    def __init__(self, folder, out):
+        ingest(folder, ROOT / "config" / "cells", out, {}, "test")
+        self.batch = read_batch(out)
+        self.observed = force.observe(
+            self.batch, lambda name, run: read_table(out / f"{name}.parquet", run), {}
+        )
+        self.task = force.problem(self.batch, self.observed, {})
+
+    def identified(self):
+        blocks = self.task.role("identify")
+        base = fit(Candidate(self.task.base), blocks, first_noise(0.007, self.task.scatter, blocks))
+        return force.report(self.batch, self.observed, {}, self.task, identified_fit(self.task, base))[
+            "force"
+        ]
+
+    def closed(self):
+        outcome = search(self.task, library("force"), GATES)
+        rows = comparison(self.task, held_out(self.task, outcome.base), held_out(self.task, outcome.final))
+        return outcome, rows, judge(self.task, outcome, rows, GATES)
+
+
+@pytest.fixture(scope="module")
+def slotting(tmp_path_factory):
+    return Observed(REAL / "slotting-d25", tmp_path_factory.mktemp("slotting") / "out")
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory):
+    return Observed(ROOT / "data" / "raw" / "clean-slot", tmp_path_factory.mktemp("clean") / "out")
+
+
+@real
+@pytest.mark.xdist_group("slotting")
+def test_mean_forces_of_all_five_feeds_give_the_published_coefficients(slotting):
+    found = slotting.identified()["mean_all_runs"]
+    assert {name: entry["value"] for name, entry in found.items()} == pytest.approx(PUBLISHED, rel=1e-3)
+
+
+@real
+@pytest.mark.xdist_group("slotting")
+def test_told_nothing_the_loop_finds_runout_in_the_real_slots_and_predicts_a_feed_better(slotting):
+    outcome, rows, _ = slotting.closed()
+    assert "tool_runout" in outcome.names
+    feed = slotting.batch.runs["feed_per_tooth_mm"]
+    held = rows[rows["run"].isin(feed.index[np.isclose(feed, 0.075)])]
+    before, after = (
+        np.sqrt(np.mean((held["measured"] - held[column]) ** 2)) for column in ("before", "after")
+    )
+    assert len(held) > 0
+    assert after < 0.95 * before
+
+
+@pytest.mark.xdist_group("clean")
+def test_all_six_coefficients_of_the_clean_batch_lie_within_their_intervals(clean):
+    truth = {"ktc": 842.0, "krc": 317.0, "kac": 176.0, "kte": 14.2, "kre": 17.8, "kae": 3.9}
+    found = clean.identified()
+    for name, value in truth.items():
+        low, high = found["waveform"][name]["ci95"]
+        assert low < value < high, name
+        assert found["mean"][name]["value"] == pytest.approx(value, rel=0.06)
+    assert all(
+        entry["unit"] == ("N/mm2" if name.endswith("c") else "N/mm")
+        for name, entry in found["waveform"].items()
+    )
+
+
+@pytest.mark.xdist_group("clean")
+def test_nothing_is_added_to_the_clean_batch(clean):
+    outcome, _, verdict = clean.closed()
+    assert outcome.names == ()
+    assert verdict["status"] == "clean"
+    assert verdict["before"] == verdict["after"]
+
+
+@pytest.mark.xdist_group("clean")
+def test_the_comparison_is_the_revolution_average_of_the_record(clean):
+    rows = comparison(clean.task, held_out(clean.task, fit_of(clean)))
+    block = clean.task.role("validate")[0]
+    own = rows[(rows["run"] == block.run) & (rows["axis"] == "y")]
+    assert own.groupby("t_s")["angle_deg"].nunique().min() >= 120
+    highest = block.setting.highest
+    y = block.measured.reshape(block.repeats, 3, -1)[0, 1]
+    wave = order_matrix(2 * math.pi * np.arange(120) / 120, highest) @ y
+    assert own["measured"].to_numpy()[:120] == pytest.approx(wave)
+    spindle = clean.observed["spindle"].set_index("run")
+    assert wave.mean() == pytest.approx(spindle.loc[block.run, "mean_y_n"], rel=0.02)
+
+
+def fit_of(observed):
+    blocks = observed.task.role("identify")
+    return fit(Candidate(observed.task.base), blocks, first_noise(0.007, observed.task.scatter, blocks))
+
+
+def test_helical_runs_give_their_coefficients_once_the_runout_is_known(tmp_path):
+    out = tmp_path / "out"
+    helical = Observed(ROOT / "data" / "raw" / "trimule-helical", out)
+    radius, angle = search(helical.task, library("force"), GATES).final.theta
+    manifest = helical.batch.manifest | {"known": {"tool_runout": {"radius_um": radius, "angle_deg": angle}}}
+    batch = replace(helical.batch, manifest=manifest)
+    task = force.problem(batch, helical.observed, {})
+    blocks = task.role("identify")
+    found = fit(Candidate(task.base), blocks, first_noise(0.007, task.scatter, blocks))
+    truth = np.array([10145.0, 11036.5, 5000.0, 591.92, 100.03, 214.32])
+    value = found.beta / [parameter.si for parameter in task.base.parameters]
+    assert value[:3] == pytest.approx(truth[:3], rel=0.03)
+    assert value[3] == pytest.approx(truth[3], rel=0.05)
+    assert [parameter.name for parameter in task.base.parameters][6:] == ["kfac", "kfae"]
+    # Two records of one hole begin anywhere on the orbit: ψ₀ is found so that the prediction holds.
+    helices = [block for block in blocks if block.setting.helix is not None]
+    for block in helices:
+        rest = block.measured - found.predict(block)
+        assert np.linalg.norm(rest) < 0.05 * np.linalg.norm(block.measured)
+        turned = found.nuisance[block.run] + np.array([0.0, 0.5])
+        wrong = block.measured - task.base.design(block, turned)[0] @ found.beta
+        assert np.linalg.norm(wrong) > 5 * np.linalg.norm(rest)
+
+
+TOOL = Cutter(6e-3, math.radians(30), evenly_pitched(2))
+BETA = np.array([842e6, 317e6, 176e6, 14.2e3, 17.8e3, 3.9e3])
+
+
+def drawn(seed, highest=8, scatter=0.01, budget=0.005):
+    """A force problem drawn from its own model: coefficients scattered by run, one model-form error."""
+    rng = np.random.default_rng(seed)
+    model, blocks = ForceModel(TOOL, EdgeLaw()), []
+    elements = 2 * highest + 1
+    axis = np.repeat(["x", "y", "z"], elements)
+    mean = np.tile(np.arange(elements) == 0, 3)
+    form = rng.normal(size=3 * elements)  # what the model gets wrong is alike in all conditions
+    for i, feed in enumerate((0.04e-3, 0.07e-3, 0.1e-3, 0.13e-3) * 2):
+        setting = ForceSetting(Cut(feed, 2e-3, Engagement(0.0, math.pi)), 0.0, highest, (0.5,), 0.0)
+        blank = Block(
+            run=f"r{i}",
+            condition=f"{feed:g}",
+            role="identify",
+            order=i,
+            measured=np.zeros(3 * elements),
+            sigma=np.full(3 * elements, 0.3),
+            setting=setting,
+            axis=axis,
+            zeros=np.stack([(axis == name) & mean for name in "xyz"], axis=1).astype(float),
+            zero_sd=np.full(3, 0.3),
+            coordinates={},
+            symmetries=np.array(TOOL.tooth_angles)[:, None],
+        )
+        matrix, _ = model.design(blank, rng.uniform(0, 2 * math.pi, 1))
+        clean = matrix @ (BETA * (1 + scatter * rng.normal(size=6)))
+        rms = np.sqrt(np.mean(clean.reshape(3, -1) ** 2, axis=1))[np.repeat([0, 1, 2], elements)]
+        measured = clean + budget * rms * form + 0.3 * rng.normal(size=3 * elements)
+        measured += blank.zeros @ (0.3 * rng.normal(size=3))
+        blocks.append(replace(blank, measured=measured))
+    return Problem("force", "N", 1.0, model, tuple(blocks), np.full(6, 0.01))
+
+
+def test_intervals_of_the_coefficients_cover_the_truth_and_are_not_needlessly_wide():
+    inside, error, told = [], [], []
+    for seed in range(40):
+        task = drawn(seed)
+        prior = first_noise(0.005, task.scatter, task.blocks)
+        found = identified_fit(task, fit(Candidate(task.base), task.blocks, prior))
+        sd = np.sqrt(np.diag(found.covariance))
+        for value, own, truth in zip(found.beta, sd, BETA, strict=True):
+            low, high = quantity(value, own, "N/m2", found.dof)["ci95"]
+            inside.append(low < truth < high)
+        error.append(found.beta / BETA - 1)
+        told.append(sd / BETA)
+    assert np.mean(inside) >= 0.88
+    # The declared budget may be the same error in all conditions, so they are a little wide, not more.
+    assert np.mean(told) < 2.5 * np.sqrt(np.mean(np.square(error)))
+
+
+def test_mean_forces_of_one_feed_cannot_part_shear_from_edge(clean):
+    blocks = [block for block in clean.task.role("identify") if block.condition == "slot-0.06"]
+    refused = force.mean_coefficients(clean.task.base, tuple(blocks), clean.observed["spindle"])
+    assert "second feed" in refused.reason
+
+
+def test_a_batch_without_records_says_so(clean):
+    batch = replace(clean.batch, runs=clean.batch.runs.assign(dynamometer=""))
+    assert "dynamometer" in force.observe(batch, None, {}).reason
+
+
+def test_coefficients_come_in_the_contracts_order():
+    assert tuple(parameter.name for parameter in ForceModel(TOOL, EdgeLaw()).parameters) == COEFFICIENTS

@@ -1,0 +1,131 @@
+"""Order tracking against signals made from known orders and speeds."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from metro.signals.orders import (
+    advance,
+    highest_order,
+    order_averages,
+    order_matrix,
+    spindle_speed,
+    to_orders,
+)
+
+seeds = st.integers(0, 10_000)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 12), seeds)
+def test_a_waveform_goes_to_orders_and_back(highest, seed):
+    value = np.random.default_rng(seed).normal(size=(2 * highest + 1, 3))
+    angle = 2 * math.pi * np.arange(64) / 64
+    assert to_orders(order_matrix(angle, highest) @ value, highest) == pytest.approx(value, abs=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 12), seeds)
+def test_squares_of_the_coefficients_sum_to_the_mean_square(highest, seed):
+    value = np.random.default_rng(seed).normal(size=2 * highest + 1)
+    wave = order_matrix(2 * math.pi * np.arange(100) / 100, highest) @ value
+    assert np.mean(wave**2) == pytest.approx(np.sum(value**2))
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 12), st.floats(-10.0, 10.0), seeds)
+def test_advancing_the_coefficients_turns_the_waveform(highest, turn, seed):
+    value = np.random.default_rng(seed).normal(size=(2 * highest + 1, 2))
+    angle = np.linspace(0.0, 6.0, 17)
+    turned = order_matrix(angle, highest) @ advance(value, turn)
+    assert turned == pytest.approx(order_matrix(angle + turn, highest) @ value, abs=1e-10)
+
+
+def test_highest_order_keeps_six_tooth_passings_below_the_limit_of_sampling():
+    assert highest_order(1e5, 100.0, 2) == 24
+    assert highest_order(1e5, 100.0, 6) == 36
+    assert highest_order(1e5, 100.0, 12) == 48
+    assert highest_order(2000.0, 100.0, 4) == 8
+
+
+def record(speed, orders, rng, *, seconds=1.5, rate=5000.0, noise=1.0):
+    """Two channels with the given orders of a speed in revolutions per second."""
+    time = 3.0 + np.arange(int(seconds * rate)) / rate
+    angle = 2 * math.pi * speed * time
+    signal = sum(
+        np.outer(np.cos(order * angle + rng.uniform(0, 6.28)), [4.0, 2.0]) / (1 + 0.1 * order)
+        for order in orders
+    )
+    return time, 20.0 + signal + noise * rng.normal(size=(len(time), 2))
+
+
+@pytest.mark.parametrize("orders", [range(1, 13), (3, 6, 9, 12)])
+@pytest.mark.parametrize("off", [-0.005, 0.0013, 0.005])
+def test_the_true_speed_is_found_from_the_force_alone(orders, off):
+    nominal, rng = 50.0, np.random.default_rng(4)
+    time, signal = record(nominal * (1 + off), orders, rng)
+    speed, _ = spindle_speed(time, signal, nominal, 18)
+    assert speed == pytest.approx(nominal * (1 + off), rel=1e-5)
+
+
+def test_the_standard_deviation_of_the_speed_covers_its_error():
+    z = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        time, signal = record(50.1, (3, 6), rng, noise=6.0)
+        speed, sd = spindle_speed(time, signal, 50.0, 9)
+        z.append((speed - 50.1) / sd)
+    assert np.mean(np.abs(z) < 2.0) >= 0.85
+    assert np.sqrt(np.mean(np.square(z))) > 0.2  # and is not needlessly wide
+
+
+def test_a_short_record_has_a_speed_without_an_error():
+    time, signal = record(50.0, (1, 2), np.random.default_rng(1), seconds=0.3)
+    assert math.isnan(spindle_speed(time, signal, 50.0, 4)[1])
+
+
+def test_order_averages_return_the_injected_coefficients_within_their_errors():
+    value = np.random.default_rng(2).normal(size=(9, 2))
+    z = []
+    for seed in range(25):
+        rng = np.random.default_rng(seed)
+        time = np.arange(10000) / 5000.0
+        angle = 2 * math.pi * 50.0 * time + 0.3
+        signal = order_matrix(angle, 4) @ value + 3.0 * rng.normal(size=(10000, 2))
+        (average,) = order_averages(time, angle, signal, 4, 1)
+        z.append((average.value - value.T) / np.sqrt(average.variance))
+        assert np.median(average.variance) == pytest.approx(9.0 / 10000, rel=0.4)
+    assert np.mean(np.abs(z) < 1.96) == pytest.approx(0.95, abs=0.03)
+    assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.1)
+
+
+def test_time_blocks_see_a_drift_that_is_not_counted_as_noise():
+    rng = np.random.default_rng(3)
+    time = np.arange(20000) / 5000.0
+    angle = 2 * math.pi * 50.0 * time
+    signal = (5.0 + 2.0 * np.round(time / 4.0 * 4 - 0.5))[:, None] + 0.5 * rng.normal(size=(20000, 1))
+    averages = order_averages(time, angle, signal, 3, 4)
+    assert [average.middle for average in averages] == pytest.approx([0.5, 1.5, 2.5, 3.5], abs=1e-3)
+    assert [average.value[0, 0] for average in averages] == pytest.approx([5.0, 7.0, 9.0, 11.0], abs=0.05)
+    assert averages[0].variance[0, 0] < 4 * 0.25 / 5000
+
+
+def test_a_short_record_is_not_cut_into_blocks():
+    time = np.arange(2000) / 5000.0
+    angle = 2 * math.pi * 50.0 * time  # 20 revolutions: room for one block of four segments
+    assert len(order_averages(time, angle, np.cos(angle)[:, None], 2, 4)) == 1
+
+
+def test_one_wild_order_is_drawn_towards_its_neighbours_but_not_lost():
+    rng = np.random.default_rng(6)
+    time = np.arange(10000) / 5000.0
+    angle = 2 * math.pi * 50.0 * time
+    loud = np.cos(3 * angle) * np.repeat(rng.normal(size=25), 400)  # changes from segment to segment
+    (average,) = order_averages(time, angle, (loud + 0.1 * rng.normal(size=10000))[:, None], 12, 1)
+    own, others = average.variance[0, 5], np.median(average.variance)
+    true = np.var(np.repeat(rng.normal(size=25), 400)) * 0.5 / 25
+    assert others < 0.1 * own
+    assert own == pytest.approx(true, rel=1.5)
