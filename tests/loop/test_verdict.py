@@ -1,5 +1,6 @@
 """The verdict: errors by run, statuses, and the entry of verdict.json as the contract has it."""
 
+import itertools
 import json
 from dataclasses import replace
 
@@ -88,17 +89,19 @@ def test_without_held_out_runs_nothing_is_claimed():
 
 
 def test_error_is_the_rms_and_its_interval_a_bootstrap_over_runs():
-    rng = np.random.default_rng(1)
-    size = np.repeat([1.0, 1.0, 4.0], 50)
-    rows = pd.DataFrame({"run": np.repeat(["a", "b", "c"], 50), "measured": 10 + size, "before": 10.0})
+    size = np.array([1.0, 2.0, 3.0, 4.0, 9.0])
+    rows = pd.DataFrame(
+        {"run": np.repeat(list("abcde"), 50), "measured": 10 + np.repeat(size, 50), "before": 10.0}
+    )
     found = error(rows, "before", seed=1)
-    assert found["rms"] == pytest.approx(np.sqrt(6.0))
-    assert found["nrmse"] == pytest.approx(np.sqrt(6.0) / np.sqrt(np.mean(rows["measured"] ** 2)))
-    # Three runs: the mean square of a bootstrap draw of them, by enumeration of what is drawn.
-    draws = np.sqrt(rng.choice([1.0, 1.0, 16.0], size=(20000, 3)).mean(axis=1))
-    assert found["ci95"] == pytest.approx(np.quantile(draws, [0.025, 0.975]), rel=1e-6)
-    two = rows[rows["run"] != "a"]  # the middle of three equally likely draws of two runs lies inside
-    assert error(two, "before", seed=1)["ci95"] == pytest.approx([1.0, 4.0])
+    rms = np.sqrt(np.mean(size**2))
+    assert found["rms"] == pytest.approx(rms)
+    assert found["nrmse"] == pytest.approx(rms / np.sqrt(np.mean(rows["measured"] ** 2)))
+    # Every draw of five runs from five, one as likely as the other.
+    draws = np.sqrt([np.mean(np.square(draw)) for draw in itertools.product(size, repeat=5)])
+    low, high = found["ci95"]
+    assert 0.01 < np.mean(draws < low) < 0.04
+    assert 0.01 < np.mean(draws > high) < 0.04
     many = pd.concat([rows] * 20)
     assert error(many, "before", seed=1)["ci95"] == pytest.approx(found["ci95"])
 

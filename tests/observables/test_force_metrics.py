@@ -23,8 +23,9 @@ def waveform(shift=0.0, heights=(1.0,)):
 
 def rows(measured, before, after=None, sigma=1.0):
     """Comparison rows of one run and axis; measured as (blocks, angles)."""
+    after = before if after is None else after
     parts = [
-        pd.DataFrame({"angle_deg": ANGLE, "measured": block, "before": before, "after": before if after is None else after})
+        pd.DataFrame({"angle_deg": ANGLE, "measured": block, "before": before, "after": after})
         .assign(run="r1", axis="x", t_s=0.5 * i, sigma=sigma, unit="N")
         for i, block in enumerate(np.atleast_2d(measured))
     ]  # fmt: skip

@@ -54,9 +54,17 @@ def test_a_file_name_that_snakemake_cannot_handle_is_named(checkout):
 
 
 def test_a_stage_refuses_to_run_code_other_than_planned(checkout):
-    folders = ["--processed", "data/processed/alpha", "--reports", "reports/alpha"]
     done = subprocess.run(
-        [*checkout.metro, "predict", *folders, "--settings", "{}", "--code", "0" * 64],
+        [
+            *checkout.metro,
+            "predict",
+            "--processed",
+            "data/processed/alpha",
+            "--settings",
+            "{}",
+            "--code",
+            "0" * 64,
+        ],
         cwd=checkout.folder,
         env=checkout.environment,
         capture_output=True,

@@ -42,6 +42,19 @@ MODES = {
     )
     for direction, rows in _TABLE_6.items()
 }
+# table 5, position: x, y, z (mm). The source draws the end stiffness without numbers, so that of this
+# simulated machine is made up (kx, ky, kz in N/um) after what is said of it: y by far the stiffest, all less towards
+# the border. Along x and z the first position has the static stiffness of the modes above. The cuts of this
+# batch are those of a rigid tool.
+_STATIONS = {
+    "1": ((0, 0, 0), (0.93, 31.0, 9.3)),
+    "2": ((0, 0, -320), (0.84, 27.5, 8.1)),
+    "3": ((0, 200, -320), (0.75, 24.0, 7.2)),
+    "4": ((-200, 0, -320), (0.79, 26.0, 7.7)),
+    "5": ((-400, 0, -320), (0.68, 22.0, 6.6)),
+    "6": ((-200, 0, 50), (0.87, 29.0, 8.7)),
+    "7": ((0, 200, 0), (0.82, 27.0, 8.2)),
+}
 _CHATTER_FEED_MM = 0.02
 _CHATTER_RPM = (1000.0, 1250.0, 1500.0, 1750.0, 2000.0, 2250.0, 2500.0)
 _CHATTER_DEPTHS_MM = (0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.1, 0.12, 0.15, 0.2)
@@ -85,7 +98,8 @@ def make(folder: Path) -> Row:
     rows += _chatter_tests(len(rows))
     write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
     write_csv(folder / "impacts.csv", _impacts(folder, rng))
-    write_yaml(folder / "cell.yaml", {"cell": "trimule"})
+    write_yaml(folder / "cell.yaml", {"cell": "trimule", "stations": "stations.csv"})
+    write_csv(folder / "stations.csv", _stations())
     write_yaml(folder / "batch.yaml", _manifest(folder.name))
     return {
         "batch": folder.name,
@@ -135,6 +149,15 @@ def _chatter_tests(before: int) -> list[Row]:
             if not good:
                 break
     return rows
+
+
+def _stations() -> list[Row]:
+    """Return simulated end stiffness at the published positions."""
+    columns = ("x_mm", "y_mm", "z_mm", "kx_n_um", "ky_n_um", "kz_n_um")
+    return [
+        {"position": name, **dict(zip(columns, (*place, *stiffness), strict=True))}
+        for name, (place, stiffness) in _STATIONS.items()
+    ]
 
 
 def _impacts(folder: Path, rng: np.random.Generator) -> list[Row]:

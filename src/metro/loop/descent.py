@@ -175,7 +175,7 @@ def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, 
 
 
 def inverse(normal: Array) -> Array:
-    """Invert a normal matrix; a parameter that it says nothing of has an infinite variance, not a small one."""
+    """Invert a normal matrix; a parameter that it says nothing of has an infinite variance."""
     scaled, scale = _scaled(normal)
     size, direction = np.linalg.eigh(scaled)
     seen = size > UNSEEN * size.max(initial=0.0)

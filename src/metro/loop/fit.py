@@ -169,8 +169,8 @@ def _refined(
 def _covariance(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> Array:
     """Covariance of base and effect parameters, (p + q, p + q).
 
-    The base parameters scatter from run to run, and the runs average that out. What the model gets wrong where
-    an effect shows may be the same in all runs: the variances of the effect parameters allow for that.
+    The base parameters scatter from run to run, and the runs average that out. What the model gets wrong
+    where an effect shows may be the same in all runs: the variances of the effect parameters allow for that.
     """
     alone, alike = (
         inverse(normal_equations(linearised(candidate, blocks, kind, state))[0])

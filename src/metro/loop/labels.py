@@ -49,9 +49,10 @@ def judge_labels(
 
     Parameters
     ----------
-    rows : comparison rows of the held-out tests; ``after`` is predicted with the coefficients as they are when the
-        effects found in the cutting force are known.
-    upstream : those effects. They are what explains the labels where the prediction contradicts these without them only.
+    rows : comparison rows of the held-out tests; ``after`` is predicted with the coefficients as they are
+        when the effects found in the cutting force are known.
+    upstream : those effects. They are what explains the labels where the prediction contradicts these without
+        them only.
     """
     label = rows["measured"].to_numpy(float)
     before, after = rows["before"].to_numpy(float), rows["after"].to_numpy(float)
@@ -106,9 +107,9 @@ def _status(tests: int, contradicted: bool, explained: bool) -> str:
 
 def _noise_words(tests: int, before: float, after: float) -> str:
     return (
-        f"{tests} held-out tests; labels drawn from the predicted probabilities would be as unlikely as those measured "
-        f"with probability {before:.2g} for the base model and {after:.2g} with the coefficients refitted with the "
-        "effects found in the cutting force."
+        f"{tests} held-out tests; labels drawn from the predicted probabilities would be as unlikely as "
+        f"those measured with probability {before:.2g} for the base model and {after:.2g} with the "
+        "coefficients refitted with the effects found in the cutting force."
     )
 
 

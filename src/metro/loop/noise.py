@@ -176,5 +176,5 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
 def _amplitude(directions: Array, residual: Array, variance: Array) -> tuple[Array, Array]:
     """Return the expected amplitude of each shared direction (k,), and the covariance of that."""
     scaled = directions / np.sqrt(variance)[:, None]
-    covariance = np.linalg.inv(np.eye(scaled.shape[1]) + scaled.T @ scaled)
+    covariance = np.asarray(np.linalg.inv(np.eye(scaled.shape[1]) + scaled.T @ scaled), dtype=float)
     return covariance @ (scaled.T @ (residual / np.sqrt(variance))), covariance

@@ -71,7 +71,8 @@ def signature(fitted: Fit, least: float) -> list[Line]:
 def _seen_and_expected(fitted: Fit, block: Block) -> Array:
     """Rest of a block averaged over its repeats, squared, and what is expected of it, (3, n / repeats).
 
-    The last row is the part of the expectation that the whole run shares: it does not average out over the repeats.
+    The last row is the part of the expectation that the whole run shares: it does not average out over the
+    repeats.
     """
     strict = replace(fitted.noise, misfit={})
     matrix, offset = fitted.candidate.model(fitted.theta).design(block, fitted.nuisance[block.run])

@@ -50,7 +50,8 @@ def _noise(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> J
     words = (
         f"From run to run the base parameters scatter by {scatter:.2g} % (from repeats, drawn towards "
         f"{100 * float(np.mean(problem.scatter)) if len(problem.scatter) else 0:.2g} %); differences below "
-        f"{100 * gates.model_form_budget:.2g} % of the signal are the declared model-form budget and nobody's effect."
+        f"{100 * gates.model_form_budget:.2g} % of the signal are the declared model-form budget "
+        "and nobody's effect."
     )
     if problem.systematic:
         words += (

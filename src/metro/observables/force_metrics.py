@@ -42,8 +42,8 @@ def metrics(rows: pd.DataFrame, teeth: int) -> pd.DataFrame:
 
     - ``nrmse``: rms of the difference over rms of the measured, %.
     - ``peak``: error of the largest magnitude over the revolution. ``mean``: error of the mean.
-    - ``phase``: how much later than predicted the measured force comes, degrees of spindle angle, modulo the pitch.
-    - ``tooth_peak``: error of the largest magnitude within each pitch, teeth numbered in the order of passing.
+    - ``phase``: how much later than predicted the force comes, degrees of spindle angle, modulo the pitch.
+    - ``tooth_peak``: error of the largest magnitude within each pitch, teeth numbered as they pass.
 
     Raises
     ------
@@ -127,9 +127,8 @@ def _figures(
     found.append(_error("mean", measured.mean(axis=1), predicted.mean(axis=1), sigma))
     sectors = tooth_sectors(measured, teeth)
     for tooth in range(teeth):
-        inside = sectors == tooth
-        peaks = [np.abs(waveforms[:, inside]).max(axis=1) for waveforms in (measured, predicted)]
-        found.append({**_error("tooth_peak", *peaks, sigma), "tooth": tooth + 1})
+        real, modelled = (np.abs(w[:, sectors == tooth]).max(axis=1) for w in (measured, predicted))
+        found.append({**_error("tooth_peak", real, modelled, sigma), "tooth": tooth + 1})
     return [{"tooth": 0, "unit": force, **figure} for figure in found]
 
 
@@ -174,7 +173,7 @@ def phase_shift(measured: Array, predicted: Array, teeth: int) -> float:
     Returns
     -------
     Degrees by which the measured waveform comes later; NaN where one of them is constant. The correlation is
-    interpolated band-limited, and a parabola through its highest point and the two beside it refines the peak.
+    interpolated band-limited; a parabola through its highest point and the two beside it refines the peak.
     """
     count = len(measured)
     cross = np.fft.rfft(measured) * np.conj(np.fft.rfft(predicted))
@@ -206,7 +205,7 @@ def tooth_sectors(measured: Array, teeth: int) -> Array:
     place = np.minimum(((phase % 1.0) * bins + 1e-9).astype(int), bins - 1)
     magnitude = np.bincount(place, np.abs(measured).mean(axis=0), bins) / np.bincount(place, minlength=bins)
     start = int(np.argmin(magnitude)) / bins
-    return np.floor(phase - start + 1e-9).astype(int) % teeth
+    return np.asarray(np.floor(phase - start + 1e-9).astype(int) % teeth)
 
 
 def _rms(values: Array) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from metro.cutting.cutter import Cutter
 from metro.cutting.force import COEFFICIENTS, Cut, force_basis
+from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped, turned
 from metro.cutting.law import EdgeLaw
 from metro.observables.problem import Block, Parameter
 from metro.signals.orders import advance, to_orders
@@ -17,23 +18,6 @@ from metro.units import N_MM, N_MM2, Array
 
 PHASES_PER_PITCH = 12
 ORBIT_PHASES = 12
-
-
-@dataclass(frozen=True)
-class Helix:
-    """Helical milling: the tool travels on a helix of ``radius`` m, sinking ``pitch`` m per orbit.
-
-    ``axial_feed`` is the axial feed per tooth, m, which the bottom edges cut.
-    """
-
-    radius: float
-    pitch: float
-    axial_feed: float
-
-    @property
-    def ramp(self) -> float:
-        """Ramp angle of the path, rad."""
-        return math.atan(self.pitch / (2.0 * math.pi * self.radius))
 
 
 @dataclass(frozen=True)
@@ -95,25 +79,21 @@ class ForceModel:
             float(nuisance[0]),
         )
         basis = basis * np.repeat([1.0, self.law.edge(setting.cut_length)], 3)
-        if self.bottom_edges:
-            basis = np.concatenate([basis, self._bottom(setting, len(basis))], axis=2)
         turn = setting.feed_direction
         if setting.helix is not None:
-            basis = _ramped(basis, setting.helix.ramp)
+            basis = ramped(basis, setting.helix.ramp)
             turn = float(nuisance[1])
-        basis = _turned(basis, turn).transpose(1, 0, 2).reshape(-1, basis.shape[2])
+        if self.bottom_edges:
+            basis = np.concatenate([basis, self._bottom(setting, len(basis))], axis=2)
+        basis = turned(basis, turn).transpose(1, 0, 2).reshape(-1, basis.shape[2])
         matrix = np.tile(basis, (len(setting.middles), 1))
         return matrix, np.zeros(len(matrix))
 
     def _bottom(self, setting: ForceSetting, orders: int) -> Array:
-        """Thrust of the bottom edges along z, N R (K_Fac s_ta + K_Fae), over the whole revolution.
-
-        Equations 7 and 8 of the source of the helical tests.
-        """
+        """Thrust of the bottom edges along z over the whole revolution: it is not inclined by the ramp."""
         columns = np.zeros((orders, 3, len(self.bottom_edges)))
         if setting.helix is not None:
-            reach = self.cutter.teeth * self.cutter.radius
-            thrust = {"kfac": reach * setting.helix.axial_feed, "kfae": reach}
+            thrust = dict(zip(BOTTOM_EDGES, bottom_thrust(self.cutter, setting.helix), strict=True))
             columns[0, 2] = [thrust[name] for name in self.bottom_edges]
         return columns
 
@@ -123,21 +103,3 @@ def _order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path
     basis = to_orders(force_basis(cutter, law, cut, true_path), highest)
     basis.flags.writeable = False
     return basis
-
-
-def _turned(basis: Array, angle: float) -> Array:
-    """Turn (orders, axis, p) about z, counter-clockwise."""
-    if angle == 0.0:
-        return basis
-    turned = np.array(basis)
-    c, s = math.cos(angle), math.sin(angle)
-    turned[:, 0], turned[:, 1] = c * basis[:, 0] - s * basis[:, 1], s * basis[:, 0] + c * basis[:, 1]
-    return turned
-
-
-def _ramped(basis: Array, ramp: float) -> Array:
-    """Incline the feed frame downwards by the ramp angle: its x and z axes turn about y."""
-    inclined = np.array(basis)
-    c, s = math.cos(ramp), math.sin(ramp)
-    inclined[:, 0], inclined[:, 2] = c * basis[:, 0] + s * basis[:, 2], c * basis[:, 2] - s * basis[:, 0]
-    return inclined

@@ -1,8 +1,9 @@
-"""A machine that yields to the cut: the chip that a tooth meets depends on where the tip was in earlier passes.
+"""A machine that yields to the cut: the chip of a tooth depends on where the tip was in earlier passes.
 
-Quasi-static regeneration ([T] eq. 10, 11, figure 6; physics.md §2): the tip is displaced by q = K⁻¹ F, and the
-chip gains q(t) − q(t − T) towards the tooth. Within one tooth passing the surfaces met are all in the past, so
-its angles are solved at once: at each the force on a two-dimensional spring, linear while the teeth stay in cut.
+Quasi-static regeneration ([T] eq. 10, 11, figure 6; physics.md §2): the tip is displaced by q = K⁻¹ F, and
+the chip gains q(t) − q(t − T) towards the tooth. Within one tooth passing the surfaces met are all in the
+past, so its angles are solved at once: at each a two-dimensional spring under a force that is linear in its
+deflection while the teeth stay in cut.
 """
 
 from __future__ import annotations
@@ -10,33 +11,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-import pandas as pd
 
-from metro.batch.batch import Batch
 from metro.cutting.cutter import Cutter
-from metro.cutting.force import COEFFICIENTS, Cut
+from metro.cutting.force import Cut
 from metro.cutting.law import EdgeLaw
-from metro.observables import cutting_force
-from metro.observables.force import recorded
-from metro.observables.problem import Refusal
-from metro.robot import stations as tabulated
-from metro.robot.kinematics import rotation
-from metro.units import DEG, JSON, MM, N_UM, Array
+from metro.units import Array
 
 ANGLES = 720
 SLICES_PER_RADIAN = 60
 TOLERANCE = 1e-6  # of the largest rigid force: [T]'s allowed difference e
 LIMIT = 200  # iterations per tooth passing
-HALVINGS = 30
-# The edge force sets in over this share of the feed per tooth. With a jump there would be no balance where the
-# edge force alone pushes a tooth out of the cut that it needs for that force.
-CONTACT = 0.01
+HALVINGS = 16
 DIFFERENCE = 1e-9  # m, of the chip thickness, for the slope of a force law
 REVOLUTIONS = 6
-HELIX_DIRECTIONS = (0.0, 45.0, 90.0, 135.0)
 
 Scheme = Literal["newton", "fixed_point"]
 Response = Callable[[Array], tuple[Array, Array]]
@@ -47,7 +37,9 @@ class NotConvergedError(RuntimeError):
     """Force and deflection found no balance: ``iterations`` made, ``residual`` max|F′ − F| left, N."""
 
     def __init__(self, scheme: str, iterations: int, residual: float) -> None:
-        super().__init__(f"{scheme}: force and deflection differ by {residual:.3g} N after {iterations} iterations")
+        super().__init__(
+            f"{scheme}: force and deflection differ by {residual:.3g} N after {iterations} iterations"
+        )
         self.iterations = iterations
         self.residual = residual
 
@@ -58,7 +50,8 @@ class Yielding:
 
     Attributes
     ----------
-    force : (revolutions × ANGLES, 3) N on the tool, feed frame. rigid : the same of a tool that does not yield.
+    force : (revolutions × ANGLES, 3) N on the tool, feed frame.
+    rigid : the same of a tool that does not yield.
     deflection : (revolutions × ANGLES, 2) m.
     iterations : most that one tooth passing took. residual : largest max|F′ − F| left, N.
     """
@@ -72,19 +65,26 @@ class Yielding:
 
 @dataclass(frozen=True, eq=False)
 class _Edges:
-    """Elements of the edges at some angles: sine and cosine of immersion, and engaged depth, each (B, H, N)."""
+    """Elements of the edges at some angles: sine and cosine of immersion, engaged depth, each (B, H, N).
+
+    ``reach`` (H, N) is how far each is from the axis of rotation, less the radius, m.
+    ``rubbing`` is the depth on which the edge force acts: that on which a rigid tool cuts. If it set in with
+    the yielding tool's own chip, it would jump there, and a tooth that it lifts off would have no balance, or
+    two.
+    """
 
     law: EdgeLaw
     coefficients: Array
-    contact: float
+    reach: Array
     sine: Array
     cosine: Array
     depth: Array
+    rubbing: Array
 
-    def at(self, index: slice) -> _Edges:
+    def at(self, index: np.ndarray) -> _Edges:
         """Return those of some angles."""
-        parts = self.sine[index], self.cosine[index], self.depth[index]
-        return _Edges(self.law, self.coefficients, self.contact, *parts)
+        parts = self.sine[index], self.cosine[index], self.depth[index], self.rubbing[index]
+        return _Edges(self.law, self.coefficients, self.reach, *parts)
 
     def towards(self, deflection: Array) -> Array:
         """Displacement (B, H, N) of each element outwards, of a tip displaced by (B, 2)."""
@@ -98,17 +98,20 @@ class _Edges:
         return np.stack([along.sum((1, 2)), across.sum((1, 2)), axial.sum((1, 2))], axis=1)
 
     def slope(self, thickness: Array) -> Array:
-        """Derivative (B, 2, 2) of the force in the plane by the displacement of the tip."""
+        """Differentiate the force in the plane by the displacement of the tip, (B, 2, 2) N/m."""
         ahead, here = self._per_direction(thickness + DIFFERENCE), self._per_direction(thickness)
         tangential, radial, _ = (ahead - here) / DIFFERENCE
-        push = np.stack([-tangential * self.cosine - radial * self.sine, tangential * self.sine - radial * self.cosine])
-        return np.einsum("ibhn,jbhn->bij", push, np.stack([self.sine, self.cosine]))
+        push = np.stack(
+            [-tangential * self.cosine - radial * self.sine, tangential * self.sine - radial * self.cosine]
+        )
+        return np.asarray(np.einsum("ibhn,jbhn->bij", push, np.stack([self.sine, self.cosine])))
 
     def _per_direction(self, thickness: Array) -> Array:
         """Tangential, radial and axial force of each element, (3, B, H, N)."""
         shear = self.law.shear(np.maximum(thickness, 0.0)) * self.depth
-        edge = np.clip(thickness / self.contact, 0.0, 1.0) * self.depth
-        return np.multiply.outer(self.coefficients[:3], shear) + np.multiply.outer(self.coefficients[3:], edge)
+        return np.multiply.outer(self.coefficients[:3], shear) + np.multiply.outer(
+            self.coefficients[3:], self.rubbing
+        )
 
 
 def yielding_force(
@@ -117,40 +120,40 @@ def yielding_force(
     cut: Cut,
     coefficients: Array,
     stiffness: Array,
+    *,
     revolutions: int = REVOLUTIONS,
     scheme: Scheme = "newton",
 ) -> Yielding:
     """Force of the peripheral edges on a tool whose tip yields, from first contact on.
 
-    A tooth meets the surface that all earlier passes left, so one that was pushed out of the cut leaves its chip
-    to the next. The work is as a rigid tool left it, the chip full at the first angle.
+    A tooth meets the surface that all earlier passes left, so one that was pushed out of the cut leaves its
+    chip to the next. The work is as a rigid tool left it, the chip full at the first angle.
 
     Parameters
     ----------
-    coefficients : (6,) SI, in the order of ``COEFFICIENTS``. stiffness : (2, 2) N/m, feed frame.
-    scheme : ``newton``, with halved steps where a tooth leaves the cut, or ``fixed_point`` ([T] figure 6): the
-        force at a deflection gives the next deflection.
+    coefficients : (6,) SI, shear, then edge, tangential, radial, axial. stiffness : (2, 2) N/m, feed frame.
+    scheme : ``newton``, with halved steps where a tooth leaves the cut, or ``fixed_point`` ([T] figure 6):
+        the force at a deflection gives the next deflection.
 
     Raises
     ------
     NotConvergedError
         If in some tooth passing max|F′ − F| does not fall below ``TOLERANCE`` of the largest rigid force.
     """
-    edges, reach = _edges(cutter, law, cut, coefficients)
-    travel = cut.feed_per_tooth * cutter.teeth / (2.0 * math.pi)
-    steps = cutter.pitch(1) * ANGLES / (2.0 * math.pi)
-    # surface left by each tooth at each angle, as a radius about the axis of rotation; the first revolution is rigid
-    left = np.concatenate([_rigid_surface(cutter, edges, reach, travel), np.empty((revolutions * ANGLES, *reach.shape))])
-    rigid = edges.force(reach - _met(left[:ANGLES], np.arange(ANGLES), steps, edges, travel))
+    edges, clear = _rigid(cutter, law, cut, coefficients)
+    rigid, reach = edges.force(clear), edges.reach
+    # surface that each tooth leaves at each angle, about the axis of rotation; the first revolution is rigid
+    left = np.empty(((1 + revolutions) * ANGLES, *clear.shape[1:]))
+    left[:ANGLES] = reach - np.minimum(clear, 0.0)
     compliance, tolerance = np.linalg.inv(stiffness), TOLERANCE * float(np.abs(rigid).max())
     solve = {"newton": _newton, "fixed_point": _fixed_point}[scheme]
     force, deflection = np.empty((revolutions * ANGLES, 3)), np.empty((revolutions * ANGLES, 2))
-    block, most, residual = math.floor(steps.min() + 1e-9), 0, 0.0
+    block, most, residual = math.floor(_steps(cutter).min() + 1e-9), 0, 0.0
     for start in range(0, len(force), block):
         at = np.arange(start, min(start + block, len(force)))
         here = edges.at(at % ANGLES)
-        met = _met(left, at + ANGLES, steps, here, travel)
-        response = _response(here, reach - met, compliance)
+        met = _met(cutter, cut, left, at + ANGLES, here)
+        response = _response(here, np.asarray(reach - met), compliance)
         plane, iterations, error = solve(response, rigid[at % ANGLES, :2], tolerance)
         if error > tolerance:
             raise NotConvergedError(scheme, iterations, error)
@@ -161,64 +164,71 @@ def yielding_force(
     return Yielding(force, np.tile(rigid, (revolutions, 1)), deflection, most, residual)
 
 
-def ratios(cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array, stiffness: Array) -> tuple[float, float]:
+def ratios(
+    cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array, stiffness: Array
+) -> tuple[float, float]:
     """Factors by which errors of the fixed-point scheme grow per iteration, and entry transients per tooth.
 
-    With G = ∂F/∂q K⁻¹ at the rigid force the scheme maps an error e to G e: it diverges where an eigenvalue of G
-    exceeds one. A tooth passing maps a difference to the steady force to −(I − G)⁻¹ G of itself. The largest over
-    a revolution of each; exact for a law linear in the chip, equal pitch and teeth that stay in cut.
+    With G = ∂F/∂q K⁻¹ at the rigid force the scheme maps an error e to G e: it diverges where an eigenvalue
+    of G exceeds one. A tooth passing maps a difference to the steady force to −(I − G)⁻¹ G of itself. The
+    largest over a revolution of each; exact for a law linear in the chip, equal teeth and as long as they
+    stay in cut.
     """
-    edges, reach = _edges(cutter, law, cut, coefficients)
-    travel = cut.feed_per_tooth * cutter.teeth / (2.0 * math.pi)
-    left = _rigid_surface(cutter, edges, reach, travel)
-    met = _met(left, np.arange(ANGLES), cutter.pitch(1) * ANGLES / (2.0 * math.pi), edges, travel)
-    # past the onset of the edge force, which is of no weight in steady cutting
-    gain = edges.slope(np.where(reach > met, reach - met + cut.feed_per_tooth, -1.0)) @ np.linalg.inv(stiffness)
-    eigenvalues = np.linalg.eigvals(gain)
+    edges, clear = _rigid(cutter, law, cut, coefficients)
+    eigenvalues = np.linalg.eigvals(edges.slope(clear) @ np.linalg.inv(stiffness))
     return float(np.abs(eigenvalues).max()), float(np.abs(eigenvalues / (1.0 - eigenvalues)).max())
 
 
-def _edges(cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array) -> tuple[_Edges, Array]:
-    """Elements of the edges over a revolution, and how far each reaches beyond the radius, (H, N) m."""
+def _rigid(cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array) -> tuple[_Edges, Array]:
+    """Elements of the edges over a revolution, and the chip thickness (ANGLES, H, N) of a rigid tool."""
     lag = cutter.lag_per_depth * cut.axial_depth
     slices = max(4, math.ceil(SLICES_PER_RADIAN * lag))
     height = (np.arange(slices) + 0.5) * cut.axial_depth / slices
     angle = 2.0 * math.pi * np.arange(ANGLES)[:, None, None] / ANGLES
     immersion = angle - cutter.lag_per_depth * height[:, None] + np.asarray(cutter.tooth_angles)
-    middle, half = (cut.engagement.exit + cut.engagement.entry) / 2, (cut.engagement.exit - cut.engagement.entry) / 2
     # an element stands for a window, of its helix or of the angular step, of which some share is engaged
     window = max(2.0 * math.pi / ANGLES, lag / slices)
+    middle, half = (
+        0.5 * (cut.engagement.entry + cut.engagement.exit),
+        0.5 * (cut.engagement.exit - cut.engagement.entry),
+    )
     offset = np.mod(immersion - middle + math.pi, 2.0 * math.pi) - math.pi
     low, high = np.maximum(offset - window / 2, -half), np.minimum(offset + window / 2, half)
-    share = np.maximum(high - low, 0.0) / window
-    immersion = np.where(share > 0.0, middle + 0.5 * (low + high), immersion)
-    depth = share * cut.axial_depth / slices
-    contact = CONTACT * cut.feed_per_tooth
-    edges = _Edges(law, coefficients, contact, np.sin(immersion), np.cos(immersion), depth)
-    return edges, cutter.radius_deviation(height).T
-
-
-def _rigid_surface(cutter: Cutter, edges: _Edges, reach: Array, travel: float) -> Array:
-    """Surface that each tooth of a rigid tool leaves behind: the farthest that it and the N − 1 before reached."""
+    engaged = high > low
+    immersion = np.where(engaged, middle + 0.5 * (low + high), immersion)
+    depth = np.where(engaged, (high - low) / window * cut.axial_depth / slices, 0.0)
+    sine, reach = np.sin(immersion), cutter.radius_deviation(height).T
+    travel = cut.feed_per_tooth * cutter.teeth / (2.0 * math.pi)
     passes = [
-        np.roll(reach, -m, axis=1) - travel * cutter.pitch(m) * edges.sine for m in range(1, cutter.teeth)
+        travel * cutter.pitch(m) * sine + reach - np.roll(reach, -m, axis=1)
+        for m in range(1, cutter.teeth + 1)
     ]
-    return np.max(np.stack([np.broadcast_to(reach, edges.sine.shape), *passes]), axis=0)
+    clear = np.min(passes, axis=0)
+    return _Edges(
+        law, coefficients, reach, sine, np.cos(immersion), depth, np.where(clear > 0.0, depth, 0.0)
+    ), clear
 
 
-def _met(left: Array, at: np.ndarray, steps: Array, edges: _Edges, travel: float) -> Array:
-    """Surface (B, H, N) that each tooth meets: what the tooth before it left a pitch ago, less the feed since.
+def _steps(cutter: Cutter) -> Array:
+    """Pitch from each tooth to the one that cut before it, (N,) angular steps."""
+    return cutter.pitch(1) * ANGLES / (2.0 * math.pi)
 
-    ``steps`` (N,) is the pitch to that tooth in angular steps. Angles before the first are those of a revolution
-    later: of a rigid tool all revolutions are alike.
+
+def _met(cutter: Cutter, cut: Cut, left: Array, at: np.ndarray, edges: _Edges) -> Array:
+    """Surface (B, H, N) that each tooth meets: what the one before left a pitch ago, less the feed since.
+
+    Between two angles at which a surface is kept it is taken as linear.
     """
+    steps = _steps(cutter)
     before = at[:, None] - steps
     low = np.floor(before + 1e-9).astype(int)
-    share = np.maximum(before - low, 0.0)[:, None, :]
-    tooth = np.roll(np.arange(len(steps)), -1)
-    early, late = (left[index, :, tooth].transpose(0, 2, 1) for index in (low, np.where(share[:, 0] > 0.0, low + 1, low)))
-    feed: Array = travel * steps * 2.0 * math.pi / ANGLES
-    return np.asarray(early * (1.0 - share) + late * share - feed * edges.sine)
+    share = np.maximum(before - low, 0.0)
+    tooth = np.roll(np.arange(cutter.teeth), -1)
+    early, late = (
+        left[index, :, tooth].transpose(0, 2, 1) for index in (low, np.where(share > 0.0, low + 1, low))
+    )
+    surface = early + share[:, None, :] * (late - early)
+    return np.asarray(surface - cut.feed_per_tooth * cutter.teeth * steps / ANGLES * edges.sine)
 
 
 def _response(edges: _Edges, clear: Array, compliance: Array) -> Response:
@@ -232,6 +242,7 @@ def _response(edges: _Edges, clear: Array, compliance: Array) -> Response:
 
 
 def _fixed_point(response: Response, force: Array, tolerance: float) -> Solution:
+    """Take the force at the deflection as the next force."""
     for iteration in range(LIMIT + 1):
         following, _ = response(force)
         error = float(np.abs(following - force).max())
@@ -242,7 +253,7 @@ def _fixed_point(response: Response, force: Array, tolerance: float) -> Solution
 
 
 def _newton(response: Response, force: Array, tolerance: float) -> Solution:
-    """Solve F′(F) = F at every angle; a step is halved until it brings the two closer."""
+    """Solve F′(F) = F at every angle; steps past a kink are halved until they bring the two closer."""
     following, slope = response(force)
     for iteration in range(LIMIT + 1):
         difference = following - force
@@ -254,7 +265,7 @@ def _newton(response: Response, force: Array, tolerance: float) -> Solution:
         for _ in range(HALVINGS):
             trial = force + share[:, None] * step
             following, slope = response(trial)
-            worse = np.linalg.norm(following - trial, axis=1) > (1.0 - 1e-4 * share) * size + 0.1 * tolerance
+            worse = np.linalg.norm(following - trial, axis=1) > np.maximum(size, tolerance)
             if not worse.any():
                 break
             share = np.where(worse, 0.5 * share, share)

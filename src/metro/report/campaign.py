@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import pandas as pd
@@ -11,8 +12,9 @@ from metro.report.content import Bullets, Item, Paragraph, Picture, Section, Tab
 from metro.report.document import Cover, compile_pdf
 from metro.report.figures import verdicts as figures
 from metro.report.numbers import listing, number, unit, words
+from metro.report.phrases import plain
 from metro.report.results import OBSERVABLES, title
-from metro.report.sections.verdict import STATUS, change, effect_words, error_text
+from metro.report.sections.verdict import STATUS, change, effect_words, error_cell, known_interval
 from metro.units import JSON
 
 PER_FIGURE = 24
@@ -48,15 +50,16 @@ def campaign_table(verdicts: Mapping[str, JSON]) -> pd.DataFrame:
 def campaign_report(verdicts: Mapping[str, JSON], identified: Mapping[str, JSON]) -> bytes:
     """Return the campaign's summary as a PDF; the same bytes for the same results."""
     entries = _entries(verdicts)
+    nexts = [
+        f"{b}, {title(n)}: {plain(e['next_experiment'])}" for b, n, e in entries if e.get("next_experiment")
+    ]
     sections = [
+        *([Section("What to measure next", [Bullets(nexts)])] if nexts else []),
         Section(
             "Verdicts", [Paragraph(_overview(verdicts), "verdict"), *_verdicts(entries), *_pictures(entries)]
         ),
         Section("What could not be told", _untold(entries, identified)),
     ]
-    nexts = [f"{b}, {title(n)}: {e['next_experiment']}" for b, n, e in entries if e.get("next_experiment")]
-    if nexts:
-        sections.append(Section("What to measure next", [Bullets(nexts)]))
     return compile_pdf(
         Cover("Campaign summary", f"{len(verdicts)} batches", f"metro {__version__}"), sections
     )
@@ -90,7 +93,7 @@ def _row(batch: str, observable: str, entry: JSON) -> JSON:
     }
     for when in ("before", "after"):
         error = entry.get(when) or {}
-        low, high = error.get("ci95") or (None, None)
+        low, high = known_interval(error) or (None, None)
         values = {"rms": error.get("rms"), "lo": low, "hi": high, "nrmse": error.get("nrmse")}
         row |= {f"{when}_{key}": value for key, value in values.items()}
     return row
@@ -114,8 +117,8 @@ def _verdicts(entries: list[tuple[str, str, JSON]]) -> list[Item]:
             batch,
             title(name),
             STATUS.get(str(entry.get("status")), "–"),
-            error_text(entry.get("before"), None),
-            error_text(entry.get("after"), None),
+            error_cell(entry.get("before"), None),
+            error_cell(entry.get("after"), None),
             unit(entry.get("unit")) or "1",
             number(entry.get("noise_floor")),
             "; ".join(effect_words(e) for e in entry.get("effects") or []) or "none",
@@ -124,7 +127,8 @@ def _verdicts(entries: list[tuple[str, str, JSON]]) -> list[Item]:
     ]
     header = ["batch", "observable", "verdict", "before", "after", "unit", "noise", "effects added"]
     caption = (
-        "Errors on held-out runs (rms, with 95 % intervals) before and after the effects that were found."
+        "Errors on held-out runs (rms, with 95 % intervals; – where one condition was held out) before and "
+        "after the effects that were found."
     )
     return [Table(header, rows, caption, [1.5, 1.3, 1, 1.25, 1.25, 0.5, 0.75, 2.1])] if rows else []
 
@@ -149,16 +153,23 @@ def _untold(entries: list[tuple[str, str, JSON]], identified: Mapping[str, JSON]
         if row["rivals"]:
             told.append(f"{batch}, {title(name)}: {row['rivals']} cannot be told apart.")
         if row["unexplained"]:
-            told.append(f"{batch}, {title(name)}: unexplained rest, {row['unexplained']}.")
+            told.append(f"{batch}, {title(name)}: unexplained rest, {plain(row['unexplained'])}.")
         if row["status"] == "insufficient":
             told.append(f"{batch}, {title(name)}: too few runs to tell.")
-    missing = [
-        [batch, words(str(name)), str(reason)]
-        for batch, content in sorted(identified.items())
-        for name, reason in (content.get("not_identified") or {}).items()
-    ]
+    missing = _missing(identified)
     items: list[Item] = [Bullets(told)] if told else [Paragraph("Every residual was told.")]
     if missing:
         caption = "What was not identified, and why."
-        items.append(Table(["batch", "quantity", "reason"], missing, caption, [1.4, 1.2, 4]))
+        items.append(Table(["reason", "not identified", "batches"], missing, caption, [2.4, 1, 3]))
     return items
+
+
+def _missing(identified: Mapping[str, JSON]) -> list[list[str]]:
+    """Return a row for each reason and quantity, with the batches that it holds for."""
+    batches: dict[tuple[str, str], list[str]] = {}
+    for batch, content in sorted(identified.items()):
+        for name, reason in (content.get("not_identified") or {}).items():
+            told = re.sub(r"^cell \S+: ", "", str(reason)).rstrip(".")
+            batches.setdefault((told, words(str(name))), []).append(batch)
+    ranked = sorted(batches.items(), key=lambda item: -len(item[1]))
+    return [[reason, name, ", ".join(found)] for (reason, name), found in ranked]

@@ -37,6 +37,7 @@ class Table:
     widths : relative widths of the columns; 0 for "as wide as the text".
     numeric : columns that are set flush right.
     strong : rows that stand out.
+    faint : columns that are set in grey.
     small : set in small type (hashes, long lists).
     """
 
@@ -46,6 +47,7 @@ class Table:
     widths: Sequence[float] = ()
     numeric: Sequence[int] = ()
     strong: Sequence[int] = ()
+    faint: Sequence[int] = ()
     small: bool = False
 
 

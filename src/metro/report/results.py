@@ -49,13 +49,21 @@ class Results:
         return str(self.batch.manifest.get("title") or self.batch.name)
 
     def verdicts(self) -> dict[str, JSON]:
-        """Verdict by observable, in the contract's order."""
+        """Verdict by observable, in the contract's order; of one held-out condition without intervals."""
         found = self.verdict.get("observables") or {}
         return {
-            name: found[name]
+            name: self._honest(found[name])
             for name in [*OBSERVABLES, *sorted(set(found) - set(OBSERVABLES))]
             if name in found
         }
+
+    def _honest(self, entry: JSON) -> JSON:
+        """Drop the intervals over held-out runs where these are repeats of one condition."""
+        known = self.batch.runs["condition"].to_dict() if "condition" in self.batch.runs else {}
+        if len({known.get(run, run) for run in entry.get("held_out_runs") or []}) > 1:
+            return entry
+        errors = {when: {**error, "ci95": None} for when in ("before", "after") if (error := entry.get(when))}
+        return {**entry, **errors}
 
     def told(self, observable: str) -> JSON:
         """Return what the loop tells of an observable; empty where it tells nothing."""

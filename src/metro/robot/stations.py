@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from metro.units import Array
+from metro.units import MM, Array
 
 SPLINE_STATIONS = 10  # from here on a spline through the stations; fewer carry no more than a plane
 MARGIN = 0.1  # how far beyond the stations' hull is still answered, as a share of their extent
@@ -67,8 +67,8 @@ def stiffness_at(stations: Stations, place: Array) -> EndStiffness:
     beyond, allowed = beyond_hull(stations.place, place), MARGIN * stations.extent
     if beyond > allowed + 1e-9:
         raise ValueError(
-            f"({', '.join(f'{1e3 * x:.0f}' for x in place)}) mm lies {1e3 * beyond:.0f} mm beyond the stations, "
-            f"expected at most {1e3 * allowed:.0f} mm"
+            f"({', '.join(f'{x / MM:.0f}' for x in place)}) mm lies {beyond / MM:.0f} mm beyond the "
+            f"stations, expected at most {allowed / MM:.0f} mm"
         )
     return EndStiffness(_interpolated(stations, place, stations.method), stations.method, beyond)
 

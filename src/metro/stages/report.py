@@ -8,7 +8,9 @@ from typing import Any
 
 import pandas as pd
 
+from metro.batch.batch import Batch
 from metro.batch.processed import read_batch, write_atomically
+from metro.observables import force_metrics
 from metro.report.batch_report import batch_report
 from metro.report.results import Results
 from metro.units import JSON
@@ -34,9 +36,11 @@ def report(processed: Path, reports: Path, settings: JSON, code: str) -> None:
 def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> Results:
     """Read what the stages before left; tables that are absent or empty are left out."""
     tables = {name: pd.read_parquet(p) for name in TABLES if (p := processed / f"{name}.parquet").exists()}
+    batch = read_batch(processed)
+    tables = {name: table for name, table in tables.items() if len(table)}
     return Results(
-        batch=read_batch(processed),
-        tables={name: table for name, table in tables.items() if len(table)},
+        batch=batch,
+        tables=tables | _force_figures(batch, tables.get("comparison")),
         identified=_json(reports / "identified.json"),
         verdict=_json(reports / "verdict.json"),
         loop=_json(processed / "loop.json"),
@@ -44,6 +48,21 @@ def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> R
         settings=settings,
         code=code,
     )
+
+
+def _force_figures(batch: Batch, comparison: pd.DataFrame | None) -> dict[str, pd.DataFrame]:
+    """Figures of merit of the held-out forces that were measured over the revolution."""
+    teeth = int((batch.manifest.get("tool") or {}).get("teeth") or 0)
+    if comparison is None or not teeth:
+        return {}
+    rows = comparison[(comparison["observable"] == "force") & comparison["angle_deg"].notna()]
+    if rows.empty:
+        return {}
+    rows = rows.fillna({"after": rows["before"]})
+    return {
+        "force_metrics": force_metrics.metrics(rows, teeth),
+        "force_orders": force_metrics.order_spectrum(rows),
+    }
 
 
 def _json(path: Path) -> JSON:

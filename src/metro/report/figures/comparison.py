@@ -13,6 +13,7 @@ from metro.report.numbers import unit as shown_unit
 from metro.units import Array
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -22,7 +23,7 @@ COORDINATES = {
     "x_mm": "x (mm)",
     "t_s": "time (s)",
 }
-ROWS, BINS, POINTS = 4, 60, 1200
+ROWS, BINS, POINTS = 3, 60, 1200
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def overlay(frame: pd.DataFrame, title: str) -> Figure:
     column, drawn = coordinate(frame), predictions(frame)
     with style.style():
         figure, grid = style.new_figure(
-            0.75 + 1.2 * rows, rows, columns, sharey="col" if len(axes_of(frame)) > 1 else "all"
+            0.75 + 1.15 * rows, rows, columns, sharey=False if len(axes_of(frame)) > 1 else "all"
         )
         flat = [axes for row in grid for axes in row]
         for axes, (run, axis) in zip(flat, panels, strict=False):
@@ -109,39 +110,52 @@ def residuals(frame: pd.DataFrame, title: str) -> Figure:
 
 
 def parity(frame: pd.DataFrame, title: str) -> Figure:
-    """Draw predicted over measured, and the distribution of the residuals beside that of the noise."""
-    thin = frame.sample(min(len(frame), POINTS), random_state=0)
+    """Draw predicted over measured, axis by axis, and the distribution of the residuals."""
+    names, drawn = axes_of(frame), predictions(frame)
     with style.style():
-        figure, ((left, right),) = style.new_figure(2.2, 1, 2)
-        for kind in predictions(frame):
-            values = thin[kind.column]
-            left.scatter(
-                thin["measured"],
-                values,
-                s=7,
-                c=kind.colour,
-                marker=kind.mark,
-                lw=0.5,
-                alpha=0.6,
-                label=kind.label,
-            )
-        span = frame[["measured", "before", "after"]].to_numpy(float)
-        ends = [float(span.min()), float(span.max())]
-        left.plot(ends, ends, color=style.MEASURED, lw=0.7, label="equal")
-        left.set(
-            title="Parity", xlabel=_label(f"{title}, measured", frame), ylabel=_label("predicted", frame)
-        )
-        left.legend(loc="upper left", handletextpad=0.3, markerscale=2)
-        _histogram(right, frame)
-        right.set(
-            title="Residual", xlabel=_label("measured − predicted", frame), ylabel="share of values per bin"
-        )
-        right.legend(loc="upper right", handlelength=1.4)
+        figure, (row,) = style.new_figure(2.2, 1, len(names) + 1)
+        for axes, name in zip(row, names, strict=False):
+            _equal(axes, frame[axis_labels(frame) == name], drawn)
+            axes.set_title(f"Parity, {name}" if len(names) > 1 else "Parity", loc="left")
+            axes.set_xlabel(_label("measured" if len(names) > 1 else f"{title}, measured", frame))
+        row[0].set_ylabel(_label("predicted", frame))
+        _histogram(row[-1], frame)
+        row[-1].set_title("Residual", loc="left")
+        difference = "difference" if len(names) > 1 else "measured − predicted"
+        row[-1].set(xlabel=_label(difference, frame), ylabel="share per bin")
+        _legend(figure, row[0], row[-1])
     return figure
 
 
+def _equal(axes: Axes, part: pd.DataFrame, drawn: tuple[Prediction, ...]) -> None:
+    """Scatter of the predictions over the measured values, and the line on which both are equal."""
+    thin = part.sample(min(len(part), POINTS), random_state=0)
+    for kind in drawn:
+        axes.scatter(
+            *(thin["measured"], thin[kind.column]),
+            s=7,
+            c=kind.colour,
+            marker=kind.mark,
+            lw=0.5,
+            alpha=0.6,
+            label=kind.label,
+        )
+    span = part[["measured", "before", "after"]].to_numpy(float)
+    ends = [float(span.min()), float(span.max())]
+    axes.plot(ends, ends, color=style.MEASURED, lw=0.7, label="equal")
+
+
+def _legend(figure: Figure, points: Axes, bars: Axes) -> None:
+    """One legend for points and histogram: the series of both have the same colours and names."""
+    named: dict[str, Artist] = {}
+    for axes in (points, bars):
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    figure.legend(list(named.values()), list(named), loc="outside upper center", ncols=len(named))
+
+
 def _histogram(axes: Axes, frame: pd.DataFrame) -> None:
-    """Histograms of the residuals; above them room for the legend."""
+    """Histograms of the residuals, and what the noise alone would give."""
     drawn = predictions(frame)
     rest = [(frame["measured"] - frame[kind.column]).to_numpy(float) for kind in drawn]
     edge = max(float(np.quantile(np.abs(r), 0.995)) for r in rest) or 1.0
@@ -155,7 +169,7 @@ def _histogram(axes: Axes, frame: pd.DataFrame) -> None:
         at, sd = np.linspace(-edge, edge, 401), float(np.sqrt(np.mean(sigma**2)))
         normal = np.exp(-0.5 * (at / sd) ** 2) / (sd * np.sqrt(2 * np.pi)) * (bins[1] - bins[0])
         axes.plot(at, np.minimum(normal, 1.2 * top), color=style.GREY, lw=0.9, label="noise alone")
-    axes.set_ylim(0, 1.8 * top)
+    axes.set_ylim(0, 1.25 * top)
 
 
 def _places(part: pd.DataFrame, column: str) -> Array:

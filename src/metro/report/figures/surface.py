@@ -152,6 +152,8 @@ def responses(frf: pd.DataFrame) -> Figure:
     ----------
     frf : ``position, reference, response, frequency_hz, measured_m_n, modal_m_n`` (magnitudes).
     """
+    from matplotlib.ticker import NullFormatter
+
     pairs = list(frf.groupby(["position", "reference", "response"], sort=False))[:6]
     columns = min(2, len(pairs))
     with style.style():
@@ -168,7 +170,12 @@ def responses(frf: pd.DataFrame) -> Figure:
                 thin["frequency_hz"], thin["modal_m_n"], color=style.BEFORE, ls="--", label="modal model"
             )
             axes.set_title(f"position {position}: {reference} → {response}", loc="left")
-            axes.set(xlabel="frequency (Hz)", ylabel="receptance (m/N)")
+            axes.yaxis.set_minor_formatter(NullFormatter())
+        for row in grid:
+            row[0].set_ylabel("receptance (m/N)")
+        for axes in flat[max(0, len(pairs) - columns) : len(pairs)]:
+            axes.set_xlabel("frequency (Hz)")
+            axes.xaxis.set_tick_params(labelbottom=True)
         for axes in flat[len(pairs) :]:
             axes.set_visible(False)
         style.legend_above(figure, flat[0])

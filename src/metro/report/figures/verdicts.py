@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PATTERNS = 16
+PATTERNS = 12
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Change:
 def changes(rows: Sequence[Change], xlabel: str) -> Figure:
     """Draw a line from before to after for each row, with intervals and the noise floor."""
     with style.style():
-        figure, ((axes,),) = style.new_figure(0.85 + 0.3 * len(rows))
+        figure, ((axes,),) = style.new_figure(0.9 + 0.24 * len(rows))
         y = np.arange(len(rows))[::-1]
         for at, row in zip(y, rows, strict=True):
             axes.plot([row.before, row.after], [at, at], color=style.GREY, lw=1.4, zorder=1)
@@ -130,7 +130,7 @@ def signature(entries: Sequence[JSON], unit: str) -> Figure:
     labels = _largest(entries)
     with style.style():
         figure, (row,) = style.new_figure(
-            1.1 + 0.2 * len(labels), 1, len(axes_names), sharey=True, sharex=True
+            0.75 + 0.15 * len(labels), 1, len(axes_names), sharey=True, sharex=True
         )
         for axes, axis in zip(row, axes_names, strict=True):
             mine = {str(e["label"]): e for e in entries if str(e.get("axis") or "") == axis}

@@ -10,6 +10,7 @@ from metro.report.figures import comparison as figures
 from metro.report.figures import surface
 from metro.report.numbers import listing, number, percent, probability, unit
 from metro.report.results import OBSERVABLES, Results, title
+from metro.report.sections.force import force_items
 
 LONGEST = 30
 FEWEST = 3  # values of a run along an axis that make a curve
@@ -23,29 +24,43 @@ def comparison(results: Results) -> Section:
         if frame is not None:
             name = title(observable)
             items.append(Heading(name[0].upper() + name[1:]))
-            items += _labels(results, frame) if observable == "lobes" else _values(frame, name)
+            merit = force_items(results) if observable == "force" else []
+            items += _labels(results, frame) if observable == "lobes" else _values(frame, name, merit)
     if not items:
         nothing = "No held-out run has both a measurement and a prediction: there is nothing to compare."
         return Section("Predicted against measured", [Paragraph(nothing)])
-    return Section("Predicted against measured", items, page=True)
+    return Section("Predicted against measured", items)
 
 
-def _values(frame: pd.DataFrame, name: str) -> list[Item]:
+def _values(frame: pd.DataFrame, name: str, merit: list[Item]) -> list[Item]:
+    """Errors, curves and parity; ``merit`` takes the place of the table of errors and of the residual.
+
+    A force's angle starts anywhere in each run: residuals of several runs over it are no picture of anything.
+    """
     rms = {k: float(np.sqrt(np.mean((frame["measured"] - frame[k]) ** 2))) for k in ("before", "after")}
     shown = unit(str(frame["unit"].iloc[0]))
     words = f"rms residual {number(rms['before'])} {shown} before and {number(rms['after'])} {shown} after"
     parity = Picture(
         figures.parity(frame, name),
-        "Parity on held-out runs, and distribution of the residual beside the measurement noise alone.",
+        "Parity on held-out runs, axis by axis, and distribution of the residual beside the noise alone."
+        if len(figures.axes_of(frame)) > 1
+        else "Parity on held-out runs, and distribution of the residual beside the noise alone.",
         f"Scatter of predicted over measured {name} and histogram of both residuals; {words}.",
     )
     if frame.groupby(["run", figures.axis_labels(frame)]).size().max() < FEWEST:
         return [errors(frame), parity]
-    return [errors(frame), *_curves(frame, name, words), parity]
+    if merit:
+        return [*merit, *_curves(frame, name, words), parity]
+    residual = Picture(
+        figures.residuals(frame, name),
+        "Residual of all held-out runs: median and the band that holds 80 % of the values.",
+        f"Residual of the base model and of the model with effects; {words}.",
+    )
+    return [errors(frame), *_curves(frame, name, words), residual, parity]
 
 
 def _curves(frame: pd.DataFrame, name: str, words: str) -> list[Item]:
-    """Overlay, maps where there are places on a face, and residual."""
+    """Overlay, and maps where there are places on a face."""
     runs, shown = frame["run"].nunique(), figures.shown_runs(frame)
     part = f" Runs {listing(shown)} of {runs}." if runs > len(shown) else ""
     blocks = frame["angle_deg"].notna().all() and frame["t_s"].nunique() > 1
@@ -65,12 +80,7 @@ def _curves(frame: pd.DataFrame, name: str, words: str) -> list[Item]:
                 f"Maps of measured deviation and of both residuals; {words}.",
             )
         )
-    residual = Picture(
-        figures.residuals(frame, name),
-        "Residual of all held-out runs: median and the band that holds 80 % of the values.",
-        f"Residual of the base model and of the model with effects; {words}.",
-    )
-    return [*items, residual]
+    return items
 
 
 def errors(frame: pd.DataFrame) -> Table:

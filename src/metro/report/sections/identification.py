@@ -32,7 +32,7 @@ RUN_BLOCKS = {
     "waviness": "waviness",
     "observability": "observability of the joints",
 }
-LONGEST = 30
+LONGEST, ABREAST = 30, 3
 
 
 def identification(results: Results) -> Section:
@@ -197,13 +197,19 @@ def _by_run(blocks: JSON, name: str, caption: str) -> Table:
     body = [
         [str(run), *(row.get(column, "–") for column in columns)] for run, row in list(rows.items())[:LONGEST]
     ]
-    return Table(
-        ["run", *columns],
-        body,
-        caption + _more(len(rows)),
-        [1, *([1.2] * len(columns))],
-        small=len(columns) > 5,
-    )
+    if len(columns) == 1 and len(body) > ABREAST:
+        return _abreast(["run", *columns], body, caption + _more(len(rows)))
+    small = len(columns) > 5
+    widths = [0] * (1 + len(columns)) if small else [1, *([1.2] * len(columns))]
+    return Table(["run", *columns], body, caption + _more(len(rows)), widths, small=small)
+
+
+def _abreast(header: list[str], body: list[list[str]], caption: str) -> Table:
+    """Set a long table of two columns in several pairs of columns side by side."""
+    height = -(-len(body) // ABREAST)
+    filled = [*body, *([["", ""]] * (ABREAST * height - len(body)))]
+    rows = [[cell for part in range(ABREAST) for cell in filled[part * height + i]] for i in range(height)]
+    return Table(header * ABREAST, rows, caption, [0.7, 1.5] * ABREAST)
 
 
 def _flat(value: Any, name: str) -> dict[str, str]:

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import verdicts as figures
 from metro.report.numbers import number, percent, probability, quantity, unit, words
+from metro.report.phrases import plain
 from metro.report.results import Results, title
-from metro.report.sections.verdict import STATUS, error_text, parameter_name, sentence
+from metro.report.sections.verdict import STATUS, error_cell, left_words, parameter_name, sentence
 from metro.units import JSON
 
 LONGEST = 16
@@ -20,17 +21,18 @@ def loop(results: Results) -> Section:
     for observable, entry in results.verdicts().items():
         name = title(observable)
         items.append(Heading(f"{name[0].upper()}{name[1:]}: {STATUS.get(str(entry.get('status')), '–')}"))
-        items += _observable(observable, entry, results.told(observable))
+        items += _observable(observable, entry, results.told(observable), left_words(results, observable))
     if not items:
         nothing = "There was no residual to trace: no held-out run has both a measurement and a prediction."
         return Section("The closed loop", [Paragraph(nothing)])
-    return Section("The closed loop", items, page=True)
+    return Section("The closed loop", items)
 
 
-def _observable(observable: str, entry: JSON, told: JSON) -> list[Item]:
+def _observable(observable: str, entry: JSON, told: JSON, left: str) -> list[Item]:
     shown = entry.get("unit") or told.get("unit")
     noise = told.get("noise") or {}
-    items: list[Item] = [Paragraph(str(told.get("words") or sentence(observable, entry)))]
+    words_told = str(told.get("words") or "").partition(" What is left: ")[0]
+    items: list[Item] = [Paragraph(words_told or sentence(observable, entry, left))]
     if noise:
         items.append(Paragraph(_noise_words(noise, shown)))
     items += _added(entry)
@@ -46,11 +48,12 @@ def _observable(observable: str, entry: JSON, told: JSON) -> list[Item]:
                 alt,
             )
         )
-    return [*items, *_rest(entry, told, shown)]
+    return [*items, *_rest(entry, told, shown, left)]
 
 
 def _noise_words(noise: JSON, shown: str | None) -> str:
-    return f"Noise floor {number(noise.get('floor'))} {unit(shown)}. {noise.get('words') or ''}".strip()
+    floor = f"{number(noise.get('floor'))} {unit(shown)}".strip()
+    return f"Noise floor {floor}. {noise.get('words') or ''}".strip()
 
 
 def _added(entry: JSON) -> list[Item]:
@@ -119,26 +122,23 @@ def _path(path: list[JSON], entry: JSON, shown: str | None) -> list[Item]:
         for step in path
     ]
     header = ["model", *(name for _, name in known), "of the signal"]
-    caption = f"How the model grew. Final held-out error {error_text(entry.get('after'), shown)}."
+    caption = f"How the model grew. Final held-out error {error_cell(entry.get('after'), shown)}."
     numeric = list(range(1, len(header)))
     return [Table(header, rows, caption, [2.4, *([1.4] * len(known)), 1], numeric=numeric)]
 
 
-def _rest(entry: JSON, told: JSON, shown: str | None) -> list[Item]:
+def _rest(entry: JSON, told: JSON, shown: str | None, left: str) -> list[Item]:
     items: list[Item] = []
     entries = [e for e in told.get("signature") or [] if e.get("amplitude") is not None]
-    if entries:
+    if len({e["label"] for e in entries}) > 1:
         full = [f"{e.get('axis') or ''} {e['label']}".strip() for e in entries if e.get("significant")]
         alt = "Significant: " + (", ".join(full[:6]) if full else "nothing") + "."
         caption = "Signature of what is left, by axis and pattern; full bars are significant."
         items.append(Picture(figures.signature(entries, shown or ""), caption, alt))
     rest = entry.get("unexplained") or {}
     if rest.get("signature"):
-        items.append(
-            Paragraph(
-                f"Unexplained: {number(rest.get('rms'))} {unit(shown)} rms, {rest['signature']}.", "warning"
-            )
-        )
+        size = f"{number(rest.get('rms'))} {unit(shown)} rms"
+        items.append(Paragraph(f"Unexplained: {size}, {left or plain(rest['signature'])}.", "warning"))
     groups = [" and ".join(words(str(n)) for n in group) for group in entry.get("indistinguishable") or []]
     if groups:
         items.append(Paragraph("Cannot be told apart with these data: " + "; ".join(groups) + "."))
@@ -149,5 +149,5 @@ def _rest(entry: JSON, told: JSON, shown: str | None) -> list[Item]:
     if hidden:
         items += [Paragraph("Cannot be seen in this batch:"), Bullets(hidden)]
     if entry.get("next_experiment"):
-        items.append(Paragraph(f"Measure next: {entry['next_experiment']}"))
+        items.append(Paragraph(f"Measure next: {plain(entry['next_experiment']).rstrip('.')}."))
     return items

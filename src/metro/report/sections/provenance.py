@@ -27,9 +27,7 @@ LIMITS = {
 
 def provenance(results: Results) -> Section:
     """Write hold-out plan, limits of the models, settings, versions and the hash of every source file."""
-    return Section(
-        "Provenance", [*_plan(results), *_limits(results), *_code(results), *_sources(results)], page=True
-    )
+    return Section("Provenance", [*_plan(results), *_limits(results), *_code(results), *_sources(results)])
 
 
 def _plan(results: Results) -> list[Item]:

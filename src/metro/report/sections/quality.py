@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+import re
+
 import pandas as pd
 
 from metro.report.content import Item, Paragraph, Section, Table
-from metro.report.numbers import number, words
+from metro.report.numbers import listing, number, words
 from metro.report.results import Results
 
-LONGEST = 40
+LONGEST, MOST_NAMES = 40, 24
 
 
 def quality(results: Results) -> Section:
-    """List every failed check with its message, then each kind of check with its worst value."""
+    """List what failed, then each kind of check with the range of its values."""
     table = results.tables.get("qc")
+    page = bool(results.verdicts())  # a first page that is full of verdicts stands alone
     if table is None:
         return Section(
-            "Data quality", [Paragraph("No signal was read, so there was nothing to check.")], page=True
+            "Data quality", [Paragraph("No signal was read, so there was nothing to check.")], page
         )
     failed = table[~table["ok"].astype(bool)]
     checks = table["check"].nunique()
     items: list[Item] = []
     if failed.empty:
-        items.append(Paragraph(f"All {len(table)} checks of {checks} kinds passed."))
+        kinds = f"{checks} kinds" if checks > 1 else "one kind"
+        items.append(Paragraph(f"All {len(table)} checks, of {kinds}, passed."))
     else:
         items.append(
             Paragraph(
@@ -32,34 +36,62 @@ def quality(results: Results) -> Section:
         )
         items.append(_failures(failed))
     items.append(_checked(table))
-    return Section("Data quality", items, page=True)
+    return Section("Data quality", items, page)
 
 
 def _failures(failed: pd.DataFrame) -> Table:
+    """Tabulate what failed, a row for each check and meaning, with the runs (or files) that it failed in."""
+    groups = failed.assign(meaning=failed["message"].map(_without_numbers)).groupby(
+        ["check", "meaning"], sort=False
+    )
     rows = [
         [
-            str(r["file"]),
-            str(r["run"] or "–"),
-            words(str(r["check"])),
-            number(r["value"]),
-            number(r["limit"]),
-            str(r["message"]),
+            words(str(check)),
+            _span(part["value"]),
+            _limit(part["limit"]),
+            str(part["message"].iloc[0]) + (f" (and {len(part) - 1} more alike)" if len(part) > 1 else ""),
+            _where(part),
         ]
-        for _, r in failed.head(LONGEST).iterrows()
+        for (check, _), part in groups
     ]
-    more = f" The first {LONGEST} of {len(failed)}." if len(failed) > LONGEST else ""
-    header = ["file", "run", "check", "value", "limit", "what it means"]
-    return Table(header, rows, "Checks that failed." + more, [1.8, 0.8, 1.1, 0.8, 0.8, 2.6], numeric=[3, 4])
+    more = f" The first {LONGEST} of {len(rows)}." if len(rows) > LONGEST else ""
+    header = ["check", "value", "limit", "what it means", "where"]
+    caption = f"Checks that failed, alike ones together.{more}"
+    return Table(header, rows[:LONGEST], caption, [1.1, 1.2, 0.7, 2.6, 2], numeric=[1, 2])
+
+
+def _without_numbers(message: object) -> str:
+    return re.sub(r"[-+]?\d[\d.,]*(?:e[-+]?\d+)?", "#", str(message))
+
+
+def _where(part: pd.DataFrame) -> str:
+    """Name the runs, else the files, that a check failed in."""
+    runs = [str(run) for run in part["run"] if run and pd.notna(run)]
+    named = list(dict.fromkeys(runs if len(runs) == len(part) else part["file"].astype(str)))
+    if len(named) > MOST_NAMES:
+        return f"{', '.join(named[:MOST_NAMES])} and {len(named) - MOST_NAMES} more"
+    return listing(named)
+
+
+def _span(values: pd.Series) -> str:
+    known = values.dropna()
+    if known.empty:
+        return "–"
+    ends = [number(known.min()), number(known.max())]
+    return ends[0] if ends[0] == ends[1] else " … ".join(ends)
+
+
+def _limit(limits: pd.Series) -> str:
+    known = limits.dropna().unique()
+    return "–" if len(known) == 0 else number(float(known[0])) if len(known) == 1 else "differs"
 
 
 def _checked(table: pd.DataFrame) -> Table:
     rows = []
     for check, part in table.groupby("check", sort=True):
         failed = int((~part["ok"].astype(bool)).sum())
-        values = part["value"].dropna()
-        limits = part["limit"].dropna().unique()
-        span = "–" if values.empty else f"{number(values.min())} … {number(values.max())}"
-        limit = number(float(limits[0])) if len(limits) == 1 else "–" if len(limits) == 0 else "differs"
-        rows.append([words(str(check)), str(len(part)), str(failed), span, limit])
+        rows.append(
+            [words(str(check)), str(len(part)), str(failed), _span(part["value"]), _limit(part["limit"])]
+        )
     header = ["check", "times", "failed", "values", "limit"]
     return Table(header, rows, "What was checked.", [2, 0.7, 0.7, 2, 1], numeric=[1, 2, 3, 4])

@@ -8,11 +8,14 @@ import pandas as pd
 
 from metro.report.content import Facts, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import verdicts as figures
+from metro.report.figures.comparison import coordinate, overlay
 from metro.report.figures.verdicts import Change
 from metro.report.numbers import listing, number, percent, quantity, unit, with_interval, words
+from metro.report.phrases import plain, rest_words
 from metro.report.results import Results, title
 from metro.units import JSON
 
+MOST_DRAWN = 2  # verdicts beside which a first page has room for a run
 STATUS = {
     "clean": "clean",
     "explained": "explained",
@@ -23,8 +26,8 @@ STATUS = {
 }
 
 
-def sentence(observable: str, entry: JSON) -> str:
-    """Say the verdict on an observable in a few sentences, with its numbers."""
+def sentence(observable: str, entry: JSON, left: str = "") -> str:
+    """Say the verdict on an observable in a few sentences, with its numbers and what is ``left``."""
     name, status = title(observable), str(entry.get("status"))
     start = name[0].upper() + name[1:]
     floor = entry.get("noise_floor")
@@ -36,11 +39,11 @@ def sentence(observable: str, entry: JSON) -> str:
         "explained": f"{start}: the difference from the base model is traced to {found}. {_fall(entry)} "
         f"What is left is within the noise{noise}.",
         "partly_explained": f"{start}: part of the difference is traced to {found}. {_fall(entry)} "
-        f"A significant rest remains{noise}. {_rest(entry)}",
+        f"A significant rest remains{noise}. {_rest(entry, left)}",
         "undetermined": f"{start}: something is missing from the base model; these data cannot tell what. "
         f"{_rivals(entry)}{_fall(entry)}",
         "unexplained": f"{start}: the base model leaves a significant error{noise}, and no effect of the "
-        f"library accounts for it. {_rest(entry)}",
+        f"library accounts for it. {_rest(entry, left)}",
         "insufficient": f"{start}: too few runs to tell. {_fall(entry)}",
     }
     return says.get(status, f"{start}: {words(status)}.").strip()
@@ -64,12 +67,25 @@ def parameter_name(name: str, entry: Any) -> str:
 
 
 def error_text(error: JSON | None, unit_name: str | None) -> str:
-    """Write an error of the verdict: rms with its interval and unit."""
+    """Write an error of the verdict: rms with its interval, where it has one, and unit."""
     if not error or error.get("rms") is None:
         return "–"
-    text = with_interval(error["rms"], error.get("ci95"))
+    text = with_interval(error["rms"], known_interval(error))
     shown = unit(unit_name)
     return f"{text} {shown}" if shown else text
+
+
+def error_cell(error: JSON | None, unit_name: str | None) -> str:
+    """Write an error for a table, where an interval that is not known reads –."""
+    if not error or error.get("rms") is None or known_interval(error):
+        return error_text(error, unit_name)
+    return f"{number(error['rms'])} ± – {unit(unit_name)}".strip()
+
+
+def known_interval(error: JSON) -> list[float | None] | None:
+    """Return the interval of an error; None where one condition, which has no scatter, makes it a point."""
+    low, high = error.get("ci95") or (None, None)
+    return [low, high] if low is not None and high is not None and high > low else None
 
 
 def change(label: str, entry: JSON) -> Change | None:
@@ -90,8 +106,8 @@ def change(label: str, entry: JSON) -> Change | None:
 
 
 def _scaled(error: JSON) -> tuple[float, float] | None:
-    ci95, rms = error.get("ci95"), error.get("rms")
-    if not ci95 or None in ci95 or not rms:
+    ci95, rms = known_interval(error), error.get("rms")
+    if not ci95 or not rms:
         return None
     scale = 100 * error["nrmse"] / rms
     return scale * ci95[0], scale * ci95[1]
@@ -126,12 +142,18 @@ def _fall(entry: JSON) -> str:
     return f"{where} the error goes from {old} to {new}{share}."
 
 
-def _rest(entry: JSON) -> str:
+def _rest(entry: JSON, left: str) -> str:
     rest = entry.get("unexplained") or {}
     if not rest.get("signature"):
         return ""
     size = f" ({number(rest['rms'])}{_unit(entry)} rms)" if rest.get("rms") is not None else ""
-    return f"What is left{size}: {rest['signature']}."
+    return f"What is left{size}: {left or plain(str(rest['signature']))}."
+
+
+def left_words(results: Results, observable: str) -> str:
+    """Say what an observable's loop left over, as an engineer would; empty where that is not known."""
+    teeth = int((results.batch.manifest.get("tool") or {}).get("teeth") or 0)
+    return rest_words(results.told(observable).get("signature") or [], teeth)
 
 
 def _rivals(entry: JSON) -> str:
@@ -145,7 +167,15 @@ def summary(results: Results) -> Section:
     """Write the first page: what was measured, the verdicts, the key numbers."""
     items: list[Item] = [Paragraph(measured_words(results))]
     verdicts = results.verdicts()
-    items += [Paragraph(sentence(name, entry), "verdict") for name, entry in verdicts.items()]
+    items += [
+        Paragraph(sentence(name, entry, left_words(results, name)), "verdict")
+        for name, entry in verdicts.items()
+    ]
+    nexts = [
+        f"{title(n)}: {plain(e['next_experiment'])}" for n, e in verdicts.items() if e.get("next_experiment")
+    ]
+    if nexts:
+        items.append(Paragraph("Measure next: " + "; ".join(nexts).rstrip(".") + "."))
     if not verdicts:
         nothing = "No held-out measurement could be compared with a prediction in this batch: no verdict."
         items.append(Paragraph(f"{nothing} {_identified_words(results.identified)}".strip(), "verdict"))
@@ -159,10 +189,20 @@ def summary(results: Results) -> Section:
                 "; ".join(f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in told),
             )
         )
-    nexts = [f"{title(n)}: {e['next_experiment']}" for n, e in verdicts.items() if e.get("next_experiment")]
-    if nexts:
-        items.append(Paragraph("Measure next: " + "; ".join(nexts).rstrip(".") + "."))
-    return Section("Summary", items)
+    return Section("Summary", [*items, *(_one_run(results) if len(verdicts) <= MOST_DRAWN else [])])
+
+
+def _one_run(results: Results) -> list[Item]:
+    """Draw the held-out run that the base model misses most, of the first observable that has curves."""
+    for name in results.verdicts():
+        frame = results.compared(name) if name != "lobes" else None
+        if frame is None or not coordinate(frame):
+            continue
+        square = (frame["measured"] - frame["before"]) ** 2
+        run = str(square.groupby(frame["run"]).mean().idxmax())
+        caption = f"The held-out run that the base model misses most, {run}: {title(name)}."
+        return [Picture(overlay(frame[frame["run"] == run], title(name)), caption, caption)]
+    return []
 
 
 def _identified_words(found: JSON) -> str:
@@ -206,12 +246,12 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
                     ),
                     (
                         "error before",
-                        error_text(before, entry.get("unit")),
+                        error_cell(before, entry.get("unit")),
                         f"{percent(before.get('nrmse'))} of the signal",
                     ),
                     (
                         "error after",
-                        error_text(after, entry.get("unit")),
+                        error_cell(after, entry.get("unit")),
                         f"{percent(after.get('nrmse'))} of the signal",
                     ),
                     (
@@ -226,8 +266,8 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
         [
             title(name),
             STATUS.get(str(entry.get("status")), "–"),
-            error_text(entry.get("before"), entry.get("unit")),
-            error_text(entry.get("after"), entry.get("unit")),
+            error_cell(entry.get("before"), entry.get("unit")),
+            error_cell(entry.get("after"), entry.get("unit")),
             f"{number(entry.get('noise_floor'))}{_unit(entry)}",
             listing([words(str(e["effect"])) for e in entry.get("effects") or []]) or "none",
         ]
@@ -261,9 +301,12 @@ def _run_words(runs: pd.DataFrame) -> str:
     if runs.empty:
         return ""
     operations = listing([str(o) for o in runs["operation"].dropna().unique() if str(o)])
-    made = f" {len(runs)} cutting runs ({operations or 'operation not stated'})"
+    one = len(runs) == 1
+    made = f" {len(runs)} cutting run{'' if one else 's'} ({operations or 'operation not stated'})"
     recorded = int(runs["role"].isin(["identify", "validate"]).sum())
     held = int((runs["role"] == "validate").sum())
     if not recorded:
-        return f"{made} were made; none of their records is in the batch."
+        return (
+            f"{made} {'was' if one else 'were'} made; no record of {'it' if one else 'them'} is in the batch."
+        )
     return f"{made}, {recorded} recorded, {held} of them held out: no model saw those before it was judged."

@@ -1,0 +1,89 @@
+"""Helical milling: the tool travels on a helix, its periphery inclined by the ramp, its bottom edges in the work."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from metro.cutting.chip import Cut
+from metro.cutting.cutter import Cutter
+from metro.cutting.law import EdgeLaw
+from metro.cutting.time_signal import time_signal
+from metro.units import Array
+
+BOTTOM_EDGES = ("kfac", "kfae")
+
+
+@dataclass(frozen=True)
+class Helix:
+    """Helical milling: the tool travels on a helix of ``radius`` m, sinking ``pitch`` m per orbit.
+
+    ``axial_feed`` is the axial feed per tooth, m, which the bottom edges cut.
+    """
+
+    radius: float
+    pitch: float
+    axial_feed: float
+
+    @property
+    def ramp(self) -> float:
+        """Ramp angle of the path, rad."""
+        return math.atan(self.pitch / (2.0 * math.pi * self.radius))
+
+
+def ramped(vectors: Array, ramp: float) -> Array:
+    """Incline the feed frame of (n, 3, …) vectors downwards by the ramp angle: x and z turn about y."""
+    c, s = math.cos(ramp), math.sin(ramp)
+    x, y, z = vectors[:, 0], vectors[:, 1], vectors[:, 2]
+    return np.stack([c * x + s * z, y, c * z - s * x], axis=1)
+
+
+def turned(vectors: Array, angle: float | Array) -> Array:
+    """Turn (n, 3, …) vectors about z, counter-clockwise, by one angle or, (n, 3) vectors, by (n,) angles, rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = vectors[:, 0], vectors[:, 1], vectors[:, 2]
+    return np.stack([c * x - s * y, s * x + c * y, z], axis=1)
+
+
+def bottom_thrust(cutter: Cutter, helix: Helix) -> Array:
+    """Thrust of all bottom edges along z per unit of K_Fac and of K_Fae, (2,): N R s_ta, m², and N R, m.
+
+    It is steady: the bottom edges are in the work over the whole revolution ([T] eq. 7 and 8).
+    """
+    reach = cutter.teeth * cutter.radius
+    return np.array([reach * helix.axial_feed, reach])
+
+
+def helical_signal(
+    cutter: Cutter,
+    law: EdgeLaw,
+    cut: Cut,
+    helix: Helix,
+    coefficients: Array,
+    speed: float,
+    orbit_speed: float,
+    time: Array,
+    phase: float = 0.0,
+    direction: float = 0.0,
+    true_path: bool = False,
+) -> Array:
+    """Force on the tool at given times, (n, 3) N, in the fixed work frame, which does not turn with the orbit.
+
+    Peripheral forces of the feed frame, inclined by the ramp; the bottom edges' thrust, which is along the
+    spindle and not inclined; all turned to the direction of feed (physics.md §2). The table turns with the
+    feed: its angles count from the feed's left, so the teeth pass there faster or slower by the orbit speed.
+
+    Parameters
+    ----------
+    coefficients : (8,) SI, ``COEFFICIENTS`` then ``BOTTOM_EDGES``.
+    speed, orbit_speed : of the spindle (clockwise) and of the orbit (counter-clockwise positive), rad/s.
+    phase : immersion of tooth 0 at t = 0, from the feed's left, rad. direction : of feed at t = 0,
+        counter-clockwise from work +x, rad.
+    """
+    relative = speed + orbit_speed
+    force = time_signal(cutter, law, cut, coefficients[:6], relative, time, phase, true_path)
+    force = ramped(force, helix.ramp)
+    force[:, 2] += bottom_thrust(cutter, helix) @ coefficients[6:]
+    return turned(force, direction + orbit_speed * time)

@@ -1,0 +1,73 @@
+"""What is left over, in the words of an engineer: offsets, once per revolution, tooth passing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from metro.report.numbers import listing, percent
+from metro.units import JSON
+
+MOST_ORDERS = 6
+
+
+def rest_words(entries: Sequence[JSON], teeth: int) -> str:
+    """Describe the significant places of a signature, the largest kind first; empty where there are none.
+
+    Parameters
+    ----------
+    entries : ``{"axis", "label", "excess", "relative", "significant"}`` of ``loop.json``; labels are ``all``,
+        ``mean`` and ``order <k>`` of the spindle. teeth : of the cutter; 0 where not known.
+    """
+    kinds: dict[str, list[JSON]] = {}
+    for entry in entries:
+        if entry.get("significant"):
+            kinds.setdefault(_kind(str(entry["label"]), teeth), []).append(entry)
+    ranked = sorted(kinds.items(), key=lambda item: -max(_size(entry) for entry in item[1]))
+    return "; ".join(_kind_words(kind, found) for kind, found in ranked)
+
+
+def plain(text: str) -> str:
+    """Return a sentence of ``verdict.json`` with the places of a signature in words.
+
+    What an experiment is to describe is left out: the report says it next to it.
+    """
+    text = re.sub(r"(, to describe what is left):.*$", r"\1", text)
+    text = re.sub(r"\ball along in (\w+)", r"throughout in \1", text)
+    text = re.sub(r"\bmean in (\w+)", r"a constant offset in \1", text)
+    text = re.sub(r"\border 1 in (\w+)", r"once per revolution in \1", text)
+    text = re.sub(r"\border (\d+) in (\w+)", r"\1 times per revolution in \2", text)
+    text = text.replace(" % of the signal there)", " %)").replace(" and 1 more places", " and one more place")
+    return re.sub(r" and (\d+) more places", r" and smaller parts at \1 more places", text)
+
+
+def _kind(label: str, teeth: int) -> str:
+    found = re.fullmatch(r"order (\d+)", label)
+    if found is None:
+        return {"all": "throughout", "mean": "a constant offset"}.get(label, label)
+    order = int(found[1])
+    if teeth > 1 and order % teeth == 0:
+        return "at the tooth passing and its harmonics"
+    if order == 1:
+        return "once per revolution"
+    return "between the harmonics of the tooth passing" if teeth > 1 else "at multiples of the spindle speed"
+
+
+def _kind_words(kind: str, entries: list[JSON]) -> str:
+    orders = sorted({int(o[1]) for e in entries if (o := re.fullmatch(r"order (\d+)", str(e["label"])))})
+    largest = max(entries, key=_size)
+    if len(orders) <= 1:
+        axes = [_share(entry) for entry in sorted(entries, key=lambda entry: -_size(entry))]
+        return f"{kind} ({listing(axes)} of the signal)"
+    named = [str(order) for order in orders[:MOST_ORDERS]]
+    more = " …" if len(orders) > MOST_ORDERS else ""
+    most = f"{_share(largest)} of the signal at {largest['label']}"
+    return f"{kind} (orders {', '.join(named)}{more}; most in {most})"
+
+
+def _share(entry: JSON) -> str:
+    return f"{entry.get('axis') or ''} {percent(entry.get('relative'))}".strip()
+
+
+def _size(entry: JSON) -> float:
+    return float(entry.get("excess") or entry.get("amplitude") or 0.0)

@@ -1,0 +1,109 @@
+"""The cutting force of the held-out runs in figures of merit: table, order spectrum, peaks of the teeth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+import pandas as pd
+
+from metro.report.content import Item, Picture, Table
+from metro.report.figures import force as figures
+from metro.report.numbers import number, with_interval
+from metro.report.results import Results
+
+LONGEST = 30
+# metric, its title, and whether its share of the measured is told
+COLUMNS = (
+    ("nrmse", "NRMSE (%)", False),
+    ("peak", "peak (N)", True),
+    ("mean", "mean (N)", True),
+    ("phase", "phase (°)", False),
+)
+
+
+def force_items(results: Results) -> list[Item]:
+    """Write the figures of merit of each held-out run, the order spectra and the peaks of the teeth.
+
+    Nothing where they were not computed.
+    """
+    metrics, orders = results.tables.get("force_metrics"), results.tables.get("force_orders")
+    if metrics is None or orders is None:
+        return []
+    teeth = int(metrics["tooth"].max())
+    peaks = metrics[metrics["metric"] == "tooth_peak"]
+    return [
+        metrics_table(metrics),
+        Picture(
+            figures.spectrum(orders, teeth),
+            "Order spectrum of the measured force and of what the predictions leave, rms over the held-out "
+            f"runs. Ticks stand at the tooth passing, every {teeth} orders.",
+            _spectrum_words(orders),
+        ),
+        Picture(
+            figures.tooth_peaks(peaks),
+            f"Largest magnitude within each pitch, the {teeth} teeth of a run in the order of passing; "
+            "whiskers: 95 % interval of predicted less measured.",
+            f"Bars of the measured peak of each of {teeth} teeth, and the predicted ones beside them.",
+        ),
+    ]
+
+
+def metrics_table(metrics: pd.DataFrame) -> Table:
+    """Tabulate NRMSE, peak, mean and phase of each run and axis; the base model in grey beside."""
+    whole = metrics[metrics["metric"] != "tooth_peak"]
+    figures_of = {
+        (row["run"], row["axis"], row["metric"], row["model"]): row for row in whole.to_dict("records")
+    }
+    keys = list(dict.fromkeys(zip(metrics["run"], metrics["axis"], strict=True)))
+    changed = any(
+        not math.isnan(row["value"]) and row["value"] != figures_of[(*key[:3], "after")]["value"]
+        for key, row in figures_of.items()
+    )
+    models = ["after", "before"] if changed else ["before"]
+    rows = [
+        [
+            str(run),
+            str(axis),
+            *(
+                _cell(figures_of[run, axis, metric, model], share, model == models[0])
+                for metric, _, share in COLUMNS
+                for model in models
+            ),
+        ]
+        for run, axis in keys[:LONGEST]
+    ]
+    header = ["run", "axis"]
+    for _, name, _ in COLUMNS:
+        header += [name, "before"] if changed else [name]
+    widths = [w for _, _, share in COLUMNS for w in (2.2 if share else 1.6, 1)[: len(models)]]
+    caption = (
+        "Errors on held-out runs, predicted less measured, with 95 % intervals from the scatter over the "
+        "time blocks of a run (one block: from its noise): NRMSE, largest magnitude, mean, and phase "
+        "(positive: the measured force comes later)."
+    )
+    caption += " In grey: the base model." if changed else " Base model; nothing was added."
+    caption += f" The first {LONGEST} of {len(keys)} rows." if len(keys) > LONGEST else ""
+    return Table(
+        *(header, rows, caption, [1.1, 0.5, *widths]),
+        faint=[i for i, name in enumerate(header) if name == "before"],
+        small=changed,
+    )
+
+
+def _cell(row: Mapping[Hashable, Any], share: bool, whole: bool) -> str:
+    """Write a figure of merit with interval and share; what is beside it for comparison without them."""
+    if not whole:
+        return number(row["value"])
+    text = with_interval(float(row["value"]), [float(row["lo"]), float(row["hi"])])
+    return f"{text} ({number(row['percent'], 2)}\u00a0%)" if share else text
+
+
+def _spectrum_words(orders: pd.DataFrame) -> str:
+    told = []
+    for axis, part in orders.groupby("axis"):
+        largest = int(part["after"].argmax())
+        order, size = part["order"].to_numpy()[largest], part["after"].to_numpy()[largest]
+        told.append(f"{axis}: largest residual at order {order}, {number(float(size))} N")
+    return "; ".join(told) + "."
