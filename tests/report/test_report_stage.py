@@ -34,4 +34,10 @@ def test_empty_and_absent_tables_are_left_out_and_sources_are_gathered(tmp_path)
     results = read_results(tmp_path / "processed", tmp_path / "reports", {}, "")
     assert "qc" not in results.tables
     assert "published_errors" not in results.tables
-    assert set(results.sources) == {"runs.csv", "comparison.csv", "lobes_final.csv", "face_map.csv", "frf_used.csv"}
+    assert set(results.sources) == {
+        "runs.csv",
+        "comparison.csv",
+        "lobes_final.csv",
+        "face_map.csv",
+        "frf_used.csv",
+    }

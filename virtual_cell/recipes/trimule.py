@@ -43,9 +43,9 @@ MODES = {
     for direction, rows in _TABLE_6.items()
 }
 # table 5, position: x, y, z (mm). The source draws the end stiffness without numbers, so that of this
-# simulated machine is made up (kx, ky, kz in N/um) after what is said of it: y by far the stiffest, all less towards
-# the border. Along x and z the first position has the static stiffness of the modes above. The cuts of this
-# batch are those of a rigid tool.
+# simulated machine is made up (kx, ky, kz in N/um) after what is said of it: y by far the stiffest, all less
+# towards the border. Along x and z the first position has the static stiffness of the modes above. The cuts
+# of this batch are those of a rigid tool.
 _STATIONS = {
     "1": ((0, 0, 0), (0.93, 31.0, 9.3)),
     "2": ((0, 0, -320), (0.84, 27.5, 8.1)),

@@ -57,12 +57,11 @@ def chip_thickness(cutter: Cutter, cut: Cut, immersion: Array, height: Array, tr
     least = np.full(immersion.shape, np.inf)
     for steps in range(1, passes + 1):
         earlier = np.roll(deviation, -steps, axis=1)
-        pitch, radius = np.broadcast_to(cutter.pitch(steps), earlier.shape).copy(), cutter.radius + earlier
-        thickness = (feed * pitch) * sine
-        thickness += deviation - earlier
+        pitch, radius = cutter.pitch(steps), cutter.radius + earlier
+        thickness = (feed * pitch) * sine + (deviation - earlier)
         if true_path:
             lean = (feed / radius) * cosine
-            lean *= pitch - pitch * lean
+            lean = lean * pitch * (1.0 - lean)
             thickness += lean * ((0.5 * radius) * lean - feed * sine)
         np.minimum(least, thickness, out=least)
     return least

@@ -160,9 +160,8 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         spread = left**2 + np.einsum("ij,jk,ik->i", directions, uncertain, directions)
         excess = spread - diagonal(block, replace(noise, misfit={}))
         names, number, rms = _axes(block)
-        share = noise.repeats.get(block.condition, 1) * block.repeats * rms**2
-        pulled = np.bincount(number, share * excess / variance**2)
-        weighed = np.bincount(number, (share / variance) ** 2)
+        pulled = np.bincount(number, rms**2 * excess / variance**2)
+        weighed = np.bincount(number, (rms**2 / variance) ** 2)
         for name, one, other in zip(names, pulled, weighed, strict=True):
             pull[name] = pull.get(name, 0.0) + float(one)
             weight[name] = weight.get(name, 0.0) + float(other)

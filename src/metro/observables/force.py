@@ -12,9 +12,10 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.cutting.cutter import Cutter
+from metro.cutting.helical import Helix
 from metro.cutting.law import EdgeLaw
 from metro.observables import cutting_force
-from metro.observables.force_model import ForceModel, ForceSetting, Helix
+from metro.observables.force_model import ForceModel, ForceSetting
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.signals import orders, steady
@@ -196,7 +197,7 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, *, zeroed:
         highest=highest,
         middles=middles,
         cut_length=float(row["cut_before_m"]) + 0.5 * cutting_force.or_zero(row["cut_length_mm"]) * MM,
-        helix=_helix(batch, row),
+        helix=helix(batch, row),
     )
     axis = table["axis"].to_numpy().astype(str)
     mean = (table["part"] == "mean").to_numpy()
@@ -225,7 +226,7 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, *, zeroed:
 def _zeros(axis: np.ndarray, mean: np.ndarray, time: Array, orbit: float) -> Array:
     """Directions (n, 3) of a zero offset of the dynamometer along x, y, z.
 
-    In helical milling the frame of the comparison turns with the orbit, and a zero in x and y turns the other way.
+    In helical milling the frame of the comparison turns with the orbit: zeros in x and y turn the other way.
     """
     along = {name: (axis == name) & mean for name in AXES}
     c, s = np.cos(orbit * time), np.sin(orbit * time)
@@ -234,7 +235,8 @@ def _zeros(axis: np.ndarray, mean: np.ndarray, time: Array, orbit: float) -> Arr
     return np.column_stack([x, y, along["z"].astype(float)])
 
 
-def _helix(batch: Batch, row: pd.Series) -> Helix | None:
+def helix(batch: Batch, row: pd.Series) -> Helix | None:
+    """Return the path of a helical run's tool; None of any other run."""
     if row["operation"] != "helical":
         return None
     tool = batch.manifest["tool"]

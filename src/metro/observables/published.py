@@ -17,6 +17,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.observables.problem import Block, Parameter, Problem, Refusal
+from metro.observables.published_forces import forces
 from metro.structure import Structure
 from metro.units import JSON, MM, UM, Array
 
@@ -66,9 +67,9 @@ class PrintedModel:
 
 
 def observe(
-    _batch: Batch, read: Callable[..., pd.DataFrame], _identified: JSON
+    batch: Batch, read: Callable[..., pd.DataFrame], _identified: JSON
 ) -> dict[str, pd.DataFrame] | Refusal:
-    """Return ``published_errors``, ``published_modes`` and ``published_loads`` of a published batch."""
+    """Return what the printed tables of a published batch say: tables ``published_…`` of the layout."""
     published = read("published")
     if published.empty:
         return Refusal("no published.csv")
@@ -76,6 +77,7 @@ def observe(
         "published_errors": errors(published),
         "published_modes": modes(published),
         "published_loads": loads(published),
+        "published_forces": forces(batch, published),
     }
 
 

@@ -24,7 +24,6 @@ ANGLES = 720
 SLICES_PER_RADIAN = 60
 TOLERANCE = 1e-6  # of the largest rigid force: [T]'s allowed difference e
 LIMIT = 200  # iterations per tooth passing
-HALVINGS = 16
 DIFFERENCE = 1e-9  # m, of the chip thickness, for the slope of a force law
 REVOLUTIONS = 6
 
@@ -132,8 +131,8 @@ def yielding_force(
     Parameters
     ----------
     coefficients : (6,) SI, shear, then edge, tangential, radial, axial. stiffness : (2, 2) N/m, feed frame.
-    scheme : ``newton``, with halved steps where a tooth leaves the cut, or ``fixed_point`` ([T] figure 6):
-        the force at a deflection gives the next deflection.
+    scheme : ``newton`` (semi-smooth: teeth may leave the cut) or ``fixed_point`` ([T] figure 6): the force at
+        a deflection gives the next deflection.
 
     Raises
     ------
@@ -145,7 +144,8 @@ def yielding_force(
     # surface that each tooth leaves at each angle, about the axis of rotation; the first revolution is rigid
     left = np.empty(((1 + revolutions) * ANGLES, *clear.shape[1:]))
     left[:ANGLES] = reach - np.minimum(clear, 0.0)
-    compliance, tolerance = np.linalg.inv(stiffness), TOLERANCE * float(np.abs(rigid).max())
+    compliance: Array = np.asarray(np.linalg.inv(stiffness), dtype=float)
+    tolerance = TOLERANCE * float(np.abs(rigid).max())
     solve = {"newton": _newton, "fixed_point": _fixed_point}[scheme]
     force, deflection = np.empty((revolutions * ANGLES, 3)), np.empty((revolutions * ANGLES, 2))
     block, most, residual = math.floor(_steps(cutter).min() + 1e-9), 0, 0.0
@@ -153,7 +153,7 @@ def yielding_force(
         at = np.arange(start, min(start + block, len(force)))
         here = edges.at(at % ANGLES)
         met = _met(cutter, cut, left, at + ANGLES, here)
-        response = _response(here, np.asarray(reach - met), compliance)
+        response = _response(here, reach, met, compliance)
         plane, iterations, error = solve(response, rigid[at % ANGLES, :2], tolerance)
         if error > tolerance:
             raise NotConvergedError(scheme, iterations, error)
@@ -231,11 +231,11 @@ def _met(cutter: Cutter, cut: Cut, left: Array, at: np.ndarray, edges: _Edges) -
     return np.asarray(surface - cut.feed_per_tooth * cutter.teeth * steps / ANGLES * edges.sine)
 
 
-def _response(edges: _Edges, clear: Array, compliance: Array) -> Response:
+def _response(edges: _Edges, reach: Array, met: Array, compliance: Array) -> Response:
     """Map from a force in the plane (B, 2) to the force at its deflection, F′, and ∂F′/∂F (B, 2, 2)."""
 
     def response(force: Array) -> tuple[Array, Array]:
-        thickness = clear + edges.towards(force @ compliance.T)
+        thickness = reach + edges.towards(force @ compliance.T) - met
         return edges.force(thickness)[:, :2], edges.slope(thickness) @ compliance
 
     return response
@@ -253,21 +253,11 @@ def _fixed_point(response: Response, force: Array, tolerance: float) -> Solution
 
 
 def _newton(response: Response, force: Array, tolerance: float) -> Solution:
-    """Solve F′(F) = F at every angle; steps past a kink are halved until they bring the two closer."""
-    following, slope = response(force)
+    """Solve F′(F) = F at every angle, with the slope of the side of a kink that each element is on."""
     for iteration in range(LIMIT + 1):
-        difference = following - force
-        error = float(np.abs(difference).max())
+        following, slope = response(force)
+        error = float(np.abs(following - force).max())
         if error <= tolerance or iteration == LIMIT:
             break
-        step = np.linalg.solve(np.eye(2) - slope, difference[:, :, None])[:, :, 0]
-        share, size = np.ones(len(force)), np.linalg.norm(difference, axis=1)
-        for _ in range(HALVINGS):
-            trial = force + share[:, None] * step
-            following, slope = response(trial)
-            worse = np.linalg.norm(following - trial, axis=1) > np.maximum(size, tolerance)
-            if not worse.any():
-                break
-            share = np.where(worse, 0.5 * share, share)
-        force = trial
+        force = force + np.linalg.solve(np.eye(2) - slope, (following - force)[:, :, None])[:, :, 0]
     return force, iteration, error

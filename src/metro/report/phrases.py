@@ -61,8 +61,9 @@ def _kind_words(kind: str, entries: list[JSON]) -> str:
         return f"{kind} ({listing(axes)} of the signal)"
     named = [str(order) for order in orders[:MOST_ORDERS]]
     more = " …" if len(orders) > MOST_ORDERS else ""
-    most = f"{_share(largest)} of the signal at {largest['label']}"
-    return f"{kind} (orders {', '.join(named)}{more}; most in {most})"
+    share = percent(largest.get("relative"))
+    most = f"{largest.get('axis') or 'all'}, {share} of the signal at {largest['label']}"
+    return f"{kind} (orders {', '.join(named)}{more}; most along {most})"
 
 
 def _share(entry: JSON) -> str:

@@ -57,7 +57,7 @@ class _Closing:
 
 
 def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
-    """Write ``comparison``, ``lobes_final``, ``loop.json``, and the batch's ``verdict.json``, ``identified.json``.
+    """Write ``comparison``, ``lobes_final``, ``loop.json``, and the ``verdict.json`` and ``identified.json``.
 
     ``settings``: ``model_form_budget``, ``materiality``, ``false_additions``, ``held_out_gain``, ``seed``.
     """

@@ -24,6 +24,7 @@ TABLES = (
     "published_errors",
     "published_modes",
     "published_loads",
+    "published_forces",
 )
 
 

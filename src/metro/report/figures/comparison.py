@@ -23,7 +23,8 @@ COORDINATES = {
     "x_mm": "x (mm)",
     "t_s": "time (s)",
 }
-ROWS, BINS, POINTS = 3, 60, 1200
+RUNS, BINS, POINTS = 4, 60, 1200
+RUNS_OF_AXES = 3
 
 
 @dataclass(frozen=True)
@@ -187,7 +188,8 @@ def _abscissa(axes: Axes, column: str) -> None:
 
 def shown_runs(frame: pd.DataFrame) -> list[str]:
     """Return the runs that the overlay shows: the first few in the order of the table."""
-    return [str(run) for run in frame["run"].drop_duplicates()][:ROWS]
+    most = RUNS if len(axes_of(frame)) == 1 else RUNS_OF_AXES
+    return [str(run) for run in frame["run"].drop_duplicates()][:most]
 
 
 def axes_of(frame: pd.DataFrame) -> list[str]:

@@ -68,7 +68,7 @@ def face_maps(frame: pd.DataFrame) -> Figure:
     limit = float(np.nanquantile(np.abs(frame["deviation_um"]), 0.995)) or 1.0
     shape = float(np.ptp(frame["y_mm"]) / (np.ptp(frame["x_mm"]) or 1.0))
     with style.style():
-        figure, grid = style.new_figure(0.3 + rows * (0.6 + 2.6 * min(max(shape, 0.2), 1.2)), rows, 2)
+        figure, grid = style.new_figure(0.3 + rows * (0.5 + 2.2 * min(max(shape, 0.2), 1.2)), rows, 2)
         flat = [axes for row in grid for axes in row]
         for axes, run in zip(flat, runs, strict=False):
             x, y, z = _raster(frame[frame["run"] == run])

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PATTERNS = 12
+LABEL_ROOM = 90  # characters that fit side by side under a figure
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
             xlabel="run, in the order of cutting",
         )
         step = max(1, len(rows) // 24)
-        rotation = 90 if len(rows) > 10 or max((len(str(b["run"])) for b in rows), default=0) > 12 else 0
+        rotation = 90 if sum(len(str(b["run"])) + 2 for b in rows[::step]) > LABEL_ROOM else 0
         axes.set_xticks(x[::step], [str(b["run"]) for b in rows][::step], rotation=rotation)
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=3)

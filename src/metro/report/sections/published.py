@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pandas as pd
 
-from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
+from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
+from metro.report.figures import force as figures
 from metro.report.numbers import number, unit
 from metro.report.results import Results
 
@@ -23,6 +26,7 @@ def published(results: Results) -> Section | None:
     items += _single(table[table["predicted"].isna()], results)
     items += _modes(results.tables.get("published_modes"))
     items += _loads(results.tables.get("published_loads"))
+    items += _forces(results, table)
     return Section("Published tables", items)
 
 
@@ -150,3 +154,30 @@ def _loads(loads: pd.DataFrame | None) -> list[Item]:
         "differs, no one stiffness describes the machine."
     )
     return [Table(header, rows, caption, [2.6, 0.6, 0.8, 0.7, 1.5, 1.2], numeric=[2, 3, 4, 5])]
+
+
+def _forces(results: Results, table: pd.DataFrame) -> list[Item]:
+    """Draw the helical cut that the coefficients were checked on, with what the source says of it."""
+    forces, runs = results.tables.get("published_forces"), results.batch.runs
+    if forces is None or runs.empty:
+        return []
+    row: Any = runs[runs["operation"] == "helical"].iloc[0]
+    settings = (
+        f"{number(row['spindle_rpm'], 4)} rpm, {row['feed_per_tooth_mm']:g} mm per tooth, "
+        f"{row['axial_depth_mm']:g} mm per orbit"
+    )
+    means = forces[["fx_n", "fy_n", "fz_n"]].mean()
+    caption = f"Force on the tool over one orbit, computed from the printed coefficients: {settings}."
+    said = [str(note).partition("validation: ")[2] for note in table["note"].dropna()]
+    text = (
+        f"Mean along z {number(means['fz_n'])} N; in the plane the force turns with the orbit, "
+        f"{number(row['orbit_rpm'] / 60.0)} times per second."
+    )
+    told = " ".join(f"The source says: {note.rstrip('.')}." for note in said if note)
+    effect = " Such a fluctuation is what the effect orbit stiffness describes." if told else ""
+    alt = f"Forces over one orbit and over two revolutions; mean along z {number(means['fz_n'])} N."
+    return [
+        Heading("The validation cut"),
+        Paragraph(f"{text} {told}{effect}".strip()),
+        Picture(figures.orbit(forces, float(row["spindle_rpm"])), caption, alt),
+    ]

@@ -26,7 +26,10 @@ def quality(results: Results) -> Section:
     items: list[Item] = []
     if failed.empty:
         kinds = f"{checks} kinds" if checks > 1 else "one kind"
-        items.append(Paragraph(f"All {len(table)} checks, of {kinds}, passed."))
+        passed = (
+            f"All {len(table)} checks, of {kinds}, passed." if len(table) > 1 else "The one check passed."
+        )
+        items.append(Paragraph(passed))
     else:
         items.append(
             Paragraph(

@@ -227,7 +227,8 @@ def _print_check(results: Results) -> list[Item]:
     errata = int(table["note"].fillna("").str.contains("erratum: ").sum())
     text = (
         f"{len(table)} printed values were transcribed, {pairs} of them with a prediction beside them; "
-        f"every printed error was recomputed. {flagged} cannot be right as printed; {errata} have an erratum."
+        f"every printed error was recomputed. {flagged or 'None'} cannot be right as printed; "
+        f"for {errata or 'none'} an erratum is stated."
     )
     return [Paragraph(text)]
 
@@ -242,7 +243,7 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
                     (
                         "verdict",
                         STATUS.get(str(entry.get("status")), "–"),
-                        f"{len(entry.get('held_out_runs') or [])} held-out runs",
+                        _count(len(entry.get("held_out_runs") or []), "held-out run"),
                     ),
                     (
                         "error before",
@@ -281,6 +282,10 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
     )
 
 
+def _count(count: int, name: str) -> str:
+    return f"{count} {name}{'' if count == 1 else 's'}"
+
+
 def measured_words(results: Results) -> str:
     """Say what the batch is and what was measured in it."""
     manifest, runs = results.batch.manifest, results.batch.runs
@@ -302,7 +307,7 @@ def _run_words(runs: pd.DataFrame) -> str:
         return ""
     operations = listing([str(o) for o in runs["operation"].dropna().unique() if str(o)])
     one = len(runs) == 1
-    made = f" {len(runs)} cutting run{'' if one else 's'} ({operations or 'operation not stated'})"
+    made = f" {_count(len(runs), 'cutting run')} ({operations or 'operation not stated'})"
     recorded = int(runs["role"].isin(["identify", "validate"]).sum())
     held = int((runs["role"] == "validate").sum())
     if not recorded:

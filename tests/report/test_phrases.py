@@ -1,0 +1,45 @@
+"""What is left over, in words."""
+
+from metro.report.phrases import plain, rest_words
+
+
+def place(axis, label, relative, excess=None, significant=True):
+    return {
+        "axis": axis, "label": label, "relative": relative, "excess": excess or 100 * relative,
+        "amplitude": 100 * relative, "significant": significant,
+    }  # fmt: skip
+
+
+def test_orders_are_told_by_what_makes_them():
+    entries = [
+        place("y", "order 3", 0.2),
+        place("x", "order 6", 0.1),
+        place("x", "order 1", 0.05),
+        place("z", "mean", 0.02),
+        place("z", "order 4", 0.01),
+    ]
+    assert rest_words(entries, 3) == (
+        "at the tooth passing and its harmonics (orders 3, 6; most along y, 20 % of the signal at order 3); "
+        "once per revolution (x 5.0 % of the signal); a constant offset (z 2.0 % of the signal); "
+        "between the harmonics of the tooth passing (z 1.0 % of the signal)"
+    )
+
+
+def test_what_is_not_significant_is_not_told():
+    assert rest_words([place("x", "order 1", 0.5, significant=False)], 3) == ""
+
+
+def test_axes_stand_in_the_order_of_their_size():
+    entries = [place("x", "all", 0.1, 2.0), place("z", "all", 0.7, 9.0)]
+    assert rest_words(entries, 0) == "throughout (z 70 % and x 10 % of the signal)"
+
+
+def test_sentences_of_the_verdict_lose_their_jargon():
+    told = "order 8 in y (28 % of the signal there); mean in x (2 % of the signal there) and 66 more places"
+    assert plain(told) == (
+        "8 times per revolution in y (28 %); a constant offset in x (2 %) and smaller parts at 66 more places"
+    )
+    assert plain(f"repeats spread over the session, to describe what is left: {told}") == (
+        "repeats spread over the session, to describe what is left"
+    )
+    assert plain("a test beside run c08") == "a test beside run c08"
