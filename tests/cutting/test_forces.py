@@ -1,20 +1,16 @@
-"""The mechanistic force model against closed forms, limits and a brute-force slice integration."""
+"""The mechanistic force model against closed forms and limits."""
 
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from scipy.special import beta
 
-from metro.cutting.arcs import arcs, integrated
-from metro.cutting.chip import Cut, chip_thickness, path_difference
+from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement, engagement
-from metro.cutting.force import ANGLES, _assembled, force_basis, mean_basis, mean_force
+from metro.cutting.force import ANGLES, force_basis, mean_basis, mean_force
 from metro.cutting.law import EdgeLaw
-from metro.cutting.slices import sliced
-from scipy.special import beta
 
 SLOT = Engagement(0.0, math.pi)
 # [T] table 4, N/m² and N/m
@@ -57,12 +53,14 @@ def closed_mean(engaged, feed, depth, teeth=4):
 def test_mean_force_at_any_immersion_is_the_integral_over_the_arc(direction, sign, true_limit):
     engaged = engagement("side", direction, 2e-3, 6e-3)
     tool, feed = cutter(), 0.05e-3
-    if true_limit:  # a tool so large that its teeth run on circles: the integrals are then those of the spline
-        tool, feed = cutter(radius=6e7), 0.05e-3
+    if true_limit:  # so large a tool that its teeth run on circles: the integrals are then those of a spline
+        tool = cutter(radius=6e7)
     expected = closed_mean(engaged, feed, 1e-3)
     found = mean_basis(tool, EdgeLaw(), Cut(feed, 1e-3, engaged), true_limit) @ TITANIUM
     assert found == pytest.approx(expected, rel=1e-10)
-    assert math.copysign(1.0, found[0]) == sign  # climb milling pulls the tool along the feed, up milling holds it back
+    assert (
+        math.copysign(1.0, found[0]) == sign
+    )  # climb milling pulls the tool along, up milling holds it back
 
 
 @pytest.mark.parametrize("exponent", [0.15, 0.4])
@@ -87,11 +85,11 @@ def test_unequal_pitch_leaves_the_mean_alone_but_not_its_spectrum():
     uneven = Cutter(6e-3, math.radians(40), (0.0, 1.4, 3.3, 4.9))
     cut = Cut(0.05e-3, 3e-3, SLOT)
     # What one tooth cuts more another cuts less: over a turn the pitches add up to the same feed.
-    assert mean_basis(uneven, EdgeLaw(), cut) == pytest.approx(mean_basis(cutter(), EdgeLaw(), cut), rel=1e-12)
-    first = [
-        np.abs(np.fft.rfft(force_basis(tool, EdgeLaw(), cut) @ TITANIUM, axis=0)[1, 1]) for tool in (uneven, cutter())
-    ]
-    assert first[0] > 100 * first[1]
+    even = mean_basis(cutter(), EdgeLaw(), cut)
+    assert mean_basis(uneven, EdgeLaw(), cut) == pytest.approx(even, rel=1e-12)
+    waves = [force_basis(tool, EdgeLaw(), cut)[:, 1] @ TITANIUM for tool in (uneven, cutter())]
+    first, none = (abs(np.fft.rfft(wave)[1]) for wave in waves)
+    assert first > 100 * none
 
 
 @pytest.mark.parametrize("runout", [0.0, 4e-6])
@@ -117,10 +115,11 @@ def test_a_helix_that_spans_one_pitch_makes_the_force_constant():
 def test_many_teeth_make_the_force_constant():
     def ripple(teeth):
         force = force_basis(cutter(teeth=teeth, helix=0.0), EdgeLaw(), Cut(0.02e-3, 1e-3, SLOT)) @ TITANIUM
-        return np.ptp(force[:, :2], axis=0).max() / np.abs(force.mean(axis=0)).max()
+        return np.ptp(force, axis=0).max() / np.abs(force.mean(axis=0)).max()
 
-    assert ripple(60) < 0.05
-    assert ripple(60) < ripple(20) < ripple(6)
+    # What a tooth adds when it enters stays, the mean grows with the number of teeth.
+    assert ripple(60) == pytest.approx(ripple(6) / 10, rel=0.2)
+    assert ripple(60) < 0.1
 
 
 def test_little_helix_tends_to_none():
@@ -136,7 +135,8 @@ def test_little_runout_tends_to_none(true_path):
     cut = Cut(0.05e-3, 3e-3, Engagement(0.5, 2.4))
     none = force_basis(cutter(), EdgeLaw(), cut, true_path)
     little = force_basis(cutter(runout_radius=1e-13), EdgeLaw(), cut, true_path)
-    assert little == pytest.approx(none, abs=(2e-3 if true_path else 1e-6) * np.abs(none).max(axis=(0, 1)))
+    scale = np.abs(none).max(axis=(0, 1))
+    assert little / scale == pytest.approx(none / scale, abs=1e-4 if true_path else 1e-8)
 
 
 def test_without_helix_a_tooth_cuts_only_inside_the_engagement():
@@ -176,135 +176,6 @@ def test_teeth_of_equal_radius_make_no_order_but_their_own():
     )
     orders = np.arange(len(spectrum))
     assert spectrum[orders % 4 != 0].max() < 1e-9 * spectrum.max()
-
-
-def brute_force(tool, cut, coefficients, angle, slices=400):
-    """Slice the edge and step through the teeth one by one, with the chip thickness written out."""
-    force = np.zeros(3)
-    dz = cut.axial_depth / slices
-    n = tool.teeth
-    for i in range(slices):
-        lag = (i + 0.5) * dz * math.tan(tool.helix) / tool.radius
-        offset = [tool.runout_radius * math.cos(tool.runout_angle - a + lag) for a in tool.tooth_angles]
-        for j, tooth in enumerate(tool.tooth_angles):
-            phi = (angle + tooth - lag) % (2 * math.pi)
-            if not cut.engagement.entry < phi < cut.engagement.exit:
-                continue
-            pitch = [
-                (tool.tooth_angles[(j + m) % n] - tooth) % (2 * math.pi) or 2 * math.pi for m in range(1, n + 1)
-            ]
-            h = min(
-                cut.feed_per_tooth * n * pitch[m - 1] / (2 * math.pi) * math.sin(phi) + offset[j] - offset[(j + m) % n]
-                for m in range(1, n + 1)
-            )
-            if h <= 0:
-                continue
-            ft, fr, fa = (coefficients[k] * h + coefficients[k + 3] for k in range(3))
-            force += dz * np.array(
-                [-ft * math.cos(phi) - fr * math.sin(phi), ft * math.sin(phi) - fr * math.cos(phi), fa]
-            )
-    return force
-
-
-@settings(max_examples=15, deadline=None)
-@given(
-    st.integers(1, 5),
-    st.floats(2.0, 50.0),
-    st.floats(0.0, 30e-6),
-    st.floats(0.0, 6.28),
-    st.floats(0.0, 0.3),
-    st.sampled_from([3e-3, 40e-3]),
-    st.integers(0, ANGLES - 1),
-)
-def test_force_is_that_of_a_brute_force_slice_integration(teeth, helix, runout, direction, shift, depth, step):
-    angles = [a + shift * math.sin(3 * i) for i, a in enumerate(evenly_pitched(teeth))]
-    tool = Cutter(6e-3, math.radians(helix), tuple(angles), runout, direction)
-    cut = Cut(0.03e-3, depth, engagement("side", "up", 5e-3, 6e-3))
-    table = force_basis(tool, EdgeLaw(), cut) @ TITANIUM
-    expected = brute_force(tool, cut, TITANIUM, 2 * math.pi * step / ANGLES)
-    # What the brute force does not resolve: each tooth enters, leaves and bounds the chip within a slice.
-    tooth = np.abs(TITANIUM[:3]).max() * 0.03e-3 + np.abs(TITANIUM[3:]).max()
-    assert table[step] == pytest.approx(expected, abs=4 * teeth * tooth * depth / 400)
-
-
-@pytest.mark.parametrize("runout", [0.0, 8e-6])
-def test_slices_tend_to_the_exact_integral_as_they_get_thinner(runout):
-    tool = cutter(runout_radius=runout, runout_angle=0.4)
-    cut = Cut(0.05e-3, 20e-3, engagement("side", "down", 4e-3, 6e-3))
-    angle = 2 * math.pi * np.arange(ANGLES) / ANGLES
-    lag = tool.lag_per_depth * cut.axial_depth
-    pieces = arcs(tool, EdgeLaw(), cut, False, angle)
-    exact = integrated(pieces, angle[:, None] + np.array(tool.tooth_angles), lag) / tool.lag_per_depth
-    scale = np.abs(exact).max(axis=0)
-    error = [
-        np.sqrt(np.mean(((sliced(tool, EdgeLaw(), cut, False, angle, n) - exact) / scale) ** 2)) for n in (6, 24, 96)
-    ]
-    assert error[0] < 0.05
-    assert error[1] < error[0] / 4
-    assert error[2] < error[1] / 4
-
-
-@pytest.mark.parametrize("law", [EdgeLaw(), EdgeLaw(size_exponent=0.25)], ids=["linear", "power"])
-def test_the_spline_of_true_paths_and_power_laws_is_the_sum_of_thin_slices(law):
-    tool, cut = cutter(), Cut(0.1e-3, 5e-3, SLOT)
-    step = 2 * math.pi / ANGLES
-    lag = 30 * step  # so that the window of a slice is its own
-    cut = Cut(0.1e-3, lag / tool.lag_per_depth, SLOT)
-    angle = np.arange(ANGLES) * step
-    table = force_basis(tool, law, cut, True)
-    thin = _assembled(sliced(tool, law, cut, True, angle, per_radian=1 / step))
-    assert table == pytest.approx(thin, abs=2e-4 * np.abs(thin).max(axis=(0, 1)))
-
-
-def true_chip(tool, feed, phi_now, tooth, height=0.0):
-    """Follow the tooth that cut before, back along its trochoid, until it crosses the ray."""
-    n = tool.teeth
-    per_radian = feed * n / (2 * math.pi)
-    lag = height * math.tan(tool.helix) / tool.radius
-
-    def radius(j):
-        return tool.radius + tool.runout_radius * math.cos(tool.runout_angle - tool.tooth_angles[j % n] + lag)
-
-    best = math.inf
-    for m in range(1, n + 1):
-        pitch = 2 * math.pi * m / n
-
-        def off_ray(turned, pitch=pitch, m=m):
-            phi = phi_now + pitch - turned
-            x = -per_radian * turned + radius(tooth + m) * math.sin(phi)
-            y = radius(tooth + m) * math.cos(phi)
-            return x * math.cos(phi_now) - y * math.sin(phi_now), x * math.sin(phi_now) + y * math.cos(
-                phi_now
-            )
-
-        low, high = pitch - 0.3, pitch + 0.3
-        for _ in range(80):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if off_ray(middle)[0] > 0 else (low, middle)
-        best = min(best, radius(tooth) - off_ray(low)[1])
-    return best
-
-
-@pytest.mark.parametrize("degrees", [5.0, 40.0, 90.0, 140.0, 175.0])
-@pytest.mark.parametrize("runout", [0.0, 8e-6])
-def test_true_chip_thickness_is_that_of_intersected_trochoids(degrees, runout):
-    tool = cutter(runout_radius=runout, runout_angle=0.4)
-    phi = math.radians(degrees)
-    cut = Cut(0.1e-3, 1e-3, SLOT)
-    found = chip_thickness(tool, cut, np.full((1, 1, 4), phi), np.zeros(1), true_path=True)
-    expected = [true_chip(tool, 0.1e-3, phi, j) for j in range(4)]
-    assert found[0, 0] == pytest.approx(expected, abs=2e-9)
-
-
-@pytest.mark.parametrize("teeth", [2, 4])
-def test_true_paths_differ_from_circles_by_the_square_of_the_feed_over_the_radius(teeth):
-    feed, radius = 0.1e-3, 6e-3
-    phi = np.linspace(0.0, math.pi, 2001)
-    # Second order in feed/radius: the turn of the earlier tooth, and the curvature of its path.
-    second = feed**2 / radius * (0.5 * np.cos(phi) ** 2 - teeth / (2 * math.pi) * np.sin(phi) * np.cos(phi))
-    difference = path_difference(cutter(teeth=teeth, radius=radius), Cut(feed, 1e-3, SLOT))
-    assert difference.largest == pytest.approx(np.abs(second).max(), rel=0.05)
-    assert difference.rms == pytest.approx(math.sqrt(np.mean(second**2)), rel=0.05)
 
 
 def test_up_and_down_milling_mirror_each_other():

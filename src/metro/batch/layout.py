@@ -1,7 +1,7 @@
 """Names of the tables that identify writes for the later stages: what was observed, compact."""
 
 OBSERVED: tuple[str, ...] = (
-    *("orders", "spindle", "force_refused"),
+    *("orders", "spindle", "force_refused", "yielding"),
     *("tip_force", "profile_points", "observability", "arm_loads", "deformation_refused"),
     *("face_indices", "face_map", "face_points", "face_loads", "face_mass", "face_refused"),
     *("modes", "lobes", "frf_used", "lobe_runs", "lobes_refused"),

@@ -88,7 +88,7 @@ def over_arc(pieces: Arcs) -> Array:
 
 
 def _is_linear(law: EdgeLaw, cut: Cut) -> bool:
-    """Whether the law's shear is the thickness itself: asked of the law, which an effect may have replaced."""
+    """Whether the law's shear is the thickness itself: asked of it, for an effect may have replaced it."""
     thickness = np.linspace(0.0, cut.feed_per_tooth, 5)
     return bool(np.all(law.shear(thickness) == thickness))
 
@@ -134,7 +134,7 @@ def _with_runout(cutter: Cutter, cut: Cut, angle: Array) -> Arcs:
 
 def _bound(level: Array, slope: Array, least: Array, most: Array, among: npt.NDArray[np.bool_]) -> None:
     """Narrow ``least`` and ``most``, in place, to where level + slope × cot φ < 0; last axis ``among``."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         crossing = -level / (slope + 0.0)
     rising = slope >= 0.0
     np.fmin(most, crossing, out=most, where=rising & among)

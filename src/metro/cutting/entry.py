@@ -34,12 +34,12 @@ def leaving(whole: Engagement, radius: float, travel: float) -> tuple[Engagement
 
 
 def entry_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, travel: float, true_path: bool = False) -> Array:
-    """Force per unit of each coefficient, (ANGLES, 3, 6) as of :func:`force_basis`, going into the block."""
+    """Force per unit of each coefficient, (ANGLES, 3, 6) as of ``force_basis``, going into the block."""
     return _summed(cutter, law, cut, entering(cut.engagement, cutter.radius, travel), true_path)
 
 
 def exit_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, travel: float, true_path: bool = False) -> Array:
-    """Force per unit of each coefficient, (ANGLES, 3, 6) as of :func:`force_basis`, going out of the block."""
+    """Force per unit of each coefficient, (ANGLES, 3, 6) as of ``force_basis``, going out of the block."""
     return _summed(cutter, law, cut, leaving(cut.engagement, cutter.radius, travel), true_path)
 
 
@@ -56,9 +56,7 @@ def _parts(whole: Engagement, inside: list[tuple[float, float]]) -> tuple[Engage
     return tuple(Engagement(low, high) for low, high in parts if high > low)
 
 
-def _summed(
-    cutter: Cutter, law: EdgeLaw, cut: Cut, parts: tuple[Engagement, ...], true_path: bool
-) -> Array:
+def _summed(cutter: Cutter, law: EdgeLaw, cut: Cut, parts: tuple[Engagement, ...], true_path: bool) -> Array:
     basis = np.zeros((ANGLES, 3, 6))
     for part in parts:
         basis += force_basis(cutter, law, replace(cut, engagement=part), true_path)

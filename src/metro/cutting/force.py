@@ -44,7 +44,7 @@ def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False)
     angle = 2.0 * math.pi * np.arange(ANGLES) / ANGLES
     pieces = arcs(cutter, law, cut, true_path, angle)
     if pieces is None:
-        basis = _assembled(sliced(cutter, law, cut, true_path, angle))
+        basis = _assembled(sliced(cutter, law, cut, true_path=true_path, angle=angle))
     else:
         lag = cutter.lag_per_depth * cut.axial_depth
         span = max(abs(lag), 2.0 * math.pi / ANGLES)

@@ -1,4 +1,4 @@
-"""Helical milling: the tool travels on a helix, its periphery inclined by the ramp, its bottom edges in the work."""
+"""Helical milling: the tool on a helix, its periphery inclined by the ramp, its bottom edges in cut."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def ramped(vectors: Array, ramp: float) -> Array:
 
 
 def turned(vectors: Array, angle: float | Array) -> Array:
-    """Turn (n, 3, …) vectors about z, counter-clockwise, by one angle or, (n, 3) vectors, by (n,) angles, rad."""
+    """Turn (n, 3, …) vectors about z, counter-clockwise, by one angle, or (n, 3) by (n,) angles, rad."""
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = vectors[:, 0], vectors[:, 1], vectors[:, 2]
     return np.stack([c * x - s * y, s * x + c * y, z], axis=1)
@@ -62,6 +62,7 @@ def helical_signal(
     cut: Cut,
     helix: Helix,
     coefficients: Array,
+    *,
     speed: float,
     orbit_speed: float,
     time: Array,
@@ -69,7 +70,7 @@ def helical_signal(
     direction: float = 0.0,
     true_path: bool = False,
 ) -> Array:
-    """Force on the tool at given times, (n, 3) N, in the fixed work frame, which does not turn with the orbit.
+    """Force on the tool at given times, (n, 3) N, in the fixed work frame.
 
     Peripheral forces of the feed frame, inclined by the ramp; the bottom edges' thrust, which is along the
     spindle and not inclined; all turned to the direction of feed (physics.md §2). The table turns with the
@@ -83,7 +84,9 @@ def helical_signal(
         counter-clockwise from work +x, rad.
     """
     relative = speed + orbit_speed
-    force = time_signal(cutter, law, cut, coefficients[:6], relative, time, phase, true_path)
+    force = time_signal(
+        cutter, law, cut, coefficients[:6], speed=relative, time=time, phase=phase, true_path=true_path
+    )
     force = ramped(force, helix.ramp)
     force[:, 2] += bottom_thrust(cutter, helix) @ coefficients[6:]
     return turned(force, direction + orbit_speed * time)

@@ -24,40 +24,50 @@ def sliced(
     cutter: Cutter,
     law: EdgeLaw,
     cut: Cut,
+    *,
     true_path: bool,
     angle: Array,
     per_radian: float = SLICES_PER_RADIAN,
 ) -> Array:
-    """Integrals (angles, 6) over the edges of what ``_assembled`` of the force table takes, in its order.
-
-    m, those of the shear: its unit × m.
+    """Integrals (angles, 6) m over the edges of shear × sin φ, shear × cos φ, shear, sin φ, cos φ, 1.
 
     Parameters
     ----------
     angle : of tooth 0, even over the revolution, rad. per_radian : slices per radian of lag, at least four.
     """
     lag = abs(cutter.lag_per_depth * cut.axial_depth)
-    slices = max(4, math.ceil(per_radian * lag))
-    height = (np.arange(slices) + 0.5) * cut.axial_depth / slices
-    window = max(2.0 * math.pi / len(angle), lag / slices)
-    parts = math.ceil(len(angle) * slices * cutter.teeth / POINTS_AT_ONCE)
-    summed = [
-        _summed(cutter, law, cut, true_path, part, height, window) for part in np.array_split(angle, parts)
+    count = max(4, math.ceil(per_radian * lag))
+    height = (np.arange(count) + 0.5) * cut.axial_depth / count
+    window = max(2.0 * math.pi / len(angle), lag / count)
+    parts = math.ceil(len(angle) * count * cutter.teeth / POINTS_AT_ONCE)
+    sums = [
+        _summed(cutter, law, cut, true_path=true_path, angle=part, height=height, window=window)
+        for part in np.array_split(angle, parts)
     ]
-    return np.concatenate(summed) * (cut.axial_depth / slices)
+    return np.concatenate(sums) * (cut.axial_depth / count)
 
 
 def _summed(
-    cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool, angle: Array, height: Array, window: float
+    cutter: Cutter,
+    law: EdgeLaw,
+    cut: Cut,
+    *,
+    true_path: bool,
+    angle: Array,
+    height: Array,
+    window: float,
 ) -> Array:
-    """Sums (angles, 6) over slices and teeth, each slice counting by its share in the cut."""
+    """Sum (angles, 6) over slices and teeth, each slice counting by its share in the cut."""
     teeth = np.asarray(cutter.tooth_angles)
     immersion = angle[:, None, None] + (teeth - cutter.lag_per_depth * height[:, None])
     engaged = _opened(cut.engagement) if true_path else cut.engagement
     covered, immersion = _covered(immersion, engaged, window)
     thickness = chip_thickness(cutter, cut, immersion, height, true_path)
     sine, cosine = np.sin(immersion), np.cos(immersion)
-    edge = covered * _positive_share(thickness, cut.feed_per_tooth * cosine * covered * window)
+    # Neighbours in height tell the slope, runout included; an edge that hardly lags turns with its runout.
+    helical = window < 1.001 * abs(cutter.lag_per_depth) * (height[1] - height[0])
+    change = np.gradient(thickness, axis=1) if helical else cut.feed_per_tooth * cosine * window
+    edge = covered * _positive_share(thickness, change * covered)
     shear = edge * law.shear(np.maximum(thickness, 0.0))
     weighted = [weight * wave for weight in (shear, edge) for wave in (sine, cosine, 1.0)]
     return np.stack([part.sum(axis=(1, 2)) for part in weighted], axis=1)
@@ -72,12 +82,12 @@ def _opened(engaged: Engagement) -> Engagement:
     return Engagement(entry, engaged.exit + OPENING if engaged.exit == math.pi else engaged.exit)
 
 
-def _positive_share(thickness: Array, slope: Array) -> Array:
+def _positive_share(thickness: Array, change: Array) -> Array:
     """Share of the window around each point in which the thickness, taken as linear there, is positive.
 
-    ``slope`` is the change of the thickness over the engaged part of the window.
+    ``change`` is that of the thickness over the engaged part of the window.
     """
-    return np.clip(thickness / np.maximum(np.abs(slope), 1e-15) + 0.5, 0.0, 1.0)
+    return np.clip(thickness / np.maximum(np.abs(change), 1e-15) + 0.5, 0.0, 1.0)
 
 
 def _covered(immersion: Array, engaged: Engagement, window: float) -> tuple[Array, Array]:

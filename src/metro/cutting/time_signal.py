@@ -18,6 +18,7 @@ def time_signal(
     law: EdgeLaw,
     cut: Cut,
     coefficients: Array,
+    *,
     speed: float,
     time: Array,
     phase: float = 0.0,

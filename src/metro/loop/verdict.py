@@ -148,10 +148,16 @@ def parameters(fitted: Fit, name: str) -> JSON:
 
 
 def _bounded(parameter: EffectParameter, value: float, deviation: float, dof: float) -> JSON:
+    """Write an effect's parameter: its interval within the bounds, that of an angle within its period."""
     entry = quantity(value, deviation, parameter.unit, dof)
-    if parameter.period is None and entry["ci95"][0] is not None:
-        low, high = entry["ci95"]
+    low, high = entry["ci95"]
+    if low is None:
+        return entry
+    if parameter.period is None:
         entry["ci95"] = [max(low, parameter.lower), min(high, parameter.upper)]
+    else:
+        half = min(0.5 * (high - low), 0.5 * parameter.period)
+        entry["ci95"] = [value - half, value + half]
     return entry
 
 

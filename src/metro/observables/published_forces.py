@@ -50,7 +50,7 @@ def forces(batch: Batch, published: pd.DataFrame) -> pd.DataFrame:
     duration = 2.0 * math.pi / abs(orbit)
     time = np.arange(0.0, duration, 2.0 * math.pi / speed / POINTS_PER_REVOLUTION)
     cut = cutting_force.cut(batch, str(helical[0]), tool.radius)
-    force = helical_signal(tool, EdgeLaw(), cut, path, values, speed, orbit, time)
+    force = helical_signal(tool, EdgeLaw(), cut, path, values, speed=speed, orbit_speed=orbit, time=time)
     return pd.DataFrame(np.column_stack([time, force]), columns=COLUMNS)
 
 

@@ -17,6 +17,7 @@ from metro.loop.noise import first_noise
 from metro.loop.verdict import identified_fit
 from metro.observables import published
 from metro.observables.problem import BaseFit, Problem, Refusal
+from metro.observables.yielding_table import yielding_table
 from metro.stages.observed import MODULES, merged
 from metro.units import JSON
 
@@ -44,6 +45,8 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
             lacking[module.OBSERVABLE] = task.reason
     printed = published.observe(batch, read, identified)
     observed |= {} if isinstance(printed, Refusal) else printed
+    feedback = yielding_table(batch, read, identified)
+    observed |= {} if isinstance(feedback, Refusal) else {"yielding": feedback}
     _write(processed, batch, observed, code)
     write_json(processed / "identified.json", {**identified, "not_identified": lacking})
 

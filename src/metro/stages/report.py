@@ -19,6 +19,7 @@ TABLES = (
     "qc",
     "comparison",
     "lobes_final",
+    "yielding",
     "frf_used",
     "face_map",
     "published_errors",

@@ -40,6 +40,7 @@ def identification(results: Results) -> Section:
     found = results.identified
     items: list[Item] = [
         *_force(found.get("force") or {}),
+        *_yielding(results.tables.get("yielding")),
         *_modes(found.get("modes") or [], results.tables.get("frf_used")),
         *_lobes(found.get("lobes") or []),
         *_arm(found.get("arm") or {}),
@@ -128,6 +129,33 @@ def _magnitudes(frf: pd.DataFrame) -> pd.DataFrame | None:
     if not {c for pair in pairs.values() for c in pair} <= set(frf.columns):
         return None
     return frf.assign(**{name: (frf[re] ** 2 + frf[im] ** 2) ** 0.5 for name, (re, im) in pairs.items()})
+
+
+def _yielding(table: pd.DataFrame | None) -> list[Item]:
+    """Write the deflection feedback at the stations of a tabulated machine, run by run."""
+    if table is None:
+        return []
+    items: list[Item] = [Heading("Deflection feedback")]
+    if "difference_n" in table:
+        rows = [
+            [str(row["run"]), *(number(row[f"k{axis}_n_um"]) for axis in "xyz"), *_feedback(row)]
+            for _, row in table[table["refused"] == ""].iterrows()
+        ]
+        head = ["run", "k x (N/µm)", "k y", "k z", "iterations", "plain scheme", "at entry (N)", "at last (N)"]
+        caption = (
+            "Force of the yielding tool against that of a rigid one: iterations to convergence, those of the "
+            "plain fixed-point scheme, largest difference in the first and the last of six revolutions."
+        )
+        items.append(Table(head, rows, caption, [1, 1, 1, 1, 1, 1, 1, 1]))
+    refused = table[table["refused"] != ""].groupby("refused")["run"].agg(", ".join)
+    items += [Bullets([f"{runs}: {reason}." for reason, runs in refused.items()])] if len(refused) else []
+    return items
+
+
+def _feedback(row: pd.Series) -> list[str]:
+    plain = str(row["iterations_fixed_point"])
+    differences = (number(row["entry_difference_n"]), number(row["difference_n"]))
+    return [f"{row['iterations_newton']:.0f}", plain, *differences]
 
 
 def _lobes(lobes: list[JSON]) -> list[Item]:
