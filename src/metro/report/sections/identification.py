@@ -141,7 +141,7 @@ def _yielding(table: pd.DataFrame | None) -> list[Item]:
             [str(row["run"]), *(number(row[f"k{axis}_n_um"]) for axis in "xyz"), *_feedback(row)]
             for _, row in table[table["refused"] == ""].iterrows()
         ]
-        head = ["run", "k x (N/µm)", "k y", "k z", "iterations", "plain scheme", "at entry (N)", "at last (N)"]
+        head = ["run", "k x (N/µm)", "k y", "k z", "iterations", "plain scheme", "entry (N)", "last (N)"]
         caption = (
             "Force of the yielding tool against that of a rigid one: iterations to convergence, those of the "
             "plain fixed-point scheme, largest difference in the first and the last of six revolutions."
