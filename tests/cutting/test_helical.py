@@ -91,3 +91,22 @@ def test_rotations_keep_length_and_hand():
     # A ramp leads downwards: a force along the inclined feed has a part along −z.
     assert ramped(np.array([[1.0, 0.0, 0.0]]), 0.1)[0, 2] < 0
     assert turned(np.array([[1.0, 0.0, 0.0]]), 0.1)[0, 1] > 0
+
+
+def test_forces_are_those_of_chips_traced_on_the_orbit():
+    from virtual_cell import chips, milling, motion  # shares no code with the package
+
+    tool = chips.Tool(TOOL.radius, TOOL.helix, np.array(TOOL.tooth_angles))
+    orbit = motion.Orbit(ORBIT_RADIUS, ORBIT, 0.3, HELIX.pitch)
+    law = milling.in_millimetres((10145, 11036.5, 5000), (591.92, 100.03, 214.32), (243.47, 33.072))
+    cut = milling.Cut(chips.Engagement(tool, orbit, SPEED, 0.0, CUT.axial_depth), law)
+    time = np.arange(6000) * 1e-4
+    traced = milling.forces(cut, time)
+    found = helical_signal(
+        TOOL, EdgeLaw(), CUT, HELIX, TITANIUM,
+        speed=SPEED, orbit_speed=ORBIT, time=time, phase=0.3, direction=0.3, true_path=True,
+    )  # fmt: skip
+    scale = math.sqrt(np.mean(np.sum(traced**2, axis=1)))
+    # There the path curves by the radius of the orbit, and the edge enters in three steps.
+    assert np.abs((found - traced).mean(axis=0)).max() < 0.001 * scale
+    assert np.sqrt(np.mean((found - traced) ** 2, axis=0)).max() < 0.008 * scale

@@ -73,20 +73,22 @@ def helical_signal(
     """Force on the tool at given times, (n, 3) N, in the fixed work frame.
 
     Peripheral forces of the feed frame, inclined by the ramp; the bottom edges' thrust, which is along the
-    spindle and not inclined; all turned to the direction of feed (physics.md §2). The table turns with the
-    feed: its angles count from the feed's left, so the teeth pass there faster or slower by the orbit speed.
+    spindle and not inclined; all turned to the direction of feed (physics.md §2). The feed turns as well, so
+    the teeth pass it at the spindle's and the orbit's speed together. On true paths a tooth cuts the way
+    since the tooth before, whose direction is that of feed half a tooth passing ago.
 
     Parameters
     ----------
     coefficients : (8,) SI, ``COEFFICIENTS`` then ``BOTTOM_EDGES``.
     speed, orbit_speed : of the spindle (clockwise) and of the orbit (counter-clockwise positive), rad/s.
-    phase : immersion of tooth 0 at t = 0, from the feed's left, rad. direction : of feed at t = 0,
+    phase : immersion of tooth 0 at t = 0, rad. direction : of feed at t = 0,
         counter-clockwise from work +x, rad.
     """
     relative = speed + orbit_speed
+    lag = orbit_speed * math.pi / (cutter.teeth * relative) if true_path else 0.0
     force = time_signal(
-        cutter, law, cut, coefficients[:6], speed=relative, time=time, phase=phase, true_path=true_path
+        cutter, law, cut, coefficients[:6], speed=relative, time=time, phase=phase - lag, true_path=true_path
     )
     force = ramped(force, helix.ramp)
     force[:, 2] += bottom_thrust(cutter, helix) @ coefficients[6:]
-    return turned(force, direction + orbit_speed * time)
+    return turned(force, direction - lag + orbit_speed * time)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -15,6 +14,7 @@ from metro.cutting.cutter import Cutter
 from metro.cutting.helical import Helix
 from metro.cutting.law import EdgeLaw
 from metro.observables import cutting_force
+from metro.observables.force_coefficients import AXES, correlation, mean_coefficients, waveform
 from metro.observables.force_model import ForceModel, ForceSetting
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
@@ -22,7 +22,6 @@ from metro.signals import orders, steady
 from metro.units import DEG, JSON, MM, RPM, Array
 
 OBSERVABLE = "force"
-AXES = ("x", "y", "z")
 ANGLES = 120
 TIME_BLOCKS = 4
 SCATTER = 0.01
@@ -289,7 +288,7 @@ def report(
     found: dict[str, JSON | Refusal] = {
         "mean": mean_coefficients(model, task.role("identify"), spindle),
         "mean_all_runs": mean_coefficients(model, task.blocks, spindle),
-        "waveform": _waveform(model, fit),
+        "waveform": waveform(model, fit),
     }
     lacking = {name: value.reason for name, value in found.items() if isinstance(value, Refusal)}
     if model.bottom_edges == ("kfae",):
@@ -297,53 +296,5 @@ def report(
             "the helical runs have one axial feed: kfae holds the whole thrust of the bottom edges"
         )
     block |= {name: value for name, value in found.items() if not isinstance(value, Refusal)}
+    block |= correlation(model, fit)
     return {"force": {**block, "not_identified": lacking} if lacking else block}
-
-
-def _waveform(model: ForceModel, fit: BaseFit | None) -> JSON | Refusal:
-    if fit is None:
-        return Refusal("no run has the role identify")
-    deviation = np.sqrt(np.diag(fit.covariance))
-    return {
-        parameter.name: quantity(value / parameter.si, sd / parameter.si, parameter.unit, fit.dof)
-        for parameter, value, sd in zip(model.parameters, fit.beta, deviation, strict=True)
-    }
-
-
-def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.DataFrame) -> JSON | Refusal:
-    """Classical identification: least squares of the mean forces of runs over the feed ([T] §4.1).
-
-    The mean over a revolution does not depend on the start phase, so it needs no waveform. Its intervals come
-    from the scatter of the runs about the line.
-
-    Parameters
-    ----------
-    blocks : runs to use; helical ones are left out. spindle : the observed table, with the mean force of each
-        run.
-    """
-    means = spindle.set_index("run")[[f"mean_{axis}_n" for axis in AXES]]
-    straight = [block for block in blocks if block.setting.helix is None]
-    rows = [_mean_design(model, block) for block in straight]
-    matrix = np.concatenate(rows) if rows else np.zeros((0, 6))
-    target = means.loc[[block.run for block in straight]].to_numpy().ravel()
-    size = np.linalg.norm(matrix, axis=0)
-    if len(target) < 6 or np.linalg.matrix_rank(matrix / np.maximum(size, 1e-300), tol=1e-6) < 6:
-        return Refusal(
-            "the mean forces of one feed cannot part shear from edge coefficients: cut a second feed"
-        )
-    beta, residual, _, _ = np.linalg.lstsq(matrix / size, target, rcond=None)
-    dof = len(target) - 6
-    covariance = np.linalg.inv((matrix / size).T @ (matrix / size))
-    variance = float(residual[0]) / dof if dof else math.nan
-    sd = np.sqrt(np.diag(covariance) * variance) / size
-    return {
-        parameter.name: quantity(value / parameter.si, error / parameter.si, parameter.unit, max(dof, 1))
-        for parameter, value, error in zip(model.parameters[:6], beta / size, sd, strict=True)
-    }
-
-
-def _mean_design(model: ForceModel, block: Block) -> Array:
-    """Mean force per unit of each coefficient on circular paths, (3, 6), in the frame of the comparison."""
-    matrix, _ = replace(model, true_path=False).design(block, np.zeros(1))
-    first = matrix[: len(matrix) // block.repeats, :6]
-    return np.stack([first[zero[: len(first)] > 0].sum(axis=0) for zero in block.zeros.T])

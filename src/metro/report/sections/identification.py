@@ -89,6 +89,8 @@ def _force(force: JSON) -> list[Item]:
     caption = f"Cutting coefficients with 95 % intervals; the edge terms count along the {edge} edge length."
     header = ["coefficient", "unit", *(FORCE_SETS[key] for key in sets)]
     items: list[Item] = [Heading("Cutting force"), Table(header, rows, caption, [1, 0.8, *([2] * len(sets))])]
+    warnings = force.get("warnings") or []
+    items += [Bullets([f"{str(warning).rstrip('.')}." for warning in warnings])] if warnings else []
     speeds = force.get("spindle_rpm") or {}
     if speeds:
         items.append(_by_run(speeds, "spindle speed", "Spindle speed from each record."))
