@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.cutting.chip import path_difference
 from metro.cutting.cutter import Cutter
 from metro.cutting.helical import Helix
 from metro.cutting.law import EdgeLaw
@@ -19,7 +20,7 @@ from metro.observables.force_model import ForceModel, ForceSetting
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.signals import orders, steady
-from metro.units import DEG, JSON, MM, RPM, Array
+from metro.units import DEG, JSON, MM, RPM, UM, Array
 
 OBSERVABLE = "force"
 ANGLES = 120
@@ -166,6 +167,7 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
     notes = [
         "The chip thickness is that of the true tooth paths, the force law linear in it; "
         "tool, machine and dynamometer are rigid in the base model.",
+        _path_note(tool, blocks),
         f"Forces are compared per revolution up to spindle order {blocks[0].setting.highest}, "
         "in the work frame"
         + (" (helical runs: in the frame that turns with the orbit)." if helical else "."),
@@ -173,6 +175,17 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
     ]
     scatter = np.full(len(model.parameters), SCATTER)
     return Problem(OBSERVABLE, "N", 1.0, model, blocks, scatter, notes=tuple(notes))
+
+
+def _path_note(tool: Cutter, blocks: tuple[Block, ...]) -> str:
+    """Say how far the true tooth paths are from feed × sine of the immersion, at the largest feed."""
+    widest = max((block.setting.cut for block in blocks), key=lambda cut: cut.feed_per_tooth)
+    difference = path_difference(tool, widest)
+    share = difference.largest / widest.feed_per_tooth
+    return (
+        f"At {widest.feed_per_tooth / MM:.3g} mm per tooth the true chip differs from feed × sine by up to "
+        f"{difference.largest / UM:.2g} µm ({100 * share:.2g} % of the feed), {difference.rms / UM:.2g} µm rms."
+    )
 
 
 def _bottom_edges(blocks: tuple[Block, ...]) -> tuple[str, ...]:

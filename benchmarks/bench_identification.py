@@ -1,0 +1,84 @@
+"""Identification of a batch of 36 runs of one second at 10 kHz: order tracking, speeds, phases, coefficients.
+
+Floor: one pass of least squares over the samples. Growth: with the length of the records. Run: ``pytest
+benchmarks/bench_identification.py -s``; the test that prints compares within the same run.
+"""
+
+import math
+import time
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.cutting.chip import Cut
+from metro.cutting.cutter import Cutter, evenly_pitched
+from metro.cutting.engagement import Engagement
+from metro.cutting.law import EdgeLaw
+from metro.cutting.time_signal import time_signal
+from metro.loop.candidate import Candidate
+from metro.loop.fit import fit
+from metro.loop.noise import first_noise
+from metro.observables import force
+
+BETA = np.array([850e6, 320e6, 180e6, 15e3, 18e3, 4e3])
+TOOL = Cutter(6e-3, math.radians(40), evenly_pitched(4))
+RATE, RPM, FEEDS, RUNS = 10_000, 6000.0, (0.03, 0.05, 0.08, 0.12), 36
+
+
+def batch_of(seconds):
+    """Make batch and records in memory: four feeds, nine repeats, noise, speeds off by up to 0.5 %."""
+    rng = np.random.default_rng(1)
+    names = [f"r{i:02d}" for i in range(RUNS)]
+    feeds = np.array([FEEDS[i % len(FEEDS)] for i in range(RUNS)])
+    runs = pd.DataFrame(
+        {
+            "run": names,
+            "role": "identify",
+            "condition": [f"f{feed}" for feed in feeds],
+            "order": np.arange(RUNS),
+            "operation": "slot",
+            "direction": "slot",
+            "spindle_rpm": RPM,
+            "feed_per_tooth_mm": feeds,
+            "axial_depth_mm": 2.0,
+            "radial_depth_mm": 12.0,
+            "feed_direction_deg": 0.0,
+            "orbit_rpm": np.nan,
+            "cut_length_mm": 50.0,
+            "cut_before_m": 0.0,
+            "dynamometer": names,
+        }
+    ).set_index("run")
+    tool = {"diameter_mm": 12.0, "teeth": 4, "helix_deg": 40.0}
+    moments = np.arange(round(seconds * RATE)) / RATE
+    records = {}
+    for name, feed in zip(names, feeds, strict=True):
+        speed = RPM / 60 * 2 * math.pi * (1 + 0.005 * rng.uniform(-1, 1))
+        cut = Cut(feed * 1e-3, 2e-3, Engagement(0.0, math.pi))
+        own = BETA * (1 + 0.01 * rng.normal(size=6))
+        signal = time_signal(TOOL, EdgeLaw(), cut, own, speed=speed, time=moments, true_path=True)
+        signal += rng.normal(0.0, 2.0, signal.shape)
+        columns = {"t_s": moments, "fx_n": signal[:, 0], "fy_n": signal[:, 1], "fz_n": signal[:, 2]}
+        records[name] = pd.DataFrame({**columns, "spindle_deg": np.nan})
+    return Batch("bench", {"tool": tool}, {}, runs, {}), lambda _table, run: records[run]
+
+
+def identified(batch, read):
+    observed = force.observe(batch, read, {})
+    task = force.problem(batch, observed, {})
+    return fit(Candidate(task.base), task.blocks, first_noise(0.007, task.scatter, task.blocks))
+
+
+def test_36_runs_of_one_second(benchmark):
+    batch, read = batch_of(1.0)
+    found = benchmark.pedantic(identified, (batch, read), rounds=3, warmup_rounds=1)
+    assert np.abs(found.beta / BETA - 1).max() < 0.03
+
+
+def test_growth_with_the_length_of_the_records():
+    for seconds in (0.5, 1.0, 2.0, 4.0):
+        batch, read = batch_of(seconds)
+        start = time.perf_counter()
+        identified(batch, read)
+        print(f"{RUNS} runs of {seconds:3.1f} s: {time.perf_counter() - start:.2f} s")
