@@ -156,11 +156,9 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
     if isinstance(tool, Refusal) or "orders" not in observed:
         return tool if isinstance(tool, Refusal) else Refusal("no order averages")
     by_run = dict(tuple(observed["orders"].groupby("run", sort=False)))
-    air = observed["spindle"].set_index("run")["air_s"]
+    spindle = observed["spindle"].set_index("run")
     blocks = tuple(
-        _block(batch, run, by_run[run], tool, zeroed=bool(air[run] > 0.0))
-        for run in recorded(batch)
-        if run in by_run
+        _block(batch, run, by_run[run], tool, spindle.loc[run]) for run in recorded(batch) if run in by_run
     )
     helical = any(block.setting.helix is not None for block in blocks)
     model = ForceModel(cutter=tool, law=EdgeLaw(), bottom_edges=_bottom_edges(blocks))
@@ -184,7 +182,8 @@ def _path_note(tool: Cutter, blocks: tuple[Block, ...]) -> str:
     share = difference.largest / widest.feed_per_tooth
     return (
         f"At {widest.feed_per_tooth / MM:.3g} mm per tooth the true chip differs from feed × sine by up to "
-        f"{difference.largest / UM:.2g} µm ({100 * share:.2g} % of the feed), {difference.rms / UM:.2g} µm rms."
+        f"{difference.largest / UM:.2g} µm ({100 * share:.2g} % of the feed), "
+        f"{difference.rms / UM:.2g} µm rms."
     )
 
 
@@ -198,7 +197,7 @@ def _bottom_edges(blocks: tuple[Block, ...]) -> tuple[str, ...]:
     return ("kfac", "kfae") if max(feeds) > LEAST_FEED_RATIO * min(feeds) else ("kfae",)
 
 
-def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, *, zeroed: bool) -> Block:
+def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, spindle: Any) -> Block:
     row: Any = batch.runs.loc[run]
     middles = tuple(float(t) for t in table.groupby("block")["t_s"].first())
     highest = int(table["order"].max())
@@ -210,6 +209,7 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, *, zeroed:
         middles=middles,
         cut_length=float(row["cut_before_m"]) + 0.5 * cutting_force.or_zero(row["cut_length_mm"]) * MM,
         helix=helix(batch, row),
+        feed_ratio=float(row["spindle_rpm"]) / float(spindle["spindle_rpm"]),
     )
     axis = table["axis"].to_numpy().astype(str)
     mean = (table["part"] == "mean").to_numpy()
@@ -225,7 +225,7 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, *, zeroed:
         setting=setting,
         axis=axis,
         zeros=zeros,
-        zero_sd=np.full(3, (ZERO_SHARE if zeroed else UNZEROED_SHARE) * rms),
+        zero_sd=np.full(3, (ZERO_SHARE if spindle["air_s"] > 0.0 else UNZEROED_SHARE) * rms),
         coordinates=_coordinates(middles),
         synthesis=_synthesis(len(middles), highest),
         scale=_scale(table),

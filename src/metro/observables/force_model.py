@@ -26,7 +26,9 @@ class ForceSetting:
 
     ``feed_direction`` is the turn of the feed frame about z, rad; ``blocks`` the number of time blocks,
     ``middles`` their times (s from the start of the steady cut); ``cut_length`` metres cut before the run's
-    middle since the tool was new.
+    middle since the tool was new; ``feed_ratio`` true over nominal feed per tooth: the feed rate is as
+    programmed, so a spindle that turns slower than it says takes thicker chips. The chip is taken as
+    proportional to it.
     """
 
     cut: Cut
@@ -35,6 +37,7 @@ class ForceSetting:
     middles: tuple[float, ...]
     cut_length: float
     helix: Helix | None = None
+    feed_ratio: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class ForceModel:
             _order_basis(self.cutter, self.law, setting.cut, setting.highest, self.true_path),
             float(nuisance[0]),
         )
-        basis = basis * np.repeat([1.0, self.law.edge(setting.cut_length)], 3)
+        basis = basis * np.repeat([setting.feed_ratio, self.law.edge(setting.cut_length)], 3)
         turn = setting.feed_direction
         if setting.helix is not None:
             basis = ramped(basis, setting.helix.ramp)
