@@ -80,7 +80,11 @@ def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.
 
 
 def _mean_design(model: ForceModel, block: Block) -> Array:
-    """Mean force per unit of each coefficient on circular paths, (3, 6), in the frame of the comparison."""
-    matrix, _ = replace(model, true_path=False).design(block, np.zeros(1))
+    """Mean force per unit of each coefficient on circular paths at the nominal feed, (3, 6).
+
+    In the frame of the comparison.
+    """
+    nominal = replace(block, setting=replace(block.setting, feed_ratio=1.0))
+    matrix, _ = replace(model, true_path=False).design(nominal, np.zeros(1))
     first = matrix[: len(matrix) // block.repeats, :6]
     return np.stack([first[zero[: len(first)] > 0].sum(axis=0) for zero in block.zeros.T])
