@@ -4,6 +4,8 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH="$PATH:/usr/sbin:/sbin"
+# The environment is made from the Python outside it, whether it is active or not.
+PATH=":$PATH:" && PATH="${PATH//:"$PWD"\/.venv\/bin:/:}" && PATH="${PATH#:}" && PATH="${PATH%:}"
 
 say() { printf 'setup: %s\n' "$*" >&2; }
 fail() { say "$*"; exit 1; }
@@ -11,7 +13,7 @@ fail() { say "$*"; exit 1; }
 # --- Python ---------------------------------------------------------------------------------------------------------
 python=${PYTHON:-$(command -v python3.11 || command -v python3 || true)}
 [ -n "$python" ] || fail "Python 3.11 or newer is needed and not found (Debian: apt-get install python3 python3-venv)"
-interpreter=$("$python" -c 'import sys; print(sys.version, sys.prefix); sys.exit(sys.version_info < (3, 11))') ||
+interpreter=$("$python" -c 'import sys; print(sys.version, sys.base_prefix); sys.exit(sys.version_info < (3, 11))') ||
     fail "Python 3.11 or newer is needed; $python is $interpreter. Name another one with PYTHON=…"
 
 # --- System libraries -----------------------------------------------------------------------------------------------

@@ -1,8 +1,10 @@
 """Rules of the repository that no linter knows."""
 
 import ast
+import os
 import re
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -220,3 +222,18 @@ def test_every_link_between_the_pages_leads_somewhere():
 def test_the_bundled_batches_are_small():
     size = sum(path.stat().st_size for path in (ROOT / "data/raw").rglob("*") if path.is_file())
     assert size <= 12e6
+
+
+@pytest.mark.skipif(not (ROOT / ".venv/made-from").exists(), reason="the environment is not that of set-up")
+def test_set_up_finds_everything_in_place_with_its_environment_active():
+    path = f"{ROOT / '.venv/bin'}:{os.environ['PATH']}"
+    start = time.perf_counter()
+    done = subprocess.run(
+        [ROOT / "scripts/setup.sh"],
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr == ""
+    assert time.perf_counter() - start < 1.0
