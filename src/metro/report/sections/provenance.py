@@ -18,8 +18,8 @@ LIMITS = {
     "deformation": "The arm deforms at its joints alone, linearly; links, base and tool holder are rigid.",
     "waviness": "Waviness is predicted from the tracking error of the joints; vibration faster than the "
     "controller's log is not in it.",
-    "flatness": "The face is the static answer of the tip to the mean force at each path point; transients "
-    "at entry and exit are not in the base model.",
+    "flatness": "The face is the answer of the tip to the mean force at each path point; transients at entry "
+    "and exit are in the base model where mass.csv gives the arm's mass.",
     "lobes": "Stability is that of the linear delay equation with the identified modes; process damping and "
     "modes that change with speed are not in the base model.",
 }
