@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import metro.effects
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import COEFFICIENTS, Cut
@@ -69,7 +68,7 @@ def test_an_effect_of_another_package_is_found_by_its_entry_point(third_party):
 
 
 def test_without_that_package_it_is_not_there():
-    assert "edge_dulling" not in {effect.name for effect in metro.effects.library()}
+    assert "edge_dulling" not in {effect.name for effect in library()}
 
 
 def test_the_documented_effect_does_to_the_force_what_it_says(third_party):

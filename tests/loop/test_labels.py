@@ -1,9 +1,13 @@
 """Labels against predicted probabilities."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pandas as pd
 import pytest
 
-from metro.loop.labels import log_likelihood, surprise
+from metro.loop.labels import judge_labels, log_likelihood, surprise
+from metro.loop.search import Gates
 
 RNG = np.random.default_rng(1)
 PROBABILITY = RNG.uniform(0.02, 0.98, 40)
@@ -39,3 +43,38 @@ def test_surprise_is_small_when_labels_contradict_a_confident_prediction():
 
 def test_an_undecided_prediction_is_never_surprised():
     assert surprise(np.ones(20), np.full(20, 0.5), 1) == pytest.approx(1.0)
+
+
+GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
+CAUSE = [{"effect": "tool_runout", "probability": 1.0, "parameters": {}}]
+LABEL = np.tile([0.0, 1.0], 6)
+RIGHT, WRONG = np.where(LABEL > 0.5, 0.95, 0.05), np.where(LABEL > 0.5, 0.05, 0.95)
+
+
+def judged(before, after, tests=12):
+    rows = pd.DataFrame(
+        {"run": [f"c{i}" for i in range(12)], "measured": LABEL, "before": before, "after": after}
+    )
+    return judge_labels(SimpleNamespace(notes=()), rows.head(tests), CAUSE, GATES)[1]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "tests", "status", "effects"),
+    [
+        (RIGHT, RIGHT, 12, "clean", []),
+        (WRONG, RIGHT, 12, "explained", CAUSE),
+        (WRONG, WRONG, 12, "unexplained", []),
+        (RIGHT, RIGHT, 4, "insufficient", []),
+    ],
+)
+def test_force_effects_explain_labels_that_only_the_refitted_coefficients_predict(
+    before, after, tests, status, effects
+):
+    verdict = judged(before, after, tests)
+    assert (verdict["status"], verdict["effects"]) == (status, effects)
+
+
+def test_labels_that_nothing_predicts_are_named():
+    verdict = judged(WRONG, WRONG)
+    assert "12 of 12 tests: c0, c1" in verdict["unexplained"]["signature"]
+    assert judged(WRONG, RIGHT)["after"]["rms"] < judged(WRONG, RIGHT)["before"]["rms"]
