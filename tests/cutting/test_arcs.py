@@ -1,97 +1,79 @@
-"""Exact integrals along the edge against a brute-force slice integration written here, and against slices."""
+"""Where one pass bounds the chip, against the least of the passes on a fine grid of immersions."""
 
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
+from metro.cutting.arcs import arcs
 from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement, engagement
-from metro.cutting.force import ANGLES, _assembled, force_basis
-from metro.cutting.law import EdgeLaw
-from metro.cutting.slices import sliced
+from metro.cutting.passes import passes
 
 SLOT = Engagement(0.0, math.pi)
-ANGLE = 2 * math.pi * np.arange(ANGLES) / ANGLES
-# [T] table 4, N/m² and N/m
-TITANIUM = np.array([10145e6, 11036.5e6, 5000e6, 591.92e3, 100.03e3, 214.32e3])
+ANGLE = 2 * math.pi * np.arange(24) / 24
+FINE = np.linspace(-0.25, math.pi + 0.25, 20001)
 
 
-def cutter(teeth=4, helix=40.0, radius=6e-3, **runout):
-    return Cutter(radius, math.radians(helix), evenly_pitched(teeth), **runout)
+def found(angles, runout, true_path, engaged=SLOT, feed=0.03e-3):
+    tool = Cutter(6e-3, math.radians(40), angles, runout, 0.7)
+    before = passes(tool, Cut(feed, 3e-3, engaged), true_path, ANGLE)
+    return before, arcs(before, engaged)
 
 
-def brute_force(tool, cut, coefficients, angle, slices=400):
-    """Slice the edge and step through the teeth one by one, with the chip thickness written out."""
-    force = np.zeros(3)
-    dz = cut.axial_depth / slices
-    n = tool.teeth
-    for i in range(slices):
-        lag = (i + 0.5) * dz * math.tan(tool.helix) / tool.radius
-        offset = [tool.runout_radius * math.cos(tool.runout_angle - a + lag) for a in tool.tooth_angles]
-        for j, tooth in enumerate(tool.tooth_angles):
-            phi = (angle + tooth - lag) % (2 * math.pi)
-            if not cut.engagement.entry < phi < cut.engagement.exit:
-                continue
-            h = math.inf
-            for m in range(1, n + 1):
-                earlier = (j + m) % n
-                pitch = (tool.tooth_angles[earlier] - tooth) % (2 * math.pi) or 2 * math.pi
-                feed = cut.feed_per_tooth * n * pitch / (2 * math.pi)
-                h = min(h, feed * math.sin(phi) + offset[j] - offset[earlier])
-            if h <= 0:
-                continue
-            ft, fr, fa = (coefficients[k] * h + coefficients[k + 3] for k in range(3))
-            force += dz * np.array(
-                [-ft * math.cos(phi) - fr * math.sin(phi), ft * math.sin(phi) - fr * math.cos(phi), fa]
-            )
-    return force
+@pytest.mark.parametrize("true_path", [False, True])
+@pytest.mark.parametrize("runout", [0.0, 3e-6, 12e-6])
+@pytest.mark.parametrize("angles", [evenly_pitched(2), evenly_pitched(5), (0.0, 1.4, 3.3, 4.9)])
+def test_bounds_are_the_ends_and_kinks_of_the_least_chip(angles, runout, true_path):
+    before, bounds = found(angles, runout, true_path)
+    step = FINE[1] - FINE[0]
+    for row in np.ndindex(bounds.shape[1:]):
+        here = before[:, *row][:, None]
+        chips = here.chip(np.sin(FINE), np.cos(FINE))
+        cutting = FINE[chips.min(axis=0) > 0.0]
+        low, high = bounds[0, *row], bounds[-1, *row]
+        if len(cutting) == 0:
+            assert high < low + step
+            continue
+        assert (low, high) == pytest.approx((cutting[0], cutting[-1]), abs=2 * step)
+        inside = (low < FINE) & (high > FINE)
+        kinks = FINE[1:][(np.diff(chips.argmin(axis=0)) != 0) & inside[1:] & inside[:-1]]
+        for kink in kinks:
+            assert np.abs(bounds[:, *row] - kink).min() < 2 * step
 
 
-@settings(max_examples=15, deadline=None)
-@given(
-    st.integers(1, 5),
-    st.floats(2.0, 50.0),
-    st.floats(0.0, 30e-6),
-    st.tuples(st.floats(0.0, 6.28), st.floats(0.0, 0.3), st.sampled_from([3e-3, 40e-3])),
-)
-def test_force_is_that_of_a_brute_force_slice_integration(teeth, helix, runout, other):
-    direction, shift, depth = other
-    angles = [a + shift * math.sin(3 * i) for i, a in enumerate(evenly_pitched(teeth))]
-    tool = Cutter(6e-3, math.radians(helix), tuple(angles), runout, direction)
-    cut = Cut(0.03e-3, depth, engagement("side", "up", 5e-3, 6e-3))
-    table = force_basis(tool, EdgeLaw(), cut) @ TITANIUM
-    steps = (0, 170, 500)
-    expected = np.array([brute_force(tool, cut, TITANIUM, 2 * math.pi * step / ANGLES) for step in steps])
-    # What the brute force does not resolve: each tooth enters, leaves and bounds the chip within a slice.
-    tooth = np.abs(TITANIUM[:3]).max() * 0.03e-3 + np.abs(TITANIUM[3:]).max()
-    assert table[list(steps)] == pytest.approx(expected, abs=3 * teeth * tooth * depth / 400)
+def test_true_paths_cross_outside_the_half_circle_as_well():
+    # Kinks of the least chip before φ = 0 or after π, where the chip of a turn is still positive.
+    angle = 2 * math.pi * np.arange(720) / 720
+    tool, cut = Cutter(6e-3, 0.7, evenly_pitched(5), 20e-6, 0.7), Cut(0.2e-3, 3e-3, SLOT)
+    before = passes(tool, cut, True, angle)
+    bounds, outside = arcs(before, SLOT), 0
+    for phi in (np.linspace(-0.2, -1e-3, 400), np.linspace(math.pi + 1e-3, math.pi + 0.2, 400)):
+        chips = before[:, :, 0, None].chip(np.sin(phi), np.cos(phi))
+        kinks = np.argwhere((np.diff(chips.argmin(axis=0)) != 0) & (chips.min(axis=0)[:, 1:] > 1e-9))
+        for row, place in kinks:
+            assert np.abs(bounds[:, row, 0] - phi[place]).min() < 1e-3
+        outside += len(kinks)
+    assert outside > 10
 
 
-@pytest.mark.parametrize("runout", [0.0, 8e-6])
-def test_slices_tend_to_the_exact_integral_as_they_get_thinner(runout):
-    tool = cutter(runout_radius=runout, runout_angle=0.4)
-    cut = Cut(0.05e-3, 20e-3, engagement("side", "down", 4e-3, 6e-3))
-    exact = force_basis(tool, EdgeLaw(), cut)
-    scale = np.abs(exact).max(axis=(0, 1))
-
-    def error(per_radian):
-        basis = _assembled(sliced(tool, EdgeLaw(), cut, true_path=False, angle=ANGLE, per_radian=per_radian))
-        return math.sqrt(np.mean(((basis - exact) / scale) ** 2))
-
-    assert error(12) < 0.01
-    assert error(48) < error(12) / 4
-    assert error(96) < error(48) / 2
+def test_on_true_paths_a_tooth_starts_half_the_feed_angle_before_the_circle():
+    # h ≈ f p sin φ + (f p)²/2R cos² φ: zero half of what the centre moved over a pitch, seen from the radius.
+    _, bounds = found(evenly_pitched(4), 0.0, True, feed=0.01e-3)
+    early = 0.5 * 0.01e-3 / 6e-3
+    assert bounds[0] == pytest.approx(-early, rel=0.01)
+    assert bounds[-1] == pytest.approx(math.pi + early, rel=0.01)
 
 
-@pytest.mark.parametrize("law", [EdgeLaw(), EdgeLaw(size_exponent=0.25)], ids=["linear", "power"])
-def test_the_spline_of_true_paths_and_power_laws_is_the_sum_of_thin_slices(law):
-    tool, step = cutter(), 2 * math.pi / ANGLES
-    cut = Cut(0.1e-3, 30 * step / tool.lag_per_depth, SLOT)  # slices that span a step of the table each
-    table = force_basis(tool, law, cut, True)
-    thin = _assembled(sliced(tool, law, cut, true_path=True, angle=ANGLE, per_radian=1 / step))
-    scale = np.abs(thin).max(axis=(0, 1))
-    assert table / scale == pytest.approx(thin / scale, abs=2e-4)
+def test_a_wall_cuts_the_arc_short():
+    engaged = engagement("side", "down", 2e-3, 6e-3)
+    _, bounds = found(evenly_pitched(4), 3e-6, True, engaged)
+    assert bounds[0].min() == engaged.entry
+    assert bounds[-1].max() > math.pi
+
+
+def test_one_tooth_meets_its_own_path_alone():
+    before, bounds = found((0.0,), 12e-6, False)
+    assert len(before.sine) == 1
+    assert bounds == pytest.approx(np.broadcast_to([[[0.0]], [[math.pi]]], bounds.shape))

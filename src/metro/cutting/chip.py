@@ -16,11 +16,15 @@ ARC_POINTS = 2001
 
 @dataclass(frozen=True)
 class Cut:
-    """The nominal settings of a cut (SI): what the force over a revolution depends on besides the tool."""
+    """The nominal settings of a cut (SI): what the force over a revolution depends on besides the tool.
+
+    ``curvature`` of the tool's path, 1/m, positive where it turns left (counter-clockwise seen from +z).
+    """
 
     feed_per_tooth: float
     axial_depth: float
     engagement: Engagement
+    curvature: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -41,9 +45,7 @@ def chip_thickness(cutter: Cutter, cut: Cut, immersion: Array, height: Array, tr
 
     A tooth clears what the teeth before it left, and some of those may have left more than the last one: the
     least over m = 1…N counts. On circular paths h_m = s_m sin φ + R_j − R_{j+m}, with s_m the feed between
-    the two passes (physics.md §2). On the true, trochoidal paths tooth j+m crossed the ray of tooth j from a
-    centre d behind, at an immersion larger by δ: sin δ = d cos φ / R_{j+m}, d = (v/ω)(pitch − δ), h_m = d sin
-    φ + R_j − R_{j+m} cos δ; two iterations are exact to rounding.
+    the two passes (physics.md §2); true paths add :func:`path_excess`, and :func:`curve_excess` on a curve.
 
     Parameters
     ----------
@@ -53,18 +55,39 @@ def chip_thickness(cutter: Cutter, cut: Cut, immersion: Array, height: Array, tr
     sine, cosine = np.sin(immersion), np.cos(immersion)
     feed = feed_per_radian(cutter, cut)
     deviation = cutter.radius_deviation(height).T
-    passes = cutter.teeth if cutter.runout_radius > 0.0 else 1
+    curvature = cut.curvature if true_path else 0.0
+    passes = cutter.teeth if deviation.any() or curvature else 1
     least = np.full(immersion.shape, np.inf)
     for steps in range(1, passes + 1):
-        earlier = np.roll(deviation, -steps, axis=1)
-        pitch, radius = cutter.pitch(steps), cutter.radius + earlier
+        earlier, pitch = np.roll(deviation, -steps, axis=1), cutter.pitch(steps)
         thickness = (feed * pitch) * sine + (deviation - earlier)
+        thickness += curve_excess(curvature, feed * pitch) * cosine
         if true_path:
-            lean = (feed / radius) * cosine
-            lean = lean * pitch * (1.0 - lean)
-            thickness += lean * ((0.5 * radius) * lean - feed * sine)
+            thickness += path_excess(feed, pitch, cutter.radius + earlier, sine, cosine)
         np.minimum(least, thickness, out=least)
     return least
+
+
+def path_excess(feed: float, pitch: Array, radius: Array, sine: Array, cosine: Array) -> Array:
+    """Chip between two trochoidal paths less that between the two circles, m.
+
+    The earlier tooth, ``radius`` from the axis and ``pitch`` ahead, crossed the ray of the later one from a
+    centre d behind, at an immersion larger by δ: sin δ = d cos φ / radius, d = feed × (pitch − δ), and the
+    chip is d sin φ + R_j − radius × cos δ; two iterations are exact to rounding.
+    """
+    lean = (feed / radius) * cosine
+    lean = lean * pitch * (1.0 - lean)
+    return np.asarray(lean * ((0.5 * radius) * lean - feed * sine))
+
+
+def curve_excess(curvature: float, travel: Array) -> Array:
+    """Share of cos φ, m, in the chip between two passes on a curve, ``travel`` (m) along it apart.
+
+    The chord between the two centres is turned against the feed by half the angle between them, and a curve
+    of radius 1/κ turns by κ × travel: travel sin(φ − κ travel / 2). Towards the centre of the curve the older
+    passes have cleared more than the last one.
+    """
+    return np.asarray(-0.5 * curvature * travel**2)
 
 
 def path_difference(cutter: Cutter, cut: Cut) -> PathDifference:

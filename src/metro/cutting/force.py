@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 
 import numpy as np
 
-from metro.cutting.arcs import arcs, integrated, over_arc
+from metro.cutting.arcs import arcs
 from metro.cutting.chip import Cut, chip_thickness
 from metro.cutting.cutter import Cutter
+from metro.cutting.edges import TURN, integrated
 from metro.cutting.law import EdgeLaw
-from metro.cutting.slices import sliced
+from metro.cutting.passes import passes
 from metro.units import Array
 
 __all__ = [
@@ -32,24 +32,25 @@ ANGLES = 720
 def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) -> Array:
     """Force on the tool per unit of each coefficient over one revolution, feed frame.
 
-    The edge is integrated exactly wherever the chip allows (metro.cutting.arcs), else in slices. An edge
-    that lags by less than one angular step (no helix: none) is averaged over that step, so that the table of
-    an edge that enters at once has the right mean.
+    The edge is integrated to 1e-9 of the largest force (laws that are not linear: 1e-7), runout and true
+    paths included (metro.cutting.edges). An edge that lags by less than one angular step (no helix: none) is
+    averaged over that step, so that the table of an edge that enters at once has the right mean.
 
     Returns
     -------
     (ANGLES, 3, 6) array: angle of tooth 0's tip from +y, evenly from 0 to 2π; axis; coefficient in the order
     of ``COEFFICIENTS`` (shear in N per N/m², edge in N per N/m of axial depth). Read-only: it is cached.
     """
-    angle = 2.0 * math.pi * np.arange(ANGLES) / ANGLES
-    pieces = arcs(cutter, law, cut, true_path, angle)
-    if pieces is None:
-        basis = _assembled(sliced(cutter, law, cut, true_path=true_path, angle=angle))
-    else:
-        lag = cutter.lag_per_depth * cut.axial_depth
-        span = max(abs(lag), 2.0 * math.pi / ANGLES)
-        top = angle[:, None] + np.asarray(cutter.tooth_angles) + 0.5 * (span - lag)
-        basis = _assembled(integrated(pieces, top, span) * (cut.axial_depth / span))
+    angle = TURN * np.arange(ANGLES) / ANGLES
+    before = passes(cutter, cut, true_path, angle)
+    bounds = arcs(before, cut.engagement)
+    if before.sine.size == 1 and ANGLES % cutter.teeth == 0:  # teeth that are all alike: one pitch of angles
+        angle = angle[: ANGLES // cutter.teeth]
+    lag = cutter.lag_per_depth * cut.axial_depth
+    span = max(abs(lag), TURN / ANGLES)
+    top = angle[:, None] + np.asarray(cutter.tooth_angles) + 0.5 * (span - lag)
+    pitch = _assembled(integrated(before, bounds, law, top, span) * (cut.axial_depth / span))
+    basis = np.tile(pitch, (ANGLES // len(angle), 1, 1))
     basis.flags.writeable = False
     return basis
 
@@ -60,10 +61,12 @@ def mean_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) 
     Without runout every height of the edge goes through the same arc: exact, whatever the helix. With
     runout the mean of :func:`force_basis`.
     """
-    pieces = None if cutter.runout_radius > 0.0 else arcs(cutter, law, cut, true_path, np.zeros(1))
-    if pieces is None:
+    before = passes(cutter, cut, true_path, np.zeros(1))
+    if before.off_sine.any() or before.off_cosine.any():
         return np.asarray(force_basis(cutter, law, cut, true_path).mean(axis=0))
-    return _assembled(over_arc(pieces) * (cut.axial_depth / (2.0 * math.pi)))
+    bounds = arcs(before, cut.engagement)
+    top = np.full((1, cutter.teeth), bounds.max())
+    return _assembled(integrated(before, bounds, law, top, TURN)[0] * (cut.axial_depth / TURN))
 
 
 def mean_force(cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array) -> Array:

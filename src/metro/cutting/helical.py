@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,8 +74,7 @@ def helical_signal(
 
     Peripheral forces of the feed frame, inclined by the ramp; the bottom edges' thrust, which is along the
     spindle and not inclined; all turned to the direction of feed (physics.md §2). The feed turns as well, so
-    the teeth pass it at the spindle's and the orbit's speed together. On true paths a tooth cuts the way
-    since the tooth before, whose direction is that of feed half a tooth passing ago.
+    the teeth pass it at the spindle's and the orbit's speed together. True paths follow the orbit's curve.
 
     Parameters
     ----------
@@ -85,10 +84,10 @@ def helical_signal(
         counter-clockwise from work +x, rad.
     """
     relative = speed + orbit_speed
-    lag = orbit_speed * math.pi / (cutter.teeth * relative) if true_path else 0.0
+    curved = replace(cut, curvature=math.copysign(1.0 / helix.radius, orbit_speed))
     force = time_signal(
-        cutter, law, cut, coefficients[:6], speed=relative, time=time, phase=phase - lag, true_path=true_path
+        cutter, law, curved, coefficients[:6], speed=relative, time=time, phase=phase, true_path=true_path
     )
     force = ramped(force, helix.ramp)
     force[:, 2] += bottom_thrust(cutter, helix) @ coefficients[6:]
-    return turned(force, direction - lag + orbit_speed * time)
+    return turned(force, direction + orbit_speed * time)
