@@ -3,13 +3,20 @@
 export OPENBLAS_NUM_THREADS := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-.PHONY: reports test setup lint lock clean
+.PHONY: reports test proof-small setup lint lock clean
 
 reports: setup
 	snakemake
 
 test: lint
 	pytest -n 2 --dist loadgroup $(PYTEST_ARGS)
+
+# Blind batches, few of them: fails where a demand is missed by more than chance.
+proof-small: setup
+	rm -rf build/proof
+	python -m proof make build/proof --batches 8 --seed 3 --style a
+	python -m proof run build/proof
+	python -m proof open build/proof --strict
 
 lint: setup
 	ruff check .

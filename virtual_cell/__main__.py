@@ -23,7 +23,7 @@ def main(arguments: list[str] | None = None) -> None:
         bundled(options.root)
         return
     hidden = dict(_effect(words) for words in options.effect)
-    truth = force.make(options.folder, hidden, options.seed)
+    truth = force.make(options.folder, hidden, options.seed, options.style)
     path = options.truth or options.folder.parent / f"{options.folder.name}.truth.json"
     path.write_text(json.dumps(truth, indent=1) + "\n")
 
@@ -46,6 +46,7 @@ def _parser() -> argparse.ArgumentParser:
         help="hide an effect, its parameters as given or drawn; may be repeated: " + ", ".join(EFFECTS),
     )
     one.add_argument("--seed", type=int, default=0)
+    one.add_argument("--style", choices=force.STYLES, default="a", help="how it is measured")
     one.add_argument("--truth", type=Path, help="where to write the truth")
     return parser
 

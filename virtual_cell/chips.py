@@ -20,7 +20,7 @@ from virtual_cell.units import DEG, Array
 Path = Callable[[Array], tuple[Array, Array]]
 _SLICE = 1.0 * DEG  # helix lag of one slice
 _TRACE_STEPS = 2  # each gains a factor feed/(cutting speed), about 1e-3
-_BEHIND = 0.02  # a trochoid cuts a little before 0 and after 180 degrees
+_BEHIND = 0.1  # a trochoid cuts a little before 0 and after 180 degrees, a tooth that runs out further
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from virtual_cell.session import Session
-from virtual_cell.units import DEG, N_UM, UM
+from virtual_cell.units import DEG, MM, MS, N_UM, UM
 
 Parameters = dict[str, Any]
 
@@ -76,6 +76,14 @@ def _drift(rng: np.random.Generator, _: Session) -> Parameters:
     return {"slope_n_s": [_signed(rng, 1.0, 12.0) for _ in range(3)]}
 
 
+def _warm(session: Session, p: Parameters) -> Session:
+    return replace(session, growth=p["growth_um"] * UM)
+
+
+def _speed(session: Session, p: Parameters) -> Session:
+    return replace(session, speed_exponent=p["exponent"])
+
+
 EFFECTS: Mapping[str, Hidden] = {
     "tool_runout": Hidden(lambda r, _: {"radius_um": _size(r, 2.0, 25.0), "angle_deg": _angle(r)}, _runout),
     "tool_wear": Hidden(
@@ -112,5 +120,22 @@ EFFECTS: Mapping[str, Hidden] = {
     "chipped_tooth": Hidden(
         lambda r, s: {"tooth": int(r.integers(s.tool.teeth)), "length_um": _size(r, 8.0, 60.0)}, _chipped
     ),
-    "hard_spot": Hidden(lambda _r, _s: {"ktc_step": 0.08}, lambda s, p: replace(s, hard_spot=p["ktc_step"])),
+    "hard_spot": Hidden(
+        lambda r, _: {"ktc_step": _signed(r, 0.04, 0.15), "from_share": round(float(r.uniform(0.3, 0.7)), 2)},
+        lambda s, p: replace(s, hard_spot=p["ktc_step"], hard_from=p["from_share"]),
+    ),
+    "speed_dependence": Hidden(lambda r, _: {"exponent": _size(r, 0.05, 0.3)}, _speed),
+    "sensor_lag": Hidden(
+        lambda r, _: {"time_constant_ms": _size(r, 0.03, 0.5)},
+        lambda s, p: _sensor(s, lag=p["time_constant_ms"] * MS),
+    ),
+    "second_orbit_stiffness": Hidden(
+        lambda r, _: {"amplitude": _size(r, 0.03, 0.25), "phase_deg": _angle(r)},
+        lambda s, p: replace(s, orbit_stiffness=(p["amplitude"], p["phase_deg"] * DEG), orbit_harmonic=2),
+    ),
+    "slow_growth": Hidden(lambda r, _: {"growth_um": _size(r, 10.0, 120.0)}, _warm),
+    "tilted_surface": Hidden(
+        lambda r, _: {"rise_um_mm": _signed(r, 1.0, 12.0)},
+        lambda s, p: replace(s, tilt=p["rise_um_mm"] * UM / MM),
+    ),
 }

@@ -37,6 +37,10 @@ class Coefficients:
     size_reference: float = 1.0
     wear: float = 0.0
 
+    def softened(self, factor: float) -> Coefficients:
+        """Coefficients with the shear of the periphery times a factor."""
+        return replace(self, ktc=self.ktc * factor, krc=self.krc * factor, kac=self.kac * factor)
+
     def worn(self, metres: Array | float) -> Array | float:
         """Factor on the edge coefficients after some metres of cut."""
         return 1.0 + self.wear * metres

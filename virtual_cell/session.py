@@ -52,9 +52,13 @@ class Session:
     scatter : relative run-to-run standard deviation of each coefficient. speed_error : largest relative error
         of speed.
     stiffness : (kx, ky) N/m along work x, y, or None. orbit_stiffness : amplitude and phase (rad) of the
-        modulation of F_z.
-    hard_spot : relative step of K_t for the second half of the session.
+        modulation of F_z, ``orbit_harmonic`` times per orbit.
+    hard_spot, hard_from : relative step of K_t, and the share of the session after which it comes.
+    speed_exponent, speed_reference : shear coefficients go as (speed/reference)^−exponent; rad/s.
+    growth : m, how much deeper the tool cuts at the end of the session, because it grew as it warmed up.
+    tilt : depth of cut gained per length travelled along work x.
     depth, mean_chip : m, usual axial depth and mean chip thickness of the identification runs.
+    tacho : whether the angle of the spindle is recorded, from an arbitrary zero.
     """
 
     tool: Tool
@@ -65,9 +69,16 @@ class Session:
     speed_error: float = 0.005
     stiffness: tuple[float, float] | None = None
     orbit_stiffness: tuple[float, float] = (0.0, 0.0)
+    orbit_harmonic: int = 1
     hard_spot: float = 0.0
+    hard_from: float = 0.5
+    speed_exponent: float = 0.0
+    speed_reference: float = 1.0
+    growth: float = 0.0
+    tilt: float = 0.0
     depth: float = 0.0
     mean_chip: float = 0.0
+    tacho: bool = False
 
 
 def orbit_rpm(session: Session, plan: Plan) -> float:
@@ -103,8 +114,8 @@ def cut_all(session: Session, plans: tuple[Plan, ...], folder: Path, rng: np.ran
     rows, metres = [], 0.0
     for place, (plan, replicate) in enumerate(order, start=1):
         name = f"r{place:02d}"
-        true = session if place <= len(order) // 2 else _harder(session)
-        file = record_run(true, plan, folder, name, metres=metres, rng=rng)
+        true, deeper = _later(session, plan, (place - 1) / len(order))
+        file = record_run(true, deeper, folder, name, metres=metres, rng=rng)
         rows.append(row_of(session, plan, name, place, replicate) | {"dynamometer": file})
         metres += plan.cut_length_mm * MM
     return rows
@@ -114,21 +125,31 @@ def record_run(
     session: Session, plan: Plan, folder: Path, name: str, *, metres: float, rng: np.random.Generator
 ) -> str:
     """Cut and record one run, after ``metres`` of cut; return the file, relative to ``folder``."""
-    time, read = _run(session, plan, metres, rng)
-    return write_force(folder, name, time, read)
+    time, read, angle = _run(session, plan, metres, rng)
+    return write_force(folder, name, time, read, angle if session.tacho else None)
 
 
-def write_force(folder: Path, run: str, time: Array, read: Array) -> str:
-    """Write a dynamometer file; return its path relative to ``folder``."""
+def write_force(folder: Path, run: str, time: Array, read: Array, angle: Array | None = None) -> str:
+    """Write a dynamometer file, with the angle of the spindle (rad) where there is a tacho.
+
+    Returns its path relative to ``folder``.
+    """
     file = f"force/{run}.parquet"
     signals = {axis: read[:, i] for i, axis in enumerate(("fx_n", "fy_n", "fz_n"))}
+    if angle is not None:
+        signals["spindle_deg"] = np.mod(angle, 2.0 * math.pi) / DEG
     write_signal(folder / file, {"t_s": time, **signals})
     return file
 
 
-def _harder(session: Session) -> Session:
+def _later(session: Session, plan: Plan, share: float) -> tuple[Session, Plan]:
+    """Return what is cut, and how deep, when a share of the session has passed."""
     k = session.coefficients
-    return replace(session, coefficients=replace(k, ktc=k.ktc * (1.0 + session.hard_spot)))
+    if share >= session.hard_from:
+        k = replace(k, ktc=k.ktc * (1.0 + session.hard_spot))
+    warm = (1.0 - math.exp(-3.0 * share)) / (1.0 - math.exp(-3.0))
+    depth = plan.axial_depth_mm + session.growth * warm / MM
+    return replace(session, coefficients=k), replace(plan, axial_depth_mm=depth)
 
 
 def row_of(session: Session, plan: Plan, name: str, place: int, replicate: int) -> Row:
@@ -155,10 +176,11 @@ def _motion(session: Session, plan: Plan, rng: np.random.Generator) -> tuple[Mot
     return Straight(speed, start, side=side, edge=edge), plan.air_s + radius / speed + plan.full_s
 
 
-def _run(session: Session, plan: Plan, metres: float, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Record one run: its own coefficients, speed, start phase and zeros."""
+def _run(session: Session, plan: Plan, metres: float, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """Record one run, with its own coefficients, speed, start phase and zeros: times, readings, angle."""
     spindle = plan.spindle_rpm * RPM * (1.0 + session.speed_error * rng.uniform(-1.0, 1.0))
     coefficients = scattered(session.coefficients, session.scatter, rng)
+    coefficients = coefficients.softened((spindle / session.speed_reference) ** -session.speed_exponent)
     phase = rng.uniform(0.0, 2.0 * math.pi)
     motion, duration = _motion(session, plan, rng)
     turn = plan.feed_direction_deg * DEG if plan.operation != "helical" else 0.0
@@ -166,15 +188,34 @@ def _run(session: Session, plan: Plan, metres: float, rng: np.random.Generator) 
     cut = Cut(engagement, coefficients, metres, _turned(session, turn))
 
     def on_tool(t: Array) -> Array:
-        force = forces(cut, t)
+        force = _on_a_slope(cut, t, session.tilt, turn)
         amplitude, towards = session.orbit_stiffness
         if plan.operation == "helical":
-            force[:, 2] *= 1.0 + amplitude * np.cos(motion.direction(t) - towards)
+            force[:, 2] *= 1.0 + amplitude * np.cos(session.orbit_harmonic * motion.direction(t) - towards)
         c, s = math.cos(turn), math.sin(turn)
         rotated: Array = force @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         return rotated
 
-    return record(session.dynamometer, on_tool, duration, rng)
+    time, read = record(session.dynamometer, on_tool, duration, rng)
+    return time, read, phase + spindle * time
+
+
+def _on_a_slope(cut: Cut, t: Array, tilt: float, turn: float) -> Array:
+    """Force (n, 3), N, in work that gets thicker by ``tilt`` per length along work x.
+
+    Interpolated between the least and the largest depth; the depth is right at the record's start. ``turn``
+    leads from the work frame to that of the motion.
+    """
+    if tilt == 0.0:
+        return forces(cut, t)
+    (x, y), (x0, y0) = (cut.engagement.motion.centre(moment) for moment in (t, np.zeros(1)))
+    deeper = tilt * ((x - x0) * math.cos(turn) - (y - y0) * math.sin(turn))
+    ends = float(deeper.min()), float(deeper.max())
+    low, high = (replace(cut.engagement, depth=cut.engagement.depth + end) for end in ends)
+    share = ((deeper - ends[0]) / (ends[1] - ends[0]))[:, None]
+    shallow, deep = (forces(replace(cut, engagement=one), t) for one in (low, high))
+    ramp: Array = shallow * (1.0 - share) + deep * share
+    return ramp
 
 
 def _turned(session: Session, turn: float) -> Array | None:

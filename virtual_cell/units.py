@@ -12,6 +12,7 @@ Array = npt.NDArray[np.floating[Any]]
 
 MM = 1e-3
 UM = 1e-6
+MS = 1e-3
 DEG = math.pi / 180.0
 RPM = 2.0 * math.pi / 60.0
 N_MM2 = 1e6

@@ -1,0 +1,60 @@
+"""``python -m proof``: make batches that hide sealed effects, run the pipeline on them, open the truth."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from proof.layout import Layout
+from virtual_cell.recipes.force import STYLES
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line."""
+    options = _parser().parse_args(arguments)
+    {"make": _make, "run": _run, "open": _open}[options.command](Layout(options.out), options)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m proof", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    make = commands.add_parser("make", help="make batches with hidden effects, and seal what they are")
+    make.add_argument("--batches", type=int, default=200)
+    make.add_argument("--seed", type=int, default=1)
+    make.add_argument("--style", choices=STYLES, default="b", help="how it is measured; a is for tuning")
+    run = commands.add_parser("run", help="run the pipeline on the batches; goes on where it was stopped")
+    run.add_argument("--keep", action="store_true", help="keep the tables of raw signals")
+    run.add_argument("--reports", action="store_true", help="write the PDF reports, too")
+    opening = commands.add_parser("open", help="check the seal and compare the verdicts with the truth")
+    opening.add_argument("--strict", action="store_true", help="fail where a demand is missed beyond chance")
+    for command in (make, run, opening):
+        command.add_argument("out", type=Path, help="folder of this proof")
+        command.add_argument("--jobs", type=int, default=2, help="worker processes")
+    return parser
+
+
+def _make(out: Layout, options: argparse.Namespace) -> None:
+    from proof.suite import make
+
+    digest = make(out, options.batches, options.seed, options.style, options.jobs)
+    print(f"{options.batches} batches in {out.raw}; what they hide is sealed as SHA-256 {digest}")
+
+
+def _run(out: Layout, options: argparse.Namespace) -> None:
+    from proof.run import run
+
+    failed = run(out, options.jobs, keep=options.keep, pdf=options.reports)
+    if failed:
+        raise SystemExit(f"failed, see reports/<batch>/failed.txt: {', '.join(failed)}")
+
+
+def _open(out: Layout, options: argparse.Namespace) -> None:
+    from proof.opening import opened
+
+    missed = [figure.label for figure in opened(out, options.jobs) if figure.missed_for_sure]
+    if options.strict and missed:
+        raise SystemExit("missed by more than chance: " + "; ".join(missed))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+"""An effect's parameters as found against the true ones, up to what cannot be observed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from metro.units import JSON
+
+# Angles that are known up to a period: that of the teeth, or a whole turn.
+ANGLES = {("tool_runout", "angle_deg"): "pitch", ("orbit_stiffness", "phase_deg"): "turn"}
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One true value and what was found for it.
+
+    ``error`` is relative (in a list: to its largest value), of an angle that has a period in degrees;
+    ``covered``: whether the 95 % interval holds the truth, None where none is stated.
+    """
+
+    effect: str
+    parameter: str
+    error: float
+    covered: bool | None
+
+
+def estimates(effect: str, truth: Mapping[str, Any], found: JSON, teeth: int) -> list[Estimate]:
+    """Compare the parameters that truth and finding both have.
+
+    Which tooth is the first one cannot be observed: the angle of runout is compared modulo the pitch, and a
+    list that has an entry per tooth in the cyclic order that fits best.
+
+    Parameters
+    ----------
+    truth, found : as in the contract's table of effects and in verdict.json: a value or a list of values by
+        name.
+    """
+    return [
+        one
+        for name, value in truth.items()
+        if name in found and len(_list(value)) == len(_list(found[name]))
+        for one in _compared(effect, name, np.array(_list(value), dtype=float), _list(found[name]), teeth)
+    ]
+
+
+def _list(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]
+
+
+def _compared(effect: str, name: str, true: np.ndarray, found: list[JSON], teeth: int) -> Iterator[Estimate]:
+    value = np.array([entry["value"] for entry in found], dtype=float)
+    period = _period(effect, name, teeth)
+    if period is not None:
+        true = true + period * np.round((value - true) / period)
+    elif effect == "pitch_error":
+        turned = [np.roll(true, shift) for shift in range(len(true))]
+        true = min(turned, key=lambda order: float(np.sum((order - value) ** 2)))
+    scale = 1.0 if period is not None else float(np.abs(true).max())
+    for right, error, entry in zip(true.tolist(), ((value - true) / scale).tolist(), found, strict=True):
+        low, high = entry["ci95"]
+        covered = None if low is None or high is None else bool(low <= right <= high)
+        yield Estimate(effect, name, error, covered)
+
+
+def _period(effect: str, name: str, teeth: int) -> float | None:
+    """Period of an angle in degrees; None of anything else."""
+    whole = ANGLES.get((effect, name))
+    return {"pitch": 360.0 / teeth, "turn": 360.0, None: None}[whole]

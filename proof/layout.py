@@ -1,0 +1,52 @@
+"""Where a proof keeps its files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The folders of one proof.
+
+    ``raw`` holds the batches, ``sealed`` the truth, ``processed`` and ``reports`` what the pipeline writes,
+    ``oracle`` what a fit with the true effects reaches.
+    """
+
+    root: Path
+
+    @property
+    def raw(self) -> Path:
+        """Folder of the batches."""
+        return self.root / "raw"
+
+    @property
+    def truth(self) -> Path:
+        """File of what is hidden."""
+        return self.root / "sealed" / "truth.json"
+
+    @property
+    def seal(self) -> Path:
+        """File of the truth's hash."""
+        return self.root / "seal.txt"
+
+    @property
+    def processed(self) -> Path:
+        """Folder of the pipeline's tables, by batch."""
+        return self.root / "processed"
+
+    @property
+    def reports(self) -> Path:
+        """Folder of the pipeline's results, by batch."""
+        return self.root / "reports"
+
+    @property
+    def oracle(self) -> Path:
+        """Folder of the oracle's figures, by batch."""
+        return self.root / "oracle"
+
+    @property
+    def batches(self) -> list[str]:
+        """Names of the batches, sorted."""
+        return sorted(path.parent.name for path in self.raw.glob("*/batch.yaml"))

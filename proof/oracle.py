@@ -1,0 +1,91 @@
+"""The oracle: what a fit reaches that is told the true effects, and how large each of them is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from metro.effects.effect import Effect, fitted_to
+from metro.loop.candidate import Candidate
+from metro.loop.fit import Fit, fit
+from metro.loop.noise import first_noise
+from metro.loop.verdict import comparison, held_out
+from metro.observables.problem import Problem
+from metro.units import JSON
+
+
+def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect], budget: float) -> JSON:
+    """Fit base and true effects to the identification runs; judge them on the held-out ones.
+
+    Parameters
+    ----------
+    hidden : true effects and their parameters, as in the contract's table.
+    effects : the library.
+    budget : relative model-form budget.
+
+    Returns
+    -------
+    ``before`` and ``after`` (rms error on the held-out runs without and with the effects), ``floor`` (rms of
+    the noise there) and ``sizes``: of each effect, how much the prediction changes when it is left out and
+    all else is refitted, over the floor. Where the library lacks one of them: ``after`` is None, the floor
+    that of the declared noise (the fitted one has swallowed some of the effect), and the size what of the
+    error is not noise.
+    """
+    blocks = task.role("identify", "calibrate")
+    prior = first_noise(budget, task.scatter, blocks)
+    base = fit(Candidate(task.base), blocks, prior)
+    able, _ = fitted_to(tuple(effects), task)
+    known = [_told(able, name, values) for name, values in hidden.items()]
+    told = [effect for effect in known if effect is not None]
+    if len(told) < len(hidden):
+        rows = _rows(task, base, replace(base, noise=prior))
+        before, floor = _rms(rows["measured"] - rows["before"]), _rms(rows["sigma"])
+        size = float(np.sqrt(max(0.0, before**2 - floor**2))) / floor
+        return {"before": before, "after": None, "floor": floor, "sizes": dict.fromkeys(hidden, size)}
+
+    def fitted(chosen: list[Effect]) -> Fit:
+        return fit(Candidate(task.base, tuple(chosen)), blocks, prior, base) if chosen else base
+
+    full = fitted(told)
+    rows = _rows(task, base, full)
+    floor = _rms(rows["sigma"])
+    sizes = {}
+    for effect in told:
+        without = _rows(task, fitted([other for other in told if other is not effect]), full)
+        sizes[effect.name] = _rms(without["after"] - without["before"]) / floor
+    return {
+        "before": _rms(rows["measured"] - rows["before"]),
+        "after": _rms(rows["measured"] - rows["after"]),
+        "floor": floor,
+        "sizes": sizes,
+    }
+
+
+def _told(able: Sequence[Effect], name: str, values: JSON) -> Effect | None:
+    """Return an effect that starts from its true parameters; None where the library lacks it."""
+    for effect in able:
+        if effect.name == name and {parameter.name for parameter in effect.reported} == set(values):
+            theta = np.linalg.lstsq(effect.matrix, _flat(effect, values), rcond=None)[0]
+            started = zip(effect.parameters, theta.tolist(), strict=True)
+            return replace(
+                effect, parameters=tuple(replace(p, starts=(value,), group=0) for p, value in started)
+            )
+    return None
+
+
+def _flat(effect: Effect, values: Mapping[str, Any]) -> list[float]:
+    """Return the values in the order in which the effect has them; those of one name are a list."""
+    left = {name: iter(np.atleast_1d(value).tolist()) for name, value in values.items()}
+    return [next(left[parameter.name]) for parameter in effect.reported]
+
+
+def _rows(task: Problem, before: Fit, after: Fit) -> pd.DataFrame:
+    return comparison(task, held_out(task, before), held_out(task, after))
+
+
+def _rms(values: pd.Series[float]) -> float:
+    return float(np.sqrt((values**2).mean()))

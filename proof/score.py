@@ -1,0 +1,175 @@
+"""One batch scored: what was hidden, what was found, and in which way that is right or wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from metro.units import JSON
+from proof.estimates import Estimate, estimates
+
+FAILED = "failed"
+STATUSES = ("clean", "explained", "partly_explained", "undetermined", "unexplained", "insufficient", FAILED)
+SURE = 0.9
+SEEN = 1.0  # size over noise from which an effect must be found
+
+Stated = tuple[float, bool]  # a probability, and whether it came true
+
+
+@dataclass(frozen=True)
+class Score:
+    """What became of a batch.
+
+    Attributes
+    ----------
+    kind : none, one, two or outside. hidden : names of the true effects. sizes : of each over the noise, once
+        all else is refitted.
+    named : the effects of the verdict with their stated probabilities, in order. groups : sets that it cannot
+        tell apart. rest : whether it says that something is unexplained.
+    before, after : rms error on held-out runs. oracle, floor : that of the fit told the truth, and the noise.
+    stated, rejected : probability of every effect named, or tried and not named, and whether it was there;
+        those of effects too small to be seen left out.
+    cannot_be_seen : effects of which the verdict says that these data cannot speak.
+    seconds : the stages took.
+    """
+
+    batch: str
+    kind: str
+    hidden: tuple[str, ...]
+    sizes: dict[str, float]
+    status: str
+    named: dict[str, float]
+    groups: tuple[frozenset[str], ...] = ()
+    rest: bool = False
+    before: float | None = None
+    after: float | None = None
+    oracle: float | None = None
+    floor: float | None = None
+    estimates: tuple[Estimate, ...] = ()
+    stated: tuple[Stated, ...] = ()
+    rejected: tuple[Stated, ...] = ()
+    cannot_be_seen: tuple[str, ...] = ()
+    seconds: float | None = None
+
+    @property
+    def seen(self) -> bool:
+        """Whether every hidden effect is large enough to be found, or its size is not known."""
+        return bool(self.hidden) and all(self._large(name) for name in self.hidden)
+
+    @cached_property
+    def extra(self) -> frozenset[str]:
+        """Effects named that are neither there nor declared a rival of one that is."""
+        rivals = frozenset().union(*(group for group in self.groups if group & set(self.hidden)))
+        return frozenset(self.named) - frozenset(self.hidden) - rivals
+
+    @property
+    def both(self) -> bool:
+        """Whether every hidden effect is named."""
+        return self.status != FAILED and set(self.hidden) <= set(self.named)
+
+    @property
+    def exact(self) -> bool:
+        """Whether what is hidden is named first, and nothing else but declared rivals."""
+        first = list(self.named)[: len(self.hidden)]
+        return self.status != FAILED and set(first) == set(self.hidden) and not self.extra
+
+    @property
+    def seen_named(self) -> bool:
+        """Whether those of the hidden effects that are large enough are named."""
+        return all(name in self.named for name in self.hidden if self._large(name))
+
+    def _large(self, name: str) -> bool:
+        return self.sizes.get(name, SEEN) >= SEEN
+
+    @property
+    def detected(self) -> bool:
+        """Whether the verdict says that there is something."""
+        return self.status not in {"clean", "insufficient", FAILED}
+
+    @property
+    def surely_wrong(self) -> bool:
+        """Whether an effect that is not there is named with a probability above 0.9."""
+        return any(probability > SURE for name, probability in self.named.items() if name not in self.hidden)
+
+    @property
+    def admitted(self) -> bool:
+        """Whether the verdict says that something is left that the library does not account for."""
+        return self.status in {"unexplained", "partly_explained"}
+
+    @property
+    def misattributed(self) -> bool:
+        """Of what is outside the library: said to be explained, or named for sure without a rest."""
+        return self.status == "explained" or (self.surely_wrong and not self.rest)
+
+    @property
+    def share(self) -> float | None:
+        """Share of the oracle's reduction of the held-out error that was reached."""
+        if self.before is None or self.after is None or self.oracle is None or self.oracle >= self.before:
+            return None
+        return (self.before - self.after) / (self.before - self.oracle)
+
+
+def score(
+    truth: JSON,
+    oracle: JSON | None,
+    verdict: JSON | None,
+    told: JSON | None,
+    *,
+    teeth: int,
+    seconds: float | None,
+) -> Score:
+    """Score a force batch.
+
+    Parameters
+    ----------
+    truth : of the batch. oracle : what :func:`proof.oracle.oracle` found; None where nothing is hidden.
+    verdict, told : content of verdict.json and loop.json; None where the pipeline failed.
+    """
+    hidden: JSON = truth["effects"]
+    oracle = oracle or {"after": None, "floor": None, "sizes": {}}
+    entry = (verdict or {"observables": {}})["observables"].get("force")
+    if entry is None:
+        return Score(truth["batch"], truth["kind"], tuple(hidden), oracle["sizes"], FAILED, {})
+    groups = tuple(frozenset(group) for group in entry["indistinguishable"])
+    named = {found["effect"]: found["probability"] for found in entry["effects"]}
+    if not named and entry["status"] == "undetermined":
+        candidates = {c["effect"]: c["probability"] for c in entry["candidates"]}
+        named = {group[0]: candidates.get(group[0], 0.0) for group in entry["indistinguishable"]}
+    unseen = (told or {"observables": {}})["observables"].get("force", {}).get("cannot_be_seen", [])
+    return Score(
+        batch=truth["batch"],
+        kind=truth["kind"],
+        hidden=tuple(hidden),
+        sizes=oracle["sizes"],
+        status=entry["status"],
+        named=named,
+        groups=groups,
+        rest=entry["unexplained"] is not None,
+        before=_rms(entry["before"]),
+        after=_rms(entry["after"]),
+        oracle=oracle["after"],
+        floor=oracle["floor"],
+        estimates=tuple(
+            one
+            for found in entry["effects"]
+            if found["effect"] in hidden
+            for one in estimates(found["effect"], hidden[found["effect"]], found["parameters"], teeth)
+        ),
+        stated=_stated(entry["effects"], truth["effects"], oracle["sizes"]),
+        rejected=_stated(entry["candidates"], truth["effects"], oracle["sizes"]),
+        cannot_be_seen=tuple(one["effect"] for one in unseen),
+        seconds=seconds,
+    )
+
+
+def _stated(said: Iterable[JSON], hidden: JSON, sizes: Mapping[str, float]) -> tuple[Stated, ...]:
+    return tuple(
+        (one["probability"], one["effect"] in hidden)
+        for one in said
+        if one["probability"] is not None and sizes.get(one["effect"], SEEN) >= SEEN
+    )
+
+
+def _rms(error: JSON | None) -> float | None:
+    return None if error is None else float(error["rms"])

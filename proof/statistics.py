@@ -1,0 +1,107 @@
+"""Figures with their intervals, and what is demanded of them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+NORMAL = 1.959963984540054  # 97.5 % quantile
+BINS = (0.0, 0.05, 0.2, 0.5, 0.8, 0.9, 0.95, 0.99, 1.0)  # of stated probabilities
+
+
+@dataclass(frozen=True)
+class Demand:
+    """Bounds that a figure must keep; None: no bound on that side."""
+
+    least: float | None = None
+    most: float | None = None
+
+    def met(self, low: float, high: float) -> bool:
+        """Whether something between ``low`` and ``high`` keeps the bounds."""
+        over = self.most is None or low <= self.most
+        return over and (self.least is None or high >= self.least)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A share (of ``count`` cases) or a median, its 95 % interval, and what is demanded of it."""
+
+    label: str
+    value: float
+    low: float
+    high: float
+    count: int
+    demand: Demand | None = None
+    unit: str = "%"
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the figure itself keeps the demand; None without a demand, or without a case."""
+        return None if self.demand is None or not self.count else self.demand.met(self.value, self.value)
+
+    @property
+    def missed_for_sure(self) -> bool:
+        """Whether the demand is missed by more than chance: nothing in the interval keeps it."""
+        return self.demand is not None and self.count > 0 and not self.demand.met(self.low, self.high)
+
+
+def share(label: str, cases: Sequence[bool], demand: Demand | None = None) -> Figure:
+    """Share of the cases that are true, with its Wilson interval."""
+    low, high = wilson(sum(cases), len(cases))
+    return Figure(label, sum(cases) / len(cases) if cases else math.nan, low, high, len(cases), demand)
+
+
+def wilson(hits: int, count: int) -> tuple[float, float]:
+    """95 % interval of a binomial share (Wilson, J. Am. Stat. Assoc. 22 (1927) 209)."""
+    if count == 0:
+        return 0.0, 1.0
+    p, z = hits / count, NORMAL
+    middle = (p + z * z / (2 * count)) / (1 + z * z / count)
+    half = z * math.sqrt(p * (1 - p) / count + z * z / (4 * count * count)) / (1 + z * z / count)
+    # at 0 and 1 an end is the share itself, which rounding must not undo
+    return max(0.0, min(p, middle - half)), min(1.0, max(p, middle + half))
+
+
+def median(label: str, values: Sequence[float], demand: Demand | None = None, unit: str = "") -> Figure:
+    """Median, with the distribution-free 95 % interval between two order statistics; six values give one."""
+    if not values:
+        return Figure(label, math.nan, math.nan, math.nan, 0, demand, unit)
+    from scipy.stats import binom
+
+    ordered, count = np.sort(values), len(values)
+    rank = int(binom.ppf(0.025, count, 0.5))
+    low, high = (float(ordered[rank - 1]), float(ordered[-rank])) if rank else (-math.inf, math.inf)
+    return Figure(label, float(np.median(ordered)), low, high, count, demand, unit)
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Stated probabilities from ``low`` to ``high``: how many, their mean, and how often they came true."""
+
+    low: float
+    high: float
+    count: int
+    stated: float
+    came_true: Figure
+
+
+def binned(stated: Sequence[tuple[float, bool]]) -> list[Bin]:
+    """Put stated probabilities into bins, to be compared with what came true; empty bins are left out."""
+    bins = []
+    for low, high in itertools.pairwise(BINS):
+        inside = [(p, right) for p, right in stated if low <= p < high or p == high == 1.0]
+        if inside:
+            mean = float(np.mean([p for p, _ in inside]))
+            bins.append(Bin(low, high, len(inside), mean, share("", [right for _, right in inside])))
+    return bins
+
+
+def brier(stated: Sequence[tuple[float, bool]]) -> float:
+    """Mean squared distance of stated probabilities from what came true."""
+    return (
+        float(np.mean([(probability - right) ** 2 for probability, right in stated])) if stated else math.nan
+    )

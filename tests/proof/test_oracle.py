@@ -1,0 +1,92 @@
+"""The oracle on a problem whose answers are known in closed form."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from metro.effects.effect import Effect, EffectParameter
+from metro.observables.problem import Block, Parameter, Problem
+from proof.oracle import oracle
+
+POINTS, SIGMA, BUDGET = 40, 0.1, 1e-6
+ANGLE = 2.0 * np.pi * np.arange(POINTS) / POINTS
+
+
+@dataclass(frozen=True)
+class Wave:
+    """b (1 + twist) cos τ + c sin τ + bump cos 3τ + ripple sin 5τ, c free: ``twist`` is absorbed by b."""
+
+    twist: float = 0.0
+    bump: float = 0.0
+    ripple: float = 0.0
+
+    @property
+    def parameters(self):
+        return (Parameter("b", "N"), Parameter("c", "N"))
+
+    def nuisance_starts(self, _block):
+        return np.zeros((1, 0))
+
+    def design(self, _block, _nuisance, _beta=None):
+        matrix = np.stack([(1.0 + self.twist) * np.cos(ANGLE), np.sin(ANGLE)], axis=1)
+        return matrix, self.bump * np.cos(3.0 * ANGLE) + self.ripple * np.sin(5.0 * ANGLE)
+
+
+def effect(name):
+    def apply(model, values):
+        return replace(model, **{name: values[name]})
+
+    return Effect(name, ("toy",), (EffectParameter(name, "1", -5.0, 5.0, 0.1, (-1.0,)),), apply, "", "", "")
+
+
+LIBRARY = (effect("twist"), effect("bump"), effect("ripple"))
+
+
+def problem(truth):
+    rng = np.random.default_rng(2)
+    blocks = []
+    for i in range(12):
+        empty = Block(
+            run=f"r{i}",
+            condition=f"c{i // 2}",
+            role="validate" if i >= 8 else "identify",
+            order=i,
+            measured=np.zeros(POINTS),
+            sigma=np.full(POINTS, SIGMA),
+            setting=None,
+            axis=np.full(POINTS, "x"),
+            zeros=np.zeros((POINTS, 0)),
+            zero_sd=np.zeros(0),
+            coordinates={"axis": np.full(POINTS, "x")},
+        )
+        matrix, offset = truth.design(empty, np.zeros(0))
+        noise = SIGMA * rng.standard_normal(POINTS)
+        blocks.append(replace(empty, measured=matrix @ [4.0, 2.0] + offset + noise))
+    return Problem("toy", "N", 1.0, Wave(), tuple(blocks), np.full(2, 1e-6))
+
+
+def test_the_size_is_the_rms_of_the_effect_over_the_noise_and_the_error_falls_to_the_noise():
+    found = oracle(problem(Wave(bump=0.6)), {"bump": {"bump": 0.6}}, LIBRARY, BUDGET)
+    assert found["floor"] == pytest.approx(SIGMA, rel=0.05)
+    assert found["sizes"]["bump"] == pytest.approx(0.6 / np.sqrt(2.0) / SIGMA, rel=0.1)
+    assert found["before"] == pytest.approx(np.hypot(0.6 / np.sqrt(2.0), SIGMA), rel=0.1)
+    assert found["after"] == pytest.approx(SIGMA, rel=0.1)
+
+
+def test_what_the_base_absorbs_has_no_size():
+    found = oracle(problem(Wave(twist=0.5)), {"twist": {"twist": 0.5}}, LIBRARY, BUDGET)
+    assert found["sizes"]["twist"] < 0.05
+
+
+def test_of_two_effects_each_has_its_own_size():
+    truth = {"bump": {"bump": 0.3}, "ripple": {"ripple": 0.9}}
+    found = oracle(problem(Wave(bump=0.3, ripple=0.9)), truth, LIBRARY, BUDGET)
+    assert found["sizes"]["bump"] == pytest.approx(0.3 / np.sqrt(2.0) / SIGMA, rel=0.15)
+    assert found["sizes"]["ripple"] == pytest.approx(0.9 / np.sqrt(2.0) / SIGMA, rel=0.1)
+
+
+def test_what_the_library_lacks_has_no_oracle_but_a_size():
+    found = oracle(problem(Wave(bump=0.6)), {"chip": {"length_um": 20.0}}, LIBRARY[:1], BUDGET)
+    assert found["after"] is None
+    assert found["sizes"]["chip"] == pytest.approx(0.6 / np.sqrt(2.0) / SIGMA, rel=0.1)

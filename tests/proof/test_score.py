@@ -1,0 +1,133 @@
+"""Right and wrong, on truths and verdicts written by hand."""
+
+import pytest
+
+from proof.score import FAILED, score
+
+
+def truth(kind, **effects):
+    return {"batch": "blind-1", "kind": kind, "effects": effects}
+
+
+def oracle(after=2.0, **sizes):
+    return {"before": 10.0, "after": after, "floor": 1.9, "sizes": sizes}
+
+
+def verdict(status, *named, candidates=(), groups=(), rest=None, after=2.5):
+    entry = {
+        "status": status,
+        "before": {"rms": 10.0},
+        "after": {"rms": after},
+        "effects": [{"effect": name, "probability": p, "parameters": {}} for name, p in named],
+        "candidates": [{"effect": name, "probability": p} for name, p in candidates],
+        "indistinguishable": [list(group) for group in groups],
+        "unexplained": rest,
+    }
+    return {"observables": {"force": entry}}
+
+
+def scored(hidden, asked, found, told=None):
+    return score(hidden, asked, found, told, teeth=3, seconds=1.0)
+
+
+RUNOUT = truth("one", tool_runout={"radius_um": 5.0})
+BOTH = truth("two", tool_runout={"radius_um": 5.0}, tool_wear={"edge_growth_per_m": 0.1})
+
+
+def test_one_effect_named_alone_is_right():
+    one = scored(RUNOUT, oracle(tool_runout=3.0), verdict("explained", ("tool_runout", 0.99)))
+    assert one.exact
+    assert one.seen
+    assert not one.surely_wrong
+    assert one.share == pytest.approx(7.5 / 8.0)
+
+
+def test_one_effect_with_a_false_one_beside_it_is_not():
+    found = verdict("explained", ("tool_runout", 0.99), ("pitch_error", 0.95))
+    one = scored(RUNOUT, oracle(tool_runout=3.0), found)
+    assert not one.exact
+    assert one.both
+    assert one.extra == {"pitch_error"}
+    assert one.surely_wrong
+
+
+def test_the_right_one_first_of_declared_rivals_is_right_and_second_is_not():
+    rivals = [("tool_runout", "pitch_error")]
+    first = verdict("undetermined", ("tool_runout", 0.6), groups=rivals)
+    second = verdict("undetermined", ("pitch_error", 0.6), groups=[("pitch_error", "tool_runout")])
+    asked = oracle(tool_runout=3.0)
+    assert scored(RUNOUT, asked, first).exact
+    assert not scored(RUNOUT, asked, second).exact
+
+
+def test_an_undetermined_verdict_that_adds_nothing_names_the_first_of_its_rivals():
+    rivals, candidates = [("tool_runout", "pitch_error")], [("tool_runout", 0.5), ("pitch_error", 0.4)]
+    found = verdict("undetermined", groups=rivals, candidates=candidates)
+    assert scored(RUNOUT, oracle(tool_runout=3.0), found).named == {"tool_runout": 0.5}
+
+
+def test_rivals_among_themselves_excuse_no_false_addition():
+    found = verdict(
+        "undetermined", ("tool_runout", 1.0), ("tool_wear", 0.6), groups=[("tool_wear", "charge_drift")]
+    )
+    assert scored(RUNOUT, oracle(tool_runout=3.0), found).extra == {"tool_wear"}
+
+
+def test_two_effects_may_be_named_in_any_order_and_one_is_not_both():
+    asked = oracle(tool_runout=3.0, tool_wear=2.0)
+    swapped = verdict("explained", ("tool_wear", 0.9), ("tool_runout", 0.9))
+    assert scored(BOTH, asked, swapped).exact
+    assert not scored(BOTH, asked, verdict("explained", ("tool_wear", 0.9))).both
+
+
+def test_an_effect_below_the_noise_is_not_asked_for_nor_does_its_probability_count():
+    found = verdict("explained", ("tool_wear", 0.9), candidates=[("tool_runout", 0.3), ("pitch_error", 0.1)])
+    one = scored(BOTH, oracle(tool_runout=0.5, tool_wear=2.0), found)
+    assert not one.seen
+    assert one.seen_named
+    assert one.stated == ((0.9, True),)
+    assert one.rejected == ((0.1, False),)
+
+
+OUTSIDE = truth("outside", chipped_tooth={"length_um": 20.0})
+
+
+@pytest.mark.parametrize(
+    ("found", "admitted", "wrong"),
+    [
+        (verdict("unexplained", rest={}), True, False),
+        (verdict("partly_explained", ("tool_runout", 0.99), rest={}), True, False),
+        (verdict("explained", ("tool_runout", 0.4)), False, True),
+        (
+            verdict("undetermined", ("tool_runout", 0.95), groups=[("tool_runout", "pitch_error")]),
+            False,
+            True,
+        ),
+        (
+            verdict("undetermined", ("tool_runout", 0.5), groups=[("tool_runout", "pitch_error")]),
+            False,
+            False,
+        ),
+        (verdict("clean"), False, False),
+    ],
+)
+def test_outside_the_library_a_rest_must_be_admitted(found, admitted, wrong):
+    one = scored(OUTSIDE, oracle(after=None, chipped_tooth=3.0), found)
+    assert one.admitted is admitted
+    assert one.misattributed is wrong
+    assert one.share is None
+
+
+def test_a_batch_that_the_pipeline_could_not_run_is_right_in_nothing():
+    one = scored(RUNOUT, None, None)
+    assert one.status == FAILED
+    assert [one.exact, one.both, one.detected] == [False, False, False]
+    assert not scored(truth("none"), None, None).exact
+
+
+def test_what_the_verdict_says_cannot_be_seen_is_read():
+    told = {"observables": {"force": {"cannot_be_seen": [{"effect": "dynamometer_rotation", "why": ""}]}}}
+    hidden = truth("one", dynamometer_rotation={"angle_deg": 3.0})
+    one = scored(hidden, oracle(dynamometer_rotation=0.1), verdict("clean"), told)
+    assert one.cannot_be_seen == ("dynamometer_rotation",)
+    assert not one.seen

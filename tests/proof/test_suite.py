@@ -1,0 +1,59 @@
+"""What the batches of a suite hide."""
+
+from collections import Counter
+
+import pytest
+
+from proof.layout import Layout
+from proof.suite import ABSORBED, SHARES, draw, make
+
+KNOWN = ["tool_runout", "tool_wear", "pitch_error", "dynamometer_rotation"]
+UNKNOWN = ["chipped_tooth", "sensor_lag"]
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    return draw(200, 5, KNOWN, UNKNOWN)
+
+
+def test_kinds_have_their_shares_and_effects_of_a_kind_come_equally_often(drawn):
+    kinds = Counter(one.kind for one in drawn)
+    assert kinds == {kind: 200 * share for kind, share in SHARES.items()}
+    for kind, each in (("one", 4), ("two", 3), ("outside", 2)):
+        counts = Counter(one.effects for one in drawn if one.kind == kind)
+        assert len(counts) == each
+        assert max(counts.values()) - min(counts.values()) <= 1
+
+
+def test_pairs_are_of_different_effects_that_the_base_model_does_not_absorb(drawn):
+    pairs = [one.effects for one in drawn if one.kind == "two"]
+    assert all(len(set(pair)) == 2 and not set(pair) & set(ABSORBED) for pair in pairs)
+
+
+def test_neither_name_nor_order_nor_seed_tells_what_is_hidden(drawn):
+    assert [one.name for one in drawn] == [f"blind-{i:03d}" for i in range(1, 201)]
+    assert len({one.seed for one in drawn}) == 200
+    other = draw(200, 6, KNOWN, UNKNOWN)
+    same = sum(a.kind == b.kind for a, b in zip(drawn, other, strict=True))
+    assert same < 100  # by chance 0.27 of them
+
+
+def test_batches_that_are_there_are_not_made_again(tmp_path):
+    (tmp_path / "raw/blind-1").mkdir(parents=True)
+    (tmp_path / "raw/blind-1/batch.yaml").write_text("")
+    with pytest.raises(FileExistsError, match="holds batches already"):
+        make(Layout(tmp_path), 3, 1, "a", 1)
+
+
+def test_making_seals_what_every_batch_hides_and_leaves_no_trace_of_it_with_the_batch(tmp_path):
+    from proof.seal import unseal
+
+    out = Layout(tmp_path)
+    digest = make(out, 1, 2, "b", 1)
+    truth = unseal(out.truth, out.seal)
+    assert out.seal.read_text().strip() == digest
+    assert sorted(truth["batches"]) == out.batches == ["blind-1"]
+    for name, hidden in truth["batches"].items():
+        written = "".join(path.read_text() for path in (out.raw / name).glob("*.*"))
+        assert not [effect for effect in hidden["effects"] if effect in written]
+        assert hidden["kind"] not in written.split()
