@@ -13,6 +13,7 @@ from metro.cutting.engagement import Engagement
 from metro.cutting.force import COEFFICIENTS, Cut
 from metro.cutting.law import EdgeLaw
 from metro.effects import library
+from metro.observables.dynamometer import Recording
 from metro.observables.force_model import ForceModel, ForceSetting
 from metro.observables.problem import Block
 
@@ -64,7 +65,7 @@ def test_every_effect_is_described_and_can_be_started(effect):
 def test_an_effect_of_another_package_is_found_by_its_entry_point(third_party):
     assert third_party in {entry.name for entry in metadata.entry_points(group="metro.effects")}
     assert third_party in {effect.name for effect in library("force")}
-    assert len(library()) == len({effect.name for effect in library()})
+    assert len(library()) == len({(effect.name, effect.form) for effect in library()})
 
 
 def test_without_that_package_it_is_not_there():
@@ -76,8 +77,9 @@ def test_the_documented_effect_does_to_the_force_what_it_says(third_party):
     model = ForceModel(Cutter(6e-3, 0.5, evenly_pitched(2)), EdgeLaw())
     cut = Cut(1e-4, 1e-3, Engagement(0.0, np.pi))
     zeros = np.zeros(39)
+    setting = ForceSetting(cut, 0.0, 6, Recording((0.5,), 1.0, 100.0), 2.0)
     block = Block(
-        "r1", "c", "identify", 1, zeros, zeros + 1, ForceSetting(cut, 0.0, 6, (0.5,), 2.0),
+        "r1", "c", "identify", 1, zeros, zeros + 1, setting,
         np.repeat(["x", "y", "z"], 13), np.zeros((39, 0)), np.zeros(0), {},
     )  # fmt: skip
     changed = effect.apply(model, {"edge_share_per_m": 0.1})

@@ -37,7 +37,7 @@ class Springs:
     def nuisance_starts(self, _block):
         return np.zeros((1, 0))
 
-    def design(self, block, _nuisance):
+    def design(self, block, _nuisance, _beta=None):
         rows = block.setting
         return (rows if block.role == "calibrate" else self.structure.in_cut(rows)), np.zeros(len(rows))
 

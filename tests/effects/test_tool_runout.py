@@ -4,35 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from blind import clean, closed
 
-from metro.batch.processed import read_batch, read_table
 from metro.cutting.cutter import Cutter
 from metro.cutting.law import EdgeLaw
-from metro.effects import library
 from metro.effects.tool_runout import EFFECT, apply
-from metro.loop.search import Gates, search
-from metro.loop.verdict import comparison, held_out, judge
-from metro.observables import force
 from metro.observables.force_model import ForceModel
-from metro.stages.ingest import ingest
-from virtual_cell.recipes.force import make
 
-GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
 RADIUS_UM, ANGLE_DEG = 9.0, 40.0
-
-
-def closed(tmp_path, effects, seed):
-    """Make a batch, and let the loop judge its force."""
-    make(tmp_path / "runout-test", effects, seed)
-    ingest(tmp_path / "runout-test", tmp_path, tmp_path / "out", {}, "test")
-    batch = read_batch(tmp_path / "out")
-    observed = force.observe(
-        batch, lambda name, run: read_table(tmp_path / "out" / f"{name}.parquet", run), {}
-    )
-    task = force.problem(batch, observed, {})
-    outcome = search(task, library("force"), GATES)
-    rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
-    return outcome, judge(task, outcome, rows, GATES), batch.manifest["tool"]["teeth"]
 
 
 @pytest.mark.parametrize("seed", [3, 5])
@@ -49,8 +28,8 @@ def test_hidden_runout_is_found_with_its_radius_and_angle(tmp_path, seed):
     assert verdict["after"]["rms"] < 0.3 * verdict["before"]["rms"]
 
 
-def test_no_runout_is_found_in_a_batch_without_it(tmp_path):
-    outcome, verdict, _ = closed(tmp_path, {}, 3)
+def test_no_runout_is_found_in_a_batch_without_it():
+    outcome, verdict, _ = clean(3)
     assert "tool_runout" not in outcome.names
     assert verdict["status"] == "clean"
 

@@ -208,10 +208,10 @@ def test_a_condition_left_out_is_predicted_from_the_others_alone():
     for name in out:
         rest = [block for block in blocks if block.condition != name]
         held = [block for block in blocks if block.condition == name]
-        fresh = fit(Candidate(task.base), rest, prior)
+        fresh = fit(Candidate(task.base), tuple(rest), prior)
         assert out[name] == pytest.approx(score(fresh, held).total, abs=0.5)
         spoilt = [replace(b, measured=b.measured * 1.2) if b.condition == name else b for b in blocks]
-        other = refit(fit(Candidate(task.base), spoilt, prior), rest, prior)
+        other = refit(fit(Candidate(task.base), tuple(spoilt), prior), rest, prior)
         assert other.beta == pytest.approx(fresh.beta, rel=2e-3)
 
 

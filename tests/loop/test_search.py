@@ -7,6 +7,7 @@ import pytest
 from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, problem
 
 from metro.loop import search as search_room
+from metro.loop import trial as trial_room
 from metro.loop.candidate import Candidate
 from metro.loop.evidence import Evidence
 from metro.loop.fit import fit
@@ -73,7 +74,7 @@ def test_an_effect_that_the_base_absorbs_is_said_to_be_invisible():
 def test_two_effects_that_are_the_same_leave_the_cause_undetermined():
     outcome, verdict = judged(problem(6, truth=Wave(bend=0.2)), (BEND, TWIN))
     assert len(outcome.names) == 1
-    assert {*outcome.rivals[0]} == {"bend", "twin"}
+    assert {*outcome.rivals[0].pair} == {"bend", "twin"}
     assert verdict["status"] == "undetermined"
     assert {*verdict["indistinguishable"][0]} == {"bend", "twin"}
     assert "an experiment for twin" in verdict["next_experiment"]
@@ -157,6 +158,6 @@ def test_an_effect_that_helps_one_condition_alone_is_not_added():
         statistic=50.0, p_value=1e-6, held_out={"a": 9.0, "b": -1.0, "c": -1.0, "d": -1.0}, size=0.1
     )
     assert evidence.gain > GATES.held_out_gain
-    assert "25 %" in search_room._not_held_out(evidence, GATES)
+    assert "25 %" in trial_room._not_held_out(evidence, GATES)
     even = replace(evidence, held_out=dict.fromkeys("abcd", 1.5))
-    assert search_room._not_held_out(even, GATES) == ""
+    assert trial_room._not_held_out(even, GATES) == ""

@@ -42,7 +42,7 @@ class Wave:
             return np.zeros((1, 0))
         return (2 * np.pi * np.arange(16) / 16)[:, None]
 
-    def design(self, block, nuisance):
+    def design(self, block, nuisance, _beta=None):
         tau = ANGLE - (nuisance[0] if len(nuisance) else 0.0)
         first = block.setting.feed * (1 + self.gain) * (np.cos(tau) + self.bend * np.cos(3 * tau))
         second = (

@@ -113,12 +113,6 @@ def test_time_blocks_see_a_drift_that_is_not_counted_as_noise():
     assert averages[0].variance[0, 0] < 4 * 0.25 / 5000
 
 
-def test_a_short_record_is_not_cut_into_blocks():
-    time = np.arange(2000) / 5000.0
-    angle = 2 * math.pi * 50.0 * time  # 20 revolutions: room for one block of four segments
-    assert len(order_averages(time, angle, np.cos(angle)[:, None], 2, 4)) == 1
-
-
 def test_one_wild_order_is_drawn_towards_its_neighbours_but_not_lost():
     rng = np.random.default_rng(6)
     time = np.arange(10000) / 5000.0

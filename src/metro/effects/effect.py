@@ -6,6 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from metro.observables.problem import Problem, Refusal
+from metro.units import Array
+
+Values = Mapping[str, Any]
+
 
 @dataclass(frozen=True)
 class EffectParameter:
@@ -14,13 +21,16 @@ class EffectParameter:
     Attributes
     ----------
     name, unit : as in the contract's table of effects, e.g. ``radius_um`` in ``um``; values are given in this
-        unit.
+        unit. Parameters of one name make a list (per axis, per tooth).
     lower, upper : bounds of the search.
     scale : a typical size: the step of the search and the yardstick of "not zero".
-    starts : values from which the joint refit starts; all combinations over the parameters are tried.
+    starts : values from which the joint refit starts.
     plausible : standard deviation of a weak prior about zero (None: flat): of two explanations that the data
         cannot part, the one that a machinist would believe.
     period : for an angle, the period after which the model is the same; None otherwise.
+    group : parameters of a group are started from all combinations of their ``starts``, group after group,
+        those of later groups ``neutral`` meanwhile.
+    neutral : value at which the parameter's group changes nothing.
     """
 
     name: str
@@ -31,6 +41,8 @@ class EffectParameter:
     starts: tuple[float, ...]
     period: float | None = None
     plausible: float | None = None
+    group: int = 0
+    neutral: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -42,16 +54,60 @@ class Effect:
     name : as in the contract.
     observables : names of the observables whose models have the part that it changes.
     parameters : its parameters, in the units of the contract.
-    apply : ``apply(model, values) -> model``; ``values`` maps parameter names to numbers in their own units.
+    apply : ``apply(model, values) -> model``; ``values`` maps names to numbers in their own units, or to
+        lists.
     signature : one sentence: where it is seen, and what resembles it.
     literature : where the model of the effect comes from.
     experiment : the measurement that would show it best, for "measure this next".
+    adapt : what makes it fit a batch: ``adapt(effect, problem)`` is the effect with the parameters that the
+        batch calls for (one per tooth), or why this batch cannot show it. None: as it is.
+    mixing : rows that make the values of the contract from the parameters of the search, where these are
+        fewer (pitch errors add up to nothing); empty: they are the same.
+    form : where one cause has two models of which a batch has one: what tells them apart, for the report.
     """
 
     name: str
     observables: tuple[str, ...]
     parameters: tuple[EffectParameter, ...]
-    apply: Callable[[Any, Mapping[str, float]], Any]
+    apply: Callable[[Any, Values], Any]
     signature: str
     literature: str
     experiment: str
+    adapt: Callable[[Effect, Problem], Effect | Refusal] | None = None
+    mixing: tuple[tuple[float, ...], ...] = ()
+    form: str = ""
+
+    @property
+    def reported(self) -> tuple[EffectParameter, ...]:
+        """The parameter that each value of the contract belongs to."""
+        return self.parameters[:1] * len(self.mixing) if self.mixing else self.parameters
+
+    @property
+    def matrix(self) -> Array:
+        """Map (values, parameters) from the parameters of the search to the values of the contract."""
+        return np.array(self.mixing) if self.mixing else np.eye(len(self.parameters))
+
+    def values(self, theta: Array) -> dict[str, Any]:
+        """Return the values by name, those of one name as a list; ``theta`` (parameters,)."""
+        return by_name(self.reported, [float(value) for value in self.matrix @ theta])
+
+
+def by_name(parameters: tuple[EffectParameter, ...], entries: list[Any]) -> dict[str, Any]:
+    """Put one entry per parameter under its name: as it is, or as a list where several have the name."""
+    names = [parameter.name for parameter in parameters]
+    taken: dict[str, list[Any]] = {}
+    for name, entry in zip(names, entries, strict=True):
+        taken.setdefault(name, []).append(entry)
+    return {name: found if names.count(name) > 1 else found[0] for name, found in taken.items()}
+
+
+def fitted_to(effects: tuple[Effect, ...], problem: Problem) -> tuple[tuple[Effect, ...], dict[str, str]]:
+    """Fit effects to a batch: those that it may show, and of the others why it cannot."""
+    able, unable = [], {}
+    for effect in effects:
+        adapted = effect.adapt(effect, problem) if effect.adapt else effect
+        if isinstance(adapted, Refusal):
+            unable[effect.name] = adapted.reason
+        else:
+            able.append(adapted)
+    return tuple(able), {name: why for name, why in unable.items() if name not in {e.name for e in able}}

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
+
+import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter
 from metro.observables.problem import Model
@@ -22,10 +25,34 @@ class Candidate:
         """Parameters of all effects, in order."""
         return tuple(itertools.chain.from_iterable(effect.parameters for effect in self.effects))
 
+    def parts(self, theta: Array) -> Iterator[tuple[Effect, slice]]:
+        """Go through the effects, each with its place in ``theta``."""
+        first = 0
+        for effect in self.effects:
+            yield effect, slice(first, first + len(effect.parameters))
+            first += len(effect.parameters)
+        assert first == len(theta)
+
     def model(self, theta: Array) -> Model:
         """Apply the effects with the parameter values ``theta``, in the units of the contract."""
-        model, values = self.base, list(theta)
-        for effect in self.effects:
-            taken = {parameter.name: float(values.pop(0)) for parameter in effect.parameters}
-            model = effect.apply(model, taken)
+        model = self.base
+        for effect, place in self.parts(theta):
+            model = effect.apply(model, effect.values(theta[place]))
         return model
+
+    def groups(self, known: int) -> list[list[int]]:
+        """Places of the parameters from ``known`` on, that are started together, group after group."""
+        fresh = self.parameters[known:]
+        numbers = sorted({parameter.group for parameter in fresh})
+        return [[known + i for i, p in enumerate(fresh) if p.group == number] for number in numbers]
+
+
+def started(candidate: Candidate, theta: Array, places: list[int]) -> list[Array]:
+    """Return ``theta`` with every combination of the starting values at ``places``."""
+    parameters = candidate.parameters
+    result = []
+    for combination in itertools.product(*(parameters[i].starts for i in places)):
+        trial = theta.copy()
+        trial[places] = combination
+        result.append(np.asarray(trial))
+    return result

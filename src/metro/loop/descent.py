@@ -65,12 +65,12 @@ def linearised(
 ) -> System:
     """Whitened rest of every block, its likelihood, and (unless not wanted) its derivatives."""
     model = candidate.model(state.theta)
-    moved = _moved_models(candidate, state.theta) if derivatives else []
+    moved = moved_models(candidate, state.theta) if derivatives else []
     rows: list[Rows] = []
     log_likelihood, chi2 = {}, {}
     for block in blocks:
         nuisance = state.nuisance[block.run]
-        matrix, offset = model.design(block, nuisance)
+        matrix, offset = model.design(block, nuisance, state.beta)
         predicted = offset + matrix @ state.beta
         directions = noise_room.shared(block, noise, matrix, state.beta)
         whiten = noise_room.whitener(noise_room.diagonal(block, noise), directions)
@@ -80,22 +80,38 @@ def linearised(
             chi2[block.run] + whiten.log_shared + noise_room.log_scale(block, noise)
         )
         if derivatives:
-            effect = [
-                (_prediction(other, block, nuisance, state.beta) - predicted) / step for other, step in moved
-            ]
-            own = [
-                (_prediction(model, block, nuisance + NUISANCE_STEP * unit, state.beta) - predicted)
-                / NUISANCE_STEP
-                for unit in np.eye(len(nuisance))
-            ]
-            whitened = whiten(np.column_stack([matrix, *effect, *own]))
-            p, q = matrix.shape[1], matrix.shape[1] + len(effect)
+            effect, own = sensitivities(model, moved, block, nuisance, state.beta, predicted=predicted)
+            whitened = whiten(np.hstack([matrix, effect, own]))
+            p, q = matrix.shape[1], matrix.shape[1] + effect.shape[1]
             rows.append((rest, whitened[:, :p], whitened[:, p:q], whitened[:, q:]))
     weight = np.array([0.0 if p.plausible is None else p.plausible**-2 for p in candidate.parameters])
     return System(rows, log_likelihood, chi2, state.theta, weight)
 
 
-def _moved_models(candidate: Candidate, theta: Array) -> list[tuple[Model, float]]:
+def sensitivities(
+    model: Model,
+    moved: Sequence[tuple[Model, float]],
+    block: Block,
+    nuisance: Array,
+    beta: Array,
+    *,
+    predicted: Array,
+) -> tuple[Array, Array]:
+    """Return derivatives of a block's prediction by the effect parameters (n, q) and by its unknowns (n, m).
+
+    ``moved``: the model with each effect parameter moved, of :func:`moved_models`; ``predicted``: (n,) by the
+    model itself.
+    """
+    effect = [(_prediction(other, block, nuisance, beta) - predicted) / step for other, step in moved]
+    own = [
+        (_prediction(model, block, nuisance + NUISANCE_STEP * unit, beta) - predicted) / NUISANCE_STEP
+        for unit in np.eye(len(nuisance))
+    ]
+    n = len(predicted)
+    return np.array(effect).reshape(-1, n).T, np.array(own).reshape(-1, n).T
+
+
+def moved_models(candidate: Candidate, theta: Array) -> list[tuple[Model, float]]:
     """Return the model with each effect parameter moved a little, within its bounds, and by how much."""
     models = []
     for i, parameter in enumerate(candidate.parameters):
@@ -109,7 +125,7 @@ def _moved_models(candidate: Candidate, theta: Array) -> list[tuple[Model, float
 
 
 def _prediction(model: Model, block: Block, nuisance: Array, beta: Array) -> Array:
-    matrix, offset = model.design(block, nuisance)
+    matrix, offset = model.design(block, nuisance, beta)
     return np.asarray(offset + matrix @ beta)
 
 
@@ -143,8 +159,7 @@ def descend(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: 
     system = linearised(candidate, blocks, noise, state)
     for _ in range(ITERATIONS):
         normal, right = normal_equations(system)
-        scaled, scale = _scaled(normal)
-        common = scale * np.linalg.lstsq(scaled, scale * right, rcond=UNSEEN)[0]
+        common = solution(normal, right)
         own = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
         for share in SHARES:
             trial = _moved(candidate, state, share * common, {run: share * own[run] for run in own})
@@ -172,6 +187,12 @@ def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, 
             theta[i] = min(max(theta[i], parameter.lower), parameter.upper)
     nuisance = {run: state.nuisance[run] + step for run, step in own.items()}
     return State(theta, state.beta + common[:p], nuisance)
+
+
+def solution(normal: Array, right: Array) -> Array:
+    """Solve normal equations; a parameter that they say nothing of stays zero."""
+    scaled, scale = _scaled(normal)
+    return np.asarray(scale * np.linalg.lstsq(scaled, scale * right, rcond=UNSEEN)[0])
 
 
 def inverse(normal: Array) -> Array:

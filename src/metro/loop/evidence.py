@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from metro.loop.candidate import Candidate
-from metro.loop.descent import State, linearised
+from metro.loop.descent import State, linearised, normal_equations, solution
 from metro.loop.fit import Fit, refit, score
 from metro.loop.noise import PRIOR_RUNS, Noise
 from metro.observables.problem import Block
@@ -77,6 +78,7 @@ def change(smaller: Fit, larger: Fit) -> float:
     return math.sqrt(difference / signal)
 
 
+@lru_cache(maxsize=256)
 def leave_out(fitted: Fit, prior: Noise) -> dict[str, float]:
     """Log-likelihood of each condition under the fit of all others; of each run if there is one condition."""
     cut = [block for block in fitted.blocks if block.role != "calibrate"]
@@ -118,26 +120,38 @@ def surviving_share(candidate: Candidate, base: Fit) -> float:
     The signature is the change of the prediction with the effect's first parameter, its size, near the first
     start. Near zero, the data cannot speak of the effect: the base absorbs it.
     """
+    return share_left(signature(candidate, base), len(base.beta) + len(base.theta))
+
+
+@dataclass(frozen=True)
+class Signature:
+    """What runs say of an effect not there yet: its whitened sum of squares, and the normal matrix."""
+
+    total: float
+    normal: Array
+
+    def __add__(self, other: Signature) -> Signature:
+        """Put two sets of runs together."""
+        return Signature(self.total + other.total, self.normal + other.normal)
+
+    def __mul__(self, repeats: int) -> Signature:
+        """Make the runs several times."""
+        return Signature(self.total * repeats, self.normal * repeats)
+
+
+@lru_cache(maxsize=64)
+def signature(candidate: Candidate, base: Fit) -> Signature:
+    """Return the signature of the effects that a candidate has more than the fit ``base``, in its blocks."""
     theta = np.concatenate([base.theta, [p.starts[0] for p in candidate.parameters[len(base.theta) :]]])
-    total, left = linearised_signature(candidate, base, theta)
-    return left / total if total > 0 else 0.0
-
-
-def linearised_signature(candidate: Candidate, base: Fit, theta: Array) -> tuple[float, float]:
-    """Whitened sum of squares of the last effect's first column, before and after projection on the rest."""
-    state = State(theta, base.beta, dict(base.nuisance))
-    system = linearised(candidate, base.blocks, base.noise, state)
+    system = linearised(candidate, base.blocks, base.noise, State(theta, base.beta, dict(base.nuisance)))
     first = len(base.theta)
-    size, total = [], 0.0
-    columns = []
-    for _, matrix, effect, own in system.rows:
-        signature, others = effect[:, first], np.hstack([matrix, effect[:, :first]])
-        total += float(signature @ signature)
-        if own.shape[1]:
-            basis = np.linalg.qr(own)[0]
-            signature, others = signature - basis @ (basis.T @ signature), others - basis @ (basis.T @ others)
-        size.append(signature)
-        columns.append(others)
-    stacked, target = np.vstack(columns), np.concatenate(size)
-    rest = target - stacked @ np.linalg.lstsq(stacked, target, rcond=None)[0]
-    return total, float(rest @ rest)
+    total = sum(float(effect[:, first] @ effect[:, first]) for _, _, effect, _ in system.rows)
+    normal, _ = normal_equations(replace(system, weight=np.zeros_like(system.weight)))
+    return Signature(total, normal)
+
+
+def share_left(seen: Signature, place: int) -> float:
+    """Share of the signature of parameter ``place`` that those before it leave."""
+    known, mixed = seen.normal[:place, :place], seen.normal[:place, place]
+    left = seen.normal[place, place] - mixed @ solution(known, mixed)
+    return max(0.0, float(left)) / seen.total if seen.total > 0 else 0.0

@@ -22,7 +22,7 @@ PRIOR_RUNS = 4
 MISFIT_CORRELATION = 12.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Noise:
     """The noise of an observable.
 
@@ -148,15 +148,15 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         if block.role == "calibrate":
             continue
         variance = diagonal(block, noise)
-        amplitude, uncertain = _amplitude(directions, residual, variance)
-        expected = amplitude**2 + np.diag(uncertain)
+        found, uncertain = amplitude(directions, residual, variance)
+        expected = found**2 + np.diag(uncertain)
         amplitudes["scatter"] += [float(size**2 * expected[:p].mean())] if p else []
         amplitudes["zero"] += (
             [float(noise.zero_factor**2 * expected[p:].mean())] if block.zeros.shape[1] else []
         )
         # The misfit as it is, not as it weighs: else it takes what the shared directions explain.
-        amplitude, uncertain = _amplitude(directions, residual, diagonal(block, noise, correlation=1.0))
-        left = residual - directions @ amplitude
+        found, uncertain = amplitude(directions, residual, diagonal(block, noise, correlation=1.0))
+        left = residual - directions @ found
         spread = left**2 + np.einsum("ij,jk,ik->i", directions, uncertain, directions)
         excess = spread - diagonal(block, replace(noise, misfit={}))
         names, number, rms = _axes(block)
@@ -172,7 +172,7 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
     )
 
 
-def _amplitude(directions: Array, residual: Array, variance: Array) -> tuple[Array, Array]:
+def amplitude(directions: Array, residual: Array, variance: Array) -> tuple[Array, Array]:
     """Return the expected amplitude of each shared direction (k,), and the covariance of that."""
     scaled = directions / np.sqrt(variance)[:, None]
     covariance = np.asarray(np.linalg.inv(np.eye(scaled.shape[1]) + scaled.T @ scaled), dtype=float)

@@ -42,23 +42,25 @@ class Line:
 
 
 def signature(fitted: Fit, least: float) -> list[Line]:
-    """Test the rest of a fit, place by place (axis × label), against the noise without the misfit.
+    """Test the rest of a fit, place by place (axis × label × how it changes), against the plain noise.
 
-    A place counts when it is significant by Benjamini–Hochberg at 1 % over all places and its excess over the
-    noise is at least ``least`` of the axis's signal.
+    The plain noise is that without the misfit. A place counts when it is significant by Benjamini–Hochberg at
+    1 % over all places and its excess over the noise is at least ``least`` of the axis's signal.
     """
     places: dict[tuple[str, str], list[Array]] = {}
     signal: dict[str, float] = {}
     cut = [block for block in fitted.blocks if block.role != "calibrate"]
     for block in cut:
-        seen = _seen_and_expected(fitted, block)
         labels = np.full(len(block.axis), "all") if block.labels is None else block.labels
+        once = len(block.axis) // block.repeats
         for axis in np.unique(block.axis):
             power = float(np.sum(block.measured[block.axis == axis] ** 2)) / block.repeats
             signal[str(axis)] = signal.get(str(axis), 0.0) + power
-            for label in np.unique(labels[block.axis == axis]):
-                chosen = (block.axis == axis) & (labels == label)
-                places.setdefault((str(axis), str(label)), []).append(seen[:, chosen[: seen.shape[1]]])
+        for change, seen in _by_change(fitted, block).items():
+            for axis, label in sorted(set(zip(block.axis.tolist(), labels.tolist(), strict=True))):
+                chosen = ((block.axis == axis) & (labels == label))[:once]
+                name = f"{label}, {change}" if change else str(label)
+                places.setdefault((str(axis), name), []).append(seen[:, chosen].reshape(3, -1))
     freedom = len(cut) + noise_room.PRIOR_RUNS
     lines = [_line(axis, label, parts, signal[axis], freedom) for (axis, label), parts in places.items()]
     accepted = discoveries([line.p_value for line in lines], FALSE_DISCOVERY)
@@ -68,19 +70,38 @@ def signature(fitted: Fit, least: float) -> list[Line]:
     ]
 
 
-def _seen_and_expected(fitted: Fit, block: Block) -> Array:
-    """Rest of a block averaged over its repeats, squared, and what is expected of it, (3, n / repeats).
+def _by_change(fitted: Fit, block: Block) -> dict[str, Array]:
+    """Rest of a block and what is expected of it, for what is steady ("") and each way it may change.
 
-    The last row is the part of the expectation that the whole run shares: it does not average out over the
-    repeats.
+    Each (3, n / repeats, k): the square of the rest's component, the mean square expected of it, and the part
+    of that which the whole run shares: that does not average out over the repeats.
     """
     strict = replace(fitted.noise, misfit={})
-    matrix, offset = fitted.candidate.model(fitted.theta).design(block, fitted.nuisance[block.run])
-    rest = (block.measured - offset - matrix @ fitted.beta).reshape(block.repeats, -1).mean(axis=0)
-    alone = noise_room.diagonal(block, strict).reshape(block.repeats, -1).mean(axis=0) / block.repeats
-    directions = noise_room.shared(block, strict, matrix, fitted.beta)
-    common = (directions**2).sum(axis=1).reshape(block.repeats, -1).mean(axis=0)
-    return np.array([rest**2, alone + common, common])
+    model = fitted.candidate.model(fitted.theta)
+    matrix, offset = model.design(block, fitted.nuisance[block.run], fitted.beta)
+    repeats = block.repeats
+    rest = (block.measured - offset - matrix @ fitted.beta).reshape(repeats, -1)
+    directions = noise_room.shared(block, strict, matrix, fitted.beta).reshape(*rest.shape, -1)
+    within = block.sigma.reshape(rest.shape) ** 2
+    budget = noise_room.diagonal(block, strict).reshape(rest.shape) - within
+    result = {}
+    for name, functions in {"": np.ones((repeats, 1)), **block.slow}.items():
+        unit = _orthonormal(functions, against=np.ones((repeats, 1)) if name else None)
+        seen = np.einsum("kf,kn->nf", unit, rest) ** 2
+        common = (np.einsum("kf,knd->nfd", unit, directions) ** 2).sum(axis=2)
+        # The budget is the same in all repeats of a steady wave; what changes has it once per repeat.
+        own = within + (budget if not name else budget / repeats)
+        alone = np.einsum("kf,kn->nf", unit**2, own)
+        result[name] = np.array([seen, alone + common, common]) / repeats
+    return result
+
+
+def _orthonormal(functions: Array, against: Array | None) -> Array:
+    """Columns of unit length, free of those ``against``; what vanishes then is left out."""
+    if against is not None:
+        functions = functions - against @ np.linalg.lstsq(against, functions, rcond=None)[0]
+    left, size, _ = np.linalg.svd(functions, full_matrices=False)
+    return np.asarray(left[:, size > 1e-6 * max(1e-300, size.max(initial=0.0))])
 
 
 def _line(axis: str, label: str, parts: list[Array], signal: float, freedom: int) -> Line:

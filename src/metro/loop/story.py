@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from metro.loop import signature as rest
+from metro.loop.advice import ranked
 from metro.loop.search import Gates, Outcome, Trial
 from metro.loop.verdict import comparison, error, finite, held_out, parameters
 from metro.observables.problem import Block, Problem
 from metro.units import JSON, Array
 
+MOST_PROPOSALS = 5
 SENTENCES = {
     "clean": "The base model predicts the held-out runs within the noise and the declared model-form budget; "
     "nothing was added.",
@@ -32,13 +34,8 @@ def told(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> JSO
         "candidates": [_tried(trial, outcome) for trial in outcome.trials],
         "path": _path(problem, outcome),
         "signature": [_line(line, problem.si) for line in outcome.lines],
-        "cannot_be_seen": [
-            {
-                "effect": name,
-                "why": f"the base parameters imitate all but {100 * share:.1f} % of its signature",
-            }
-            for name, share in outcome.not_visible.items()
-        ],
+        "cannot_be_seen": [{"effect": name, "why": why} for name, why in outcome.not_visible.items()],
+        "experiments": _experiments(problem, outcome),
         "blocks": _blocks(problem, outcome),
         "words": in_words(verdict),
     }
@@ -67,7 +64,7 @@ def _noise(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> J
 
 
 def _tried(trial: Trial, outcome: Outcome) -> JSON:
-    rivals = {name for pair in outcome.rivals for name in pair[1:]}
+    rivals = {rival.other for rival in outcome.rivals}
     verdict = "added" if trial.effect.name in outcome.names else "rejected"
     verdict = "rival" if trial.effect.name in rivals else verdict
     verdict = "not visible" if trial.effect.name in outcome.not_visible else verdict
@@ -108,6 +105,22 @@ def _line(line: rest.Line, si: float) -> JSON:
         "p_value": line.p_value,
         "significant": line.significant,
     }
+
+
+def _experiments(problem: Problem, outcome: Outcome) -> list[JSON]:
+    """Say what the most promising runs promise for each pair that is undecided."""
+    return [
+        {
+            "pair": list(rival.pair),
+            "proposal": prospect.proposal.words,
+            "repeats": prospect.repeats,
+            "runs": prospect.runs,
+            "probability": prospect.probability,
+            "probability_once": prospect.once,
+        }
+        for rival in outcome.rivals
+        for prospect in ranked(problem, outcome, rival)[:MOST_PROPOSALS]
+    ]
 
 
 def _blocks(problem: Problem, outcome: Outcome) -> list[JSON]:

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from metro.batch.batch import Batch
+from metro.batch.manifest import signed_axes
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import engagement
 from metro.cutting.force import COEFFICIENTS, Cut, mean_force
 from metro.cutting.law import EdgeLaw
+from metro.observables.dynamometer import Rows
 from metro.observables.problem import Refusal
+from metro.signals.conversion import sensor_to_tool
 from metro.units import DEG, JSON, MM, N_MM, N_MM2, UM, Array
 
 TO_SI = np.array([N_MM2] * 3 + [N_MM] * 3)
@@ -35,6 +38,17 @@ def cutter(batch: Batch) -> Cutter | Refusal:
         runout_radius=runout.get("radius_um", 0.0) * UM,
         runout_angle=runout.get("angle_deg", 0.0) * DEG,
     )
+
+
+def channels(batch: Batch) -> Rows:
+    """Return what each channel of the dynamometer reads of the force on the tool, work frame, as rows."""
+    sensor = (batch.manifest.get("instruments") or {}).get("dynamometer") or {}
+    to_tool = sensor_to_tool(
+        signed_axes(sensor.get("axes") or {}),
+        float(sensor.get("rotation_deg", 0.0)),
+        sensor.get("reads", "work"),
+    )
+    return tuple(tuple(float(value) for value in row) for row in np.linalg.inv(to_tool))
 
 
 def cut(batch: Batch, run: str, radius: float) -> Cut:

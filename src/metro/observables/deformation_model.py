@@ -79,7 +79,7 @@ class DeformationModel:
         """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
         return np.zeros((1, 0))
 
-    def design(self, block: Block, _nuisance: Array) -> tuple[Array, Array]:
+    def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
         """Design matrix (n, 6), m per rad/(N m), and offset (n,), m, of a cut, load test or known joints."""
         setting: Any = block.setting
         if isinstance(setting, CutWall):

@@ -186,7 +186,7 @@ def _predicted_xm(task: Problem, fit: BaseFit) -> dict[str, JSON]:
     for block in task.role("identify", "validate"):
         if block.run not in fit.nuisance:
             continue
-        design, offset = task.base.design(block, fit.nuisance[block.run])
+        design, offset = task.base.design(block, fit.nuisance[block.run], fit.beta)
         heights = offset + design @ fit.beta
         x, y = block.coordinates["x_mm"] * MM, block.coordinates["y_mm"] * MM
         points = np.column_stack([x, y, heights])

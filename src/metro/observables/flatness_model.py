@@ -153,7 +153,7 @@ class FlatnessModel:
             return np.log(DAMPING_RATIOS)[:, None]
         return np.zeros((1, 0))
 
-    def design(self, block: Block, nuisance: Array) -> tuple[Array, Array]:
+    def design(self, block: Block, nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
         """Matrix (n, p) in m per (m/N), and the ringing (n,) m."""
         setting = block.setting
         if isinstance(setting, LoadSetting):

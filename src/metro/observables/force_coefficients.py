@@ -85,6 +85,6 @@ def _mean_design(model: ForceModel, block: Block) -> Array:
     In the frame of the comparison.
     """
     nominal = replace(block, setting=replace(block.setting, feed_ratio=1.0))
-    matrix, _ = replace(model, true_path=False).design(nominal, np.zeros(1))
+    matrix, _ = replace(model, true_path=False).design(nominal, np.zeros(1), None)
     first = matrix[: len(matrix) // block.repeats, :6]
     return np.stack([first[zero[: len(first)] > 0].sum(axis=0) for zero in block.zeros.T])

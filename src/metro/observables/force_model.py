@@ -1,9 +1,9 @@
-"""The force model of a batch: what is known of the tool and the law, and the coefficients that are not."""
+"""The force model of a batch: tool, law, structure and sensor, and the coefficients that are to be found."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -12,6 +12,7 @@ from metro.cutting.cutter import Cutter
 from metro.cutting.force import COEFFICIENTS, Cut, force_basis
 from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped, turned
 from metro.cutting.law import EdgeLaw
+from metro.observables.dynamometer import Dynamometer, Recording, read
 from metro.observables.problem import Block, Parameter
 from metro.signals.orders import advance, to_orders
 from metro.units import N_MM, N_MM2, Array
@@ -24,25 +25,35 @@ ORBIT_PHASES = 12
 class ForceSetting:
     """What the force of a run depends on (SI): its cut, and how its record was averaged.
 
-    ``feed_direction`` is the turn of the feed frame about z, rad; ``blocks`` the number of time blocks,
-    ``middles`` their times (s from the start of the steady cut); ``cut_length`` metres cut before the run's
-    middle since the tool was new; ``feed_ratio`` true over nominal feed per tooth: the feed rate is as
-    programmed, so a spindle that turns slower than it says takes thicker chips. The chip is taken as
-    proportional to it.
+    ``feed_direction`` is the turn of the feed frame about z, rad; ``cut_length`` metres cut before the run's
+    middle since the first; ``feed_ratio`` true over nominal feed per tooth: the feed rate is as programmed,
+    so a spindle that turns slower than it says takes thicker chips. The chip is taken as proportional to it.
     """
 
     cut: Cut
     feed_direction: float
     highest: int
-    middles: tuple[float, ...]
+    recording: Recording
     cut_length: float
     helix: Helix | None = None
     feed_ratio: float = 1.0
 
 
 @dataclass(frozen=True)
+class Structure:
+    """How the machine answers the force.
+
+    ``orbit_amplitude``, ``orbit_phase`` (rad): the axial force times 1 + amplitude × cos(ψ − phase), ψ the
+    direction of feed in helical milling.
+    """
+
+    orbit_amplitude: float = 0.0
+    orbit_phase: float = 0.0
+
+
+@dataclass(frozen=True)
 class ForceModel:
-    """Mechanistic milling force: cutter geometry and force law; linear in the cutting coefficients.
+    """Mechanistic milling force; linear in the cutting coefficients.
 
     ``true_path`` takes the chip from the trochoidal paths of the teeth; else from circles (feed × sine of the
     immersion). A block's nuisance is the angle of tooth 0 at the record's start, rad, and in helical milling
@@ -54,6 +65,8 @@ class ForceModel:
     law: EdgeLaw
     true_path: bool = True
     bottom_edges: tuple[str, ...] = ()
+    structure: Structure = field(default_factory=Structure)
+    sensor: Dynamometer = field(default_factory=Dynamometer)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -74,9 +87,10 @@ class ForceModel:
         directions = 2.0 * math.pi * np.arange(ORBIT_PHASES) / ORBIT_PHASES
         return np.stack(np.meshgrid(phases, directions, indexing="ij"), axis=-1).reshape(-1, 2)
 
-    def design(self, block: Block, nuisance: Array) -> tuple[Array, Array]:
+    def design(self, block: Block, nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
         """Order coefficients of the force per unit of each coefficient: rows (time block, axis, order)."""
         setting: ForceSetting = block.setting
+        recording = setting.recording
         basis = advance(
             _order_basis(self.cutter, self.law, setting.cut, setting.highest, self.true_path),
             float(nuisance[0]),
@@ -88,9 +102,9 @@ class ForceModel:
             turn = float(nuisance[1])
         if self.bottom_edges:
             basis = np.concatenate([basis, self._bottom(setting, len(basis))], axis=2)
-        basis = turned(basis, turn).transpose(1, 0, 2).reshape(-1, basis.shape[2])
-        matrix = np.tile(basis, (len(setting.middles), 1))
-        return matrix, np.zeros(len(matrix))
+        seen = self._seen(turned(basis, turn), setting, turn)
+        matrix = seen.transpose(0, 2, 1, 3).reshape(-1, basis.shape[2])
+        return matrix, self._drift(block, recording)
 
     def _bottom(self, setting: ForceSetting, orders: int) -> Array:
         """Thrust of the bottom edges along z over the whole revolution: it is not inclined by the ramp."""
@@ -99,6 +113,27 @@ class ForceModel:
             thrust = dict(zip(BOTTOM_EDGES, bottom_thrust(self.cutter, setting.helix), strict=True))
             columns[0, 2] = [thrust[name] for name in self.bottom_edges]
         return columns
+
+    def _seen(self, basis: Array, setting: ForceSetting, direction: float) -> Array:
+        """Return what the sensor reads of the force in each time block, (blocks, orders, 3, coefficients)."""
+        recording = setting.recording
+        if self.sensor.ideal:
+            seen = np.repeat(basis[None], len(recording.middles), axis=0)
+        else:
+            seen = read(self.sensor, recording, basis)
+        if setting.helix is not None and self.structure.orbit_amplitude:
+            feed = direction + recording.orbit * np.array(recording.middles)
+            wave = recording.attenuation * np.cos(feed - self.structure.orbit_phase)
+            seen[:, :, 2] *= (1.0 + self.structure.orbit_amplitude * wave)[:, None, None]
+        return seen
+
+    def _drift(self, block: Block, recording: Recording) -> Array:
+        """Offset (n,) from the drift of the sensor since its zero was read."""
+        if not any(self.sensor.slope):
+            return np.zeros(len(block.zeros))
+        since = np.array(recording.middles) - recording.zero_at
+        each = len(block.zeros) // len(since)
+        return np.asarray(np.repeat(since, each) * (block.zeros @ self.sensor.drift))
 
 
 @lru_cache(maxsize=4096)

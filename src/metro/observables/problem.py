@@ -2,8 +2,9 @@
 
 A **block** is what one run says about one observable. It is the unit of evidence: the 10^5 samples of one run
 share its coefficients, its phase and its zero, so they count once. A **model** predicts a block as ``offset +
-X @ beta``, linear in the base parameters; everything nonlinear is either a parameter of an effect (it made
-the model what it is) or a per-block nuisance (an unknown start phase).
+X @ beta``, linear in the base parameters, or made so about their values; everything else that is nonlinear
+is either a parameter of an effect (it made the model what it is) or a per-block nuisance (an unknown start
+phase).
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ class Block:
         label.
     repeats : how many times the block repeats one waveform (its time blocks): what a model gets wrong is the
         same in each.
+    slow : how what repeats may change along the run, by its name in the report: (repeats, k) each.
     synthesis : (m, n) map from ``measured`` to the rows of the comparison table; None where they are the
         same.
     coordinates : column of the comparison table (axis, t_s, angle_deg, s_mm, x_mm, y_mm) → its (m,) values.
@@ -73,6 +75,7 @@ class Block:
     repeats: int = 1
     labels: np.ndarray | None = None
     symmetries: Array | None = None
+    slow: Mapping[str, Array] = field(default_factory=dict)
 
     def to_rows(self, values: Array) -> Array:
         """Express a vector of the fit's basis, shape (n,) or (n, k), in the rows of the comparison table."""
@@ -91,9 +94,24 @@ class Model(Protocol):
         """Return starts (k, m) of the block's m nonlinear unknowns over their whole range; (1, 0) if none."""
         ...
 
-    def design(self, block: Block, nuisance: Array) -> tuple[Array, Array]:
-        """Matrix ``X`` (n, p) and offset (n,), SI: the prediction is ``offset + X @ beta``."""
+    def design(self, block: Block, nuisance: Array, beta: Array | None) -> tuple[Array, Array]:
+        """Matrix ``X`` (n, p) and offset (n,), SI: the prediction is ``offset + X @ beta``.
+
+        A model that is not linear in the base parameters is so about ``beta`` (None: not known yet).
+        """
         ...
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Runs that could be made next.
+
+    ``words``: what they are, for the report. ``blocks`` hold the setting of each run as it would be made;
+    their ``measured`` is that of a run like it, for the size of the signal alone.
+    """
+
+    words: str
+    blocks: tuple[Block, ...]
 
 
 @dataclass(frozen=True)
@@ -110,6 +128,7 @@ class Problem:
     systematic : relative error that all runs may share because the base model's inputs do (a force estimate,
         a gauge); an effect must change the prediction by more than twice this to be told from it.
     notes : sentences on what this problem had to leave out or assume, for the report.
+    feasible : runs that could be made next, among which the loop looks for the one that would tell most.
     """
 
     observable: str
@@ -120,6 +139,7 @@ class Problem:
     scatter: Array
     systematic: float = 0.0
     notes: tuple[str, ...] = field(default=())
+    feasible: tuple[Proposal, ...] = ()
 
     def role(self, *roles: Role) -> tuple[Block, ...]:
         """Return the blocks that have one of ``roles``."""

@@ -59,7 +59,7 @@ class PrintedModel:
         """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
         return np.zeros((1, 0))
 
-    def design(self, block: Block, _nuisance: Array) -> tuple[Array, Array]:
+    def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
         """Return an empty matrix (n, 0) and the printed prediction (n,), SI, in the structure assumed."""
         printed: Array = block.setting
         offset = self.structure.in_cut(printed) if self.elastic else printed

@@ -13,7 +13,7 @@ from metro.cutting.force import COEFFICIENTS
 from metro.cutting.helical import BOTTOM_EDGES, helical_signal
 from metro.cutting.law import EdgeLaw
 from metro.observables import cutting_force
-from metro.observables.force import helix
+from metro.observables.force_blocks import helix
 from metro.observables.problem import Refusal
 from metro.units import N_MM, N_MM2, RPM, Array
 

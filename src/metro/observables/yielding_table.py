@@ -13,7 +13,7 @@ from metro.cutting.cutter import Cutter
 from metro.cutting.force import COEFFICIENTS, Cut
 from metro.cutting.law import EdgeLaw
 from metro.observables import cutting_force
-from metro.observables.force import recorded
+from metro.observables.force_orders import recorded
 from metro.observables.problem import Refusal
 from metro.observables.yielding import ANGLES, NotConvergedError, ratios, yielding_force
 from metro.robot.kinematics import rotation

@@ -156,7 +156,7 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
     highest : order. blocks : number of time blocks.
     """
     revolutions = (angle[-1] - angle[0]) / (2.0 * math.pi)
-    blocks = max(1, min(blocks, int(revolutions / (4 * REVOLUTIONS_PER_SEGMENT))))
+    blocks = max(1, blocks)
     per_s = revolutions / (time[-1] - time[0])
     edges = np.searchsorted(time, np.linspace(time[0], time[-1], blocks + 1))
     edges[-1] = len(time)

@@ -1,0 +1,34 @@
+"""Charge leak: a piezoelectric sensor discharges, so that a steady force fades from its signal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from metro.effects.effect import Effect, EffectParameter, Values
+
+CHANNELS = 3
+NEVER = 1e4  # s
+
+
+def apply(model: Any, values: Values) -> Any:
+    """Discharge each channel with its ``time_constant_s``."""
+    discharge = tuple(1.0 / value for value in values["time_constant_s"])
+    return replace(model, sensor=replace(model.sensor, discharge=discharge))
+
+
+EFFECT = Effect(
+    name="charge_drift",
+    observables=("force",),
+    parameters=tuple(
+        EffectParameter(
+            "time_constant_s", "s", 0.02, NEVER, 1.0, starts=(0.5, 3.0, 20.0), group=number, neutral=NEVER
+        )
+        for number in range(CHANNELS)
+    ),
+    apply=apply,
+    signature="A mean that fades along every record in proportion to itself, and undershoots after the cut.",
+    literature="Kistler, Piezoelectric Measurement: time constant of a charge amplifier",
+    experiment="a cut of at least half the time constant, with air before and after it",
+    form="discharge",
+)

@@ -1,0 +1,29 @@
+"""Dynamometer rotation: the sensor stands turned on the table against what the manifest says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from metro.effects.effect import Effect, EffectParameter, Values
+from metro.units import DEG
+
+
+def apply(model: Any, values: Values) -> Any:
+    """Turn the sensor by ``angle_deg`` about +z, in addition to what is declared."""
+    sensor = replace(model.sensor, rotation=model.sensor.rotation + values["angle_deg"] * DEG)
+    return replace(model, sensor=sensor)
+
+
+EFFECT = Effect(
+    name="dynamometer_rotation",
+    observables=("force",),
+    parameters=(EffectParameter("angle_deg", "deg", -30.0, 30.0, 1.0, starts=(-3.0, 3.0), plausible=5.0),),
+    apply=apply,
+    signature=(
+        "Forces in the plane turned by the same angle in every run. K_t and K_r, where they are to be found "
+        "from the same forces, take the turn for a change of theirs whatever is cut."
+    ),
+    literature="a turn of (K_t, K_r) and a turn of (F_x, F_y) are the same thing: physics.md, section 2",
+    experiment="a known force along the table's x axis: push the dynamometer with a load cell along a slot",
+)

@@ -1,0 +1,42 @@
+"""Orbit stiffness: a robot is not equally stiff all the way round a helical hole, nor is its axial force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.problem import Problem, Refusal
+from metro.units import DEG
+
+
+def apply(model: Any, values: Values) -> Any:
+    """Let the axial force of helical runs vary with the direction of feed."""
+    structure = replace(
+        model.structure, orbit_amplitude=values["amplitude"], orbit_phase=values["phase_deg"] * DEG
+    )
+    return replace(model, structure=structure)
+
+
+def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
+    """Only helical runs show it."""
+    if not any(block.setting.helix for block in problem.role("identify")):
+        return Refusal("no helical run is among those of the identification")
+    return effect
+
+
+EFFECT = Effect(
+    name="orbit_stiffness",
+    observables=("force",),
+    parameters=(
+        EffectParameter("amplitude", "1", 0.0, 1.0, 0.02, starts=(0.03, 0.15)),
+        EffectParameter(
+            "phase_deg", "deg", 0.0, 360.0, 20.0, starts=tuple(45.0 * i for i in range(8)), period=360.0
+        ),
+    ),
+    apply=apply,
+    adapt=adapt,
+    signature="Axial force of helical runs that rises and falls once per orbit, the same way in each hole.",
+    literature="a parallel kinematic machine is not equally stiff all over its workspace",
+    experiment="a hole at each of two places of the workspace, and one with the orbit reversed",
+)

@@ -1,0 +1,54 @@
+"""Pitch error: teeth that are not where they should be cut chips of different feed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.problem import Problem, Refusal
+from metro.units import DEG
+
+
+def apply(model: Any, values: Values) -> Any:
+    """Turn each tooth by its ``pitch_deg``, clockwise."""
+    turned = np.array(model.cutter.tooth_angles) + np.array(values["pitch_deg"]) * DEG
+    return replace(model, cutter=replace(model.cutter, tooth_angles=tuple(float(a) for a in turned)))
+
+
+def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
+    """Give each tooth its deviation; they add up to nothing, so there is one parameter less than teeth."""
+    base: Any = problem.base
+    teeth = base.cutter.teeth
+    if teeth < 2:
+        return Refusal("the tool has one tooth")
+    contrasts = np.array(
+        [
+            [math.sqrt(2.0 / teeth) * wave(2.0 * math.pi * (k * j) / teeth) for j in range(teeth)]
+            for k in range(1, teeth // 2 + 1)
+            for wave in ((math.cos,) if 2 * k == teeth else (math.cos, math.sin))
+        ]
+    ).T
+    return replace(
+        effect,
+        parameters=tuple(replace(effect.parameters[0]) for _ in range(teeth - 1)),
+        mixing=tuple(tuple(float(x) for x in row) for row in contrasts),
+    )
+
+
+EFFECT = Effect(
+    name="pitch_error",
+    observables=("force",),
+    parameters=(EffectParameter("pitch_deg", "deg", -15.0, 15.0, 0.5, starts=(-0.7, 0.7), plausible=2.0),),
+    apply=apply,
+    adapt=adapt,
+    signature=(
+        "Force at spindle orders that are no multiple of the number of teeth, in proportion to the feed. "
+        "Runout looks alike but does not depend on the feed."
+    ),
+    literature="Altintas, Engin and Budak, J. Manuf. Sci. Eng. 121 (1999) 173: cutters with variable pitch",
+    experiment="runs at two feeds that differ by a factor of three or more, and the pitch under a microscope",
+)

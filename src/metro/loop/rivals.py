@@ -1,0 +1,93 @@
+"""Rivals: other effects in the place of one that was found, refitted with all the others.
+
+An effect that was added first may have stood for one that fits better once the others are known; and what
+explains the runs as well, on conditions left out, is named beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from metro.effects.effect import Effect
+from metro.loop.candidate import Candidate
+from metro.loop.evidence import leave_out, weights
+from metro.loop.fit import Fit, fit
+from metro.loop.noise import Noise
+from metro.loop.trial import Gates, without
+
+RIVAL_WEIGHT = 0.05
+HOPELESS = 12.0  # log-likelihood on the runs of the fit by which a rival may be behind and still be weighed
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An effect in the place of one that was found: names of both, weight of the other, and its fit."""
+
+    found: str
+    other: str
+    weight: float
+    fit: Fit
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """The two names."""
+        return self.found, self.other
+
+
+@dataclass(frozen=True)
+class Contest:
+    """The model after the contest, the weight of each of its effects, and the rivals that stay undecided."""
+
+    final: Fit
+    weight: dict[str, float] = field(default_factory=dict)
+    rivals: tuple[Rival, ...] = ()
+
+
+def contested(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> Contest:
+    """Weigh every effect found against each other effect in its place, and put the better one there."""
+    swapped: set[str] = set()
+    while True:
+        contest, better = _round(current, effects, prior, gates)
+        if better is None or set(_names(better)) <= swapped:
+            return contest
+        swapped |= set(_names(current)) | set(_names(better))
+        current = better
+
+
+def _names(fitted: Fit) -> list[str]:
+    return [effect.name for effect in fitted.candidate.effects]
+
+
+def _round(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> tuple[Contest, Fit | None]:
+    """Contest each effect once; also the fit with the best rival in place, where one is better."""
+    weight: dict[str, float] = {}
+    rivals: list[Rival] = []
+    better: Fit | None = None
+    out = leave_out(current, prior) if current.candidate.effects else {}
+    for effect in current.candidate.effects:
+        smaller = without(current, tuple(e for e in current.candidate.effects if e is not effect), prior)
+        others = _replaced(current, smaller, effects, prior)
+        share = weights(
+            [leave_out(smaller, prior), out, *(leave_out(fitted, prior) for fitted in others)], gates.seed
+        )[1:]
+        weight[effect.name] = float(share[0])
+        for fitted, other in zip(others, share[1:], strict=True):
+            if other > RIVAL_WEIGHT:
+                rivals.append(Rival(effect.name, fitted.candidate.effects[-1].name, float(other), fitted))
+            if better is None and other > share[0] and other == share.max():
+                better = fitted
+    return Contest(current, weight, tuple(rivals)), better
+
+
+def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Noise) -> list[Fit]:
+    """Fit every other effect in place of the one that ``smaller`` lacks; those not far behind."""
+    names = set(_names(current))
+    fits = []
+    for effect in effects:
+        if effect.name not in names:
+            candidate = Candidate(current.candidate.base, (*smaller.candidate.effects, effect))
+            fitted = fit(candidate, current.blocks, prior, smaller)
+            if fitted.total > current.total - HOPELESS:
+                fits.append(fitted)
+    return fits

@@ -1,0 +1,121 @@
+"""Trials: one effect fitted jointly with what a model has already, and the gates that it must pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from metro.effects.effect import Effect
+from metro.loop import signature as rest
+from metro.loop.candidate import Candidate
+from metro.loop.evidence import Evidence, compare, hold_out, leave_out, weights
+from metro.loop.fit import Fit, fit
+from metro.loop.noise import Noise
+
+LEAST_BETTER = 0.4
+
+
+@dataclass(frozen=True)
+class Gates:
+    """Thresholds of the configuration.
+
+    Attributes
+    ----------
+    model_form_budget : relative to the signal.
+    materiality : least relative change of the prediction.
+    false_additions : rate of false discoveries over the candidates.
+    held_out_gain : least gain in log-likelihood on conditions left out.
+    seed : of the bootstraps.
+    """
+
+    model_form_budget: float
+    materiality: float
+    false_additions: float
+    held_out_gain: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One effect tried on top of those already chosen."""
+
+    effect: Effect
+    fit: Fit
+    evidence: Evidence
+    q_value: float = 1.0
+    weight: float = 0.0
+    why_not: str = ""
+
+
+def tried(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, least: float) -> list[Trial]:
+    """Fit each effect jointly with what is there, compare, and apply the gates.
+
+    Conditions are left out only for effects that pass the gates before.
+    """
+    trials = []
+    for effect in effects:
+        candidate = Candidate(current.candidate.base, (*current.candidate.effects, effect))
+        larger = fit(candidate, current.blocks, prior, current)
+        trials.append(Trial(effect, larger, compare(current, larger)))
+    p_values = [trial.evidence.p_value for trial in trials]
+    accepted = rest.discoveries(p_values, gates.false_additions)
+    trials = [
+        replace(
+            trial,
+            q_value=min(1.0, p * len(trials) / (1 + sum(other < p for other in p_values))),
+            why_not=_why_not(trial.evidence, bool(found), least),
+        )
+        for trial, p, found in zip(trials, p_values, accepted, strict=True)
+    ]
+    return _held_out(current, trials, prior, gates)
+
+
+def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> list[Trial]:
+    """Apply the held-out gate, and weigh the candidates against each other and against adding nothing."""
+    if all(trial.why_not for trial in trials):
+        return trials
+    out = leave_out(current, prior)
+    trials = [
+        trial if trial.why_not else replace(trial, evidence=hold_out(trial.evidence, out, trial.fit, prior))
+        for trial in trials
+    ]
+    weighed = [trial for trial in trials if not trial.why_not]
+    nothing = dict.fromkeys(out, 0.0)
+    share = weights([nothing, *(trial.evidence.held_out for trial in weighed)], gates.seed)[1:]
+    weight = {trial.effect.name: float(value) for trial, value in zip(weighed, share, strict=True)}
+    return [
+        replace(
+            trial,
+            weight=weight.get(trial.effect.name, 0.0),
+            why_not=trial.why_not or _not_held_out(trial.evidence, gates),
+        )
+        for trial in trials
+    ]
+
+
+def _why_not(evidence: Evidence, found: bool, least: float) -> str:
+    if not found:
+        return f"no evidence: p = {evidence.p_value:.2g} over the runs of the fit"
+    if evidence.size < least:
+        return f"changes the prediction by {100 * evidence.size:.2f} %: below {100 * least:.2g} %, immaterial"
+    return ""
+
+
+def _not_held_out(evidence: Evidence, gates: Gates) -> str:
+    if evidence.gain < gates.held_out_gain:
+        needed = gates.held_out_gain
+        return f"predicts left-out conditions no better: gain {evidence.gain:.1f}, {needed:g} needed"
+    if evidence.better_share < LEAST_BETTER:
+        return f"better in {100 * evidence.better_share:.0f} % of the left-out conditions only"
+    return ""
+
+
+def without(current: Fit, kept: tuple[Effect, ...], prior: Noise) -> Fit:
+    """Refit with the effects that are kept, from the base up."""
+    first = Candidate(current.candidate.base)
+    fitted = fit(first, current.blocks, prior)
+    for effect in kept:
+        fitted = fit(
+            Candidate(first.base, (*fitted.candidate.effects, effect)), current.blocks, prior, fitted
+        )
+    return fitted

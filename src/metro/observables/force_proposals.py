@@ -1,0 +1,209 @@
+"""Force runs that could be made next: variations of those of a batch, as an engineer would cut them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from metro.cutting.cutter import Cutter
+from metro.cutting.engagement import Engagement, engagement
+from metro.observables.force_blocks import UNZEROED_SHARE, ZERO_SHARE, zeros
+from metro.observables.force_model import ForceSetting
+from metro.observables.problem import Block, Proposal
+from metro.units import MM
+
+LARGEST_FEED = 0.02  # per tooth, in tool diameters
+SIDE_WIDTH = 0.25  # of a side cut that is proposed, in tool diameters
+SLOT = Engagement(0.0, math.pi)
+LONGER = 3.0
+HOLE, FACE = "a hole", "a face cut"
+
+
+def feasible(blocks: Sequence[Block], cutter: Cutter) -> tuple[Proposal, ...]:
+    """Return the runs that could be made after those of a batch, with the same tool.
+
+    The first condition again, a longer cut and a record in the air; and of each kind of cut that the batch
+    has, feed, depth, speed, side and direction of feed beyond what was cut, one at a time.
+
+    Parameters
+    ----------
+    blocks : all runs of the batch; those of the identification are varied.
+    """
+    last = max(_setting(block).cut_length for block in blocks)
+    made = [
+        replace(block, setting=replace(_setting(block), cut_length=last))
+        for block in blocks
+        if block.role == "identify"
+    ]
+    return tuple(_proposals(made, blocks, cutter)) if made else ()
+
+
+def _proposals(made: Sequence[Block], blocks: Sequence[Block], cutter: Cutter) -> Iterator[Proposal]:
+    yield from _first_again(made[0])
+    kinds = dict.fromkeys(kind(block) for block in made)
+    for name in kinds:
+        runs = [block for block in made if kind(block) == name]
+        seen = [_setting(block) for block in blocks if kind(block) == name]
+        deepest = max(_setting(block).cut.axial_depth for block in blocks)
+        like = max(runs, key=_feed)
+        yield from _feeds(name, runs, seen, LARGEST_FEED * 2.0 * cutter.radius)
+        yield from _depths(name, runs, seen, deepest)
+        yield from _speeds(name, like, seen)
+        if name != HOLE:
+            yield from _sides(like, kinds, cutter)
+            yield from _across(name, like, seen)
+
+
+def kind(block: Block) -> str:
+    """Return what a run cuts, in words."""
+    setting = _setting(block)
+    if setting.helix is not None:
+        return HOLE
+    arc = setting.cut.engagement
+    from_the_side, to_the_side = math.isclose(arc.entry, 0.0, abs_tol=1e-9), math.isclose(arc.exit, math.pi)
+    if from_the_side and to_the_side:
+        return "a slot"
+    if from_the_side or to_the_side:
+        return "an up-milled side cut" if from_the_side else "a down-milled side cut"
+    return FACE
+
+
+def _setting(block: Block) -> ForceSetting:
+    setting: ForceSetting = block.setting
+    return setting
+
+
+def _feed(block: Block) -> float:
+    return _setting(block).cut.feed_per_tooth
+
+
+def _proposal(words: str, like: Block, setting: ForceSetting) -> Proposal:
+    """Propose a run with the noise and the zeros of one that it is like."""
+    recording = setting.recording
+    time = np.repeat(recording.middles, len(like.axis) // like.repeats)
+    directions = zeros(like.axis, np.asarray(like.labels) == "mean", time, recording)
+    block = replace(like, run=f"proposed: {words}", condition=words, setting=setting, zeros=directions)
+    return Proposal(words, (block,))
+
+
+def _first_again(first: Block) -> Iterator[Proposal]:
+    """Propose the first condition again, so, longer, and with the zero read in the air; and the air alone."""
+    setting = _setting(first)
+    words = f"the first condition ({kind(first)} at {_feed(first) / MM:.3g} mm per tooth) again"
+    yield Proposal(
+        f"{words} at the end of the session", (replace(first, run="proposed: first condition again"),)
+    )
+    rms = math.sqrt(float(np.sum(first.measured**2)) / first.repeats)
+    if first.zero_sd.max() > 2.0 * ZERO_SHARE * rms:
+        zeroed = replace(first, zero_sd=first.zero_sd * (ZERO_SHARE / UNZEROED_SHARE))
+        yield _proposal(f"{words} with a record of the air before the cut", zeroed, setting)
+    if setting.helix is None:
+        yield _proposal(f"{words}, three times as long", first, _longer(setting))
+    recording = setting.recording
+    silent = replace(
+        setting,
+        cut=replace(setting.cut, axial_depth=0.0),
+        helix=None,
+        recording=replace(recording, orbit=0.0, speed=_spindle(setting)),
+    )
+    words = "a record in the air, spindle turning, as long as that of a run"
+    yield _proposal(words, replace(first, symmetries=None), silent)
+
+
+def _longer(setting: ForceSetting) -> ForceSetting:
+    recording = setting.recording
+    middles = tuple(recording.contact + LONGER * (t - recording.contact) for t in recording.middles)
+    return replace(setting, recording=replace(recording, middles=middles, span=LONGER * recording.span))
+
+
+def _feeds(
+    name: str, runs: Sequence[Block], seen: Sequence[ForceSetting], limit: float
+) -> Iterator[Proposal]:
+    """Propose feeds below and above those that were cut, these within what the teeth bear."""
+    least, most = (choose(setting.cut.feed_per_tooth for setting in seen) for choose in (min, max))
+    slow, fast = min(runs, key=_feed), max(runs, key=_feed)
+    for like, feed, how in (
+        (slow, 0.5 * least, "half the least"),
+        (fast, 2.0 * most, "twice the largest"),
+        (fast, 3.0 * most, "three times the largest"),
+    ):
+        if feed <= max(limit, least):
+            words = f"{name} at {feed / MM:.3g} mm per tooth ({how} feed so far)"
+            yield _proposal(words, like, _fed(_setting(like), feed / _feed(like)))
+
+
+def _fed(setting: ForceSetting, factor: float) -> ForceSetting:
+    """Feed faster; in a hole the orbit is as much faster, and the bottom edges cut as much more."""
+    cut = replace(setting.cut, feed_per_tooth=factor * setting.cut.feed_per_tooth)
+    recording, helix = setting.recording, setting.helix
+    if helix is not None:
+        helix = replace(helix, axial_feed=factor * helix.axial_feed)
+        orbit = factor * recording.orbit
+        recording = replace(recording, orbit=orbit, speed=_spindle(setting) + orbit / (2.0 * math.pi))
+    return replace(setting, cut=cut, helix=helix, recording=recording)
+
+
+def _spindle(setting: ForceSetting) -> float:
+    """Spindle speed, rev/s."""
+    return setting.recording.speed - setting.recording.orbit / (2.0 * math.pi)
+
+
+def _depths(
+    name: str, runs: Sequence[Block], seen: Sequence[ForceSetting], deepest: float
+) -> Iterator[Proposal]:
+    """Propose half the least depth, and twice that if the batch went as deep elsewhere."""
+    like = min(runs, key=lambda block: (_setting(block).cut.axial_depth, -_feed(block)))
+    depths = [setting.cut.axial_depth for setting in seen]
+    for factor, how in ((0.5, "half"), (2.0, "twice")):
+        depth = factor * min(depths)
+        if depth <= deepest and not any(math.isclose(depth, other, rel_tol=0.2) for other in depths):
+            words = f"{name} {depth / MM:.3g} mm deep ({how} the least depth so far)"
+            yield _proposal(words, like, _deep(_setting(like), depth / _setting(like).cut.axial_depth))
+
+
+def _deep(setting: ForceSetting, factor: float) -> ForceSetting:
+    """Cut deeper; in a hole that is a steeper helix."""
+    cut, helix = replace(setting.cut, axial_depth=factor * setting.cut.axial_depth), setting.helix
+    if helix is not None:
+        helix = replace(helix, pitch=factor * helix.pitch, axial_feed=factor * helix.axial_feed)
+    return replace(setting, cut=cut, helix=helix)
+
+
+def _speeds(name: str, like: Block, seen: Sequence[ForceSetting]) -> Iterator[Proposal]:
+    """Propose spindle speeds below and above those that were run, the feed per tooth as it was."""
+    least, most = (choose(_spindle(setting) for setting in seen) for choose in (min, max))
+    for speed, how in ((0.8 * least, "0.8 of the lowest"), (1.25 * most, "1.25 of the highest")):
+        factor = speed / _spindle(_setting(like))
+        recording = _setting(like).recording
+        recording = replace(recording, speed=factor * recording.speed, orbit=factor * recording.orbit)
+        words = f"{name} at {60.0 * speed:.0f} rpm ({how} speed so far)"
+        yield _proposal(words, like, replace(_setting(like), recording=recording))
+
+
+def _sides(like: Block, kinds: Collection[str], cutter: Cutter) -> Iterator[Proposal]:
+    """Propose side cuts where the batch has slots only, and the other way round (at half the depth)."""
+    setting = _setting(like)
+    width = SIDE_WIDTH * 2.0 * cutter.radius
+    for direction in ("up", "down"):
+        name = f"a{'n' if direction == 'up' else ''} {direction}-milled side cut"
+        if name not in kinds:
+            arc = engagement("side", direction, width, cutter.radius)
+            words = f"{name}, {width / MM:.3g} mm wide at {_feed(like) / MM:.3g} mm per tooth"
+            yield _proposal(words, like, replace(setting, cut=replace(setting.cut, engagement=arc)))
+    if "a slot" not in kinds:
+        depth = 0.5 * setting.cut.axial_depth
+        words = f"a slot {depth / MM:.3g} mm deep at {_feed(like) / MM:.3g} mm per tooth"
+        cut = replace(setting.cut, axial_depth=depth, engagement=SLOT)
+        yield _proposal(words, like, replace(setting, cut=cut))
+
+
+def _across(name: str, like: Block, seen: Sequence[ForceSetting]) -> Iterator[Proposal]:
+    """Propose the feed turned by 90°, where no such cut goes across the others yet."""
+    setting = _setting(like)
+    turned = setting.feed_direction + 0.5 * math.pi
+    if all(abs(math.cos(other.feed_direction - turned)) < math.sqrt(0.5) for other in seen):
+        words = f"{name} at {_feed(like) / MM:.3g} mm per tooth with the feed turned by 90°"
+        yield _proposal(words, like, replace(setting, feed_direction=turned))
