@@ -20,6 +20,7 @@ from metro.loop.noise import first_noise
 from metro.loop.search import Gates, search
 from metro.loop.verdict import comparison, held_out, identified_fit, judge
 from metro.observables import force
+from metro.observables.dynamometer import Recording
 from metro.observables.force_coefficients import correlation
 from metro.observables.force_model import ForceModel, ForceSetting
 from metro.observables.problem import BaseFit, Block, Problem
@@ -30,6 +31,7 @@ from metro.stages.ingest import ingest
 ROOT = Path(__file__).parents[2]
 REAL = Path(os.environ.get("METRO_REAL_DATA", ROOT / "../shared/real")) / "batches"
 real = pytest.mark.skipif(not REAL.is_dir(), reason="the real data (METRO_REAL_DATA) are not there")
+RECORDING = Recording((0.5,), 1.0, 100.0)
 GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
 PUBLISHED = {"ktc": 958.86, "krc": 250.86, "kac": 146.36, "kte": 15.758, "kre": 19.434, "kae": 18.208}
 
@@ -167,7 +169,7 @@ def drawn(seed, highest=8, scatter=0.01, budget=0.005):
     mean = np.tile(np.arange(elements) == 0, 3)
     form = rng.normal(size=3 * elements)  # what the model gets wrong is alike in all conditions
     for i, feed in enumerate((0.04e-3, 0.07e-3, 0.1e-3, 0.13e-3) * 2):
-        setting = ForceSetting(Cut(feed, 2e-3, Engagement(0.0, math.pi)), 0.0, highest, (0.5,), 0.0)
+        setting = ForceSetting(Cut(feed, 2e-3, Engagement(0.0, math.pi)), 0.0, highest, RECORDING, 0.0)
         blank = Block(
             run=f"r{i}",
             condition=f"{feed:g}",

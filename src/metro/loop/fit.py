@@ -6,14 +6,15 @@ combinations of their starting values; the noise is re-estimated from the rest a
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
 from metro.loop import noise as noise_room
-from metro.loop.candidate import Candidate
+from metro.loop.candidate import Candidate, started
+from metro.loop.covariance import between_runs
 from metro.loop.descent import State, descend, inverse, linearised, normal_equations, own_step
 from metro.loop.noise import Noise
 from metro.observables.problem import Block
@@ -25,7 +26,7 @@ EM_STEPS = 8
 NUISANCE_STEPS = 8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A fitted candidate.
 
@@ -61,28 +62,33 @@ class Fit:
 
     def predict(self, block: Block) -> Array:
         """Prediction of a block of this fit in the fit's basis, (n,) SI."""
-        matrix, offset = self.candidate.model(self.theta).design(block, self.nuisance[block.run])
+        matrix, offset = self.candidate.model(self.theta).design(block, self.nuisance[block.run], self.beta)
         return offset + matrix @ self.beta
 
 
-def fit(candidate: Candidate, blocks: Sequence[Block], prior: Noise, start: Fit | None = None) -> Fit:
+@lru_cache(maxsize=256)
+def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fit | None = None) -> Fit:
     """Fit a candidate to blocks: base parameters, effect parameters and nuisances jointly.
 
     ``start``, a fit of the same or of a simpler candidate, gives the base parameters and the noise to begin
-    with; effect parameters that it lacks are started from all combinations of their starting values, and the
-    best few are followed.
+    with; effect parameters that it lacks are started from all combinations of their starting values, group
+    after group, and the best few are followed.
     """
     noise = start.noise if start else prior
     known = start.theta if start else np.zeros(0)
     fresh = candidate.parameters[len(known) :]
+    theta = np.concatenate([known, [parameter.neutral for parameter in fresh]])
     beta = start.beta if start else _first_beta(candidate, blocks, noise)
     around = start.nuisance if start and fresh else None
-    trials: list[tuple[float, int, State]] = []
-    for combination in itertools.product(*(parameter.starts for parameter in fresh)):
-        state = State(np.concatenate([known, combination]), beta.copy(), {})
-        trials.append((_search_nuisance(candidate, blocks, noise, state, around), len(trials), state))
-    trials.sort(key=lambda trial: trial[:2])
-    followed = [descend(candidate, blocks, noise, state) for *_, state in trials[: FOLLOWED if fresh else 1]]
+    best = [State(theta, beta, {})]
+    for places in candidate.groups(len(known)) or [[]]:
+        trials: list[tuple[float, int, State]] = []
+        for given in started(candidate, best[0].theta, places):
+            state = State(given, beta.copy(), {})
+            trials.append((_search_nuisance(candidate, blocks, noise, state, around), len(trials), state))
+        trials.sort(key=lambda trial: trial[:2])
+        best = [state for *_, state in trials]
+    followed = [descend(candidate, blocks, noise, state) for state in best[: FOLLOWED if fresh else 1]]
     cost = [linearised(candidate, blocks, noise, state, derivatives=False).cost for state in followed]
     return _refined(candidate, blocks, prior, noise, followed[int(np.argmin(cost))], rounds=ROUNDS)
 
@@ -115,7 +121,7 @@ def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> 
         weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
         best, kept = np.inf, None
         for nuisance in model.nuisance_starts(block):
-            matrix, offset = model.design(block, nuisance)
+            matrix, offset = model.design(block, nuisance, None)
             scaled, target = matrix * weight[:, None], (block.measured - offset) * weight
             solution = np.linalg.lstsq(scaled, target, rcond=None)[0]
             cost = float(np.sum((target - scaled @ solution) ** 2))
@@ -144,7 +150,7 @@ def _search_nuisance(
         weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
         best = np.inf
         for nuisance in _images(block, around[block.run]) if around else model.nuisance_starts(block):
-            matrix, offset = model.design(block, nuisance)
+            matrix, offset = model.design(block, nuisance, state.beta)
             cost = float(np.sum(((block.measured - offset - matrix @ state.beta) * weight) ** 2))
             if cost < best:
                 best, state.nuisance[block.run] = cost, np.asarray(nuisance, dtype=float)
@@ -169,16 +175,20 @@ def _refined(
 def _covariance(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> Array:
     """Covariance of base and effect parameters, (p + q, p + q).
 
-    The base parameters scatter from run to run, and the runs average that out. What the model gets wrong
-    where an effect shows may be the same in all runs: the variances of the effect parameters allow for that.
+    The base parameters scatter from run to run, and the runs tell how far that leaves them off. What the
+    model gets wrong where an effect shows may be the same in all runs: the variances of the effect parameters
+    allow for that.
     """
-    alone, alike = (
-        inverse(normal_equations(linearised(candidate, blocks, kind, state))[0])
-        for kind in (noise, noise_room.all_alike(noise))
+    system, wide = (
+        linearised(candidate, blocks, kind, state) for kind in (noise, noise_room.all_alike(noise))
     )
+    covariance, alike = (inverse(normal_equations(each)[0]) for each in (system, wide))
     p = len(state.beta)
-    alone[p:, p:] = alike[p:, p:]
-    return alone
+    factor = between_runs(system)
+    factor[p:] = 1.0
+    covariance *= np.outer(factor, factor)
+    covariance[p:, p:] = alike[p:, p:]
+    return covariance
 
 
 def _reestimated(
@@ -188,7 +198,7 @@ def _reestimated(
     for _ in range(EM_STEPS):
         parts = []
         for block in blocks:
-            matrix, offset = model.design(block, state.nuisance[block.run])
+            matrix, offset = model.design(block, state.nuisance[block.run], state.beta)
             rest = block.measured - offset - matrix @ state.beta
             parts.append((block, rest, noise_room.shared(block, noise, matrix, state.beta)))
         noise = noise_room.updated(noise, prior, parts)

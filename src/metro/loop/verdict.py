@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from metro.effects.effect import EffectParameter
-from metro.loop import signature as rest
+from metro.effects.effect import EffectParameter, by_name
+from metro.loop.advice import MORE_RUNS, left_over, next_experiment
 from metro.loop.fit import Fit, score
 from metro.loop.noise import block_sigma
 from metro.loop.search import Gates, Outcome, Trial
@@ -42,7 +42,7 @@ def held_out(problem: Problem, fitted: Fit) -> Held:
     model = scored.candidate.model(scored.theta)
     predicted, sigma = {}, {}
     for block in blocks:
-        matrix, offset = model.design(block, scored.nuisance[block.run])
+        matrix, offset = model.design(block, scored.nuisance[block.run], scored.beta)
         predicted[block.run] = block.to_rows(offset + matrix @ scored.beta) / problem.si
         sigma[block.run] = block_sigma(block, fitted.noise, matrix, fitted.beta) / problem.si
     return Held(predicted, sigma)
@@ -95,7 +95,7 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
     """Return the observable's entry of verdict.json."""
     runs = problem.role("identify")
     floor = float(np.sqrt((rows["sigma"] ** 2).mean())) if len(rows) else math.nan
-    remaining = [line for line in outcome.lines if line.significant]
+    remaining = left_over(outcome)
     enough = len(runs) >= LEAST_RUNS and len(rows) > 0
     before = error(rows, "before", gates.seed) if len(rows) else None
     after = error(rows, "after", gates.seed) if len(rows) else None
@@ -110,8 +110,8 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         "candidates": [
             _candidate(trial) for trial in outcome.trials if trial.effect.name not in outcome.names
         ],
-        "indistinguishable": [list(pair) for pair in outcome.rivals],
-        "next_experiment": _next_experiment(outcome, enough),
+        "indistinguishable": [list(rival.pair) for rival in outcome.rivals],
+        "next_experiment": next_experiment(problem, outcome) if enough else MORE_RUNS,
         "unexplained": _unexplained(problem, outcome, after, floor) if remaining else None,
     }
 
@@ -127,24 +127,46 @@ def _status(outcome: Outcome, remaining: bool, enough: bool) -> str:
 
 
 def _effect(outcome: Outcome, name: str) -> JSON:
-    trial = next(trial for trial in outcome.trials if trial.effect.name == name)
-    return {"effect": name, "probability": trial.weight, "parameters": parameters(outcome.final, name)}
+    return {
+        "effect": name,
+        "probability": probability(outcome, name),
+        "parameters": parameters(outcome.final, name),
+    }
+
+
+def probability(outcome: Outcome, name: str) -> float:
+    """Return the probability that an effect found is the cause.
+
+    Its weight against its rivals and against nothing; where a significant rest stays, the library lacks a
+    cause, and what is missing may have lent the effect its part: the weight counts by the share explained.
+    """
+    left, first = (
+        sum(line.excess**2 for line in lines if line.significant)
+        for lines in (outcome.lines, outcome.base_lines)
+    )
+    return outcome.weight[name] * (1.0 - left / max(first, left) if left else 1.0)
 
 
 def parameters(fitted: Fit, name: str) -> JSON:
-    """Parameters of one effect of a fit with their intervals, in the contract's units."""
+    """Parameters of one effect of a fit with their intervals, in the contract's units; lists as lists."""
     p, dof = len(fitted.beta), run_dof(fitted)
-    deviation = np.sqrt(np.maximum(np.diag(fitted.covariance)[p:], 0.0) * fitted.dispersion)
-    values: JSON = {}
-    position = 0
-    for effect in fitted.candidate.effects:
-        for parameter in effect.parameters:
-            if effect.name == name:
-                values[parameter.name] = _bounded(
-                    parameter, float(fitted.theta[position]), float(deviation[position]), dof
-                )
-            position += 1
-    return values
+    for effect, place in fitted.candidate.parts(fitted.theta):
+        if effect.name != name:
+            continue
+        values = effect.matrix @ fitted.theta[place]
+        covariance = fitted.covariance[p:, p:][place, place]
+        # An infinite variance stays one: a product with zeros would make it undefined.
+        variance = [
+            float(row[row != 0] @ covariance[np.ix_(row != 0, row != 0)] @ row[row != 0])
+            for row in effect.matrix
+        ]
+        deviation = np.sqrt(np.maximum(variance, 0.0) * fitted.dispersion)
+        entries = [
+            _bounded(parameter, float(value), float(sd), dof)
+            for parameter, value, sd in zip(effect.reported, values, deviation, strict=True)
+        ]
+        return by_name(effect.reported, entries)
+    raise KeyError(name)
 
 
 def _bounded(parameter: EffectParameter, value: float, deviation: float, dof: float) -> JSON:
@@ -191,22 +213,6 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _next_experiment(outcome: Outcome, enough: bool) -> str | None:
-    if not enough:
-        return "more runs: at least two conditions to identify on and one to validate on, each repeated"
-    if outcome.rivals:
-        names = sorted({name for pair in outcome.rivals for name in pair})
-        wanted = {t.effect.name: t.effect.experiment for t in outcome.trials if t.effect.name in names}
-        return "; ".join(f"for {name}: {experiment}" for name, experiment in wanted.items())
-    unseen = [t.effect for t in outcome.trials if t.effect.name in outcome.not_visible]
-    if unseen:
-        return "; ".join(f"to see {effect.name}: {effect.experiment}" for effect in unseen)
-    if any(line.significant for line in outcome.lines):
-        left = rest.in_words(list(outcome.lines), 2)
-        return f"repeats spread over the session, to describe what is left: {left}"
-    return None
-
-
 def _unexplained(problem: Problem, outcome: Outcome, after: JSON | None, floor: float) -> JSON:
     over = math.sqrt(max(0.0, after["rms"] ** 2 - floor**2)) if after else None
-    return {"rms": over, "unit": problem.unit, "signature": rest.in_words(list(outcome.lines))}
+    return {"rms": over, "unit": problem.unit, "signature": left_over(outcome)}

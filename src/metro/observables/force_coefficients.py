@@ -50,8 +50,9 @@ def correlation(model: ForceModel, fit: BaseFit | None) -> JSON:
 def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.DataFrame) -> JSON | Refusal:
     """Classical identification: least squares of the mean forces of runs over the feed ([T] §4.1).
 
-    The mean over a revolution does not depend on the start phase, so it needs no waveform. Its intervals come
-    from the scatter of the runs about the line.
+    The mean over a revolution does not depend on the start phase, so it needs no waveform. The chip is that
+    of circular paths at the nominal feed. The intervals hold the scatter of the runs (how the coefficients
+    move as each run is left out), and how far the coefficients would be off for the paths alone.
 
     Parameters
     ----------
@@ -60,31 +61,49 @@ def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.
     """
     means = spindle.set_index("run")[[f"mean_{axis}_n" for axis in AXES]]
     straight = [block for block in blocks if block.setting.helix is None]
-    rows = [_mean_design(model, block) for block in straight]
-    matrix = np.concatenate(rows) if rows else np.zeros((0, 6))
-    target = means.loc[[block.run for block in straight]].to_numpy().ravel()
-    size = np.linalg.norm(matrix, axis=0)
-    if len(target) < 6 or np.linalg.matrix_rank(matrix / np.maximum(size, 1e-300), tol=1e-6) < 6:
+    circular, true = (
+        np.array([_mean_design(model, block, path) for block in straight]).reshape(-1, 3, 6)
+        for path in (False, True)
+    )
+    target = means.loc[[block.run for block in straight]].to_numpy()
+    size = np.sqrt((circular**2).sum(axis=(0, 1)))
+    scaled = circular / np.maximum(size, 1e-300)
+    if not _parted(scaled):
         return Refusal(
             "the mean forces of one feed cannot part shear from edge coefficients: cut a second feed"
         )
-    beta, residual, _, _ = np.linalg.lstsq(matrix / size, target, rcond=None)
-    dof = len(target) - 6
-    covariance = np.linalg.inv((matrix / size).T @ (matrix / size))
-    variance = float(residual[0]) / dof if dof else math.nan
-    sd = np.sqrt(np.diag(covariance) * variance) / size
+    solve = np.linalg.pinv(scaled.reshape(-1, 6))
+    beta = solve @ target.ravel()
+    off = solve @ ((true - circular) @ (beta / size)).ravel()
+    deviation = np.hypot(_left_out(scaled, target - scaled @ beta), off)
     return {
-        parameter.name: quantity(value / parameter.si, error / parameter.si, parameter.unit, max(dof, 1))
-        for parameter, value, error in zip(model.parameters[:6], beta / size, sd, strict=True)
+        parameter.name: quantity(
+            value / parameter.si, error / parameter.si, parameter.unit, max(len(straight) - 2, 1)
+        )
+        for parameter, value, error in zip(model.parameters[:6], beta / size, deviation / size, strict=True)
     }
 
 
-def _mean_design(model: ForceModel, block: Block) -> Array:
-    """Mean force per unit of each coefficient on circular paths at the nominal feed, (3, 6).
+def _parted(designs: Array) -> bool:
+    """Whether the runs of (n, 3, 6) designs tell all six coefficients."""
+    return bool(designs.size and np.linalg.matrix_rank(designs.reshape(-1, 6), tol=1e-6) == 6)
 
-    In the frame of the comparison.
+
+def _left_out(designs: Array, rest: Array) -> Array:
+    """Root of the sum of squared moves (6,) of the coefficients as each run is left out.
+
+    Not a number where a run cannot be spared. ``designs`` (n, 3, 6), ``rest`` (n, 3).
     """
+    if not all(_parted(np.delete(designs, i, axis=0)) for i in range(len(designs))):
+        return np.full(6, math.nan)
+    own = np.einsum("iac,iad->icd", designs, designs)
+    moves = np.linalg.solve(own.sum(axis=0) - own, np.einsum("iac,ia->ic", designs, rest)[..., None])
+    return np.asarray(np.sqrt((moves**2).sum(axis=(0, 2))))
+
+
+def _mean_design(model: ForceModel, block: Block, true_path: bool) -> Array:
+    """Mean force per unit of each coefficient at the nominal feed, (3, 6), in the comparison's frame."""
     nominal = replace(block, setting=replace(block.setting, feed_ratio=1.0))
-    matrix, _ = replace(model, true_path=False).design(nominal, np.zeros(1), None)
+    matrix, _ = replace(model, true_path=true_path).design(nominal, np.zeros(1), None)
     first = matrix[: len(matrix) // block.repeats, :6]
     return np.stack([first[zero[: len(first)] > 0].sum(axis=0) for zero in block.zeros.T])

@@ -1,0 +1,147 @@
+"""What to measure next, in words: one paragraph for the engineer who plans the next session."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from metro.loop import signature as rest
+from metro.loop.experiment import Prospect, best_view, prospects
+from metro.loop.rivals import Rival
+from metro.loop.search import Outcome
+from metro.observables.problem import Problem, Proposal
+
+MORE_RUNS = "more runs: at least two conditions to identify on and one to validate on, each repeated"
+WORTH = 0.5  # probability of deciding below which a run is not worth naming
+
+
+def next_experiment(problem: Problem, outcome: Outcome) -> str | None:
+    """Say what to measure next; None where nothing is open.
+
+    An undecided cause comes first, then what is left unexplained, then what these runs cannot show.
+    """
+    if outcome.rivals:
+        return _to_decide(problem, outcome)
+    left = left_over(outcome)
+    if left:
+        return _to_describe(outcome, left)
+    if outcome.not_visible:
+        return _to_show(problem, outcome)
+    return None
+
+
+def left_over(outcome: Outcome) -> str:
+    """Describe the significant rest; empty where there is none."""
+    parts = [rest.in_words(list(outcome.lines))]
+    if outcome.step:
+        step = outcome.step
+        parts.append(f"a step of {step.parameter} by {100 * step.relative:+.1f} % after run {step.after}")
+    return "; ".join(part for part in parts if part)
+
+
+def _to_decide(problem: Problem, outcome: Outcome) -> str:
+    """Name the runs that tell the rivals apart, as few proposals as will do."""
+    open_rivals = sorted(outcome.rivals, key=lambda rival: -rival.weight)
+    parts = []
+    while open_rivals:
+        chosen = _best_for(problem, outcome, open_rivals)
+        decided = {rival: prospect for rival, prospect in chosen if prospect.decides}
+        if not decided:
+            break
+        repeats = max(prospect.repeats for prospect in decided.values())
+        pairs = " and ".join(
+            f"{_pair(rival)} with a probability of {_chance(prospect.probability)}"
+            for rival, prospect in decided.items()
+        )
+        parts.append(f"{_cut(chosen[0][1].proposal, repeats)}: this tells {pairs}")
+        open_rivals = [rival for rival in open_rivals if rival not in decided]
+    return "; ".join(parts + ([_undecided(problem, outcome, open_rivals)] if open_rivals else []))
+
+
+def _best_for(problem: Problem, outcome: Outcome, rivals: Sequence[Rival]) -> list[tuple[Rival, Prospect]]:
+    """Return the proposal that decides most of the rivals, and of those the one with the fewest runs."""
+    choices = []
+    for proposal in problem.feasible:
+        seen = [(rival, _of(proposal, ranked(problem, outcome, rival))) for rival in rivals]
+        decided = [prospect for _, prospect in seen if prospect.decides]
+        runs = max((prospect.runs for prospect in decided), default=0)
+        once = sum(prospect.once for _, prospect in seen)
+        choices.append(((-len(decided), runs, -once), seen))
+    return min(choices, key=lambda choice: choice[0])[1] if choices else []
+
+
+def ranked(problem: Problem, outcome: Outcome, rival: Rival) -> tuple[Prospect, ...]:
+    """Return what each feasible run promises for telling a rival from what was found, the best first."""
+    return prospects(outcome.final, rival.fit, problem.feasible)
+
+
+def _of(proposal: Proposal, found: Sequence[Prospect]) -> Prospect:
+    return next(prospect for prospect in found if prospect.proposal is proposal)
+
+
+def _undecided(problem: Problem, outcome: Outcome, rivals: Sequence[Rival]) -> str:
+    """Say what comes nearest to deciding, or what the heaviest rivals' own experiments are."""
+    first = rivals[0]
+    best = next(iter(ranked(problem, outcome, first)), None)
+    if best and best.probability >= WORTH:
+        return (
+            f"{_cut(best.proposal, best.repeats)}: the best of the runs tried to tell {_pair(first)}, "
+            f"but it decides with a probability of {_chance(best.probability)} only"
+        )
+    texts = {effect.name: effect.experiment for effect in outcome.library if effect.name in first.pair}
+    names = " or ".join(_pair(rival) for rival in rivals)
+    tried = f"no run of the kinds tried tells {names}; " if problem.feasible else ""
+    return tried + "; or ".join(f"for {_words(name)}: {text}" for name, text in texts.items())
+
+
+def _to_describe(outcome: Outcome, left: str) -> str:
+    """Name the condition whose rest is largest against the noise."""
+    fitted = outcome.final
+    chi2: dict[str, float] = {}
+    elements: dict[str, int] = {}
+    for block in fitted.blocks:
+        if block.role != "calibrate":
+            chi2[block.condition] = chi2.get(block.condition, 0.0) + fitted.chi2[block.run]
+            elements[block.condition] = elements.get(block.condition, 0) + fitted.elements[block.run]
+    worst = max(chi2, key=lambda name: chi2[name] / elements[name])
+    return f"condition {worst} again, its repeats spread over the session, to describe what is left: {left}"
+
+
+def _to_show(problem: Problem, outcome: Outcome) -> str:
+    """Name runs that would show hidden effects; where none does, one effect's own experiment."""
+    by_words: dict[str, list[str]] = {}
+    hidden: list[str] = []
+    experiments = {effect.name: effect.experiment for effect in outcome.library}
+    for name in outcome.not_visible:
+        forms = [effect for effect in outcome.library if effect.name == name]
+        view = best_view(problem, outcome.base, forms)
+        if view:
+            by_words.setdefault(view.proposal.words, []).append(name)
+        else:
+            hidden.append(name)
+    parts = [f"to see {_listed(names)}: {words}" for words, names in by_words.items()]
+    if hidden:
+        parts.append(f"to see {_words(hidden[0])}: {experiments[hidden[0]]}")
+    if len(hidden) > 1:
+        parts.append(f"no run of the kinds tried shows {_listed(hidden[1:])}")
+    return "; ".join(parts)
+
+
+def _cut(proposal: Proposal, repeats: int) -> str:
+    return proposal.words if repeats == 1 else f"{proposal.words}, {repeats} times"
+
+
+def _pair(rival: Rival) -> str:
+    return f"{_words(rival.found)} from {_words(rival.other)}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    *first, last = map(_words, names)
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _chance(probability: float) -> str:
+    return "more than 0.99" if probability > 0.99 else f"{probability:.2f}"
