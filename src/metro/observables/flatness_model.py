@@ -17,7 +17,7 @@ ENTRIES = ("zx", "zy", "zz")
 DAMPING_RATIOS = (0.02, 0.05, 0.12)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PoseField:
     """The z row of the tip compliance over the face at one pose; ``entries`` (3,): those that loads show."""
 
@@ -31,7 +31,7 @@ class PoseField:
         return np.repeat(self.entries, self.basis.terms)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Passages:
     """Every time that the cutter's rim went over each point of a face.
 
@@ -49,7 +49,7 @@ class Passages:
     valid: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ringing:
     """What the transients of a face follow from.
 
@@ -81,7 +81,7 @@ class Ringing:
         return np.asarray(low + share * (high - low))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FaceSetting:
     """A face at the points of its path.
 
@@ -111,7 +111,7 @@ class FaceSetting:
         return np.asarray((np.add.reduceat(values, self.first, axis=0).T / count).T)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LoadSetting:
     """The static load tests of one pose."""
 

@@ -20,7 +20,7 @@ TERMS = (1, 3, 4, 6)  # constant, plane, bilinear, quadratic: leading entries of
 PURE = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PointCompliance:
     """Compliance at a point: symmetric ``matrix`` (3, 3) m/N and ``sd``, NaN where no load shows it.
 
@@ -32,7 +32,7 @@ class PointCompliance:
     residual_sd: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Nonlinearity:
     """Displacement over force (3,), m/N, along a load direction (3,) at a smaller and a larger load (N)."""
 
@@ -47,7 +47,7 @@ class Nonlinearity:
         return (high - low) / abs(float(np.nansum(low * self.direction)) or np.nan)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Basis:
     """Polynomial terms over a face: coordinates are taken from ``centre`` (2,) in units of ``half`` (2,)."""
 
@@ -61,7 +61,7 @@ class Basis:
         return np.column_stack([u**i * v**j for i, j in POWERS[: self.terms]])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rows:
     """Evidence on the z row of C: displacements (n,) in m at ``x``, ``y`` by the effective ``force`` (n, 3).
 
