@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,6 +50,16 @@ class Cutter:
         """Return how far each tooth is from the axis of rotation, less the radius: (N, heights) m."""
         angles = np.asarray(self.tooth_angles)[:, None]
         return self.runout_radius * np.cos(self.runout_angle - angles + self.lag_per_depth * height[None, :])
+
+    def about_axis(self, height: float) -> Cutter:
+        """Return the cutter with each tooth at its angle about the axis of rotation, at a height, m.
+
+        Runout moves a tooth along its circle as well, by ρ/R sin(λ − α_j + κz): it comes early or late.
+        """
+        angles = np.asarray(self.tooth_angles)
+        towards = self.runout_angle - angles + self.lag_per_depth * height
+        angles = angles + (self.runout_radius / self.radius) * np.sin(towards)
+        return replace(self, tooth_angles=tuple(angles.tolist()))
 
 
 def evenly_pitched(teeth: int) -> tuple[float, ...]:

@@ -34,7 +34,8 @@ def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False)
 
     The edge is integrated to 1e-9 of the largest force (laws that are not linear: 1e-7), runout and true
     paths included (metro.cutting.edges). An edge that lags by less than one angular step (no helix: none) is
-    averaged over that step, so that the table of an edge that enters at once has the right mean.
+    averaged over that step, so that the table of an edge that enters at once has the right mean. On true
+    paths the teeth are where runout puts them about the axis of rotation, at half the depth.
 
     Returns
     -------
@@ -42,6 +43,8 @@ def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False)
     of ``COEFFICIENTS`` (shear in N per N/m², edge in N per N/m of axial depth). Read-only: it is cached.
     """
     angle = TURN * np.arange(ANGLES) / ANGLES
+    if true_path and cutter.runout_radius:
+        cutter = cutter.about_axis(0.5 * cut.axial_depth)
     before = passes(cutter, cut, true_path, angle)
     bounds = arcs(before, cut.engagement)
     if before.sine.size == 1 and ANGLES % cutter.teeth == 0:  # teeth that are all alike: one pitch of angles

@@ -10,6 +10,7 @@ predictions in units of the noise: Box & Hill 1967, Technometrics 9). The probab
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -121,7 +122,11 @@ def log_bayes_factor(
     beyond the space of r and of the derivatives is noise to both and is left out. The mean is the
     Kullback–Leibler divergence, the variance that of a quadratic form.
     """
-    rows = np.vstack([_whitened(forecast, truth.noise, repeats) for forecast in forecasts])
+    made = Counter(forecast.block.condition for forecast in forecasts for _ in range(repeats))
+    known = truth.noise.repeats
+    cut = {name: known.get(name, 0) + count for name, count in made.items()}
+    noise = replace(truth.noise, repeats={**known, **cut})
+    rows = np.vstack([_whitened(forecast, noise) for forecast in forecasts]) * math.sqrt(repeats)
     square = np.asarray(np.linalg.qr(rows, mode="r"), dtype=float)
     p = truth.covariance.shape[0]
     difference, mine, others = square[:, 0], square[:, 1 : 1 + p], square[:, 1 + p :]
@@ -147,19 +152,13 @@ def _covariance(fitted: Fit) -> Array:
     return np.asarray(covariance)
 
 
-def _whitened(forecast: _Forecast, noise: noise_room.Noise, repeats: int) -> Array:
-    """Difference and derivatives (n, 1 + k + l) in units of the noise of the mean over the repeats.
-
-    The run's own unknowns take up what they can. The budget is shared with the runs of the same condition.
-    """
-    block = forecast.block
-    cut = noise.repeats.get(block.condition, 0) + repeats
-    noise = replace(noise, repeats={**noise.repeats, block.condition: cut})
-    whiten = noise_room.whitener(noise_room.diagonal(block, noise), forecast.shared)
+def _whitened(forecast: _Forecast, noise: noise_room.Noise) -> Array:
+    """Difference and derivatives (n, 1 + k + l) in units of the noise; the run's unknowns take what they can."""
+    whiten = noise_room.whitener(noise_room.diagonal(forecast.block, noise), forecast.shared)
     columns = whiten(np.column_stack([forecast.difference, forecast.mine, forecast.others]))
     own = whiten(forecast.own)
     taken = own @ np.linalg.lstsq(own, columns, rcond=None)[0] if own.shape[1] else 0.0
-    return np.asarray(math.sqrt(repeats) * (columns - taken))
+    return np.asarray(columns - taken)
 
 
 def _forecasts(truth: Fit, other: Fit, blocks: Sequence[Block]) -> list[_Forecast]:

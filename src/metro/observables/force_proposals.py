@@ -179,7 +179,7 @@ def _speeds(name: str, like: Block, seen: Sequence[ForceSetting]) -> Iterator[Pr
         factor = speed / _spindle(_setting(like))
         recording = _setting(like).recording
         recording = replace(recording, speed=factor * recording.speed, orbit=factor * recording.orbit)
-        words = f"{name} at {60.0 * speed:.0f} rpm ({how} speed so far)"
+        words = f"{name} at {round(60.0 * speed, -1):.0f} rpm ({how} speed so far)"
         yield _proposal(words, like, replace(_setting(like), recording=recording))
 
 
