@@ -4,6 +4,7 @@ import re
 import sys
 from importlib import metadata
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,11 +13,12 @@ from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import COEFFICIENTS, Cut
 from metro.cutting.law import EdgeLaw
-from metro.effects import library
+from metro.effects import library, told_of
 from metro.observables.dynamometer import Recording
 from metro.observables.force_model import ForceModel, ForceSetting
-from metro.observables.problem import Block
+from metro.observables.problem import Block, Problem
 
+RECORDING = Recording((0.5,), 1.0, 50.0)
 DOCS = Path(__file__).parents[2] / "docs" / "effects.md"
 
 
@@ -87,3 +89,29 @@ def test_the_documented_effect_does_to_the_force_what_it_says(third_party):
     edge = [COEFFICIENTS.index(name) for name in ("kte", "kre", "kae")]
     assert after[:, edge] == pytest.approx(1.2 * before[:, edge])  # two metres cut
     assert after[:, :3] == pytest.approx(before[:, :3])
+
+
+def test_the_base_model_is_told_of_what_the_manifest_declares():
+    cut = Cut(1e-4, 1e-3, Engagement(0.0, np.pi))
+    runs = tuple(
+        SimpleNamespace(
+            role="identify", condition=str(i), setting=ForceSetting(cut, 0.0, 4, RECORDING, metres)
+        )
+        for i, metres in enumerate((0.0, 2.0))
+    )
+    base = ForceModel(Cutter(6e-3, 0.6, evenly_pitched(4)), EdgeLaw())
+    task = Problem("force", "N", 1.0, base, runs, np.full(6, 0.01))
+    known = {
+        "dynamometer_resonance": {"frequency_hz": [900, 800, 1500], "damping": 0.03},
+        "tool_wear": {"edge_growth_per_m": 0.2},
+        "charge_drift": {"time_constant_s": 4.0},
+        "orbit_stiffness": {"amplitude": 0.1, "phase_deg": 20.0},
+        "stiffness_scale": {"factor": 0.9},
+    }
+    told = told_of(task, known)
+    assert told.base.sensor.frequency == (900, 800, 1500)
+    assert told.base.sensor.damping == (0.03, 0.03, 0.03)
+    assert told.base.sensor.discharge == (0.25, 0.25, 0.25)
+    assert told.base.law.edge(2.0) == pytest.approx(1.4)
+    assert told.base.structure == base.structure
+    assert any("orbit stiffness" in note and "helical" in note for note in told.notes)

@@ -98,7 +98,7 @@ def test_one_run_is_too_few_to_tell():
     task = problem(9, feeds=(2.0,), repeats=1)
     _, verdict = judged(task, (BEND,))
     assert verdict["status"] == "insufficient"
-    assert "more runs" in verdict["next_experiment"]
+    assert "at least two conditions" in verdict["next_experiment"]
 
 
 def test_the_search_never_reads_the_validation_runs():

@@ -48,7 +48,7 @@ def test_highest_order_keeps_six_tooth_passings_below_the_limit_of_sampling():
     assert highest_order(1e5, 100.0, 2) == 24
     assert highest_order(1e5, 100.0, 6) == 36
     assert highest_order(1e5, 100.0, 12) == 48
-    assert highest_order(2000.0, 100.0, 4) == 8
+    assert highest_order(2000.0, 100.0, 4) == 6
 
 
 def record(speed, orders, rng, *, seconds=1.5, rate=5000.0, noise=1.0):
@@ -85,6 +85,11 @@ def test_the_standard_deviation_of_the_speed_covers_its_error():
 def test_a_short_record_has_a_speed_without_an_error():
     time, signal = record(50.0, (1, 2), np.random.default_rng(1), seconds=0.3)
     assert math.isnan(spindle_speed(time, signal, 50.0, 4)[1])
+
+
+def test_a_record_of_less_than_eight_revolutions_is_taken_to_have_the_nominal_speed():
+    time, signal = record(20.1, (2, 4), np.random.default_rng(1), seconds=0.3)
+    assert spindle_speed(time, signal, 20.0, 24)[0] == 20.0
 
 
 def test_order_averages_return_the_injected_coefficients_within_their_errors():

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from collections.abc import Mapping
+from dataclasses import replace
 from importlib.metadata import entry_points
+from typing import Any
 
-from metro.effects.effect import Effect
+from metro.effects.effect import Effect, fitted_to
+from metro.observables.problem import Problem
 
 
 def library(observable: str | None = None) -> tuple[Effect, ...]:
@@ -20,3 +24,21 @@ def library(observable: str | None = None) -> tuple[Effect, ...]:
     effects += [entry.load() for entry in entry_points(group="metro.effects")]
     chosen = [effect for effect in effects if observable is None or observable in effect.observables]
     return tuple(sorted(chosen, key=lambda effect: effect.name))
+
+
+def told_of(problem: Problem, known: Mapping[str, Mapping[str, Any]]) -> Problem:
+    """Return the problem with a base model that is told of the effects that the manifest declares.
+
+    ``known``: parameters by name, by name of the effect, in the units of the contract; one value stands for
+    all entries of a list.
+    """
+    effects, unable = fitted_to(library(problem.observable), problem)
+    base, notes = problem.base, []
+    for name, values in known.items():
+        matching = [e for e in effects if e.name == name and set(e.names) == set(values)]
+        if matching:
+            base = matching[0].apply(base, matching[0].spread(values))
+            notes.append(f"The base model is told of {name.replace('_', ' ')} (batch.yaml, known).")
+        elif name in unable:
+            notes.append(f"batch.yaml declares {name.replace('_', ' ')}, but {unable[name]}.")
+    return replace(problem, base=base, notes=(*problem.notes, *notes))

@@ -87,6 +87,19 @@ class Effect:
         """Map (values, parameters) from the parameters of the search to the values of the contract."""
         return np.array(self.mixing) if self.mixing else np.eye(len(self.parameters))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its values, each once."""
+        return tuple(dict.fromkeys(parameter.name for parameter in self.reported))
+
+    def spread(self, values: Values) -> Values:
+        """Return values with every list as long as it must be: one number stands for all its entries."""
+        lengths = {name: sum(p.name == name for p in self.reported) for name in self.names}
+        return {
+            name: [value] * lengths[name] if lengths[name] > 1 and not isinstance(value, list) else value
+            for name, value in values.items()
+        }
+
     def values(self, theta: Array) -> dict[str, Any]:
         """Return the values by name, those of one name as a list; ``theta`` (parameters,)."""
         return by_name(self.reported, [float(value) for value in self.matrix @ theta])

@@ -10,7 +10,7 @@ from metro.loop.rivals import Rival
 from metro.loop.search import Outcome
 from metro.observables.problem import Problem, Proposal
 
-MORE_RUNS = "more runs: at least two conditions to identify on and one to validate on, each repeated"
+LEAST_RUNS = 2  # to identify on
 WORTH = 0.5  # probability of deciding below which a run is not worth naming
 
 
@@ -27,6 +27,23 @@ def next_experiment(problem: Problem, outcome: Outcome) -> str | None:
     if outcome.not_visible:
         return _to_show(problem, outcome)
     return None
+
+
+def more_runs(problem: Problem) -> str:
+    """Say which runs are lacking before anything can be told."""
+    conditions = len({block.condition for block in problem.role("identify")})
+    lacking = []
+    if len(problem.role("identify")) < LEAST_RUNS:
+        there = "one there is" if conditions else "there is none"
+        lacking.append(f"at least two conditions to identify on, each repeated ({there} now)")
+    if not problem.role("validate"):
+        lacking.append("at least one condition that no fit sees (role validate), repeated")
+    return "cut " + ", and ".join(lacking)
+
+
+def enough_runs(problem: Problem) -> bool:
+    """Whether there are runs to fit and runs to judge by."""
+    return len(problem.role("identify")) >= LEAST_RUNS and bool(problem.role("validate"))
 
 
 def left_over(outcome: Outcome) -> str:

@@ -153,7 +153,7 @@ def _covariance(fitted: Fit) -> Array:
 
 
 def _whitened(forecast: _Forecast, noise: noise_room.Noise) -> Array:
-    """Difference and derivatives (n, 1 + k + l) in units of the noise; the run's unknowns take what they can."""
+    """Difference and derivatives (n, 1 + k + l) in units of the noise; own unknowns take what they can."""
     whiten = noise_room.whitener(noise_room.diagonal(forecast.block, noise), forecast.shared)
     columns = whiten(np.column_stack([forecast.difference, forecast.mine, forecast.others]))
     own = whiten(forecast.own)

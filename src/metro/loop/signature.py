@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +24,7 @@ class Line:
     Attributes
     ----------
     axis, label : where. rms : of the rest there over the runs, SI; ``excess`` of it over the noise.
-    relative : excess over the rms of the axis's signal. p_value, significant : after correction for all
+    signal : rms of the axis; ``relative``: excess over it. p_value, significant : after correction for all
         places.
     """
 
@@ -31,6 +32,7 @@ class Line:
     label: str
     rms: float
     excess: float
+    signal: float
     relative: float
     p_value: float
     significant: bool
@@ -114,8 +116,15 @@ def _line(axis: str, label: str, parts: list[Array], signal: float, freedom: int
     p_value = float(f.sf(np.mean(seen / expected), len(seen), denominator))
     excess = max(0.0, float(seen.sum()) - total)
     relative = math.sqrt(excess / signal) if signal > 0 else 0.0
-    runs = len(parts)
-    return Line(axis, label, math.sqrt(seen.sum() / runs), math.sqrt(excess / runs), relative, p_value, False)
+    rms, beyond, whole = (math.sqrt(power / len(parts)) for power in (seen.sum(), excess, signal))
+    return Line(axis, label, rms, beyond, whole, relative, p_value, False)
+
+
+def share_left(lines: Sequence[Line]) -> float:
+    """Return what stands out of the noise and the budget, all places together, relative to the signal."""
+    signal = {line.axis: line.signal**2 for line in lines}
+    excess = sum(line.excess**2 for line in lines if line.significant)
+    return math.sqrt(excess / sum(signal.values())) if excess else 0.0
 
 
 def discoveries(p_values: list[float], rate: float) -> Array:

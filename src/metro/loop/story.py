@@ -7,7 +7,7 @@ import numpy as np
 from metro.loop import signature as rest
 from metro.loop.advice import ranked
 from metro.loop.search import Gates, Outcome, Trial
-from metro.loop.verdict import comparison, error, finite, held_out, parameters
+from metro.loop.verdict import comparison, error, finite, held_out, held_out_rms, parameters
 from metro.observables.problem import Block, Problem
 from metro.units import JSON, Array
 
@@ -31,7 +31,7 @@ def told(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> JSO
         "unit": problem.unit,
         "notes": list(problem.notes),
         "noise": _noise(problem, outcome, verdict, gates),
-        "candidates": [_tried(trial, outcome) for trial in outcome.trials],
+        "candidates": [_tried(problem, trial, outcome) for trial in outcome.trials],
         "path": _path(problem, outcome),
         "signature": [_line(line, problem.si) for line in outcome.lines],
         "cannot_be_seen": [{"effect": name, "why": why} for name, why in outcome.not_visible.items()],
@@ -63,7 +63,7 @@ def _noise(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> J
     }
 
 
-def _tried(trial: Trial, outcome: Outcome) -> JSON:
+def _tried(problem: Problem, trial: Trial, outcome: Outcome) -> JSON:
     rivals = {rival.other for rival in outcome.rivals}
     verdict = "added" if trial.effect.name in outcome.names else "rejected"
     verdict = "rival" if trial.effect.name in rivals else verdict
@@ -73,6 +73,7 @@ def _tried(trial: Trial, outcome: Outcome) -> JSON:
         "statistic": trial.evidence.statistic,
         "p_value": trial.evidence.p_value,
         "q_value": trial.q_value,
+        "held_out_rms": held_out_rms(problem, trial.fit),
         "held_out_gain": finite(trial.evidence.gain),
         "size": trial.evidence.size,
         "weight": trial.weight,

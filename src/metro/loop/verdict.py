@@ -9,10 +9,11 @@ import numpy as np
 import pandas as pd
 
 from metro.effects.effect import EffectParameter, by_name
-from metro.loop.advice import MORE_RUNS, left_over, next_experiment
+from metro.loop.advice import enough_runs, left_over, more_runs, next_experiment
 from metro.loop.fit import Fit, score
 from metro.loop.noise import block_sigma
 from metro.loop.search import Gates, Outcome, Trial
+from metro.loop.signature import share_left
 from metro.observables.problem import BaseFit, Problem
 from metro.observables.quantity import quantity
 from metro.units import JSON, Array
@@ -21,8 +22,8 @@ COMPARISON = (
     *("observable", "run", "axis", "t_s", "angle_deg", "s_mm", "x_mm", "y_mm"),
     *("measured", "before", "after", "sigma", "unit"),
 )
-LEAST_RUNS = 2
 DRAWS = 2000
+UNTESTED = "not tested: there is no run to judge it by that the fit has not seen"
 
 
 @dataclass(frozen=True)
@@ -93,10 +94,10 @@ def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
 
 def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) -> JSON:
     """Return the observable's entry of verdict.json."""
-    runs = problem.role("identify")
     floor = float(np.sqrt((rows["sigma"] ** 2).mean())) if len(rows) else math.nan
     remaining = left_over(outcome)
-    enough = len(runs) >= LEAST_RUNS and len(rows) > 0
+    enough = enough_runs(problem)
+    found = outcome.names if enough else ()  # what no held-out run has tested is not claimed
     before = error(rows, "before", gates.seed) if len(rows) else None
     after = error(rows, "after", gates.seed) if len(rows) else None
     return {
@@ -106,13 +107,15 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         "held_out_runs": [block.run for block in problem.role("validate")],
         "before": before,
         "after": after,
-        "effects": [_effect(outcome, effect.name) for effect in outcome.final.candidate.effects],
+        "effects": [_effect(outcome, name) for name in found],
         "candidates": [
-            _candidate(trial) for trial in outcome.trials if trial.effect.name not in outcome.names
+            _candidate(problem, trial, UNTESTED if trial.effect.name in outcome.names else trial.why_not)
+            for trial in outcome.trials
+            if trial.effect.name not in found
         ],
         "indistinguishable": [list(rival.pair) for rival in outcome.rivals],
-        "next_experiment": next_experiment(problem, outcome) if enough else MORE_RUNS,
-        "unexplained": _unexplained(problem, outcome, after, floor) if remaining else None,
+        "next_experiment": next_experiment(problem, outcome) if enough else more_runs(problem),
+        "unexplained": _unexplained(problem, outcome, rows) if remaining else None,
     }
 
 
@@ -197,15 +200,22 @@ def run_dof(fitted: Fit) -> float:
     return float(max(1, len(fitted.blocks) - 1))
 
 
-def _candidate(trial: Trial) -> JSON:
+def _candidate(problem: Problem, trial: Trial, why_not: str) -> JSON:
     return {
         "effect": trial.effect.name,
         "probability": trial.weight,
+        "held_out_rms": held_out_rms(problem, trial.fit),
         "held_out_gain": finite(trial.evidence.gain),
         "p_value": trial.evidence.p_value,
         "size": trial.evidence.size,
-        "why_not": trial.why_not,
+        "why_not": why_not,
     }
+
+
+def held_out_rms(problem: Problem, fitted: Fit) -> float | None:
+    """Error of a fit on the held-out runs, rms in the problem's unit; None without such runs."""
+    rows = comparison(problem, held_out(problem, fitted))
+    return float(np.sqrt(((rows["measured"] - rows["before"]) ** 2).mean())) if len(rows) else None
 
 
 def finite(value: float) -> float | None:
@@ -213,6 +223,8 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _unexplained(problem: Problem, outcome: Outcome, after: JSON | None, floor: float) -> JSON:
-    over = math.sqrt(max(0.0, after["rms"] ** 2 - floor**2)) if after else None
+def _unexplained(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON:
+    """Describe the rest; its size is the share left on the identification runs, of the held-out signal."""
+    share = max(share_left(outcome.lines), abs(outcome.step.relative) if outcome.step else 0.0)
+    over = share * float(np.sqrt((rows["measured"] ** 2).mean())) if len(rows) else None
     return {"rms": over, "unit": problem.unit, "signature": left_over(outcome)}

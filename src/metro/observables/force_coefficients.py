@@ -61,6 +61,8 @@ def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.
     """
     means = spindle.set_index("run")[[f"mean_{axis}_n" for axis in AXES]]
     straight = [block for block in blocks if block.setting.helix is None]
+    if not straight:
+        return Refusal("all runs are helical: their mean forces turn with the orbit")
     circular, true = (
         np.array([_mean_design(model, block, path) for block in straight]).reshape(-1, 3, 6)
         for path in (False, True)

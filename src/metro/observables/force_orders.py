@@ -77,7 +77,7 @@ def _observed(
     tacho = record["spindle_deg"].to_numpy()[found.steady]
     if np.isfinite(tacho).all():
         angle = np.unwrap(tacho * DEG) + 2.0 * math.pi * orbit * time
-        speed, deviation = (angle[-1] - angle[0]) / (2.0 * math.pi * (time[-1] - time[0])), 0.0
+        speed, deviation = _tacho_speed(time, angle)
     else:
         speed, deviation = orders.spindle_speed(time, signal, nominal + orbit, highest)
         angle = 2.0 * math.pi * speed * time
@@ -99,6 +99,14 @@ def _observed(
     return pd.concat(
         [_long(run, i, average) for i, average in enumerate(averages)], ignore_index=True
     ), summary
+
+
+def _tacho_speed(time: Array, angle: Array) -> tuple[float, float]:
+    """Speed of a tacho's angle, rev/s, and its deviation: either end may be off by what a reading is."""
+    slope, start = np.polyfit(time, angle, 1)
+    reading = float(np.sqrt(np.mean((angle - slope * time - start) ** 2)))
+    turn = 2.0 * math.pi
+    return float(slope) / turn, math.sqrt(2.0) * reading / (turn * float(time[-1] - time[0]))
 
 
 def _zeroing(found: steady.Segments) -> np.ndarray:

@@ -18,7 +18,7 @@ from metro.loop.verdict import identified_fit
 from metro.observables import published
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.observables.yielding_table import yielding_table
-from metro.stages.observed import MODULES, merged
+from metro.stages.observed import MODULES, merged, task_of
 from metro.units import JSON
 
 
@@ -38,7 +38,7 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
             lacking[module.OBSERVABLE] = found.reason
             continue
         observed |= found
-        task = module.problem(batch, found, identified)
+        task = task_of(module, batch, found, identified)
         fitted = base_fit(task, settings["model_form_budget"]) if isinstance(task, Problem) else None
         identified = merged(identified, module.report(batch, found, identified, task, fitted))
         if isinstance(task, Refusal):

@@ -31,6 +31,7 @@ from metro.stages.observed import (
     merged,
     read_json,
     read_observed,
+    task_of,
 )
 from metro.units import JSON
 
@@ -78,7 +79,7 @@ def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
                 read = partial(_read, processed)
                 again = module.observe(state.batch, read, state.identified)
                 state.observed |= {} if isinstance(again, Refusal) else again
-            task = module.problem(state.batch, state.observed, state.identified)
+            task = task_of(module, state.batch, state.observed, state.identified)
             outcome = _close(state, task)
             fitted = identified_fit(task, outcome.final) if outcome else None
             if state.found and (fitted or (module is lobes and "modes" in state.observed)):

@@ -11,6 +11,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.layout import OBSERVED
+from metro.effects import told_of
 from metro.observables import deformation, flatness, force, lobes, published
 from metro.observables.lobes import LabelProblem
 from metro.observables.problem import Problem, Refusal
@@ -40,7 +41,14 @@ def problems(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSO
     """Return the problem of each observable, or why the batch has none."""
     if "published_errors" in observed:
         return {task.observable: task for task in published.problems(batch, observed, identified)}
-    return {module.OBSERVABLE: module.problem(batch, observed, identified) for module in MODULES}
+    return {module.OBSERVABLE: task_of(module, batch, observed, identified) for module in MODULES}
+
+
+def task_of(module: ModuleType, batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON) -> Task:
+    """Return the problem of an observable, its base model told of what the manifest declares as known."""
+    task: Task = module.problem(batch, observed, identified)
+    known = batch.manifest.get("known") or {}
+    return told_of(task, known) if known and isinstance(task, Problem) else task
 
 
 def merged(identified: JSON, blocks: JSON) -> JSON:
