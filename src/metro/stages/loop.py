@@ -71,8 +71,8 @@ def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
         observed=read_observed(processed),
     )
     if "published_errors" in state.observed:
-        for task in published.problems(state.batch, state.observed, state.identified):
-            _close(state, task)
+        for printed in published.problems(state.batch, state.observed, state.identified):
+            _close(state, printed)
     else:
         for module in MODULES:
             if state.found and module in OBSERVED_WITH_COEFFICIENTS:
