@@ -239,3 +239,13 @@ def test_a_batch_without_records_says_so(clean):
 
 def test_coefficients_come_in_the_contracts_order():
     assert tuple(parameter.name for parameter in ForceModel(TOOL, EdgeLaw()).parameters) == COEFFICIENTS
+
+
+def test_holes_alone_do_not_tell_tangential_from_radial(tmp_path):
+    holes = Observed(ROOT / "data" / "raw" / "trimule-helical", tmp_path / "out")
+    blocks = tuple(block for block in holes.task.blocks if block.setting.helix is not None)
+    holes.task = replace(holes.task, blocks=blocks)
+    found = holes.identified()
+    assert set(found["waveform"]) == {"kac", "kae", "kfac", "kfae"}
+    assert "cut one slot" in found["not_identified"]["krc"]
+    assert found["not_identified"]["mean"].startswith("all runs are helical")

@@ -65,7 +65,7 @@ def signature(fitted: Fit, least: float) -> list[Line]:
                 places.setdefault((str(axis), name), []).append(seen[:, chosen].reshape(3, -1))
     freedom = len(cut) + noise_room.PRIOR_RUNS
     lines = [_line(axis, label, parts, signal[axis], freedom) for (axis, label), parts in places.items()]
-    accepted = discoveries([line.p_value for line in lines], FALSE_DISCOVERY)
+    accepted = q_values([line.p_value for line in lines]) <= FALSE_DISCOVERY
     return [
         replace(line, significant=bool(found) and line.ratio > LEAST_RATIO and line.relative > least)
         for line, found in zip(lines, accepted, strict=True)
@@ -127,15 +127,14 @@ def share_left(lines: Sequence[Line]) -> float:
     return math.sqrt(excess / sum(signal.values())) if excess else 0.0
 
 
-def discoveries(p_values: list[float], rate: float) -> Array:
-    """Benjamini–Hochberg: which of the p-values are discoveries at a false discovery rate, (n,) bool."""
-    p = np.asarray(p_values)
-    order = np.argsort(p)
-    passed = p[order] <= rate * np.arange(1, len(p) + 1) / len(p)
-    last = int(np.max(np.flatnonzero(passed), initial=-1))
-    accepted = np.zeros(len(p), dtype=bool)
-    accepted[order[: last + 1]] = True
-    return accepted
+def q_values(p_values: Sequence[float]) -> Array:
+    """Least false discovery rate (n,) at which each of the p-values is a discovery (Benjamini–Hochberg)."""
+    p = np.asarray(p_values, dtype=float)
+    order = np.argsort(p)[::-1]
+    rate = p[order] * len(p) / np.arange(len(p), 0, -1)
+    q = np.empty(len(p))
+    q[order] = np.minimum.accumulate(np.minimum(rate, 1.0))
+    return q
 
 
 def in_words(lines: list[Line], most: int = 4) -> str:

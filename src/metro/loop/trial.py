@@ -58,14 +58,14 @@ def tried(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, l
         larger = fit(candidate, current.blocks, prior, current)
         trials.append(Trial(effect, larger, compare(current, larger)))
     p_values = [trial.evidence.p_value for trial in trials]
-    accepted = rest.discoveries(p_values, gates.false_additions)
+    q_values = rest.q_values(p_values)
     trials = [
         replace(
             trial,
-            q_value=min(1.0, p * len(trials) / (1 + sum(other < p for other in p_values))),
-            why_not=_why_not(trial.evidence, bool(found), least),
+            q_value=float(q),
+            why_not=_why_not(trial.evidence, q <= gates.false_additions, least),
         )
-        for trial, p, found in zip(trials, p_values, accepted, strict=True)
+        for trial, q in zip(trials, q_values, strict=True)
     ]
     return _held_out(current, trials, prior, gates)
 

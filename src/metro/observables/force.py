@@ -93,12 +93,18 @@ def report(
         "spindle_rpm": {run: quantity(speed, sd, "rpm") for run, speed, sd in runs},
         "edge_length": "axial",
     }
+    turned = all(block.setting.helix is not None for block in task.role("identify"))
     found: dict[str, JSON | Refusal] = {
         "mean": mean_coefficients(model, task.role("identify"), spindle),
         "mean_all_runs": mean_coefficients(model, task.blocks, spindle),
-        "waveform": waveform(model, fit),
+        "waveform": waveform(model, fit, turned=turned),
     }
     lacking = {name: value.reason for name, value in found.items() if isinstance(value, Refusal)}
+    if turned and fit:
+        lacking["ktc"] = lacking["krc"] = lacking["kte"] = lacking["kre"] = (
+            "all runs are helical and where on the orbit their records begin is not known: the force in the "
+            "plane is told but for a rotation; cut one slot"
+        )
     if model.bottom_edges == ("kfae",):
         lacking["kfac"] = (
             "the helical runs have one axial feed: kfae holds the whole thrust of the bottom edges"

@@ -14,17 +14,23 @@ from metro.observables.quantity import quantity
 from metro.units import JSON, Array
 
 AXES = ("x", "y", "z")
+IN_PLANE = ("ktc", "krc", "kte", "kre")
 INSEPARABLE = 0.98  # correlation of shear and edge term from which they are not told apart
 
 
-def waveform(model: ForceModel, fit: BaseFit | None) -> JSON | Refusal:
-    """Return the coefficients of the joint fit of all waveforms, with their intervals."""
+def waveform(model: ForceModel, fit: BaseFit | None, *, turned: bool) -> JSON | Refusal:
+    """Return the coefficients of the joint fit of all waveforms, with their intervals.
+
+    ``turned``: all runs are helical, and began nobody knows where on the orbit. The force in the plane is then
+    told but for a rotation: tangential and radial coefficients are not.
+    """
     if fit is None:
         return Refusal("no run has the role identify")
     deviation = np.sqrt(np.diag(fit.covariance))
     return {
         parameter.name: quantity(value / parameter.si, sd / parameter.si, parameter.unit, fit.dof)
         for parameter, value, sd in zip(model.parameters, fit.beta, deviation, strict=True)
+        if not (turned and parameter.name in IN_PLANE)
     }
 
 

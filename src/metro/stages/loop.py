@@ -81,7 +81,7 @@ def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
                 state.observed |= {} if isinstance(again, Refusal) else again
             task = task_of(module, state.batch, state.observed, state.identified)
             outcome = _close(state, task)
-            fitted = identified_fit(task, outcome.final) if outcome else None
+            fitted = identified_fit(task, outcome.final) if outcome and isinstance(task, Problem) else None
             if state.found and (fitted or (module is lobes and "modes" in state.observed)):
                 blocks = module.report(state.batch, state.observed, state.identified, task, fitted)
                 state.identified = merged(state.identified, blocks)
