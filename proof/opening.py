@@ -65,7 +65,7 @@ def _oracles(out: Layout, truths: JSON, jobs: int) -> dict[str, JSON]:
     asked = [
         name for name, truth in truths.items() if truth["effects"] and _read(out.reports / name / "run.json")
     ]
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
         futures = [pool.submit(_oracle, out, name, truths[name]["effects"]) for name in asked]
         return dict(future.result() for future in tracked(futures, "asking the oracle"))
 

@@ -60,7 +60,7 @@ def run(out: Layout, jobs: int, *, keep: bool, pdf: bool) -> list[str]:
     """
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     waiting = [job for job in _planned(out, keep, pdf) if not job.done]
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
         futures = [pool.submit(_closed, job) for job in waiting]
         failed = [future.result() for future in tracked(futures, "closing the loop")]
     return sorted(name for name in failed if name is not None)
