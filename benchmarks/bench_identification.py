@@ -1,14 +1,14 @@
 """Identification of a batch of 36 runs of one second at 10 kHz: order tracking, speeds, phases, coefficients.
 
-Floor: one pass of least squares over the samples. Growth: with the length of the records. Run: ``pytest
-benchmarks/bench_identification.py -s``; the test that prints compares within the same run.
+From the records in memory to the coefficients with their covariance. How it grows with the length of the
+records is drawn by ``benchmarks/growth.py``. Run: ``pytest benchmarks/bench_identification.py -s``.
 """
 
 import math
-import time
 
 import numpy as np
 import pandas as pd
+from bench_forces import seconds
 
 from metro.batch.batch import Batch
 from metro.cutting.chip import Cut
@@ -70,15 +70,10 @@ def identified(batch, read):
     return fit(Candidate(task.base), task.blocks, first_noise(0.007, task.scatter, task.blocks))
 
 
-def test_36_runs_of_one_second(benchmark):
+def test_36_runs_of_one_second_take_at_most_three(benchmark):
     batch, read = batch_of(1.0)
     found = benchmark.pedantic(identified, (batch, read), rounds=3, warmup_rounds=1)
     assert np.abs(found.beta / BETA - 1).max() < 0.03
-
-
-def test_growth_with_the_length_of_the_records():
-    for seconds in (0.5, 1.0, 2.0, 4.0):
-        batch, read = batch_of(seconds)
-        start = time.perf_counter()
-        identified(batch, read)
-        print(f"{RUNS} runs of {seconds:3.1f} s: {time.perf_counter() - start:.2f} s")
+    spent = seconds(identified, batch, read, repeats=3)
+    print(f"\n{RUNS} runs of 1 s at {RATE} Hz: {spent:.2f} s")
+    assert spent <= 3.0

@@ -1,4 +1,7 @@
-"""``python -m proof``: make batches that hide sealed effects, run the pipeline on them, open the truth."""
+"""``python -m proof``: make batches that hide sealed effects, run the pipeline on them, open the truth.
+
+``coverage`` needs no seal: its batches hide nothing, and what is counted is how often intervals hold.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +15,21 @@ from virtual_cell.recipes.force import STYLES
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line."""
     options = _parser().parse_args(arguments)
-    {"make": _make, "run": _run, "open": _open}[options.command](Layout(options.out), options)
+    if options.command == "coverage":
+        _coverage(options)
+    else:
+        {"make": _make, "run": _run, "open": _open}[options.command](Layout(options.out), options)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m proof", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("make", help="make batches with hidden effects, and seal what they are")
-    make.add_argument("--batches", type=int, default=200)
-    make.add_argument("--seed", type=int, default=1)
-    make.add_argument("--style", choices=STYLES, default="b", help="how it is measured; a is for tuning")
+    coverage = commands.add_parser("coverage", help="how often the intervals of the coefficients hold")
+    for command in (make, coverage):
+        command.add_argument("--batches", type=int, default=200)
+        command.add_argument("--seed", type=int, default=1)
+        command.add_argument("--style", choices=STYLES, default="b", help="how it is measured; a: for tuning")
     run = commands.add_parser("run", help="run the pipeline on the batches; goes on where it was stopped")
     run.add_argument("--keep", action="store_true", help="keep the tables of raw signals")
     run.add_argument("--reports", action="store_true", help="write the PDF reports, too")
@@ -29,6 +37,7 @@ def _parser() -> argparse.ArgumentParser:
     opening.add_argument("--strict", action="store_true", help="fail where a demand is missed beyond chance")
     for command in (make, run, opening):
         command.add_argument("out", type=Path, help="folder of this proof")
+    for command in (make, coverage, run, opening):
         command.add_argument("--jobs", type=int, default=2, help="worker processes")
     return parser
 
@@ -54,6 +63,16 @@ def _open(out: Layout, options: argparse.Namespace) -> None:
     missed = [figure.label for figure in opened(out, options.jobs) if figure.missed_for_sure]
     if options.strict and missed:
         raise SystemExit("missed by more than chance: " + "; ".join(missed))
+
+
+def _coverage(options: argparse.Namespace) -> None:
+    from rich.console import Console
+
+    from proof.coverage import WAYS, coverage, table
+    from proof.show import printed
+
+    found = coverage(options.batches, options.seed, options.style, options.jobs)
+    printed([table(found, way) for way in WAYS], Console())
 
 
 if __name__ == "__main__":

@@ -35,8 +35,8 @@ class Table:
 def tables(scores: Sequence[Score]) -> list[Table]:
     """Return every table of a proof."""
     return [
-        _figures("What is demanded", demanded(scores), NOTE),
-        _figures("What lies behind", further(scores), ""),
+        tabulated("What is demanded", demanded(scores), NOTE),
+        tabulated("What lies behind", further(scores), ""),
         _statuses(scores),
         _effects(scores),
         confusion(scores),
@@ -56,7 +56,8 @@ NOTE = (
 )
 
 
-def _figures(title: str, figures: Iterable[Figure], note: str) -> Table:
+def tabulated(title: str, figures: Iterable[Figure], note: str) -> Table:
+    """Return figures as a table, each with its interval and what is demanded of it."""
     rows = [
         (f.label, _number(f.value, f.unit), _interval(f), str(f.count), _demand(f.demand, f.unit), _met(f))
         for f in figures

@@ -30,10 +30,10 @@ def test_air_entry_steady_exit_are_told_apart():
     found = segments(signal, TURN, settling=10 * TURN)
     assert 30 * TURN <= found.steady.start <= 36 * TURN
     assert 84 * TURN <= found.steady.stop <= 90 * TURN
-    assert found.air[: 20 * TURN].all()
-    assert found.air[-20 * TURN :].all()
-    assert not found.air[22 * TURN : 98 * TURN].any()
-    assert signal[found.air].mean(axis=0) == pytest.approx([3.0, 3.0], abs=5.0)
+    assert found.air[: 19 * TURN].all()
+    assert found.air[-19 * TURN :].all()
+    assert not found.air[20 * TURN : 100 * TURN].any()
+    assert signal[found.air].mean(axis=0) == pytest.approx([3.0, 3.0], abs=0.1)
 
 
 def test_a_record_of_steady_cutting_alone_is_kept_whole():

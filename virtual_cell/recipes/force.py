@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +18,9 @@ import numpy as np
 from virtual_cell.chips import Tool
 from virtual_cell.dynamometer import Dynamometer
 from virtual_cell.hidden import EFFECTS, Parameters
-from virtual_cell.milling import in_millimetres
+from virtual_cell.milling import Coefficients, in_millimetres
 from virtual_cell.session import Plan, Session, cut_all
-from virtual_cell.units import DEG, MM, RPM
+from virtual_cell.units import DEG, MM, N_MM, N_MM2, RPM
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_yaml
 
 _AXES = (
@@ -88,6 +88,7 @@ def make(folder: Path, effects: Mapping[str, Parameters | None], seed: int, styl
         mean_chip=float(np.mean(feeds)) * MM * 2.0 / math.pi,
         speed_reference=plans[0].spindle_rpm * RPM,
     )
+    coefficients = _in_words(session.coefficients)
     truth = {name: given or EFFECTS[name].draw(rng, session) for name, given in effects.items()}
     for name, parameters in truth.items():
         session = EFFECTS[name].apply(session, parameters)
@@ -96,7 +97,20 @@ def make(folder: Path, effects: Mapping[str, Parameters | None], seed: int, styl
     write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
     write_yaml(folder / "cell.yaml", {"cell": "bench-mill"})
     write_yaml(folder / "batch.yaml", _manifest(folder.name, session, diameter, axes, noise))
-    return {"batch": folder.name, "seed": seed, "style": style, "effects": truth}
+    return {
+        "batch": folder.name,
+        "seed": seed,
+        "style": style,
+        "effects": truth,
+        "coefficients": coefficients,
+    }
+
+
+def _in_words(metal: Coefficients) -> Row:
+    """Return the coefficients of the metal as a manifest writes them: before any effect, and any scatter."""
+    force = {name: value for name, value in asdict(metal).items() if name.startswith("k")}
+    shear = {f"{name}_n_mm2": value / N_MM2 for name, value in force.items() if name.endswith("c")}
+    return shear | {f"{name}_n_mm": value / N_MM for name, value in force.items() if name.endswith("e")}
 
 
 def _session(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -130,10 +131,13 @@ def _scale(table: pd.DataFrame) -> Array:
     return np.asarray(np.sqrt(0.5 * (own + axis)))
 
 
+@lru_cache
 def _synthesis(blocks: int, highest: int) -> Array:
-    """Map from (block, axis, order element) to (block, axis, angle)."""
+    """Map from (block, axis, order element) to (block, axis, angle); read-only, shared by runs alike."""
     angle = 2.0 * math.pi * np.arange(ANGLES) / ANGLES
-    return np.asarray(np.kron(np.eye(blocks * len(AXES)), orders.order_matrix(angle, highest)), dtype=float)
+    matrix = np.asarray(np.kron(np.eye(blocks * len(AXES)), orders.order_matrix(angle, highest)), dtype=float)
+    matrix.flags.writeable = False
+    return matrix
 
 
 def _coordinates(middles: tuple[float, ...]) -> dict[str, np.ndarray]:

@@ -13,10 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from metro.units import Array
+from metro.units import Array, ComplexArray
 
 SPEED_SEARCH = 0.006
 REVOLUTIONS_PER_SEGMENT = 4.0
+FINE_STEPS = 20  # to either side of the best of the search
+PADDING = 16  # of the Fourier transform of the search: well below a step at the highest order
 
 
 @dataclass(frozen=True)
@@ -70,8 +72,11 @@ def advance(coefficients: Array, angle: float) -> Array:
 
 
 def highest_order(rate: float, revolutions_per_s: float, teeth: int) -> int:
-    """Highest order that is worth keeping: six tooth passings, below 0.4 of the sampling rate, at most 48."""
-    return max(1, min(48, max(24, 6 * teeth), int(0.4 * rate / revolutions_per_s)))
+    """Highest order that is worth keeping: six tooth passings, at most 48.
+
+    Below 0.3 of the sampling rate: above it, the filter that guards against aliasing shows.
+    """
+    return max(1, min(48, max(24, 6 * teeth), int(0.3 * rate / revolutions_per_s)))
 
 
 def _segments(time: Array, revolutions_per_s: float, per_segment: float) -> list[slice]:
@@ -92,55 +97,75 @@ def spindle_speed(time: Array, signal: Array, nominal: float, highest: int) -> t
 
     Returns
     -------
-    speed, its standard deviation : revolutions per second; NaN deviation where there are fewer than six
-        segments.
+    speed, its standard deviation : revolutions per second. Fewer than six segments (of four revolutions)
+        give a NaN deviation, a single one the nominal speed.
     """
-    speed = nominal
-    for _ in range(2):
-        pieces = _segments(time, speed, REVOLUTIONS_PER_SEGMENT)
-        middle = np.array([time[piece].mean() for piece in pieces])
-        order = np.arange(1.0, highest + 1)
-        spectra = np.stack(
-            [
-                np.exp(-2j * math.pi * speed * order[:, None] * time[None, piece]) @ _centred(signal[piece])
-                for piece in pieces
-            ]
-        )
-        duration = time[-1] - time[0]
-        step = 0.1 / (highest * duration)
-        span = SPEED_SEARCH * nominal if speed == nominal else 20 * step
-        trial = np.arange(-span, span + step / 2, step)
-        energy = np.array([_gathered(spectra, order, middle, shift) for shift in trial])
-        best = int(np.argmax(energy))
-        shift = trial[best]
-        if 0 < best < len(trial) - 1:
-            left, mid, right = energy[best - 1 : best + 2]
-            shift += 0.5 * step * (left - right) / (left - 2 * mid + right)
-        speed += float(shift)
-    return speed, _speed_deviation(spectra, order, middle, shift)
+    pieces = _segments(time, nominal, REVOLUTIONS_PER_SEGMENT)
+    if len(pieces) < 2:  # there is nothing that could have turned
+        return nominal, math.nan
+    middle = np.array([time[piece].mean() for piece in pieces])
+    step = 0.1 / (highest * (time[-1] - time[0]))
+    span = SPEED_SEARCH * nominal
+    trial = np.arange(-span, span + step / 2, step)
+    spectra = _spectra(time, signal, pieces, nominal, highest)
+    speed = nominal + float(trial[np.argmax(_roughly_gathered(spectra, middle, trial))])
+    spectra = _spectra(time, signal, pieces, speed, highest)
+    trial = step * np.arange(-FINE_STEPS, FINE_STEPS + 1)
+    energy = np.array([_gathered(spectra, middle, shift) for shift in trial])
+    best = int(np.argmax(energy))
+    shift = float(trial[best])
+    if 0 < best < len(trial) - 1:
+        left, mid, right = energy[best - 1 : best + 2]
+        shift += float(0.5 * step * (left - right) / (left - 2 * mid + right))
+    return speed + shift, _speed_deviation(spectra, middle, shift)
+
+
+def _spectra(time: Array, signal: Array, pieces: list[slice], speed: float, highest: int) -> ComplexArray:
+    """Amplitudes of each segment at the orders 1…highest, (segments, orders, channels)."""
+    matrix = order_matrix(2.0 * math.pi * speed * time, highest)
+    parts = np.stack([matrix[piece].T @ _centred(signal[piece]) for piece in pieces])
+    return np.asarray(parts[:, 1::2] - 1j * parts[:, 2::2])
 
 
 def _centred(piece: Array) -> Array:
     return np.asarray(piece - piece.mean(axis=0))
 
 
-def _gathered(spectra: Array, order: Array, middle: Array, shift: float) -> float:
-    turned = np.exp(-2j * math.pi * shift * middle[:, None] * order[None, :])
+def _orders(spectra: ComplexArray) -> Array:
+    return np.arange(1.0, spectra.shape[1] + 1)
+
+
+def _roughly_gathered(spectra: ComplexArray, middle: Array, trial: Array) -> Array:
+    """Energy at the orders of each speed that is off by ``trial``, (trials,), from one Fourier transform.
+
+    It takes the segments as evenly spaced, so that its cost grows with the record as the record does.
+    """
+    count = PADDING * len(spectra)
+    power = (np.abs(np.fft.fft(spectra, count, axis=0)) ** 2).sum(axis=2)
+    spacing = (middle[-1] - middle[0]) / (len(middle) - 1)
+    order = _orders(spectra)
+    place = np.rint(trial[:, None] * order * spacing * count).astype(int) % count
+    return np.asarray(power[place, order.astype(int) - 1].sum(axis=1))
+
+
+def _gathered(spectra: ComplexArray, middle: Array, shift: float) -> float:
+    turned = np.exp(-2j * math.pi * shift * middle[:, None] * _orders(spectra)[None, :])
     return float(np.sum(np.abs(np.einsum("sk,skc->kc", turned, spectra)) ** 2))
 
 
-def _speed_deviation(spectra: Array, order: Array, middle: Array, shift: float) -> float:
+def _speed_deviation(spectra: ComplexArray, middle: Array, shift: float) -> float:
     """Return the speed's standard deviation, from the strongest order's phase about a straight line."""
     if len(middle) < 6:
         return math.nan
     power = np.abs(spectra.sum(axis=0)) ** 2
     k, channel = np.unravel_index(int(np.argmax(power)), power.shape)
-    phase = np.unwrap(np.angle(spectra[:, k, channel] * np.exp(-2j * math.pi * shift * middle * order[k])))
+    order = float(k + 1)
+    phase = np.unwrap(np.angle(spectra[:, k, channel] * np.exp(-2j * math.pi * shift * middle * order)))
     centred = middle - middle.mean()
     slope = centred @ phase / (centred @ centred)
     rest = phase - phase.mean() - slope * centred
     sd = math.sqrt(rest @ rest / (len(middle) - 2) / (centred @ centred))
-    return float(sd / (2.0 * math.pi * order[k]))
+    return float(sd / (2.0 * math.pi * order))
 
 
 def order_averages(time: Array, angle: Array, signal: Array, highest: int, blocks: int) -> list[OrderAverage]:
@@ -166,7 +191,8 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
         pieces = _segments(
             time[start:end], per_s, max(REVOLUTIONS_PER_SEGMENT, (2 * highest + 20) / len(time) * revolutions)
         )
-        values = np.stack([_fit(angle[start:end][p], signal[start:end][p], highest) for p in pieces])
+        matrix = order_matrix(angle[start:end], highest)
+        values = np.stack([_fit(matrix[p], signal[start:end][p]) for p in pieces])
         means.append(values.mean(axis=0))
         counts.append(len(pieces))
         middles.append(float(time[start:end].mean()))
@@ -179,8 +205,9 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
     ]
 
 
-def _fit(angle: Array, signal: Array, highest: int) -> Array:
-    return np.asarray(np.linalg.lstsq(order_matrix(angle, highest), signal, rcond=None)[0].T)
+def _fit(matrix: Array, signal: Array) -> Array:
+    """Least squares, (channels, 2H+1), by normal equations: over whole revolutions they are near diagonal."""
+    return np.asarray(np.linalg.solve(matrix.T @ matrix, matrix.T @ signal).T)
 
 
 def _shrunk(variance: Array, freedom: int, prior_freedom: int = 6) -> Array:

@@ -47,7 +47,7 @@ def segments(signal: Array, samples_per_revolution: float, settling: int) -> Seg
         level = _level(turns, turns[quiet].mean(axis=(0, 1)))
     typical = np.median(level[level > 0.5 * np.quantile(level, 0.9)])
     first, last = _longest(level > CUTTING * typical)
-    air = np.repeat(level < IN_AIR * typical, length)
+    air = np.repeat(_clear(level < IN_AIR * typical), length)
     start = first * length + (settling if first > 0 else 0)
     stop = last * length - settling if last < count else len(signal)
     if stop - start < 6 * length:
@@ -55,6 +55,13 @@ def segments(signal: Array, samples_per_revolution: float, settling: int) -> Seg
             "the cut is over before the tool is fully engaged: fewer than six steady revolutions"
         )
     return Segments(slice(start, stop), np.pad(air, (0, len(signal) - len(air))))
+
+
+def _clear(quiet: np.ndarray) -> np.ndarray:
+    """Quiet revolutions beside quiet ones: where the tool first touches, it cuts a little already."""
+    padded = np.pad(quiet, 1, constant_values=True)
+    clear = quiet & padded[:-2] & padded[2:]
+    return clear if clear.any() else quiet
 
 
 def _level(turns: Array, zero: Array) -> Array:
