@@ -89,7 +89,7 @@ def fitted_again(fitted, noise, made):
     """Log-likelihood of all runs, when a run is added and everything is fitted anew."""
     blocks = [*fitted.blocks, *made]
     start = {**fitted.nuisance, **(score(fitted, made).nuisance if made else {})}
-    state = descend(fitted.candidate, blocks, noise, State(fitted.theta, fitted.beta, start))
+    state, _ = descend(fitted.candidate, blocks, noise, State(fitted.theta, fitted.beta, start))
     return -0.5 * linearised(fitted.candidate, blocks, noise, state, derivatives=False).cost
 
 

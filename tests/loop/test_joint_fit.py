@@ -139,7 +139,7 @@ def test_descent_never_raises_the_cost_and_keeps_parameters_in_bounds():
     candidate = Candidate(task.base, (tight,))
     state = State(np.array([0.0]), BETA * 1.3, {b.run: np.array([0.1]) for b in blocks})
     before = linearised(candidate, blocks, noise, state, derivatives=False).cost
-    after = descend(candidate, blocks, noise, state)
+    after, _ = descend(candidate, blocks, noise, state)
     assert linearised(candidate, blocks, noise, after, derivatives=False).cost < before
     assert after.theta[0] <= 0.12
 
@@ -154,13 +154,13 @@ def test_the_weak_prior_pulls_an_effect_towards_zero_and_only_then():
         np.linalg.inv(normal_equations(linearised(flat.candidate, blocks, flat.noise, state))[0])[2, 2]
     )
     believed = replace(BEND, parameters=(replace(BEND.parameters[0], plausible=100.0 * float(sd)),))
-    pulled = descend(
+    pulled, _ = descend(
         Candidate(task.base, (believed,)), blocks, flat.noise, replace(state, theta=state.theta + 3 * sd)
     )
     # The mean of likelihood and prior, weighted by their precisions.
     assert pulled.theta[0] == pytest.approx(flat.theta[0] / (1.0 + 1e-4), abs=0.15 * sd)
     certain = replace(BEND, parameters=(replace(BEND.parameters[0], plausible=1e-3 * float(sd)),))
-    kept = descend(Candidate(task.base, (certain,)), blocks, flat.noise, state)
+    kept, _ = descend(Candidate(task.base, (certain,)), blocks, flat.noise, state)
     assert abs(kept.theta[0]) < 0.05 * flat.theta[0]
 
 
@@ -169,7 +169,7 @@ def test_an_angle_is_the_same_after_its_period():
     task = problem(8, truth=Wave(bend=0.2))
     blocks = task.role("identify")
     candidate = Candidate(task.base, (turning,))
-    found = descend(
+    found, _ = descend(
         candidate,
         blocks,
         prior_of(task, blocks),
@@ -302,5 +302,5 @@ def test_descent_from_anywhere_ends_lower_than_it_began():
     for _ in range(15):
         state = State(np.zeros(0), BETA, {b.run: rng.uniform(0, 6.28, 1) for b in blocks})
         before = linearised(candidate, blocks, noise, state, derivatives=False).cost
-        after = descend(candidate, blocks, noise, state)
+        after, _ = descend(candidate, blocks, noise, state)
         assert linearised(candidate, blocks, noise, after, derivatives=False).cost <= before

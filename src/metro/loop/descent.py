@@ -154,10 +154,17 @@ def own_step(row: Rows, common: Array) -> Array:
     return np.asarray(np.linalg.lstsq(own, left, rcond=None)[0])
 
 
-def descend(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> State:
-    """Follow Gauss–Newton steps, shortened until the cost falls, to where they gain next to nothing."""
+def descend(
+    candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, steps: int = ITERATIONS
+) -> tuple[State, float]:
+    """Follow Gauss–Newton steps, shortened until the cost falls, to where they gain next to nothing.
+
+    Returns
+    -------
+    state, cost : where at most so many ``steps`` lead.
+    """
     system = linearised(candidate, blocks, noise, state)
-    for _ in range(ITERATIONS):
+    for step in range(steps):
         normal, right = normal_equations(system)
         common = solution(normal, right)
         own = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
@@ -167,13 +174,13 @@ def descend(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: 
             if reached.cost < system.cost:
                 break
         else:
-            return state
-        gain = system.cost - reached.cost
-        state = trial
+            break
+        gain, system, state = system.cost - reached.cost, reached, trial
         if gain < ENOUGH:
-            return state
-        system = linearised(candidate, blocks, noise, state)
-    return state
+            break
+        if step + 1 < steps:
+            system = linearised(candidate, blocks, noise, state)
+    return state, system.cost
 
 
 def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, Array]) -> State:

@@ -15,12 +15,13 @@ import numpy as np
 from metro.loop import noise as noise_room
 from metro.loop.candidate import Candidate, started
 from metro.loop.covariance import between_runs
-from metro.loop.descent import State, descend, inverse, linearised, normal_equations, own_step
+from metro.loop.descent import ITERATIONS, State, descend, inverse, linearised, normal_equations, own_step
 from metro.loop.noise import Noise
 from metro.observables.problem import Block
 from metro.units import Array
 
-FOLLOWED = 4  # starts of new effect parameters that are followed to the end
+FOLLOWED, KEPT = 4, 2  # starts of new effect parameters that are followed a few steps, and to the end
+FIRST_STEPS = 3
 ROUNDS = 3  # of noise estimation and descent
 EM_STEPS = 8
 NUISANCE_STEPS = 8
@@ -88,9 +89,19 @@ def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fi
             trials.append((_search_nuisance(candidate, blocks, noise, state, around), len(trials), state))
         trials.sort(key=lambda trial: trial[:2])
         best = [state for *_, state in trials]
-    followed = [descend(candidate, blocks, noise, state) for state in best[: FOLLOWED if fresh else 1]]
-    cost = [linearised(candidate, blocks, noise, state, derivatives=False).cost for state in followed]
-    return _refined(candidate, blocks, prior, noise, followed[int(np.argmin(cost))], rounds=ROUNDS)
+    if fresh:
+        best = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS)[:KEPT]
+    reached = _lowest_first(candidate, blocks, noise, best[:KEPT], steps=ITERATIONS)[0]
+    return _refined(candidate, blocks, prior, noise, reached, rounds=ROUNDS)
+
+
+def _lowest_first(
+    candidate: Candidate, blocks: Sequence[Block], noise: Noise, states: Sequence[State], *, steps: int
+) -> list[State]:
+    """Follow each state some steps down."""
+    reached = [descend(candidate, blocks, noise, state, steps) for state in states]
+    order = np.argsort([cost for _, cost in reached], kind="stable")
+    return [reached[i][0] for i in order]
 
 
 def refit(start: Fit, blocks: Sequence[Block], prior: Noise) -> Fit:
@@ -168,7 +179,7 @@ def _refined(
     """Descend from a state and re-estimate the noise from the rest, in turn."""
     for _ in range(rounds):
         noise = _reestimated(candidate, blocks, prior, noise, state)
-        state = descend(candidate, blocks, noise, state)
+        state, _ = descend(candidate, blocks, noise, state)
     return _finished(candidate, blocks, noise, state, _covariance(candidate, blocks, noise, state))
 
 
