@@ -106,10 +106,13 @@ def lags(tool: Tool, slices: Array) -> Array:
     return lag
 
 
-def chips(engagement: Engagement, t: Array, tooth: int, past: Path | None = None) -> Chips:
+def chips(
+    engagement: Engagement, t: Array, tooth: int, past: Path | None = None, now: Array | float = 0.0
+) -> Chips:
     """Trace the chips of one tooth at times ``t`` (n,), s.
 
-    The axis is where the motion says; in earlier passes it was at ``past(t)`` where that is given.
+    The axis is where the motion says, displaced by ``now`` (2, n), m; in earlier passes it was at ``past(t)``
+    where that is given.
     """
     slices = engagement.slices
     radius, angle = engagement.tool.points(slices)
@@ -118,7 +121,7 @@ def chips(engagement: Engagement, t: Array, tooth: int, past: Path | None = None
     ahead = np.sin(phi + engagement.motion.direction(t)[:, None]) > -_BEHIND
     sample, level = np.nonzero(ahead)
     sine, cosine = np.sin(phi[ahead]), np.cos(phi[ahead])
-    x, y = (along[sample] for along in engagement.motion.centre(t))
+    x, y = (along[sample] for along in np.array(engagement.motion.centre(t)) + now)
     low, high = engagement.motion.block((x, y), (sine, cosine))
     for other in range(engagement.tool.teeth):
         passed = t[sample] - lag[other][level] / engagement.spindle

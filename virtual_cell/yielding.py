@@ -1,8 +1,9 @@
 """A tool tip that yields: a small mass on springs, marched in time, that leaves a deflected surface behind.
 
 Within less than a tooth's passing time the surfaces that it meets are all in the past: the chips of such a
-block are traced at once for the undeflected tool, and the tip then steps through them, each chip growing by
-the deflection towards it.
+block are traced at once for a tool displaced as it was a revolution before (a raw edge of the block is met
+where the displaced tool meets it), and the tip then steps through them, each chip growing by what the
+deflection has grown towards it.
 """
 
 from __future__ import annotations
@@ -15,16 +16,19 @@ from virtual_cell.chips import Path, chips, lags
 from virtual_cell.milling import Cut
 from virtual_cell.units import Array
 
-# The tip follows forces up to well above tooth passing, as a static spring would.
-TIP_FREQUENCY = 1500.0  # Hz
+# The tip follows forces up to far above tooth passing, as a static spring would.
+TIP_FREQUENCY = 12e3  # Hz
 TIP_DAMPING = 0.7
+SUBSTEPS = 2  # of the march, which holds the force over a step
 
 
 def yielding_force(cut: Cut, t: Array) -> Array:
     """Return the force of the peripheral edges (n, 3), N, at even times ``t`` (s); the tip starts at rest."""
     engagement = cut.engagement
-    rate = (len(t) - 1) / (t[-1] - t[0])
+    rate = (len(t) - 1) / (t[-1] - t[0]) * SUBSTEPS
+    t = t[0] + np.arange(len(t) * SUBSTEPS) / rate
     shortest = float(lags(engagement.tool, engagement.slices).min()) / engagement.spindle
+    revolution = 2.0 * math.pi / engagement.spindle
     block = max(1, math.floor(0.95 * shortest * rate))
     moved, force = np.zeros((len(t), 2)), np.zeros((len(t), 3))
     state: Array = np.zeros((2, 2))
@@ -35,33 +39,35 @@ def yielding_force(cut: Cut, t: Array) -> Array:
 
     for start in range(0, len(t), block):
         stop = min(start + block, len(t))
-        dense = _dense(cut, t[start:stop], past)
-        state = _march(
-            cut, t[start:stop], dense, state, dt=1.0 / rate, moved=moved[start:stop], force=force[start:stop]
-        )
-    return force
+        here = slice(start, stop)
+        guess = np.stack([np.interp(t[here] - revolution, t, along) for along in moved.T])
+        dense = _dense(cut, t[here], past, guess)
+        state = _march(cut, t[here], dense, guess, state, dt=1.0 / rate, moved=moved[here], force=force[here])
+    return force[::SUBSTEPS]
 
 
-def _dense(cut: Cut, t: Array, past: Path) -> Array:
-    """Chip thickness of the undeflected tool, sine and cosine of the immersion: (3, n, N·S)."""
+def _dense(cut: Cut, t: Array, past: Path, guess: Array) -> Array:
+    """Chip, sine and cosine of the immersion (3, n, N·S) of a tool displaced by ``guess`` (2, n)."""
     engagement = cut.engagement
     teeth, levels = engagement.tool.teeth, len(engagement.slices)
     dense = np.zeros((3, len(t), teeth, levels))
     dense[0] = -np.inf
     for tooth in range(teeth):
-        traced = chips(engagement, t, tooth, past)
+        traced = chips(engagement, t, tooth, past, guess)
         dense[:, traced.sample, tooth, traced.level] = traced.thickness, traced.sin, traced.cos
     return dense.reshape(3, len(t), teeth * levels)
 
 
-def _march(cut: Cut, t: Array, dense: Array, state: Array, *, dt: float, moved: Array, force: Array) -> Array:
+def _march(
+    cut: Cut, t: Array, dense: Array, guess: Array, state: Array, *, dt: float, moved: Array, force: Array
+) -> Array:
     """Step the tip through one block, filling ``moved`` and ``force``; return position and velocity."""
     assert cut.compliance is not None
     dz = cut.engagement.depth / len(cut.engagement.slices)
     worn = np.asarray(cut.coefficients.worn(cut.metres(t)))
     step, push = _propagator(dt)
     for i, (thickness, sine, cosine) in enumerate(zip(*dense, strict=True)):
-        x, y = state[0]
+        x, y = state[0] - guess[:, i]
         tangential, radial, axial = cut.coefficients.per_length(thickness + x * sine + y * cosine, worn[i])
         force[i] = (
             -dz * (tangential @ cosine + radial @ sine),

@@ -8,9 +8,11 @@ smooth there, so that a few points are exact to rounding.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from metro.cutting.law import EdgeLaw
 from metro.cutting.passes import Passes
@@ -21,42 +23,66 @@ LEAST_POINTS, POINTS_PER_RADIAN = 2, 4.0
 POINTS_OF_ROOTS = 8  # more, where the law makes roots of the chip's ends
 
 
-def integrated(before: Passes, bounds: Array, law: EdgeLaw, top: Array, span: float) -> Array:
-    """Integrals (angles, 6) rad of shear × sin φ, shear × cos φ, shear, sin φ, cos φ, 1, summed over teeth.
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Pieces of edges in the cut, in each of which one pass bounds the chip.
+
+    Attributes
+    ----------
+    angle : (pieces,) index of the angle of the tool. bounding : (pieces,) of the pass, 0 the last one.
+    low, high : (pieces,) immersions at the ends, rad. before : the pass that bounds each, (pieces,).
+    depth : what a radian of edge spans, m/rad.
+    """
+
+    angle: npt.NDArray[np.intp]
+    bounding: npt.NDArray[np.intp]
+    low: Array
+    high: Array
+    before: Passes
+    depth: float
+
+
+def pieces(before: Passes, bounds: Array, top: Array, span: float, depth: float) -> Pieces:
+    """Cut the engaged part of each edge where the pass that bounds its chip changes.
 
     Parameters
     ----------
     bounds : (bounds, angles or 1, N or 1) of :func:`metro.cutting.arcs.arcs`, rad.
     top : (angles, N) immersion of the leading end of each edge, rad. span : what an edge spans, > 0, rad.
+    depth : what a radian of edge spans, m/rad.
     """
     low, high = bounds[:-1], bounds[1:]
     start = low[0].min()
     leading = start + np.mod(top - start, TURN)
-    linear = _is_linear(law, before.feed)
-    sums = np.zeros((6, len(top)))
+    found = []
     for turn in range(math.ceil((high.max() - start + span) / TURN)):
         upper = np.minimum(high, leading + TURN * turn)
         lower = np.maximum(low, leading + (TURN * turn - span))
         at = np.nonzero(upper > lower)
-        if not at[0].size:
-            continue
-        _, angle, tooth = at
-        parts = _quadrature(before.before(angle, tooth), law, linear, lower[at], upper[at])
-        sums += np.stack([np.bincount(angle, part, len(top)) for part in parts])
-    return sums.T
+        found.append((at[1], at[2], lower[at], upper[at]))
+    angle, tooth, lower, upper = (np.concatenate(part) for part in zip(*found, strict=True))
+    passed = before.before(angle, tooth)
+    middle = 0.5 * (lower + upper)
+    bounding = passed.chip(np.sin(middle), np.cos(middle)).argmin(axis=0)
+    return Pieces(angle, bounding, lower, upper, passed[bounding, np.arange(len(angle))], depth)
 
 
-def _quadrature(before: Passes, law: EdgeLaw, linear: bool, low: Array, high: Array) -> Array:
-    """Integrals (6, pieces) over pieces of edges; ``before`` is (passes, pieces)."""
-    length, middle = high - low, 0.5 * (low + high)
-    points, weights = rule(LEAST_POINTS + math.ceil(POINTS_PER_RADIAN * length.max()), linear)
-    bounding = before.chip(np.sin(middle), np.cos(middle)).argmin(axis=0)
-    before = before[bounding, np.arange(len(low))]
-    phi = low + points[:, None] * length
+def points(cut: Pieces, law: EdgeLaw) -> tuple[Array, Array]:
+    """Immersions (points, pieces), rad, and weights (points,) of a quadrature along each piece."""
+    length = cut.high - cut.low
+    count = LEAST_POINTS + math.ceil(POINTS_PER_RADIAN * length.max(initial=0.0))
+    places, weights = rule(count, _is_linear(law, cut.before.feed))
+    return cut.low + places[:, None] * length, weights
+
+
+def integrated(cut: Pieces, law: EdgeLaw, angles: int) -> Array:
+    """Integrals (angles, 6) m of shear × sin φ, shear × cos φ, shear, sin φ, cos φ, 1, summed over teeth."""
+    phi, weights = points(cut, law)
     sine, cosine = np.sin(phi), np.cos(phi)
-    shear = law.shear(np.maximum(before.chip(sine, cosine), 0.0))
-    parts = [weights @ values for values in (shear * sine, shear * cosine, shear, sine, cosine)]
-    return np.stack([*parts, np.ones(len(low))]) * length
+    shear = law.shear(np.maximum(cut.before.chip(sine, cosine), 0.0))
+    parts = [weights @ wave for wave in (shear * sine, shear * cosine, shear, sine, cosine)]
+    depths = np.stack([*parts, np.ones(len(cut.angle))]) * (cut.depth * (cut.high - cut.low))
+    return np.stack([np.bincount(cut.angle, part, angles) for part in depths], axis=1)
 
 
 def _is_linear(law: EdgeLaw, thickness: float) -> bool:

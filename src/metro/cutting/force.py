@@ -9,9 +9,9 @@ import numpy as np
 from metro.cutting.arcs import arcs
 from metro.cutting.chip import Cut, chip_thickness
 from metro.cutting.cutter import Cutter
-from metro.cutting.edges import TURN, integrated
+from metro.cutting.edges import TURN, Pieces, integrated, pieces
 from metro.cutting.law import EdgeLaw
-from metro.cutting.passes import passes
+from metro.cutting.passes import Passes, passes
 from metro.units import Array
 
 __all__ = [
@@ -43,19 +43,31 @@ def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False)
     of ``COEFFICIENTS`` (shear in N per N/m², edge in N per N/m of axial depth). Read-only: it is cached.
     """
     angle = TURN * np.arange(ANGLES) / ANGLES
-    if true_path and cutter.runout_radius:
-        cutter = cutter.about_axis(0.5 * cut.axial_depth)
+    cutter = placed(cutter, cut, true_path)
     before = passes(cutter, cut, true_path, angle)
     bounds = arcs(before, cut.engagement)
     if before.sine.size == 1 and ANGLES % cutter.teeth == 0:  # teeth that are all alike: one pitch of angles
         angle = angle[: ANGLES // cutter.teeth]
-    lag = cutter.lag_per_depth * cut.axial_depth
-    span = max(abs(lag), TURN / ANGLES)
-    top = angle[:, None] + np.asarray(cutter.tooth_angles) + 0.5 * (span - lag)
-    pitch = _assembled(integrated(before, bounds, law, top, span) * (cut.axial_depth / span))
+    pitch = assembled(engaged(cutter, cut, before, bounds, angle, step=TURN / ANGLES), law, len(angle))
     basis = np.tile(pitch, (ANGLES // len(angle), 1, 1))
     basis.flags.writeable = False
     return basis
+
+
+def placed(cutter: Cutter, cut: Cut, true_path: bool) -> Cutter:
+    """Return the cutter with its teeth where runout puts them at half the depth: on true paths only."""
+    return cutter.about_axis(0.5 * cut.axial_depth) if true_path and cutter.runout_radius else cutter
+
+
+def engaged(cutter: Cutter, cut: Cut, before: Passes, bounds: Array, angle: Array, *, step: float) -> Pieces:
+    """Return the engaged pieces of the edges at angles (n,) of tooth 0, a ``step`` apart, rad.
+
+    Of an edge that lags by less than a step: as it turns through the step.
+    """
+    lag = cutter.lag_per_depth * cut.axial_depth
+    span = max(abs(lag), step)
+    top = angle[:, None] + np.asarray(cutter.tooth_angles) + 0.5 * (span - lag)
+    return pieces(before, bounds, top, span, cut.axial_depth / span)
 
 
 def mean_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) -> Array:
@@ -69,7 +81,8 @@ def mean_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) 
         return np.asarray(force_basis(cutter, law, cut, true_path).mean(axis=0))
     bounds = arcs(before, cut.engagement)
     top = np.full((1, cutter.teeth), bounds.max())
-    return _assembled(integrated(before, bounds, law, top, TURN)[0] * (cut.axial_depth / TURN))
+    whole = pieces(before, bounds, top, TURN, cut.axial_depth / TURN)
+    return np.asarray(assembled(whole, law, 1)[0])
 
 
 def mean_force(cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array) -> Array:
@@ -77,15 +90,13 @@ def mean_force(cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array) -> A
     return np.asarray(mean_basis(cutter, law, cut) @ coefficients)
 
 
-def _assembled(integrals: Array) -> Array:
-    """Project tangential, radial and axial edge forces on the axes: (…, 6) integrals to (…, 3, 6).
-
-    The integrals are shear × sin φ, shear × cos φ, shear, sin φ, cos φ, 1 along the edge, m (physics.md §2).
-    """
-    basis = np.zeros((*integrals.shape[:-1], 3, 6))
+def assembled(cut: Pieces, law: EdgeLaw, angles: int) -> Array:
+    """Force on the tool per unit of each coefficient, (angles, 3, 6), of pieces of edges (physics.md §2)."""
+    integrals = integrated(cut, law, angles)
+    basis = np.zeros((angles, 3, 6))
     for column in (0, 3):
-        along_sine, along_cosine, whole = np.moveaxis(integrals[..., column : column + 3], -1, 0)
-        basis[..., 0, column], basis[..., 1, column] = -along_cosine, along_sine
-        basis[..., 0, column + 1], basis[..., 1, column + 1] = -along_sine, -along_cosine
-        basis[..., 2, column + 2] = whole
+        along_sine, along_cosine, whole = integrals[:, column : column + 3].T
+        basis[:, 0, column], basis[:, 1, column] = -along_cosine, along_sine
+        basis[:, 0, column + 1], basis[:, 1, column + 1] = -along_sine, -along_cosine
+        basis[:, 2, column + 2] = whole
     return basis

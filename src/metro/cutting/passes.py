@@ -74,16 +74,17 @@ class Passes:
         return np.asarray(slope)
 
 
-def passes(cutter: Cutter, cut: Cut, true_path: bool, angle: Array) -> Passes:
+def passes(cutter: Cutter, cut: Cut, true_path: bool, angle: Array, *, every: bool = False) -> Passes:
     """Return the passes before each tooth at angles (n,) of tooth 0's tip, rad.
 
     (N or 1, n or 1, N or 1): without deviations of the radius the angles are alike, and the last pass counts
-    alone unless the path is curved; where pitch and deviations are equal as well, the teeth are alike.
+    alone unless the path is curved, or ``every`` one is wanted; where pitch and deviations are equal as
+    well, the teeth are alike.
     """
     deviation = _deviation(cutter)
     off = deviation.any()
     curvature = cut.curvature if true_path else 0.0
-    steps = range(1, cutter.teeth + 1 if off or curvature else 2)
+    steps = range(1, cutter.teeth + 1 if off or curvature or every else 2)
     pitch = np.stack([cutter.pitch(m) for m in steps])
     # At the height where tooth j has immersion φ tooth j+m is off by the real part of earlier × exp i(θ − φ).
     here = np.exp(1j * np.asarray(cutter.tooth_angles))

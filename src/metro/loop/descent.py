@@ -17,7 +17,7 @@ from metro.loop.noise import Noise
 from metro.observables.problem import Block, Model
 from metro.units import Array
 
-ITERATIONS = 25
+ITERATIONS = 40
 ENOUGH = 0.01  # gain in twice the log-likelihood below which a descent ends
 SHARES = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step, tried in turn until the cost falls
 THETA_STEP = 1e-3  # in units of the parameter's scale
@@ -176,7 +176,7 @@ def descend(
         else:
             break
         gain, system, state = system.cost - reached.cost, reached, trial
-        if gain < ENOUGH:
+        if gain < share * ENOUGH:
             break
         if step + 1 < steps:
             system = linearised(candidate, blocks, noise, state)

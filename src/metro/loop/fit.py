@@ -20,9 +20,11 @@ from metro.loop.noise import Noise
 from metro.observables.problem import Block
 from metro.units import Array
 
-FOLLOWED, KEPT = 4, 2  # starts of new effect parameters that are followed a few steps, and to the end
-FIRST_STEPS = 3
-ROUNDS = 3  # of noise estimation and descent
+FOLLOWED = 4  # starts of new effect parameters that are followed to the end
+FIRST_STEPS, KEPT = 3, 2  # where little is left to explain, after so many steps so many are kept
+HOPELESS = 1.0  # and none, where twice the log-likelihood has not gained that much per parameter: chance does
+UNDECIDED = 0.1  # differences in twice the log-likelihood that the noise, once known better, may turn round
+ROUNDS, SETTLED = 12, 0.2  # of noise estimation and descent; gain in twice the log-likelihood that ends them
 EM_STEPS = 8
 NUISANCE_STEPS = 8
 
@@ -89,19 +91,26 @@ def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fi
             trials.append((_search_nuisance(candidate, blocks, noise, state, around), len(trials), state))
         trials.sort(key=lambda trial: trial[:2])
         best = [state for *_, state in trials]
-    if fresh:
-        best = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS)[:KEPT]
-    reached = _lowest_first(candidate, blocks, noise, best[:KEPT], steps=ITERATIONS)[0]
-    return _refined(candidate, blocks, prior, noise, reached, rounds=ROUNDS)
+    best = best[: FOLLOWED if fresh else 1]
+    if start and fresh and all(missed < noise.budget for missed in noise.misfit.values()):
+        first = _lowest_first(candidate, blocks, noise, best, steps=FIRST_STEPS)
+        best = [state for _, state in first[:KEPT]]
+        here = State(start.theta, start.beta, dict(start.nuisance))
+        without = linearised(start.candidate, blocks, noise, here, derivatives=False).cost
+        if without - first[0][0] < HOPELESS * len(fresh):
+            return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
+    reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS)
+    near = [state for cost, state in reached if cost < reached[0][0] + UNDECIDED]
+    refined = [_refined(candidate, blocks, prior, noise, state, rounds=ROUNDS) for state in near]
+    return max(refined, key=lambda found: found.total)
 
 
 def _lowest_first(
     candidate: Candidate, blocks: Sequence[Block], noise: Noise, states: Sequence[State], *, steps: int
-) -> list[State]:
-    """Follow each state some steps down."""
+) -> list[tuple[float, State]]:
+    """Follow each state some steps down; return where they lead, with the cost there."""
     reached = [descend(candidate, blocks, noise, state, steps) for state in states]
-    order = np.argsort([cost for _, cost in reached], kind="stable")
-    return [reached[i][0] for i in order]
+    return sorted(((cost, state) for state, cost in reached), key=lambda pair: pair[0])
 
 
 def refit(start: Fit, blocks: Sequence[Block], prior: Noise) -> Fit:
@@ -176,10 +185,14 @@ def _images(block: Block, nuisance: Array) -> Array:
 def _refined(
     candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State, *, rounds: int
 ) -> Fit:
-    """Descend from a state and re-estimate the noise from the rest, in turn."""
+    """Re-estimate the noise from the rest and descend, in turn, until that gains next to nothing."""
+    before = np.inf
     for _ in range(rounds):
         noise = _reestimated(candidate, blocks, prior, noise, state)
-        state, _ = descend(candidate, blocks, noise, state)
+        state, cost = descend(candidate, blocks, noise, state)
+        if before - cost < SETTLED:
+            break
+        before = cost
     return _finished(candidate, blocks, noise, state, _covariance(candidate, blocks, noise, state))
 
 

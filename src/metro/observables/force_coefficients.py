@@ -21,8 +21,8 @@ INSEPARABLE = 0.98  # correlation of shear and edge term from which they are not
 def waveform(model: ForceModel, fit: BaseFit | None, *, turned: bool) -> JSON | Refusal:
     """Return the coefficients of the joint fit of all waveforms, with their intervals.
 
-    ``turned``: all runs are helical, and began nobody knows where on the orbit. The force in the plane is then
-    told but for a rotation: tangential and radial coefficients are not.
+    ``turned``: all runs are helical, and began nobody knows where on the orbit. The force in the plane is
+    then told but for a rotation: tangential and radial coefficients are not.
     """
     if fit is None:
         return Refusal("no run has the role identify")

@@ -12,6 +12,7 @@ from metro.cutting.cutter import Cutter
 from metro.cutting.force import COEFFICIENTS, Cut, force_basis
 from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped, turned
 from metro.cutting.law import EdgeLaw
+from metro.cutting.yielding_steady import NotBalancedError, yielding_basis
 from metro.observables.dynamometer import Dynamometer, Recording, read
 from metro.observables.problem import Block, Parameter
 from metro.signals.orders import advance, to_orders
@@ -19,6 +20,11 @@ from metro.units import N_MM, N_MM2, Array
 
 PHASES_PER_PITCH = 12
 ORBIT_PHASES = 12
+FEEDS = (
+    0.0,
+    math.pi / 3.0,
+    2.0 * math.pi / 3.0,
+)  # directions that tell all: a spring repeats after half a turn
 
 
 @dataclass(frozen=True)
@@ -44,11 +50,18 @@ class Structure:
     """How the machine answers the force.
 
     ``orbit_amplitude``, ``orbit_phase`` (rad): the axial force times 1 + amplitude × cos(ψ − phase), ψ the
-    direction of feed in helical milling.
+    direction of feed in helical milling. ``compliance`` of the tool's tip along work x, y, m/N.
     """
 
     orbit_amplitude: float = 0.0
     orbit_phase: float = 0.0
+    compliance: tuple[float, float] = (0.0, 0.0)
+
+    def seen(self, direction: float) -> tuple[float, float, float]:
+        """Compliance xx, yy, xy in a frame turned about z by the direction of feed, rad: m/N."""
+        x, y = self.compliance
+        c, s = math.cos(direction), math.sin(direction)
+        return c * c * x + s * s * y, s * s * x + c * c * y, c * s * (y - x)
 
 
 @dataclass(frozen=True)
@@ -87,24 +100,47 @@ class ForceModel:
         directions = 2.0 * math.pi * np.arange(ORBIT_PHASES) / ORBIT_PHASES
         return np.stack(np.meshgrid(phases, directions, indexing="ij"), axis=-1).reshape(-1, 2)
 
-    def design(self, block: Block, nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
-        """Order coefficients of the force per unit of each coefficient: rows (time block, axis, order)."""
+    def design(self, block: Block, nuisance: Array, beta: Array | None = None) -> tuple[Array, Array]:
+        """Order coefficients of the force per unit of each coefficient: rows (time block, axis, order).
+
+        A tool that yields is displaced as it is with the coefficients ``beta``; as long as they are not
+        known it is rigid.
+        """
         setting: ForceSetting = block.setting
         recording = setting.recording
-        basis = advance(
-            _order_basis(self.cutter, self.law, setting.cut, setting.highest, self.true_path),
-            float(nuisance[0]),
-        )
-        basis = basis * np.repeat([setting.feed_ratio, self.law.edge(setting.cut_length)], 3)
+        basis = advance(self._orders(setting, beta), float(nuisance[0]))
+        basis = basis * np.repeat([setting.feed_ratio, self.law.edge(setting.cut_length)], 3)[:, None]
         turn = setting.feed_direction
         if setting.helix is not None:
             basis = ramped(basis, setting.helix.ramp)
             turn = float(nuisance[1])
         if self.bottom_edges:
-            basis = np.concatenate([basis, self._bottom(setting, len(basis))], axis=2)
-        seen = self._seen(turned(basis, turn), setting, turn)
-        matrix = seen.transpose(0, 2, 1, 3).reshape(-1, basis.shape[2])
+            bottom = self._bottom(setting, len(basis))[..., None]
+            basis = np.concatenate([basis, np.repeat(bottom, basis.shape[3], axis=3)], axis=2)
+        count, feeds = basis.shape[2:]
+        seen = self._seen(turned(basis, turn).reshape(len(basis), 3, -1), setting, turn)
+        if feeds > 1:
+            shares = _shares_of_feeds(recording, turn)
+            seen = np.einsum("bhapf,bf->bhap", seen.reshape(*seen.shape[:3], count, feeds), shares)
+        matrix = seen.transpose(0, 2, 1, 3).reshape(-1, count)
         return matrix, self._drift(block, recording)
+
+    def _orders(self, setting: ForceSetting, beta: Array | None) -> Array:
+        """Order coefficients of the peripheral force, feed frame, (2H+1, 3, 6, feeds).
+
+        Of a tool that yields in helical milling for each direction of ``FEEDS``, else one.
+        """
+        tool, highest = (self.cutter, self.law, setting.cut), setting.highest
+        if beta is None or not any(self.structure.compliance):
+            return _order_basis(*tool, highest, self.true_path)[..., None]
+        worn = tuple((beta[:6] * np.repeat([1.0, self.law.edge(setting.cut_length)], 3)).tolist())
+        feeds = FEEDS if setting.helix else (setting.feed_direction,)
+        springs = [self.structure.seen(feed) for feed in feeds]
+        bases = [
+            _yielding_orders(*tool, spring, worn, highest=highest, true_path=self.true_path)
+            for spring in springs
+        ]
+        return np.stack(bases, axis=3)
 
     def _bottom(self, setting: ForceSetting, orders: int) -> Array:
         """Thrust of the bottom edges along z over the whole revolution: it is not inclined by the ramp."""
@@ -136,8 +172,47 @@ class ForceModel:
         return np.asarray(np.repeat(since, each) * (block.zeros @ self.sensor.drift))
 
 
+def _shares_of_feeds(recording: Recording, direction: float) -> Array:
+    """Shares (blocks, feeds) of ``FEEDS`` in each time block of an orbit; ``direction`` of feed at its start.
+
+    What a spring that stands makes of the force is nearly a sinusoid of twice the direction of feed: three
+    directions give it, and the time block averages it.
+    """
+    feed = direction + recording.orbit * np.array(recording.middles)
+    attenuation = np.sinc(recording.orbit * recording.span / math.pi)
+    wave = attenuation * np.cos(2.0 * (feed[:, None] - np.array(FEEDS)))
+    return np.asarray((1.0 + 2.0 * wave) / len(FEEDS))
+
+
 @lru_cache(maxsize=4096)
 def _order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path: bool) -> Array:
     basis = to_orders(force_basis(cutter, law, cut, true_path), highest)
     basis.flags.writeable = False
     return basis
+
+
+@lru_cache(maxsize=1024)
+def _yielding_orders(
+    cutter: Cutter,
+    law: EdgeLaw,
+    cut: Cut,
+    spring: tuple[float, float, float],
+    coefficients: tuple[float, ...],
+    *,
+    highest: int,
+    true_path: bool,
+) -> Array:
+    """Order coefficients of a tool that yields; one too soft to cut steadily is taken half as soft."""
+    along, across, mixed = spring
+    compliance = np.array([[along, mixed], [mixed, across]])
+    sharp = np.array(coefficients)
+    while True:
+        try:
+            basis = yielding_basis(cutter, law, cut, sharp, compliance, true_path=true_path)
+        except NotBalancedError:
+            compliance = 0.5 * compliance
+        else:
+            break
+    orders = to_orders(basis, highest)
+    orders.flags.writeable = False
+    return orders
