@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from metro.dynamics.band import depth_samples
+from metro.dynamics.band import depth_samples, depths_anew
 from metro.dynamics.lobes import stability_boundary
 from metro.dynamics.system import Cut, Structure
 
@@ -22,13 +22,13 @@ def test_samples_are_near_the_boundary_solved_anew():
     rng = np.random.default_rng(3)
     deviations = rng.normal(size=(6, 11)) * np.repeat([0.003, 0.03, 0.02, 0.02], [3, 3, 3, 2])
     samples = depth_samples(STRUCTURE, CUT, stability_boundary(STRUCTURE, CUT, RPM), deviations)
-    for sample, d in zip(samples, np.exp(deviations), strict=True):
+    anew = depths_anew(STRUCTURE, CUT, RPM, deviations)
+    for sample, solved, d in zip(samples, anew, np.exp(deviations), strict=True):
         structure = Structure(
             STRUCTURE.axis, STRUCTURE.omega * d[:3], STRUCTURE.zeta * d[3:6], STRUCTURE.stiffness * d[6:9]
         )
-        solved = stability_boundary(
-            structure, replace(CUT, ktc=CUT.ktc * d[9], krc=CUT.krc * d[10]), RPM
-        ).depth
+        cut = replace(CUT, ktc=CUT.ktc * d[9], krc=CUT.krc * d[10])
+        np.testing.assert_array_equal(solved, stability_boundary(structure, cut, RPM).depth)
         assert np.median(np.abs(np.log(sample / solved))) < 0.006
 
 

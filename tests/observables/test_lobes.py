@@ -40,7 +40,8 @@ def tables(directions=("x", "y")):
         part = pd.DataFrame({"frequency_hz": frequency, "real_m_n": frf.real, "imag_m_n": frf.imag})
         parts.append(part.assign(test="tip", position="1", reference=f"1{d}", response=f"1{d}", replicate=1))
     hit = pd.DataFrame(columns=[*COLUMNS, "response_unit", "t_s", "force_n", "response_si"])
-    return {"hit": hit, "frf": pd.concat(parts, ignore_index=True)}
+    stations = pd.DataFrame(columns=["position", "x_mm", "y_mm", "z_mm"])
+    return {"hit": hit, "frf": pd.concat(parts, ignore_index=True), "stations": stations}
 
 
 def batch(**changes):
@@ -53,6 +54,7 @@ def batch(**changes):
             "spindle_rpm": [700.0, 700.0, 900.0, 1200.0],
             "axial_depth_mm": [0.05, 20.0, 0.3, 0.3],
             "radial_depth_mm": 3.0,
+            "feed_per_tooth_mm": 0.05,
             "feed_direction_deg": np.nan,
             "pose": "1",
             "stable": ["yes", "no", "yes", ""],
@@ -185,6 +187,7 @@ def test_without_runs_the_lobes_are_refused_and_the_modes_kept():
 
 def test_without_impacts_there_is_nothing():
     source = {name: table.iloc[:0] for name, table in tables().items()}
+    source["published"] = pd.DataFrame(columns=["observable", "quantity", "row", "axis", "measured", "note"])
     refused = lobes.observe(batch(), lambda name: source[name], {})
     assert isinstance(refused, Refusal)
     assert "impacts.csv" in refused.reason

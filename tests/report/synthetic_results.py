@@ -61,9 +61,24 @@ def lobe_rows():
 def boundary():
     rpm = np.linspace(1000, 4000, 120)
     depth = 1 + 0.6 * np.abs(np.sin(rpm / 300))
-    return pd.DataFrame(
-        {"position": 1, "rpm": rpm, "depth_mm": depth, "depth_lo_mm": 0.9 * depth, "depth_hi_mm": 1.1 * depth}
-    )
+    columns = {"depth_lo_mm": 0.8, "depth_p05_mm": 0.9, "depth_p95_mm": 1.1, "depth_hi_mm": 1.2}
+    bands = {name: factor * depth for name, factor in columns.items()}
+    kind = np.where(rpm > 3000, "flip", "hopf")
+    rest = {"kind": kind, "error_mm": 1e-4 * depth, "interpolated": False}
+    return pd.DataFrame({"position": "1", "rpm": rpm, "depth_mm": depth, **bands, **rest})
+
+
+def methods():
+    line = boundary().iloc[::6]
+    depth = line["depth_mm"]
+    other = {"cdsem_mm": 0.909, "single_mode_mm": 0.9, "semidiscretisation_mm": 1.0002, "tool_mm": 1.03}
+    columns = {name: factor * depth for name, factor in other.items()}
+    mode = np.where(line["rpm"] > 2000, "x4", "x3")
+    return line[["position", "rpm", "depth_mm"]].assign(governing_mode=mode, checked=True, **columns)
+
+
+def islands():
+    return pd.DataFrame({"position": "1", "rpm": [1500.0, 1525.0], "from_mm": 1.7, "to_mm": 1.9})
 
 
 def responses():
@@ -235,6 +250,8 @@ def tables():
         "qc": qc,
         "comparison": comparison,
         "lobes_final": boundary(),
+        "lobe_methods": methods(),
+        "lobe_islands": islands(),
         "face_map": face_map,
         "frf_used": responses(),
     }

@@ -1,7 +1,6 @@
 """Figures show what is in the frame, name their units, and are the same for the same data."""
 
 import numpy as np
-import pandas as pd
 import synthetic_results as synthetic
 
 from metro.report.figures import comparison, surface, verdicts
@@ -46,19 +45,6 @@ def test_residual_bands_hold_the_median_of_every_bin():
     axes = comparison.residuals(rows("deformation"), "deformation").axes[0]
     frame = rows("deformation")
     assert np.allclose(lines(axes)["base model"], frame["measured"] - frame["before"])
-
-
-def test_a_chart_of_lobes_marks_chatter_and_stable_cuts_apart():
-    tests = pd.DataFrame(
-        {"position": ["1", "1"], "rpm": [2000.0, 3000.0], "depth_mm": [1.5, 0.5], "measured": [1.0, 0.0]}
-    )
-    axes = surface.lobes_chart(synthetic.boundary(), tests).axes[0]
-    points = {
-        c.get_label(): c.get_offsets().tolist()
-        for c in axes.collections
-        if c.get_label() in {"stable cut", "chatter"}
-    }
-    assert points == {"stable cut": [[3000.0, 0.5]], "chatter": [[2000.0, 1.5]]}
 
 
 def test_changes_show_the_errors_they_are_given():

@@ -38,6 +38,8 @@ def test_empty_and_absent_tables_are_left_out_and_sources_are_gathered(tmp_path)
         "runs.csv",
         "comparison.csv",
         "lobes_final.csv",
+        "lobe_methods.csv",
+        "lobe_islands.csv",
         "face_map.csv",
         "frf_used.csv",
     }

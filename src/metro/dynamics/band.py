@@ -13,7 +13,7 @@ import numpy as np
 
 from metro.dynamics import crossings
 from metro.dynamics.crossings import Candidates
-from metro.dynamics.lobes import Boundary, fine_kernel, groups
+from metro.dynamics.lobes import Boundary, fine_kernel, groups, stability_boundary
 from metro.dynamics.system import Cut, Structure
 from metro.units import Array
 
@@ -44,6 +44,22 @@ def depth_samples(structure: Structure, cut: Cut, boundary: Boundary, deviations
     return depths
 
 
+def depths_anew(structure: Structure, cut: Cut, rpm: Array, deviations: Array) -> Array:
+    """Depths (s, k) of the same samples solved from scratch, to see what first order is worth."""
+    m = len(structure.omega)
+    depths = []
+    for factor in np.exp(deviations):
+        changed = replace(
+            structure,
+            omega=structure.omega * factor[:m],
+            zeta=structure.zeta * factor[m : 2 * m],
+            stiffness=structure.stiffness * factor[2 * m : 3 * m],
+        )
+        harder = replace(cut, ktc=cut.ktc * factor[3 * m], krc=cut.krc * factor[3 * m + 1])
+        depths.append(stability_boundary(changed, harder, rpm).depth)
+    return np.stack(depths)
+
+
 def _log_slopes(structure: Structure, cut: Cut, rpm: Array, at: Candidates) -> Array:
     """(c, 3 m + 2) derivatives of log(1/depth) of each crossing by the logarithms of the parameters."""
     base = np.log(_followed(structure, cut, rpm, at))
@@ -53,8 +69,8 @@ def _log_slopes(structure: Structure, cut: Cut, rpm: Array, at: Candidates) -> A
 
 
 def _followed(structure: Structure, cut: Cut, rpm: Array, at: Candidates) -> Array:
-    refined, _, converged = crossings.refine(fine_kernel(structure, cut, rpm), at, 2)
-    return np.where(converged, refined.inverse, np.nan)
+    found = crossings.refine(fine_kernel(structure, cut, rpm), at, 2)
+    return np.where(found.converged, found.at.inverse, np.nan)
 
 
 def _perturbed(structure: Structure, cut: Cut) -> Iterator[tuple[Structure, Cut]]:

@@ -22,6 +22,8 @@ import numpy as np
 from metro.dynamics.system import Cut, Structure, chip_direction
 from metro.units import Array, ComplexArray
 
+_NEGLIGIBLE = 0.03  # share of the free vibrations below which one is left out of the reduced equation
+
 
 @dataclass(frozen=True)
 class Arc:
@@ -63,6 +65,11 @@ class Kernel:
     states: ComplexArray
     drive: ComplexArray
     decay: ComplexArray
+
+    def take(self, speed: np.ndarray) -> Kernel:
+        """Return the equation at the speeds of index ``speed``."""
+        parts = (self.period, self.volterra, self.states, self.drive, self.decay)
+        return Kernel(*(part[speed] for part in parts))
 
 
 def panels_of(cut: Cut) -> list[tuple[float, float, int]]:
@@ -172,8 +179,29 @@ def _product_weights(n: int) -> Array:
     return weights
 
 
-def spectral_radius(equation: Kernel, depth: Array) -> Array:
-    """(k,) largest modulus of the Floquet multipliers at axial depths (k,) in metres.
+def reduced(equation: Kernel) -> Kernel:
+    """Project the equation on half as many functions, those that carry its large eigenvalues.
+
+    They are the free vibrations and what the response to the cut makes of them, again and again: as that
+    response is a Volterra operator, its powers fade faster than geometrically.
+    """
+    n, poles = equation.states.shape[1:]
+    free = equation.states[:, :, : poles // 2]
+    u, s, _ = np.linalg.svd(np.concatenate([free.real, free.imag], axis=2), full_matrices=False)
+    basis = last = u[:, :, : int(np.sum(s > _NEGLIGIBLE * s[:, :1], axis=1).max())]
+    while basis.shape[2] < 0.6 * n:
+        image = equation.volterra @ last
+        for _ in range(2):  # once leaves rounding errors of the parts taken away
+            image -= basis @ (basis.transpose(0, 2, 1) @ image)
+        last = np.linalg.qr(image)[0]
+        basis = np.concatenate([basis, last], axis=2)[:, :, :n]
+    onto = basis.transpose(0, 2, 1)
+    volterra, states = onto @ equation.volterra @ basis, onto @ equation.states
+    return Kernel(equation.period, volterra, states, equation.drive @ basis, equation.decay)
+
+
+def multipliers(equation: Kernel, depth: Array) -> ComplexArray:
+    """(k, p + n) Floquet multipliers at axial depths (k,) in metres.
 
     The period map acts on the modal states at the period's begin and the displacements of the period before.
     """
@@ -188,5 +216,10 @@ def spectral_radius(equation: Kernel, depth: Array) -> Array:
     moved = depth * equation.drive @ change
     moved[:, :, :p] += np.eye(p)
     period_map = np.concatenate([equation.decay[:, :, None] * moved, top], axis=1)
-    radius: Array = np.abs(np.linalg.eigvals(period_map)).max(axis=1)
+    return np.linalg.eigvals(period_map).astype(complex)
+
+
+def spectral_radius(equation: Kernel, depth: Array) -> Array:
+    """(k,) largest modulus of the Floquet multipliers at axial depths (k,) in metres."""
+    radius: Array = np.abs(multipliers(equation, depth)).max(axis=1)
     return radius

@@ -18,7 +18,8 @@ from metro.dynamics.system import Structure
 from metro.units import Array, ComplexArray
 
 _FOLLOWED = 8
-_KEEP = 1.5  # candidates deeper than this many times the lowest cannot win after refinement
+_AT_ONE = 1e-5  # half the angle of a multiplier, rad
+_RESIDUAL = 1e-4  # of an eigenvalue: below it Newton's method has converged, or will in the steps to come
 
 
 @dataclass(frozen=True)
@@ -33,10 +34,16 @@ class Candidates:
         """Those at the indices, or under the mask, ``which``."""
         return Candidates(self.speed[which], self.theta[which], self.inverse[which])
 
-    def distinct(self) -> Candidates:
-        """Each crossing once, where several starts led to it."""
+    def near_lowest(self, factor: float) -> Candidates:
+        """Those up to ``factor`` times the lowest depth of their speed."""
+        best = np.zeros(self.speed.max(initial=0) + 1)
+        np.maximum.at(best, self.speed, self.inverse)
+        return self.take(self.inverse * factor > best[self.speed])
+
+    def distinct(self) -> np.ndarray:
+        """Return the indices of each crossing once, where several starts led to it."""
         keys = np.stack([self.speed, np.round(np.log(self.inverse), 6)], axis=1)
-        return self.take(np.unique(keys, axis=0, return_index=True)[1])
+        return np.unique(keys, axis=0, return_index=True)[1]
 
     @staticmethod
     def join(parts: Sequence[Candidates]) -> Candidates:
@@ -46,6 +53,31 @@ class Candidates:
             np.concatenate([part.theta for part in parts]),
             np.concatenate([part.inverse for part in parts]),
         )
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Crossings after Newton's method.
+
+    Attributes
+    ----------
+    at : the c crossings.
+    shape : (c, n) eigenvectors: the vibration along the arc.
+    rate : (c,) derivative of the eigenvalue by theta, 1/m.
+    converged : (c,) whether it is one.
+    """
+
+    at: Candidates
+    shape: ComplexArray
+    rate: ComplexArray
+    converged: np.ndarray
+
+    @property
+    def leaves(self) -> np.ndarray:
+        """(c,) whether the multiplier leaves the unit circle as the depth grows (else it comes back)."""
+        # with 1/a = value(mu): d(log mu)/da = -i / (a² rate), whose real part has the sign of -Im rate
+        leaves: np.ndarray = self.rate.imag < 0.0
+        return leaves
 
 
 def angles(structure: Structure, period: Array, count: int) -> Array:
@@ -58,32 +90,31 @@ def angles(structure: Structure, period: Array, count: int) -> Array:
     columns += [at[:, narrow] + step * width[:, narrow] for step in (-1.5, -0.5, 0.5, 1.5)]
     folded = np.abs((np.concatenate(columns, axis=1) + np.pi) % (2.0 * np.pi) - np.pi)
     inner = np.sort(np.clip(folded, 1e-3, np.pi - 1e-3), axis=1)
-    return np.concatenate([inner, np.full((len(period), 2), (np.pi - 1e-3, np.pi))], axis=1)
+    return np.concatenate([inner, np.full((len(period), 1), np.pi)], axis=1)
 
 
-def matrix(
-    equation: Kernel, theta: Array, speed: np.ndarray | slice = slice(None)
-) -> tuple[ComplexArray, ComplexArray]:
-    """S(theta) and its derivative by theta, (c, n, n) each, at angles (c,) and speeds ``speed``."""
-    volterra, states, drive = equation.volterra[speed], equation.states[speed], equation.drive[speed]
-    decay, mu = equation.decay[speed], np.exp(1j * theta)[:, None]
+def matrix(equation: Kernel, theta: Array) -> ComplexArray:
+    """S(theta) (k, t, n, n) at angles (k, t)."""
+    mu = np.exp(1j * theta)[:, :, None]
+    decay = equation.decay[:, None]
     gain = decay / (mu - decay)
-    slope = -1j * mu * decay / (mu - decay) ** 2
-    turn = (1.0 - 1.0 / mu)[:, :, None]
-    closed = volterra + (states * gain[:, None, :]) @ drive
-    return turn * closed, (1j / mu)[:, :, None] * closed + turn * ((states * slope[:, None, :]) @ drive)
+    closed: ComplexArray = (equation.states[:, None] * gain[:, :, None, :]) @ equation.drive[:, None]
+    closed += equation.volterra[:, None]
+    closed *= (1.0 - 1.0 / mu)[:, :, :, None]
+    return closed
 
 
-def scan(structure: Structure, equation: Kernel, count: int) -> Candidates:
-    """Follow the eigenvalues over theta and return the crossings that may be the lowest at their speed."""
+def scan(structure: Structure, equation: Kernel, count: int, followed: float = _FOLLOWED) -> Candidates:
+    """Follow the eigenvalues over theta and return the crossings, roughly and some of them twice.
+
+    At most the ``followed`` largest eigenvalues of each angle: these are the least depths.
+    """
     theta = angles(structure, equation.period, count)
-    k, t = theta.shape
-    S = matrix(equation, theta.ravel(), np.repeat(np.arange(k), t))[0]
-    values: ComplexArray = np.linalg.eigvals(S).astype(complex).reshape(k, t, -1)
-    keep = min(_FOLLOWED, values.shape[2])
-    order = np.argsort(-np.abs(values), axis=2)[:, :, :keep]
+    values: ComplexArray = np.linalg.eigvals(matrix(equation, theta)).astype(complex)
+    keep = int(min(followed, values.shape[2]))
+    order = np.argpartition(-np.abs(values), keep - 1, axis=2)[:, :, :keep]
     values = np.take_along_axis(values, order, axis=2)
-    speed, place, left, right = _links(values[:, :-1])
+    speed, place, left, right = _links(values)
     a, b = values[speed, place, left], values[speed, place + 1, right]
     share = np.clip(a.imag / np.where(a.imag == b.imag, np.inf, a.imag - b.imag), 0.0, 1.0)
     inverse = a.real + share * (b.real - a.real)
@@ -91,12 +122,11 @@ def scan(structure: Structure, equation: Kernel, count: int) -> Candidates:
     hopf = (a.imag * b.imag <= 0.0) & (inverse > 0.0)
     end = values[:, -1]
     row, column = np.nonzero((np.abs(end.imag) <= 1e-9 * np.abs(end)) & (end.real > 0.0))
-    found = Candidates(
+    return Candidates(
         np.concatenate([speed[hopf], row]),
         np.concatenate([at[hopf], np.full(len(row), np.pi)]),
         np.concatenate([inverse[hopf], end.real[row, column]]),
     )
-    return _lowest_few(found, k)
 
 
 def _links(values: ComplexArray) -> tuple[np.ndarray, ...]:
@@ -109,46 +139,47 @@ def _links(values: ComplexArray) -> tuple[np.ndarray, ...]:
     return tuple(np.concatenate([f.ravel(), b.ravel()]) for f, b in zip(forward, backward, strict=True))
 
 
-def _lowest_few(found: Candidates, speeds: int) -> Candidates:
-    """Drop what is repeated and what is too deep to become the lowest."""
-    best = np.zeros(speeds)
-    np.maximum.at(best, found.speed, found.inverse)
-    keys = np.round(np.stack([found.speed, found.theta * 1e6, found.inverse], axis=1), 0)
-    first = np.unique(keys, axis=0, return_index=True)[1]
-    first = first[found.inverse[first] * _KEEP > best[found.speed[first]]]
-    return Candidates(found.speed[first], found.theta[first], found.inverse[first])
-
-
-def refine(equation: Kernel, start: Candidates, steps: int) -> tuple[Candidates, ComplexArray, np.ndarray]:
-    """Newton's method on theta for a real eigenvalue of S(theta), by inverse iteration from both sides.
-
-    Returns
-    -------
-    The refined candidates, their eigenvectors (c, n), and whether each converged to a crossing (c,).
-    """
+def refine(equation: Kernel, start: Candidates, steps: int) -> Refined:
+    """Newton's method on theta for a real eigenvalue of S(theta), by inverse iteration from both sides."""
     theta, shift = start.theta.copy(), start.inverse.astype(complex)
-    n = equation.states.shape[1]
-    x = np.random.default_rng(0).normal(size=(len(theta), n)).astype(complex)
-    y = x.copy()
+    here = equation.take(start.speed)
+    n = here.states.shape[1]
+    x = np.random.default_rng(0).normal(size=(len(theta), n, 1)).astype(complex)
+    y = x.transpose(0, 2, 1)
+    rate = np.zeros(len(theta), dtype=complex)
     converged = np.zeros(len(theta), dtype=bool)
     for step in range(steps):
-        S, slope = matrix(equation, theta, start.speed)
+        S = matrix(here, theta[:, None])[:, 0]
         shifted = np.linalg.inv(S - (shift * (1.0 + 1e-9))[:, None, None] * np.eye(n))
         for _ in range(4 if step == 0 else 1):  # the first vectors are random
-            x, y = _unit(np.einsum("cij,cj->ci", shifted, x)), _unit(np.einsum("cji,cj->ci", shifted, y))
-        pairing = np.einsum("ci,ci->c", y, x)
-        image = np.einsum("cij,cj->ci", S, x)
-        value = np.einsum("ci,ci->c", y, image) / pairing
-        rate = np.einsum("ci,cij,cj->c", y, slope, x, optimize=True) / pairing
+            x, y = _unit(shifted @ x), _unit(y @ shifted)
+        pairing = (y @ x)[:, 0, 0]
+        image = S @ x
+        value = (y @ image)[:, 0, 0] / pairing
+        rate = (y @ _slope(here, theta, x))[:, 0, 0] / pairing
         change = np.clip(-value.imag / np.where(rate.imag == 0.0, np.inf, rate.imag), -0.3, 0.3)
-        residual = np.linalg.norm(image - value[:, None] * x, axis=1)
-        converged = np.maximum(residual, np.abs(value.imag)) < 1e-4 * np.abs(value)
-        theta = theta + change
-        shift = value + rate * change
+        residual = np.linalg.norm(image - value[:, None, None] * x, axis=(1, 2))
+        converged = np.maximum(residual, np.abs(value.imag)) < _RESIDUAL * np.abs(value)
+        # at mu = 1 every depth is infinite: who gets there starts again
+        lost = np.abs(np.sin((theta + change) / 2.0)) < _AT_ONE
+        theta = np.where(lost, start.theta, theta + change)
+        shift = np.where(lost, start.inverse, value + rate * change)
+        converged &= ~lost
     converged &= shift.real > 0.0
-    return Candidates(start.speed, theta, shift.real), x, converged
+    return Refined(Candidates(start.speed, theta, shift.real), x[:, :, 0], rate, converged)
+
+
+def _slope(equation: Kernel, theta: Array, x: ComplexArray) -> ComplexArray:
+    """Apply the derivative of S(theta) by theta to ``x`` (c, n, 1)."""
+    mu = np.exp(1j * theta)[:, None, None]
+    decay = equation.decay[:, :, None]
+    driven = equation.drive @ x
+    closed = equation.volterra @ x + equation.states @ (decay / (mu - decay) * driven)
+    gain_slope = -1j * mu * decay / (mu - decay) ** 2
+    change: ComplexArray = 1j / mu * closed + (1.0 - 1.0 / mu) * (equation.states @ (gain_slope * driven))
+    return change
 
 
 def _unit(vectors: ComplexArray) -> ComplexArray:
-    unit: ComplexArray = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    unit: ComplexArray = vectors / np.linalg.norm(vectors, axis=(1, 2), keepdims=True)
     return unit

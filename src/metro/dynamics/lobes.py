@@ -14,15 +14,19 @@ import numpy as np
 
 from metro.dynamics import collocation, crossings
 from metro.dynamics.collocation import Arc, Kernel
-from metro.dynamics.crossings import Candidates
+from metro.dynamics.crossings import Candidates, Refined
 from metro.dynamics.system import Cut, Structure
 from metro.units import Array, ComplexArray
 
 # Points per radian of the fastest vibration, further points per panel, and multiplier angles of the scan.
 # Gauss points resolve an oscillation from 1/2 per radian on and converge exponentially beyond.
 # The later efforts are for speeds at which the first one missed a crossing: peaks of the lobes, mostly.
-_EFFORTS = ((0.65, 5, 14), (0.75, 8, 40), (0.9, 12, 120))
-_EXTRA_POINTS = 6  # of the second resolution, which gives the result and, by its difference, the error
+_EFFORTS = ((0.65, 4, 7), (0.75, 9, 40), (0.9, 12, 120))
+_EXTRA_POINTS = 5  # from one resolution to the next; the difference is the error
+_RESOLUTIONS, _TOLERANCE = 3, 5e-4  # at most, and the relative error that is good enough
+_BELOW = (0.995, 0.88, 0.5)  # shares of a boundary at which the cut must be stable
+_ASIDE = 0.1  # rad beside a multiplier's angle
+_KEEP = 1.5  # crossings deeper than this many times the lowest cannot become it
 
 
 @dataclass(frozen=True)
@@ -59,10 +63,10 @@ def stability_boundary(structure: Structure, cut: Cut, rpm: Array) -> Boundary:
         return result
     parts: list[Candidates] = []
     for members in groups(structure, cut, rpm):
-        group = members
+        group, hints = members, result.crossings
         for effort in _EFFORTS:
-            part = _solve(structure, cut, rpm[group], effort)
-            again = _unstable_below(structure, cut, rpm[group], part.depth, effort)
+            part = _solve(structure, cut, rpm[group], effort, hints)
+            again, hints = _missed(structure, cut, rpm[group], part.depth, effort)
             for name in ("depth", "chatter_hz", "kind", "error"):
                 getattr(result, name)[group] = getattr(part, name)
             last = effort is _EFFORTS[-1]
@@ -77,8 +81,7 @@ def stability_boundary(structure: Structure, cut: Cut, rpm: Array) -> Boundary:
 def spectral_radius(structure: Structure, cut: Cut, rpm: Array, depth: Array) -> Array:
     """Largest modulus of the Floquet multipliers at speeds (k,) rev/min and axial depths (k,) m."""
     rpm, depth = np.broadcast_arrays(np.asarray(rpm, dtype=float), np.asarray(depth, dtype=float))
-    arc = _arc(structure, cut, rpm, 2.0, _EXTRA_POINTS)
-    return collocation.spectral_radius(_kernel(structure, cut, arc, rpm), depth)
+    return collocation.spectral_radius(discretised(structure, cut, rpm, 2.0, _EXTRA_POINTS)[1], depth)
 
 
 def groups(structure: Structure, cut: Cut, rpm: Array) -> Iterator[np.ndarray]:
@@ -95,46 +98,64 @@ def _cycles(structure: Structure, cut: Cut, rpm: Array) -> Array:
     return radians
 
 
-def _arc(structure: Structure, cut: Cut, rpm: Array, per_radian: float, extra: int) -> Arc:
-    """Points for the slowest of ``rpm``: ``per_radian`` of the fastest vibration, ``extra`` per panel."""
+def discretised(
+    structure: Structure, cut: Cut, rpm: Array, per_radian: float, extra: int
+) -> tuple[Arc, Kernel]:
+    """Discretise for the slowest of ``rpm``: points per radian of the fastest vibration, and per panel."""
     radians = float(_cycles(structure, cut, rpm).max())
     points = [
         math.ceil(per_radian * radians * (end - start)) + extra
         for start, end, _ in collocation.panels_of(cut)
     ]
-    return collocation.collocate(structure, cut, tuple(points))
-
-
-def _kernel(structure: Structure, cut: Cut, arc: Arc, rpm: Array) -> Kernel:
-    return collocation.kernel(structure, arc, cut.tooth_period(rpm))
+    arc = collocation.collocate(structure, cut, tuple(points))
+    return arc, collocation.kernel(structure, arc, cut.tooth_period(rpm))
 
 
 def fine_kernel(structure: Structure, cut: Cut, rpm: Array) -> Kernel:
-    """Discretise at the resolution of the boundary's first effort, for speeds of one group."""
+    """Discretise at the second resolution of the boundary's first effort, for speeds of one group."""
     share, extra, _ = _EFFORTS[0]
-    return _kernel(structure, cut, _arc(structure, cut, rpm, share, extra + _EXTRA_POINTS), rpm)
+    return discretised(structure, cut, rpm, share, extra + _EXTRA_POINTS)[1]
 
 
-def _solve(structure: Structure, cut: Cut, rpm: Array, effort: tuple[float, int, int]) -> Boundary:
-    """Scan at one resolution, refine there and at a second one, take the lowest."""
+def _solve(
+    structure: Structure, cut: Cut, rpm: Array, effort: tuple[float, int, int], hints: Candidates
+) -> Boundary:
+    """Scan at a low resolution, refine at rising ones until two agree, take the lowest crossings.
+
+    ``hints``: crossings that may be near, to be refined with those of the scan.
+    """
     share, extra, count = effort
-    arcs = [_arc(structure, cut, rpm, share, points) for points in (extra, extra + _EXTRA_POINTS)]
-    middle, fine = (_kernel(structure, cut, arc, rpm) for arc in arcs)
-    first, _, good = crossings.refine(middle, crossings.scan(structure, middle, count), 4)
-    last, shapes, converged = crossings.refine(fine, first, 3)
-    converged &= good
-    order = np.argsort(last.inverse)
-    order = order[converged[order]]
-    winner = np.full(len(rpm), -1)
-    winner[last.speed[order]] = order  # the largest 1/depth of each speed is written last
-    found, best = winner >= 0, winner[winner >= 0]
-    result = replace(_nothing(rpm), crossings=last.take(order).distinct())
-    result.depth[found] = 1.0 / last.inverse[best]
-    result.error[found] = np.abs(1.0 / last.inverse[best] - 1.0 / first.inverse[best])
-    theta = last.theta[best]
-    result.kind[found] = np.where(np.abs(theta - np.pi) < 1e-6, "flip", "hopf")
-    result.chatter_hz[found] = _chatter_hz(structure, arcs[1], fine.period[found], theta, shapes[best])
+    _, equation = discretised(structure, cut, rpm, share, extra)
+    start = crossings.scan(structure, collocation.reduced(equation), count).near_lowest(_KEEP)
+    start = Candidates.join([start.take(start.distinct()), hints])
+    found = crossings.refine(equation, start, 5)
+    for _ in range(_RESOLUTIONS):
+        before = found.at.take(found.at.inverse > 0.0)
+        before = before.take(before.distinct())
+        extra += _EXTRA_POINTS
+        arc, equation = discretised(structure, cut, rpm, share, extra)
+        found = crossings.refine(equation, before, 2)
+        rising = _rising(found)
+        winner = np.full(len(rpm), -1)
+        winner[found.at.speed[rising]] = rising  # the largest 1/depth of each speed is written last
+        hit, best = winner >= 0, winner[winner >= 0]
+        change = np.abs(found.at.inverse[best] / before.inverse[best] - 1.0)
+        if np.all(change < _TOLERANCE):
+            break
+    result = replace(_nothing(rpm), crossings=found.at.take(rising))
+    theta = found.at.theta[best]
+    result.depth[hit] = 1.0 / found.at.inverse[best]
+    result.error[hit] = change * result.depth[hit]
+    result.kind[hit] = kind(theta)
+    result.chatter_hz[hit] = chatter_hz(structure, arc, equation.period[hit], theta, found.shape[best])
     return result
+
+
+def _rising(found: Refined) -> np.ndarray:
+    """Return the indices of the crossings that Newton's method found, by rising 1/depth."""
+    order = np.argsort(found.at.inverse)
+    rising: np.ndarray = order[found.converged[order]]
+    return rising
 
 
 def _nothing(rpm: Array) -> Boundary:
@@ -145,7 +166,12 @@ def _nothing(rpm: Array) -> Boundary:
     )
 
 
-def _chatter_hz(structure: Structure, arc: Arc, period: Array, theta: Array, shape: ComplexArray) -> Array:
+def kind(theta: Array) -> np.ndarray:
+    """Return "flip" where a multiplier of angle ``theta`` is -1, else "hopf"."""
+    return np.where(np.abs(theta - np.pi) < 1e-6, "flip", "hopf")
+
+
+def chatter_hz(structure: Structure, arc: Arc, period: Array, theta: Array, shape: ComplexArray) -> Array:
     """Frequency (k,) of the largest of the vibration's lines (theta + 2 pi j) / period, j integer."""
     if not len(theta):
         return theta
@@ -158,12 +184,28 @@ def _chatter_hz(structure: Structure, arc: Arc, period: Array, theta: Array, sha
     return np.abs(strongest) / (2.0 * np.pi)
 
 
-def _unstable_below(
+def _missed(
     structure: Structure, cut: Cut, rpm: Array, depth: Array, effort: tuple[float, int, int]
-) -> np.ndarray:
-    """(k,) whether the cut is unstable a little below the boundary: then a crossing was missed."""
-    # where nothing was found: at this depth the cut is as stiff as the structure
-    stiff = structure.stiffness.min() / max(abs(cut.ktc), abs(cut.krc))
-    below = np.where(np.isfinite(depth), 0.995 * depth, stiff)
-    arc = _arc(structure, cut, rpm, effort[0], effort[1] + _EXTRA_POINTS)
-    return collocation.spectral_radius(_kernel(structure, cut, arc, rpm), below) > 1.0 + 1e-6
+) -> tuple[np.ndarray, Candidates]:
+    """Tell where a crossing was missed: where there is none, or the cut is unstable below it.
+
+    Returns
+    -------
+    (k,) whether; and for these speeds, numbered anew, the multipliers that are outside the unit circle: the
+    crossing is not far from them.
+    """
+    missed = ~np.isfinite(depth)
+    below = np.where(missed, 0.0, depth)
+    equation = discretised(structure, cut, rpm, effort[0], effort[1] + _EXTRA_POINTS)[1]
+    cheap = collocation.reduced(equation)
+    outside = []
+    for share in _BELOW:
+        multipliers = collocation.multipliers(cheap, share * below)
+        largest = multipliers[np.arange(len(rpm)), np.abs(multipliers).argmax(axis=1)]
+        speed = np.flatnonzero(np.abs(largest) > 1.0 + 1e-6)
+        theta, inverse = np.abs(np.angle(largest[speed])), 1.0 / (share * below[speed])
+        # to either side too: an island starts with one crossing and ends with another
+        outside += [Candidates(speed, theta + aside, inverse) for aside in (-_ASIDE, 0.0, _ASIDE)]
+        missed[speed] = True
+    hints = Candidates.join(outside)
+    return missed, replace(hints, speed=np.searchsorted(np.flatnonzero(missed), hints.speed))

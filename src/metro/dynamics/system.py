@@ -42,6 +42,11 @@ class Structure:
         """(m,) residues of the receptance at :attr:`poles`: 1 / (2 i m omega_d), m/(N s)."""
         return self.omega**2 / (2j * self.stiffness * self.poles.imag)
 
+    def mode(self, which: int) -> Structure:
+        """One mode alone."""
+        parts = (self.axis, self.omega, self.zeta, self.stiffness)
+        return Structure(*(part[[which]] for part in parts))
+
     def receptance(self, omega: Array) -> ComplexArray:
         """Receptance of x and y at angular frequencies of shape (...): (..., 2), m/N."""
         ratio = np.asarray(omega)[..., None] / self.omega

@@ -10,15 +10,26 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
-from metro.observables import stability
+from metro.observables import lobe_methods, lobe_positions, printed_modes, stability
+from metro.observables.lobe_positions import Tip
 from metro.observables.modal_test import Read, observe_modes
 from metro.observables.problem import Refusal
 from metro.observables.quantity import quantity
 from metro.units import JSON, MM, Array
 
 OBSERVABLE = "lobes"
-_COLUMNS = ("position", "rpm", "depth_mm", "depth_lo_mm", "depth_hi_mm", "chatter_hz", "kind")
-_RUN_COLUMNS = ("run", "position", "rpm", "depth_mm", "boundary_mm", "unstable", "probability_unstable")
+_PRINTED = "modes as printed, without intervals: the bands hold the uncertainty of the coefficients alone"
+# Columns of the tables that are written even where they have no rows.
+_COLUMNS: dict[str, tuple[str, ...]] = {
+    "lobes": (
+        *("position", "rpm", "depth_mm", "depth_lo_mm", "depth_hi_mm", "depth_p05_mm", "depth_p95_mm"),
+        *("chatter_hz", "kind", "error_mm", "interpolated"),
+    ),
+    "lobe_runs": ("run", "position", "rpm", "depth_mm", "boundary_mm", "unstable", "probability_unstable"),
+    "lobe_methods": lobe_methods.METHOD_COLUMNS,
+    "lobe_islands": lobe_methods.ISLAND_COLUMNS,
+    "lobe_stations": lobe_methods.STATION_COLUMNS,
+}
 
 
 @dataclass(frozen=True)
@@ -49,38 +60,62 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
     """Identify the modes of every position and solve the lobes of the cuts that were made there.
 
     Tables ``modes``, ``frf_used``, ``lobes`` (diagram per position), ``lobe_runs`` (probability per run with
-    a depth), ``lobes_refused`` (reasons and notes).
+    a depth), those of :mod:`metro.observables.lobe_methods`, ``lobes_refused`` (reasons and notes).
     """
     modes, used, notes = observe_modes(read)
+    if modes.empty and not notes:
+        published = read("published")
+        modes = printed_modes.printed_modes(published)
+        identified = {**printed_modes.printed_coefficients(published), **identified}
+        notes = [] if modes.empty else [_PRINTED]
     if modes.empty:
         return Refusal("; ".join(notes) or "no impacts.csv: no hammer record and no FRF")
-    tables = {"modes": modes, "frf_used": used}
     found = stability.cutting(batch, identified)
-    tips = stability.tips(modes, notes)
-    diagrams, runs, reason = [], [], ""
-    if isinstance(found, Refusal):
-        reason = found.reason
-    else:
+    tips = lobe_positions.tips(modes, notes)
+    where = lobe_positions.places(read("stations"))
+    parts: dict[str, list[pd.DataFrame]] = {}
+    if not isinstance(found, Refusal):
         notes += stability.assumptions(batch)
-        for rows, tip in stability.pairs(batch, tips, notes):
-            cuts = sorted(stability.same_cut(rows), key=len, reverse=True)
-            for place, same in enumerate(cuts):
-                # one boundary per position: of the cut that most of its runs share
-                diagram, at_runs = stability.diagram(batch, found, tip, same, whole=place == 0)
-                runs.append(at_runs)
-                diagrams += [diagram] if place == 0 and len(diagram) else []
-    reason = reason or ("" if diagrams else "no run with a depth of cut at a position whose modes are known")
-    tables["lobes"] = (
-        pd.concat(diagrams, ignore_index=True) if diagrams else pd.DataFrame(columns=list(_COLUMNS))
-    )
-    tables["lobe_runs"] = (
-        pd.concat(runs, ignore_index=True) if runs else pd.DataFrame(columns=list(_RUN_COLUMNS))
-    )
+        parts = _solved(batch, found, lobe_positions.pairs(batch, tips, where, notes), where, notes)
+    tables = {name: _joined(parts.get(name, []), columns) for name, columns in _COLUMNS.items()}
+    reason = "no run with a depth of cut at a position whose modes are known" if tables["lobes"].empty else ""
+    reason = found.reason if isinstance(found, Refusal) else reason
     said = [("refusal", reason)] if reason else []
-    tables["lobes_refused"] = pd.DataFrame(
-        [*said, *(("note", n) for n in notes)], columns=["kind", "reason"], dtype=str
-    )
-    return tables
+    refused = pd.DataFrame([*said, *(("note", n) for n in notes)], columns=["kind", "reason"], dtype=str)
+    return {"modes": modes, "frf_used": used, **tables, "lobes_refused": refused}
+
+
+def _joined(parts: list[pd.DataFrame], columns: tuple[str, ...]) -> pd.DataFrame:
+    filled = [part for part in parts if len(part)]
+    return pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(columns))
+
+
+def _solved(
+    batch: Batch,
+    found: stability.Cutting,
+    pairs: list[tuple[pd.DataFrame, Tip]],
+    where: Mapping[str, Array],
+    notes: list[str],
+) -> dict[str, list[pd.DataFrame]]:
+    """Tables of lobes, as parts to be joined: one boundary per position, of the cut that most runs share."""
+    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in _COLUMNS}
+    solved = []
+    for rows, tip in pairs:
+        for place, same in enumerate(sorted(stability.same_cut(rows), key=len, reverse=True)):
+            whole = place == 0
+            rpm = stability.speeds_of(same, whole=whole)
+            lobes = stability.solve(tip, found, same.iloc[0], rpm, check=whole)
+            parts["lobe_runs"].append(stability.run_probabilities(batch, lobes, same))
+            if whole and np.any(np.isfinite(lobes.boundary.depth)):
+                solved.append(lobes)
+                feed = float(same["feed_per_tooth_mm"].iloc[0]) * MM
+                deepest = stability.deepest(lobes, same)
+                parts["lobes"].append(stability.diagram(lobes))
+                parts["lobe_methods"].append(lobe_methods.methods(lobes, found.tool, feed))
+                parts["lobe_islands"].append(lobe_methods.islands(lobes, deepest))
+    parts["lobe_stations"].append(lobe_methods.stations(solved, where))
+    notes += stability.worth(solved)
+    return parts
 
 
 def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON) -> LabelProblem | Refusal:

@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
-from metro.dynamics.band import depth_samples
+from metro.cutting.cutter import Cutter
+from metro.dynamics.band import depth_samples, depths_anew
 from metro.dynamics.lobes import Boundary, stability_boundary
-from metro.dynamics.system import Cut, Structure, immersion
+from metro.dynamics.system import Cut, immersion
+from metro.dynamics.teeth import equal_teeth, mean_directional_factors
 from metro.observables import cutting_force
+from metro.observables.lobe_positions import Tip
 from metro.observables.problem import Refusal
 from metro.units import DEG, JSON, MM, N_MM2, Array
 
 SPEEDS = 80  # of a diagram
 ORBIT_DIRECTIONS = 4  # of feed, over the half turn after which the cut repeats itself
-SAMPLES = 400
+_STEPS = 17  # of a tooth period, at which cuts are compared
+SAMPLES = 600
+ANEW, ANEW_EVERY = (
+    6,
+    8,
+)  # samples solved from scratch, at every so many speeds, to see what first order is worth
 # Standard deviations of logarithms: of the depth, for what the model leaves out (helix, process damping,
 # runout, the operator's threshold); of a coefficient that comes without its interval.
 MODEL_SD = 0.15
 COEFFICIENT_SD = 0.03
 LABEL_ERROR = 0.005  # probability that a label is wrong whatever the depth
-
-
-@dataclass(frozen=True)
-class Tip:
-    """Structure at a position; ``sd`` (3 m,) of the logarithms of omega, zeta, stiffness."""
-
-    position: str
-    structure: Structure
-    sd: Array
 
 
 @dataclass(frozen=True)
@@ -42,15 +41,35 @@ class Cutting:
     ----------
     ktc, krc : N/m².
     sd : (2,) standard deviations of their logarithms.
-    teeth : number of teeth.
-    diameter : m.
+    tool : its teeth.
     """
 
     ktc: float
     krc: float
     sd: Array
-    teeth: int
-    diameter: float
+    tool: Cutter
+
+
+@dataclass(frozen=True)
+class Lobes:
+    """Lowest boundary over the directions in which a cut is fed, and how sure it is.
+
+    Attributes
+    ----------
+    tip, cuts, turns : structure; the cut in each direction of feed, and these directions (rad).
+    boundary : k speeds.
+    which : (k,) index of the cut that is the least stable.
+    samples : (s, k) m, lowest depths under the uncertainty of modes and coefficients.
+    anew : (r, j) ratio of some of the samples, at some speeds, to solving them from scratch.
+    """
+
+    tip: Tip
+    cuts: tuple[Cut, ...]
+    turns: tuple[float, ...]
+    boundary: Boundary
+    which: np.ndarray
+    samples: Array
+    anew: Array = field(default_factory=lambda: np.ones((0, 0)))
 
 
 def cutting(batch: Batch, identified: JSON) -> Cutting | Refusal:
@@ -67,38 +86,7 @@ def cutting(batch: Batch, identified: JSON) -> Cutting | Refusal:
         interval = [end for end in (waveform.get(name) or {}).get("ci95") or () if end is not None]
         known = len(interval) == 2 and values[name] != 0
         sd.append((interval[1] - interval[0]) / (2 * 1.96 * abs(values[name])) if known else COEFFICIENT_SD)
-    return Cutting(
-        values["ktc"] * N_MM2, values["krc"] * N_MM2, np.array(sd), len(tool.tooth_angles), 2 * tool.radius
-    )
-
-
-def tips(modes: pd.DataFrame, notes: list[str]) -> list[Tip]:
-    """Structures of the positions: x and y of the tool; with modes in x and z alone, z stands for y."""
-    tips = []
-    for position, rows in modes[modes["used"].astype(bool)].groupby("position", sort=False):
-        letters = [str(d).lstrip("+-") for d in rows["direction"]]
-        second = "y" if "y" in letters or "z" not in letters else "z"
-        if second == "z":
-            notes.append(
-                f"position {position}: modes in x and z: z is taken as the second direction of cutting"
-            )
-        notes += [
-            f"position {position}: no modes in {d}: rigid there" for d in ("x", second) if d not in letters
-        ]
-        inside = np.isin(letters, ["x", second])
-        kept = rows[inside]
-        if kept.empty:
-            continue
-        axis = np.array([0 if letter == "x" else 1 for letter in np.array(letters)[inside]])
-        omega = 2 * np.pi * kept["frequency_hz"].to_numpy(float)
-        zeta, stiffness = kept["damping"].to_numpy(float), kept["stiffness_n_m"].to_numpy(float)
-        relative = [
-            kept["frequency_sd_hz"] / kept["frequency_hz"],
-            kept["damping_sd"] / kept["damping"],
-            kept["stiffness_sd"] / kept["stiffness_n_m"],
-        ]
-        tips.append(Tip(str(position), Structure(axis, omega, zeta, stiffness), np.concatenate(relative)))
-    return tips
+    return Cutting(values["ktc"] * N_MM2, values["krc"] * N_MM2, np.array(sd), tool)
 
 
 def assumptions(batch: Batch) -> list[str]:
@@ -115,80 +103,147 @@ def assumptions(batch: Batch) -> list[str]:
     return notes
 
 
-def pairs(batch: Batch, tips: list[Tip], notes: list[str]) -> list[tuple[pd.DataFrame, Tip]]:
-    """Pair the runs of each pose with its structure; one structure alone serves every pose."""
-    runs = batch.runs[(batch.runs["axial_depth_mm"] > 0) & (batch.runs["spindle_rpm"] > 0)]
-    if len(tips) == 1:
-        tip = tips[0]
-        away = [
-            str(p) for p in runs["pose"].unique() if str(p) not in ("", "nan", tip.position.split("/")[0])
-        ]
-        if away:
-            notes.append(f"the modes of position {tip.position} are used at pose {', '.join(away)} too")
-        return [(runs, tip)] if len(runs) else []
-    pairs = [(runs[runs["pose"].astype(str) == tip.position.split("/")[0]], tip) for tip in tips]
-    return [(rows, tip) for rows, tip in pairs if len(rows)]
-
-
 def same_cut(runs: pd.DataFrame) -> list[pd.DataFrame]:
     """Group the runs that share one diagram: operation, direction, radial depth, feed direction."""
     keys = ["operation", "direction", "radial_depth_mm", "feed_direction_deg"]
     return [rows for _, rows in runs.groupby(keys, sort=False, dropna=False)]
 
 
-def _cuts(first: pd.Series, cutting: Cutting) -> list[Cut]:
-    """Cuts in the frame of the modes, turned by the feed direction; several for a helix."""
-    helical = first["operation"] == "helical"
-    direction = "slot" if helical else str(first["direction"])
-    radial = cutting.diameter if pd.isna(first["radial_depth_mm"]) else first["radial_depth_mm"] * MM
-    entry, leave = immersion(direction, radial, cutting.diameter)
-    feed = 0.0 if pd.isna(first["feed_direction_deg"]) else float(first["feed_direction_deg"])
-    turns = np.arange(ORBIT_DIRECTIONS) * np.pi / ORBIT_DIRECTIONS if helical else np.array([feed * DEG])
-    return [
-        Cut(cutting.teeth, entry - float(turn), leave - float(turn), cutting.ktc, cutting.krc)
-        for turn in turns
-    ]
+def _directions(first: pd.Series) -> tuple[float, ...]:
+    """Directions of feed in the frame of the modes, rad; several for a helix."""
+    if first["operation"] == "helical":
+        return tuple(np.arange(ORBIT_DIRECTIONS) * np.pi / ORBIT_DIRECTIONS)
+    return (0.0 if pd.isna(first["feed_direction_deg"]) else float(first["feed_direction_deg"]) * DEG,)
 
 
-def diagram(
-    batch: Batch, found: Cutting, tip: Tip, runs: pd.DataFrame, *, whole: bool
-) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Lobes over the range of the runs' speeds, or at those speeds alone, and the probability of each run."""
+def _cut(first: pd.Series, cutting: Cutting, turn: float) -> Cut:
+    """Cut in the frame of the modes: its immersion is turned by the direction of feed."""
+    direction = "slot" if first["operation"] == "helical" else str(first["direction"])
+    diameter = 2 * cutting.tool.radius
+    radial = diameter if pd.isna(first["radial_depth_mm"]) else first["radial_depth_mm"] * MM
+    entry, leave = immersion(direction, radial, diameter)
+    return Cut(len(cutting.tool.tooth_angles), entry - turn, leave - turn, cutting.ktc, cutting.krc)
+
+
+def _distinct(turned: list[tuple[float, Cut]]) -> tuple[tuple[float, ...], tuple[Cut, ...]]:
+    """Drop directions that act like one before: a slot with four teeth pushes the same way in all of them."""
+    kept: list[tuple[float, Cut]] = []
+    known: list[Array] = []
+    for turn, cut in turned:
+        factors, _ = mean_directional_factors(equal_teeth(cut), np.zeros(1), _STEPS)
+        if not any(np.allclose(factors, other, atol=1e-9 * np.abs(factors).max()) for other in known):
+            kept.append((turn, cut))
+            known.append(factors)
+    turns, cuts = zip(*kept, strict=True)
+    return turns, cuts
+
+
+def speeds_of(runs: pd.DataFrame, *, whole: bool) -> Array:
+    """Speeds of the runs, rev/min; with the range about them where a ``whole`` diagram is wanted.
+
+    That is the range which they span and a tenth more; for a single speed, from a quarter of it to a quarter
+    above.
+    """
     speeds = runs["spindle_rpm"].to_numpy(float)
     low, high = speeds.min(), speeds.max()
-    margin = 0.1 * (high - low) if high > low else 0.2 * low
-    between = np.linspace(low - margin, high + margin, SPEEDS if whole else 0)
-    rpm = np.unique(np.concatenate([between, speeds]))
-    cuts = _cuts(runs.iloc[0], found)
-    boundary, samples = _lowest_over(tip, cuts, rpm, found.sd)
+    margin = 0.1 * (high - low)
+    ends = (low - margin, high + margin) if high > low else (0.25 * low, 1.25 * low)
+    between = np.linspace(*ends, SPEEDS if whole else 0)
+    return np.unique(np.concatenate([between, speeds]))
+
+
+def solve(tip: Tip, found: Cutting, first: pd.Series, rpm: Array, *, check: bool) -> Lobes:
+    """Lowest boundary over the directions of feed of a cut whose settings are ``first``'s.
+
+    ``check``: solve some of the samples from scratch too.
+    """
+    turns, cuts = _distinct([(turn, _cut(first, found, turn)) for turn in _directions(first)])
+    sd = np.concatenate([tip.sd, found.sd])
+    deviations = np.random.default_rng(1).normal(size=(SAMPLES, len(sd))) * np.where(np.isfinite(sd), sd, 0.0)
+    boundaries = [stability_boundary(tip.structure, cut, rpm) for cut in cuts]
+    samples = [
+        depth_samples(tip.structure, cut, one, deviations) for cut, one in zip(cuts, boundaries, strict=True)
+    ]
+    which = np.argmin([one.depth for one in boundaries], axis=0)
+    lobes = Lobes(tip, cuts, turns, _lowest(boundaries, which), which, np.min(samples, axis=0))
+    if not check:
+        return lobes
+    some = slice(ANEW_EVERY // 2, None, ANEW_EVERY)
+    solved = [depths_anew(tip.structure, cut, rpm[some], deviations[:ANEW]) for cut in cuts]
+    return replace(lobes, anew=lobes.samples[:ANEW, some] / np.min(solved, axis=0))
+
+
+def _lowest(boundaries: list[Boundary], which: np.ndarray) -> Boundary:
+    """Boundary that is, speed by speed, the one of index ``which``."""
+    depth, chatter, error = (
+        np.choose(which, [getattr(one, name) for one in boundaries])
+        for name in ("depth", "chatter_hz", "error")
+    )
+    kind = np.array([one.kind for one in boundaries])[which, np.arange(len(which))]
+    return replace(boundaries[0], depth=depth, chatter_hz=chatter, error=error, kind=kind)
+
+
+def diagram(lobes: Lobes) -> pd.DataFrame:
+    """Boundary with its bands: of modes and coefficients (5 to 95 %), and with the model's error (95 %)."""
+    boundary = lobes.boundary
     scatter = np.random.default_rng(2).normal(size=(SAMPLES, 1)) * MODEL_SD
-    band = np.quantile(samples * np.exp(scatter), [0.025, 0.975], axis=0, method="nearest")
-    diagram = pd.DataFrame(
+    band = np.quantile(lobes.samples * np.exp(scatter), [0.025, 0.975], axis=0, method="nearest")
+    inner = np.quantile(lobes.samples, [0.05, 0.95], axis=0, method="nearest")
+    finite = np.isfinite(boundary.depth)
+    return pd.DataFrame(
         {
-            "position": tip.position,
-            "rpm": rpm,
+            "position": lobes.tip.position,
+            "rpm": boundary.rpm,
             "depth_mm": boundary.depth / MM,
             "depth_lo_mm": np.minimum(band[0], boundary.depth) / MM,
             "depth_hi_mm": np.maximum(band[1], boundary.depth) / MM,
+            "depth_p05_mm": inner[0] / MM,
+            "depth_p95_mm": inner[1] / MM,
             "chatter_hz": boundary.chatter_hz,
             "kind": boundary.kind.astype(str),
+            "error_mm": boundary.error / MM,
+            "interpolated": lobes.tip.interpolated,
         }
-    )
-    at = np.searchsorted(rpm, speeds)
+    ).loc[finite]
+
+
+def deepest(lobes: Lobes, runs: pd.DataFrame) -> float:
+    """Depth (m) down to which all changes of stability are sought: about what is drawn."""
+    depth = lobes.boundary.depth[np.isfinite(lobes.boundary.depth)]
+    tested = float(runs["axial_depth_mm"].max()) * MM
+    return min(max(2.5 * float(depth.min()), float(np.median(depth)), tested), 4.0 * float(depth.min()))
+
+
+def worth(solved: list[Lobes]) -> list[str]:
+    """Return what the bands are worth: how far samples to first order are from the same solved anew."""
+    ratios = [np.abs(np.log(one.anew[np.isfinite(one.anew)])) for one in solved]
+    every = np.concatenate([*ratios, np.zeros(0)])
+    if not len(every):
+        return []
+    median, most = 100.0 * np.quantile(every, [0.5, 0.95])
+    return [
+        f"the bands are of {SAMPLES} samples to first order in the parameters; {len(every)} depths solved "
+        f"anew differ from theirs by {median:.2g} % in the median, by less than {most:.2g} % in 95 of 100"
+    ]
+
+
+def run_probabilities(batch: Batch, lobes: Lobes, runs: pd.DataFrame) -> pd.DataFrame:
+    """Boundary and probability of chatter at each of the runs, whose speeds are among the boundary's."""
+    speeds = runs["spindle_rpm"].to_numpy(float)
+    at = np.searchsorted(lobes.boundary.rpm, speeds)
     depth = runs["axial_depth_mm"].to_numpy(float) * MM
     labels = batch.runs.loc[runs.index, "stable"].astype(str)
-    rows = pd.DataFrame(
+    return pd.DataFrame(
         {
             "run": runs.index.astype(str),
-            "position": tip.position,
+            "position": lobes.tip.position,
             "rpm": speeds,
             "depth_mm": depth / MM,
-            "boundary_mm": boundary.depth[at] / MM,
+            "boundary_mm": lobes.boundary.depth[at] / MM,
             "unstable": labels.map({"no": 1, "yes": 0}).fillna(-1).astype(int).to_numpy(),
-            "probability_unstable": probability_unstable(depth, samples[:, at]),
+            "probability_unstable": probability_unstable(depth, lobes.samples[:, at]),
         }
     )
-    return diagram[np.isfinite(diagram["depth_mm"])], rows
 
 
 def probability_unstable(depth: Array, boundary_samples: Array) -> Array:
@@ -198,25 +253,3 @@ def probability_unstable(depth: Array, boundary_samples: Array) -> Array:
     distance = np.log(depth) - np.log(boundary_samples)
     probability: Array = norm.cdf(distance / MODEL_SD).mean(axis=0)
     return LABEL_ERROR + (1.0 - 2.0 * LABEL_ERROR) * probability
-
-
-def _lowest_over(tip: Tip, cuts: list[Cut], rpm: Array, coefficient_sd: Array) -> tuple[Boundary, Array]:
-    """Lowest boundary over the cuts, and samples (s, k) of it under the given uncertainty."""
-    sd = np.concatenate([tip.sd, coefficient_sd])
-    deviations = np.random.default_rng(1).normal(size=(SAMPLES, len(sd))) * np.where(np.isfinite(sd), sd, 0.0)
-    lowest, samples = None, np.full((SAMPLES, len(rpm)), np.inf)
-    for cut in cuts:
-        boundary = stability_boundary(tip.structure, cut, rpm)
-        samples = np.minimum(samples, depth_samples(tip.structure, cut, boundary, deviations))
-        lowest = boundary if lowest is None else _lower(lowest, boundary)
-    assert lowest is not None  # there is at least one cut
-    return lowest, samples
-
-
-def _lower(a: Boundary, b: Boundary) -> Boundary:
-    deeper = a.depth > b.depth
-    chosen = {
-        name: np.where(deeper, getattr(b, name), getattr(a, name))
-        for name in ("depth", "chatter_hz", "kind", "error")
-    }
-    return replace(a, **chosen)

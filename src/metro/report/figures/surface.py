@@ -1,4 +1,4 @@
-"""Faces and stability charts: what is drawn over a plane rather than along a line."""
+"""Faces, drawn over a plane, and frequency responses."""
 
 from __future__ import annotations
 
@@ -87,62 +87,6 @@ def face_maps(frame: pd.DataFrame) -> Figure:
 def _raster(part: pd.DataFrame) -> tuple[Array, Array, Array]:
     table = part.pivot_table(index="y_mm", columns="x_mm", values="deviation_um")
     return table.columns.to_numpy(float), table.index.to_numpy(float), table.to_numpy(float)
-
-
-def lobes_chart(boundary: pd.DataFrame, tests: pd.DataFrame) -> Figure:
-    """Draw stability boundaries with their 95 % band, and the test cuts on them.
-
-    Parameters
-    ----------
-    boundary : ``position, rpm, depth_mm, depth_lo_mm, depth_hi_mm``.
-    tests : ``position, rpm, depth_mm, measured`` (1 = unstable), ``before``, ``after``; may be empty.
-    """
-    positions = list(boundary["position"].drop_duplicates())[:4]
-    columns = min(2, len(positions))
-    with style.style():
-        figure, grid = style.new_figure(
-            0.6 + 2.3 * -(-len(positions) // columns), -(-len(positions) // columns), columns
-        )
-        flat = [axes for row in grid for axes in row]
-        for axes, position in zip(flat, positions, strict=False):
-            line = boundary[boundary["position"] == position].sort_values("rpm")
-            axes.fill_between(
-                line["rpm"],
-                line["depth_lo_mm"],
-                line["depth_hi_mm"],
-                color=style.SKY,
-                alpha=0.35,
-                lw=0,
-                label="95 % band",
-            )
-            axes.plot(line["rpm"], line["depth_mm"], color=style.AFTER, label="stability boundary")
-            here = tests[tests["position"].astype(str) == str(position)]
-            for unstable, mark, label in ((0, "o", "stable cut"), (1, "X", "chatter")):
-                part = here[here["measured"].round() == unstable]
-                axes.scatter(
-                    part["rpm"],
-                    part["depth_mm"],
-                    marker=mark,
-                    s=28,
-                    c=style.BEFORE if unstable else style.GREEN,
-                    edgecolors="white",
-                    lw=0.5,
-                    zorder=3,
-                    label=label,
-                )
-            axes.set_title(f"position {position}", loc="left")
-            axes.set(xlabel="spindle speed (rpm)", ylabel="depth of cut (mm)")
-            axes.set_ylim(0, 1.15 * _top(line, here))
-        for axes in flat[len(positions) :]:
-            axes.set_visible(False)
-        style.legend_above(figure, flat[0])
-    return figure
-
-
-def _top(line: pd.DataFrame, tests: pd.DataFrame) -> float:
-    """Upper end of the depth axis: what the tests reach, and the lower lobes; not the peaks between them."""
-    depths = [2.5 * float(line["depth_mm"].min()), float(line["depth_mm"].median())]
-    return max([*depths, float(tests["depth_mm"].max())] if len(tests) else depths)
 
 
 def responses(frf: pd.DataFrame) -> Figure:

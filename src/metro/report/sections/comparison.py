@@ -8,9 +8,10 @@ import pandas as pd
 from metro.report.content import Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import comparison as figures
 from metro.report.figures import surface
-from metro.report.numbers import listing, number, percent, probability, unit
+from metro.report.numbers import listing, number, percent, unit
 from metro.report.results import OBSERVABLES, Results, title
 from metro.report.sections.force import force_items
+from metro.report.sections.lobes import cut_items
 
 LONGEST = 30
 FEWEST = 3  # values of a run along an axis that make a curve
@@ -25,7 +26,7 @@ def comparison(results: Results) -> Section:
             name = title(observable)
             items.append(Heading(name[0].upper() + name[1:]))
             merit = force_items(results) if observable == "force" else []
-            items += _labels(results, frame) if observable == "lobes" else _values(frame, name, merit)
+            items += cut_items(results, frame) if observable == "lobes" else _values(frame, name, merit)
     if not items:
         nothing = "No held-out run has both a measurement and a prediction: there is nothing to compare."
         return Section("Predicted against measured", [Paragraph(nothing)])
@@ -102,52 +103,3 @@ def errors(frame: pd.DataFrame) -> Table:
         caption += f" The first {LONGEST} of {len(rows)} rows; comparison.parquet has all."
     header = ["run", "axis", "measured", "base model", "with effects", "gain", "values"]
     return Table(header, rows[:LONGEST], caption, [2, 0.6, 1, 1, 1, 0.8, 0.8], numeric=[2, 3, 4, 5, 6])
-
-
-def _labels(results: Results, frame: pd.DataFrame) -> list[Item]:
-    tests = _tests(results, frame)
-    items: list[Item] = []
-    boundary = results.tables.get("lobes_final")
-    if boundary is not None:
-        right = {k: int(((frame[k] > 0.5) == (frame["measured"] > 0.5)).sum()) for k in ("before", "after")}
-        caption = (
-            f"Stability boundary and held-out test cuts. On the right side of it: {right['before']} of "
-            f"{len(frame)} with the base model, {right['after']} with the effects found."
-        )
-        items.append(Picture(surface.lobes_chart(boundary, tests), caption, caption))
-    rows = [
-        [
-            str(r["run"]),
-            number(r["rpm"]),
-            number(r["depth_mm"]),
-            "chatter" if r["measured"] > 0.5 else "stable",
-            probability(r["before"]),
-            probability(r["after"]),
-        ]
-        for _, r in tests.head(LONGEST).iterrows()
-    ]
-    header = [
-        "run",
-        "speed (rpm)",
-        "depth (mm)",
-        "found",
-        "P(chatter), base model",
-        "P(chatter), with effects",
-    ]
-    more = f" The first {LONGEST} of {len(tests)}." if len(tests) > LONGEST else ""
-    items.append(
-        Table(header, rows, f"Held-out test cuts.{more}", [1.4, 1, 1, 1, 1.4, 1.4], numeric=[1, 2, 4, 5])
-    )
-    return items
-
-
-def _tests(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
-    """Join the held-out labels to where they were cut."""
-    runs = results.batch.runs
-    at = runs.reindex(frame["run"])
-    position = at["pose"].astype(str).to_numpy() if "pose" in runs else [""] * len(frame)
-    return frame.assign(
-        position=position,
-        rpm=at["spindle_rpm"].to_numpy(float),
-        depth_mm=at["axial_depth_mm"].to_numpy(float),
-    )

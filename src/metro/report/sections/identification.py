@@ -10,6 +10,7 @@ from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Sec
 from metro.report.figures import surface as figures
 from metro.report.numbers import number, quantity, unit, words
 from metro.report.results import Results
+from metro.report.sections.lobes import boundaries
 from metro.units import JSON
 
 COEFFICIENTS = {
@@ -42,7 +43,7 @@ def identification(results: Results) -> Section:
         *_force(found.get("force") or {}),
         *_yielding(results.tables.get("yielding")),
         *_modes(found.get("modes") or [], results.tables.get("frf_used")),
-        *_lobes(found.get("lobes") or []),
+        *boundaries(results),
         *_arm(found.get("arm") or {}),
         *_tip(found.get("tip") or {}),
         *_faces(found.get("faces") or {}, results.tables.get("face_map")),
@@ -158,20 +159,6 @@ def _feedback(row: pd.Series) -> list[str]:
     plain = str(row["iterations_fixed_point"])
     differences = (number(row["entry_difference_n"]), number(row["difference_n"]))
     return [f"{row['iterations_newton']:.0f}", plain, *differences]
-
-
-def _lobes(lobes: list[JSON]) -> list[Item]:
-    if not lobes:
-        return []
-    rows = [[str(b.get("position", "–")), _cell(b.get("lowest_mm"), "mm")] for b in lobes]
-    return [
-        Heading("Stability"),
-        Table(["position", "lowest limit of the depth of cut"], rows, "Stability boundaries.", [1, 2]),
-    ]
-
-
-def _cell(value: Any, unit_name: str) -> str:
-    return quantity(value) if isinstance(value, dict) else f"{number(value)} {unit_name}"
 
 
 def _arm(arm: JSON) -> list[Item]:

@@ -1,0 +1,86 @@
+"""The published method of the helical-milling machine: complete discretisation with Euler's method (CDSEM).
+
+State, delayed state and derivative are all differenced; an interpolation between the ends of the step makes
+it explicit (0), the midpoint rule (1/2) or implicit (1). Each mode is solved alone and the lowest boundary
+counts: neither is exact, and neither bounds what the coupled modes do.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from metro.dynamics import periodmap
+from metro.dynamics.lobes import stability_boundary
+from metro.dynamics.periodmap import PeriodMap
+from metro.dynamics.system import Cut, Structure, chip_direction
+from metro.units import Array
+
+MIDPOINT = 0.5
+
+
+def single_mode_depths(structure: Structure, cut: Cut, rpm: Array) -> Array:
+    """Lowest depths (m, k) in metres of each of the m modes solved alone, at speeds (k,) rev/min."""
+    alone = [structure.mode(i) for i in range(len(structure.omega))]
+    return np.stack([stability_boundary(one, cut, rpm).depth for one in alone])
+
+
+def steps_for_stability(structure: Structure, cut: Cut, rpm: float) -> int:
+    """Return the steps per tooth period above which explicit Euler steps do not make free vibration grow."""
+    ratio = structure.omega * float(cut.tooth_period(np.array(rpm))) / (2.0 * structure.zeta)
+    return math.floor(float(ratio.max())) + 1
+
+
+def cdsem_depths(structure: Structure, cut: Cut, rpm: Array, exact: Array) -> Array:
+    """Depths (m, k) in metres at which CDSEM has each mode alone become unstable, near ``exact`` (m, k).
+
+    By the midpoint rule, with as many steps as the explicit rule would need to be stable; infinite where
+    ``exact`` is.
+    """
+    mode, speed = np.nonzero(np.isfinite(exact))
+    depths = np.full(exact.shape, np.inf)
+    steps = steps_for_stability(structure, cut, float(np.min(rpm)))
+    if len(mode):
+        depths[mode, speed] = periodmap.unit_radius(
+            lambda depth: spectral_radius(structure, cut, mode, rpm[speed], depth, steps=steps),
+            exact[mode, speed],
+        )
+    return depths
+
+
+def spectral_radius(
+    structure: Structure,
+    cut: Cut,
+    mode: np.ndarray,
+    rpm: Array,
+    depth: Array,
+    *,
+    steps: int,
+    interpolation: float = MIDPOINT,
+) -> Array:
+    """Largest modulus of the multipliers of modes ``mode`` (c,) alone, at speeds and depths (c,)."""
+    axis, omega, zeta = structure.axis[mode], structure.omega[mode], structure.zeta[mode]
+    factor = _node_factors(cut, steps)[:, axis].T  # (c, steps + 1)
+    between = (1.0 - interpolation) * factor[:, :-1] + interpolation * factor[:, 1:]
+    dt = cut.tooth_period(rpm) / steps
+    regenerative = depth[:, None] * between * (omega / structure.stiffness[mode])[:, None]
+    rate = np.zeros((len(mode), steps, 2, 2))  # of the states q and q' / omega
+    rate[..., 0, 1] = omega[:, None]
+    rate[..., 1, 0] = regenerative - omega[:, None]
+    rate[..., 1, 1] = -2.0 * (zeta * omega)[:, None]
+    rate *= dt[:, None, None, None]
+    solve = np.linalg.inv(np.eye(2) - interpolation * rate)
+    push = solve @ np.stack([np.zeros_like(regenerative), -dt[:, None] * regenerative], axis=-1)[..., None]
+    delayed = np.stack([interpolation * push, (1.0 - interpolation) * push], axis=2)
+    state = solve @ (np.eye(2) + (1.0 - interpolation) * rate)
+    out = np.array([[1.0, 0.0]])
+    return periodmap.spectral_radius(PeriodMap(state, delayed, np.array([steps, steps + 1]), out))
+
+
+def _node_factors(cut: Cut, steps: int) -> Array:
+    """Force along x, and along y, per depth and displacement along itself, at the nodes (steps + 1, 2)."""
+    phi = cut.pitch * (np.arange(steps + 1)[:, None] / steps + np.arange(-cut.teeth, cut.teeth))
+    inside = (phi > cut.entry - 1e-9) & (phi < cut.exit - 1e-9)  # of two teeth that change places, one
+    factors: Array = (inside[..., None] * cut.force_direction(phi) * chip_direction(phi)).sum(axis=1)
+    return factors

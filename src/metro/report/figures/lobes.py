@@ -1,0 +1,190 @@
+"""Stability charts: boundaries with bands and test cuts, methods side by side, modes and positions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from metro.report import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+POSITIONS = 8
+CUTS = ((0, "o", style.GREEN, "stable cut"), (1, "X", style.BEFORE, "chatter"))
+BANDS = (
+    ("depth_lo_mm", "depth_hi_mm", 0.22, "95 %, with model error"),
+    ("depth_p05_mm", "depth_p95_mm", 0.6, "5–95 %, modes and forces"),
+)
+METHODS = (
+    ("depth_mm", "all modes together", style.AFTER, "-", ""),
+    ("single_mode_mm", "lowest of single modes", style.BEFORE, "--", ""),
+    ("cdsem_mm", "single modes by CDSEM", style.PURPLE, "", "+"),
+    ("semidiscretisation_mm", "semi-discretisation", style.MEASURED, "", "o"),
+    ("tool_mm", "as the tool is", style.GREEN, "", "x"),
+)
+
+
+def lobes_chart(boundary: pd.DataFrame, tests: pd.DataFrame, islands: pd.DataFrame | None = None) -> Figure:
+    """Draw stability boundaries with their bands, islands of stability above them, and the test cuts.
+
+    Parameters
+    ----------
+    boundary : ``position, rpm, depth_mm, depth_lo_mm, depth_hi_mm, depth_p05_mm, depth_p95_mm, kind``.
+    tests : ``position, rpm, depth_mm, measured`` (1 = unstable), ``before``, ``after``; may be empty.
+    islands : ``position, rpm, from_mm, to_mm``.
+    """
+    positions = list(boundary["position"].drop_duplicates())[:POSITIONS]
+    columns = min(2, len(positions))
+    rows = -(-len(positions) // columns)
+    with style.style():
+        figure, grid = style.new_figure(0.6 + 2.3 * rows, rows, columns)
+        flat = [axes for row in grid for axes in row]
+        for axes, position in zip(flat, positions, strict=False):
+            line = boundary[boundary["position"] == position].sort_values("rpm")
+            here = tests[tests["position"].astype(str) == str(position)]
+            _boundary(axes, line)
+            if islands is not None:
+                _islands(axes, islands[islands["position"] == position], line)
+            _cuts(axes, here)
+            axes.set_title(f"position {position}", loc="left")
+            axes.set(xlabel="spindle speed (rpm)", ylabel="depth of cut (mm)")
+            axes.set_ylim(0, 1.15 * _top(line["depth_mm"], here))
+        for axes in flat[len(positions) :]:
+            axes.set_visible(False)
+        style.legend_above(figure, max(flat[: len(positions)], key=_entries))
+    return figure
+
+
+def _entries(axes: Axes) -> int:
+    return len(axes.get_legend_handles_labels()[1])
+
+
+def _boundary(axes: Axes, line: pd.DataFrame) -> None:
+    """Both bands, and the boundary, dotted where it is a flip."""
+    rpm, depth = line["rpm"], line["depth_mm"]
+    for low, high, alpha, label in BANDS:
+        axes.fill_between(rpm, line[low], line[high], color=style.SKY, lw=0, alpha=alpha, label=label)
+    axes.plot(rpm, depth, color=style.AFTER, label="boundary")
+    flip = line["kind"] == "flip"
+    if flip.any():
+        axes.plot(rpm, depth.where(flip), color=style.MEASURED, lw=2.0, ls=":", label="flip")
+
+
+def _islands(axes: Axes, islands: pd.DataFrame, line: pd.DataFrame) -> None:
+    if len(islands):
+        axes.vlines(
+            islands["rpm"],
+            islands["from_mm"],
+            islands["to_mm"],
+            color=style.GREEN,
+            alpha=0.35,
+            lw=400.0 / max(len(line), 1) / 2.0,
+            label="stable island",
+        )
+
+
+def _cuts(axes: Axes, tests: pd.DataFrame) -> None:
+    for unstable, mark, colour, label in CUTS:
+        part = tests[tests["measured"].round() == unstable]
+        if part.empty:
+            continue
+        axes.scatter(
+            part["rpm"],
+            part["depth_mm"],
+            marker=mark,
+            s=28,
+            c=colour,
+            edgecolors="white",
+            lw=0.5,
+            zorder=3,
+            label=label,
+        )
+
+
+def _top(depth: pd.Series, tests: pd.DataFrame) -> float:
+    """Upper end of the depth axis: what the tests reach, and the lobes; not the peaks between them."""
+    depths = [2.5 * float(depth.min()), float(depth.quantile(0.8))]
+    return max([*depths, float(tests["depth_mm"].max())] if len(tests) else depths)
+
+
+def methods_chart(methods: pd.DataFrame) -> Figure:
+    """Draw the boundary by each method, a panel per position.
+
+    Parameters
+    ----------
+    methods : rows of ``lobe_methods``.
+    """
+    positions = list(methods["position"].drop_duplicates())[:POSITIONS]
+    columns = min(2, len(positions))
+    rows = -(-len(positions) // columns)
+    with style.style():
+        figure, grid = style.new_figure(0.6 + 2.3 * rows, rows, columns)
+        flat = [axes for row in grid for axes in row]
+        for axes, position in zip(flat, positions, strict=False):
+            part = methods[methods["position"] == position].sort_values("rpm")
+            for column, label, colour, line, mark in METHODS:
+                (drawn,) = axes.plot(part["rpm"], part[column], color=colour, ls=line, label=label)
+                drawn.set(marker=mark, markersize=5, markerfacecolor="none")
+            axes.set_title(f"position {position}", loc="left")
+            axes.set(xlabel="spindle speed (rpm)", ylabel="depth of cut (mm)")
+            axes.set_ylim(0, 1.15 * max(_top(part[c], part[:0]) for c in ("depth_mm", "single_mode_mm")))
+        for axes in flat[len(positions) :]:
+            axes.set_visible(False)
+        handles, labels = flat[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    return figure
+
+
+def governing_modes(methods: pd.DataFrame) -> Figure:
+    """Draw which mode, solved alone, chatters first, over spindle speed; a row per position.
+
+    Parameters
+    ----------
+    methods : rows of ``lobe_methods``.
+    """
+    from matplotlib.patches import Patch
+
+    positions = list(methods["position"].drop_duplicates())
+    modes = sorted(methods["governing_mode"].unique())
+    colours = dict(zip(modes, _colours(len(modes)), strict=True))
+    with style.style():
+        figure, [[axes]] = style.new_figure(0.9 + 0.3 * len(positions))
+        for row, position in enumerate(positions):
+            part = methods[methods["position"] == position].sort_values("rpm")
+            middle = part["rpm"].to_numpy(float)
+            edges = np.concatenate([middle[:1], (middle[1:] + middle[:-1]) / 2.0, middle[-1:]])
+            shades = [colours[mode] for mode in part["governing_mode"]]
+            axes.barh(row, np.diff(edges), left=edges[:-1], height=0.8, color=shades)
+        axes.set_yticks(range(len(positions)), [f"position {p}" for p in positions])
+        axes.set_xlabel("spindle speed (rpm)")
+        axes.grid(visible=False)
+        handles = [Patch(color=colours[mode], label=f"mode {mode}") for mode in modes]
+        figure.legend(handles=handles, loc="outside upper center", ncols=len(modes))
+    return figure
+
+
+def _colours(count: int) -> list[str]:
+    return [style.SERIES[i % len(style.SERIES)] for i in range(count)]
+
+
+def positions_chart(boundary: pd.DataFrame) -> Figure:
+    """Draw the boundaries of all positions in one panel; dashed where the modes were interpolated.
+
+    Parameters
+    ----------
+    boundary : ``position, rpm, depth_mm, interpolated``.
+    """
+    groups = list(boundary.groupby("position", sort=False))
+    with style.style():
+        figure, [[axes]] = style.new_figure(3.0)
+        for (position, line), colour in zip(groups, _colours(len(groups)), strict=True):
+            look = "--" if line["interpolated"].any() else "-"
+            axes.plot(line["rpm"], line["depth_mm"], color=colour, ls=look, label=f"position {position}")
+        axes.set(xlabel="spindle speed (rpm)", ylabel="depth of cut (mm)")
+        axes.set_ylim(0, 1.15 * max(_top(line["depth_mm"], line[:0]) for _, line in groups))
+        figure.legend(loc="outside upper center", ncols=4)
+    return figure

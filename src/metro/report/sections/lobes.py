@@ -1,0 +1,166 @@
+"""Stability: the boundary by every method, the modes that govern it, positions, and the test cuts on it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from metro.report.content import Bullets, Heading, Item, Picture, Table
+from metro.report.figures import lobes as figures
+from metro.report.numbers import number, probability, quantity
+from metro.report.results import Results
+from metro.units import JSON, Array
+
+LONGEST = 30
+_NOTHING_PERCENT = 0.001
+_NO_TESTS = pd.DataFrame(columns=["position", "rpm", "depth_mm", "measured"], dtype=float)
+
+
+def boundaries(results: Results) -> list[Item]:
+    """Write the lowest depth of each position, the methods side by side, and what positions change."""
+    blocks: list[JSON] = results.identified.get("lobes") or []
+    if not blocks:
+        return []
+    items: list[Item] = [Heading("Stability"), _lowest(blocks)]
+    methods, boundary = results.tables.get("lobe_methods"), results.tables.get("lobes_final")
+    if boundary is not None and results.compared("lobes") is None:
+        caption = "Stability boundary with its bands."
+        chart = figures.lobes_chart(boundary, _NO_TESTS, results.tables.get("lobe_islands"))
+        items.append(Picture(chart, caption, caption))
+    if methods is not None:
+        items += _methods(methods, boundary)
+    stations = results.tables.get("lobe_stations")
+    if boundary is not None and boundary["position"].nunique() > 1:
+        caption = "Stability boundaries of all positions."
+        if boundary["interpolated"].any():
+            caption += " Dashed: with modes interpolated between the positions where they were measured."
+        items.append(Picture(figures.positions_chart(boundary), caption, caption))
+    if stations is not None:
+        items.append(_stations(stations))
+    return items
+
+
+def _lowest(blocks: list[JSON]) -> Table:
+    rows = [
+        [
+            str(block.get("position", "–")),
+            quantity(lowest)
+            if isinstance(lowest := block.get("lowest_mm"), dict)
+            else f"{number(lowest)} mm",
+        ]
+        for block in blocks
+    ]
+    return Table(["position", "lowest limit of the depth of cut"], rows, "Stability boundaries.", [1, 2])
+
+
+def _methods(methods: pd.DataFrame, boundary: pd.DataFrame | None) -> list[Item]:
+    caption = (
+        "The boundary by each method. Published diagrams of this kind take the lowest of all modes solved "
+        "alone, by complete discretisation with Euler's method (CDSEM)."
+    )
+    governing = "The mode that, solved alone, chatters first: direction and number by rising frequency."
+    return [
+        Picture(figures.methods_chart(methods), caption, caption),
+        Bullets(agreement(methods, boundary)),
+        Picture(figures.governing_modes(methods), governing, _governing_words(methods)),
+    ]
+
+
+def agreement(methods: pd.DataFrame, boundary: pd.DataFrame | None) -> list[str]:
+    """Say how far the methods are from each other, in percent of depth."""
+    told = []
+    if boundary is not None and "error_mm" in boundary:
+        error = float((100.0 * boundary["error_mm"] / boundary["depth_mm"]).max())
+        told.append(f"Two resolutions of the default method differ by at most {number(error, 2)} %.")
+    pairs = (
+        ("semidiscretisation_mm", "depth_mm", "Semi-discretisation, which shares no step with it, differs"),
+        ("tool_mm", "depth_mm", "With the tool's helix, pitch and declared runout the boundary differs"),
+        ("cdsem_mm", "single_mode_mm", "CDSEM differs from the exact boundary of single modes"),
+        ("single_mode_mm", "depth_mm", "The lowest of the single modes differs from all modes together"),
+    )
+    checked = methods[methods["checked"]]
+    for column, reference, words in pairs:
+        change = 100.0 * (checked[column] / checked[reference] - 1.0).to_numpy(float)
+        known = change[np.isfinite(change)]
+        if len(known):
+            told.append(f"{words} by {_spread(known)}, over {len(known)} speeds.")
+        missing = len(change) - len(known)
+        if missing and column != "single_mode_mm":
+            told.append(f"At {missing} speeds that method found no boundary near the default one's.")
+    return told
+
+
+def _spread(change: Array) -> str:
+    """Range and median size of changes in percent."""
+    size = np.abs(change)
+    if size.max() < _NOTHING_PERCENT:
+        return f"less than {_NOTHING_PERCENT:g} %"
+    low, high, median = (number(float(x), 2) for x in (change.min(), change.max(), np.median(size)))
+    return f"{low} to {high} %, {median} % in the median"
+
+
+def _governing_words(methods: pd.DataFrame) -> str:
+    share = methods["governing_mode"].value_counts(normalize=True)
+    return "Share of the speeds: " + ", ".join(f"{m} {100 * s:.0f} %" for m, s in share.items()) + "."
+
+
+def _stations(stations: pd.DataFrame) -> Table:
+    columns = ("x_mm", "y_mm", "z_mm", "lowest_mm", "lowest_from_others_mm", "depth_error_percent")
+    rows = [[str(row["position"]), *(number(row[c]) for c in columns)] for _, row in stations.iterrows()]
+    header = ["position", "x (mm)", "y", "z", "lowest (mm)", "told by the others", "depth error (%)"]
+    caption = (
+        "Each position's boundary as the other positions tell it: modes interpolated between stations, "
+        "median error of depth over the speeds."
+    )
+    return Table(header, rows, caption, [0.8, 0.8, 0.8, 0.8, 1, 1.2, 1.2], numeric=[1, 2, 3, 4, 5, 6])
+
+
+def cut_items(results: Results, frame: pd.DataFrame) -> list[Item]:
+    """Draw the held-out test cuts on the boundary and tabulate the probability of each."""
+    tests = _placed(results, frame)
+    items: list[Item] = []
+    boundary = results.tables.get("lobes_final")
+    if boundary is not None:
+        right = {k: int(((frame[k] > 0.5) == (frame["measured"] > 0.5)).sum()) for k in ("before", "after")}
+        caption = (
+            f"Stability boundary and held-out test cuts. On the right side of it: {right['before']} of "
+            f"{len(frame)} with the base model, {right['after']} with the effects found."
+        )
+        chart = figures.lobes_chart(boundary, tests, results.tables.get("lobe_islands"))
+        items.append(Picture(chart, caption, caption))
+    rows = [
+        [
+            str(r["run"]),
+            number(r["rpm"]),
+            number(r["depth_mm"]),
+            "chatter" if r["measured"] > 0.5 else "stable",
+            probability(r["before"]),
+            probability(r["after"]),
+        ]
+        for _, r in tests.head(LONGEST).iterrows()
+    ]
+    header = [
+        "run",
+        "speed (rpm)",
+        "depth (mm)",
+        "found",
+        "P(chatter), base model",
+        "P(chatter), with effects",
+    ]
+    more = f" The first {LONGEST} of {len(tests)}." if len(tests) > LONGEST else ""
+    items.append(
+        Table(header, rows, f"Held-out test cuts.{more}", [1.4, 1, 1, 1, 1.4, 1.4], numeric=[1, 2, 4, 5])
+    )
+    return items
+
+
+def _placed(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
+    """Join the held-out labels to where they were cut."""
+    runs = results.batch.runs
+    at = runs.reindex(frame["run"])
+    position = at["pose"].astype(str).to_numpy() if "pose" in runs else [""] * len(frame)
+    return frame.assign(
+        position=position,
+        rpm=at["spindle_rpm"].to_numpy(float),
+        depth_mm=at["axial_depth_mm"].to_numpy(float),
+    )

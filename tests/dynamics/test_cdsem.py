@@ -1,0 +1,72 @@
+"""CDSEM: where the explicit rule breaks down, the order of the midpoint rule, and modes alone."""
+
+import numpy as np
+import pytest
+
+from metro.dynamics import cdsem, lobes
+from metro.dynamics.system import Cut, Structure, immersion
+
+OMEGA, ZETA = 2 * np.pi * 922.0, 0.011
+BENCH = Structure(np.array([0]), np.array([OMEGA]), np.array([ZETA]), np.array([0.03993 * OMEGA**2]))
+SLOT = Cut(2, *immersion("slot", 1.0, 1.0), 6e8, 2e8)
+TWO = Structure(
+    np.array([0, 1]), 2 * np.pi * np.array([41.0, 63.0]), np.array([0.05, 0.04]), np.array([4e6, 7e6])
+)
+
+
+def radius(depth, steps, interpolation):
+    mode, rpm = np.array([0]), np.array([5000.0])
+    settings = {"steps": steps, "interpolation": interpolation}
+    return cdsem.spectral_radius(BENCH, SLOT, mode, rpm, np.array([depth]), **settings)[0]
+
+
+def test_the_explicit_rule_needs_the_published_number_of_steps():
+    # omega T / (2 zeta): 1580 at 5000 rpm; rounded up in print to 1582
+    assert cdsem.steps_for_stability(BENCH, SLOT, 5000.0) == pytest.approx(1582, abs=2)
+    assert radius(0.0, 1500, 0.0) > 1
+    assert radius(0.0, 1582, 0.0) < 1
+
+
+def test_the_midpoint_rule_is_of_second_order():
+    exact = lobes.spectral_radius(BENCH, SLOT, [5000], [0.5e-3])[0]
+    coarse, fine = (radius(0.5e-3, steps, cdsem.MIDPOINT) - exact for steps in (400, 800))
+    assert coarse / fine == pytest.approx(4.0, abs=0.3)
+
+
+def test_the_explicit_rule_is_of_first_order():
+    exact = lobes.spectral_radius(BENCH, SLOT, [5000], [0.5e-3])[0]
+    coarse, fine = (radius(0.5e-3, steps, 0.0) - exact for steps in (4000, 8000))
+    assert coarse / fine == pytest.approx(2.0, abs=0.5)
+
+
+def test_depths_of_modes_alone_are_close_to_the_exact_ones():
+    cut, rpm = Cut(4, 0.0, np.pi, 2e9, 8e8), np.linspace(500, 2000, 7)
+    exact = cdsem.single_mode_depths(TWO, cut, rpm)
+    np.testing.assert_allclose(cdsem.cdsem_depths(TWO, cut, rpm, exact), exact, rtol=0.02)
+
+
+def test_a_mode_alone_is_a_structure_of_one_mode():
+    cut, rpm = Cut(4, 0.0, 1.4, 2e9, 8e8), np.linspace(500, 2000, 5)
+    one = Structure(TWO.axis[1:], TWO.omega[1:], TWO.zeta[1:], TWO.stiffness[1:])
+    np.testing.assert_array_equal(
+        cdsem.single_mode_depths(TWO, cut, rpm)[1], lobes.stability_boundary(one, cut, rpm).depth
+    )
+
+
+def test_the_lowest_of_modes_alone_bounds_the_modes_together_from_neither_side():
+    four = Structure(
+        np.zeros(4, dtype=int),
+        2 * np.pi * np.array([21.4, 34.8, 56.6, 65.6]),
+        np.array([0.061, 0.071, 0.036, 0.063]),
+        np.array([7.3e6, 4.1e6, 4.2e6, 2.2e6]),
+    )
+    cut, rpm = Cut(4, 0.0, np.pi, 10145e6, 11036.5e6), np.linspace(500, 2500, 41)
+    alone = cdsem.single_mode_depths(four, cut, rpm).min(axis=0)
+    together = lobes.stability_boundary(four, cut, rpm).depth
+    assert np.any(together < 0.9 * alone)
+    assert np.any(together > 1.1 * alone)
+
+
+def test_where_a_mode_alone_never_chatters_there_is_nothing_to_find():
+    exact = np.full((2, 3), np.inf)
+    assert np.all(np.isinf(cdsem.cdsem_depths(TWO, Cut(4, 0.0, 1.0, 2e9, 8e8), np.full(3, 900.0), exact)))

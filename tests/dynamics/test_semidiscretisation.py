@@ -1,0 +1,121 @@
+"""Semi-discretisation: its order and constant, helix, pitch and runout against cases with a known answer."""
+
+import numpy as np
+import pytest
+
+from metro.dynamics import lobes, semidiscretisation, teeth
+from metro.dynamics.system import Cut, Structure, immersion
+
+OMEGA, ZETA, MASS = 2 * np.pi * 922.0, 0.011, 0.03993
+BENCH = Structure(np.array([0]), np.array([OMEGA]), np.array([ZETA]), np.array([MASS * OMEGA**2]))
+TWO = Structure(
+    np.array([0, 0, 1, 1]),
+    2 * np.pi * np.array([41.0, 63.0, 35.0, 66.0]),
+    np.array([0.05, 0.04, 0.06, 0.03]),
+    np.array([4e6, 3e6, 7e6, 5e6]),
+)
+CUTS = {
+    "one tooth of four at a time": Cut(4, 0.0, np.pi / 3, 1e9, 4e8),
+    "one or two teeth of three": Cut(3, 0.0, np.pi, 1e9, 4e8),
+    "two teeth of four, always": Cut(4, 0.0, np.pi, 1e9, 4e8),
+    "two or three teeth of five": Cut(5, 0.0, np.pi, 1e9, 4e8),
+    "down milling": Cut(4, 2.0, np.pi, 1e9, 4e8),
+}
+# table 6, position 1; what is printed as natural frequency is the damped one
+PRINTED = np.array([21.3257, 34.6937, 56.6075, 65.5141, 31.4277, 35.0952, 54.7344, 67.2582])
+DAMPING = np.array([6.08951, 7.07726, 3.5692, 6.33944, 6.71896, 4.76042, 4.99933, 3.79608]) / 100
+STIFFNESS = np.array([7.25548e6, 4.05902e6, 4.18385e6, 2.21663e6, 3.1541e8, 7.06418e7, 4.71786e7, 1.46188e7])
+TRIMULE = Structure(np.repeat([0, 1], 4), 2 * np.pi * PRINTED / np.sqrt(1 - DAMPING**2), DAMPING, STIFFNESS)
+LAG = np.tan(np.radians(40)) / 6e-3
+
+
+def radius(structure, cut, rpm, depth, steps):
+    engagement = cut if isinstance(cut, teeth.Engagement) else teeth.equal_teeth(cut)
+    return semidiscretisation.spectral_radius(structure, engagement, [rpm], [depth], steps)[0]
+
+
+def test_it_has_the_error_constant_of_its_first_order_form():
+    # with the weights of the delayed displacement exchanged it is still of second order, but three times as
+    # far off
+    cut = Cut(2, *immersion("down", 0.5, 1.0), 6e8, 2e8)
+    exact = lobes.spectral_radius(BENCH, cut, [5000], [1e-3])[0]
+    error = radius(BENCH, cut, 5000.0, 1e-3, 80) - exact
+    assert abs(error) < 0.05 * (OMEGA * 60 / (2 * 5000) / 80) ** 2
+
+
+@pytest.mark.parametrize("rpm", [3000.0, 8000.0])
+def test_free_vibration_decays_by_the_mode_alone_at_zero_depth(rpm):
+    cut = Cut(2, 0.0, 1.0, 6e8, 2e8)
+    assert radius(BENCH, cut, rpm, 0.0, 40) == pytest.approx(np.exp(-ZETA * OMEGA * 30 / rpm))
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_it_agrees_with_collocation_for_several_modes_in_two_directions(name):
+    cut, rpm, depth = CUTS[name], 700.0, 0.15e-3
+    exact = lobes.spectral_radius(TWO, cut, [rpm], [depth])[0]
+    coarse, fine = (radius(TWO, cut, rpm, depth, steps) for steps in (60, 120))
+    assert abs(fine - exact) < 0.4 * abs(coarse - exact) + 1e-7  # second order
+    assert fine + (fine - coarse) / 3 == pytest.approx(exact, rel=2e-5)
+
+
+def test_both_methods_agree_to_a_thousandth_of_depth_on_the_published_machine():
+    cut, rpm = Cut(4, 0.0, np.pi, 10145e6, 11036.5e6), np.linspace(500, 2500, 41)
+    default = lobes.stability_boundary(TRIMULE, cut, rpm).depth
+    coarse, fine = (
+        semidiscretisation.boundary_near(TRIMULE, teeth.equal_teeth(cut), rpm, default, steps)
+        for steps in (40, 80)
+    )
+    np.testing.assert_allclose(fine + (fine - coarse) / 3, default, rtol=1e-4)
+
+
+def test_a_helix_that_spans_a_pitch_leaves_nothing_of_the_period():
+    # height of one axial pitch: the factors of a cut do not change with time any more
+    cut = CUTS["one tooth of four at a time"]
+    height = cut.pitch / LAG
+    means, _ = teeth.mean_directional_factors(teeth.equal_teeth(cut, LAG), np.array([height]), 30)
+    np.testing.assert_allclose(means, np.broadcast_to(means[:, :1], means.shape), rtol=1e-9)
+
+
+def test_helix_does_nothing_where_the_factors_do_not_change_with_time():
+    cut = CUTS["two teeth of four, always"]
+    plain, helical = (radius(TWO, teeth.equal_teeth(cut, lag), 700.0, 1e-4, 60) for lag in (0.0, LAG))
+    assert helical == pytest.approx(plain, rel=1e-9)
+
+
+def test_equal_teeth_give_the_same_over_a_whole_turn():
+    cut = CUTS["one or two teeth of three"]
+    whole = teeth.unequal_teeth(cut, np.full(3, 2 * np.pi / 3))
+    a_pitch = radius(TWO, cut, 700.0, 1.5e-4, 60)
+    assert radius(TWO, whole, 700.0, 1.5e-4, 180) == pytest.approx(a_pitch**3, rel=1e-8)
+
+
+def test_a_tooth_that_is_out_of_cut_halves_the_number_of_teeth():
+    one, two = Cut(1, 0.0, 1.5, 1e9, 4e8), Cut(2, 0.0, 1.5, 1e9, 4e8)
+    apart = teeth.eccentric_teeth(two, np.full(2, np.pi), np.array([0.2e-3, 0.0]), 0.05e-3)
+    expected = radius(TWO, one, 900.0, 2e-4, 160)
+    assert radius(TWO, apart, 900.0, 2e-4, 160) == pytest.approx(expected, rel=1e-9)
+
+
+def test_fractional_delays_converge_like_whole_ones():
+    cut = CUTS["two teeth of four, always"]
+    uneven = teeth.unequal_teeth(cut, np.radians([84.0, 97.0, 86.0, 93.0]))
+    values = [radius(TWO, uneven, 700.0, 1.2e-4, steps) for steps in (90, 180, 360)]
+    assert abs(values[2] - values[1]) < 0.45 * abs(values[1] - values[0])
+
+
+def test_uneven_pitch_steadies_the_worst_speed_of_a_light_mode():
+    # two delays cannot both meet the phase that excites a lightly damped mode (Slavicek 1965)
+    light = Structure(np.array([0]), np.array([2 * np.pi * 60.0]), np.array([0.02]), np.array([3e6]))
+    cut, rpm = Cut(4, 0.0, np.pi, 1e9, 4e8), np.linspace(500, 620, 15)
+    depth = lobes.stability_boundary(light, cut, rpm).depth
+    worst, deeper = rpm[depth.argmin()], 1.1 * depth.min()
+    uneven = teeth.unequal_teeth(cut, np.radians([75.0, 105.0, 75.0, 105.0]))
+    assert radius(light, cut, worst, deeper, 120) > 1
+    assert radius(light, uneven, worst, deeper, 360) < 1
+
+
+def test_modal_matrices_give_the_receptance():
+    free, force_in, out = semidiscretisation.state_space(TWO)
+    omega = np.array([100.0, 260.0, 400.0])
+    told = [np.diagonal(out @ np.linalg.solve(1j * w * np.eye(len(free)) - free, force_in)) for w in omega]
+    np.testing.assert_allclose(told, TWO.receptance(omega), rtol=1e-9)

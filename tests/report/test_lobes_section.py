@@ -1,0 +1,120 @@
+"""Stability in the report: what the charts hold, and what is said of the methods."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+import synthetic_results as synthetic
+
+from metro.report.content import Bullets, Picture, Table
+from metro.report.figures import lobes as figures
+from metro.report.sections import lobes
+from metro.report.style import to_svg
+
+TESTS = pd.DataFrame(
+    {"position": ["1", "1"], "rpm": [2000.0, 3000.0], "depth_mm": [1.5, 0.5], "measured": [1.0, 0.0]}
+)
+STATIONS = pd.DataFrame(
+    {"position": ["1", "2"], "x_mm": 0.0, "y_mm": 0.0, "z_mm": [0.0, -320.0], "lowest_mm": [1.0, 1.2],
+     "lowest_from_others_mm": [1.2, np.nan], "depth_error_percent": [18.2, np.nan]}
+)  # fmt: skip
+
+
+def labels(axes):
+    return axes.get_legend_handles_labels()[1]
+
+
+def test_a_chart_of_lobes_marks_chatter_and_stable_cuts_apart():
+    axes = figures.lobes_chart(synthetic.boundary(), TESTS).axes[0]
+    points = {
+        c.get_label(): c.get_offsets().tolist()
+        for c in axes.collections
+        if c.get_label() in {"stable cut", "chatter"}
+    }
+    assert points == {"stable cut": [[3000.0, 0.5]], "chatter": [[2000.0, 1.5]]}
+
+
+def test_both_bands_flips_and_islands_are_in_the_legend():
+    axes = figures.lobes_chart(synthetic.boundary(), TESTS, synthetic.islands()).axes[0]
+    expected = {"95 %, with model error", "5–95 %, modes and forces", "boundary", "flip", "stable island"}
+    assert expected <= set(labels(axes))
+
+
+def test_flips_are_drawn_where_the_boundary_is_one():
+    axes = figures.lobes_chart(synthetic.boundary(), TESTS).axes[0]
+    flip = next(line for line in axes.get_lines() if line.get_label() == "flip")
+    drawn = flip.get_xdata()[np.isfinite(flip.get_ydata())]
+    assert drawn.min() > 3000
+
+
+def test_without_a_flip_there_is_none_in_the_legend():
+    plain = synthetic.boundary().assign(kind="hopf")
+    assert "flip" not in labels(figures.lobes_chart(plain, TESTS).axes[0])
+
+
+def test_every_method_is_drawn():
+    axes = figures.methods_chart(synthetic.methods()).axes[0]
+    drawn = {line.get_label(): line.get_ydata() for line in axes.get_lines()}
+    for column, label, *_ in figures.METHODS:
+        np.testing.assert_allclose(drawn[label], synthetic.methods()[column])
+
+
+def test_the_governing_mode_changes_colour_where_it_changes():
+    axes = figures.governing_modes(synthetic.methods()).axes[0]
+    colours = {patch.get_facecolor() for patch in axes.patches}
+    assert len(colours) == 2
+    low = [p.get_facecolor() for p in axes.patches if p.get_x() + p.get_width() < 1990]
+    assert len(set(low)) == 1
+
+
+def test_positions_share_a_panel_and_interpolated_ones_are_dashed():
+    both = pd.concat([synthetic.boundary(), synthetic.boundary().assign(position="2", interpolated=True)])
+    lines = figures.positions_chart(both).axes[0].get_lines()
+    assert [line.get_linestyle() for line in lines] == ["-", "--"]
+
+
+def test_the_words_give_the_differences_between_methods():
+    told = " ".join(lobes.agreement(synthetic.methods(), synthetic.boundary()))
+    assert "Two resolutions of the default method differ by at most 0.010 %" in told
+    assert "Semi-discretisation, which shares no step with it, differs by 0.020 to 0.020 %" in told
+    assert "declared runout the boundary differs by 3.0 to 3.0 %" in told
+    assert "CDSEM differs from the exact boundary of single modes by 1.0 to 1.0 %" in told
+    assert "all modes together by −10 to −10 %" in told
+
+
+def test_no_difference_is_told_as_none():
+    same = synthetic.methods().assign(tool_mm=lambda table: table["depth_mm"] * (1 + 1e-9))
+    assert any("differs by less than 0.001 %" in words for words in lobes.agreement(same, None))
+
+
+def test_speeds_without_a_boundary_are_counted():
+    gaps = synthetic.methods()
+    gaps.loc[gaps.index[:3], "tool_mm"] = np.nan
+    assert any("At 3 speeds" in words for words in lobes.agreement(gaps, None))
+
+
+def test_the_section_has_methods_and_governing_modes():
+    items = lobes.boundaries(synthetic.results())
+    assert [type(item) for item in items[1:]] == [Table, Picture, Bullets, Picture]
+    assert "x4" in items[-1].alt
+
+
+def test_several_positions_are_compared():
+    tables = synthetic.tables()
+    both = pd.concat([tables["lobes_final"], tables["lobes_final"].assign(position="2")])
+    made = replace(synthetic.results(), tables={**tables, "lobes_final": both, "lobe_stations": STATIONS})
+    items = lobes.boundaries(made)
+    assert isinstance(items[-2], Picture)
+    assert items[-1].rows[0] == ["1", "0", "0", "0", "1.00", "1.20", "18.2"]
+    assert items[-1].rows[1][-1] == "–"
+
+
+def test_without_a_boundary_there_is_nothing():
+    assert lobes.boundaries(replace(synthetic.results(), identified={})) == []
+
+
+@pytest.mark.parametrize("draw", [figures.methods_chart, figures.governing_modes])
+def test_the_same_table_gives_the_same_bytes(draw):
+    first, second = (to_svg(draw(synthetic.methods())) for _ in range(2))
+    assert first == second
