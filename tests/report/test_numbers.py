@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from metro.report.numbers import listing, number, percent, probability, quantity, with_interval
+from metro.report.sections.verdict import parameter_name
 
 
 @pytest.mark.parametrize(
@@ -49,6 +50,9 @@ def test_a_quantity_carries_its_unit_and_a_list_is_written_item_by_item():
         quantity({"value": [1.0, 2.0], "ci95": [[0.9, 1.1], [1.5, 2.5]], "unit": "N/s"})
         == "1.00 ± 0.10, 2.00 ± 0.50 N/s"
     )
+    axes = [{"value": v, "ci95": [v - 10, v + 10], "unit": "Hz"} for v in (770.0, 980.0)]
+    assert quantity(axes) == "770 ± 10, 980 ± 10 Hz"
+    assert parameter_name("frequency_hz", axes) == "frequency"
     assert quantity({"value": "all"}) == "all"
     assert quantity(3) == "3"
 

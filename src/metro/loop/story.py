@@ -148,7 +148,8 @@ def _rms(block: Block, values: Array) -> float:
 
 def in_words(verdict: JSON) -> str:
     """Say the verdict as an engineer would."""
-    named = " and ".join(entry["effect"].replace("_", " ") for entry in verdict["effects"])
+    *first, last = [entry["effect"].replace("_", " ") for entry in verdict["effects"]] or [""]
+    named = f"{', '.join(first)} and {last}" if first else last
     rivals = "; ".join(" or ".join(pair).replace("_", " ") for pair in verdict["indistinguishable"])
     sentence = SENTENCES[verdict["status"]].format(named=named, rivals=rivals)
     before, after, left = verdict["before"], verdict["after"], verdict["unexplained"]

@@ -53,9 +53,12 @@ def with_interval(value: float | None, ci95: list[float | None] | None) -> str:
 def quantity(entry: Any, with_unit: bool = True) -> str:
     """Write a quantity of ``identified.json`` or ``verdict.json``: value ± half its 95 % interval, unit.
 
-    A parameter that is a list (per axis, per tooth) is written item by item; what is no quantity
+    A list of them (per axis, per tooth) is written item by item, the unit last; what is no quantity
     (``joint: 3``) as it is.
     """
+    if isinstance(entry, list) and entry and all(isinstance(item, dict) for item in entry):
+        first = [quantity(item, with_unit=False) for item in entry[:-1]]
+        return ", ".join([*first, quantity(entry[-1], with_unit)])
     if not isinstance(entry, dict):
         return str(entry)
     value, ci95 = entry.get("value"), entry.get("ci95")

@@ -59,6 +59,8 @@ def effect_words(effect: JSON) -> str:
 
 def parameter_name(name: str, entry: Any) -> str:
     """Name of a parameter without the unit that its key ends in: radius_um → radius."""
+    if isinstance(entry, list) and entry:
+        return parameter_name(name, entry[0])
     if not isinstance(entry, dict):
         return words(name)
     tail = str(entry.get("unit") or "").replace("/", "_").replace(" ", "_").lower()
