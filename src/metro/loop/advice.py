@@ -104,7 +104,7 @@ def _undecided(problem: Problem, outcome: Outcome, rivals: Sequence[Rival]) -> s
             f"{_cut(best.proposal, best.repeats)}: the best of the runs tried to tell {_pair(first)}, "
             f"but it decides with a probability of {_chance(best.probability)} only"
         )
-    texts = {effect.name: effect.experiment for effect in outcome.library if effect.name in first.pair}
+    texts = {effect.name: effect.experiment for effect in outcome.offered if effect.name in first.pair}
     names = " or ".join(_pair(rival) for rival in rivals)
     tried = f"no run of the kinds tried tells {names}; " if problem.feasible else ""
     return tried + "; or ".join(f"for {_words(name)}: {text}" for name, text in texts.items())
@@ -127,9 +127,9 @@ def _to_show(problem: Problem, outcome: Outcome) -> str:
     """Name runs that would show hidden effects; where none does, one effect's own experiment."""
     by_words: dict[str, list[str]] = {}
     hidden: list[str] = []
-    experiments = {effect.name: effect.experiment for effect in outcome.library}
+    experiments = {effect.name: effect.experiment for effect in outcome.offered}
     for name in outcome.not_visible:
-        forms = [effect for effect in outcome.library if effect.name == name]
+        forms = [effect for effect in outcome.offered if effect.name == name]
         view = best_view(problem, outcome.base, forms)
         if view:
             by_words.setdefault(view.proposal.words, []).append(name)

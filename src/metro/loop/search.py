@@ -49,7 +49,7 @@ class Outcome:
     base_lines: tuple[rest.Line, ...]
     lines: tuple[rest.Line, ...]
     step: Step | None = None
-    library: tuple[Effect, ...] = ()
+    offered: tuple[Effect, ...] = ()
     not_visible: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -98,7 +98,7 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
         base_lines=tuple(rest.signature(base, floor)),
         lines=tuple(rest.signature(compared.final, floor)),
         step=step if step and step.p_value < SESSION and abs(step.relative) > SESSION_SIZE else None,
-        library=tuple(library),
+        offered=tuple(library),
         not_visible=unable | absorbed,
     )
 
