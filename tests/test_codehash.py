@@ -2,6 +2,8 @@
 
 import ast
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -140,3 +142,13 @@ def test_all_stages_of_the_package_are_hashed_with_each_module_read_once(monkeyp
     hashes = {stage: codehash.code_hash(stage) for stage in real_stages()}
     assert 50 < len(read) <= len(list(Path(codehash.__file__).parent.rglob("*.py")))
     assert len(set(hashes.values())) == len(hashes)
+
+
+def test_all_stages_of_the_package_are_hashed_fast():
+    # In a process of its own: in one that holds much, the collector's rounds are counted, too.
+    code = (
+        "import sys, time; from metro import codehash; start = time.process_time(); "
+        "[codehash.code_hash(stage) for stage in sys.argv[1:]]; print(time.process_time() - start)"
+    )
+    spent = subprocess.run([sys.executable, "-c", code, *real_stages()], capture_output=True, check=True)
+    assert float(spent.stdout) < 1.0
