@@ -8,11 +8,14 @@ import pytest
 from metro.cutting.arcs import arcs
 from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter, evenly_pitched
+from metro.cutting.edges import pieces
 from metro.cutting.engagement import Engagement, engagement
+from metro.cutting.nearby import edges
 from metro.cutting.passes import passes
 
 SLOT = Engagement(0.0, math.pi)
 ANGLE = 2 * math.pi * np.arange(24) / 24
+ANGLE_FINE = 2 * math.pi * np.arange(120) / 120
 FINE = np.linspace(-0.25, math.pi + 0.25, 20001)
 
 
@@ -64,6 +67,43 @@ def test_on_true_paths_a_tooth_starts_half_the_feed_angle_before_the_circle():
     early = 0.5 * 0.01e-3 / 6e-3
     assert bounds[0] == pytest.approx(-early, rel=0.01)
     assert bounds[-1] == pytest.approx(math.pi + early, rel=0.01)
+
+
+def test_on_true_paths_a_tooth_stops_where_the_first_of_several_close_passes_leaves_nothing():
+    # At 63° pass 2 leaves nothing 1e-4 rad before pass 3 does: the chip is 0 there and grows inwards.
+    tool = Cutter(3.85e-3, 0.37, evenly_pitched(6), 0.93e-6, 0.42)
+    before = passes(tool, Cut(0.0376e-3, 0.5e-3, SLOT), True, ANGLE_FINE)
+    low, high = arcs(before, SLOT)[[0, -1]]
+    for end, inward in ((low, 1e-5), (high, -1e-5)):
+        at = before.chip(np.sin(end), np.cos(end)).min(axis=0)
+        inside = before.chip(np.sin(end + inward), np.cos(end + inward)).min(axis=0)
+        assert np.abs(at).max() < 1e-5 * inside.min()
+
+
+def test_teeth_that_others_leave_nothing_cut_nowhere_on_true_paths_as_well():
+    # Runout of 3.5 feeds: whole angles of the tool at which no tooth cuts beyond φ = 0.814.
+    entry = Engagement(0.814, math.pi)
+    tool = Cutter(9.2e-3, 0.0, evenly_pitched(5), 45.5e-6, 0.38)
+    before = passes(tool, Cut(0.0128e-3, 39e-3, entry), True, ANGLE_FINE)
+    bounds = arcs(before, entry)
+    fine = np.linspace(entry.entry, math.pi, 2001)[:, None, None, None]
+    cuts = (before.chip(np.sin(fine), np.cos(fine)).min(axis=1) > 0.0).any(axis=0)
+    assert 0.1 < cuts.mean() < 0.9
+    assert np.all(bounds[-1] - bounds[0] <= np.where(cuts, math.pi, 2e-3))
+
+
+@pytest.mark.parametrize("true_path", [False, True])
+def test_pieces_of_edges_need_the_bounds_within_their_reach_alone(true_path):
+    tool, cut = Cutter(6e-3, 0.6, (0.0, 1.4, 3.3, 4.9), 12e-6, 0.7), Cut(0.03e-3, 3e-3, SLOT)
+    before = passes(tool, cut, true_path, ANGLE_FINE)
+    along = edges(tool, cut, ANGLE_FINE, step=ANGLE_FINE[1])
+    near, every = arcs(before, SLOT, along), arcs(before, SLOT)
+    assert len(near) < len(every)
+    found, expected = (
+        np.stack([cuts.angle, cuts.low, cuts.high])[:, np.lexsort((cuts.low, cuts.angle))]
+        for cuts in (pieces(before, bounds, along) for bounds in (near, every))
+    )
+    assert found == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_wall_cuts_the_arc_short():

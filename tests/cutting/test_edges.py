@@ -66,15 +66,28 @@ def test_force_is_that_of_a_brute_force_slice_integration(teeth, helix, runout, 
     assert table[list(steps)] == pytest.approx(expected, abs=3 * teeth * tooth * depth / 400)
 
 
+def within_work(h, tip, phi, engaged, radius):
+    """Chip on the rays at φ, between ``tip`` less ``h`` and ``tip`` from the axis, within the work."""
+    first, last = tip - h, tip
+    for edge, side in ((engaged.entry, 1.0), (engaged.exit, -1.0)):
+        if 0.0 < edge < math.pi:  # the work is where side × (distance × cos φ − y of the edge) < 0
+            crossing = radius * math.cos(edge) / np.cos(phi)
+            leaves = side * np.cos(phi) > 0.0
+            last = np.where(leaves, np.minimum(last, crossing), last)
+            first = np.where(leaves, first, np.maximum(first, crossing))
+    return np.maximum(last - first, -1e-4)  # none is none, however far from the work
+
+
 def thin_slices(tool, law, cut, angle, *, true_path, slices=40_000):
     """Thin slices of every stretch of edge in the arc: thrust per unit of K_tc, K_rc, K_ac, K_te, K_re, K_ae.
 
-    Where the chip begins or ends along the feed, the chip decides, and in part of a slice.
+    Where the chip begins or ends along the feed, the chip decides, and in part of a slice; on true paths at
+    the raw edges as well.
     """
     basis, helix = np.zeros((3, 6)), tool.lag_per_depth
     beyond = 0.2 if true_path else 0.0
     entry, leaving = cut.engagement.entry, cut.engagement.exit
-    entry, leaving = entry - beyond * (entry == 0.0), leaving + beyond * (leaving == math.pi)
+    entry, leaving = (-beyond, math.pi + beyond) if true_path else (entry, leaving)
     for j, tooth in enumerate(tool.tooth_angles):
         for turn in (-2, -1, 0, 1, 2):
             leading = angle + tooth + 2 * math.pi * turn
@@ -86,8 +99,12 @@ def thin_slices(tool, law, cut, angle, *, true_path, slices=40_000):
             phi = leading - helix * z
             immersion = np.repeat(phi[None, :, None], tool.teeth, axis=2)
             h = chip_thickness(tool, cut, immersion, z, true_path)[0, :, j]
+            if true_path:
+                h = within_work(
+                    h, tool.radius + tool.radius_deviation(z)[j], phi, cut.engagement, tool.radius
+                )
             change = np.abs(np.gradient(h))
-            share = np.clip(h / change + 0.5, 0.0, 1.0)
+            share = np.clip(h / np.maximum(change, 1e-30) + 0.5, 0.0, 1.0)
             shear = law.shear(np.where(share < 1.0, 0.5 * share**2 * change, h))
             tangential = np.stack([-np.cos(phi), np.sin(phi)])
             radial = np.stack([-np.sin(phi), -np.cos(phi)])

@@ -11,43 +11,61 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from metro.cutting.corners import Corner
 from metro.cutting.engagement import Engagement
+from metro.cutting.nearby import LARGEST_STEP, Edges, Nearby, nearby
 from metro.cutting.passes import Passes
 from metro.units import Array
 
-STEPS = 2  # an error of a crossing counts in second order only
-LARGEST_STEP = 0.3  # where the curve is flat
+STEPS_TO_ENDS, STEPS = 3, 2  # an error of a crossing counts in second order only
 
 
-def arcs(before: Passes, engagement: Engagement) -> Array:
+def arcs(
+    before: Passes, engagement: Engagement, edges: Edges | None = None, corners: tuple[Corner, ...] = ()
+) -> Array:
     """Immersions (bounds, angles, teeth) rad, rising, between which one pass bounds a tooth's chip.
 
     The first and the last are where the tooth starts and stops cutting: the first above the last where it
     does not cut. Along the feed it is the chip that begins and ends there: on true paths a little outside
-    0…π.
+    0…π. Where ``edges`` are given, bounds that they do not reach are left out, or are ends of circular paths.
+    ``corners``: of the raw edges; an arc that ends at one that has none given is cut short there.
     """
-    low, high = _ends(before)
-    if engagement.entry > 0.0:
+    near = nearby(edges, before.sine.shape[1:])
+    (low, high), between = _ends(before, near), _crossings(before, near)
+    at_corners = [corner.begins for corner in corners]
+    if engagement.entry > 0.0 and True not in at_corners:
         low = np.maximum(low, engagement.entry)
-    if engagement.exit < math.pi:
+    if engagement.exit < math.pi and False not in at_corners:
         high = np.minimum(high, engagement.exit)
-    return np.concatenate([low[None], np.clip(_crossings(before), low, high), high[None]])
+    for corner in corners:
+        vanishing, whole = corner.limits
+        between = np.sort(np.concatenate([between, whole[None]]), axis=0)
+        if corner.begins:
+            low = np.maximum(low, vanishing)
+        else:
+            high = np.minimum(high, vanishing)
+    return np.concatenate([low[None], np.clip(between, low, high), high[None]])
 
 
-def _ends(before: Passes) -> Array:
+def _ends(before: Passes, near: Nearby) -> Array:
     """Find the ends (2, angles, teeth) of the arc where every pass leaves a chip."""
     root = np.arctan2(-before.cosine, before.sine)
     phi = np.stack([root.max(axis=0), root.min(axis=0) + math.pi])
     if not before.true_path:
         return phi
-    rows = np.ix_(*(range(size) for size in phi.shape))[1:]
-    for steps in (1, 2):  # which pass bounds the chip there may change with the first step
-        bounding = before[:, None].chip(np.sin(phi), np.cos(phi)).argmin(axis=0)
-        phi = _settled(phi, steps, before[bounding, *rows])
+    at = np.nonzero(near.covers(np.sin(phi), np.cos(phi)))
+    passed, end, inward = before.before(*at[1:]), phi[at], 1.0 - 2.0 * at[0]
+    for _ in range(STEPS_TO_ENDS):  # each to the innermost of where the passes leave none
+        sine, cosine = np.sin(end), np.cos(end)
+        value, growth = passed.chip(sine, cosine), inward * passed.slope(sine, cosine)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = np.where(growth > 0.0, -value / growth, -LARGEST_STEP).max(axis=0)
+        end += inward * np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+    phi[at] = end
     return phi
 
 
-def _crossings(before: Passes) -> Array:
+def _crossings(before: Passes, near: Nearby) -> Array:
     """Immersions (most, angles, teeth), rising, where two passes leave the same chip, less than any other.
 
     Where there are fewer than most, ∞ follows.
@@ -64,24 +82,23 @@ def _crossings(before: Passes) -> Array:
     for of_sine, of_cosine in zip(before.sine, before.cosine, strict=True):
         np.minimum(least, of_sine * sine + of_cosine * cosine, out=least)
     crossed = before.sine[first] * sine + before.cosine[first] * cosine
-    at = np.stack(np.nonzero((crossed < least + margin) & (crossed > -margin)))
+    at = np.stack(np.nonzero(near.covers(sine, cosine) & (crossed < least + margin) & (crossed > -margin)))
     phi = np.arctan2(sine[*at], cosine[*at])
     if before.true_path:  # a little outside 0…π as well
-        beyond = np.stack(np.nonzero(sine < stray))
+        beyond = np.stack(np.nonzero((sine < stray) & near.covers(-sine, -cosine)))
         opposite = np.arctan2(sine[*beyond], cosine[*beyond])
         phi = np.append(phi, opposite + np.where(opposite < 1.0, math.pi, -math.pi))
         at = np.concatenate([at, beyond], axis=1)
-        phi = _settled(phi, STEPS, before[first[at[0]], *at[1:]], before[second[at[0]], *at[1:]])
+        phi = _settled(phi, before[first[at[0]], *at[1:]], before[second[at[0]], *at[1:]])
     return _in_order(phi, at[1:], before.sine.shape[1:])
 
 
-def _settled(phi: Array, steps: int, one: Passes, other: Passes | None = None) -> Array:
-    """Newton's steps from circular paths to where a pass leaves no chip, or the same as another."""
-    for _ in range(steps):
+def _settled(phi: Array, one: Passes, other: Passes) -> Array:
+    """Newton's steps from circular paths to where two passes leave the same chip."""
+    for _ in range(STEPS):
         sine, cosine = np.sin(phi), np.cos(phi)
-        value, slope = one.chip(sine, cosine), one.slope(sine, cosine)
-        if other is not None:
-            value, slope = value - other.chip(sine, cosine), slope - other.slope(sine, cosine)
+        value = one.chip(sine, cosine) - other.chip(sine, cosine)
+        slope = one.slope(sine, cosine) - other.slope(sine, cosine)
         with np.errstate(divide="ignore", invalid="ignore"):
             phi = phi - np.clip(value / slope, -LARGEST_STEP, LARGEST_STEP)
     return phi

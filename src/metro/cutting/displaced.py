@@ -17,9 +17,10 @@ import numpy as np
 from metro.cutting.arcs import arcs
 from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter
-from metro.cutting.edges import TURN, Pieces
+from metro.cutting.edges import TURN, Pieces, pieces
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import engaged, placed
+from metro.cutting.nearby import edges
 from metro.cutting.passes import ALIKE, Passes, passes
 from metro.units import Array, ComplexArray
 
@@ -54,14 +55,18 @@ class Displaced:
         raw edges : (2, n) immersion at which they begin and end the arc, rad; infinite where there is none.
         """
         before = self._passes(bent, swept)
-        bounds, raw = arcs(before, WHOLE), np.full((2, len(bent)), math.inf)
+        along = edges(self.cutter, self.cut, self.angle, step=TURN / len(bent))
+        raw = np.full((2, len(bent)), math.inf)
+        if swept:
+            return engaged(before, self.cut.engagement, along, bent[:, 1:]), raw
+        bounds = arcs(before, WHOLE, along)
         if self.cut.engagement.entry > 0.0:
             raw[0] = self._shifted(self.cut.engagement.entry, bent)
             bounds = np.maximum(bounds, raw[0, :, None])
         if self.cut.engagement.exit < math.pi:
             raw[1] = self._shifted(self.cut.engagement.exit, bent)
             bounds = np.minimum(bounds, raw[1, :, None])
-        return engaged(self.cutter, self.cut, before, bounds, self.angle, step=TURN / len(bent)), raw
+        return pieces(before, bounds, along), raw
 
     def _shifted(self, immersion: float, bent: Array) -> Array:
         """Immersion (n,) of an edge along the feed, which stays where it is while the tool is displaced."""

@@ -14,7 +14,9 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from metro.cutting.corners import Corner
 from metro.cutting.law import EdgeLaw
+from metro.cutting.nearby import Edges
 from metro.cutting.passes import Passes
 from metro.units import Array
 
@@ -31,7 +33,7 @@ class Pieces:
     ----------
     angle : (pieces,) index of the angle of the tool. bounding : (pieces,) of the pass, 0 the last one.
     low, high : (pieces,) immersions at the ends, rad. before : the pass that bounds each, (pieces,).
-    depth : what a radian of edge spans, m/rad.
+    depth : what a radian of edge spans, m/rad. partial : pieces in a corner of the work, with the corner.
     """
 
     angle: npt.NDArray[np.intp]
@@ -40,31 +42,45 @@ class Pieces:
     high: Array
     before: Passes
     depth: float
+    partial: tuple[tuple[npt.NDArray[np.intp], Corner], ...] = ()
+
+    def chip(self, sine: Array, cosine: Array) -> Array:
+        """Chip (…, pieces) at an immersion given by its sine and cosine, m."""
+        chip = self.before.chip(sine, cosine)
+        for at, corner in self.partial:
+            beyond = corner.beyond(sine[..., at], cosine[..., at])
+            chip[..., at] = beyond if corner.outer else chip[..., at] - beyond
+        return np.maximum(chip, 0.0)
 
 
-def pieces(before: Passes, bounds: Array, top: Array, span: float, depth: float) -> Pieces:
+def pieces(before: Passes, bounds: Array, along: Edges, corners: tuple[Corner, ...] = ()) -> Pieces:
     """Cut the engaged part of each edge where the pass that bounds its chip changes.
 
     Parameters
     ----------
-    bounds : (bounds, angles or 1, N or 1) of :func:`metro.cutting.arcs.arcs`, rad.
-    top : (angles, N) immersion of the leading end of each edge, rad. span : what an edge spans, > 0, rad.
-    depth : what a radian of edge spans, m/rad.
+    bounds : (bounds, angles or 1, N or 1) of :func:`metro.cutting.arcs.arcs`, rad. along : the edges.
+    corners : of the work, where the bounds allow for them.
     """
     low, high = bounds[:-1], bounds[1:]
     start = low[0].min()
-    leading = start + np.mod(top - start, TURN)
+    leading = start + np.mod(along.top - start, TURN)
     found = []
-    for turn in range(math.ceil((high.max() - start + span) / TURN)):
+    for turn in range(math.ceil((high.max() - start + along.span) / TURN)):
         upper = np.minimum(high, leading + TURN * turn)
-        lower = np.maximum(low, leading + (TURN * turn - span))
+        lower = np.maximum(low, leading + (TURN * turn - along.span))
         at = np.nonzero(upper > lower)
         found.append((at[1], at[2], lower[at], upper[at]))
     angle, tooth, lower, upper = (np.concatenate(part) for part in zip(*found, strict=True))
     passed = before.before(angle, tooth)
     middle = 0.5 * (lower + upper)
     bounding = passed.chip(np.sin(middle), np.cos(middle)).argmin(axis=0)
-    return Pieces(angle, bounding, lower, upper, passed[bounding, np.arange(len(angle))], depth)
+    partial = []
+    for corner in corners:
+        vanishing, whole = corner.at(angle, tooth).limits
+        (inside,) = np.nonzero((middle - vanishing) * (middle - whole) < 0.0)
+        partial.append((inside, corner.at(angle[inside], tooth[inside])))
+    bounded = passed[bounding, np.arange(len(angle))]
+    return Pieces(angle, bounding, lower, upper, bounded, along.depth, tuple(partial))
 
 
 def points(cut: Pieces, law: EdgeLaw) -> tuple[Array, Array]:
@@ -79,7 +95,7 @@ def integrated(cut: Pieces, law: EdgeLaw, angles: int) -> Array:
     """Integrals (angles, 6) m of shear × sin φ, shear × cos φ, shear, sin φ, cos φ, 1, summed over teeth."""
     phi, weights = points(cut, law)
     sine, cosine = np.sin(phi), np.cos(phi)
-    shear = law.shear(np.maximum(cut.before.chip(sine, cosine), 0.0))
+    shear = law.shear(cut.chip(sine, cosine))
     parts = [weights @ wave for wave in (shear * sine, shear * cosine, shear, sine, cosine)]
     depths = np.stack([*parts, np.ones(len(cut.angle))]) * (cut.depth * (cut.high - cut.low))
     return np.stack([np.bincount(cut.angle, part, angles) for part in depths], axis=1)

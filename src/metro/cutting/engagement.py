@@ -8,10 +8,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Engagement:
-    """Immersion from ``entry`` to ``exit``, rad, clockwise from +y of the feed frame (towards +x)."""
+    """Immersion from ``entry`` to ``exit``, rad, clockwise from +y of the feed frame (towards +x).
+
+    ``entry_face``, ``exit_face``: whether a face square to the feed cuts the arc short there, not an edge of
+    the work along it.
+    """
 
     entry: float
     exit: float
+    entry_face: bool = False
+    exit_face: bool = False
 
 
 def engagement(operation: str, direction: str, radial_depth: float, radius: float) -> Engagement:

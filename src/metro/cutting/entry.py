@@ -52,8 +52,11 @@ def _parts(whole: Engagement, inside: list[tuple[float, float]]) -> tuple[Engage
     """Intersect ``whole`` with intervals; intervals that touch are one."""
     if len(inside) == 2 and inside[0][1] >= inside[1][0]:
         return (whole,)
-    parts = [(max(whole.entry, low), min(whole.exit, high)) for low, high in inside]
-    return tuple(Engagement(low, high) for low, high in parts if high > low)
+    return tuple(
+        Engagement(max(whole.entry, low), min(whole.exit, high), low > whole.entry, high < whole.exit)
+        for low, high in inside
+        if min(whole.exit, high) > max(whole.entry, low)
+    )
 
 
 def _summed(cutter: Cutter, law: EdgeLaw, cut: Cut, parts: tuple[Engagement, ...], true_path: bool) -> Array:

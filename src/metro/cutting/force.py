@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
 
 from metro.cutting.arcs import arcs
 from metro.cutting.chip import Cut, chip_thickness
+from metro.cutting.corners import corners
 from metro.cutting.cutter import Cutter
 from metro.cutting.edges import TURN, Pieces, integrated, pieces
+from metro.cutting.engagement import Engagement
 from metro.cutting.law import EdgeLaw
+from metro.cutting.nearby import Edges, edges, nearby
 from metro.cutting.passes import Passes, passes
 from metro.units import Array
 
@@ -45,10 +49,10 @@ def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False)
     angle = TURN * np.arange(ANGLES) / ANGLES
     cutter = placed(cutter, cut, true_path)
     before = passes(cutter, cut, true_path, angle)
-    bounds = arcs(before, cut.engagement)
-    if before.sine.size == 1 and ANGLES % cutter.teeth == 0:  # teeth that are all alike: one pitch of angles
+    if before.sine[0].size == 1 and ANGLES % cutter.teeth == 0:  # all teeth are alike: one pitch of angles
         angle = angle[: ANGLES // cutter.teeth]
-    pitch = assembled(engaged(cutter, cut, before, bounds, angle, step=TURN / ANGLES), law, len(angle))
+    along = edges(cutter, cut, angle, step=TURN / ANGLES)
+    pitch = assembled(engaged(before, cut.engagement, along), law, len(angle))
     basis = np.tile(pitch, (ANGLES // len(angle), 1, 1))
     basis.flags.writeable = False
     return basis
@@ -59,15 +63,11 @@ def placed(cutter: Cutter, cut: Cut, true_path: bool) -> Cutter:
     return cutter.about_axis(0.5 * cut.axial_depth) if true_path and cutter.runout_radius else cutter
 
 
-def engaged(cutter: Cutter, cut: Cut, before: Passes, bounds: Array, angle: Array, *, step: float) -> Pieces:
-    """Return the engaged pieces of the edges at angles (n,) of tooth 0, a ``step`` apart, rad.
-
-    Of an edge that lags by less than a step: as it turns through the step.
-    """
-    lag = cutter.lag_per_depth * cut.axial_depth
-    span = max(abs(lag), step)
-    top = angle[:, None] + np.asarray(cutter.tooth_angles) + 0.5 * (span - lag)
-    return pieces(before, bounds, top, span, cut.axial_depth / span)
+def engaged(before: Passes, engagement: Engagement, along: Edges, aside: Array | float = 0.0) -> Pieces:
+    """Return the engaged pieces of edges; ``aside`` (angles, 1) m displaces a tool on true paths along y."""
+    near = nearby(along, before.sine.shape[1:])
+    cut = corners(before, engagement, near, aside) if before.true_path else ()
+    return pieces(before, arcs(before, engagement, along, cut), along, cut)
 
 
 def mean_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) -> Array:
@@ -79,10 +79,9 @@ def mean_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) 
     before = passes(cutter, cut, true_path, np.zeros(1))
     if before.off_sine.any() or before.off_cosine.any():
         return np.asarray(force_basis(cutter, law, cut, true_path).mean(axis=0))
-    bounds = arcs(before, cut.engagement)
-    top = np.full((1, cutter.teeth), bounds.max())
-    whole = pieces(before, bounds, top, TURN, cut.axial_depth / TURN)
-    return np.asarray(assembled(whole, law, 1)[0])
+    top = np.full((1, cutter.teeth), 1.5 * math.pi)  # in the air
+    around = Edges(top, TURN, cut.axial_depth / TURN)
+    return np.asarray(assembled(engaged(before, cut.engagement, around), law, 1)[0])
 
 
 def mean_force(cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array) -> Array:
