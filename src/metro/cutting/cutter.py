@@ -21,6 +21,7 @@ class Cutter:
     tooth_angles : angle of each tooth from tooth 0, clockwise, rad. Tooth j+1 cuts before tooth j.
     runout_radius, runout_angle : offset of the tool's axis, m, and its direction from tooth 0, clockwise,
         rad.
+    reach : (N,) how much farther each tooth reaches than the radius, m; empty: none does.
     """
 
     radius: float
@@ -28,6 +29,7 @@ class Cutter:
     tooth_angles: tuple[float, ...]
     runout_radius: float = 0.0
     runout_angle: float = 0.0
+    reach: tuple[float, ...] = ()
 
     @property
     def teeth(self) -> int:
@@ -49,7 +51,8 @@ class Cutter:
     def radius_deviation(self, height: Array) -> Array:
         """Return how far each tooth is from the axis of rotation, less the radius: (N, heights) m."""
         angles = np.asarray(self.tooth_angles)[:, None]
-        return self.runout_radius * np.cos(self.runout_angle - angles + self.lag_per_depth * height[None, :])
+        towards = self.runout_angle - angles + self.lag_per_depth * height[None, :]
+        return self.runout_radius * np.cos(towards) + (np.array(self.reach)[:, None] if self.reach else 0.0)
 
     def about_axis(self, height: float) -> Cutter:
         """Return the cutter with each tooth at its angle about the axis of rotation, at a height, m.

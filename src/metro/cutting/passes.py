@@ -81,7 +81,7 @@ def passes(cutter: Cutter, cut: Cut, true_path: bool, angle: Array, *, every: bo
     alone unless the path is curved, or ``every`` one is wanted; where pitch and deviations are equal as
     well, the teeth are alike.
     """
-    deviation = _deviation(cutter)
+    deviation = _deviation(cutter, cut)
     off = deviation.any()
     curvature = cut.curvature if true_path else 0.0
     steps = range(1, cutter.teeth + 1 if off or curvature or every else 2)
@@ -102,9 +102,13 @@ def passes(cutter: Cutter, cut: Cut, true_path: bool, angle: Array, *, every: bo
     return Passes(feed, cutter.radius, true_path, pitch, sine, cosine, off_sine, off_cosine)
 
 
-def _deviation(cutter: Cutter) -> npt.NDArray[np.complex128]:
-    """Complex amplitude (N,) m of how far each tooth is off the radius: the real part of it × exp iκz."""
-    if cutter.helix == 0.0:  # all of the edge is at height 0 of a helix, whichever that is
-        cutter = replace(cutter, helix=0.25 * math.pi)
-    start, quarter = cutter.radius_deviation(np.array([0.0, 0.5 * math.pi / cutter.lag_per_depth])).T
-    return np.asarray(start - 1j * quarter)
+def _deviation(cutter: Cutter, cut: Cut) -> npt.NDArray[np.complex128]:
+    """Complex amplitude (N,) m of how far each tooth is off the radius: the real part of it × exp iκz.
+
+    How far a tooth reaches is the same at all heights: it is taken as such a wave with its crest at half the
+    depth, too little by 1 − cos(κ × depth / 2) at both ends.
+    """
+    even = replace(cutter, reach=(), helix=cutter.helix or 0.25 * math.pi)  # no helix: all is at height 0
+    start, quarter = even.radius_deviation(np.array([0.0, 0.5 * math.pi / even.lag_per_depth])).T
+    reach = np.array(cutter.reach or (0.0,)) * np.exp(-0.5j * cutter.lag_per_depth * cut.axial_depth)
+    return np.asarray(start - 1j * quarter + reach)

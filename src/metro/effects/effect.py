@@ -63,6 +63,8 @@ class Effect:
         batch calls for (one per tooth), or why this batch cannot show it. None: as it is.
     mixing : rows that make the values of the contract from the parameters of the search, where these are
         fewer (pitch errors add up to nothing); empty: they are the same.
+    resembled : true of a cause that is not one of the contract's: it is tried like the others, so that none
+        of them is taken for it, but the verdict only says that the rest resembles it.
     form : where one cause has two models of which a batch has one: what tells them apart, for the report.
     """
 
@@ -76,6 +78,7 @@ class Effect:
     adapt: Callable[[Effect, Problem], Effect | Refusal] | None = None
     mixing: tuple[tuple[float, ...], ...] = ()
     form: str = ""
+    resembled: bool = False
 
     @property
     def reported(self) -> tuple[EffectParameter, ...]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 
+from metro.cutting.chipped import Chipped
 from metro.cutting.cutter import Cutter
 from metro.cutting.force import COEFFICIENTS, Cut, force_basis
 from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped, turned
@@ -80,6 +81,7 @@ class ForceModel:
     bottom_edges: tuple[str, ...] = ()
     structure: Structure = field(default_factory=Structure)
     sensor: Dynamometer = field(default_factory=Dynamometer)
+    chipped: Chipped | None = None
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -130,6 +132,9 @@ class ForceModel:
 
         Of a tool that yields in helical milling for each direction of ``FEEDS``, else one.
         """
+        if self.chipped:
+            sound = replace(self, chipped=None)
+            return sound._orders(setting, beta) + self._lost(self.chipped, setting)[..., None]
         tool, highest = (self.cutter, self.law, setting.cut), setting.highest
         if beta is None or not any(self.structure.compliance):
             return _order_basis(*tool, highest, self.true_path)[..., None]
@@ -141,6 +146,15 @@ class ForceModel:
             for spring in springs
         ]
         return np.stack(bases, axis=3)
+
+    def _lost(self, chipped: Chipped, setting: ForceSetting) -> Array:
+        """Order coefficients of what a chipped tooth changes in the force, as if the tool did not yield."""
+        broken, low = chipped.change(self.cutter, setting.cut)
+        with_it, without = (
+            _order_basis(tool, self.law, low, setting.highest, self.true_path)
+            for tool in (broken, self.cutter)
+        )
+        return np.asarray(with_it - without)
 
     def _bottom(self, setting: ForceSetting, orders: int) -> Array:
         """Thrust of the bottom edges along z over the whole revolution: it is not inclined by the ramp."""
