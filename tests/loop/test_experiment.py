@@ -90,7 +90,7 @@ def fitted_again(fitted, noise, made):
     blocks = [*fitted.blocks, *made]
     start = {**fitted.nuisance, **(score(fitted, made).nuisance if made else {})}
     state, _ = descend(fitted.candidate, blocks, noise, State(fitted.theta, fitted.beta, start))
-    return -0.5 * linearised(fitted.candidate, blocks, noise, state, derivatives=False).cost
+    return -0.5 * linearised(fitted.candidate, blocks, noise, state, derivatives="none").cost
 
 
 def frequency(truth, other, feed, draws=150):

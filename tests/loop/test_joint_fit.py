@@ -56,7 +56,7 @@ def test_log_likelihood_is_that_of_the_dense_gaussian():
     found = fit(Candidate(task.base), blocks, prior_of(task, blocks))
     noise = replace(found.noise, misfit={})  # with misfit, elements are deliberately counted together
     state = State(found.theta, found.beta, dict(found.nuisance))
-    reached = linearised(found.candidate, blocks, noise, state, derivatives=False)
+    reached = linearised(found.candidate, blocks, noise, state, derivatives="none")
     for block in blocks:
         covariance = dense_covariance(block, noise, task.base, found.nuisance[block.run], found.beta)
         dense = stats.multivariate_normal(found.predict(block), covariance).logpdf(block.measured)
@@ -138,9 +138,9 @@ def test_descent_never_raises_the_cost_and_keeps_parameters_in_bounds():
     tight = replace(BEND, parameters=(replace(BEND.parameters[0], upper=0.12),))
     candidate = Candidate(task.base, (tight,))
     state = State(np.array([0.0]), BETA * 1.3, {b.run: np.array([0.1]) for b in blocks})
-    before = linearised(candidate, blocks, noise, state, derivatives=False).cost
+    before = linearised(candidate, blocks, noise, state, derivatives="none").cost
     after, _ = descend(candidate, blocks, noise, state)
-    assert linearised(candidate, blocks, noise, after, derivatives=False).cost < before
+    assert linearised(candidate, blocks, noise, after, derivatives="none").cost < before
     assert after.theta[0] <= 0.12
 
 
@@ -301,6 +301,6 @@ def test_descent_from_anywhere_ends_lower_than_it_began():
     noise, candidate, rng = prior_of(task, blocks), Candidate(task.base), np.random.default_rng(1)
     for _ in range(15):
         state = State(np.zeros(0), BETA, {b.run: rng.uniform(0, 6.28, 1) for b in blocks})
-        before = linearised(candidate, blocks, noise, state, derivatives=False).cost
+        before = linearised(candidate, blocks, noise, state, derivatives="none").cost
         after, _ = descend(candidate, blocks, noise, state)
-        assert linearised(candidate, blocks, noise, after, derivatives=False).cost <= before
+        assert linearised(candidate, blocks, noise, after, derivatives="none").cost <= before

@@ -155,9 +155,39 @@ def test_the_rest_of_a_clean_fit_is_nowhere_significant_and_named_in_order_of_si
 
 def test_an_effect_that_helps_one_condition_alone_is_not_added():
     evidence = Evidence(
-        statistic=50.0, p_value=1e-6, held_out={"a": 9.0, "b": -1.0, "c": -1.0, "d": -1.0}, size=0.1
+        statistic=50.0,
+        p_value=1e-6,
+        held_out={"a": 9.0, "b": -1.0, "c": -1.0, "d": -1.0},
+        size=0.1,
+        missed=0.0,
     )
     assert evidence.gain > GATES.held_out_gain
     assert "25 %" in trial_room._not_held_out(evidence, GATES)
     even = replace(evidence, held_out=dict.fromkeys("abcd", 1.5))
     assert trial_room._not_held_out(even, GATES) == ""
+
+
+def test_an_effect_smaller_than_half_of_what_stays_unexplained_is_not_added():
+    evidence = Evidence(statistic=50.0, p_value=1e-6, held_out={}, size=0.02, missed=0.05)
+    assert "5 % stay unexplained" in trial_room._why_not(evidence, True, 0.004)
+    assert trial_room._why_not(replace(evidence, missed=0.03), True, 0.004) == ""
+
+
+def test_what_is_not_of_the_library_is_told_as_a_likeness_and_not_added():
+    strange = replace(RIPPLE, resembled=True)
+    task = problem(15, truth=Wave(ripple=0.1))
+    outcome, verdict = judged(task, (BEND, strange))
+    assert outcome.names == ()
+    assert outcome.final is outcome.base
+    assert outcome.likeness.theta[0] == pytest.approx(0.1, rel=0.1)
+    assert verdict["status"] == "unexplained"
+    assert "like a ripple (ripple 0.0997)" in verdict["unexplained"]["signature"]
+
+
+@pytest.mark.parametrize("seed", range(15, 18))
+def test_what_explains_as_well_as_an_effect_of_the_library_leaves_that_in_its_place(seed):
+    strange = replace(TWIN, resembled=True)
+    outcome = search(problem(seed, truth=Wave(bend=0.1)), (strange, BEND), GATES)
+    assert outcome.names == ("bend",)
+    assert outcome.likeness is None
+    assert [rival.pair for rival in outcome.rivals] == [("bend", "twin")]

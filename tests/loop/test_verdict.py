@@ -8,11 +8,21 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
-from toy import BEND, BETA, GATES, POINTS, RIPPLE, TWIN, Wave, problem
+from toy import BEND, BETA, GATES, POINTS, RIPPLE, SIGMA, TWIN, Wave, problem
 
 from metro.loop.search import search
+from metro.loop.signature import Line, share_left
 from metro.loop.story import SENTENCES, in_words, told
-from metro.loop.verdict import COMPARISON, comparison, error, held_out, identified_fit, judge, run_dof
+from metro.loop.verdict import (
+    COMPARISON,
+    UNTESTED,
+    comparison,
+    error,
+    held_out,
+    identified_fit,
+    judge,
+    run_dof,
+)
 
 STATUSES = {"clean", "explained", "partly_explained", "undetermined", "unexplained", "insufficient"}
 
@@ -86,6 +96,50 @@ def test_without_held_out_runs_nothing_is_claimed():
     assert verdict["status"] == "insufficient"
     assert verdict["before"] is None
     check_entry(verdict)
+
+
+def test_insufficient_runs_claim_no_effect_and_the_one_found_is_a_candidate_that_was_not_tested():
+    task = problem(10, truth=Wave(bend=0.2), held=())
+    outcome, _, verdict = closed(task, (BEND, RIPPLE))
+    assert outcome.names == ("bend",)  # so sure is the search
+    assert verdict["status"] == "insufficient"
+    assert verdict["effects"] == []
+    found = {entry["effect"]: entry for entry in verdict["candidates"]}
+    assert set(found) == {"bend", "ripple"}
+    assert found["bend"]["why_not"] == UNTESTED
+    assert found["ripple"]["why_not"] not in ("", UNTESTED)
+    assert all(entry["held_out_rms"] is None for entry in found.values())
+
+
+def test_every_candidate_that_is_not_taken_has_its_own_error_on_held_out_runs():
+    task = problem(11, truth=Wave(bend=0.2))
+    immaterial = replace(GATES, materiality=0.5)
+    outcome = search(task, (BEND, RIPPLE), immaterial)
+    rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
+    verdict = judge(task, outcome, rows, immaterial)
+    found = {entry["effect"]: entry["held_out_rms"] for entry in verdict["candidates"]}
+    # The held-out runs at feeds 2.5 and 3.5 hold a wave of 0.2 β feed; ripple leaves it, bend takes it out.
+    wave = 0.2 * BETA[0] * np.sqrt((2.5**2 + 3.5**2) / 4)
+    assert verdict["before"]["rms"] == pytest.approx(wave, rel=0.05)
+    assert found["ripple"] == pytest.approx(wave, rel=0.05)
+    assert SIGMA / 2 < found["bend"] < 0.2 * wave
+
+
+def test_the_unexplained_rest_has_the_size_of_what_the_library_lacks():
+    task = problem(12, truth=Wave(spike=0.3))
+    _, _, verdict = closed(task, (BEND,))
+    assert verdict["status"] == "unexplained"
+    assert verdict["unexplained"]["rms"] == pytest.approx(0.3 * BETA[1] / np.sqrt(2), rel=0.1)
+    assert verdict["unexplained"]["unit"] == "N"
+
+
+def test_the_share_left_is_what_is_significant_over_all_axes():
+    def line(axis, excess, signal, significant=True):
+        return Line(axis, "all", 2 * excess, excess, signal, excess / signal, 0.0, significant)
+
+    lines = [line("x", 3.0, 30.0), line("x", 4.0, 30.0), line("y", 12.0, 40.0), line("y", 20.0, 40.0, False)]
+    assert share_left(lines) == pytest.approx(13.0 / 50.0)
+    assert share_left(lines[-1:]) == 0.0
 
 
 def test_error_is_the_rms_and_its_interval_a_bootstrap_over_runs():

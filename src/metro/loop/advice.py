@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from metro.loop import signature as rest
 from metro.loop.experiment import Prospect, best_view, prospects
+from metro.loop.fit import Fit
 from metro.loop.rivals import Rival
 from metro.loop.search import Outcome
 from metro.observables.problem import Problem, Proposal
@@ -47,12 +48,27 @@ def enough_runs(problem: Problem) -> bool:
 
 
 def left_over(outcome: Outcome) -> str:
-    """Describe the significant rest; empty where there is none."""
-    parts = [rest.in_words(list(outcome.lines))]
+    """Describe the significant rest, and what it resembles; empty where there is none."""
+    parts = [_resembled(outcome.likeness)] if outcome.likeness else []
+    parts.append(rest.in_words(list(outcome.lines)))
     if outcome.step:
         step = outcome.step
         parts.append(f"a step of {step.parameter} by {100 * step.relative:+.1f} % after run {step.after}")
     return "; ".join(part for part in parts if part)
+
+
+def _resembled(likeness: Fit) -> str:
+    """Name what is not of the library and would lower the rest, with the values that do it best."""
+    found = [
+        f"{_words(effect.name)} ("
+        + ", ".join(
+            f"{_words(name)} {value:.3g}" for name, value in effect.values(likeness.theta[place]).items()
+        )
+        + ")"
+        for effect, place in likeness.candidate.parts(likeness.theta)
+        if effect.resembled
+    ]
+    return f"like a {' and a '.join(found)}, which is no effect of the library"
 
 
 def _to_decide(problem: Problem, outcome: Outcome) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -61,11 +62,16 @@ class System:
 
 
 def linearised(
-    candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, *, derivatives: bool = True
+    candidate: Candidate,
+    blocks: Sequence[Block],
+    noise: Noise,
+    state: State,
+    *,
+    derivatives: Literal["all", "own", "none"] = "all",
 ) -> System:
-    """Whitened rest of every block, its likelihood, and (unless not wanted) its derivatives."""
+    """Whitened rest of every block, its likelihood, and its derivatives: all, or by its own unknowns only."""
     model = candidate.model(state.theta)
-    moved = moved_models(candidate, state.theta) if derivatives else []
+    moved = moved_models(candidate, state.theta) if derivatives == "all" else []
     rows: list[Rows] = []
     log_likelihood, chi2 = {}, {}
     for block in blocks:
@@ -79,7 +85,7 @@ def linearised(
         log_likelihood[block.run] = -0.5 * (
             chi2[block.run] + whiten.log_shared + noise_room.log_scale(block, noise)
         )
-        if derivatives:
+        if derivatives != "none":
             effect, own = sensitivities(model, moved, block, nuisance, state.beta, predicted=predicted)
             whitened = whiten(np.hstack([matrix, effect, own]))
             p, q = matrix.shape[1], matrix.shape[1] + effect.shape[1]
@@ -150,27 +156,37 @@ def own_step(row: Rows, common: Array) -> Array:
     rest, base, effect, own = row
     if not own.shape[1]:
         return np.zeros(0)
-    left = rest - np.hstack([base, effect]) @ common
+    left = rest - np.hstack([base, effect]) @ common if common.any() else rest
     return np.asarray(np.linalg.lstsq(own, left, rcond=None)[0])
 
 
 def descend(
-    candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, steps: int = ITERATIONS
+    candidate: Candidate,
+    blocks: Sequence[Block],
+    noise: Noise,
+    state: State,
+    steps: int = ITERATIONS,
+    *,
+    own: bool = False,
 ) -> tuple[State, float]:
     """Follow Gauss–Newton steps, shortened until the cost falls, to where they gain next to nothing.
+
+    Parameters
+    ----------
+    own : move the blocks' own unknowns alone; base and effect parameters stay.
 
     Returns
     -------
     state, cost : where at most so many ``steps`` lead.
     """
-    system = linearised(candidate, blocks, noise, state)
+    free: Literal["all", "own"] = "own" if own else "all"
+    system = linearised(candidate, blocks, noise, state, derivatives=free)
     for step in range(steps):
-        normal, right = normal_equations(system)
-        common = solution(normal, right)
-        own = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
+        common = np.zeros(len(state.beta) + len(state.theta)) if own else solution(*normal_equations(system))
+        alone = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
         for share in SHARES:
-            trial = _moved(candidate, state, share * common, {run: share * own[run] for run in own})
-            reached = linearised(candidate, blocks, noise, trial, derivatives=False)
+            trial = _moved(candidate, state, share * common, {run: share * alone[run] for run in alone})
+            reached = linearised(candidate, blocks, noise, trial, derivatives="none")
             if reached.cost < system.cost:
                 break
         else:
@@ -179,7 +195,7 @@ def descend(
         if gain < share * ENOUGH:
             break
         if step + 1 < steps:
-            system = linearised(candidate, blocks, noise, state)
+            system = linearised(candidate, blocks, noise, state, derivatives=free)
     return state, system.cost
 
 

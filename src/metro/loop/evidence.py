@@ -29,13 +29,15 @@ class Evidence:
     statistic : twice the gain in log-likelihood. p_value : of it, by F with run-level degrees of freedom.
     held_out : gain in log-likelihood of each condition when it is left out of both fits; empty where that was
         not worth computing.
-    size : rms change of the prediction over the rms of the signal.
+    size : rms change of the prediction over the rms of the signal. missed : rms of what the larger candidate
+        misses beyond the noise, over that of the signal.
     """
 
     statistic: float
     p_value: float
     held_out: dict[str, float]
     size: float
+    missed: float
 
     @property
     def gain(self) -> float:
@@ -53,7 +55,8 @@ def compare(smaller: Fit, larger: Fit) -> Evidence:
     runs = sum(block.role != "calibrate" for block in larger.blocks)
     statistic = 2.0 * (larger.total - smaller.total)
     parameters = len(larger.theta) - len(smaller.theta)
-    return Evidence(statistic, _tail(statistic, parameters, runs), {}, change(smaller, larger))
+    p_value = _tail(statistic, parameters, runs)
+    return Evidence(statistic, p_value, {}, change(smaller, larger), missed(larger))
 
 
 def hold_out(evidence: Evidence, smaller_out: Mapping[str, float], larger: Fit, prior: Noise) -> Evidence:
@@ -78,6 +81,17 @@ def change(smaller: Fit, larger: Fit) -> float:
     return math.sqrt(difference / signal)
 
 
+def missed(fitted: Fit) -> float:
+    """Rms of what a fit misses beyond the noise over the rms measured, over the runs, not the load tests."""
+    lost, signal = 0.0, 0.0
+    for block in fitted.blocks:
+        if block.role != "calibrate":
+            share = np.array([fitted.noise.misfit.get(str(axis), 0.0) for axis in np.unique(block.axis)])
+            power = [float(np.sum(block.measured[block.axis == axis] ** 2)) for axis in np.unique(block.axis)]
+            lost, signal = lost + float(share**2 @ power), signal + sum(power)
+    return math.sqrt(lost / signal)
+
+
 @lru_cache(maxsize=256)
 def leave_out(fitted: Fit, prior: Noise) -> dict[str, float]:
     """Log-likelihood of each condition under the fit of all others; of each run if there is one condition."""
@@ -86,12 +100,27 @@ def leave_out(fitted: Fit, prior: Noise) -> dict[str, float]:
     groups: dict[str, list[Block]] = {}
     for block in cut:
         groups.setdefault(block.condition if by_condition else block.run, []).append(block)
-    result = {}
-    for name, held in groups.items():
-        left_out = {block.run for block in held}
-        rest = [block for block in fitted.blocks if block.run not in left_out]
-        result[name] = score(refit(fitted, rest, prior), held).total if len(groups) > 1 else -math.inf
-    return result
+    if len(groups) == 1:
+        return dict.fromkeys(groups, -math.inf)
+    return {name: _unseen(fitted, held, prior) for name, held in groups.items()}
+
+
+def _unseen(fitted: Fit, held: Sequence[Block], prior: Noise) -> float:
+    """Log-likelihood of runs under the fit of all others.
+
+    Of runs that alone tell a base parameter (the only hole among slots) nothing can be predicted without
+    them: they are left out one by one.
+    """
+    left_out = {block.run for block in held}
+    others = refit(fitted, [block for block in fitted.blocks if block.run not in left_out], prior)
+    if len(held) > 1 and _told(others) < _told(fitted):
+        return sum(_unseen(fitted, [block], prior) for block in held)
+    return score(others, held).total
+
+
+def _told(fitted: Fit) -> int:
+    """Count the base parameters that the runs of a fit tell."""
+    return int(np.isfinite(np.diag(fitted.covariance)[: len(fitted.beta)]).sum())
 
 
 def weights(held_out: Sequence[dict[str, float]], seed: int, draws: int = 2000) -> Array:

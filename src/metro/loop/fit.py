@@ -15,18 +15,18 @@ import numpy as np
 from metro.loop import noise as noise_room
 from metro.loop.candidate import Candidate, started
 from metro.loop.covariance import between_runs
-from metro.loop.descent import ITERATIONS, State, descend, inverse, linearised, normal_equations, own_step
+from metro.loop.descent import ENOUGH, ITERATIONS, State, descend, inverse, linearised, normal_equations
 from metro.loop.noise import Noise
-from metro.observables.problem import Block
+from metro.observables.problem import Block, Model
 from metro.units import Array
 
 FOLLOWED = 4  # starts of new effect parameters that are followed to the end
 FIRST_STEPS, KEPT = 3, 2  # where little is left to explain, after so many steps so many are kept
 HOPELESS = 1.0  # and none, where twice the log-likelihood has not gained that much per parameter: chance does
+ALIKE = 1e-9  # relative difference of the sums of squares of starts that are the same
 UNDECIDED = 0.1  # differences in twice the log-likelihood that the noise, once known better, may turn round
 ROUNDS, SETTLED = 12, 0.2  # of noise estimation and descent; gain in twice the log-likelihood that ends them
 EM_STEPS = 8
-NUISANCE_STEPS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,24 +85,33 @@ def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fi
     around = start.nuisance if start and fresh else None
     best = [State(theta, beta, {})]
     for places in candidate.groups(len(known)) or [[]]:
-        trials: list[tuple[float, int, State]] = []
+        trials: list[tuple[float, State]] = []
         for given in started(candidate, best[0].theta, places):
             state = State(given, beta.copy(), {})
-            trials.append((_search_nuisance(candidate, blocks, noise, state, around), len(trials), state))
-        trials.sort(key=lambda trial: trial[:2])
-        best = [state for *_, state in trials]
-    best = best[: FOLLOWED if fresh else 1]
-    if start and fresh and all(missed < noise.budget for missed in noise.misfit.values()):
-        first = _lowest_first(candidate, blocks, noise, best, steps=FIRST_STEPS)
-        best = [state for _, state in first[:KEPT]]
-        here = State(start.theta, start.beta, dict(start.nuisance))
-        without = linearised(start.candidate, blocks, noise, here, derivatives=False).cost
-        if without - first[0][0] < HOPELESS * len(fresh):
-            return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
+            trials.append((_search_nuisance(candidate, blocks, noise, state, around), state))
+        best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
+    if start and fresh:
+        first = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS)
+        best = _distinct(first, ENOUGH)
+        if all(missed < noise.budget for missed in noise.misfit.values()):
+            best = best[:KEPT]
+            here = State(start.theta, start.beta, dict(start.nuisance))
+            without = linearised(start.candidate, blocks, noise, here, derivatives="none").cost
+            if without - first[0][0] < HOPELESS * len(fresh):
+                return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
     reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS)
     near = [state for cost, state in reached if cost < reached[0][0] + UNDECIDED]
     refined = [_refined(candidate, blocks, prior, noise, state, rounds=ROUNDS) for state in near]
     return max(refined, key=lambda found: found.total)
+
+
+def _distinct(found: Sequence[tuple[float, State]], apart: float) -> list[State]:
+    """Return states with rising costs, without those that cost the same as the one before.
+
+    They are the same with another tooth as the first one, or come from two starts that lead to one place.
+    """
+    costs = [-np.inf, *(cost for cost, _ in found)]
+    return [state for (cost, state), lower in zip(found, costs, strict=False) if cost - lower > apart]
 
 
 def _lowest_first(
@@ -122,14 +131,15 @@ def refit(start: Fit, blocks: Sequence[Block], prior: Noise) -> Fit:
 
 def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
     """Evaluate a fit on blocks it has not seen: only their nuisances are estimated, nothing else moves."""
+    candidate, noise = fitted.candidate, fitted.noise
+    model = candidate.model(fitted.theta)
     state = State(fitted.theta, fitted.beta, {})
-    _search_nuisance(fitted.candidate, blocks, fitted.noise, state)
-    still = np.zeros(len(fitted.beta) + len(fitted.theta))
-    for _ in range(NUISANCE_STEPS):
-        system = linearised(fitted.candidate, blocks, fitted.noise, state)
-        for block, row in zip(blocks, system.rows, strict=True):
-            state.nuisance[block.run] = state.nuisance[block.run] + own_step(row, still)
-    return _finished(fitted.candidate, blocks, fitted.noise, state, fitted.covariance)
+    for block in blocks:
+        costs = _costs(model, block, noise, state.beta, starts := model.nuisance_starts(block))
+        near = [State(state.theta, state.beta, {block.run: starts[i]}) for i in np.argsort(costs)[:FOLLOWED]]
+        reached = [descend(candidate, [block], noise, each, own=True) for each in near]
+        state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
+    return _finished(candidate, blocks, noise, state, fitted.covariance)
 
 
 def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> Array:
@@ -167,15 +177,22 @@ def _search_nuisance(
     model = candidate.model(state.theta)
     total = 0.0
     for block in blocks:
-        weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
-        best = np.inf
-        for nuisance in _images(block, around[block.run]) if around else model.nuisance_starts(block):
-            matrix, offset = model.design(block, nuisance, state.beta)
-            cost = float(np.sum(((block.measured - offset - matrix @ state.beta) * weight) ** 2))
-            if cost < best:
-                best, state.nuisance[block.run] = cost, np.asarray(nuisance, dtype=float)
-        total += best
+        starts = _images(block, around[block.run]) if around else model.nuisance_starts(block)
+        costs = _costs(model, block, noise, state.beta, starts)
+        best = int(np.argmin(costs))
+        state.nuisance[block.run] = np.asarray(starts[best], dtype=float)
+        total += float(costs[best])
     return total
+
+
+def _costs(model: Model, block: Block, noise: Noise, beta: Array, starts: Array) -> Array:
+    """Weighted sum of squares that each of a block's nuisances leaves, (starts,)."""
+    weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
+    costs = np.empty(len(starts))
+    for i, nuisance in enumerate(starts):
+        matrix, offset = model.design(block, nuisance, beta)
+        costs[i] = np.sum(((block.measured - offset - matrix @ beta) * weight) ** 2)
+    return costs
 
 
 def _images(block: Block, nuisance: Array) -> Array:
@@ -232,7 +249,7 @@ def _reestimated(
 def _finished(
     candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, covariance: Array
 ) -> Fit:
-    system = linearised(candidate, blocks, noise, state, derivatives=False)
+    system = linearised(candidate, blocks, noise, state, derivatives="none")
     elements = {block.run: len(block.measured) for block in blocks}
     return Fit(
         candidate, state.theta, state.beta, dict(state.nuisance), noise, covariance,

@@ -48,7 +48,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class Whitener:
-    """The inverse square root of a block's covariance, in factored form.
+    """The inverse square root of a block's covariance, in factored form: 1 − vectors × shrink × vectorsᵀ.
 
     ``log_shared`` is what the shared directions add to the logarithm of its determinant.
     """
@@ -115,8 +115,12 @@ def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
 def whitener(variance: Array, directions: Array) -> Whitener:
     """Factor the covariance ``diag(variance) + directions @ directionsᵀ``."""
     inverse_sd = 1.0 / np.sqrt(variance)
-    left, size, _ = np.linalg.svd(inverse_sd[:, None] * directions, full_matrices=False)
-    return Whitener(inverse_sd, left, 1.0 - 1.0 / np.sqrt(1.0 + size**2), float(np.log1p(size**2).sum()))
+    scaled = inverse_sd[:, None] * directions
+    power, turn = np.linalg.eigh(scaled.T @ scaled)
+    power = np.maximum(power, 0.0)
+    root = np.sqrt(1.0 + power)
+    # 1 − 1/root over the power, without the loss of digits where there is next to none of it.
+    return Whitener(inverse_sd, scaled @ turn, 1.0 / (root * (1.0 + root)), float(np.log1p(power).sum()))
 
 
 def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array:

@@ -44,6 +44,11 @@ class Contest:
     rivals: tuple[Rival, ...] = ()
 
 
+def believed(effect: Effect, weight: float) -> tuple[bool, float]:
+    """Order of belief: what is not of the library comes after all that is and has a weight that counts."""
+    return not effect.resembled and weight > RIVAL_WEIGHT, weight
+
+
 def contested(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> Contest:
     """Weigh every effect found against each other effect in its place, and put the better one there."""
     swapped: set[str] = set()
@@ -75,8 +80,11 @@ def _round(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) 
         for fitted, other in zip(others, share[1:], strict=True):
             if other > RIVAL_WEIGHT:
                 rivals.append(Rival(effect.name, fitted.candidate.effects[-1].name, float(other), fitted))
-            if better is None and other > share[0] and other == share.max():
-                better = fitted
+        in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
+        belief = [believed(one, float(part)) for one, part in zip(in_place, share, strict=True)]
+        first = belief.index(max(belief))
+        if better is None and first > 0:
+            better = others[first - 1]
     return Contest(current, weight, tuple(rivals)), better
 
 

@@ -16,7 +16,7 @@ from metro.loop.candidate import Candidate
 from metro.loop.evidence import compare, hold_out, leave_out, surviving_share
 from metro.loop.fit import Fit, fit
 from metro.loop.noise import Noise, first_noise
-from metro.loop.rivals import Rival, contested
+from metro.loop.rivals import Rival, believed, contested
 from metro.loop.session import Step, scan
 from metro.loop.trial import Gates, Trial, tried, without
 from metro.observables.problem import Problem
@@ -37,7 +37,8 @@ class Outcome:
     ``base`` and ``final`` are fits of the identification runs; ``steps`` the fits after each addition;
     ``trials`` the last trial of each effect, ``weight`` the probability of each effect found against its
     rivals and against nothing; ``rivals`` effects that explain the rest as well as a chosen one; ``lines``
-    the signature of the rest, ``step`` that along the session; ``not_visible`` why effects cannot be seen.
+    the signature of the rest, ``step`` that along the session; ``not_visible`` why effects cannot be seen;
+    ``likeness`` the fit with what the rest resembles and is no effect of the library (``final`` is without).
     """
 
     base: Fit
@@ -51,6 +52,7 @@ class Outcome:
     step: Step | None = None
     offered: tuple[Effect, ...] = ()
     not_visible: dict[str, str] = field(default_factory=dict)
+    likeness: Fit | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -65,7 +67,9 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
     prior = first_noise(gates.model_form_budget, problem.scatter, blocks)
     base = fit(Candidate(problem.base), blocks, prior)
     least = max(gates.materiality, 2.0 * problem.systematic)
-    visible = {e.name: surviving_share(Candidate(problem.base, (e,)), base) for e in effects}
+    visible = {
+        e.name: surviving_share(Candidate(problem.base, (e,)), base) for e in effects if not e.resembled
+    }
     absorbed = {
         name: ABSORBED.format(100.0 * share) for name, share in visible.items() if share < NOT_VISIBLE
     }
@@ -78,28 +82,37 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
         open_effects = [effect for effect in effects if effect.name not in taken]
         round_trials = tried(current, open_effects, prior, gates, least)
         trials |= {(trial.effect.name, trial.effect.form): trial for trial in round_trials}
-        passed = sorted((t for t in round_trials if not t.why_not), key=lambda trial: -trial.weight)
+        passed = [trial for trial in round_trials if not trial.why_not]
         if not passed:
             break
-        current, dropped = _pruned(passed[0].fit, prior, gates, least)
+        first = max(passed, key=lambda trial: believed(trial.effect, trial.weight))
+        current, dropped = _pruned(first.fit, prior, gates, least)
         barred |= dropped
         steps.append(current)
     compared = contested(current, seen, prior, gates)
     if compared.final is not current:
-        steps.append(compared.final)
-    step, floor = scan(compared.final, gates.seed), max(least, gates.model_form_budget)
+        current, dropped = _pruned(compared.final, prior, gates, least)
+        compared = contested(current, seen, prior, gates) if dropped else compared
+    likeness = compared.final
+    kept = tuple(effect for effect in likeness.candidate.effects if not effect.resembled)
+    final = likeness if len(kept) == len(likeness.candidate.effects) else without(likeness, kept, prior)
+    steps = [fitted for fitted in steps if not any(e.resembled for e in fitted.candidate.effects)]
+    if final not in (base, *steps):
+        steps.append(final)
+    step, floor = scan(likeness, gates.seed), max(least, gates.model_form_budget)
     return Outcome(
         base=base,
-        final=compared.final,
+        final=final,
         steps=tuple(steps),
         trials=tuple(trials.values()),
         weight=compared.weight,
         rivals=compared.rivals,
         base_lines=tuple(rest.signature(base, floor)),
-        lines=tuple(rest.signature(compared.final, floor)),
+        lines=tuple(rest.signature(final, floor)),
         step=step if step and step.p_value < SESSION and abs(step.relative) > SESSION_SIZE else None,
         offered=tuple(library),
         not_visible=unable | absorbed,
+        likeness=likeness if likeness is not final else None,
     )
 
 

@@ -13,6 +13,7 @@ from metro.loop.fit import Fit, fit
 from metro.loop.noise import Noise
 
 LEAST_BETTER = 0.4
+OF_THE_REST = 0.5  # an effect smaller than this share of what stays unexplained may be part of that
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,11 @@ def _why_not(evidence: Evidence, found: bool, least: float) -> str:
         return f"no evidence: p = {evidence.p_value:.2g} over the runs of the fit"
     if evidence.size < least:
         return f"changes the prediction by {100 * evidence.size:.2f} %: below {100 * least:.2g} %, immaterial"
+    if evidence.size < OF_THE_REST * evidence.missed:
+        return (
+            f"changes the prediction by {100 * evidence.size:.2g} %, where {100 * evidence.missed:.2g} % "
+            "stay unexplained: what is missing may look like it"
+        )
     return ""
 
 

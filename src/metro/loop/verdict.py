@@ -227,4 +227,9 @@ def _unexplained(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON
     """Describe the rest; its size is the share left on the identification runs, of the held-out signal."""
     share = max(share_left(outcome.lines), abs(outcome.step.relative) if outcome.step else 0.0)
     over = share * float(np.sqrt((rows["measured"] ** 2).mean())) if len(rows) else None
-    return {"rms": over, "unit": problem.unit, "signature": left_over(outcome)}
+    words = left_over(outcome)
+    if outcome.likeness and len(rows):
+        words += (
+            f"; with that the error would be {held_out_rms(problem, outcome.likeness):.3g} {problem.unit} rms"
+        )
+    return {"rms": over, "unit": problem.unit, "signature": words}
