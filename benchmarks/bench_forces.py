@@ -107,8 +107,7 @@ def test_ratios_to_real_time_and_to_the_peers():
         ("slices, all vectorised", whole),
     ):
         print(f"{name:30s}{1e3 * spent:10.2f}{1 / spent:14.0f}{loop / spent:14.1f}{whole / spent:14.1f}")
-    assert 1 / circular >= 200
-    assert 1 / true >= 100  # runout puts every tooth elsewhere: four times the chips of circular paths
+    assert 1 / max(circular, true) >= 200
     assert loop / max(circular, true) >= 20
 
 
