@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
+from machines import BENCH
 
 from metro.dynamics import cdsem, lobes
 from metro.dynamics.system import Cut, Structure, immersion
 
-OMEGA, ZETA = 2 * np.pi * 922.0, 0.011
-BENCH = Structure(np.array([0]), np.array([OMEGA]), np.array([ZETA]), np.array([0.03993 * OMEGA**2]))
 SLOT = Cut(2, *immersion("slot", 1.0, 1.0), 6e8, 2e8)
 TWO = Structure(
     np.array([0, 1]), 2 * np.pi * np.array([41.0, 63.0]), np.array([0.05, 0.04]), np.array([4e6, 7e6])

@@ -2,38 +2,17 @@
 
 import numpy as np
 import pytest
+from machines import BENCH, CUTS, OMEGA, PRINTED, TWO, ZETA, modes
 
 from metro.dynamics.lobes import spectral_radius, stability_boundary
 from metro.dynamics.system import Cut, Structure, immersion
 
-BENCH_OMEGA, BENCH_ZETA, BENCH_MASS = 2 * np.pi * 922.0, 0.011, 0.03993
 SPEEDS = np.linspace(5000, 10000, 26)
-
-
-def modes(*rows):
-    """Structure of rows (axis, Hz, damping, N/m)."""
-    axis, hz, zeta, k = np.array(rows, dtype=float).T
-    return Structure(axis.astype(int), 2 * np.pi * hz, zeta, k)
-
-
-BENCH = modes((0, 922.0, BENCH_ZETA, BENCH_MASS * BENCH_OMEGA**2))
-TWO = modes((0, 41.0, 0.05, 4e6), (0, 63.0, 0.04, 3e6), (1, 35.0, 0.06, 7e6), (1, 66.0, 0.03, 5e6))
 
 TRIMULE = modes(
     (0, 21.3, 0.061, 7.3e6), (0, 34.7, 0.071, 4.1e6), (0, 56.6, 0.036, 4.2e6), (0, 65.5, 0.063, 2.2e6),
     (1, 31.4, 0.067, 3.2e8), (1, 35.1, 0.048, 7.1e7), (1, 54.7, 0.050, 4.7e7), (1, 67.3, 0.038, 1.5e7),
 )  # fmt: skip
-
-# table 6 of the published machine, position 1: damped frequency, damping ratio, stiffness
-PRINTED = modes(*[
-    (axis, f / np.sqrt(1 - zeta**2), zeta, k)
-    for axis, f, zeta, k in (
-        (0, 21.3257, 0.0608951, 7.25548e6), (0, 34.6937, 0.0707726, 4.05902e6),
-        (0, 56.6075, 0.035692, 4.18385e6), (0, 65.5141, 0.0633944, 2.21663e6),
-        (1, 31.4277, 0.0671896, 3.1541e8), (1, 35.0952, 0.0476042, 7.06418e7),
-        (1, 54.7344, 0.0499933, 4.71786e7), (1, 67.2582, 0.0379608, 1.46188e7),
-    )
-])  # fmt: skip
 
 NEAR_HALF = modes(
     (0, 21.379, 0.0615, 7.155e6), (0, 34.774, 0.0718, 4.015e6), (0, 56.636, 0.036, 4.128e6),
@@ -79,7 +58,7 @@ def test_up_and_down_milling_differ_in_the_benchmark():
 @pytest.mark.parametrize("rpm", [3000.0, 8000.0])
 def test_free_vibration_decays_by_the_mode_alone_at_zero_depth(share, rpm):
     period = 60 / (2 * rpm)
-    expected = np.exp(-BENCH_ZETA * BENCH_OMEGA * period)
+    expected = np.exp(-ZETA * OMEGA * period)
     assert spectral_radius(BENCH, bench_cut(share), [rpm], [0.0])[0] == pytest.approx(expected, rel=1e-12)
 
 
@@ -94,15 +73,6 @@ def test_up_milling_leaves_where_the_radial_depth_says():
 def test_a_radial_depth_outside_the_tool_is_refused(depth):
     with pytest.raises(ValueError, match="expected more than 0 and at most the diameter"):
         immersion("up", depth, 12.0)
-
-
-CUTS = {
-    "one tooth of four at a time": Cut(4, 0.0, np.pi / 3, 1e9, 4e8),
-    "one or two teeth of three": Cut(3, 0.0, np.pi, 1e9, 4e8),
-    "two teeth of four, always": Cut(4, 0.0, np.pi, 1e9, 4e8),
-    "two or three teeth of five": Cut(5, 0.0, np.pi, 1e9, 4e8),
-    "down milling": Cut(4, 2.0, np.pi, 1e9, 4e8),
-}
 
 
 @pytest.mark.parametrize("name", CUTS)

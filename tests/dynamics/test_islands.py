@@ -2,24 +2,17 @@
 
 import numpy as np
 import pytest
+from machines import BENCH, TWO
 
 from metro.dynamics import collocation
 from metro.dynamics.islands import all_crossings
 from metro.dynamics.lobes import discretised, stability_boundary
-from metro.dynamics.system import Cut, Structure, immersion
+from metro.dynamics.system import Cut, immersion
 
-OMEGA = 2 * np.pi * 922.0
-ONE = Structure(np.array([0]), np.array([OMEGA]), np.array([0.011]), np.array([0.03993 * OMEGA**2]))
-TWO = Structure(
-    np.array([0, 0, 1, 1]),
-    2 * np.pi * np.array([41.0, 63.0, 35.0, 66.0]),
-    np.array([0.05, 0.04, 0.06, 0.03]),
-    np.array([4e6, 3e6, 7e6, 5e6]),
-)
 HALF, LITTLE = (Cut(2, *immersion("down", share, 1.0), 6e8, 2e8) for share in (0.5, 0.05))
 CASES = {
-    "low immersion": (ONE, LITTLE, np.linspace(5000, 10000, 17), 8e-3),
-    "half immersion": (ONE, HALF, np.linspace(5000, 10000, 17), 4e-3),
+    "low immersion": (BENCH, LITTLE, np.linspace(5000, 10000, 17), 8e-3),
+    "half immersion": (BENCH, HALF, np.linspace(5000, 10000, 17), 4e-3),
     "two directions": (TWO, Cut(4, 0.0, np.pi, 1e9, 4e8), np.linspace(500, 2500, 17), 2e-3),
 }  # fmt: skip
 

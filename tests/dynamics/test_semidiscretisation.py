@@ -2,30 +2,11 @@
 
 import numpy as np
 import pytest
+from machines import BENCH, CUTS, OMEGA, PRINTED, TWO, ZETA
 
 from metro.dynamics import lobes, semidiscretisation, teeth
 from metro.dynamics.system import Cut, Structure, immersion
 
-OMEGA, ZETA, MASS = 2 * np.pi * 922.0, 0.011, 0.03993
-BENCH = Structure(np.array([0]), np.array([OMEGA]), np.array([ZETA]), np.array([MASS * OMEGA**2]))
-TWO = Structure(
-    np.array([0, 0, 1, 1]),
-    2 * np.pi * np.array([41.0, 63.0, 35.0, 66.0]),
-    np.array([0.05, 0.04, 0.06, 0.03]),
-    np.array([4e6, 3e6, 7e6, 5e6]),
-)
-CUTS = {
-    "one tooth of four at a time": Cut(4, 0.0, np.pi / 3, 1e9, 4e8),
-    "one or two teeth of three": Cut(3, 0.0, np.pi, 1e9, 4e8),
-    "two teeth of four, always": Cut(4, 0.0, np.pi, 1e9, 4e8),
-    "two or three teeth of five": Cut(5, 0.0, np.pi, 1e9, 4e8),
-    "down milling": Cut(4, 2.0, np.pi, 1e9, 4e8),
-}
-# table 6, position 1; what is printed as natural frequency is the damped one
-PRINTED = np.array([21.3257, 34.6937, 56.6075, 65.5141, 31.4277, 35.0952, 54.7344, 67.2582])
-DAMPING = np.array([6.08951, 7.07726, 3.5692, 6.33944, 6.71896, 4.76042, 4.99933, 3.79608]) / 100
-STIFFNESS = np.array([7.25548e6, 4.05902e6, 4.18385e6, 2.21663e6, 3.1541e8, 7.06418e7, 4.71786e7, 1.46188e7])
-TRIMULE = Structure(np.repeat([0, 1], 4), 2 * np.pi * PRINTED / np.sqrt(1 - DAMPING**2), DAMPING, STIFFNESS)
 LAG = np.tan(np.radians(40)) / 6e-3
 
 
@@ -60,9 +41,9 @@ def test_it_agrees_with_collocation_for_several_modes_in_two_directions(name):
 
 def test_both_methods_agree_to_a_thousandth_of_depth_on_the_published_machine():
     cut, rpm = Cut(4, 0.0, np.pi, 10145e6, 11036.5e6), np.linspace(500, 2500, 41)
-    default = lobes.stability_boundary(TRIMULE, cut, rpm).depth
+    default = lobes.stability_boundary(PRINTED, cut, rpm).depth
     coarse, fine = (
-        semidiscretisation.boundary_near(TRIMULE, teeth.equal_teeth(cut), rpm, default, steps)
+        semidiscretisation.boundary_near(PRINTED, teeth.equal_teeth(cut), rpm, default, steps)
         for steps in (40, 80)
     )
     np.testing.assert_allclose(fine + (fine - coarse) / 3, default, rtol=1e-4)
