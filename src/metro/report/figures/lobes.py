@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -37,34 +37,42 @@ def lobes_chart(boundary: pd.DataFrame, tests: pd.DataFrame, islands: pd.DataFra
     tests : ``position, rpm, depth_mm, measured`` (1 = unstable), ``before``, ``after``; may be empty.
     islands : ``position, rpm, from_mm, to_mm``.
     """
-    positions = list(boundary["position"].drop_duplicates())[:POSITIONS]
-    columns = min(2, len(positions))
-    rows = -(-len(positions) // columns)
     with style.style():
-        figure, grid = style.new_figure(0.6 + 2.3 * rows, rows, columns)
-        flat = [axes for row in grid for axes in row]
-        for axes, position in zip(flat, positions, strict=False):
+        figure, panels = panels_of(boundary)
+        for position, axes in panels.items():
             line = boundary[boundary["position"] == position].sort_values("rpm")
             here = tests[tests["position"].astype(str) == str(position)]
-            _boundary(axes, line)
+            draw_boundary(axes, line)
             if islands is not None:
                 _islands(axes, islands[islands["position"] == position], line)
             _cuts(axes, here)
-            axes.set_title(f"position {position}", loc="left")
-            axes.set(xlabel="spindle speed (rpm)", ylabel="depth of cut (mm)")
-            axes.set_ylim(0, 1.15 * _top(line["depth_mm"], here))
-        for axes in flat[len(positions) :]:
-            axes.set_visible(False)
-        style.legend_above(figure, max(flat[: len(positions)], key=_entries))
+            axes.set_ylim(0, 1.15 * top_of(line["depth_mm"], here))
+        style.legend_above(figure, max(panels.values(), key=entries))
     return figure
 
 
-def _entries(axes: Axes) -> int:
+def panels_of(table: pd.DataFrame) -> tuple[Figure, dict[Any, Axes]]:
+    """Return a figure with a panel of depth over speed for each of the first positions of a table."""
+    positions = list(table["position"].drop_duplicates())[:POSITIONS]
+    columns = min(2, len(positions))
+    rows = -(-len(positions) // columns)
+    figure, grid = style.new_figure(0.6 + 2.3 * rows, rows, columns)
+    flat = [axes for row in grid for axes in row]
+    for position, axes in zip(positions, flat, strict=False):
+        axes.set_title(f"position {position}", loc="left")
+        axes.set(xlabel="spindle speed (rpm)", ylabel="depth of cut (mm)")
+    for axes in flat[len(positions) :]:
+        axes.set_visible(False)
+    return figure, dict(zip(positions, flat, strict=False))
+
+
+def entries(axes: Axes) -> int:
+    """Count what a legend of the panel names."""
     return len(axes.get_legend_handles_labels()[1])
 
 
-def _boundary(axes: Axes, line: pd.DataFrame) -> None:
-    """Both bands, and the boundary, dotted where it is a flip."""
+def draw_boundary(axes: Axes, line: pd.DataFrame) -> None:
+    """Draw both bands, and the boundary, dotted where it is a flip."""
     rpm, depth = line["rpm"], line["depth_mm"]
     for low, high, alpha, label in BANDS:
         axes.fill_between(rpm, line[low], line[high], color=style.SKY, lw=0, alpha=alpha, label=label)
@@ -105,8 +113,8 @@ def _cuts(axes: Axes, tests: pd.DataFrame) -> None:
         )
 
 
-def _top(depth: pd.Series, tests: pd.DataFrame) -> float:
-    """Upper end of the depth axis: what the tests reach, and the lobes; not the peaks between them."""
+def top_of(depth: pd.Series, tests: pd.DataFrame) -> float:
+    """Return the upper end of the depth axis: what tests and lobes reach, not the peaks between."""
     depths = [2.5 * float(depth.min()), float(depth.quantile(0.8))]
     return max([*depths, float(tests["depth_mm"].max())] if len(tests) else depths)
 
@@ -118,23 +126,15 @@ def methods_chart(methods: pd.DataFrame) -> Figure:
     ----------
     methods : rows of ``lobe_methods``.
     """
-    positions = list(methods["position"].drop_duplicates())[:POSITIONS]
-    columns = min(2, len(positions))
-    rows = -(-len(positions) // columns)
     with style.style():
-        figure, grid = style.new_figure(0.6 + 2.3 * rows, rows, columns)
-        flat = [axes for row in grid for axes in row]
-        for axes, position in zip(flat, positions, strict=False):
+        figure, panels = panels_of(methods)
+        for position, axes in panels.items():
             part = methods[methods["position"] == position].sort_values("rpm")
             for column, label, colour, line, mark in METHODS:
                 (drawn,) = axes.plot(part["rpm"], part[column], color=colour, ls=line, label=label)
                 drawn.set(marker=mark, markersize=5, markerfacecolor="none")
-            axes.set_title(f"position {position}", loc="left")
-            axes.set(xlabel="spindle speed (rpm)", ylabel="depth of cut (mm)")
-            axes.set_ylim(0, 1.15 * max(_top(part[c], part[:0]) for c in ("depth_mm", "single_mode_mm")))
-        for axes in flat[len(positions) :]:
-            axes.set_visible(False)
-        handles, labels = flat[0].get_legend_handles_labels()
+            axes.set_ylim(0, 1.15 * max(top_of(part[c], part[:0]) for c in ("depth_mm", "single_mode_mm")))
+        handles, labels = next(iter(panels.values())).get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure
 
@@ -185,6 +185,6 @@ def positions_chart(boundary: pd.DataFrame) -> Figure:
             look = "--" if line["interpolated"].any() else "-"
             axes.plot(line["rpm"], line["depth_mm"], color=colour, ls=look, label=f"position {position}")
         axes.set(xlabel="spindle speed (rpm)", ylabel="depth of cut (mm)")
-        axes.set_ylim(0, 1.15 * max(_top(line["depth_mm"], line[:0]) for _, line in groups))
+        axes.set_ylim(0, 1.15 * max(top_of(line["depth_mm"], line[:0]) for _, line in groups))
         figure.legend(loc="outside upper center", ncols=4)
     return figure
