@@ -14,7 +14,7 @@ from metro.loop.fit import fit
 from metro.loop.noise import first_noise
 from metro.loop.search import search
 from metro.loop.signature import in_words, q_values
-from metro.loop.verdict import comparison, held_out, judge
+from metro.loop.verdict import RESEMBLED, comparison, held_out, judge
 
 
 def judged(task, library, gates=GATES):
@@ -181,6 +181,7 @@ def test_what_is_not_of_the_library_is_told_as_a_likeness_and_not_added():
     assert outcome.final is outcome.base
     assert outcome.likeness.theta[0] == pytest.approx(0.1, rel=0.1)
     assert verdict["status"] == "unexplained"
+    assert [c["why_not"] for c in verdict["candidates"] if c["effect"] == "ripple"] == [RESEMBLED]
     assert "like a ripple (ripple 0.0997)" in verdict["unexplained"]["signature"]
 
 

@@ -23,6 +23,7 @@ COMPARISON = (
     *("measured", "before", "after", "sigma", "unit"),
 )
 DRAWS = 2000
+RESEMBLED = "no effect of the library: it is only said what the rest is like"
 UNTESTED = "not tested: there is no run to judge it by that the fit has not seen"
 
 
@@ -109,7 +110,7 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         "after": after,
         "effects": [_effect(outcome, name) for name in found],
         "candidates": [
-            _candidate(problem, trial, UNTESTED if trial.effect.name in outcome.names else trial.why_not)
+            _candidate(problem, trial, _why_not(outcome, trial))
             for trial in outcome.trials
             if trial.effect.name not in found
         ],
@@ -117,6 +118,13 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         "next_experiment": next_experiment(problem, outcome) if enough else more_runs(problem),
         "unexplained": _unexplained(problem, outcome, rows) if remaining else None,
     }
+
+
+def _why_not(outcome: Outcome, trial: Trial) -> str:
+    """Say why an effect that was tried is not claimed."""
+    if trial.effect.name in outcome.names:
+        return UNTESTED
+    return trial.why_not or (RESEMBLED if trial.effect.resembled else "")
 
 
 def _status(outcome: Outcome, remaining: bool, enough: bool) -> str:
