@@ -14,7 +14,7 @@ from metro.loop.candidate import Candidate
 from metro.loop.evidence import leave_out, weights
 from metro.loop.fit import Fit, fit
 from metro.loop.noise import Noise
-from metro.loop.trial import Gates, without
+from metro.loop.trial import Gates, unlike, without
 
 RIVAL_WEIGHT = 0.05
 HOPELESS = 12.0  # log-likelihood on the runs of the fit by which a rival may be behind and still be weighed
@@ -96,6 +96,6 @@ def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Nois
         if effect.name not in names:
             candidate = Candidate(current.candidate.base, (*smaller.candidate.effects, effect))
             fitted = fit(candidate, current.blocks, prior, smaller)
-            if fitted.total > current.total - HOPELESS:
+            if fitted.total > current.total - HOPELESS and not unlike(effect, fitted):
                 fits.append(fitted)
     return fits

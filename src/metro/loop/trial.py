@@ -8,12 +8,15 @@ from dataclasses import dataclass, replace
 from metro.effects.effect import Effect
 from metro.loop import signature as rest
 from metro.loop.candidate import Candidate
-from metro.loop.evidence import Evidence, compare, hold_out, leave_out, weights
+from metro.loop.evidence import Evidence, compare, hold_out, leave_out, missed, weights
 from metro.loop.fit import Fit, fit
 from metro.loop.noise import Noise
 
 LEAST_BETTER = 0.4
 OF_THE_REST = 0.5  # an effect smaller than this share of what stays unexplained may be part of that
+
+
+UNLIKE = "no effect of the library, and it does not explain the rest either"
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,8 @@ def tried(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, l
         replace(
             trial,
             q_value=float(q),
-            why_not=_why_not(trial.evidence, q <= gates.false_additions, least),
+            why_not=_why_not(trial.evidence, q <= gates.false_additions, least)
+            or (UNLIKE if unlike(trial.effect, trial.fit) else ""),
         )
         for trial, q in zip(trials, q_values, strict=True)
     ]
@@ -114,6 +118,14 @@ def _not_held_out(evidence: Evidence, gates: Gates) -> str:
     if evidence.better_share < LEAST_BETTER:
         return f"better in {100 * evidence.better_share:.0f} % of the left-out conditions only"
     return ""
+
+
+def unlike(effect: Effect, fitted: Fit) -> bool:
+    """Whether an effect that is not of the library leaves more than the declared budget: no likeness then.
+
+    Where much stays unexplained, what has more freedom comes nearer to it, whatever the cause.
+    """
+    return effect.resembled and missed(fitted) > fitted.noise.budget
 
 
 def without(current: Fit, kept: tuple[Effect, ...], prior: Noise) -> Fit:
