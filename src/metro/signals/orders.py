@@ -171,9 +171,9 @@ def _speed_deviation(spectra: ComplexArray, middle: Array, shift: float) -> floa
 def order_averages(time: Array, angle: Array, signal: Array, highest: int, blocks: int) -> list[OrderAverage]:
     """Average a record over its revolutions, in time blocks, with the error of each coefficient.
 
-    Each block is cut into segments of a few revolutions; the scatter of the segments gives the error of their
-    mean. It is pooled over the blocks (whose means are each taken out) and drawn towards its neighbouring
-    orders, since the scatter of few segments is itself uncertain.
+    Each block is cut into segments of a few revolutions; the differences of successive segments give the
+    error of their mean: what changes slowly is no error. It is pooled over the blocks and drawn towards its
+    neighbouring orders, since that of few segments is itself uncertain.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
         means.append(values.mean(axis=0))
         counts.append(len(pieces))
         middles.append(float(time[start:end].mean()))
-        squares += ((values - means[-1]) ** 2).sum(axis=0)
+        squares += 0.5 * (np.diff(values, axis=0) ** 2).sum(axis=0)
         freedom += len(pieces) - 1
     variance = _shrunk(squares / max(freedom, 1), freedom)
     return [
