@@ -20,7 +20,7 @@ EFFECT = Effect(
     name="tool_runout",
     observables=("force",),
     parameters=(
-        EffectParameter("radius_um", "um", 0.0, 200.0, 5.0, starts=(4.0, 20.0), plausible=20.0),
+        EffectParameter("radius_um", "um", 0.0, 200.0, 5.0, starts=(4.0, 20.0), plausible=10.0),
         EffectParameter(
             "angle_deg",
             "deg",
