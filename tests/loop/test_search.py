@@ -192,3 +192,11 @@ def test_what_explains_as_well_as_an_effect_of_the_library_leaves_that_in_its_pl
     assert outcome.names == ("bend",)
     assert outcome.likeness is None
     assert [rival.pair for rival in outcome.rivals] == [("bend", "twin")]
+
+
+def test_runs_that_hold_their_wave_once_say_nothing_of_changes_along_the_run():
+    task = problem(19)
+    once = tuple(replace(block, slow={"along the run": np.zeros((1, 1))}) for block in task.blocks)
+    lines = search(replace(task, blocks=once), (), GATES).lines
+    assert len(lines) == 4
+    assert not any("along the run" in line.label for line in lines)

@@ -89,6 +89,8 @@ def _by_change(fitted: Fit, block: Block) -> dict[str, Array]:
     result = {}
     for name, functions in {"": np.ones((repeats, 1)), **block.slow}.items():
         unit = _orthonormal(functions, against=np.ones((repeats, 1)) if name else None)
+        if not unit.shape[1]:  # what there is once does not change
+            continue
         seen = np.einsum("kf,kn->nf", unit, rest) ** 2
         common = (np.einsum("kf,knd->nfd", unit, directions) ** 2).sum(axis=2)
         # The budget is the same in all repeats of a steady wave; what changes has it once per repeat.

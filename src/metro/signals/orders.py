@@ -18,6 +18,7 @@ from metro.units import Array, ComplexArray
 SPEED_SEARCH = 0.006
 REVOLUTIONS_PER_SEGMENT = 4.0
 FINE_STEPS = 20  # to either side of the best of the search
+WORTH = (0.0, 0.67, 0.51)  # degrees of freedom of a difference of first and second order, in white noise
 PADDING = 16  # of the Fourier transform of the search: well below a step at the highest order
 
 
@@ -171,9 +172,9 @@ def _speed_deviation(spectra: ComplexArray, middle: Array, shift: float) -> floa
 def order_averages(time: Array, angle: Array, signal: Array, highest: int, blocks: int) -> list[OrderAverage]:
     """Average a record over its revolutions, in time blocks, with the error of each coefficient.
 
-    Each block is cut into segments of a few revolutions; the differences of successive segments give the
-    error of their mean: what changes slowly is no error. It is pooled over the blocks and drawn towards its
-    neighbouring orders, since that of few segments is itself uncertain.
+    Each block is cut into segments of a few revolutions; how far each is from the middle of its neighbours
+    gives the error of their mean: what changes slowly is no error. It is drawn towards its neighbouring
+    orders, since that of few segments is itself uncertain.
 
     Parameters
     ----------
@@ -185,8 +186,8 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
     per_s = revolutions / (time[-1] - time[0])
     edges = np.searchsorted(time, np.linspace(time[0], time[-1], blocks + 1))
     edges[-1] = len(time)
-    means, counts, middles, freedom = [], [], [], 0
-    squares = np.zeros((signal.shape[1], 2 * highest + 1))
+    means, counts, middles = [], [], []
+    segments: list[Array] = []
     for start, end in pairwise(edges):
         pieces = _segments(
             time[start:end], per_s, max(REVOLUTIONS_PER_SEGMENT, (2 * highest + 20) / len(time) * revolutions)
@@ -196,9 +197,11 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
         means.append(values.mean(axis=0))
         counts.append(len(pieces))
         middles.append(float(time[start:end].mean()))
-        squares += 0.5 * (np.diff(values, axis=0) ** 2).sum(axis=0)
-        freedom += len(pieces) - 1
-    variance = _shrunk(squares / max(freedom, 1), freedom)
+        segments.extend(values)
+    order = min(2, len(segments) - 1)  # of the differences
+    differences = np.diff(segments, order, axis=0) ** 2 / math.comb(2 * order, order)
+    freedom = WORTH[order] * len(differences)
+    variance = _shrunk(differences.mean(axis=0) if freedom else np.zeros_like(means[0]), freedom)
     return [
         OrderAverage(mean, variance / count, middle)
         for mean, count, middle in zip(means, counts, middles, strict=True)
@@ -210,7 +213,7 @@ def _fit(matrix: Array, signal: Array) -> Array:
     return np.asarray(np.linalg.solve(matrix.T @ matrix, matrix.T @ signal).T)
 
 
-def _shrunk(variance: Array, freedom: int, prior_freedom: int = 6) -> Array:
+def _shrunk(variance: Array, freedom: float, prior_freedom: int = 6) -> Array:
     """Draw each order's variance, (channels, 2H+1), towards the median of five orders on each side."""
     padded = np.pad(variance, ((0, 0), (10, 10)), mode="edge")
     neighbours = np.median(np.lib.stride_tricks.sliding_window_view(padded, 21, axis=1), axis=2)
