@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from metro.dynamics.frf import Hit, estimate_frf, fault, gate
+from metro.dynamics.frf import estimate_frf
+from metro.dynamics.hits import Hit, fault, gate
 
 REAL = Path(os.environ.get("METRO_REAL_DATA", "../shared/real"))
 RATE, SECONDS = 2048.0, 2.0
@@ -76,6 +77,20 @@ def test_stated_variance_covers_the_actual_error():
     assert 0.5 < ratio.mean() < 2.0
 
 
+def test_what_the_hits_add_to_the_error_adds_up_to_the_spread_of_tests_of_unequal_hits():
+    rng = np.random.default_rng(7)
+    clean = [record(scale=scale) for scale in (1.0, 1.0, 2.0)]
+    noise = 0.02 * clean[0].response.std()
+    stated, found = [], []
+    for _ in range(30):
+        hits = [Hit(h.force, h.response + noise * rng.normal(size=len(h.response)), RATE) for h in clean]
+        frf = estimate_frf(hits, "m/s2")
+        band = (frf.frequency > 20) & (frf.frequency < 150)
+        stated.append(np.sum(np.abs(frf.deviation[:, band]) ** 2, axis=0))
+        found.append(frf.h1[band])
+    assert 0.8 < np.mean(np.mean(stated, axis=0) / np.var(found, axis=0, ddof=1)) < 1.25
+
+
 def test_estimators_agree_where_the_noise_is_low_and_h2_is_never_smaller():
     rng = np.random.default_rng(3)
     frf = estimate_frf([record(rng) for _ in range(5)], "m/s2")
@@ -109,7 +124,7 @@ def test_spoilt_hits_are_rejected_and_named(spoil, reason):
     rng = np.random.default_rng(4)
     hits = [record(rng), spoil(record()), record(rng)]
     frf = estimate_frf(hits, "m/s2")
-    assert frf.hits == 2
+    assert frf.used == (0, 2)
     assert frf.notes == (f"hit 2 rejected: {reason}",)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from metro.dynamics.modal import identify_modes, roughness
 from metro.dynamics.plscf import normal_equations, poles
+from metro.dynamics.refine import Data, losses, refine
 
 REAL = Path(os.environ.get("METRO_REAL_DATA", "../shared/real"))
 needs_real = pytest.mark.skipif(not REAL.exists(), reason="METRO_REAL_DATA is not there")
@@ -38,7 +39,7 @@ def noise(rng, shape):
 
 @needs_real
 @pytest.mark.parametrize("direction", ["x", "y"])
-@pytest.mark.parametrize("start", [20, 40])
+@pytest.mark.parametrize("start", [20, 30, 40])
 def test_every_mode_of_the_noise_free_tool_is_recovered(direction, start):
     table = pd.read_parquet(REAL / "reference" / "modal" / f"altintas-{direction}.parquet")
     table = table[table["frequency_hz"] >= start]
@@ -166,3 +167,28 @@ def test_five_receptances_of_a_real_tool_are_reconstructed():
     model = identify_modes(frequency[band], frf[band], driving=0)
     assert model.error.max() < 0.03
     assert 9 <= len(model.modes) <= 18
+
+
+@pytest.mark.parametrize("real", [True, False])
+def test_the_loss_of_a_mode_is_what_a_linear_fit_without_it_leaves_more(real):
+    frequency = np.arange(10.0, 110.0, 1.0)
+    rng = np.random.default_rng(6)
+    exact = np.stack([receptance(frequency), 0.3 * receptance(frequency, UNDAMPED[::-1])], axis=1)
+    frf = exact + 0.05 * np.abs(exact).mean() * noise(rng, exact.shape)
+    data = Data(2 * np.pi * frequency, frf, rng.uniform(1e8, 2e8, frf.shape))
+    fit = refine(data, 2 * np.pi * UNDAMPED, ZETA, real=real)
+    s = 1j * data.omega[:, None]
+    for mode, loss in enumerate(losses(data, fit)):
+        poles_left = np.delete(fit.poles, mode)
+        plus, minus = 1 / (s - poles_left), 1 / (s - poles_left.conj())
+        columns = [1j * (plus - minus), *([] if real else [plus + minus]), np.ones_like(s), 1 / s**2]
+        basis = np.concatenate(columns, axis=1)
+        chi2 = 0.0
+        for weight, values in zip(data.weight.T, frf.T, strict=True):
+            both = np.concatenate([basis * weight[:, None], (values * weight)[:, None]], axis=1)
+            both = np.concatenate([both.real, both.imag]) / np.linalg.norm(both, axis=0)
+            scale = np.linalg.norm(values * weight)
+            chi2 += scale**2 * np.sum(
+                (both[:, -1] - both[:, :-1] @ np.linalg.lstsq(both[:, :-1], both[:, -1])[0]) ** 2
+            )
+        assert loss == pytest.approx(chi2 - fit.chi2, rel=1e-6)

@@ -2,75 +2,77 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from metro.dynamics.plscf import stable_poles
-from metro.dynamics.refine import Data, PoleFit, chi2_without, refine
+from metro.dynamics.modes import Mode, modal_constants
+from metro.dynamics.polefit import PoleFit, Scatter
+from metro.dynamics.refine import Data, losses, refine
+from metro.dynamics.shapes import residues
+from metro.dynamics.stabilisation import Diagram, stabilisation
 from metro.units import Array, ComplexArray
 
 # Model error as a share of an FRF's rms: what a linear model of a machine leaves, and so where adding modes
 # ends; greater where the FRF comes without its scatter, since then its systematic errors are not known
 # either.
 _MODEL_ERROR = 1e-3
-_MODEL_ERROR_UNKNOWN_SCATTER = 0.02
+_MODEL_ERROR_UNKNOWN_SCATTER = 0.025
 _SEARCH_LINES = 500
 _ORDERS = range(8, 49, 2)
 _MOST_MODES = 24
-
-
-@dataclass(frozen=True)
-class Mode:
-    """A mode of vibration with its standard deviations.
-
-    Attributes
-    ----------
-    frequency, frequency_sd : undamped natural frequency, Hz. (Printed "natural frequencies" are often the
-        damped one.)
-    damping, damping_sd : damping ratio.
-    stiffness, stiffness_sd : at the driving point, N/m; NaN where there is no driving point, or where the
-        residue there has the wrong sign for a mode of a passive structure.
-    mass : stiffness / omega², kg.
-    shape : (c,) complex residues over the responses, scaled to 1 at the driving point (else at the largest).
-    """
-
-    frequency: float
-    frequency_sd: float
-    damping: float
-    damping_sd: float
-    stiffness: float
-    stiffness_sd: float
-    mass: float
-    shape: ComplexArray
+_LARGEST_DAMPING = 0.35
+_CHANCE, _TRACE = 1e-3, 0.25
 
 
 @dataclass(frozen=True)
 class ModalModel:
-    """Modes by rising frequency, the fit they come from, and its error per FRF (rms over rms)."""
+    """Modes by rising frequency.
+
+    Attributes
+    ----------
+    modes : those inside the band.
+    fit : the fit they come from; its other modes stand for what is outside the band.
+    error : (c,) what it leaves of each FRF, rms over rms.
+    diagram : the stabilisation diagram that it started from.
+    doubtful : a further mode that lowers chi² beyond chance, but by less than its unknowns are worth; None
+        without such a trace.
+    """
 
     modes: tuple[Mode, ...]
     fit: PoleFit
     error: Array
+    diagram: Diagram
+    doubtful: Mode | None
 
 
 def identify_modes(
-    frequency: Array, frf: ComplexArray, variance: Array | None = None, driving: int | None = None
+    frequency: Array,
+    frf: ComplexArray,
+    variance: Array | None = None,
+    driving: int | None = None,
+    *,
+    inputs: int = 1,
+    scatter: Scatter | None = None,
+    decay: float = 0.0,
 ) -> ModalModel:
     """Identify the modes in the band that ``frequency`` spans.
 
     Parameters
     ----------
     frequency : (n,) Hz, above 0; independent lines (thin out what a gate made redundant).
-    frf : (n, c) receptances that share their modes, m/N.
+    frf : (n, c) receptances that share their modes, m/N, the inputs of one output side by side.
     variance : (n, c) of the complex FRFs; None: estimated from the roughness between lines.
     driving : column of the driving point (reference = response), which gives the stiffness.
+    inputs : how many columns belong to one output.
+    scatter : how the repeats differ, on the same lines and columns.
+    decay : 1/s, of an exponential window on force and response, which is taken off the damping.
 
     Raises
     ------
     ValueError
         When there are fewer than 16 lines, or values that are not finite, or none of the FRFs has a driving
-        point's sign although one is declared (conjugated or negated data).
+        point's sign although one is declared (conjugated or negated data), or the window hides a mode.
     """
     if len(frequency) < 16:
         raise ValueError(f"{len(frequency)} lines in the band: expected 16 or more")
@@ -82,18 +84,17 @@ def identify_modes(
         )
     noise = roughness(frf) if variance is None else variance
     rms = np.sqrt(np.mean(np.abs(frf) ** 2, axis=0))
-    unit = rms.max()  # residues and residual terms of order one
     model_error = _MODEL_ERROR_UNKNOWN_SCATTER if variance is None else _MODEL_ERROR
-    weight = unit / np.sqrt(noise + (model_error * rms) ** 2)
-    data = Data(2 * np.pi * frequency, frf / unit, weight)
-    found = _search(data.thinned(_SEARCH_LINES))
-    fit = _rescaled(refine(data, found.omega, found.zeta, real=found.real), unit)
+    weight = np.sqrt(2.0 / (noise + (model_error * rms) ** 2))  # of the real and the imaginary part
+    data = Data(2 * np.pi * frequency, frf, weight, inputs, scatter)
+    found, diagram = _search(data.thinned(_SEARCH_LINES))
+    fit = refine(data, found.omega, found.zeta, real=found.real)
     change = np.linalg.norm(fit.evaluate(data.omega) - frf, axis=0) / np.linalg.norm(frf, axis=0)
-    inside = (fit.omega > data.omega[0]) & (fit.omega < data.omega[-1]) & (fit.zeta < 0.35)
-    order = [
-        int(r) for r in np.argsort(fit.omega) if inside[r]
-    ]  # the others stand for what is outside the band
-    return ModalModel(tuple(_mode(fit, r, driving) for r in order), fit, change)
+    inside = (fit.omega > data.omega[0]) & (fit.omega < data.omega[-1]) & (fit.zeta < _LARGEST_DAMPING)
+    free = residues(data.omega, frf, np.sqrt(np.mean(data.weight**2, axis=1)), fit.poles)
+    order = [int(r) for r in np.argsort(fit.omega) if inside[r]]
+    modes = tuple(modal_constants(fit, r, driving, free[r], decay) for r in order)
+    return ModalModel(modes, fit, change, diagram, _doubtful(data, fit, driving, decay))
 
 
 def roughness(frf: ComplexArray, lines: int = 15) -> Array:
@@ -105,30 +106,29 @@ def roughness(frf: ComplexArray, lines: int = 15) -> Array:
     return np.stack([np.convolve(column, window, mode="same") / count for column in second.T], axis=1)
 
 
-def _search(data: Data) -> PoleFit:
+def _search(data: Data) -> tuple[PoleFit, Diagram]:
     """Start from the stable poles, then add and remove modes while the information criterion falls.
 
     Modes are real (normal) where that costs no more than it saves.
     """
-    frequency = data.omega / (2 * np.pi)
-    orders = range(_ORDERS.start, min(_ORDERS.stop, len(frequency) // 2), _ORDERS.step)
-    clusters = stable_poles(frequency, data.frf[:, :, None], data.weight, orders)
-    starts = [pole for pole, count in clusters if count >= len(orders) / 4][:_MOST_MODES]
+    orders = range(_ORDERS.start, min(_ORDERS.stop, len(data.omega) // 2), _ORDERS.step)
+    diagram = stabilisation(data, orders)
+    starts = diagram.recurring()[:_MOST_MODES]
     starts = starts or [_strongest(data, np.zeros_like(data.frf))]
     general = _added(data, _pruned(data, _fit(data, np.array(starts), real=False)))
     normal = _pruned(data, _fit(data, general.poles, real=True))
-    return min(normal, general, key=lambda fit: fit.bic())
+    return min(normal, general, key=lambda fit: fit.bic()), diagram
 
 
 def _fit(data: Data, poles: ComplexArray, *, real: bool) -> PoleFit:
     omega = np.abs(poles)
-    return refine(data, omega, np.clip(-poles.real / omega, 1e-3, 0.35), real=real)
+    return refine(data, omega, np.clip(-poles.real / omega, 1e-3, _LARGEST_DAMPING), real=real)
 
 
 def _pruned(data: Data, fit: PoleFit) -> PoleFit:
     """Remove the mode that is missed least while the criterion falls."""
     while len(fit.omega) > 1:
-        least = int(np.argmin([chi2_without(data, fit, r) for r in range(len(fit.omega))]))
+        least = int(np.argmin(losses(data, fit)))
         again = _fit(data, np.delete(fit.poles, least), real=fit.real)
         if again.bic() >= fit.bic():
             break
@@ -147,41 +147,27 @@ def _added(data: Data, fit: PoleFit) -> PoleFit:
     return fit
 
 
+def _doubtful(data: Data, fit: PoleFit, driving: int | None, decay: float) -> Mode | None:
+    """Return the mode at the residual's highest peak where it is no chance, though it was not kept.
+
+    Chi² must say so, and the damping's own error, which holds what the hits share.
+    """
+    from scipy import stats
+
+    start = _strongest(data, fit.evaluate(data.omega))
+    longer = _fit(data, np.append(fit.poles, start), real=fit.real)
+    gain = (fit.chi2 - longer.chi2) / max(longer.chi2_per_datum, 1.0)
+    last = len(longer.omega) - 1
+    inside = data.omega[0] < longer.omega[last] < data.omega[-1] and longer.zeta[last] < _LARGEST_DAMPING
+    if not inside or stats.chi2.sf(gain, longer.count[1] - fit.count[1]) > _CHANCE:
+        return None
+    mode = modal_constants(longer, last, driving, longer.residues[last], decay)
+    return mode if mode.damping_sd < _TRACE * mode.damping else None
+
+
 def _strongest(data: Data, fitted: ComplexArray) -> complex:
     """Pole at the line at which the weighted residual, smoothed over 2 % of the band, is largest."""
     size = np.sum(np.abs((data.frf - fitted) * data.weight) ** 2, axis=1)
     window = np.ones(max(len(size) // 50, 3))
     omega = float(data.omega[np.convolve(size, window, mode="same").argmax()])
     return omega * complex(-0.03, 1.0)
-
-
-def _rescaled(fit: PoleFit, unit: float) -> PoleFit:
-    return replace(
-        fit,
-        residues=fit.residues * unit,
-        residue_sd=fit.residue_sd * unit,
-        residual_terms=fit.residual_terms * unit,
-    )
-
-
-def _mode(fit: PoleFit, r: int, driving: int | None) -> Mode:
-    m = len(fit.omega)
-    omega, zeta = float(fit.omega[r]), float(fit.zeta[r])
-    sd = np.sqrt(np.diag(fit.covariance))
-    residues = fit.residues[r]
-    stiffness = stiffness_sd = float("nan")
-    if driving is not None and residues[driving].imag < 0.0:
-        # 1/m = 2 i omega_d A for a real mode, A = -i/(2 m omega_d)
-        stiffness = omega**2 / (-2.0 * omega * np.sqrt(1.0 - zeta**2) * float(residues[driving].imag))
-        stiffness_sd = stiffness * float(fit.residue_sd[r, driving] / -residues[driving].imag)
-    place = int(np.abs(residues).argmax()) if driving is None else driving
-    return Mode(
-        frequency=omega / (2 * np.pi),
-        frequency_sd=omega / (2 * np.pi) * float(sd[r]),
-        damping=zeta,
-        damping_sd=zeta * float(sd[m + r]),
-        stiffness=stiffness,
-        stiffness_sd=stiffness_sd,
-        mass=stiffness / omega**2,
-        shape=residues / residues[place],
-    )

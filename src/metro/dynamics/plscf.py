@@ -1,4 +1,4 @@
-"""Poly-reference least-squares complex frequency: poles of a right matrix fraction, for one model order.
+"""Poly-reference least-squares complex frequency: poles of a right matrix fraction, for every model order.
 
 Guillaume, Verboven, Vanlanduit, Van der Auweraer, Peeters (2003). ``H(omega) = B(z) A(z)^-1`` with real
 coefficients and ``z = exp(i pi f / f_max)`` counted from 0 Hz whatever the band, so that a band does not
@@ -13,16 +13,18 @@ import numpy as np
 
 from metro.units import Array, ComplexArray
 
+_RIDGE = 1e-13
+
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """Reduced normal equations at the highest order; lower orders are their leading blocks.
+    """Reduced normal equations of every order up to the highest.
 
-    ``blocks`` are R (outputs, p+1, p+1), S (outputs, p+1, (p+1) i), T (outputs, (p+1) i, (p+1) i) for i
-    inputs.
+    ``reduced`` (order + 1, (order + 1) i, (order + 1) i) for i inputs: those of order p are the leading
+    (p + 1) i rows and columns of ``reduced[p]``.
     """
 
-    blocks: tuple[Array, Array, Array]
+    reduced: Array
     inputs: int
     sampling_s: float
 
@@ -30,23 +32,47 @@ class NormalEquations:
 def normal_equations(frequency: Array, frf: ComplexArray, weight: Array, order: int) -> NormalEquations:
     """Set up the normal equations for orders up to ``order``.
 
+    The numerators' block R of an output is Toeplitz, and the one of a lower order is its leading block; so is
+    its Cholesky factor L, and so is V = L^-1 S: all orders are reduced, T - V'V, at the cost of the highest.
+
     Parameters
     ----------
-    frequency : (n,) Hz, of the band only.
+    frequency : (n,) Hz, of the band only; lines may be missing.
     frf : (n, outputs, inputs).
     weight : (n, outputs) of the equations; 1 / standard deviation.
     """
-    inputs = frf.shape[2]
+    inputs, size = frf.shape[2], order + 1
     sampling = 0.5 / frequency[-1]
-    powers = np.exp(2j * np.pi * frequency[:, None] * sampling * np.arange(order + 1))
-    rows, mixed, squares = [], [], []
-    for output in range(frf.shape[1]):
-        x = powers * weight[:, output, None]
-        y = (x[:, :, None] * -frf[:, output, None, :]).reshape(len(frequency), -1)
-        rows.append((x.conj().T @ x).real)
-        mixed.append((x.conj().T @ y).real)
-        squares.append((y.conj().T @ y).real)
-    return NormalEquations((np.stack(rows), np.stack(mixed), np.stack(squares)), inputs, sampling)
+    square = weight**2
+    auto = np.einsum("no,noi,noj->nij", square, frf.conj(), frf)
+    cross = -square[:, :, None] * frf
+    lags = _lags(frequency * sampling, order)
+    R = _toeplitz(lags, square.astype(np.complex128), size)
+    S = _toeplitz(lags, cross, size).transpose(2, 0, 1, 3).reshape(frf.shape[1], size, size * inputs)
+    T = _toeplitz(lags, auto, size).transpose(0, 2, 1, 3).reshape(size * inputs, size * inputs)
+    R = R.transpose(2, 0, 1) + _RIDGE * R[0, 0, :, None, None] * np.eye(size)
+    V = np.linalg.solve(np.linalg.cholesky(R), S)
+    reduced = np.empty((size, size * inputs, size * inputs))
+    for k in range(size):
+        T = T - V[:, k].T @ V[:, k]
+        reduced[k] = T
+    return NormalEquations(reduced, inputs, sampling)
+
+
+def _lags(turns: Array, order: int) -> ComplexArray:
+    """Powers 0 … order of z (order + 1, n) at frequencies given in turns per sample (n,)."""
+    powers: ComplexArray = np.exp(2j * np.pi * np.arange(order + 1)[:, None] * turns)
+    return powers
+
+
+def _toeplitz(powers: ComplexArray, values: ComplexArray, size: int) -> Array:
+    """Array (size, size, …) of Re sum over lines of z^(l - k) values (n, …), for row k and column l."""
+    flat = values.reshape(len(values), -1)
+    real, imaginary = powers.real @ flat.real, powers.imag @ flat.imag
+    lag = np.concatenate([(real + imaginary)[:0:-1], real - imaginary])  # -order … order
+    at = np.arange(size)
+    found: Array = lag[at - at[:, None] + size - 1].reshape(size, size, *values.shape[1:])
+    return found
 
 
 def poles(equations: NormalEquations, order: int) -> ComplexArray:
@@ -54,49 +80,16 @@ def poles(equations: NormalEquations, order: int) -> ComplexArray:
 
     That constraint leaves the poles of the noise unstable, so that they can be told apart.
     """
-    R, S, T = equations.blocks
     i, p = equations.inputs, order + 1
-    reduced = np.zeros((p * i, p * i))
-    for r, s, t in zip(R[:, :p, :p], S[:, :p, : p * i], T[:, : p * i, : p * i], strict=True):
-        reduced += t - s.T @ np.linalg.lstsq(r, s, rcond=None)[0]
+    reduced = equations.reduced[order][: p * i, : p * i]
     coefficients = np.linalg.lstsq(reduced[i:, i:], -reduced[i:, :i], rcond=None)[0]
     alpha = np.concatenate([np.eye(i), coefficients]).reshape(p, i, i)
     # companion of A(z)' in w = 1/z: the lowest coefficient is the identity, so no inverse is needed
     companion = np.zeros((order * i, order * i))
-    companion[: -i or None, i:] = np.eye((order - 1) * i) if order > 1 else companion[: -i or None, i:]
+    companion[:-i, i:] = np.eye((order - 1) * i)
     for k in range(order):
         companion[-i:, k * i : (k + 1) * i] = -alpha[order - k].T
     inverse = np.linalg.eigvals(companion)
     inverse = inverse[np.abs(inverse) > 1e-12]
     found: ComplexArray = -np.log(inverse) / equations.sampling_s
     return found[(found.real < 0.0) & (found.imag > 0.0)]
-
-
-def stable_poles(
-    frequency: Array, frf: ComplexArray, weight: Array, orders: range
-) -> list[tuple[complex, int]]:
-    """Clusters (median pole, at how many orders it was found) of recurring poles, frequent first.
-
-    Poles of neighbouring orders belong together when they differ by less than 2 % of frequency and 30 % of
-    damping, which keeps weakly excited modes and does not merge close pairs.
-    """
-    equations = normal_equations(frequency, frf, weight, orders[-1])
-    clusters: list[list[complex]] = []
-    for order in orders:
-        for pole in poles(equations, order):
-            if not 0.7 * frequency[0] < abs(pole) / (2 * np.pi) < 1.3 * frequency[
-                -1
-            ] or -pole.real > 0.4 * abs(pole):
-                continue
-            near = [cluster for cluster in clusters if _same(cluster[-1], complex(pole))]
-            if near:
-                min(near, key=lambda cluster: abs(cluster[-1] - pole)).append(complex(pole))
-            else:
-                clusters.append([complex(pole)])
-    found = [(complex(np.median(np.real(c)), np.median(np.imag(c))), len(c)) for c in clusters]
-    return sorted(found, key=lambda item: -item[1])
-
-
-def _same(a: complex, b: complex) -> bool:
-    zeta_a, zeta_b = -a.real / abs(a), -b.real / abs(b)
-    return abs(abs(a) / abs(b) - 1.0) < 0.02 and abs(zeta_a / zeta_b - 1.0) < 0.3

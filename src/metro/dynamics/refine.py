@@ -6,71 +6,54 @@ modes, else complex), and the residual terms 1 and 1/omega² of the modes outsid
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from metro.dynamics.polefit import PoleFit, Scatter
 from metro.units import Array, ComplexArray
 
 
 @dataclass(frozen=True)
 class Data:
-    """FRFs to be fitted: ``omega`` (n,) rad/s, ``frf`` (n, c), ``weight`` (n, c) = 1 / standard deviation."""
+    """FRFs to be fitted.
+
+    Attributes
+    ----------
+    omega : (n,) rad/s.
+    frf : (n, c), the inputs of one output side by side.
+    weight : (n, c), 1 / standard deviation.
+    inputs : how many of the columns belong to one output.
+    scatter : how the repeats of the test differ, on these lines; None where that is not known.
+    """
 
     omega: Array
     frf: ComplexArray
     weight: Array
+    inputs: int = 1
+    scatter: Scatter | None = None
 
     def thinned(self, lines: int) -> Data:
-        """Every so many-th line, so that at most ``lines`` are left."""
+        """Every so many-th line, so that at most ``lines`` are left; without the scatter."""
         every = -(-len(self.omega) // lines)
-        return Data(self.omega[::every], self.frf[::every], self.weight[::every])
+        return Data(self.omega[::every], self.frf[::every], self.weight[::every], self.inputs)
 
 
-@dataclass(frozen=True)
-class PoleFit:
-    """Poles and residues that fit best.
+class _Response(NamedTuple):
+    """One response's linear fit: weighted residual (2 n,) and Jacobian (2 n, 2m), both clear of the unknowns.
 
-    Attributes
-    ----------
-    omega, zeta : (m,) undamped frequency in rad/s and damping ratio.
-    covariance : (2m, 2m) of (log omega, log zeta), scaled by the residual.
-    residues : (m, c) complex, m rad/(N s): the FRF is sum_r A_r/(i w - p_r) + conj(A_r)/(i w - conj(p_r)).
-    residue_sd : (m, c) standard deviation of the residues' imaginary parts, poles' uncertainty included.
-    residual_terms : (2, c): compliance (m/N) and inertance (coefficient of 1/omega²).
-    chi2 : weighted sum of squares.
-    count : (real data, parameters).
-    real : whether the modes were taken as real (normal).
+    ``unknowns`` (u,) are ``solve`` (u, 2 n) times the weighted data, and move with the poles by ``slope``
+    (u, 2m); ``own`` (u, u) is their covariance for unit noise and given poles.
     """
 
-    omega: Array
-    zeta: Array
-    covariance: Array
-    residues: ComplexArray
-    residue_sd: Array
-    residual_terms: Array
-    chi2: float
-    count: tuple[int, int]
-    real: bool
-
-    @property
-    def poles(self) -> ComplexArray:
-        """(m,) poles, rad/s."""
-        return self.omega * (-self.zeta + 1j * np.sqrt(1.0 - self.zeta**2))
-
-    def bic(self) -> float:
-        """Bayesian information criterion; fitting below the stated noise gains nothing."""
-        data, parameters = self.count
-        return data * float(np.log1p(self.chi2 / data)) + parameters * float(np.log(data))
-
-    def evaluate(self, omega: Array) -> ComplexArray:
-        """Receptance (n, c) of the fit at angular frequencies (n,)."""
-        s = 1j * omega[:, None]
-        value = (1.0 / (s - self.poles)) @ self.residues + (
-            1.0 / (s - self.poles.conj())
-        ) @ self.residues.conj()
-        total: ComplexArray = value + self.residual_terms[0] + self.residual_terms[1] / omega[:, None] ** 2
-        return total
+    residual: Array
+    jacobian: Array
+    unknowns: Array
+    solve: Array
+    slope: Array
+    own: Array
 
 
 def refine(data: Data, omega: Array, zeta: Array, *, real: bool, iterations: int = 30) -> PoleFit:
@@ -78,17 +61,14 @@ def refine(data: Data, omega: Array, zeta: Array, *, real: bool, iterations: int
     theta = np.concatenate([np.log(omega), np.log(zeta)])
     low, high = _bounds(data, len(omega))
     damping = 1e-3
-    residual, jacobian, _ = _project(data, theta, real)
-    chi2 = float(residual @ residual)
+    chi2, gradient, normal = _quadratic(data, theta, real)
     for _ in range(iterations):
-        normal = jacobian.T @ jacobian
-        step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-30), jacobian.T @ residual)
+        step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-30), gradient)
         trial = np.clip(theta + np.clip(step, -0.3, 0.3), low, high)
-        new_residual, new_jacobian, _ = _project(data, trial, real)
-        new = float(new_residual @ new_residual)
+        new, *slopes = _quadratic(data, trial, real)
         if new < chi2:
             done = chi2 - new < 1e-9 * chi2
-            theta, residual, jacobian, chi2, damping = trial, new_residual, new_jacobian, new, damping / 5
+            theta, chi2, (gradient, normal), damping = trial, new, slopes, damping / 5
             if done:
                 break
         else:
@@ -123,42 +103,45 @@ def _basis(omega: Array, theta: Array, *, real: bool) -> tuple[ComplexArray, Com
     return np.concatenate([*columns, outside], axis=1), np.array(changes).transpose(2, 0, 1, 3)
 
 
-def _project(data: Data, theta: Array, real: bool) -> tuple[Array, Array, list[tuple[Array, Array, Array]]]:
-    """Residual (2 n c,), Jacobian (2 n c, 2m), and per response unknowns, covariance, slopes."""
+def _responses(data: Data, theta: Array, real: bool) -> Iterator[_Response]:
+    """Fit the unknowns of each response for given poles."""
     basis, slopes = _basis(data.omega, theta, real=real)
     scale = np.linalg.norm(basis, axis=0)
     lines, _, units, m = slopes.shape
-    residuals, jacobians, linear = [], [], []
     for c in range(data.frf.shape[1]):
         weight = data.weight[:, c, None]
         q, r = np.linalg.qr(_stack(basis / scale * weight))
         target = _stack(data.frf[:, c, None] * weight)[:, 0]
         projected = q.T @ target
-        inverse = np.linalg.pinv(r)
-        x = inverse @ projected / scale
+        inverse = np.linalg.pinv(r) / scale[:, None]
+        x = inverse @ projected
         change = np.einsum("nsum,um->nsm", slopes, x[: units * m].reshape(units, m)).reshape(lines, 2 * m)
         moved = _stack(change * weight)
         along = q.T @ moved
-        residuals.append(q @ projected - target)
-        jacobians.append(moved - q @ along)
-        linear.append(
-            (x, (inverse @ inverse.T) / np.outer(scale, scale), -(inverse @ along) / scale[:, None])
+        yield _Response(
+            q @ projected - target, moved - q @ along, x, inverse @ q.T, -inverse @ along, inverse @ inverse.T
         )
-    return np.concatenate(residuals), np.concatenate(jacobians), linear
 
 
-def chi2_without(data: Data, fit: PoleFit, mode: int) -> float:
-    """Weighted sum of squares with one mode left out and the other poles as they are."""
-    keep = np.arange(len(fit.omega)) != mode
-    theta = np.log(np.concatenate([fit.omega[keep], fit.zeta[keep]]))
-    basis = _basis(data.omega, theta, real=fit.real)[0]
-    basis = basis / np.linalg.norm(basis, axis=0)
-    total = 0.0
-    for c in range(data.frf.shape[1]):
-        weight = data.weight[:, c, None]
-        q = np.linalg.qr(_stack(basis * weight))[0]
-        target = _stack(data.frf[:, c, None] * weight)[:, 0]
-        total += float(np.sum((target - q @ (q.T @ target)) ** 2))
+def _quadratic(data: Data, theta: Array, real: bool) -> tuple[float, Array, Array]:
+    """Weighted sum of squares, half its gradient (2m,), and the normal matrix (2m, 2m)."""
+    chi2, gradient, normal = 0.0, np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
+    for each in _responses(data, theta, real):
+        chi2 += float(each.residual @ each.residual)
+        gradient += each.jacobian.T @ each.residual
+        normal += each.jacobian.T @ each.jacobian
+    return chi2, gradient, normal
+
+
+def losses(data: Data, fit: PoleFit) -> Array:
+    """Return by how much the weighted sum of squares (m,) rises without a mode, other poles kept."""
+    m, units = len(fit.omega), 1 if fit.real else 2
+    total = np.zeros(m)
+    own = np.arange(units) * m + np.arange(m)[:, None]
+    for each in _responses(data, np.log(np.concatenate([fit.omega, fit.zeta])), fit.real):
+        x = each.unknowns[own]
+        blocks = each.own[own[:, :, None], own[:, None, :]]
+        total += np.einsum("mu,mu->m", x, np.linalg.solve(blocks, x[:, :, None])[:, :, 0])
     return total
 
 
@@ -167,16 +150,43 @@ def _stack(values: ComplexArray) -> Array:
 
 
 def _finish(data: Data, theta: Array, real: bool) -> PoleFit:
-    residual, jacobian, linear = _project(data, theta, real)
+    chi2, _, normal = _quadratic(data, theta, real)
     m, responses = len(theta) // 2, data.frf.shape[1]
-    parameters = 2 * m + responses * ((1 if real else 2) * m + 2)
-    chi2 = float(residual @ residual)
-    noise = chi2 / max(len(residual) - parameters, 1)
-    covariance = np.linalg.pinv(jacobian.T @ jacobian) * noise
-    unknowns = np.stack([x for x, _, _ in linear], axis=1)
-    residues = np.asarray(1j * unknowns[:m] + (0.0 if real else unknowns[m : 2 * m]), dtype=np.complex128)
-    variance = [np.diag(own * noise + slope @ covariance @ slope.T)[:m] for _, own, slope in linear]
-    terms = unknowns[-2:] * np.array([[1.0], [data.omega[0] ** 2]])
-    sd = np.sqrt(np.stack(variance, axis=1))
-    omega, zeta, count = np.exp(theta[:m]), np.exp(theta[m:]), (len(residual), parameters)
-    return PoleFit(omega, zeta, covariance, residues, sd, terms, chi2, count, real)
+    count = 2 * len(data.omega) * responses, 2 * m + responses * ((1 if real else 2) * m + 2)
+    noise = chi2 / max(count[0] - count[1], 1)
+    inverse = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
+    unknowns, joint = [], []
+    for each in _responses(data, theta, real):
+        # (log omega, log zeta, Im A) = move (log omega, log zeta), plus the residues' own scatter
+        move = np.concatenate([np.eye(2 * m), each.slope[:m]])
+        covariance = move @ inverse @ move.T
+        covariance[2 * m :, 2 * m :] += each.own[:m, :m]
+        joint.append(noise * covariance)
+        unknowns.append(each.unknowns)
+    x = np.stack(unknowns, axis=1)
+    return PoleFit(
+        omega=np.exp(theta[:m]),
+        zeta=np.exp(theta[m:]),
+        residues=np.asarray(1j * x[:m] + (0.0 if real else x[m : 2 * m]), dtype=np.complex128),
+        residual_terms=x[-2:] * np.array([[1.0], [data.omega[0] ** 2]]),
+        joint=np.stack(joint),
+        shifts=_shifts(data, theta, inverse, real=real),
+        mean=np.zeros(0, dtype=int) if data.scatter is None else data.scatter.mean,
+        chi2=chi2,
+        count=count,
+        real=real,
+    )
+
+
+def _shifts(data: Data, theta: Array, inverse: Array, *, real: bool) -> Array:
+    """Return what each repeat adds to the error of (log omega, log zeta, Im A), (c, g, 3m)."""
+    m = len(theta) // 2
+    if data.scatter is None:
+        return np.zeros((data.frf.shape[1], 0, 3 * m))
+    parts, pull = [], np.zeros((2 * m, len(data.scatter.deviation)))
+    for c, each in enumerate(_responses(data, theta, real)):
+        deviation = _stack((data.scatter.deviation[:, :, c] * data.weight[:, c]).T)
+        pull += each.jacobian.T @ deviation
+        parts.append((each.solve[:m] @ deviation, each.slope[:m]))
+    poles = inverse @ pull
+    return np.stack([np.concatenate([poles, own + slope @ poles]).T for own, slope in parts])

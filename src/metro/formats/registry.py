@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from metro.formats.dynoware import read_dynoware
@@ -14,12 +17,14 @@ from metro.formats.kinds import KINDS, Kind, Raw, checked
 from metro.formats.pcd import read_pcd
 from metro.formats.ply import read_ply
 from metro.formats.signals import read_csv, read_npz, read_parquet
+from metro.formats.uff import COHERENCE, FRF, Function, read_functions, read_uff
 from metro.formats.xyz import read_xyz
 
 _HEAD = 512
 _FIRST_ROWS = 32
 _TABLES = tuple(KINDS)
 _ANY: tuple[bytes, ...] = (b"",)
+_UNIVERSAL = (b"-1\n", b"-1\r", b"-1".ljust(76))  # a mark on a line of its own
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,7 @@ FORMATS = (
     Format("NumPy archive", (".npz",), (b"PK\x03\x04",), ("frf",), read_npz),
     Format("PLY", (".ply",), (b"ply\n", b"ply\r"), ("cloud",), read_ply),
     Format("PCD", (".pcd",), (b"# .PCD", b"#.PCD", b"VERSION"), ("cloud",), read_pcd),
+    Format("universal", (".uff", ".unv", ".uf"), _UNIVERSAL, ("frf",), read_uff),
     Format("DynoWare text export", (".txt", ".csv"), (b"DynoWare",), ("force",), read_dynoware),
     Format("point list", (".xyz", ".txt", ".asc", ".csv"), _ANY, ("cloud",), read_xyz),
     Format("CSV", (".csv", ".txt"), _ANY, tuple(kind for kind in _TABLES if kind != "cloud"), read_csv),
@@ -58,8 +64,6 @@ UNREAD = {
     ".tdms": "CSV or Parquet",
     ".mat": "CSV, Parquet or (for an FRF) npz",
     ".xml": "CSV or Parquet",
-    ".uff": "npz or a table frequency_hz, real, imag",
-    ".unv": "npz or a table frequency_hz, real, imag",
     ".pts": "PLY, PCD or XYZ",
     ".e57": "PLY, PCD or XYZ",
     ".stl": "PLY, PCD or XYZ",
@@ -90,6 +94,51 @@ def read(path: Path, kind: str) -> pd.DataFrame:
 def sniff(path: Path, kind: str) -> None:
     """Check header and first rows of a data file, quickly; raises FormatError as :func:`read` would."""
     checked(path, KINDS[kind], _format_of(path, kind).read(path, KINDS[kind], _FIRST_ROWS), 1)
+
+
+class ReadFrf(NamedTuple):
+    """An FRF of a file; ``reference``, ``response`` and ``unit`` are "" where the file does not tell."""
+
+    reference: str
+    response: str
+    unit: str
+    table: pd.DataFrame
+
+
+def read_frfs(path: Path) -> list[ReadFrf]:
+    """Read every FRF of a data file; only universal files hold more than one, and say where each was taken.
+
+    Raises
+    ------
+    FormatError
+        As :func:`read`.
+    """
+    kind = KINDS["frf"]
+    if _format_of(path, "frf").read is not read_uff:
+        return [ReadFrf("", "", "", read(path, "frf"))]
+    functions = read_functions(path)
+    coherence = {(each.reference, each.response): each for each in functions if each.kind == COHERENCE}
+    found = []
+    for each in functions:
+        if each.kind == FRF:
+            raw = _table(each, coherence.get((each.reference, each.response)))
+            place = partial(_line, f"{each.reference} to {each.response}")
+            table = checked(path, kind, Raw(raw, place), kind.least)
+            found.append(ReadFrf(each.reference, each.response, each.unit, table))
+    if not found:
+        raise FormatError(path, f"found no function of type {FRF}, expected {kind.title}")
+    return found
+
+
+def _line(pair: str, row: int) -> str:
+    return f"{pair}, line {row + 1}"
+
+
+def _table(frf: Function, coherence: Function | None) -> pd.DataFrame:
+    table = pd.DataFrame({"frequency_hz": frf.frequency, "real": frf.values.real, "imag": frf.values.imag})
+    if coherence is not None and np.array_equal(coherence.frequency, frf.frequency):
+        table["coherence"] = coherence.values.real
+    return table
 
 
 def _format_of(path: Path, kind: str) -> Format:

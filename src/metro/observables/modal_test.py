@@ -9,132 +9,131 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from metro.dynamics.frf import Hit, estimate_frf
 from metro.dynamics.modal import ModalModel, identify_modes
-from metro.units import Array, ComplexArray
+from metro.dynamics.modes import Mode
+from metro.observables.receptance import Receptance, arranged, from_files, from_records, scatter
+from metro.units import JSON, N_UM, Array, ComplexArray
 
 MODE_COLUMNS = (
     *("position", "direction", "frequency_hz", "frequency_sd_hz", "damping", "damping_sd"),
     *("stiffness_n_m", "stiffness_sd", "mass_kg", "used"),
 )
+_MORE_COLUMNS = ("mass_sd", "viscous_n_s_m", "viscous_sd", "collinearity", "resolved")
 Read = Callable[..., pd.DataFrame]
 _LEAST_LINES = 40
 
 
 @dataclass(frozen=True)
-class Response:
-    """One receptance: ``frequency`` (n,) Hz, ``frf`` (n,) m/N, ``variance`` (n,) or None.
+class ModalTest:
+    """What the impacts of a batch told.
 
-    Every ``redundancy``-th line is independent.
+    Attributes
+    ----------
+    modes : one row per mode.
+    used : the receptances on the lines that were fitted, with what the modes make of them.
+    stabilisation : the poles of every model order, their cluster, and whether it recurs.
+    notes : what could not be had.
     """
 
-    position: str
-    reference: str
-    response: str
-    frequency: Array
-    frf: ComplexArray
-    variance: Array | None
-    redundancy: int = 1
-
-    @property
-    def driving(self) -> bool:
-        """Whether the structure was hit where its response was measured."""
-        return self.reference == self.response
+    modes: pd.DataFrame
+    used: pd.DataFrame
+    stabilisation: pd.DataFrame
+    notes: list[str]
 
 
-def observe_modes(read: Read) -> tuple[pd.DataFrame, pd.DataFrame, list[str]]:
-    """Tables ``modes`` and ``frf_used`` of all impacts, and notes on what could not be had."""
+def observe_modes(read: Read, hammer: JSON) -> ModalTest:
+    """Identify the modes of all impacts.
+
+    Parameters
+    ----------
+    hammer : the entry of batch.yaml: ``window``, and ``time_constant_s`` of an exponential one, which force
+        and response went through before they were stored.
+    """
     notes: list[str] = []
-    measured = [*_from_records(read("hit"), notes), *_from_files(read("frf"))]
-    modes, used = [], []
-    for (position, direction), group in _by_direction(measured).items():
+    decay = _decay(hammer, notes)
+    measured = [*from_records(read("hit"), decay, notes), *from_files(read("frf"), notes)]
+    modes, used, diagrams = [], [], []
+    for (position, direction), found in _by_direction(measured, notes).items():
+        name = f"position {position}, direction {direction}"
+        group, inputs = arranged(found)
         try:
-            model, keep = _identified(group)
+            model, keep = _identified(group, inputs, decay)
         except ValueError as error:
-            notes.append(f"position {position}, direction {direction}: {error}")
+            notes.append(f"{name}: {error}")
             continue
         modes.append(_mode_rows(position, direction, model))
         used.append(_used_rows(group, model, keep))
-    return _joined(modes, MODE_COLUMNS), _joined(used, ()), notes
+        diagrams.append(_diagram_rows(position, direction, model))
+        notes += [f"{name}: {note}" for note in _doubts(model)]
+    columns = (*MODE_COLUMNS, *_MORE_COLUMNS)
+    return ModalTest(_joined(modes, columns), _joined(used, ()), _joined(diagrams, ()), notes)
 
 
 def _joined(parts: list[pd.DataFrame], columns: tuple[str, ...]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(columns))
 
 
-def _from_records(hits: pd.DataFrame, notes: list[str]) -> Iterator[Response]:
-    keys = ["position", "reference", "response", "response_unit"]
-    for (position, reference, response, unit), rows in hits.groupby(keys, sort=False):
-        records = [_hit(part) for _, part in rows.groupby(["test", "replicate"], sort=False)]
-        name = f"position {position}, {reference} to {response}"
-        try:
-            frf = estimate_frf(records, str(unit))
-        except ValueError as error:
-            notes.append(f"{name}: {error}")
-            continue
-        notes += [f"{name}: {note}" for note in frf.notes]
-        keep = frf.frequency <= frf.frequency[frf.excited].max()
-        variance = frf.variance[keep] if frf.hits > 1 else None
-        names = (str(position), str(reference), str(response))
-        yield Response(*names, frf.frequency[keep], frf.h1[keep], variance, max(int(frf.redundancy), 1))
+def _decay(hammer: JSON, notes: list[str]) -> float:
+    """Return what the window adds to the decay of every mode, 1/s."""
+    if "time_constant_s" in hammer:
+        return 1.0 / float(hammer["time_constant_s"])
+    if "exp" in str(hammer.get("window", "")).lower():
+        notes.append("instruments.hammer: exponential window without time_constant_s: its damping stays in")
+    return 0.0
 
 
-def _hit(rows: pd.DataFrame) -> Hit:
-    time = rows["t_s"].to_numpy()
-    rate = (len(time) - 1) / float(time[-1] - time[0])
-    # records of one test differ by rounding of the time stamps alone
-    return Hit(rows["force_n"].to_numpy(), rows["response_si"].to_numpy(), round(rate, 3))
-
-
-def _from_files(frfs: pd.DataFrame) -> Iterator[Response]:
-    for (position, reference, response), rows in frfs.groupby(
-        ["position", "reference", "response"], sort=False
-    ):
-        parts = [
-            part.sort_values("frequency_hz") for _, part in rows.groupby(["test", "replicate"], sort=False)
-        ]
-        frequency = parts[0]["frequency_hz"].to_numpy()
-        values = np.mean(
-            [part["real_m_n"].to_numpy() + 1j * part["imag_m_n"].to_numpy() for part in parts], axis=0
-        )
-        keep = (frequency > 0) & np.isfinite(values)
-        yield Response(str(position), str(reference), str(response), frequency[keep], values[keep], None)
-
-
-def _by_direction(measured: list[Response]) -> dict[tuple[str, str], list[Response]]:
-    """Responses that share their modes: one position, one direction of force and motion, the same lines.
+def _by_direction(measured: list[Receptance], notes: list[str]) -> dict[tuple[str, str], list[Receptance]]:
+    """Receptances that share their modes: one position, one direction of force and motion, the same lines.
 
     Where records and FRF files give the same pair, the records come first and are taken.
     """
-    groups: dict[tuple[str, str], list[Response]] = {}
+    groups: dict[tuple[str, str], list[Receptance]] = {}
     for item in measured:
         if item.reference[-1] != item.response[-1]:
             continue
         group = groups.setdefault((item.position, item.response[-1]), [])
         group.append(item)
-    return {key: _compatible(group) for key, group in groups.items()}
+    return {key: _distinct(_compatible(group), notes) for key, group in groups.items()}
 
 
-def _compatible(group: list[Response]) -> list[Response]:
+def _compatible(group: list[Receptance]) -> list[Receptance]:
     """Return the largest set of pairs on the same lines, each pair once."""
-    by_lines: dict[tuple[int, float, float], dict[tuple[str, str], Response]] = {}
+    by_lines: dict[tuple[int, float, float], dict[tuple[str, str], Receptance]] = {}
     for item in group:
         lines = (len(item.frequency), float(item.frequency[0]), float(item.frequency[-1]))
         by_lines.setdefault(lines, {}).setdefault((item.reference, item.response), item)
     return list(max(by_lines.values(), key=len).values())
 
 
-def _identified(group: list[Response]) -> tuple[ModalModel, np.ndarray]:
-    """Modal model of a group, and the lines (n,) that it was identified from."""
+def _distinct(group: list[Receptance], notes: list[str]) -> list[Receptance]:
+    """Leave out a channel that is another one over again; a pair and its reciprocal may be equal."""
+    kept: list[Receptance] = []
+    for item in group:
+        twin = next((other for other in kept if item.repeats(other)), None)
+        if twin is None:
+            kept.append(item)
+        else:
+            notes.append(f"position {item.position}, {item.pair}: left out, the same data as {twin.pair}")
+    return kept
+
+
+def _identified(group: list[Receptance], inputs: int, decay: float) -> tuple[ModalModel, np.ndarray]:
+    """Modal model of a group, and the lines that it was identified from."""
     frf = np.stack([item.frf for item in group], axis=1)
     known = [item.variance for item in group if item.variance is not None]
     variance = np.stack(known, axis=1) if len(known) == len(group) else None
     driving = next((i for i, item in enumerate(group) if item.driving), None)
-    keep = _clear_of_drift(group[0].frequency, frf) if variance is None else _clear_of_noise(frf, variance)
-    every = max(item.redundancy for item in group)
-    keep = np.flatnonzero(keep)[::every]
+    clear = _clear_of_drift(group[0].frequency, frf) if variance is None else _clear_of_noise(frf, variance)
+    usable = np.logical_and.reduce([item.usable for item in group])
+    keep = np.flatnonzero(clear & usable)[:: max(item.redundancy for item in group)]
     model = identify_modes(
-        group[0].frequency[keep], frf[keep], None if variance is None else variance[keep], driving
+        group[0].frequency[keep],
+        frf[keep],
+        None if variance is None else variance[keep],
+        driving,
+        inputs=inputs,
+        scatter=scatter(group, keep),
+        decay=decay,
     )
     return model, keep
 
@@ -158,22 +157,57 @@ def _clear_of_noise(frf: ComplexArray, variance: Array) -> np.ndarray:
 
 
 def _mode_rows(position: str, direction: str, model: ModalModel) -> pd.DataFrame:
-    rows = [
-        (
-            *(position, direction, mode.frequency, mode.frequency_sd, mode.damping, mode.damping_sd),
-            *(mode.stiffness, mode.stiffness_sd, mode.mass, _usable(mode.stiffness, mode.stiffness_sd)),
-        )
-        for mode in model.modes
-    ]
-    return pd.DataFrame(rows, columns=list(MODE_COLUMNS))
+    rows = [(position, direction, *_mode_row(mode)) for mode in model.modes]
+    return pd.DataFrame(rows, columns=[*MODE_COLUMNS, *_MORE_COLUMNS])
+
+
+def _mode_row(mode: Mode) -> tuple[float | bool, ...]:
+    return (
+        *(mode.frequency, mode.frequency_sd, mode.damping, mode.damping_sd),
+        *(mode.stiffness, mode.stiffness_sd, mode.mass, _usable(mode.stiffness, mode.stiffness_sd)),
+        *(mode.mass_sd, mode.viscous, mode.viscous_sd, mode.collinearity, mode.resolved),
+    )
 
 
 def _usable(stiffness: float, sd: float) -> bool:
-    """Whether a mode is resolved: its stiffness is known to better than half."""
+    """Whether a mode can be used at all: its stiffness is known to better than half."""
     return math.isfinite(stiffness) and sd < 0.5 * stiffness
 
 
-def _used_rows(group: list[Response], model: ModalModel, keep: np.ndarray) -> pd.DataFrame:
+def _doubts(model: ModalModel) -> Iterator[str]:
+    """Say which modes the data do not resolve, and how far they know them."""
+    for mode in model.modes:
+        if not mode.resolved:
+            yield f"the mode at {_in_words(mode)}, is not resolved"
+    if model.doubtful is not None:
+        yield f"a further mode at {_in_words(model.doubtful)}, is not resolved and was left out"
+
+
+def _in_words(mode: Mode) -> str:
+    known = [f"{mode.frequency:.5g} ± {mode.frequency_sd:.1g} Hz"]
+    known.append(f"damping {100 * mode.damping:.3g} ± {100 * mode.damping_sd:.1g} %")
+    if math.isfinite(mode.stiffness):
+        known.append(f"stiffness {mode.stiffness / N_UM:.3g} ± {mode.stiffness_sd / N_UM:.1g} N/µm")
+    return ", ".join(known)
+
+
+def _diagram_rows(position: str, direction: str, model: ModalModel) -> pd.DataFrame:
+    diagram = model.diagram
+    pole = diagram.poles
+    return pd.DataFrame(
+        {
+            "position": position,
+            "direction": direction,
+            "order": diagram.order,
+            "frequency_hz": np.abs(pole) / (2.0 * np.pi),
+            "damping": -pole.real / np.abs(pole),
+            "cluster": diagram.member,
+            "recurs": diagram.recurs[diagram.member],
+        }
+    )
+
+
+def _used_rows(group: list[Receptance], model: ModalModel, keep: np.ndarray) -> pd.DataFrame:
     parts = []
     for column, item in enumerate(group):
         frequency, frf = item.frequency[keep], item.frf[keep]
@@ -187,6 +221,7 @@ def _used_rows(group: list[Response], model: ModalModel, keep: np.ndarray) -> pd
             "imag_m_n": frf.imag,
             "modal_real_m_n": modal.real,
             "modal_imag_m_n": modal.imag,
+            "error": model.error[column],
         }
         parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)

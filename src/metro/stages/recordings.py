@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +16,7 @@ from metro.batch.canonical import Part
 from metro.batch.findings import Finding as Problem
 from metro.batch.manifest import signed_axes
 from metro.formats import FormatError
-from metro.formats.registry import read
+from metro.formats.registry import ReadFrf, read, read_frfs
 from metro.signals import quality
 from metro.signals.conversion import driving_point_sign, moved, receptance, response_si, sensor_to_tool
 from metro.units import MS, Array
@@ -53,6 +54,16 @@ class Recordings:
         except FormatError as error:
             self.problems.append(Problem("error", file, error.message))
             return None
+        finally:
+            self.advance()
+
+    def frfs(self, file: str) -> list[ReadFrf]:
+        """Read every FRF of a file; none, and a problem gathered, where that is impossible."""
+        try:
+            return read_frfs(self.folder / file)
+        except FormatError as error:
+            self.problems.append(Problem("error", file, error.message))
+            return []
         finally:
             self.advance()
 
@@ -165,26 +176,43 @@ def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator
 
 
 def frf(impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:
-    """Yield each FRF as a receptance; lines that have none (0 Hz of an integrated one) are left out."""
+    """Yield each FRF as a receptance; lines that have none (0 Hz of an integrated one) are left out.
+
+    What the file says of its points and units goes before the row of impacts.csv; a row that names a pair
+    takes that pair out of a file of many.
+    """
     for row in impacts[impacts["kind"] != "record"].to_dict("records"):
-        file = str(row["file"])
-        table = recordings.table(file, "frf")
-        if table is None:
-            continue
-        frequency = table["frequency_hz"].to_numpy()
-        values = table["real"].to_numpy() + 1j * table["imag"].to_numpy()
-        values = receptance(frequency, values, str(row["response_unit"]) or "m")
-        keep = np.isfinite(values)
-        if row["reference"] == row["response"]:
-            sign = driving_point_sign(frequency[keep], values[keep])
-            recordings.note(file, "", [quality.conjugated(sign)])
-        columns = {
-            "frequency_hz": frequency[keep],
-            "real_m_n": values.real[keep],
-            "imag_m_n": values.imag[keep],
-        }
-        coherence = {"coherence": table["coherence"].to_numpy()[keep]} if "coherence" in table else {}
-        yield {**_place(row), **columns, **coherence}
+        repeats: Counter[tuple[str, str]] = Counter()
+        for one in recordings.frfs(str(row["file"])):
+            pair = one.reference or str(row["reference"]), one.response or str(row["response"])
+            if one.reference and not _asked(row, pair):
+                continue
+            repeats[pair] += 1
+            place = _place(row) | {"reference": pair[0], "response": pair[1]}
+            if repeats[pair] > 1:
+                place["replicate"] = repeats[pair]
+            unit = one.unit or str(row["response_unit"]) or "m"
+            driving = pair[0] == pair[1]
+            yield place | _receptance(str(row["file"]), one.table, unit, recordings, driving=driving)
+
+
+def _asked(row: Mapping[Hashable, Any], pair: tuple[str, str]) -> bool:
+    return all(row[name] in ("", point) for name, point in zip(("reference", "response"), pair, strict=True))
+
+
+def _receptance(
+    file: str, table: pd.DataFrame, unit: str, recordings: Recordings, *, driving: bool
+) -> dict[str, np.ndarray | pd.Series | str | int]:
+    """Columns of the canonical table of one FRF; its convention is noted where it is a driving point's."""
+    frequency = table["frequency_hz"].to_numpy()
+    values = receptance(frequency, table["real"].to_numpy() + 1j * table["imag"].to_numpy(), unit)
+    keep = np.isfinite(values)
+    if driving:
+        sign = driving_point_sign(frequency[keep], values[keep])
+        recordings.note(file, "", [quality.conjugated(sign)])
+    coherence = {"coherence": table["coherence"].to_numpy()[keep]} if "coherence" in table else {}
+    values = values[keep]
+    return {"frequency_hz": frequency[keep], "real_m_n": values.real, "imag_m_n": values.imag, **coherence}
 
 
 def _place(row: Mapping[Hashable, Any]) -> dict[str, np.ndarray | pd.Series | str | int]:

@@ -11,6 +11,7 @@ from metro.report.figures import surface as figures
 from metro.report.numbers import number, quantity, unit, words
 from metro.report.results import Results
 from metro.report.sections.lobes import boundaries
+from metro.report.sections.modes import modes
 from metro.units import JSON
 
 COEFFICIENTS = {
@@ -42,7 +43,7 @@ def identification(results: Results) -> Section:
     items: list[Item] = [
         *_force(found.get("force") or {}),
         *_yielding(results.tables.get("yielding")),
-        *_modes(found.get("modes") or [], results.tables.get("frf_used")),
+        *modes(found.get("modes") or [], results.tables),
         *boundaries(results),
         *_arm(found.get("arm") or {}),
         *_tip(found.get("tip") or {}),
@@ -96,42 +97,6 @@ def _force(force: JSON) -> list[Item]:
     if speeds:
         items.append(_by_run(speeds, "spindle speed", "Spindle speed from each record."))
     return items
-
-
-def _modes(modes: list[JSON], frf: pd.DataFrame | None) -> list[Item]:
-    if not modes:
-        return []
-    keys = [
-        ("frequency", "frequency (Hz)"),
-        ("damping", "damping ratio"),
-        ("stiffness", "stiffness (N/m)"),
-        ("mass", "mass (kg)"),
-    ]
-    rows = [
-        [
-            str(mode.get("position", "–")),
-            str(mode.get("direction", "–")),
-            *(quantity(mode[k], with_unit=False) if mode.get(k) else "–" for k, _ in keys),
-        ]
-        for mode in modes[:LONGEST]
-    ]
-    header = ["position", "direction", *(name for _, name in keys)]
-    caption = "Modes with 95 % intervals; the frequency is the undamped one." + _more(len(modes))
-    items: list[Item] = [Heading("Modes"), Table(header, rows, caption, [0.7, 0.8, 1.3, 1.5, 1.8, 1.4])]
-    drawn = None if frf is None else _magnitudes(frf)
-    if drawn is not None:
-        alt = f"Measured frequency responses ({len(drawn)} lines) with the modal model over them."
-        caption = "Measured frequency responses and what the modes reconstruct."
-        items.append(Picture(figures.responses(drawn), caption, alt))
-    return items
-
-
-def _magnitudes(frf: pd.DataFrame) -> pd.DataFrame | None:
-    """Magnitudes of measured and reconstructed receptance, where the table has both."""
-    pairs = {"measured_m_n": ("real_m_n", "imag_m_n"), "modal_m_n": ("modal_real_m_n", "modal_imag_m_n")}
-    if not {c for pair in pairs.values() for c in pair} <= set(frf.columns):
-        return None
-    return frf.assign(**{name: (frf[re] ** 2 + frf[im] ** 2) ** 0.5 for name, (re, im) in pairs.items()})
 
 
 def _yielding(table: pd.DataFrame | None) -> list[Item]:

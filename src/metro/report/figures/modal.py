@@ -1,0 +1,91 @@
+"""Modal identification: measured and reconstructed responses, and the diagram the modes were found in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from metro.report import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DIAGRAMS = 4
+
+
+def responses(frf: pd.DataFrame) -> Figure:
+    """Draw measured frequency responses and their modal reconstruction, magnitude over frequency.
+
+    Parameters
+    ----------
+    frf : ``position, reference, response, frequency_hz, measured_m_n, modal_m_n`` (magnitudes), ``error``.
+    """
+    from matplotlib.ticker import NullFormatter
+
+    pairs = list(frf.groupby(["position", "reference", "response"], sort=False))[:6]
+    columns = min(2, len(pairs))
+    with style.style():
+        figure, grid = style.new_figure(
+            0.6 + 1.7 * -(-len(pairs) // columns), -(-len(pairs) // columns), columns, sharex=True
+        )
+        flat = [axes for row in grid for axes in row]
+        for axes, ((position, reference, response), part) in zip(flat, pairs, strict=False):
+            thin = part.iloc[:: max(1, len(part) // 800)]
+            axes.semilogy(
+                thin["frequency_hz"], thin["measured_m_n"], color=style.MEASURED, lw=0.8, label="measured"
+            )
+            axes.semilogy(
+                thin["frequency_hz"], thin["modal_m_n"], color=style.BEFORE, ls="--", label="modal model"
+            )
+            error = f" ({100.0 * part['error'].iloc[0]:.2g} %)" if "error" in part else ""
+            axes.set_title(f"position {position}: {reference} → {response}{error}", loc="left")
+            axes.yaxis.set_minor_formatter(NullFormatter())
+        for row in grid:
+            row[0].set_ylabel("receptance (m/N)")
+        for axes in flat[max(0, len(pairs) - columns) : len(pairs)]:
+            axes.set_xlabel("frequency (Hz)")
+            axes.xaxis.set_tick_params(labelbottom=True)
+        for axes in flat[len(pairs) :]:
+            axes.set_visible(False)
+        style.legend_above(figure, flat[0])
+    return figure
+
+
+def stabilisation(diagram: pd.DataFrame, frf: pd.DataFrame) -> Figure:
+    """Draw the poles of every model order over the sum of the measured responses, a panel per direction.
+
+    Parameters
+    ----------
+    diagram : ``position, direction, order, frequency_hz, recurs``.
+    frf : ``position, response, frequency_hz, measured_m_n``.
+    """
+    panels = list(diagram.groupby(["position", "direction"], sort=False))[:DIAGRAMS]
+    with style.style():
+        figure, grid = style.new_figure(0.5 + 2.2 * len(panels), len(panels))
+        for (axes,), ((position, direction), poles) in zip(grid, panels, strict=True):
+            here = frf[(frf["position"] == position) & frf["response"].str.endswith(str(direction))]
+            total = here.groupby("frequency_hz")["measured_m_n"].sum()
+            behind = axes.twinx()
+            behind.semilogy(total.index, total, color=style.GREY, lw=0.8, label="sum of the responses")
+            behind.set_ylabel("receptance (m/N)")
+            behind.spines["right"].set_visible(True)
+            behind.grid(visible=False)
+            axes.set_zorder(behind.get_zorder() + 1)
+            axes.patch.set_visible(False)
+            for recurs, mark, colour, label in (
+                (False, "x", style.BEFORE, "other pole"),
+                (True, "o", style.AFTER, "recurring pole"),
+            ):
+                part = poles[poles["recurs"] == recurs]
+                axes.plot(
+                    part["frequency_hz"], part["order"], mark, color=colour, ms=3, mfc="none", label=label
+                )
+            axes.plot([], [], color=style.GREY, lw=0.8, label="sum of the responses")
+            axes.set(xlim=(total.index.min(), total.index.max()), ylabel="model order")
+            axes.set_ylim(0, 1.05 * float(np.max(poles["order"])))
+            axes.set_title(f"position {position}, direction {direction}", loc="left")
+        grid[-1][0].set_xlabel("frequency (Hz)")
+        style.legend_above(figure, grid[0][0])
+    return figure
