@@ -12,6 +12,7 @@ import numpy as np
 
 from virtual_cell.milling import Coefficients
 from virtual_cell.modes import Modes
+from virtual_cell.regeneration import cleared
 from virtual_cell.units import Array
 
 _PER_TURN = 240  # steps of the spindle's turn
@@ -64,10 +65,7 @@ def _cut(
 ) -> Array:
     """Force (n, 2), N/m of depth, of the teeth now at directions ``at``; leaves the new surface."""
     sine, cosine = ray
-    old = surface[:, at] - advance
-    reach = tip[:, :1] * sine + tip[:, 1:] * cosine
-    h = np.where(advance > 0.0, np.maximum(reach - old, 0.0), 0.0)
-    surface[:, at] = np.where(advance > 0.0, np.maximum(old, reach), 0.0)
+    h = cleared(surface, at, tip[:, :1] * sine + tip[:, 1:] * cosine, advance)
     force = np.empty_like(tip)
     force[:, 0] = -(h * (k.ktc * cosine + k.krc * sine)).sum(axis=1)
     force[:, 1] = (h * (k.ktc * sine - k.krc * cosine)).sum(axis=1)

@@ -97,7 +97,7 @@ def make(folder: Path) -> Row:
         row["pose"] = "4"
     rows += _chatter_tests(len(rows))
     write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
-    write_csv(folder / "impacts.csv", _impacts(folder, rng))
+    write_csv(folder / "impacts.csv", impacts(folder, rng))
     write_yaml(folder / "cell.yaml", {"cell": "trimule", "stations": "stations.csv"})
     write_csv(folder / "stations.csv", _stations())
     write_yaml(folder / "batch.yaml", _manifest(folder.name))
@@ -160,8 +160,8 @@ def _stations() -> list[Row]:
     ]
 
 
-def _impacts(folder: Path, rng: np.random.Generator) -> list[Row]:
-    """Five hits on the tip in each direction."""
+def impacts(folder: Path, rng: np.random.Generator) -> list[Row]:
+    """Write five hits on the tip in each direction; return their rows."""
     rows: list[Row] = []
     for direction, modes in MODES.items():
         for replicate in range(1, 6):

@@ -72,15 +72,12 @@ def _observed(
     }
     time, signal = time[found.steady], signal[found.steady] - zero
     orbit = orbit_rate(row) / (2.0 * math.pi)
-    signal = _with_orbit(time, signal, orbit)
+    signal = with_orbit(time, signal, orbit)
     highest = orders.highest_order(rate, nominal, tool.teeth)
     tacho = record["spindle_deg"].to_numpy()[found.steady]
-    if np.isfinite(tacho).all():
-        angle = np.unwrap(tacho * DEG) + 2.0 * math.pi * orbit * time
-        speed, deviation = _tacho_speed(time, angle)
-    else:
-        speed, deviation = orders.spindle_speed(time, signal, nominal + orbit, highest)
-        angle = 2.0 * math.pi * speed * time
+    angle, speed, deviation = spindle_angle(
+        time, signal, tacho, nominal=nominal, orbit=orbit, highest=highest
+    )
     averages = orders.order_averages(time, angle, signal, highest, time_blocks(time, nominal, orbit))
     summary = {
         "run": run,
@@ -99,6 +96,21 @@ def _observed(
     return pd.concat(
         [_long(run, i, average) for i, average in enumerate(averages)], ignore_index=True
     ), summary
+
+
+def spindle_angle(
+    time: Array, signal: Array, tacho: Array, *, nominal: float, orbit: float, highest: int
+) -> tuple[Array, float, float]:
+    """Angle of the spindle against the feed, (n,) rad, its speed, rev/s, and the deviation of that.
+
+    From the tacho's angle ``tacho`` (n,), degrees, where it is known, else the speed that gathers most of the
+    signal at its orders up to the ``highest``; ``nominal`` and ``orbit`` in rev/s.
+    """
+    if np.isfinite(tacho).all():
+        angle = np.unwrap(tacho * DEG) + 2.0 * math.pi * orbit * time
+        return angle, *_tacho_speed(time, angle)
+    speed, deviation = orders.spindle_speed(time, signal, nominal + orbit, highest)
+    return 2.0 * math.pi * speed * time, speed, deviation
 
 
 def _tacho_speed(time: Array, angle: Array) -> tuple[float, float]:
@@ -154,7 +166,7 @@ def orbit_rate(row: Any) -> float:
     return float(row["orbit_rpm"]) * RPM if row["operation"] == "helical" else 0.0
 
 
-def _with_orbit(time: Array, signal: Array, orbit: float) -> Array:
+def with_orbit(time: Array, signal: Array, orbit: float) -> Array:
     """Turn the force into a frame that turns with the orbit, where helical milling repeats with the tool."""
     if orbit == 0.0:
         return signal

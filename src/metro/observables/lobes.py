@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
-from metro.observables import lobe_methods, lobe_positions, printed_modes, stability
+from metro.observables import chatter_runs, lobe_methods, lobe_positions, printed_modes, stability
 from metro.observables.lobe_positions import Tip
 from metro.observables.modal_test import Read, observe_modes
 from metro.observables.problem import Refusal
@@ -25,7 +25,10 @@ _COLUMNS: dict[str, tuple[str, ...]] = {
         *("position", "rpm", "depth_mm", "depth_lo_mm", "depth_hi_mm", "depth_p05_mm", "depth_p95_mm"),
         *("chatter_hz", "kind", "error_mm", "interpolated"),
     ),
-    "lobe_runs": ("run", "position", "rpm", "depth_mm", "boundary_mm", "unstable", "probability_unstable"),
+    "lobe_runs": (
+        *("run", "position", "own_modes", "rpm", "depth_mm", "boundary_mm", "predicted_hz"),
+        *("unstable", "probability_unstable"),
+    ),
     "lobe_methods": lobe_methods.METHOD_COLUMNS,
     "lobe_islands": lobe_methods.ISLAND_COLUMNS,
     "lobe_stations": lobe_methods.STATION_COLUMNS,
@@ -59,10 +62,12 @@ class LabelProblem:
 def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Identify the modes of every position and solve the lobes of the cuts that were made there.
 
-    Tables ``modes``, ``frf_used``, ``lobes`` (diagram per position), ``lobe_runs`` (probability per run with
-    a depth), those of :mod:`metro.observables.lobe_methods`, ``lobes_refused`` (reasons and notes).
+    Tables ``modes``, ``frf_used``, ``stabilisation``, ``lobes`` (diagram per position), ``lobe_runs``
+    (probability per run with a depth), ``chatter_runs`` (what the runs' own records say), those of
+    :mod:`metro.observables.lobe_methods`, ``lobes_refused`` (reasons and notes).
     """
-    modes, used, notes = observe_modes(read)
+    test = observe_modes(read, batch.instrument("hammer"))
+    modes, notes = test.modes, test.notes
     if modes.empty and not notes:
         published = read("published")
         modes = printed_modes.printed_modes(published)
@@ -73,16 +78,20 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
     found = stability.cutting(batch, identified)
     tips = lobe_positions.tips(modes, notes)
     where = lobe_positions.places(read("stations"))
+    chatter = chatter_runs.observe_chatter(batch, read, modes)
     parts: dict[str, list[pd.DataFrame]] = {}
     if not isinstance(found, Refusal):
         notes += stability.assumptions(batch)
-        parts = _solved(batch, found, lobe_positions.pairs(batch, tips, where, notes), where, notes)
+        pairs = lobe_positions.pairs(batch, tips, where, notes)
+        told = chatter_runs.measured(chatter)
+        parts = _solved(batch, found, pairs, where=where, told=told, notes=notes)
     tables = {name: _joined(parts.get(name, []), columns) for name, columns in _COLUMNS.items()}
     reason = "no run with a depth of cut at a position whose modes are known" if tables["lobes"].empty else ""
     reason = found.reason if isinstance(found, Refusal) else reason
     said = [("refusal", reason)] if reason else []
     refused = pd.DataFrame([*said, *(("note", n) for n in notes)], columns=["kind", "reason"], dtype=str)
-    return {"modes": modes, "frf_used": used, **tables, "lobes_refused": refused}
+    found_modes = {"modes": modes, "frf_used": test.used, "stabilisation": test.stabilisation}
+    return {**found_modes, **tables, "chatter_runs": chatter, "lobes_refused": refused}
 
 
 def _joined(parts: list[pd.DataFrame], columns: tuple[str, ...]) -> pd.DataFrame:
@@ -94,7 +103,9 @@ def _solved(
     batch: Batch,
     found: stability.Cutting,
     pairs: list[tuple[pd.DataFrame, Tip]],
+    *,
     where: Mapping[str, Array],
+    told: pd.DataFrame,
     notes: list[str],
 ) -> dict[str, list[pd.DataFrame]]:
     """Tables of lobes, as parts to be joined: one boundary per position, of the cut that most runs share."""
@@ -105,7 +116,7 @@ def _solved(
             whole = place == 0
             rpm = stability.speeds_of(same, whole=whole)
             lobes = stability.solve(tip, found, same.iloc[0], rpm, check=whole)
-            parts["lobe_runs"].append(stability.run_probabilities(batch, lobes, same))
+            parts["lobe_runs"].append(stability.run_probabilities(batch, lobes, same, told))
             if whole and np.any(np.isfinite(lobes.boundary.depth)):
                 solved.append(lobes)
                 feed = float(same["feed_per_tooth_mm"].iloc[0]) * MM
@@ -129,7 +140,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
     rows = observed["lobe_runs"]
     rows = rows[rows["unstable"] >= 0]
     if rows.empty:
-        return Refusal("no run of runs.csv says whether it was stable")
+        return Refusal("no run says whether it was stable, by its record or in runs.csv")
     table = batch.runs.loc[rows["run"]]
     return LabelProblem(
         OBSERVABLE,
@@ -178,7 +189,8 @@ def report(
             "frequency": quantity(row["frequency_hz"], row["frequency_sd_hz"], "Hz"),
             "damping": quantity(row["damping"], row["damping_sd"], "1"),
             "stiffness": quantity(row["stiffness_n_m"], row["stiffness_sd"], "N/m"),
-            "mass": quantity(row["mass_kg"], _mass_sd(row), "kg"),
+            "mass": quantity(row["mass_kg"], row.get("mass_sd", math.nan), "kg"),
+            **_resolution(row),
         }
         for _, row in observed["modes"].iterrows()
     ]
@@ -199,11 +211,9 @@ def _number(position: object) -> int | str:
     return int(text) if text.isdigit() else text
 
 
-def _mass_sd(row: pd.Series) -> float:
-    relative = math.hypot(
-        row["stiffness_sd"] / row["stiffness_n_m"], 2 * row["frequency_sd_hz"] / row["frequency_hz"]
-    )
-    return float(row["mass_kg"] * relative)
+def _resolution(row: pd.Series) -> JSON:
+    """Say so where the data do not resolve the mode; a printed one counts as resolved."""
+    return {} if row.get("resolved", True) else {"resolved": False}
 
 
 def _lowest(rows: pd.DataFrame) -> JSON:

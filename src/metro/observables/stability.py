@@ -14,6 +14,7 @@ from metro.dynamics.lobes import Boundary, stability_boundary
 from metro.dynamics.system import Cut, immersion
 from metro.dynamics.teeth import equal_teeth, mean_directional_factors
 from metro.observables import cutting_force
+from metro.observables.chatter_runs import LABELS
 from metro.observables.lobe_positions import Tip
 from metro.observables.problem import Refusal
 from metro.units import DEG, JSON, MM, N_MM2, Array
@@ -138,6 +139,11 @@ def _distinct(turned: list[tuple[float, Cut]]) -> tuple[tuple[float, ...], tuple
     return turns, cuts
 
 
+def cuts_of(first: pd.Series, found: Cutting) -> tuple[tuple[float, ...], tuple[Cut, ...]]:
+    """Directions of feed, rad, that act differently on the modes, and the cut in each, as ``first`` is set."""
+    return _distinct([(turn, _cut(first, found, turn)) for turn in _directions(first)])
+
+
 def speeds_of(runs: pd.DataFrame, *, whole: bool) -> Array:
     """Speeds of the runs, rev/min; with the range about them where a ``whole`` diagram is wanted.
 
@@ -157,7 +163,7 @@ def solve(tip: Tip, found: Cutting, first: pd.Series, rpm: Array, *, check: bool
 
     ``check``: solve some of the samples from scratch too.
     """
-    turns, cuts = _distinct([(turn, _cut(first, found, turn)) for turn in _directions(first)])
+    turns, cuts = cuts_of(first, found)
     sd = np.concatenate([tip.sd, found.sd])
     deviations = np.random.default_rng(1).normal(size=(SAMPLES, len(sd))) * np.where(np.isfinite(sd), sd, 0.0)
     boundaries = [stability_boundary(tip.structure, cut, rpm) for cut in cuts]
@@ -227,20 +233,28 @@ def worth(solved: list[Lobes]) -> list[str]:
     ]
 
 
-def run_probabilities(batch: Batch, lobes: Lobes, runs: pd.DataFrame) -> pd.DataFrame:
-    """Boundary and probability of chatter at each of the runs, whose speeds are among the boundary's."""
+def run_probabilities(batch: Batch, lobes: Lobes, runs: pd.DataFrame, told: pd.DataFrame) -> pd.DataFrame:
+    """Boundary and probability of chatter at each of the runs, whose speeds are among the boundary's.
+
+    ``own_modes``: the modes are those of the run's pose. ``unstable`` is 1 or 0 as the run's own record says
+    (``told``, by run) where they are, else as the operator says; −1 where neither does.
+    """
     speeds = runs["spindle_rpm"].to_numpy(float)
     at = np.searchsorted(lobes.boundary.rpm, speeds)
     depth = runs["axial_depth_mm"].to_numpy(float) * MM
-    labels = batch.runs.loc[runs.index, "stable"].astype(str)
+    labels = batch.runs.loc[runs.index, "stable"].astype(str).map(LABELS)
+    here = runs["pose"].astype(str).isin(["", "nan", "None", lobes.tip.pose])
+    unstable = told["unstable"].reindex(runs.index).where(here).fillna(labels)
     return pd.DataFrame(
         {
             "run": runs.index.astype(str),
             "position": lobes.tip.position,
+            "own_modes": here.to_numpy(),
             "rpm": speeds,
             "depth_mm": depth / MM,
             "boundary_mm": lobes.boundary.depth[at] / MM,
-            "unstable": labels.map({"no": 1, "yes": 0}).fillna(-1).astype(int).to_numpy(),
+            "predicted_hz": lobes.boundary.chatter_hz[at],
+            "unstable": unstable.fillna(-1).astype(int).to_numpy(),
             "probability_unstable": probability_unstable(depth, lobes.samples[:, at]),
         }
     )

@@ -9,6 +9,7 @@ from metro.report.content import Bullets, Heading, Item, Picture, Table
 from metro.report.figures import lobes as figures
 from metro.report.numbers import number, probability, quantity
 from metro.report.results import Results
+from metro.report.sections.chatter import chatter_items
 from metro.units import JSON, Array
 
 LONGEST = 30
@@ -20,7 +21,7 @@ def boundaries(results: Results) -> list[Item]:
     """Write the lowest depth of each position, the methods side by side, and what positions change."""
     blocks: list[JSON] = results.identified.get("lobes") or []
     if not blocks:
-        return []
+        return chatter_items(results)
     items: list[Item] = [Heading("Stability"), _lowest(blocks)]
     methods, boundary = results.tables.get("lobe_methods"), results.tables.get("lobes_final")
     if boundary is not None and results.compared("lobes") is None:
@@ -37,7 +38,7 @@ def boundaries(results: Results) -> list[Item]:
         items.append(Picture(figures.positions_chart(boundary), caption, caption))
     if stations is not None:
         items.append(_stations(stations))
-    return items
+    return items + chatter_items(results)
 
 
 def _lowest(blocks: list[JSON]) -> Table:

@@ -1,0 +1,147 @@
+"""Chatter in the records: every test on the lobes, against labels and prediction, and the roughness left."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from metro.report.content import Bullets, Heading, Item, Picture, Table
+from metro.report.figures import chatter as figures
+from metro.report.numbers import listing, number, probability
+from metro.report.results import Results
+from metro.units import JSON
+
+LONGEST = 30
+UNDECIDED = 0.5  # probability of a record that tells neither
+KINDS = {
+    "hopf": "Hopf",
+    "flip": "flip",
+    "low_frequency": "mode of the robot",
+    "forced": "forced, stable",
+    "unknown": "unknown",
+}
+
+
+def chatter_items(results: Results) -> list[Item]:
+    """Write what the records of the test cuts say; nothing where there are no records."""
+    tests = _tests(results)
+    if tests is None:
+        return []
+    items: list[Item] = [Heading("Chatter in the records")]
+    boundary = results.tables.get("lobes_final")
+    if boundary is not None and tests["position"].notna().any():
+        caption = "Test cuts on the stability boundary, by what their own records say."
+        items.append(Picture(figures.tests_chart(boundary, tests), caption, caption))
+    items += [_table(tests, results.batch.manifest), *_confusion(tests), Bullets(_words(tests))]
+    return items + _roughness(tests)
+
+
+def _tests(results: Results) -> pd.DataFrame | None:
+    """Join tests whose record was looked at to what the lobes of their own modes say; None without any."""
+    table = results.tables.get("chatter_runs")
+    if table is None or not table["probability"].notna().any():
+        return None
+    tests = table[table["probability"].notna()].copy()
+    predicted = results.tables.get("lobe_runs")
+    columns = ["position", "predicted_hz", "probability_unstable"]
+    if predicted is None:
+        tests[columns] = None
+    else:
+        own = predicted[predicted["own_modes"].astype(bool)].drop_duplicates("run")
+        tests = tests.join(own.set_index("run")[columns], on="run")
+    told = tests["probability"] != UNDECIDED
+    tests["unstable"] = np.where(told, tests["probability"] > 0.5, -1).astype(int)
+    tests["wrong_label"] = told & (tests["labelled"] >= 0) & (tests["labelled"] != tests["unstable"])
+    return tests.reset_index(drop=True)
+
+
+def _table(tests: pd.DataFrame, manifest: JSON) -> Table:
+    teeth = int(manifest["tool"]["teeth"])
+    rows = [_row(row, teeth) for _, row in tests.head(LONGEST).iterrows()]
+    header = [
+        "run",
+        "speed (rpm)",
+        "depth (mm)",
+        "P(chatter)",
+        "kind",
+        "frequency (Hz)",
+        "phase",
+        "predicted",
+    ]
+    more = f" The first {LONGEST} of {len(tests)}." if len(tests) > LONGEST else ""
+    caption = (
+        "Chatter by the records: probability, kind, frequency with its standard deviation; phase of the "
+        f"vibration from tooth to tooth (cycles), and as predicted at the boundary.{more}"
+    )
+    widths = [1, 1, 1, 1, 1.5, 1.4, 0.8, 0.8]
+    return Table(header, rows, caption, widths, numeric=[1, 2, 3, 5, 6, 7])
+
+
+def _row(row: pd.Series, teeth: int) -> list[str]:
+    found = np.isfinite(row["chatter_hz"])
+    frequency = f"{row['chatter_hz']:.2f} ± {row['chatter_sd_hz']:.2f}" if found else "–"
+    passing = teeth * row["rpm"] / 60.0
+    phases = [
+        f"{hz / passing % 1.0:.2f}" if found and pd.notna(hz) else "–"
+        for hz in (row["chatter_hz"], row["predicted_hz"])
+    ]
+    place = [str(row["run"]), number(row["rpm"]), number(row["depth_mm"])]
+    return [*place, probability(row["probability"]), KINDS.get(row["kind"], row["kind"]), frequency, *phases]
+
+
+def _confusion(tests: pd.DataFrame) -> list[Item]:
+    """Count records against labels and against the prediction."""
+    told = tests[tests["unstable"] >= 0]
+    predicted = pd.Series(np.where(told["probability_unstable"].astype(float) > 0.5, 1, 0), told.index)
+    others = {
+        "label of the operator": told["labelled"],
+        "predicted boundary": predicted.where(told["probability_unstable"].notna(), -1),
+    }
+    rows = []
+    for name, other in others.items():
+        counts = [int(((told["unstable"] == a) & (other == b)).sum()) for a in (0, 1) for b in (0, 1)]
+        if sum(counts):
+            right = f"{100 * (counts[0] + counts[3]) / sum(counts):.0f} %"
+            rows.append([name, *(str(count) for count in counts), right])
+    if not rows:
+        return []
+    header = [
+        "against",
+        "both stable",
+        "stable by the record alone",
+        "chatter by the record alone",
+        "both chatter",
+    ]
+    caption = "Records of the test cuts against their labels and against the prediction."
+    return [Table([*header, "agree"], rows, caption, [1.6, 1, 1, 1, 1, 0.8], numeric=[1, 2, 3, 4, 5])]
+
+
+def _words(tests: pd.DataFrame) -> list[str]:
+    """Say which labels are contradicted, and which records leave open what they are."""
+    count = int((tests["unstable"] == 1).sum())
+    words = [f"{count} of {len(tests)} records hold chatter."]
+    wrong = [str(run) for run in tests["run"][tests["wrong_label"]]]
+    if wrong:
+        words.append(f"The record contradicts the label of {listing(wrong)}; the record counts.")
+    hidden = [str(run) for run in tests["run"][~tests["separable"].astype(bool)]]
+    if hidden:
+        words.append(
+            f"Not separable at this speed: {listing(hidden)}. Something stands on an order of the spindle, "
+            "where chatter and runout share their lines; another speed tells."
+        )
+    late = [str(run) for run in tests["run"][(tests["unstable"] < 0) & tests["separable"].astype(bool)]]
+    if late:
+        words.append(f"Chatter may begin at the end of the record of {listing(late)}; a longer cut tells.")
+    return words
+
+
+def _roughness(tests: pd.DataFrame) -> list[Item]:
+    """Compare the roughness that stable and unstable tests left."""
+    rough = tests[tests["ra_um"].notna() & (tests["unstable"] >= 0)]
+    if rough.empty:
+        return []
+    kinds = (("stable", 0), ("unstable", 1))
+    medians = {name: rough["ra_um"][rough["unstable"] == kind].median() for name, kind in kinds}
+    told = ", ".join(f"{name} {number(value)} µm" for name, value in medians.items() if np.isfinite(value))
+    caption = f"Roughness of stable and unstable tests; dashed: medians. Median Ra: {told}."
+    return [Picture(figures.roughness_chart(rough), caption, caption)]

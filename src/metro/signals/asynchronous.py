@@ -1,0 +1,176 @@
+"""What of a cutting record does not repeat with the spindle: its spectrum window by window, and its peaks.
+
+The record is brought to even angles. What repeats with every revolution, and the linear change of that along
+the record, is taken out phase by phase: that takes out all orders of the **spindle**, since runout lives at
+those that are none of the teeth's.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from metro.units import Array
+
+LEAST_REVOLUTIONS, MOST_REVOLUTIONS = 20, 60  # of a window
+LEAST_WINDOWS, WINDOWS = 3, 5  # of a record: at least, and wanted
+SIGNIFICANCE = 1e-3  # of a peak, over all bins of a window
+LOWEST_HZ = 5.0  # of the modes of robots
+_WANDER = 2e-3  # relative error of speed within a window, that widens what counts as on an order
+_NEIGHBOURS = 3.0  # orders, over which the noise floor is read
+_BAND = 0.3  # of the sampling rate, up to which the record is true
+_LEAK = 1  # bins to either side into which a line at a bin spreads in a Hann window; between bins, twice that
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Spectra of a record over windows of whole revolutions, half overlapping; bin b is order b/revolutions.
+
+    Attributes
+    ----------
+    revolutions : of a window.
+    speed : mean, rev/s.
+    order : (b,) of the spindle.
+    on_order : (b,) whether a bin cannot be told from an order of the spindle, or is not looked at.
+    rest, periodic, whole : (w, b) power of what does not repeat, of what does, and of both together, over all
+        channels, weighted like a displacement.
+    floor : (w, b) noise floor of ``rest``.
+    p_value : (w, b) probability that noise alone makes as much as ``rest``.
+    asynchronous : (revolutions of the record, samples per revolution, channels) what does not repeat.
+    """
+
+    revolutions: int
+    speed: float
+    order: Array
+    on_order: np.ndarray
+    rest: Array
+    periodic: Array
+    whole: Array
+    floor: Array
+    p_value: Array
+    asynchronous: Array
+
+    @property
+    def peaks(self) -> np.ndarray:
+        """Return where (w, b) the rest stands out of the noise, off the orders and not beside one."""
+        tests = max(int(np.count_nonzero(~self.on_order)), 1)
+        beside = _highest(np.where(self.on_order, self.rest, 0.0), 2 * _LEAK)
+        return np.asarray((self.p_value < SIGNIFICANCE / tests) & ~self.on_order & (self.rest > beside))
+
+    @property
+    def energy_ratio(self) -> Array:
+        """Share (w,) of the peaks' energy in that of peaks and periodic part together."""
+        around = (_highest(self.peaks.astype(float), _LEAK) > 0.0) & ~self.on_order
+        energy = np.where(around, np.maximum(self.rest - self.floor, 0.0), 0.0).sum(axis=1)
+        total = energy + self.periodic[:, np.round(self.order) > 0.0].sum(axis=1)
+        return np.asarray(energy / np.where(total > 0.0, total, 1.0))
+
+
+def windows(time: Array, angle: Array, signal: Array, *, differentiated: int = 0) -> Windows:
+    """Part the record of a steady cut into what repeats with the spindle and the rest, window by window.
+
+    Parameters
+    ----------
+    time, angle : (n,) s; rad, of the spindle. signal : (n, channels).
+    differentiated : how often the signal is the derivative of a displacement: 2 for an acceleration, 0 for a
+        displacement or a force, which follows the thickness of the chip.
+
+    Raises
+    ------
+    ValueError
+        If the record is shorter than three windows of twenty revolutions, half overlapping.
+    """
+    even = over_angle(time, angle, signal)
+    length, starts = _cut(len(even))
+    speed = float((angle[-1] - angle[0]) / (2.0 * math.pi * (time[-1] - time[0])))
+    rate = (len(time) - 1) / (time[-1] - time[0])
+    order = np.arange(int(min(_BAND * rate / speed, 0.5 * even.shape[1]) * length) + 1) / length
+    looked_at = order >= max(3.0 / length, LOWEST_HZ / speed)
+    nearest = np.round(order)
+    on_order = ~looked_at | (np.abs(order - nearest) <= 1.001 / length + _WANDER * nearest)
+    repeated = _repeated(even)
+    rest, periodic, whole = (
+        np.stack([_power(part[start : start + length], len(order)) for start in starts])
+        for part in (even - repeated, repeated, even)
+    )
+    floor = _floor(rest, on_order, length)
+    weight = looked_at * np.where(looked_at, order, 1.0) ** (-2.0 * differentiated)
+    return Windows(
+        length,
+        speed,
+        order,
+        on_order,
+        rest=rest.sum(axis=2) * weight,
+        periodic=periodic.sum(axis=2) * weight,
+        whole=whole.sum(axis=2) * weight,
+        floor=floor.sum(axis=2) * weight,
+        p_value=_p_value(rest, floor),
+        asynchronous=even - repeated,
+    )
+
+
+def over_angle(time: Array, angle: Array, signal: Array) -> Array:
+    """Whole revolutions of a record at even angles, (revolutions, samples per revolution, channels)."""
+    from scipy.interpolate import CubicSpline
+
+    turns = (angle - angle[0]) / (2.0 * math.pi)
+    count = int(turns[-1] + 1.0 / len(turns))
+    per_turn = max(8, round((len(time) - 1) / turns[-1]))
+    when = np.interp(np.arange(count * per_turn) / per_turn, turns, time)
+    return np.asarray(CubicSpline(time, signal)(when).reshape(count, per_turn, -1))
+
+
+def _cut(revolutions: int) -> tuple[int, np.ndarray]:
+    """Length and starts of the windows, in revolutions."""
+    least = LEAST_REVOLUTIONS * (LEAST_WINDOWS + 1) // 2
+    if revolutions < least:
+        raise ValueError(f"{revolutions} revolutions of steady cut: at least {least} are needed")
+    length = int(np.clip(2 * revolutions // (WINDOWS + 1), LEAST_REVOLUTIONS, MOST_REVOLUTIONS))
+    count = round(2 * revolutions / length) - 1
+    return length, np.linspace(0, revolutions - length, count).round().astype(int)
+
+
+def _repeated(even: Array) -> Array:
+    """Return what each phase of the revolution repeats, with its linear change from turn to turn."""
+    turn = np.arange(len(even)) - 0.5 * (len(even) - 1)
+    slope = np.tensordot(turn, even, axes=(0, 0)) / float(turn @ turn)
+    return np.asarray(even.mean(axis=0) + turn[:, None, None] * slope)
+
+
+def _power(part: Array, bins: int) -> Array:
+    """Mean-square spectrum (bins, channels) of a window, by a Hann taper."""
+    flat = part.reshape(-1, part.shape[2])
+    taper = 0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(len(flat)) + 0.5) / len(flat))
+    spectrum = np.fft.rfft((flat - flat.mean(axis=0)) * taper[:, None], axis=0)[:bins]
+    return np.asarray(2.0 * np.abs(spectrum) ** 2 / (len(flat) * float(taper @ taper)))
+
+
+def _floor(rest: Array, on_order: np.ndarray, length: int) -> Array:
+    """Noise floor (w, b, channels): median of the neighbouring bins off the orders, as a mean of noise.
+
+    Sensors get noisier towards low frequencies: below the first order the floor is taken to rise as 1/f.
+    """
+    from scipy.ndimage import median_filter
+
+    free = np.flatnonzero(~on_order)
+    size = (1, int(_NEIGHBOURS * length) | 1, 1)
+    level = median_filter(rest[:, free], size, mode="reflect") / math.log(2.0)
+    place = np.clip(np.searchsorted(free, np.arange(len(on_order))), 0, len(free) - 1)
+    rise = np.maximum(length / np.maximum(np.arange(len(on_order)), 1), 1.0)
+    return np.asarray(np.maximum(level[:, place] * rise[:, None], 1e-12 * rest.max()))
+
+
+def _p_value(rest: Array, floor: Array) -> Array:
+    """Probability (w, b) of as much power in all channels together, each exponential about its floor."""
+    from scipy.special import gammaincc
+
+    return np.asarray(gammaincc(rest.shape[2], (rest / floor).sum(axis=2)))
+
+
+def _highest(power: Array, reach: int) -> Array:
+    """Highest power (w, b) within some bins."""
+    from scipy.ndimage import maximum_filter1d
+
+    return np.asarray(maximum_filter1d(power, 2 * reach + 1, axis=1))

@@ -1,0 +1,98 @@
+"""Chatter in the report: points on the lobes, records against labels and prediction, roughness."""
+
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+import synthetic_results as synthetic
+
+from metro.report.content import Bullets, Picture, Table
+from metro.report.figures import chatter as figures
+from metro.report.sections.chatter import chatter_items
+from metro.report.style import to_svg
+
+RUNS = pd.DataFrame(
+    {
+        "run": ["a", "b", "c", "d", "e"],
+        "rpm": [1500.0, 1500.0, 2000.0, 2500.0, 3000.0],
+        "depth_mm": [0.5, 1.5, 1.8, 1.2, 1.0],
+        "probability": [0.01, 0.99, 0.97, 0.5, 0.02],
+        "chatter_hz": [None, 68.0, 80.5, None, None],
+        "chatter_sd_hz": [None, 0.03, 0.1, None, None],
+        "kind": ["forced", "hopf", "flip", "unknown", "forced"],
+        "separable": [True, True, True, False, True],
+        "labelled": [0, 0, 1, 1, -1],
+        "ra_um": [0.4, 0.6, 0.8, 0.5, 0.2],
+        "rz_um": [2.0, 3.0, 4.0, 2.5, 1.0],
+    }
+)
+CHANCES = [0.1, 0.9, 0.8, 0.5, 0.7]
+LOBES = RUNS[["run"]].assign(position="1", own_modes=True, predicted_hz=66.0, probability_unstable=CHANCES)
+
+
+@pytest.fixture
+def items():
+    tables = {**synthetic.tables(), "chatter_runs": RUNS, "lobe_runs": LOBES}
+    made = synthetic.results()
+    teeth = replace(made.batch, manifest={**made.batch.manifest, "tool": {"teeth": 4}})
+    return chatter_items(replace(made, batch=teeth, tables=tables))
+
+
+def tables_of(items):
+    return [item for item in items if isinstance(item, Table)]
+
+
+def test_each_run_has_its_frequency_and_the_phase_from_tooth_to_tooth(items):
+    row = tables_of(items)[0].rows[1]
+    assert row[3:6] == ["0.990", "Hopf", "68.00 ± 0.03"]
+    assert row[6:] == ["0.68", "0.66"]  # 68 and 66 Hz at 100 passings per second
+    assert tables_of(items)[0].rows[0][5:] == ["–", "–", "–"]
+
+
+def test_records_are_counted_against_labels_and_prediction(items):
+    label, predicted = tables_of(items)[1].rows
+    # a stable/stable, b chatter/stable, c chatter/chatter; d is not told, e has no label
+    assert label[1:] == ["1", "0", "1", "1", "67 %"]
+    assert predicted[1:] == ["1", "1", "0", "2", "75 %"]
+
+
+def test_a_prediction_with_the_modes_of_another_place_is_not_compared():
+    tables = {**synthetic.tables(), "chatter_runs": RUNS, "lobe_runs": LOBES.assign(own_modes=False)}
+    made = synthetic.results()
+    teeth = replace(made.batch, manifest={**made.batch.manifest, "tool": {"teeth": 4}})
+    items = chatter_items(replace(made, batch=teeth, tables=tables))
+    assert [row[0] for row in tables_of(items)[1].rows] == ["label of the operator"]
+    assert all(row[7] == "–" for row in tables_of(items)[0].rows)
+
+
+def test_contradicted_labels_and_hidden_chatter_are_named(items):
+    words = " ".join(next(item for item in items if isinstance(item, Bullets)).items)
+    assert "2 of 5 records hold chatter" in words
+    assert "contradicts the label of b;" in words
+    assert "Not separable at this speed: d." in words
+
+
+def test_roughness_is_compared(items):
+    assert isinstance(items[-1], Picture)
+    assert "stable 0.300 µm, unstable 0.700 µm" in items[-1].caption
+
+
+def test_every_kind_is_drawn_where_it_was_cut_and_wrong_labels_are_circled():
+    tests = RUNS.assign(position="1", wrong_label=RUNS["run"] == "b")
+    axes = figures.tests_chart(synthetic.boundary(), tests).axes[0]
+    drawn = {c.get_label(): c.get_offsets().tolist() for c in axes.collections}
+    assert drawn["chatter (Hopf)"] == [[1500.0, 1.5]]
+    assert drawn["chatter (flip)"] == [[2000.0, 1.8]]
+    assert drawn["unknown kind, or cannot be told"] == [[2500.0, 1.2]]
+    assert drawn["stable"] == [[1500.0, 0.5], [3000.0, 1.0]]
+    assert drawn["labelled otherwise"] == [[1500.0, 1.5]]
+
+
+def test_without_records_there_is_nothing():
+    assert chatter_items(synthetic.results()) == []
+
+
+def test_the_same_tests_give_the_same_bytes():
+    tests = RUNS.assign(position="1", wrong_label=False)
+    first, second = (to_svg(figures.tests_chart(synthetic.boundary(), tests)) for _ in range(2))
+    assert first == second
