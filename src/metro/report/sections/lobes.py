@@ -56,8 +56,9 @@ def _lowest(blocks: list[JSON]) -> Table:
 
 def _methods(methods: pd.DataFrame, boundary: pd.DataFrame | None) -> list[Item]:
     caption = (
-        "The boundary by each method. Published diagrams of this kind take the lowest of all modes solved "
-        "alone, by complete discretisation with Euler's method (CDSEM)."
+        "The boundary by each method, with the coefficients of the base model. Published diagrams of this "
+        "kind take the lowest of all modes solved alone, by complete discretisation with Euler's method "
+        "(CDSEM)."
     )
     governing = "The mode that, solved alone, chatters first: direction and number by rising frequency."
     return [
