@@ -140,7 +140,7 @@ def _distinct(turned: list[tuple[float, Cut]]) -> tuple[tuple[float, ...], tuple
 
 
 def cuts_of(first: pd.Series, found: Cutting) -> tuple[tuple[float, ...], tuple[Cut, ...]]:
-    """Directions of feed, rad, that act differently on the modes, and the cut in each, as ``first`` is set."""
+    """Directions of feed, rad, that act differently on the modes, and the cut in each, set as ``first``."""
     return _distinct([(turn, _cut(first, found, turn)) for turn in _directions(first)])
 
 
