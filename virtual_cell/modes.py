@@ -12,7 +12,10 @@ from virtual_cell.units import Array
 
 @dataclass(frozen=True)
 class Modes:
-    """Modes of one direction, each (m,): ``damped`` frequency (Hz), damping ratio, stiffness (N/m)."""
+    """Modes of one direction, each (m,): ``damped`` frequency (Hz), damping ratio, stiffness (N/m).
+
+    Or (n, m): those of each of n tests.
+    """
 
     damped: Array
     damping: Array
@@ -37,5 +40,5 @@ class Modes:
         step[..., 0, 1] = e * s / turn
         step[..., 1, 0] = -e * self.omega**2 / turn * s
         step[..., 1, 1] = e * (c - decay / turn * s)
-        push = np.stack([1.0 - step[..., 0, 0], -step[..., 1, 0]], axis=-1) / self.stiffness[:, None]
+        push = np.stack([1.0 - step[..., 0, 0], -step[..., 1, 0]], axis=-1) / self.stiffness[..., None]
         return step, push

@@ -61,7 +61,7 @@ def spectral_radius(
 ) -> Array:
     """Largest modulus of the multipliers of modes ``mode`` (c,) alone, at speeds and depths (c,)."""
     axis, omega, zeta = structure.axis[mode], structure.omega[mode], structure.zeta[mode]
-    factor = _node_factors(cut, steps)[:, axis].T  # (c, steps + 1)
+    factor = _node_factors(cut, steps, structure.directions)[:, axis].T  # (c, steps + 1)
     between = (1.0 - interpolation) * factor[:, :-1] + interpolation * factor[:, 1:]
     dt = cut.tooth_period(rpm) / steps
     regenerative = depth[:, None] * between * (omega / structure.stiffness[mode])[:, None]
@@ -78,9 +78,10 @@ def spectral_radius(
     return periodmap.spectral_radius(PeriodMap(state, delayed, np.array([steps, steps + 1]), out))
 
 
-def _node_factors(cut: Cut, steps: int) -> Array:
-    """Force along x, and along y, per depth and displacement along itself, at the nodes (steps + 1, 2)."""
+def _node_factors(cut: Cut, steps: int, along: Array) -> Array:
+    """Force along each of the directions (d, 2) per depth and displacement along itself: (steps + 1, d)."""
     phi = cut.pitch * (np.arange(steps + 1)[:, None] / steps + np.arange(-cut.teeth, cut.teeth))
     inside = (phi > cut.entry - 1e-9) & (phi < cut.exit - 1e-9)  # of two teeth that change places, one
-    factors: Array = (inside[..., None] * cut.force_direction(phi) * chip_direction(phi)).sum(axis=1)
+    force, chip = cut.force_direction(phi) @ along.T, chip_direction(phi) @ along.T
+    factors: Array = (inside[..., None] * force * chip).sum(axis=1)
     return factors

@@ -9,12 +9,15 @@ displacement along the chip thickness obeys
 mode are exact, and the unknown lives on the arc alone, however many modes there are. Teeth that cut at the
 same time are folded onto one tooth period. In matrices: ``1/w`` is an eigenvalue of ``volterra + states @
 diag(c) @ drive``.
+
+Process damping acts on the rate of the displacement along the arc, which is one more unknown there; it is not
+delayed. Its force is in proportion to the depth too, so that ``1/a`` stays an eigenvalue.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -22,6 +25,7 @@ import numpy as np
 from metro.dynamics.system import Cut, Structure, chip_direction
 from metro.units import Array, ComplexArray
 
+_NO_MOTION = 1e-12  # share of a mode's direction along an axis
 _NEGLIGIBLE = 0.03  # share of the free vibrations below which one is left out of the reduced equation
 
 
@@ -36,6 +40,7 @@ class Arc:
     chip : (n, 2) direction in which the unknown is measured: the chip thickness where one tooth cuts, the
         displacements in x and in y (two channels) where several do.
     force : (n, 2) force on the tool per depth and unit of the unknown, N/m².
+    rate : (n,) whether the unknown is the displacement's change per tooth period, not itself.
     panels : slices of points in which everything is smooth, one per panel and channel, and the panel's
         (start, length).
     """
@@ -44,6 +49,7 @@ class Arc:
     weight: Array
     chip: Array
     force: Array
+    rate: np.ndarray
     panels: tuple[tuple[slice, int, float, float], ...]
 
 
@@ -58,6 +64,8 @@ class Kernel:
     states : (k, n, p) the points' displacement per modal state at the period's begin.
     drive : (k, p, n) modal state, carried back to the period's begin, per unit of the unknown and of depth.
     decay : (k, p) exp(pole * period).
+    delayed : (n,) 1 where the force depends on the unknown less what it was a period before, 0 where it
+        depends on the unknown alone.
     """
 
     period: Array
@@ -65,11 +73,18 @@ class Kernel:
     states: ComplexArray
     drive: ComplexArray
     decay: ComplexArray
+    delayed: Array
 
     def take(self, speed: np.ndarray) -> Kernel:
         """Return the equation at the speeds of index ``speed``."""
-        parts = (self.period, self.volterra, self.states, self.drive, self.decay)
-        return Kernel(*(part[speed] for part in parts))
+        return replace(
+            self,
+            period=self.period[speed],
+            volterra=self.volterra[speed],
+            states=self.states[speed],
+            drive=self.drive[speed],
+            decay=self.decay[speed],
+        )
 
 
 def panels_of(cut: Cut) -> list[tuple[float, float, int]]:
@@ -83,55 +98,67 @@ def panels_of(cut: Cut) -> list[tuple[float, float, int]]:
 
 def collocate(structure: Structure, cut: Cut, points: tuple[int, ...]) -> Arc:
     """Place ``points[i]`` Gauss points in panel i of the tooth period and evaluate the cut there."""
-    flexible = [axis for axis in (0, 1) if np.any(structure.axis == axis)]
-    time, weight, chip, force, panels = [], [], [], [], []
+    flexible = np.flatnonzero(np.any(np.abs(structure.directions[structure.axis]) > _NO_MOTION, axis=0))
+    time, weight, chip, force, rate, panels = [], [], [], [], [], []
     first = 0
     for (start, end, teeth), n in zip(panels_of(cut), points, strict=True):
         x, w = gauss(n)
         tau = start + (end - start) * x
         phi = cut.entry + cut.pitch * (tau[:, None] + np.arange(teeth))
-        directions, forces = chip_direction(phi), cut.force_direction(phi)
-        if teeth == 1:
-            channels = [(directions[:, 0], forces[:, 0])]
-        else:
-            total = np.einsum("nji,njk->nki", forces, directions)  # (n, chip axis, force axis)
-            channels = [(np.tile(np.eye(2)[axis], (n, 1)), total[:, axis]) for axis in flexible]
-        for unit, density in channels:
+        directions = chip_direction(phi)
+        channels = _channels(directions, cut.force_direction(phi), flexible, False)
+        if cut.damping:
+            channels += _channels(directions, -cut.damping / cut.pitch * directions, flexible, True)
+        for unit, density, is_rate in channels:
             time.append(tau)
             weight.append((end - start) * w)
             chip.append(unit)
             force.append(density)
+            rate.append(np.full(n, is_rate))
             panels.append((slice(first, first + n), n, start, end - start))
             first += n
     joined = [np.concatenate(part) for part in (time, weight, chip, force)]
-    return Arc(joined[0], joined[1], joined[2], joined[3], tuple(panels))
+    return Arc(joined[0], joined[1], joined[2], joined[3], np.concatenate(rate), tuple(panels))
+
+
+def _channels(
+    directions: Array, forces: Array, flexible: np.ndarray, rate: bool
+) -> list[tuple[Array, Array, bool]]:
+    """Directions (n, 2) of the unknowns and force (n, 2) per unit of each, of teeth (n, j, 2)."""
+    n, teeth, _ = directions.shape
+    if teeth == 1:
+        return [(directions[:, 0], forces[:, 0], rate)]
+    total = np.einsum("nji,njk->nki", forces, directions)  # (n, chip axis, force axis)
+    return [(np.tile(np.eye(2)[axis], (n, 1)), total[:, axis], rate) for axis in flexible]
 
 
 def kernel(structure: Structure, arc: Arc, period: Array) -> Kernel:
     """Assemble the equation at tooth periods ``period`` (k,), s."""
-    responses = np.zeros((2, len(period), len(arc.time), len(arc.time)))
-    for axis in (0, 1):
-        if np.any(structure.axis == axis):
-            responses[axis] = _volterra(structure, axis, arc, period)
-    volterra = np.einsum("ia,akij,ja->kij", arc.chip, responses, arc.force, optimize=True)
+    chip, force = arc.chip @ structure.directions.T, arc.force @ structure.directions.T
+    volterra = np.zeros((len(period), len(arc.time), len(arc.time)))
+    for axis in np.unique(structure.axis):
+        volterra += chip[:, None, axis] * _volterra(structure, axis, arc, period) * force[:, axis]
     poles = np.concatenate([structure.poles, structure.poles.conj()])
     residues = np.concatenate([structure.residues, structure.residues.conj()])
     direction = np.concatenate([structure.axis, structure.axis])
     growth = np.exp(period[:, None, None] * arc.time[:, None] * poles)
-    states = arc.chip[:, direction] * growth
-    drive = (
-        residues * arc.force[:, direction] * arc.weight[:, None] * period[:, None, None] / growth
-    ).transpose(0, 2, 1)
-    return Kernel(period, volterra, states, drive, np.exp(period[:, None] * poles))
+    per_period = np.where(arc.rate[:, None], period[:, None, None] * poles, 1.0)
+    states = chip[:, direction] * growth * per_period
+    drive = (residues * force[:, direction] * arc.weight[:, None] * period[:, None, None] / growth).transpose(
+        0, 2, 1
+    )
+    delayed = np.where(arc.rate, 0.0, 1.0)
+    return Kernel(period, volterra, states, drive, np.exp(period[:, None] * poles), delayed)
 
 
 def _volterra(structure: Structure, axis: int, arc: Arc, period: Array) -> Array:
-    """(k, n, n) displacement along ``axis`` per unit force along it, from forces since the period began."""
+    """(k, n, n) unknowns along ``axis`` per unit force along it, from forces since the period began."""
     result = np.zeros((len(period), len(arc.time), len(arc.time)))
     for row, n, start, length in arc.panels:
         nodes, inner = gauss(n)[0], gauss(n)[0]
         lag = length * nodes[:, None] * (1.0 - inner)
-        own = _impulse_response(structure, axis, period[:, None, None] * lag)
+        rate = bool(arc.rate[row][0])
+        own = _impulse_response(structure, axis, period[:, None, None], lag, rate)
         same = np.einsum("kiq,iqj->kij", own, _product_weights(n), optimize=True)
         same *= length * period[:, None, None]
         for column, _, other, _ in arc.panels:
@@ -139,18 +166,27 @@ def _volterra(structure: Structure, axis: int, arc: Arc, period: Array) -> Array
                 result[:, row, column] = same
             elif other < start:
                 lag = arc.time[row, None] - arc.time[column]
-                response = _impulse_response(structure, axis, period[:, None, None] * lag)
+                response = _impulse_response(structure, axis, period[:, None, None], lag, rate)
                 result[:, row, column] = response * arc.weight[column] * period[:, None, None]
     return result
 
 
-def _impulse_response(structure: Structure, axis: int, time: Array) -> Array:
-    """Displacement (m) along ``axis`` a ``time`` (s, ≥ 0) after a unit impulse along it."""
+def _impulse_response(structure: Structure, axis: int, period: Array, lag: Array, rate: bool) -> Array:
+    """Displacement (m) along ``axis`` a ``lag`` (periods, ≥ 0) after a unit impulse, or its rate.
+
+    The rate is per ``period``.
+    """
+    time = period * lag
     total = np.zeros(time.shape)
     for mode in np.flatnonzero(structure.axis == axis):
         pole, residue = structure.poles[mode], structure.residues[mode]
         # 1 / (2i m omega_d) is imaginary: the pair adds up to a damped sine
-        total += 2.0 * abs(residue) * np.exp(pole.real * time) * np.sin(pole.imag * time)
+        decay = 2.0 * abs(residue) * np.exp(pole.real * time)
+        sine = np.sin(pole.imag * time)
+        if rate:
+            total += decay * period * (pole.real * sine + pole.imag * np.cos(pole.imag * time))
+        else:
+            total += decay * sine
     return total
 
 
@@ -182,9 +218,13 @@ def _product_weights(n: int) -> Array:
 def reduced(equation: Kernel) -> Kernel:
     """Project the equation on half as many functions, those that carry its large eigenvalues.
 
+    With process damping it is returned as it is: its eigenvalues fade more slowly.
+
     They are the free vibrations and what the response to the cut makes of them, again and again: as that
     response is a Volterra operator, its powers fade faster than geometrically.
     """
+    if not equation.delayed.all():
+        return equation
     n, poles = equation.states.shape[1:]
     free = equation.states[:, :, : poles // 2]
     u, s, _ = np.linalg.svd(np.concatenate([free.real, free.imag], axis=2), full_matrices=False)
@@ -197,7 +237,8 @@ def reduced(equation: Kernel) -> Kernel:
         basis = np.concatenate([basis, last], axis=2)[:, :, :n]
     onto = basis.transpose(0, 2, 1)
     volterra, states = onto @ equation.volterra @ basis, onto @ equation.states
-    return Kernel(equation.period, volterra, states, equation.drive @ basis, equation.decay)
+    delayed = np.ones(basis.shape[2])
+    return Kernel(equation.period, volterra, states, equation.drive @ basis, equation.decay, delayed)
 
 
 def multipliers(equation: Kernel, depth: Array) -> ComplexArray:
@@ -209,10 +250,11 @@ def multipliers(equation: Kernel, depth: Array) -> ComplexArray:
     depth = depth[:, None, None]
     solve = np.linalg.inv(np.eye(n) - depth * equation.volterra)
     from_states = solve @ equation.states
-    from_before = np.eye(n) - solve  # equals -solve @ (depth * volterra)
+    before = np.diag(equation.delayed)
+    from_before = (np.eye(n) - solve) @ before  # equals -solve @ (depth * volterra) @ before
     top = np.concatenate([from_states, from_before], axis=2)
     change = top.copy()
-    change[:, :, p:] -= np.eye(n)
+    change[:, :, p:] -= before
     moved = depth * equation.drive @ change
     moved[:, :, :p] += np.eye(p)
     period_map = np.concatenate([equation.decay[:, :, None] * moved, top], axis=1)

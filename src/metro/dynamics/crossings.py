@@ -1,9 +1,10 @@
 """Every depth and frequency at which a Floquet multiplier reaches the unit circle.
 
 For ``mu = exp(i theta)`` the reciprocal depth ``1/a`` is an eigenvalue of ``S(theta) = (1 - 1/mu) K(theta)``,
-and a crossing is a theta at which such an eigenvalue is real and positive. The eigenvalues are followed over
-0 < theta <= pi with few points; the crossings found are then refined by Newton's method on theta with as many
-points as it takes. At theta = pi the matrix is real: its real eigenvalues are the flips.
+and a crossing is a theta at which such an eigenvalue is real and positive. (Columns of process damping, which
+is not delayed, are those of ``K(theta)``.) The eigenvalues are followed over 0 < theta <= pi with few points;
+the crossings found are then refined by Newton's method on theta with as many points as it takes. At theta =
+pi the matrix is real: its real eigenvalues are the flips.
 """
 
 from __future__ import annotations
@@ -100,7 +101,7 @@ def matrix(equation: Kernel, theta: Array) -> ComplexArray:
     gain = decay / (mu - decay)
     closed: ComplexArray = (equation.states[:, None] * gain[:, :, None, :]) @ equation.drive[:, None]
     closed += equation.volterra[:, None]
-    closed *= (1.0 - 1.0 / mu)[:, :, :, None]
+    closed *= 1.0 - equation.delayed / mu[:, :, :, None]
     return closed
 
 
@@ -173,10 +174,11 @@ def _slope(equation: Kernel, theta: Array, x: ComplexArray) -> ComplexArray:
     """Apply the derivative of S(theta) by theta to ``x`` (c, n, 1)."""
     mu = np.exp(1j * theta)[:, None, None]
     decay = equation.decay[:, :, None]
-    driven = equation.drive @ x
-    closed = equation.volterra @ x + equation.states @ (decay / (mu - decay) * driven)
-    gain_slope = -1j * mu * decay / (mu - decay) ** 2
-    change: ComplexArray = 1j / mu * closed + (1.0 - 1.0 / mu) * (equation.states @ (gain_slope * driven))
+    delayed = equation.delayed[:, None]
+    acting, acting_slope = x * (1.0 - delayed / mu), 1j / mu * delayed * x
+    gain, gain_slope = decay / (mu - decay), -1j * mu * decay / (mu - decay) ** 2
+    driven = gain * (equation.drive @ acting_slope) + gain_slope * (equation.drive @ acting)
+    change: ComplexArray = equation.volterra @ acting_slope + equation.states @ driven
     return change
 
 

@@ -55,7 +55,7 @@ class Boundary:
 def stability_boundary(structure: Structure, cut: Cut, rpm: Array) -> Boundary:
     """Find the lowest axial depth at which the cut is unstable, at spindle speeds ``rpm`` (k,), rev/min.
 
-    Zero helix, linear regeneration: edge forces and process damping are not in it.
+    Zero helix, linear regeneration: edge forces are not in it.
     """
     rpm = np.asarray(rpm, dtype=float)
     result = _nothing(rpm)
@@ -177,9 +177,10 @@ def chatter_hz(structure: Structure, arc: Arc, period: Array, theta: Array, shap
         return theta
     highest = math.ceil(1.5 * structure.omega.max() * period.max() / (2.0 * np.pi)) + 1
     lines = theta[:, None] + 2.0 * np.pi * np.arange(-highest, highest + 1)
-    force = np.exp(-1j * lines[:, :, None] * arc.time) @ ((shape * arc.weight)[:, :, None] * arc.force)
+    acting = shape * (1.0 - np.where(arc.rate, 0.0, np.exp(-1j * theta)[:, None])) * arc.weight
+    force = np.exp(-1j * lines[:, :, None] * arc.time) @ (acting[:, :, None] * arc.force)
     omega = lines / period[:, None]
-    amplitude = np.linalg.norm(structure.receptance(omega) * force, axis=2)
+    amplitude = np.linalg.norm((structure.receptance(omega) @ force[..., None])[..., 0], axis=2)
     strongest = np.take_along_axis(omega, amplitude.argmax(axis=1)[:, None], axis=1)[:, 0]
     return np.abs(strongest) / (2.0 * np.pi)
 

@@ -3,7 +3,7 @@
 Insperger and Stépán, Semi-Discretization for Time-Delay Systems (2011). The delayed displacement is linear
 over each step; the directional factors are their exact means over it and over the height of the cut, so that
 entry and exit may fall between the steps. It takes helix, unequal pitch and runout
-(:mod:`metro.dynamics.teeth`), which the default method does not.
+(:mod:`metro.dynamics.teeth`), which the default method does not; process damping is not in it.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def period_map(
 def state_space(structure: Structure) -> tuple[Array, Array, Array]:
     """Matrices (2m, 2m), (2m, 2), (2, 2m) of z' = A z + B F, displacement = C z; z is q, then q' / omega."""
     m = len(structure.omega)
-    direction = np.eye(2)[structure.axis]
+    direction = structure.directions[structure.axis]
     omega = np.diag(structure.omega)
     free = np.block([[np.zeros((m, m)), omega], [-omega, -2.0 * structure.zeta * omega]])
     force_in = np.concatenate(

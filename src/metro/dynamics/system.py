@@ -6,7 +6,7 @@ Feed frame: x feed, z from tip to spindle, y = z × x, immersion from +y clockwi
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,14 +15,16 @@ from metro.units import Array, ComplexArray
 
 @dataclass(frozen=True)
 class Structure:
-    """Modes of the tool tip against the work, each in one direction of the feed frame.
+    """Modes of the tool tip against the work, each in one direction of the plane of cutting.
 
     Attributes
     ----------
-    axis : (m,) 0 for a mode in x, 1 for a mode in y.
+    axis : (m,) 0 for a mode in x, 1 for a mode in y: the row of ``directions``.
     omega : (m,) undamped angular frequencies, rad/s.
     zeta : (m,) damping ratios, 0 < zeta < 1.
-    stiffness : (m,) modal stiffnesses for unit displacement of the tip, N/m.
+    stiffness : (m,) modal stiffnesses for unit displacement of the tip along the mode, N/m.
+    directions : (d, 2) unit vectors along which modes move, in the feed frame: x and y unless turned. Modes
+        along neither couple the two.
 
     A direction without modes is rigid.
     """
@@ -31,6 +33,7 @@ class Structure:
     omega: Array
     zeta: Array
     stiffness: Array
+    directions: Array = field(default_factory=lambda: np.eye(2))
 
     @property
     def poles(self) -> ComplexArray:
@@ -44,14 +47,31 @@ class Structure:
 
     def mode(self, which: int) -> Structure:
         """One mode alone."""
-        parts = (self.axis, self.omega, self.zeta, self.stiffness)
-        return Structure(*(part[[which]] for part in parts))
+        axis, *parts = (part[[which]] for part in (self.axis, self.omega, self.zeta, self.stiffness))
+        return Structure(axis, parts[0], parts[1], parts[2], self.directions)
 
     def receptance(self, omega: Array) -> ComplexArray:
-        """Receptance of x and y at angular frequencies of shape (...): (..., 2), m/N."""
+        """Receptance (..., 2, 2) of displacement by force, m/N, at angular frequencies of shape (...)."""
         ratio = np.asarray(omega)[..., None] / self.omega
         modal = 1.0 / (self.stiffness * (1.0 - ratio**2 + 2j * self.zeta * ratio))
-        return np.stack([modal[..., self.axis == a].sum(axis=-1) for a in (0, 1)], axis=-1)
+        along = self.directions[self.axis]
+        full: ComplexArray = np.einsum("...m,mi,mj->...ij", modal, along, along)
+        return full
+
+    def turned(self, angle: float) -> Structure:
+        """Return the structure with all its modes turned by ``angle``, rad, from x towards y."""
+        c, s = math.cos(angle), math.sin(angle)
+        return replace(self, directions=self.directions @ np.array([[c, s], [-s, c]]))
+
+    def with_mode(self, axis: int, omega: float, zeta: float, stiffness: float) -> Structure:
+        """Return the structure with one more mode along direction ``axis``."""
+        return Structure(
+            np.append(self.axis, axis),
+            np.append(self.omega, omega),
+            np.append(self.zeta, zeta),
+            np.append(self.stiffness, stiffness),
+            self.directions,
+        )
 
 
 @dataclass(frozen=True)
@@ -63,6 +83,8 @@ class Cut:
     teeth : number of equally spaced teeth.
     entry, exit : immersion angles between which a tooth cuts, rad.
     ktc, krc : tangential and radial cutting coefficients, N/m².
+    damping : of the process, coefficient over the tool's radius, N/m²: a tooth that moves into the work at a
+        speed v is pushed back by ``damping * depth * v / spindle's angular speed``.
     """
 
     teeth: int
@@ -70,6 +92,7 @@ class Cut:
     exit: float
     ktc: float
     krc: float
+    damping: float = 0.0
 
     @property
     def pitch(self) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from metro.observables.problem import Problem, Refusal
+from metro.observables.problem import Refusal
 from metro.units import Array
 
 Values = Mapping[str, Any]
@@ -31,6 +31,7 @@ class EffectParameter:
     group : parameters of a group are started from all combinations of their ``starts``, group after group,
         those of later groups ``neutral`` meanwhile.
     neutral : value at which the parameter's group changes nothing.
+    choices : what the values 0, 1, … stand for, where the parameter is a choice among these.
     """
 
     name: str
@@ -43,6 +44,7 @@ class EffectParameter:
     plausible: float | None = None
     group: int = 0
     neutral: float = 0.0
+    choices: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class Effect:
     signature: str
     literature: str
     experiment: str
-    adapt: Callable[[Effect, Problem], Effect | Refusal] | None = None
+    adapt: Callable[[Effect, Any], Effect | Refusal] | None = None
     mixing: tuple[tuple[float, ...], ...] = ()
     form: str = ""
     resembled: bool = False
@@ -117,8 +119,8 @@ def by_name(parameters: tuple[EffectParameter, ...], entries: list[Any]) -> dict
     return {name: found if names.count(name) > 1 else found[0] for name, found in taken.items()}
 
 
-def fitted_to(effects: tuple[Effect, ...], problem: Problem) -> tuple[tuple[Effect, ...], dict[str, str]]:
-    """Fit effects to a batch: those that it may show, and of the others why it cannot."""
+def fitted_to(effects: tuple[Effect, ...], problem: Any) -> tuple[tuple[Effect, ...], dict[str, str]]:
+    """Fit effects to a batch's ``problem``: those that it may show, and of the others why it cannot."""
     able, unable = [], {}
     for effect in effects:
         adapted = effect.adapt(effect, problem) if effect.adapt else effect
