@@ -1,13 +1,12 @@
 """Labels against predicted probabilities."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pandas as pd
 import pytest
+from label_toy import GATES, SHIFT, SLOPE, TWIN, Line, Made, problem
+from scipy.stats import norm
 
 from metro.loop.labels import judge_labels, log_likelihood, surprise
-from metro.loop.search import Gates
 
 RNG = np.random.default_rng(1)
 PROBABILITY = RNG.uniform(0.02, 0.98, 40)
@@ -45,7 +44,6 @@ def test_an_undecided_prediction_is_never_surprised():
     assert surprise(np.ones(20), np.full(20, 0.5), 1) == pytest.approx(1.0)
 
 
-GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
 CAUSE = [{"effect": "tool_runout", "probability": 1.0, "parameters": {}}]
 LABEL = np.tile([0.0, 1.0], 6)
 RIGHT, WRONG = np.where(LABEL > 0.5, 0.95, 0.05), np.where(LABEL > 0.5, 0.05, 0.95)
@@ -55,7 +53,27 @@ def judged(before, after, tests=12):
     rows = pd.DataFrame(
         {"run": [f"c{i}" for i in range(12)], "measured": LABEL, "before": before, "after": after}
     )
-    return judge_labels(SimpleNamespace(notes=()), rows.head(tests), CAUSE, GATES)[1]
+    nowhere = Made(
+        tuple(rows["run"]), ("validate",) * 12, LABEL > 0, np.ones(12), np.full(12, -1), np.full(12, np.nan),
+        np.zeros(0),
+    )  # fmt: skip
+    return judge_labels(nowhere, rows.head(tests), CAUSE, (SHIFT,), GATES)[1]
+
+
+def closed(true, effects, seed=1, **more):
+    """Comparison rows, verdict and story of a toy problem; before and after are those of its base model."""
+    task = problem(true, seed, **more)
+    held = np.array(task.roles) == "validate"
+    before = norm.cdf((np.log(task.depth) - Line().boundary(task.point_rpm)[task.point]) / 0.15)[held]
+    rows = pd.DataFrame(
+        {
+            "run": np.array(task.runs)[held],
+            "measured": task.unstable[held].astype(float),
+            "before": before,
+            "after": before,
+        }
+    )
+    return judge_labels(task, rows, [], effects, GATES)
 
 
 @pytest.mark.parametrize(
@@ -78,3 +96,48 @@ def test_labels_that_nothing_predicts_are_named():
     verdict = judged(WRONG, WRONG)
     assert "12 of 12 tests: c0, c1" in verdict["unexplained"]["signature"]
     assert judged(WRONG, RIGHT)["after"]["rms"] < judged(WRONG, RIGHT)["before"]["rms"]
+
+
+def test_an_effect_found_is_told_with_its_size_and_mends_the_held_out_prediction():
+    rows, verdict, story, change = closed(Line(slope=0.9), (SHIFT, SLOPE))
+    assert verdict["status"] == "explained"
+    (effect,) = verdict["effects"]
+    assert effect["effect"] == "slope"
+    assert effect["probability"] > 0.95
+    assert effect["parameters"]["size"]["value"] == pytest.approx(0.9, abs=0.25)
+    assert verdict["after"]["rms"] < 0.8 * verdict["before"]["rms"]
+    assert (rows["after"] != rows["before"]).all()
+    assert [c["effect"] for c in verdict["candidates"]] == ["shift", "slope + shift"][
+        : len(verdict["candidates"])
+    ]
+    assert {c["effect"]: c["verdict"] for c in story["candidates"]}["slope"] == "added"
+    assert change(Line()).slope == pytest.approx(0.9, abs=0.3)
+
+
+def test_twins_are_undetermined_and_a_next_test_is_named():
+    _, verdict, story, _ = closed(Line(shift=0.8), (SHIFT, TWIN))
+    assert verdict["status"] == "undetermined"
+    assert {"shift", "twin"} <= {name for pair in verdict["indistinguishable"] for name in pair}
+    assert "rev/min" in verdict["next_experiment"]
+    assert story["experiments"][0]["probability"] <= 1.0
+
+
+def test_without_an_effect_the_prediction_stays_as_it_was():
+    rows, verdict, _, change = closed(Line(), (SHIFT, SLOPE), seed=3)
+    assert verdict["status"] == "clean"
+    assert verdict["effects"] == []
+    assert (rows["after"] == rows["before"]).all()
+    assert change is None
+
+
+def test_labels_that_contradict_every_hypothesis_are_unexplained():
+    task_rows, verdict, _, _ = closed(Line(shift=1.8), (SLOPE,))
+    assert verdict["status"] == "unexplained"
+    assert verdict["unexplained"]["signature"].startswith("labels against the predicted boundary")
+    assert len(task_rows) == len(verdict["held_out_runs"])
+
+
+def test_too_few_tests_are_insufficient_for_effects():
+    _, verdict, story, _ = closed(Line(), (SHIFT, SLOPE), seed=3, rpm=np.array([4000.0, 5000.0]))
+    assert verdict["candidates"] == []
+    assert "effects of the boundary need" in story["noise"]["words"]

@@ -1,32 +1,38 @@
 """The verdict where the measurement is a label: stable or unstable, against a predicted probability.
 
 Nothing is fitted to labels, so there is no joint refit: the residual is the likelihood of the labels under
-the predicted probabilities, judged against what those probabilities themselves would let one expect.
+the predicted probabilities, judged against what those probabilities themselves would let one expect. Effects
+of the boundary are weighed by it (:mod:`metro.loop.label_search`), on the identification tests.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from metro.loop.search import Gates
-from metro.loop.story import in_words
+from metro.effects.effect import Effect
+from metro.loop.label_advice import NextTest, advice, beside, next_tests
+from metro.loop.label_search import (
+    LEAST_SPEEDS,
+    LEAST_TESTS,
+    LabelOutcome,
+    enough,
+    pairs,
+    predicted,
+    search_labels,
+    tried,
+)
+from metro.loop.labelled import Change, Labelled, tests_of
+from metro.loop.story import MOST_PROPOSALS, in_words
+from metro.loop.trial import Gates
 from metro.loop.verdict import DRAWS, error
 from metro.units import JSON, Array
 
-LEAST_TESTS = 6
 SIGNIFICANT = 0.01
-
-
-class Labelled(Protocol):
-    """What the verdict needs of a problem of labels."""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What the problem left out or assumed."""
-        ...
+FEW = "effects of the boundary need {} tests with a label that no fit holds out, at {} speeds or more"
 
 
 def log_likelihood(label: Array, probability: Array) -> Array:
@@ -42,10 +48,49 @@ def surprise(label: Array, probability: Array, seed: int) -> float:
     return float((1 + np.count_nonzero(found)) / (1 + DRAWS))
 
 
+@dataclass(frozen=True)
+class _Judged:
+    """What the verdict is made from.
+
+    ``rows`` of the held-out tests, ``after`` with what was found; ``surprises`` of these before and after,
+    and of the identification tests under the hypothesis that leads; ``upstream`` whether the effects of the
+    force explain; ``tests`` that could come next.
+    """
+
+    rows: pd.DataFrame
+    outcome: LabelOutcome | None
+    surprises: tuple[float, float, float]
+    upstream: bool
+    tests: list[NextTest]
+
+    @property
+    def found(self) -> bool:
+        """Whether the lead has passed the gates, its own tests agree, and held-out tests have judged it."""
+        lead = self.outcome.lead if self.outcome else None
+        agrees = self.surprises[2] >= SIGNIFICANT
+        return lead is not None and not lead.rejected and agrees and len(self.rows) >= LEAST_TESTS
+
+    @property
+    def status(self) -> str:
+        """The verdict."""
+        contradicted = min(self.surprises[1:]) < SIGNIFICANT
+        if len(self.rows) < LEAST_TESTS:
+            return "insufficient"
+        if self.outcome and self.outcome.lead and not contradicted:
+            return "explained" if self.found and not self.outcome.rivals else "undetermined"
+        if self.found:
+            return "partly_explained"
+        if contradicted:
+            return "unexplained"
+        return "explained" if self.upstream else "clean"
+
+
 def judge_labels(
-    task: Labelled, rows: pd.DataFrame, upstream: list[JSON], gates: Gates
-) -> tuple[pd.DataFrame, JSON, JSON]:
-    """Judge tests with labels: comparison rows, entry of verdict.json, entry of loop.json.
+    task: Labelled, rows: pd.DataFrame, upstream: list[JSON], library: Sequence[Effect], gates: Gates
+) -> tuple[pd.DataFrame, JSON, JSON, Change | None]:
+    """Judge tests with labels: comparison rows, entries of verdict.json and loop.json, change of the models.
+
+    The change is that of the effects found, to draw the boundary with them; None where there are none.
 
     Parameters
     ----------
@@ -53,74 +98,167 @@ def judge_labels(
         when the effects found in the cutting force are known.
     upstream : those effects. They are what explains the labels where the prediction contradicts these without
         them only.
+    library : effects that change the boundary.
     """
-    label = rows["measured"].to_numpy(float)
-    before, after = rows["before"].to_numpy(float), rows["after"].to_numpy(float)
-    p_before, p_after = (surprise(label, p, gates.seed) if len(rows) else 1.0 for p in (before, after))
-    explains = p_before < SIGNIFICANT <= p_after
-    status = _status(len(rows), p_after < SIGNIFICANT, explains)
-    wrong = rows["run"][np.abs(label - after) > 0.5].tolist()
-    left = f"labels against the predicted boundary in {len(wrong)} of {len(rows)} tests: {', '.join(wrong)}"
+    judged = _judged(task, rows, library, gates)
+    rows, label = judged.rows, judged.rows["measured"].to_numpy(float)
+    after = rows["after"].to_numpy(float)
+    floor = float(np.sqrt(np.mean(after * (1.0 - after)))) if len(rows) else None
     figures = {
         column: error(rows, column, gates.seed) if len(rows) else None for column in ("before", "after")
     }
-    floor = float(np.sqrt(np.mean(after * (1.0 - after)))) if len(rows) else None
+    wrong = rows["run"][np.abs(label - after) > 0.5].tolist()
     verdict: JSON = {
-        "status": status,
+        "status": judged.status,
         "unit": "1",
         "noise_floor": floor,
         "held_out_runs": rows["run"].tolist(),
         **figures,
-        "effects": upstream if explains else [],
-        "candidates": [],
-        "indistinguishable": [],
-        "next_experiment": _next_test(rows),
+        "effects": (upstream if judged.upstream else []) + _effects(judged),
+        "candidates": _candidates(judged),
+        "indistinguishable": pairs(judged.outcome) if judged.outcome else [],
+        "next_experiment": _next(judged),
         "unexplained": None,
     }
-    if status == "unexplained" and figures["after"]:
+    if judged.status in ("unexplained", "partly_explained") and figures["after"]:
+        left = (
+            f"labels against the predicted boundary in {len(wrong)} of {len(rows)} tests: {', '.join(wrong)}"
+        )
         verdict["unexplained"] = {"rms": figures["after"]["rms"], "unit": "1", "signature": left}
-    story: JSON = {
+    lead = judged.outcome.lead if judged.outcome else None
+    change = lead.hypothesis.likeliest if lead and judged.found else None
+    return rows, verdict, _story(task, judged, verdict, gates), change
+
+
+def _judged(task: Labelled, rows: pd.DataFrame, library: Sequence[Effect], gates: Gates) -> _Judged:
+    tests, _ = tests_of(task, "identify")
+    outcome = search_labels(task, library, gates) if enough(tests) else None
+    label = rows["measured"].to_numpy(float)
+
+    def surprised(column: str) -> float:
+        return surprise(label, rows[column].to_numpy(float), gates.seed) if len(rows) else 1.0
+
+    before, refitted = surprised("before"), surprised("after")
+    lead = outcome.lead if outcome else None
+    within = _within(outcome, gates) if outcome else 1.0
+    if outcome and lead and not lead.rejected and within >= SIGNIFICANT:
+        rows = _with_effects(task, rows, outcome)
+    suggested = next_tests(task, outcome) if outcome and (lead or len(rows) < LEAST_TESTS) else []
+    upstream = before < SIGNIFICANT <= refitted
+    return _Judged(rows, outcome, (before, surprised("after"), within), upstream, suggested)
+
+
+def _with_effects(task: Labelled, rows: pd.DataFrame, outcome: LabelOutcome) -> pd.DataFrame:
+    """Put into ``after`` what the lead predicts for the held-out tests whose boundary it changes."""
+    assert outcome.lead is not None
+    tests, runs = tests_of(task, "validate")
+    told = predicted(outcome.lead.hypothesis, tests, outcome.evidence.deviations)
+    changed = pd.Series(told, index=list(runs), dtype=float).reindex(rows["run"]).to_numpy()
+    return rows.assign(after=np.where(np.isfinite(changed), changed, rows["after"]))
+
+
+def _within(outcome: LabelOutcome, gates: Gates) -> float:
+    """Return the surprise of the identification tests under the hypothesis that leads."""
+    leading = outcome.lead or outcome.weighed[0]
+    tests, deviations = outcome.evidence.tests, outcome.evidence.deviations
+    return surprise(tests.unstable, predicted(leading.hypothesis, tests, deviations), gates.seed)
+
+
+def _effects(judged: _Judged) -> list[JSON]:
+    """Effects that are claimed, the first to lead first."""
+    lead = judged.outcome.lead if judged.outcome else None
+    if judged.outcome is None or lead is None or not judged.found:
+        return []
+    return [
+        {
+            "effect": name,
+            "probability": judged.outcome.probability(name),
+            "parameters": lead.hypothesis.parameters(name),
+        }
+        for name in lead.names
+    ]
+
+
+def _candidates(judged: _Judged) -> list[JSON]:
+    claimed = {entry["effect"] for entry in _effects(judged)}
+    entries = tried(judged.outcome) if judged.outcome else []
+    return [entry for entry in entries if entry["effect"] not in claimed]
+
+
+def _next(judged: _Judged) -> str | None:
+    if judged.outcome and judged.tests and judged.status in ("undetermined", "insufficient"):
+        return advice(judged.tests, judged.outcome)
+    return beside(judged.rows)
+
+
+def _story(task: Labelled, judged: _Judged, verdict: JSON, gates: Gates) -> JSON:
+    outcome = judged.outcome
+    return {
         "unit": "1",
         "notes": list(task.notes),
         "noise": {
-            "floor": floor,
+            "floor": verdict["noise_floor"],
             "budget": gates.model_form_budget,
-            "words": _noise_words(len(rows), p_before, p_after),
+            "words": _noise_words(judged),
         },
-        "candidates": [],
+        "candidates": _told(judged),
         "path": [],
         "signature": [],
-        "cannot_be_seen": [],
+        "cannot_be_seen": [
+            {"effect": name, "why": why} for name, why in (outcome.not_visible if outcome else {}).items()
+        ],
+        "experiments": _experiments(judged),
         "blocks": [],
         "words": in_words(verdict),
     }
-    return rows, verdict, story
 
 
-def _status(tests: int, contradicted: bool, explained: bool) -> str:
-    if tests < LEAST_TESTS:
-        return "insufficient"
-    if contradicted:
-        return "unexplained"
-    return "explained" if explained else "clean"
+def _told(judged: _Judged) -> list[JSON]:
+    """Every hypothesis with what became of it."""
+    if judged.outcome is None:
+        return []
+    claimed = {entry["effect"] for entry in _effects(judged)}
+    entries = []
+    for one, entry in zip(judged.outcome.weighed[1:], tried(judged.outcome), strict=True):
+        rival = bool(set(one.names) & set(judged.outcome.rivals))
+        outcome = "added" if set(one.names) == claimed else ("rival" if rival else "rejected")
+        found = {name: one.hypothesis.parameters(name) for name in one.names}
+        parameters = found[one.names[0]] if len(found) == 1 else found
+        weighed = {"weight": entry["probability"], "verdict": outcome, "parameters": parameters}
+        entries.append({key: value for key, value in entry.items() if key != "probability"} | weighed)
+    return entries
 
 
-def _noise_words(tests: int, before: float, after: float) -> str:
-    return (
-        f"{tests} held-out tests; labels drawn from the predicted probabilities would be as unlikely as "
-        f"those measured with probability {before:.2g} for the base model and {after:.2g} with the "
-        "coefficients refitted with the effects found in the cutting force."
+def _experiments(judged: _Judged) -> list[JSON]:
+    names = (
+        [*judged.outcome.lead.names[-1:], *judged.outcome.rivals]
+        if judged.outcome and judged.outcome.lead
+        else []
     )
+    return [
+        {
+            "pair": names[:2],
+            "proposal": test.words,
+            "repeats": 1,
+            "runs": 1,
+            "probability": test.leading,
+            "probability_once": test.leading,
+        }
+        for test in judged.tests[:MOST_PROPOSALS]
+    ]
 
 
-def _next_test(rows: pd.DataFrame) -> str:
-    """Return what to test next: where the prediction says least."""
-    if rows.empty:
-        return (
-            "tests with a stable or unstable label, two depths at each of three speeds, half of them held out"
-        )
-    closest = rows.iloc[int(np.argmin(np.abs(rows["after"].to_numpy() - 0.5)))]
-    return (
-        f"a test beside run {closest['run']}, where the prediction is least sure "
-        f"(P unstable = {closest['after']:.2f})"
+def _noise_words(judged: _Judged) -> str:
+    before, after, _ = judged.surprises
+    words = (
+        f"{len(judged.rows)} held-out tests; labels drawn from the predicted probabilities would be as "
+        f"unlikely as those measured with probability {before:.2g} for the base model and {after:.2g} with "
+        "what was found."
+    )
+    if judged.outcome is None:
+        return words + " " + FEW.format(LEAST_TESTS, LEAST_SPEEDS) + "."
+    tests = judged.outcome.evidence.tests
+    return words + (
+        f" Effects of the boundary are weighed by {len(tests.depth)} other tests at {len(tests.speeds)} "
+        f"speeds; with probability {judged.outcome.weighed[0].probability:.2g} nothing is missing."
     )

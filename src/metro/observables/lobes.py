@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.observables import chatter_runs, lobe_methods, lobe_positions, printed_modes, stability
+from metro.observables.lobe_cases import Case, Change, boundaries, cases_of
 from metro.observables.lobe_positions import Tip
 from metro.observables.modal_test import Read, observe_modes
 from metro.observables.problem import Refusal
@@ -46,6 +47,11 @@ class LabelProblem:
     rpm, depth : (n,) rev/min and m.
     probability_unstable : (n,) of the base model.
     notes : what was assumed or left out.
+    cases : the models that predict the tests at places whose modes were measured.
+    point : (n,) of each test among the speeds of all cases, −1 where it is in none.
+    chatter_hz : (n,) measured where the test chattered and its record tells, else NaN.
+    model_sd : standard deviation of the logarithm of the depth for what the models leave out.
+    label_error : probability that a label is wrong whatever the depth.
     """
 
     observable: str
@@ -57,6 +63,39 @@ class LabelProblem:
     depth: Array
     probability_unstable: Array
     notes: tuple[str, ...]
+    cases: tuple[Case, ...] = ()
+    point: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    chatter_hz: Array = field(default_factory=lambda: np.zeros(0))
+    model_sd: float = stability.MODEL_SD
+    label_error: float = stability.LABEL_ERROR
+
+    @property
+    def point_rpm(self) -> Array:
+        """(p,) speed of each point, rev/min."""
+        speeds: Array = np.concatenate([np.zeros(0), *(case.rpm for case in self.cases)])
+        return speeds
+
+    def boundaries(self, change: Change) -> tuple[Array, Array]:
+        """Log depth (p,) and chatter frequency (p,), Hz, of the boundary once the models are changed."""
+        return boundaries(self.cases, change)
+
+    def case_at(self, position: str | None = None) -> Case | None:
+        """Return the case with most of the tests, of all or of those at a position."""
+        owner = np.repeat(np.arange(len(self.cases)), [len(case.rpm) for case in self.cases])
+        tests = np.bincount(owner[self.point[self.point >= 0]], minlength=len(self.cases))
+        there = [i for i, case in enumerate(self.cases) if position in (None, case.position)]
+        return self.cases[max(there, key=lambda i: int(tests[i]))] if there else None
+
+    def boundary_at(self, change: Change, rpm: Array) -> Array:
+        """Log depth (k,) of the boundary at speeds (k,), rev/min, in the case with most of the tests."""
+        case = self.case_at()
+        assert case is not None
+        return boundaries([case.at(rpm)], change)[0]
+
+    def deviations(self, draws: int, seed: int) -> Array:
+        """(draws, p) deviations of the log depth by what modes and coefficients are uncertain of."""
+        every: Array = np.concatenate([case.deviations(draws, seed) for case in self.cases], axis=1)
+        return every
 
 
 def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
@@ -142,6 +181,11 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
     if rows.empty:
         return Refusal("no run says whether it was stable, by its record or in runs.csv")
     table = batch.runs.loc[rows["run"]]
+    found, tips = stability.cutting(batch, identified), lobe_positions.tips(observed["modes"], [])
+    position = dict(zip(rows["run"], rows["position"].astype(str), strict=True))
+    if isinstance(found, Refusal):
+        return found
+    cases, point = cases_of(table, position, tips, found)
     return LabelProblem(
         OBSERVABLE,
         tuple(rows["run"]),
@@ -152,7 +196,17 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
         rows["depth_mm"].to_numpy(float) * MM,
         rows["probability_unstable"].to_numpy(float),
         tuple(said["reason"][said["kind"] == "note"]),
+        cases,
+        point,
+        _chatter_hz(observed, rows),
     )
+
+
+def _chatter_hz(observed: Mapping[str, pd.DataFrame], rows: pd.DataFrame) -> Array:
+    """Return the frequency (n,), Hz, at which the tests chattered, as their records say; NaN where none."""
+    known = observed["chatter_runs"].set_index("run")["chatter_hz"].astype(float)
+    measured = known.reindex(rows["run"]).where((rows["unstable"] > 0).to_numpy())
+    return np.asarray(measured.to_numpy(float))
 
 
 def comparison(problem: LabelProblem) -> pd.DataFrame:
@@ -172,6 +226,23 @@ def comparison(problem: LabelProblem) -> pd.DataFrame:
         },
         index=range(int(held.sum())),
     )
+
+
+def redrawn(problem: LabelProblem, diagram: pd.DataFrame, change: Change) -> pd.DataFrame:
+    """Return the table ``lobes`` with the boundaries after a change of the models, bands in proportion."""
+    parts = []
+    for position, rows in diagram.groupby("position", sort=False):
+        case = problem.case_at(str(position))
+        if case is None:
+            parts.append(rows)
+            continue
+        here = case.at(rows["rpm"].to_numpy(float))
+        before, _ = boundaries([here], lambda model: model)
+        after, chatter = boundaries([here], change)
+        depths = [name for name in rows.columns if str(name).startswith(("depth", "error"))]
+        scaled = rows[depths].mul(np.exp(after - before), axis=0)
+        parts.append(rows.assign(**scaled, chatter_hz=chatter)[np.isfinite(after)])
+    return pd.concat(parts, ignore_index=True) if parts else diagram
 
 
 def report(

@@ -82,7 +82,8 @@ def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
             task = task_of(module, state.batch, state.observed, state.identified)
             outcome = _close(state, task)
             fitted = identified_fit(task, outcome.final) if outcome and isinstance(task, Problem) else None
-            if state.found and (fitted or (module is lobes and "modes" in state.observed)):
+            mended = state.found or (module is lobes and state.verdicts.get("lobes", {}).get("effects"))
+            if mended and (fitted or (module is lobes and "modes" in state.observed)):
                 blocks = module.report(state.batch, state.observed, state.identified, task, fitted)
                 state.identified = merged(state.identified, blocks)
     _write(state, reports, code)
@@ -97,7 +98,11 @@ def _close(state: _Closing, task: Task) -> Outcome | None:
     if isinstance(task, LabelProblem):
         before = state.prediction[state.prediction["observable"] == task.observable].reset_index(drop=True)
         after = lobes.comparison(task)["before"]
-        rows, verdict, story = judge_labels(task, before.assign(after=after), state.found, state.gates)
+        rows, verdict, story, change = judge_labels(
+            task, before.assign(after=after), state.found, library(task.observable), state.gates
+        )
+        if change:
+            state.observed["lobes"] = lobes.redrawn(task, state.observed["lobes"], change)
     elif isinstance(task, Problem) and task.role("identify"):
         before = state.prediction[state.prediction["observable"] == task.observable].reset_index(drop=True)
         outcome = search(task, library(task.observable), state.gates)

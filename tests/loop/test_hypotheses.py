@@ -1,0 +1,53 @@
+"""Parameters drawn from their prior and weighed: against integrals over a fine grid."""
+
+import numpy as np
+import pytest
+from label_toy import GATES, SHIFT, SLOPE, Line, problem
+from scipy.special import logsumexp
+
+from metro.loop.hypotheses import Evidence, hypothesis, quantile
+from metro.loop.label_evidence import log_likelihood
+from metro.loop.labelled import tests_of as told_by
+
+TASK = problem(Line(slope=0.8, shift=-0.4), 5)
+TESTS, _ = told_by(TASK, "identify")
+EVIDENCE = Evidence(TASK.boundaries, TESTS, np.zeros((1, len(TASK.point_rpm))), GATES.seed)
+
+
+def grid(effects, count):
+    """Points of the prior on a fine grid, and their log-likelihood."""
+    share = (np.arange(count) + 0.5) / count
+    axes = [[quantile(effect.parameters[0], u) for u in share] for effect in effects]
+    theta = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
+    models = [Line(**{e.name: v for e, v in zip(effects, row, strict=True)}) for row in theta]
+    depth = np.stack([model.boundary(TASK.point_rpm) for model in models])
+    found = log_likelihood(TESTS, depth, np.full_like(depth, 300.0), EVIDENCE.deviations)
+    return theta, found.sum(axis=2)[:, 0]
+
+
+@pytest.mark.parametrize("effects", [(SLOPE,), (SHIFT, SLOPE)])
+def test_evidence_and_posterior_are_those_of_a_fine_grid(effects):
+    theta, log = grid(effects, 2000 if len(effects) == 1 else 150)
+    known = hypothesis(effects[:1], EVIDENCE) if len(effects) > 1 else None
+    found = hypothesis(effects, EVIDENCE, known)
+    assert found.log_evidence == pytest.approx(logsumexp(log) - np.log(len(log)), abs=0.35)
+    weights = np.exp(log - logsumexp(log))
+    for i, effect in enumerate(effects):
+        mean = weights @ theta[:, i]
+        sd = np.sqrt(weights @ (theta[:, i] - mean) ** 2)
+        told = found.parameters(effect.name)["size"]
+        assert told["value"] == pytest.approx(mean, abs=0.6 * sd)
+        assert told["ci95"][1] - told["ci95"][0] == pytest.approx(3.92 * sd, rel=0.4)
+
+
+def test_more_points_are_drawn_where_few_are_left():
+    assert len(hypothesis((SLOPE,), EVIDENCE).theta) > 32
+    few = problem(Line(), 1, rpm=np.array([4000.0]))
+    vague = Evidence(few.boundaries, told_by(few, "validate")[0], np.zeros((1, 1)), 1)
+    assert len(hypothesis((SLOPE,), vague).theta) == 32
+
+
+def test_nothing_has_one_prediction():
+    nothing = hypothesis((), EVIDENCE)
+    assert nothing.theta.shape == (1, 0)
+    np.testing.assert_allclose(nothing.depth[0], Line().boundary(TASK.point_rpm))

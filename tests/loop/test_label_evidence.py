@@ -1,0 +1,78 @@
+"""What labels say of the boundary: closed forms and brute force."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from metro.loop import label_evidence as room
+from metro.loop.label_evidence import Labels, left_out, log_evidence, log_likelihood, posterior
+
+RPM = np.array([2000.0, 3000.0])
+NONE = np.full(3, np.nan)
+
+
+def labelled(point, depth, unstable, chatter_hz=None, error=1e-9):
+    depth = np.asarray(depth)
+    chatter = np.full(len(depth), np.nan) if chatter_hz is None else np.asarray(chatter_hz)
+    return Labels(np.asarray(point), depth, np.asarray(unstable, float), chatter, RPM, 0.15, error)
+
+
+def at(tests, boundary, chatter=300.0):
+    """Log-likelihood (j,) of one boundary, the same at both points."""
+    depth = np.full((1, 2), boundary)
+    return log_likelihood(tests, depth, np.full((1, 2), chatter), np.zeros((1, 2)))[0, 0]
+
+
+@pytest.mark.parametrize("unstable", [0.0, 1.0])
+def test_one_label_says_what_a_normal_error_of_its_own_variance_says(unstable):
+    tests = labelled([0], [0.1], [unstable])
+    sign = 1.0 if unstable else -1.0
+    sd = 0.15 * np.sqrt(room.OF_SPEED + room.OF_TEST)
+    for boundary in (-0.1, 0.1, 0.3):
+        expected = norm.logcdf(sign * (0.1 - boundary) / sd)
+        assert at(tests, boundary)[0] == pytest.approx(expected, abs=0.02)
+
+
+def test_labels_of_one_speed_share_its_error_as_brute_force_says():
+    tests = labelled([0, 0, 0], [-0.1, 0.0, 0.1], [1, 1, 1])
+    error = np.linspace(-0.8, 0.8, 100001)
+    each = norm.cdf((np.array([[-0.1], [0.0], [0.1]]) - 0.2 - error) / (0.15 * np.sqrt(room.OF_TEST)))
+    density = norm.pdf(error, scale=0.15 * np.sqrt(room.OF_SPEED))
+    expected = np.log(np.trapezoid(each.prod(axis=0) * density, error))
+    assert at(tests, 0.2)[0] == pytest.approx(expected, abs=0.01)
+    alone = sum(at(labelled([0], [depth], [1]), 0.2)[0] for depth in (-0.1, 0.0, 0.1))
+    assert at(tests, 0.2)[0] > alone + 1.0
+
+
+def test_a_wrong_label_costs_no_more_than_its_probability():
+    tests = labelled([0], [3.0], [0.0], error=0.01)
+    assert at(tests, 0.0)[0] == pytest.approx(np.log(0.01), abs=1e-3)
+
+
+def test_a_chatter_frequency_speaks_for_the_boundary_that_predicts_it():
+    heard = labelled([1], [0.5], [1.0], [300.0])
+    right, near, wrong, none = (at(heard, 0.0, hz)[0] for hz in (300.0, 315.0, 600.0, np.nan))
+    assert right > near > wrong == none
+    stray = room.STRAY / room.STRAY_WIDTH
+    peak = (1 - room.STRAY) / (np.sqrt(2 * np.pi) * room.FREQUENCY_SD) + stray
+    assert right - wrong == pytest.approx(np.log(peak / stray), abs=1e-9)
+
+
+def test_evidence_is_the_mean_likelihood_under_the_prior():
+    likelihood = np.log(np.array([[[0.2, 0.5]], [[0.6, 0.1]]]))  # two boundaries, one deviation, two speeds
+    prior = np.array([0.75, 0.25])
+    assert log_evidence(likelihood, prior) == pytest.approx(np.log(0.75 * 0.1 + 0.25 * 0.06))
+    np.testing.assert_allclose(posterior(likelihood, prior), np.array([0.075, 0.015]) / 0.09)
+    first = (0.75 * 0.1 + 0.25 * 0.06) / (0.75 * 0.5 + 0.25 * 0.1)
+    assert left_out(likelihood, prior)[0] == pytest.approx(np.log(first))
+
+
+def test_speeds_left_out_are_whole():
+    tests = labelled([0, 1, 1], [0.0, 0.1, 0.2], [0, 1, 1])
+    assert list(tests.speeds) == [2000.0, 3000.0]
+    assert list(tests.take(tests.point == 1).speeds) == [3000.0]
+    same = replace(tests, rpm=np.array([2500.0, 2500.0]))  # two cuts at one speed
+    assert at(same, 0.0).shape == (1,)
+    assert at(same, 0.0).sum() == pytest.approx(at(tests, 0.0).sum())
