@@ -65,6 +65,13 @@ def draw(batches: int, seed: int, known: Sequence[str], unknown: Sequence[str]) 
     ]
 
 
+def sides() -> tuple[list[str], list[str]]:
+    """Name what the simulator can hide: what the library has; what it lacks or knows only by likeness."""
+    inside = {effect.name for effect in library("force") if not effect.resembled}
+    known, unknown = ([name for name in EFFECTS if (name in inside) is asked] for asked in (True, False))
+    return known, unknown
+
+
 def make(out: Layout, batches: int, seed: int, style: str, jobs: int) -> str:
     """Make the batches of a suite and seal what they hide; return the seal.
 
@@ -75,9 +82,7 @@ def make(out: Layout, batches: int, seed: int, style: str, jobs: int) -> str:
     """
     if out.batches:
         raise FileExistsError(f"{out.raw} holds batches already: give another folder")
-    inside = {effect.name for effect in library("force")}
-    known, unknown = ([name for name in EFFECTS if (name in inside) is asked] for asked in (True, False))
-    drawn = draw(batches, seed, known, unknown)
+    drawn = draw(batches, seed, *sides())
     out.raw.mkdir(parents=True, exist_ok=True)
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:

@@ -5,7 +5,7 @@ from collections import Counter
 import pytest
 
 from proof.layout import Layout
-from proof.suite import ABSORBED, SHARES, draw, make
+from proof.suite import ABSORBED, SHARES, draw, make, sides
 
 KNOWN = ["tool_runout", "tool_wear", "pitch_error", "dynamometer_rotation"]
 UNKNOWN = ["chipped_tooth", "sensor_lag"]
@@ -36,6 +36,13 @@ def test_neither_name_nor_order_nor_seed_tells_what_is_hidden(drawn):
     other = draw(200, 6, KNOWN, UNKNOWN)
     same = sum(a.kind == b.kind for a, b in zip(drawn, other, strict=True))
     assert same < 100  # by chance 0.27 of them
+
+
+def test_what_the_library_only_knows_the_likeness_of_is_outside_of_it():
+    known, unknown = sides()
+    assert "tool_runout" in known
+    assert {"chipped_tooth", "sensor_lag"} <= set(unknown)
+    assert not set(known) & set(unknown)
 
 
 def test_batches_that_are_there_are_not_made_again(tmp_path):
