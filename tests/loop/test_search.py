@@ -14,7 +14,7 @@ from metro.loop.fit import fit
 from metro.loop.noise import first_noise
 from metro.loop.search import search
 from metro.loop.signature import in_words, q_values
-from metro.loop.verdict import RESEMBLED, comparison, held_out, judge
+from metro.loop.verdict import BEATEN, RESEMBLED, comparison, held_out, judge, why_not
 
 
 def judged(task, library, gates=GATES):
@@ -78,6 +78,14 @@ def test_two_effects_that_are_the_same_leave_the_cause_undetermined():
     assert verdict["status"] == "undetermined"
     assert {*verdict["indistinguishable"][0]} == {"bend", "twin"}
     assert "an experiment for twin" in verdict["next_experiment"]
+    (rival,) = verdict["candidates"]
+    assert rival["why_not"] == f"these runs do not tell it from {outcome.names[0]}"
+
+
+def test_what_passes_every_gate_and_is_not_added_says_why():
+    outcome, _ = judged(problem(1, truth=Wave(bend=0.2)), (BEND,))
+    lost = replace(outcome, final=outcome.base)
+    assert why_not(lost, outcome.trials[0]) == BEATEN
 
 
 def test_a_structure_outside_the_library_is_left_unexplained():

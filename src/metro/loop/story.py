@@ -7,7 +7,7 @@ import numpy as np
 from metro.loop import signature as rest
 from metro.loop.advice import ranked
 from metro.loop.search import Gates, Outcome, Trial
-from metro.loop.verdict import comparison, error, finite, held_out, held_out_rms, parameters
+from metro.loop.verdict import comparison, error, finite, held_out, held_out_rms, parameters, why_not
 from metro.observables.problem import Block, Problem
 from metro.units import JSON, Array
 
@@ -78,7 +78,7 @@ def _tried(problem: Problem, trial: Trial, outcome: Outcome) -> JSON:
         "size": trial.evidence.size,
         "weight": trial.weight,
         "verdict": verdict,
-        "why_not": trial.why_not,
+        "why_not": "" if verdict == "added" else why_not(outcome, trial),
         "parameters": parameters(trial.fit, trial.effect.name),
     }
 

@@ -24,6 +24,7 @@ COMPARISON = (
 )
 DRAWS = 2000
 RESEMBLED = "no effect of the library: it is only said what the rest is like"
+BEATEN = "passed every gate, but what was added explains the runs better"
 UNTESTED = "not tested: there is no run to judge it by that the fit has not seen"
 
 
@@ -110,7 +111,7 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         "after": after,
         "effects": [_effect(outcome, name) for name in found],
         "candidates": [
-            _candidate(problem, trial, _why_not(outcome, trial))
+            _candidate(problem, trial, why_not(outcome, trial))
             for trial in outcome.trials
             if trial.effect.name not in found
         ],
@@ -120,11 +121,14 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
     }
 
 
-def _why_not(outcome: Outcome, trial: Trial) -> str:
+def why_not(outcome: Outcome, trial: Trial) -> str:
     """Say why an effect that was tried is not claimed."""
     if trial.effect.name in outcome.names:
         return UNTESTED
-    return trial.why_not or (RESEMBLED if trial.effect.resembled else "")
+    found = [rival.found for rival in outcome.rivals if rival.other == trial.effect.name]
+    if found:
+        return f"these runs do not tell it from {' and '.join(found).replace('_', ' ')}"
+    return trial.why_not or (RESEMBLED if trial.effect.resembled else BEATEN)
 
 
 def _status(outcome: Outcome, remaining: bool, enough: bool) -> str:
