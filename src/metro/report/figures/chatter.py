@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from metro.report import style
-from metro.report.figures.lobes import draw_boundary, entries, panels_of, top_of
+from metro.report.figures.lobes import drawn_with_tests, entries, panels_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,11 +36,8 @@ def tests_chart(boundary: pd.DataFrame, tests: pd.DataFrame) -> Figure:
     with style.style():
         figure, panels = panels_of(boundary)
         for position, axes in panels.items():
-            line = boundary[boundary["position"] == position].sort_values("rpm")
-            here = tests[tests["position"].astype(str) == str(position)]
-            draw_boundary(axes, line)
+            _, here = drawn_with_tests(axes, position, boundary, tests)
             _marks(axes, here)
-            axes.set_ylim(0, 1.15 * top_of(line["depth_mm"], here))
         handles, labels = max(panels.values(), key=entries).get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=4)
     return figure

@@ -40,15 +40,23 @@ def lobes_chart(boundary: pd.DataFrame, tests: pd.DataFrame, islands: pd.DataFra
     with style.style():
         figure, panels = panels_of(boundary)
         for position, axes in panels.items():
-            line = boundary[boundary["position"] == position].sort_values("rpm")
-            here = tests[tests["position"].astype(str) == str(position)]
-            draw_boundary(axes, line)
+            line, here = drawn_with_tests(axes, position, boundary, tests)
             if islands is not None:
                 _islands(axes, islands[islands["position"] == position], line)
             _cuts(axes, here)
-            axes.set_ylim(0, 1.15 * top_of(line["depth_mm"], here))
         style.legend_above(figure, max(panels.values(), key=entries))
     return figure
+
+
+def drawn_with_tests(
+    axes: Axes, position: object, boundary: pd.DataFrame, tests: pd.DataFrame
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Draw the boundary of a position, high enough for its tests; return it by speed, and these tests."""
+    line = boundary[boundary["position"] == position].sort_values("rpm")
+    here = tests[tests["position"].astype(str) == str(position)]
+    draw_boundary(axes, line)
+    axes.set_ylim(0, 1.15 * top_of(line["depth_mm"], here))
+    return line, here
 
 
 def panels_of(table: pd.DataFrame) -> tuple[Figure, dict[Any, Axes]]:
