@@ -107,11 +107,16 @@ def test_order_averages_return_the_injected_coefficients_within_their_errors():
     assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.1)
 
 
-def test_time_blocks_see_a_drift_that_is_not_counted_as_noise():
+@pytest.mark.parametrize(
+    "drift",
+    [lambda time: 5.0 + 2.0 * np.round(time - 0.5), lambda time: 4.0 + 2.0 * time],
+    ids=["steps", "ramp"],
+)
+def test_time_blocks_see_a_drift_that_is_not_counted_as_noise(drift):
     rng = np.random.default_rng(3)
     time = np.arange(20000) / 5000.0
     angle = 2 * math.pi * 50.0 * time
-    signal = (4.0 + 2.0 * time)[:, None] + 0.5 * rng.normal(size=(20000, 1))
+    signal = drift(time)[:, None] + 0.5 * rng.normal(size=(20000, 1))
     averages = order_averages(time, angle, signal, 3, 4)
     assert [average.middle for average in averages] == pytest.approx([0.5, 1.5, 2.5, 3.5], abs=1e-3)
     assert [average.value[0, 0] for average in averages] == pytest.approx([5.0, 7.0, 9.0, 11.0], abs=0.05)

@@ -173,8 +173,9 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
     """Average a record over its revolutions, in time blocks, with the error of each coefficient.
 
     Each block is cut into segments of a few revolutions; how far each is from the middle of its neighbours
-    gives the error of their mean: what changes slowly is no error. It is drawn towards its neighbouring
-    orders, since that of few segments is itself uncertain.
+    gives the error of their mean: what changes slowly, or from block to block, is no error. Blocks of fewer
+    than three segments are taken as one. It is drawn towards its neighbouring orders, since that of few
+    segments is itself uncertain.
 
     Parameters
     ----------
@@ -197,9 +198,12 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
         means.append(values.mean(axis=0))
         counts.append(len(pieces))
         middles.append(float(time[start:end].mean()))
-        segments.extend(values)
-    order = min(2, len(segments) - 1)  # of the differences
-    differences = np.diff(segments, order, axis=0) ** 2 / math.comb(2 * order, order)
+        segments.append(values)
+    if min(counts) < 3:
+        segments = [np.concatenate(segments)]
+    order = min(2, len(segments[0]) - 1)  # of the differences
+    differences = np.concatenate([np.diff(part, order, axis=0) for part in segments]) ** 2
+    differences /= math.comb(2 * order, order)
     freedom = WORTH[order] * len(differences)
     variance = _shrunk(differences.mean(axis=0) if freedom else np.zeros_like(means[0]), freedom)
     return [
