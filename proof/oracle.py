@@ -29,11 +29,11 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
 
     Returns
     -------
-    ``before`` and ``after`` (rms error on the held-out runs without and with the effects), ``floor`` (rms of
-    the noise there) and ``sizes``: of each effect, how much the prediction changes when it is left out and
-    all else is refitted, over the floor. Where the library lacks one of them: ``after`` is None, the floor
-    that of the declared noise (the fitted one has swallowed some of the effect), and the size what of the
-    error is not noise.
+    ``before`` and ``after`` (rms error on the held-out runs without and with the effects), ``floor`` (rms
+    there of the noise, and of what no run tells of the base model) and ``sizes``: of each effect, how much
+    the prediction changes when it is left out and all else is refitted, over the noise alone. Where the
+    library lacks one of them: ``after`` is None, the floor that of the declared noise (the fitted one has
+    swallowed some of the effect), and the size what of the error is not noise.
     """
     blocks = task.role("identify", "calibrate")
     prior = first_noise(budget, task.scatter, blocks)
@@ -52,17 +52,22 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
 
     full = fitted(told)
     rows = _rows(task, base, full)
-    floor = _rms(rows["sigma"])
+    noise = _rms(_rows(_all_told(task), base, full)["sigma"])
     sizes = {}
     for effect in told:
         without = _rows(task, fitted([other for other in told if other is not effect]), full)
-        sizes[effect.name] = _rms(without["after"] - without["before"]) / floor
+        sizes[effect.name] = _rms(without["after"] - without["before"]) / noise
     return {
         "before": _rms(rows["measured"] - rows["before"]),
         "after": _rms(rows["measured"] - rows["after"]),
-        "floor": floor,
+        "floor": _rms(rows["sigma"]),
         "sizes": sizes,
     }
+
+
+def _all_told(task: Problem) -> Problem:
+    """Take the parameters of the base model as told by the runs: what is left is noise."""
+    return replace(task, blocks=tuple(replace(block, untold=None) for block in task.blocks))
 
 
 def _told(able: Sequence[Effect], name: str, values: JSON) -> Effect | None:

@@ -15,16 +15,16 @@ LEAST_RUNS = 2  # to identify on
 WORTH = 0.5  # probability of deciding below which a run is not worth naming
 
 
-def next_experiment(problem: Problem, outcome: Outcome) -> str | None:
+def next_experiment(problem: Problem, outcome: Outcome, left: str, told_by: Fit) -> str | None:
     """Say what to measure next; None where nothing is open.
 
-    An undecided cause comes first, then what is left unexplained, then what these runs cannot show.
+    An undecided cause comes first, then what is ``left`` unexplained, ``told_by`` the runs of a fit, then
+    what these runs cannot show.
     """
     if outcome.rivals:
         return _to_decide(problem, outcome)
-    left = left_over(outcome)
     if left:
-        return _to_describe(outcome, left)
+        return _to_describe(told_by, left)
     if outcome.not_visible:
         return _to_show(problem, outcome)
     return None
@@ -50,7 +50,7 @@ def enough_runs(problem: Problem) -> bool:
 def left_over(outcome: Outcome) -> str:
     """Describe the significant rest, and what it resembles; empty where there is none."""
     parts = [_resembled(outcome.likeness)] if outcome.likeness else []
-    parts.append(rest.in_words(list(outcome.lines)))
+    parts.append(rest.in_words(outcome.lines))
     if outcome.step:
         step = outcome.step
         parts.append(f"a step of {step.parameter} by {100 * step.relative:+.1f} % after run {step.after}")
@@ -126,9 +126,8 @@ def _undecided(problem: Problem, outcome: Outcome, rivals: Sequence[Rival]) -> s
     return tried + "; or ".join(f"for {_words(name)}: {text}" for name, text in texts.items())
 
 
-def _to_describe(outcome: Outcome, left: str) -> str:
+def _to_describe(fitted: Fit, left: str) -> str:
     """Name the condition whose rest is largest against the noise."""
-    fitted = outcome.final
     chi2: dict[str, float] = {}
     elements: dict[str, int] = {}
     for block in fitted.blocks:

@@ -135,9 +135,11 @@ def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
     model = candidate.model(fitted.theta)
     state = State(fitted.theta, fitted.beta, {})
     for block in blocks:
-        costs = _costs(model, block, noise, state.beta, starts := model.nuisance_starts(block))
-        near = [State(state.theta, state.beta, {block.run: starts[i]}) for i in np.argsort(costs)[:FOLLOWED]]
-        reached = [descend(candidate, [block], noise, each, own=True) for each in near]
+        starts = model.nuisance_starts(block)
+        states = [State(state.theta, state.beta, {block.run: start}) for start in starts]
+        costs = _costs(model, block, noise, state.beta, starts).tolist()
+        near = _distinct(sorted(zip(costs, states, strict=True), key=lambda one: one[0]), ALIKE * min(costs))
+        reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
         state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
     return _finished(candidate, blocks, noise, state, fitted.covariance)
 

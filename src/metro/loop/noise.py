@@ -72,9 +72,10 @@ def first_noise(budget: float, scatter: Array, blocks: Sequence[Block]) -> Noise
 
 @lru_cache(maxsize=1024)
 def _axes(block: Block) -> tuple[tuple[str, ...], np.ndarray, Array]:
-    """Names of a block's axes, the number of each element's axis, and the rms of its axis."""
+    """Names of a block's axes, the number of each element's axis, and the rms of its axis's signal."""
     names, number = np.unique(block.axis.astype(str), return_inverse=True)
-    power = np.bincount(number, block.measured**2) / np.bincount(number)
+    signal = block.measured if block.scale is None else block.scale
+    power = np.bincount(number, signal**2) / np.bincount(number)
     return tuple(names.tolist()), number, np.sqrt(power)[number]
 
 
@@ -109,7 +110,8 @@ def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
     zeros = block.zeros * (block.zero_sd * noise.zero_factor)
     if block.role == "calibrate":
         return zeros
-    return np.hstack([design * (beta * noise.scatter), zeros])
+    untold = zeros[:, :0] if block.untold is None else block.untold
+    return np.hstack([design * (beta * noise.scatter), zeros, untold])
 
 
 def whitener(variance: Array, directions: Array) -> Whitener:
@@ -141,7 +143,7 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
     Parameters
     ----------
     parts : for each run: block, residual (n,), and directions (n, k) under ``noise``. The first p directions
-        of a run are those of the base parameters, the rest its zeros.
+        of a run are those of the base parameters, then come its zeros.
     """
     p = len(noise.scatter)
     amplitudes = {"scatter": [1.0] * PRIOR_RUNS, "zero": [1.0] * PRIOR_RUNS}
@@ -155,9 +157,8 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         found, uncertain = amplitude(directions, residual, variance)
         expected = found**2 + np.diag(uncertain)
         amplitudes["scatter"] += [float(size**2 * expected[:p].mean())] if p else []
-        amplitudes["zero"] += (
-            [float(noise.zero_factor**2 * expected[p:].mean())] if block.zeros.shape[1] else []
-        )
+        of_zeros = expected[p : p + block.zeros.shape[1]]
+        amplitudes["zero"] += [float(noise.zero_factor**2 * of_zeros.mean())] if len(of_zeros) else []
         # The misfit as it is, not as it weighs: else it takes what the shared directions explain.
         found, uncertain = amplitude(directions, residual, diagonal(block, noise, correlation=1.0))
         left = residual - directions @ found

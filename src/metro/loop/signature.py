@@ -139,7 +139,7 @@ def q_values(p_values: Sequence[float]) -> Array:
     return q
 
 
-def in_words(lines: list[Line], most: int = 4) -> str:
+def in_words(lines: Sequence[Line], most: int = 4) -> str:
     """Describe the significant places, largest first."""
     found = sorted((line for line in lines if line.significant), key=lambda line: -line.excess)
     parts = [

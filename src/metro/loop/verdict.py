@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from metro.loop.advice import enough_runs, left_over, more_runs, next_experiment
 from metro.loop.fit import Fit, score
 from metro.loop.noise import block_sigma
 from metro.loop.search import Gates, Outcome, Trial
-from metro.loop.signature import share_left
+from metro.loop.signature import Line, in_words, share_left, signature
 from metro.observables.problem import BaseFit, Problem
 from metro.observables.quantity import quantity
 from metro.units import JSON, Array
@@ -23,6 +24,7 @@ COMPARISON = (
     *("measured", "before", "after", "sigma", "unit"),
 )
 DRAWS = 2000
+WORSE = 2.0  # times the least rest that counts: on unseen runs, what the parameters are off adds to it
 RESEMBLED = "no effect of the library: it is only said what the rest is like"
 BEATEN = "passed every gate, but what was added explains the runs better"
 UNTESTED = "not tested: there is no run to judge it by that the fit has not seen"
@@ -97,8 +99,12 @@ def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
 def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) -> JSON:
     """Return the observable's entry of verdict.json."""
     floor = float(np.sqrt((rows["sigma"] ** 2).mean())) if len(rows) else math.nan
-    remaining = left_over(outcome)
+    remaining, told_by, lines = left_over(outcome), outcome.final, outcome.lines
     enough = enough_runs(problem)
+    if enough and not remaining:
+        told_by = score(outcome.final, problem.role("validate"))
+        lines = _unseen_rest(problem, told_by, gates)
+        remaining = f"only on runs that no fit has seen: {in_words(lines)}" if lines else ""
     found = outcome.names if enough else ()  # what no held-out run has tested is not claimed
     before = error(rows, "before", gates.seed) if len(rows) else None
     after = error(rows, "after", gates.seed) if len(rows) else None
@@ -116,9 +122,17 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
             if trial.effect.name not in found
         ],
         "indistinguishable": [list(rival.pair) for rival in outcome.rivals],
-        "next_experiment": next_experiment(problem, outcome) if enough else more_runs(problem),
-        "unexplained": _unexplained(problem, outcome, rows) if remaining else None,
+        "next_experiment": (
+            next_experiment(problem, outcome, remaining, told_by) if enough else more_runs(problem)
+        ),
+        "unexplained": _unexplained(problem, outcome, rows, remaining, lines) if remaining else None,
     }
+
+
+def _unseen_rest(problem: Problem, scored: Fit, gates: Gates) -> tuple[Line, ...]:
+    """Test the rest on the held-out runs, too: a model may be right only where it was fitted."""
+    least = max(gates.materiality, 2.0 * problem.systematic, gates.model_form_budget)
+    return tuple(line for line in signature(scored, WORSE * least) if line.significant)
 
 
 def why_not(outcome: Outcome, trial: Trial) -> str:
@@ -235,11 +249,12 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _unexplained(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON:
-    """Describe the rest; its size is the share left on the identification runs, of the held-out signal."""
-    share = max(share_left(outcome.lines), abs(outcome.step.relative) if outcome.step else 0.0)
+def _unexplained(
+    problem: Problem, outcome: Outcome, rows: pd.DataFrame, words: str, lines: Sequence[Line]
+) -> JSON:
+    """Describe the rest; its size is the share left on the runs that tell of it, of the held-out signal."""
+    share = max(share_left(lines), abs(outcome.step.relative) if outcome.step else 0.0)
     over = share * float(np.sqrt((rows["measured"] ** 2).mean())) if len(rows) else None
-    words = left_over(outcome)
     if outcome.likeness and len(rows):
         words += (
             f"; with that the error would be {held_out_rms(problem, outcome.likeness):.3g} {problem.unit} rms"

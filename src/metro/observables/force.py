@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -10,6 +11,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.cutting.chip import path_difference
 from metro.cutting.cutter import Cutter
+from metro.cutting.helical import bottom_thrust
 from metro.cutting.law import EdgeLaw
 from metro.observables import cutting_force
 from metro.observables.dynamometer import Dynamometer
@@ -20,12 +22,13 @@ from metro.observables.force_orders import observe, recorded
 from metro.observables.force_proposals import feasible
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
-from metro.units import JSON, MM, UM
+from metro.units import JSON, MM, N_MM2, UM, Array
 
 __all__ = ["OBSERVABLE", "observe", "problem", "report"]
 
 OBSERVABLE = "force"
 SCATTER = 0.01
+UNTOLD_KFAC = 140.0 * N_MM2  # rms of what it may be: anything up to the 243 N/mm² that [T] table 4 found
 LEAST_FEED_RATIO = 1.1  # between axial feeds that part the shear from the edge term of the bottom edges
 
 
@@ -40,10 +43,13 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
         block_of(batch, run, by_run[run], tool, spindle.loc[run]) for run in recorded(batch) if run in by_run
     )
     helical = any(block.setting.helix is not None for block in blocks)
+    bottom = _bottom_edges(blocks)
+    if bottom == ("kfae",):
+        blocks = _at_other_feeds(blocks, tool)
     model = ForceModel(
         cutter=tool,
         law=EdgeLaw(),
-        bottom_edges=_bottom_edges(blocks),
+        bottom_edges=bottom,
         sensor=Dynamometer(axes=cutting_force.channels(batch)),
     )
     notes = [
@@ -82,6 +88,25 @@ def _bottom_edges(blocks: tuple[Block, ...]) -> tuple[str, ...]:
     return ("kfac", "kfae") if max(feeds) > LEAST_FEED_RATIO * min(feeds) else ("kfae",)
 
 
+def _at_other_feeds(blocks: tuple[Block, ...], tool: Cutter) -> tuple[Block, ...]:
+    """Allow helical runs at another axial feed than the one that was identified to have another thrust."""
+    helices = [block.setting.helix for block in blocks if block.role == "identify"]
+    told = float(np.mean([helix.axial_feed for helix in helices if helix]))
+    return tuple(
+        replace(block, untold=_thrust_untold(block, tool, told)) if block.setting.helix else block
+        for block in blocks
+    )
+
+
+def _thrust_untold(block: Block, tool: Cutter, told: float) -> Array | None:
+    """Direction (n, 1) of the thrust of an unknown K_Fac, at an axial feed other than the one ``told``."""
+    helix = block.setting.helix
+    if max(helix.axial_feed, told) <= LEAST_FEED_RATIO * min(helix.axial_feed, told):
+        return None
+    per_unit = bottom_thrust(tool, helix)[0] * (1.0 - told / helix.axial_feed)
+    return np.asarray(UNTOLD_KFAC * per_unit * block.zeros[:, 2:])
+
+
 def report(
     _batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON, task: Problem, fit: BaseFit | None
 ) -> JSON:
@@ -107,7 +132,8 @@ def report(
         )
     if model.bottom_edges == ("kfae",):
         lacking["kfac"] = (
-            "the helical runs have one axial feed: kfae holds the whole thrust of the bottom edges"
+            "the helical runs have one axial feed: kfae holds the whole thrust of the bottom edges; at other "
+            "feeds the thrust is uncertain until a second one is identified"
         )
     block |= {name: value for name, value in found.items() if not isinstance(value, Refusal)}
     block |= correlation(model, fit)

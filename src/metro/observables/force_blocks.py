@@ -61,7 +61,7 @@ def block_of(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, spindle:
         zero_sd=np.full(3, (ZERO_SHARE if spindle["air_s"] > 0.0 else UNZEROED_SHARE) * rms),
         coordinates=_coordinates(middles),
         synthesis=_synthesis(len(middles), highest),
-        scale=_scale(table),
+        scale=_scale(table, turning=path is not None),
         repeats=len(middles),
         symmetries=_tooth_shifts(tool, 1 if setting.helix is None else 2),
         labels=np.where(mean, "mean", "order " + table["order"].astype(str)).astype(str),
@@ -123,12 +123,18 @@ def _tooth_shifts(tool: Cutter, unknowns: int) -> Array:
     return shifts
 
 
-def _scale(table: pd.DataFrame) -> Array:
-    """Signal around each element: half from its own order, half spread evenly over its axis's orders."""
-    power = table["force_n"] ** 2
-    own = power.groupby([table["block"], table["axis"], table["order"]]).transform("mean")
-    axis = power.groupby([table["block"], table["axis"]]).transform("mean")
-    return np.asarray(np.sqrt(0.5 * (own + axis)))
+def _scale(table: pd.DataFrame, *, turning: bool) -> Array:
+    """Signal around each element: half from its own order, half spread evenly over its axis's orders.
+
+    x and y of a frame that is ``turning`` share one: which of them gets the force depends on the direction of
+    feed where the record happens to start.
+    """
+    power, axis = table["force_n"] ** 2, table["axis"]
+    if turning:
+        axis = axis.replace("y", "x")
+    own = power.groupby([table["block"], axis, table["order"]]).transform("mean")
+    whole = power.groupby([table["block"], axis]).transform("mean")
+    return np.asarray(np.sqrt(0.5 * (own + whole)))
 
 
 @lru_cache

@@ -45,6 +45,8 @@ class Block:
         axis.
     zeros : (n, q) directions of run-level additive error (a zero offset per axis, a registration plane).
     zero_sd : (q,) prior standard deviations of the amplitudes of ``zeros``, SI.
+    untold : (n, u) directions in which the base model may be off here since no run of the fit tells a
+        parameter that matters only here, each of one standard deviation, SI; None: none.
     scale : (n,) size of the signal around each element, whose fraction the model-form budget is; None: rms of
         its axis.
     symmetries : (k, m) shifts of the nuisance that leave the base model as it is (which tooth is the first
@@ -75,6 +77,7 @@ class Block:
     repeats: int = 1
     labels: np.ndarray | None = None
     symmetries: Array | None = None
+    untold: Array | None = None
     slow: Mapping[str, Array] = field(default_factory=dict)
 
     def to_rows(self, values: Array) -> Array:
