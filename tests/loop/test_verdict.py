@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
-from toy import BEND, BETA, GATES, POINTS, RIPPLE, SIGMA, TWIN, Wave, problem
+from toy import ANGLE, BEND, BETA, GATES, POINTS, RIPPLE, SIGMA, TWIN, Wave, problem
 
 from metro.loop.search import search
 from metro.loop.signature import Line, share_left
@@ -87,6 +87,32 @@ def test_every_status_has_an_entry_by_the_contract_and_a_sentence(status):
     assert verdict["held_out_runs"] == [block.run for block in task.role("validate")]
     assert in_words(verdict).startswith(SENTENCES[status].split("{")[0])
     json.dumps(told(task, outcome, verdict, GATES), allow_nan=False)
+
+
+def with_spike_where_unseen(task):
+    """The problem with what its library lacks in the held-out runs alone."""
+    spike = 0.3 * BETA[1] * np.cos(7 * ANGLE)
+    blocks = tuple(
+        replace(block, measured=block.measured + spike) if block.role == "validate" else block
+        for block in task.blocks
+    )
+    return replace(task, blocks=blocks)
+
+
+@pytest.mark.parametrize(("truth", "status"), [(Wave(), "unexplained"), (Wave(bend=0.2), "partly_explained")])
+def test_a_rest_on_runs_that_no_fit_has_seen_is_said_and_the_condition_named(truth, status):
+    task = problem(2, truth=truth, phased=False)
+    before = closed(task, (BEND,))[2]
+    assert before["unexplained"] is None
+    *_, verdict = closed(with_spike_where_unseen(task), (BEND,))
+    assert verdict["status"] == status
+    assert [found["effect"] for found in verdict["effects"]] == [
+        found["effect"] for found in before["effects"]
+    ]
+    assert verdict["unexplained"]["signature"].startswith("only on runs that no fit has seen: ")
+    assert verdict["unexplained"]["rms"] == pytest.approx(0.3 * BETA[1] / np.sqrt(2), rel=0.1)
+    assert "condition validate-" in verdict["next_experiment"]
+    check_entry(verdict)
 
 
 def test_without_held_out_runs_nothing_is_claimed():
