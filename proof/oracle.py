@@ -33,7 +33,7 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
     there of the noise, and of what no run tells of the base model) and ``sizes``: of each effect, how much
     the prediction changes when it is left out and all else is refitted, over the noise alone. Where the
     library lacks one of them: ``after`` is None, the floor that of the declared noise (the fitted one has
-    swallowed some of the effect), and the size what of the error is not noise.
+    swallowed some of the effect), and the size what of the error is beyond the floor, over the noise.
     """
     blocks = task.role("identify", "calibrate")
     prior = first_noise(budget, task.scatter, blocks)
@@ -44,7 +44,8 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
     if len(told) < len(hidden):
         rows = _rows(task, base, replace(base, noise=prior))
         before, floor = _rms(rows["measured"] - rows["before"]), _rms(rows["sigma"])
-        size = float(np.sqrt(max(0.0, before**2 - floor**2))) / floor
+        noise = _rms(_rows(_all_told(task), base, replace(base, noise=prior))["sigma"])
+        size = float(np.sqrt(max(0.0, before**2 - floor**2))) / noise
         return {"before": before, "after": None, "floor": floor, "sizes": dict.fromkeys(hidden, size)}
 
     def fitted(chosen: list[Effect]) -> Fit:

@@ -90,3 +90,17 @@ def test_what_the_library_lacks_has_no_oracle_but_a_size():
     found = oracle(problem(Wave(bump=0.6)), {"chip": {"length_um": 20.0}}, LIBRARY[:1], BUDGET)
     assert found["after"] is None
     assert found["sizes"]["chip"] == pytest.approx(0.6 / np.sqrt(2.0) / SIGMA, rel=0.1)
+
+
+@pytest.mark.parametrize(("name", "library"), [("bump", LIBRARY), ("chip", LIBRARY[:1])])
+def test_what_no_run_tells_of_the_base_model_belongs_to_the_floor_but_not_to_the_noise(name, library):
+    task = problem(Wave(bump=0.6))
+    untold = 3.0 * SIGMA * np.full((POINTS, 1), 1.0)
+    blocks = [replace(b, untold=untold) if b.role == "validate" else b for b in task.blocks]
+    values = {name: {"bump": 0.6}}
+    sure, unsure = (
+        oracle(one, values, library, BUDGET) for one in (task, replace(task, blocks=tuple(blocks)))
+    )
+    assert unsure["floor"] == pytest.approx(np.hypot(1.0, 3.0) * SIGMA, rel=0.05)
+    size = np.sqrt(max(0.0, sure["before"] ** 2 - unsure["floor"] ** 2)) / SIGMA if name == "chip" else None
+    assert unsure["sizes"][name] == pytest.approx(size or sure["sizes"][name], rel=0.05)
