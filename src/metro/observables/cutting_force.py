@@ -51,10 +51,14 @@ def channels(batch: Batch) -> Rows:
     return tuple(tuple(float(value) for value in row) for row in np.linalg.inv(to_tool))
 
 
-def cut(batch: Batch, run: str, radius: float) -> Cut:
-    """Return the nominal settings of a run in SI; ``radius`` of the cutter in m."""
+def cut(batch: Batch, run: str, radius: float, give: float = 0.0) -> Cut:
+    """Return the nominal settings of a run in SI; ``radius`` of the cutter in m.
+
+    ``give``: how far the wall stands proud of the nominal one, m; a tenth of the radial depth stays at least.
+    """
     row: Any = batch.runs.loc[run]
     radial = 2 * radius if math.isnan(row["radial_depth_mm"]) else row["radial_depth_mm"] * MM
+    radial = max(radial - give, 0.1 * radial)
     return Cut(
         feed_per_tooth=row["feed_per_tooth_mm"] * MM,
         axial_depth=row["axial_depth_mm"] * MM,
@@ -106,8 +110,10 @@ def _per_axial_depth(batch: Batch, given: Mapping[str, float]) -> dict[str, floa
     return {name: given[name] / math.cos(helix) for name in ("kte", "kre", "kae")}
 
 
-def mean_force_on_tool(batch: Batch, run: str, values: Mapping[str, float]) -> Array:
+def mean_force_on_tool(batch: Batch, run: str, values: Mapping[str, float], give: float = 0.0) -> Array:
     """Mean cutting force of a run on the tool, (3,) N, work frame; ``values`` as of :func:`coefficients`.
+
+    ``give`` as of :func:`cut`.
 
     Raises
     ------
@@ -118,4 +124,4 @@ def mean_force_on_tool(batch: Batch, run: str, values: Mapping[str, float]) -> A
     if isinstance(tool, Refusal):
         raise ValueError(tool.reason)
     si = np.array([values[name] for name in COEFFICIENTS]) * TO_SI
-    return work_from_feed(batch, run) @ mean_force(tool, EdgeLaw(), cut(batch, run, tool.radius), si)
+    return work_from_feed(batch, run) @ mean_force(tool, EdgeLaw(), cut(batch, run, tool.radius, give), si)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,15 +11,16 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.observables import tip_force
+from metro.observables.arm_give import GivingArm, giving_arm
 from metro.observables.deformation_model import CutWall, DeformationModel
-from metro.observables.load_tests import ANGLES, best_compliance, calibration, fitted_loads, usable
+from metro.observables.load_tests import calibration, fitted_loads
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.observables.tip_force import ACTUAL, FORCE, SET, SYSTEMATIC, Log
 from metro.observables.wall import Wall, wall
-from metro.observables.wall_profile import SPACING, in_one_pose, wall_points
+from metro.observables.wall_profile import SPACING, wall_points
 from metro.robot.kinematics import Arm, arm_of_cell
-from metro.units import DEG, JSON, MM, UM, Array
+from metro.units import DEG, JSON, MM, UM
 
 OBSERVABLE = "deformation"
 SCATTER = 0.02
@@ -28,45 +29,35 @@ ZERO = 5 * UM  # how well a profile's zero is the programmed wall
 Read = Callable[..., pd.DataFrame]
 
 
-@dataclass(frozen=True, eq=False)
-class _Known:
-    """What is known before a run is looked at."""
-
-    model: DeformationModel
-    loads: pd.DataFrame
-    compliance: Array
-    identified: JSON
-
-
 def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Tip forces along the path, points along the walls, observability of the joints, and the load tests.
 
     Tables ``tip_force``, ``profile_points``, ``observability``, ``arm_loads``, ``deformation_refused``.
     """
-    arm = arm_of_cell(batch.cell, batch.manifest)
-    if arm is None:
-        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
-    model, loads = DeformationModel(arm), usable(read("loads"))
-    known = _Known(model, loads, best_compliance(batch, model, loads), identified)
+    arm = giving_arm(batch, read)
+    if isinstance(arm, Refusal):
+        return arm
     found: dict[str, list[pd.DataFrame]] = {"tip_force": [], "profile_points": [], "observability": []}
     refused: list[JSON] = []
     for run in _runs(batch, "robot_log", "profile"):
-        for name, table in _observed(batch, run, read, known).items():
+        for name, table in _observed(batch, run, read, arm, identified).items():
             if isinstance(table, Refusal):
                 refused.append({"run": run, "what": name.replace("_", " "), "reason": table.reason})
             else:
                 found[name].append(table.assign(run=run))
     tables = {name: pd.concat(parts, ignore_index=True) for name, parts in found.items() if parts}
-    tables["arm_loads"] = loads
+    tables["arm_loads"] = arm.loads
     tables["deformation_refused"] = pd.DataFrame(refused, columns=["run", "what", "reason"], dtype=str)
     return tables
 
 
-def _observed(batch: Batch, run: str, read: Read, known: _Known) -> dict[str, pd.DataFrame | Refusal]:
+def _observed(
+    batch: Batch, run: str, read: Read, known: GivingArm, identified: JSON
+) -> dict[str, pd.DataFrame | Refusal]:
     """Tables of one run, or why it has none."""
     face, arm = wall(batch, run), known.model.arm
     cut, idle = tip_force.logs(read("robot", run), arm)
-    log = cut if len(cut.tip) else _pose(batch, run, known.loads, face, arm)
+    log = known.log(batch, run, cut, face)
     tables: dict[str, pd.DataFrame | Refusal] = {}
     (force, per_joint), source = tip_force.from_torques(cut, idle, arm, face), "torque"
     if per_joint is not None:
@@ -75,8 +66,8 @@ def _observed(batch: Batch, run: str, read: Read, known: _Known) -> dict[str, pd
         tables["sensorless force"] = force
         force, source = tip_force.from_dynamometer(batch, run, read("force", run), face), "dynamometer"
     if isinstance(force, Refusal):
-        give = _give(known, log, face)
-        force, source = tip_force.from_coefficients(batch, run, known.identified, face, give), "coefficients"
+        give = partial(known.give, log, face)
+        force, source = tip_force.from_coefficients(batch, run, identified, face, give), "coefficients"
     tables["tip_force"] = force if isinstance(force, Refusal) else force.assign(source=source)
     if run in _runs(batch, "profile"):
         tables["profile_points"] = _points(batch, read("profile", run), log, face, arm)
@@ -94,14 +85,6 @@ def _points(
     return wall_points(profile, log, arm, face, cutoff=_cutoff(batch), noise=_noise(batch))
 
 
-def _give(known: _Known, log: Log | Refusal, face: Wall) -> Callable[[Array], float]:
-    """How far a wall stands proud under a force on the tip, by the load tests, in the middle of the cut."""
-    if isinstance(log, Refusal):
-        return lambda _: 0.0
-    middle = log.commanded[len(log.commanded) // 2]
-    return lambda force: float(face.normal @ known.model.contributions(middle, force) @ known.compliance)
-
-
 def _runs(batch: Batch, *columns: str) -> list[str]:
     """List the runs that have a file in one of ``columns``, in the order of cutting."""
     table = batch.runs.sort_values("order", kind="stable")
@@ -109,14 +92,6 @@ def _runs(batch: Batch, *columns: str) -> list[str]:
         lambda column: column.map(lambda file: isinstance(file, str) and file != "")
     )
     return [str(run) for run in table.index[named.any(axis=1).to_numpy(dtype=bool)]]
-
-
-def _pose(batch: Batch, run: str, loads: pd.DataFrame, face: Wall, arm: Arm) -> Log | Refusal:
-    """Stand in for a missing log by the pose's load tests."""
-    rows = loads[loads["pose"] == batch.runs.loc[run, "pose"]].dropna(subset=ANGLES)
-    if rows.empty:
-        return Refusal("no robot_log, and no load test in its pose: where the arm stood is not known")
-    return in_one_pose(rows[ANGLES].to_numpy(dtype=float)[0] * DEG, face, arm)
 
 
 def _cutoff(batch: Batch) -> float:

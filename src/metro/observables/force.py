@@ -56,6 +56,7 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
         "The chip thickness is that of the true tooth paths, the force law linear in it; "
         "tool, machine and dynamometer are rigid in the base model.",
         _path_note(tool, blocks),
+        *_give_note(observed["spindle"]),
         f"Forces are compared per revolution up to spindle order {blocks[0].setting.highest}, "
         "in the work frame"
         + (" (helical runs: in the frame that turns with the orbit)." if helical else "."),
@@ -75,6 +76,17 @@ def _path_note(tool: Cutter, blocks: tuple[Block, ...]) -> str:
         f"At {widest.feed_per_tooth / MM:.3g} mm per tooth the true chip differs from feed × sine by up to "
         f"{difference.largest / UM:.2g} µm ({100 * share:.2g} % of the feed), "
         f"{difference.rms / UM:.2g} µm rms."
+    )
+
+
+def _give_note(spindle: pd.DataFrame) -> tuple[str, ...]:
+    """Say by how much the arm gives way in side cuts, if it does."""
+    give = spindle.loc[spindle["give_mm"].abs().idxmax()]
+    if not give["give_mm"]:
+        return ()
+    return (
+        "The radial depth of side cuts is the nominal one less what the arm gives way to the measured mean "
+        f"force by its load tests: at most {give['give_mm']:.2g} mm, in run {give['run']}.",
     )
 
 

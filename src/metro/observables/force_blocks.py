@@ -36,7 +36,7 @@ def block_of(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, spindle:
     path = helix(batch, row)
     curvature = 0.0 if path is None else math.copysign(1.0 / path.radius, row["orbit_rpm"])
     setting = ForceSetting(
-        cut=replace(cutting_force.cut(batch, run, tool.radius), curvature=curvature),
+        cut=replace(cutting_force.cut(batch, run, tool.radius, spindle["give_mm"] * MM), curvature=curvature),
         feed_direction=cutting_force.or_zero(row["feed_direction_deg"]) * DEG,
         highest=highest,
         recording=_recording(row, middles, spindle),

@@ -12,6 +12,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.cutting.cutter import Cutter
 from metro.observables import cutting_force
+from metro.observables.arm_give import give_of, giving_arm
 from metro.observables.force_coefficients import AXES
 from metro.observables.problem import Refusal
 from metro.signals import orders, steady
@@ -33,8 +34,12 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
     tool = cutting_force.cutter(batch)
     if isinstance(tool, Refusal):
         return tool
+    arm = giving_arm(batch, read)
     results = [_observed(batch, run, read("force", run), tool) for run in runs]
     tables = [result for result in results if not isinstance(result, Refusal)]
+    for _, row in tables:
+        force = np.array([row[f"mean_{axis}_n"] for axis in AXES])
+        row["give_mm"] = give_of(batch, row["run"], read, arm, force) / MM
     refused = [result.reason for result in results if isinstance(result, Refusal)]
     if not tables:
         return Refusal("; ".join(refused))

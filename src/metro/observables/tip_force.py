@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -136,9 +136,8 @@ def from_coefficients(
     """Mean force by the cutting law, constant along the wall.
 
     A tool that yields cuts less: the radial depth is the nominal one less ``give(force)``, how far (m) the
-    wall stands
-    proud under a force (3,) N, by fixed-point iteration (it converges as the give is a small part of the
-    depth).
+    wall stands proud under a force (3,) N, by fixed-point iteration (it converges as the give is a small part
+    of the depth).
     """
     values = cutting_force.coefficients(batch, identified)
     if isinstance(values, Refusal):
@@ -146,18 +145,10 @@ def from_coefficients(
     try:
         force = cutting_force.mean_force_on_tool(batch, run, values)
         for _ in range(ITERATIONS):
-            force = cutting_force.mean_force_on_tool(_shallower(batch, run, give(force)), run, values)
+            force = cutting_force.mean_force_on_tool(batch, run, values, give(force))
     except ValueError as error:
         return Refusal(str(error))
     return _constant(force, SYSTEMATIC["coefficients"] * np.abs(force), wall)
-
-
-def _shallower(batch: Batch, run: str, give: float) -> Batch:
-    """Return the batch with the radial depth of a run lowered by ``give`` (m), to a tenth at least."""
-    depth = batch.runs["radial_depth_mm"].astype(float)
-    lowered = (depth - give / MM).clip(lower=0.1 * depth)
-    depth = depth.where(depth.index != run, lowered)
-    return replace(batch, runs=batch.runs.assign(radial_depth_mm=depth))
 
 
 def _constant(force: Array, sd: Array, wall: Wall) -> pd.DataFrame:

@@ -1,0 +1,87 @@
+"""How far an arm gives way to a side cut, and the radial depth that is left."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from metro.batch.processed import read_batch, read_table
+from metro.effects import library, told_of
+from metro.loop.candidate import Candidate
+from metro.loop.fit import fit
+from metro.loop.noise import first_noise
+from metro.loop.search import Gates, search
+from metro.observables import cutting_force, force
+from metro.observables.arm_give import GivingArm, give_of
+from metro.observables.deformation_model import DeformationModel
+from metro.observables.problem import Refusal
+from metro.observables.tip_force import Log
+from metro.observables.wall import Wall
+from metro.robot.kinematics import arm_of_cell
+from metro.robot.statics import tip_compliance
+from metro.stages.ingest import ingest
+
+ROOT = Path(__file__).parents[2]
+GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
+SIDE = ("r01", "r02")  # down, up
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    """The bundled batch of the robot's side cuts, and how its tables are read."""
+    out = tmp_path_factory.mktemp("kr160") / "out"
+    ingest(ROOT / "data" / "raw" / "kr160-side", ROOT / "config" / "cells", out, {}, "test")
+    return read_batch(out), lambda name, run=None: read_table(out / f"{name}.parquet", run)
+
+
+def test_the_give_is_the_compliance_of_the_tip_along_the_wall_normal(cell):
+    arm = arm_of_cell(cell[0].cell, cell[0].manifest)
+    softness = np.array([5e-7, 4e-7, 7e-7, 3e-6, 2e-6, 4e-6])
+    q, newton = np.radians([[-20.3, -13.9, -4.4, -61.7, 34.9, 56.7]]), np.array([30.0, -110.0, 45.0])
+    normal = np.array([0.0, 1.0, 0.0])
+    known = GivingArm(DeformationModel(arm), pd.DataFrame(), softness)
+    log, face = Log(q, q, 0 * q, arm.tip(q)), Wall(np.array([1.0, 0, 0]), normal, 0.0, 0.1, 0.0)
+    expected = normal @ tip_compliance(arm, q[0], softness) @ newton
+    assert known.give(log, face, newton) == pytest.approx(expected, rel=1e-9)
+    slot = Wall(face.along, 0 * normal, 0.0, 0.1, 0.0)  # has two walls
+    assert known.give(log, slot, newton) == 0.0
+    assert known.give(Refusal("no log"), face, newton) == 0.0
+
+
+def test_a_machine_that_is_no_arm_gives_nothing(cell):
+    assert give_of(cell[0], "r01", cell[1], Refusal("no arm.dh"), np.array([0.0, 100.0, 0.0])) == 0.0
+
+
+@pytest.mark.parametrize("run", SIDE)
+def test_a_wall_that_stands_proud_lowers_the_radial_depth_by_as_much(cell, run):
+    radius, nominal = 8e-3, 4e-3
+    for give in (0.0, 0.15e-3, -0.1e-3):
+        cut = cutting_force.cut(cell[0], run, radius, give).engagement
+        depth = radius * (1.0 - math.cos(cut.exit - cut.entry))  # of an arc that ends at the wall
+        assert depth == pytest.approx(nominal - give, rel=1e-9)
+    least = cutting_force.cut(cell[0], run, radius, 1.0).engagement
+    assert radius * (1.0 - math.cos(least.exit - least.entry)) == pytest.approx(0.1 * nominal)
+
+
+def test_the_forces_of_an_arm_that_gives_way_leave_no_misfit(cell):
+    batch, read = cell
+    observed = force.observe(batch, read, {})
+
+    def misfit(spindle):
+        task = force.problem(batch, observed | {"spindle": spindle}, {})
+        blocks = task.role("identify")
+        return fit(Candidate(task.base), blocks, first_noise(0.007, task.scatter, blocks)).noise.misfit
+
+    spindle = observed["spindle"]
+    assert (spindle["give_mm"] > 0).sum() >= 3
+    assert spindle["give_mm"].max() < 0.3
+    assert max(misfit(spindle).values()) < 0.002
+    assert max(misfit(spindle.assign(give_mm=0.0)).values()) > 0.01
+
+
+def test_nothing_is_added_to_the_forces_of_an_arm_that_gives_way(cell):
+    batch, read = cell
+    task = force.problem(batch, force.observe(batch, read, {}), {})
+    assert search(told_of(task, batch.manifest["known"]), library("force"), GATES).names == ()
