@@ -54,6 +54,12 @@ def left_over(outcome: Outcome) -> str:
     if outcome.step:
         step = outcome.step
         parts.append(f"a step of {step.parameter} by {100 * step.relative:+.1f} % after run {step.after}")
+    if outcome.between:
+        between = outcome.between
+        parts.append(
+            f"the base parameters differ between conditions by {100 * between.relative:.2g} % of the signal, "
+            f"more than repeats scatter, most in {between.condition}"
+        )
     return "; ".join(part for part in parts if part)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from metro.effects.effect import Effect, fitted_to
 from metro.loop import signature as rest
+from metro.loop.between import Between, between_conditions
 from metro.loop.candidate import Candidate
 from metro.loop.evidence import compare, hold_out, leave_out, surviving_share
 from metro.loop.fit import Fit, fit
@@ -28,6 +29,7 @@ NOT_VISIBLE = 0.02
 ABSORBED = "the base parameters imitate all but {:.1f} % of its signature"
 SESSION = 0.005  # p-value of a step along the session that counts
 SESSION_SIZE = 0.01
+CONDITIONS = 0.001  # p-value of differences between conditions that count
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,9 @@ class Outcome:
     ``base`` and ``final`` are fits of the identification runs; ``steps`` the fits after each addition;
     ``trials`` the last trial of each effect, ``weight`` the probability of each effect found against its
     rivals and against nothing; ``rivals`` effects that explain the rest as well as a chosen one; ``lines``
-    the signature of the rest, ``step`` that along the session; ``not_visible`` why effects cannot be seen;
-    ``likeness`` the fit with what the rest resembles and is no effect of the library (``final`` is without).
+    the signature of the rest, ``step`` that along the session, ``between`` that from condition to condition;
+    ``not_visible`` why effects cannot be seen; ``likeness`` the fit with what the rest resembles and is no
+    effect of the library (``final`` is without).
     """
 
     base: Fit
@@ -50,6 +53,7 @@ class Outcome:
     base_lines: tuple[rest.Line, ...]
     lines: tuple[rest.Line, ...]
     step: Step | None = None
+    between: Between | None = None
     offered: tuple[Effect, ...] = ()
     not_visible: dict[str, str] = field(default_factory=dict)
     likeness: Fit | None = None
@@ -100,6 +104,8 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
     if final not in (base, *steps):
         steps.append(final)
     step, floor = scan(likeness, gates.seed), max(least, gates.model_form_budget)
+    between = between_conditions(likeness)
+    differ = between and between.p_value < CONDITIONS and between.relative > floor
     return Outcome(
         base=base,
         final=final,
@@ -110,6 +116,7 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
         base_lines=tuple(rest.signature(base, floor)),
         lines=tuple(rest.signature(final, floor)),
         step=step if step and step.p_value < SESSION and abs(step.relative) > SESSION_SIZE else None,
+        between=between if differ else None,
         offered=tuple(library),
         not_visible=unable | absorbed,
         likeness=likeness if likeness is not final else None,

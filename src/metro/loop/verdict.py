@@ -253,7 +253,8 @@ def _unexplained(
     problem: Problem, outcome: Outcome, rows: pd.DataFrame, words: str, lines: Sequence[Line]
 ) -> JSON:
     """Describe the rest; its size is the share left on the runs that tell of it, of the held-out signal."""
-    share = max(share_left(lines), abs(outcome.step.relative) if outcome.step else 0.0)
+    whole = [abs(found.relative) for found in (outcome.step, outcome.between) if found]
+    share = max(share_left(lines), *whole) if whole else share_left(lines)
     over = share * float(np.sqrt((rows["measured"] ** 2).mean())) if len(rows) else None
     if outcome.likeness and len(rows):
         words += (
