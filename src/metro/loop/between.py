@@ -72,7 +72,7 @@ def _power(moved: Array, power: Array) -> float:
 
 
 def _deviations(fitted: Fit, block: Block) -> tuple[Array, Array, Array, Array]:
-    """Return a run's deviations of the base parameters, in units of their own spread and of the scatter, (p,).
+    """Return a run's deviations of the base parameters by their own spread, and by the scatter, (p,) each.
 
     Then the mean square of what a unit of the second changes, over that of the signal, (p, p), and which
     share of the scatter of each parameter the run tells, (p,).
