@@ -208,3 +208,18 @@ def test_runs_that_hold_their_wave_once_say_nothing_of_changes_along_the_run():
     lines = search(replace(task, blocks=once), (), GATES).lines
     assert len(lines) == 4
     assert not any("along the run" in line.label for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("gains", "share"),
+    [
+        ((-0.02, -0.01, 0.01, 17.0), 1.0),  # acts in one condition alone
+        ((-0.02, -5.0, 3.0, 17.0), 2 / 3),
+        ((1.0, -2.0, -3.0, -4.0), 0.25),
+        ((), 0.0),
+    ],
+)
+def test_conditions_that_an_effect_does_not_touch_say_nothing_of_it(gains, share):
+    held_out = {f"condition {i}": gain for i, gain in enumerate(gains)}
+    evidence = Evidence(1.0, 0.5, held_out, 0.1, 0.0)
+    assert evidence.better_share == pytest.approx(share)

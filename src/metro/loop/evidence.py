@@ -20,6 +20,9 @@ from metro.observables.problem import Block
 from metro.units import Array
 
 
+TOUCHED = 0.01  # of the largest gain or loss at a left-out condition: below it, the condition is not touched
+
+
 @dataclass(frozen=True)
 class Evidence:
     """How a larger candidate compares with a smaller one.
@@ -46,8 +49,13 @@ class Evidence:
 
     @property
     def better_share(self) -> float:
-        """Share of the left-out conditions that the larger candidate predicts better."""
-        return float(np.mean([value > 0 for value in self.held_out.values()])) if self.held_out else 0.0
+        """Share of the left-out conditions that the larger candidate predicts better.
+
+        Those that it hardly touches (an orbit that only holes have) say nothing either way.
+        """
+        gains = np.array([*self.held_out.values()])
+        touched = gains[np.abs(gains) > TOUCHED * np.abs(gains).max(initial=0.0)]
+        return float(np.mean(touched > 0)) if len(touched) else 0.0
 
 
 def compare(smaller: Fit, larger: Fit) -> Evidence:
