@@ -19,7 +19,6 @@ from metro.loop.noise import PRIOR_RUNS, Noise
 from metro.observables.problem import Block
 from metro.units import Array
 
-
 TOUCHED = 0.01  # of the largest gain or loss at a left-out condition: below it, the condition is not touched
 
 
