@@ -25,11 +25,11 @@ def test_it_says_its_version():
 
 def test_the_help_shows_every_command_what_people_call_first():
     output = call("--help").output
-    places = [output.index(f" {name} ") for name in ("check", "new-batch", *STAGES)]
+    places = [output.index(f" {name} ") for name in ("check", "new-batch", "frf-export", *STAGES)]
     assert places == sorted(places)
 
 
-@pytest.mark.parametrize("command", ["check", "new-batch", *STAGES])
+@pytest.mark.parametrize("command", ["check", "new-batch", "frf-export", *STAGES])
 def test_every_command_and_option_has_a_help_text(command):
     import typer
 

@@ -1,4 +1,4 @@
-"""The command line: what people call (check, new-batch) and the stage commands that the workflow calls."""
+"""The command line: what people call, and the stage commands that the workflow calls."""
 
 from __future__ import annotations
 
@@ -98,6 +98,26 @@ def new_batch(
     with readable_errors():
         folder = write(root, name)
         typer.echo(f"{folder} is there. Fill it in, then call: metro check {folder}")
+
+
+@app.command("frf-export")
+def frf_export(
+    processed: Annotated[
+        Path,
+        typer.Argument(
+            help="The batch's canonical tables: data/processed/<batch>.", exists=True, file_okay=False
+        ),
+    ],
+    out: Annotated[Path, typer.Argument(help="The universal file that is written, e.g. my-batch.uff.")],
+    position: Annotated[
+        str, typer.Option(help="Position of the tests; needed where there are several.")
+    ] = "",
+) -> None:
+    """Write a batch's FRFs as a universal file (datasets 58b), for other programs of modal analysis."""
+    from metro.stages.frf_export import frf_export as write
+
+    with readable_errors():
+        typer.echo("\n".join(write(processed, out, position)))
 
 
 @app.command(rich_help_panel=STAGES)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from machines import BENCH
+from machines import BENCH, MASS, OMEGA, ZETA
 
 from metro.dynamics import cdsem, lobes
 from metro.dynamics.system import Cut, Structure, immersion
@@ -13,10 +13,10 @@ TWO = Structure(
 )
 
 
-def radius(depth, steps, interpolation):
+def radius(depth, steps, interpolation, cut=SLOT):
     mode, rpm = np.array([0]), np.array([5000.0])
     settings = {"steps": steps, "interpolation": interpolation}
-    return cdsem.spectral_radius(BENCH, SLOT, mode, rpm, np.array([depth]), **settings)[0]
+    return cdsem.spectral_radius(BENCH, cut, mode, rpm, np.array([depth]), **settings)[0]
 
 
 def test_the_explicit_rule_needs_the_published_number_of_steps():
@@ -24,6 +24,32 @@ def test_the_explicit_rule_needs_the_published_number_of_steps():
     assert cdsem.steps_for_stability(BENCH, SLOT, 5000.0) == pytest.approx(1582, abs=2)
     assert radius(0.0, 1500, 0.0) > 1
     assert radius(0.0, 1582, 0.0) < 1
+
+
+@pytest.mark.parametrize("interpolation", [0.0, 0.3, 1.0])
+def test_every_term_is_differenced_as_the_rule_is_written(interpolation):
+    """(z[i+1] - z[i]) / dt, with state, delayed state and factor each between the step's two ends."""
+    steps, depth, dt = 40, 0.4e-3, 60 / (2 * 5000.0) / 40
+    phi = np.pi * np.arange(steps + 1) / steps
+    factor = -depth * np.sin(phi) * (6e8 * np.cos(phi) + 2e8 * np.sin(phi)) / MASS
+    factor[: steps // 2] = 0.0  # half immersion: the tooth enters at the node in the middle
+    size = 2 + steps + 1
+    total = np.eye(size)  # q, q', and the displacements of now and of a period before
+    for i in range(steps):
+        at = (1 - interpolation) * factor[i] + interpolation * factor[i + 1]
+        A = np.array([[0.0, 1.0], [at - OMEGA**2, -2 * ZETA * OMEGA]])
+        now, new = np.zeros((2, size)), np.eye(2) - interpolation * dt * A
+        now[:, :2] = np.eye(2) + (1 - interpolation) * dt * A
+        now[1, -1] -= dt * at * (1 - interpolation)
+        now[1, -2] -= dt * at * interpolation
+        step = np.eye(size, k=-1)
+        step[:3] = 0.0
+        step[:2] = np.linalg.solve(new, now)
+        step[2] = step[0]
+        total = step @ total
+    expected = np.abs(np.linalg.eigvals(total)).max()
+    half = Cut(2, *immersion("down", 0.5, 1.0), 6e8, 2e8)
+    assert radius(depth, steps, interpolation, half) == pytest.approx(expected, rel=1e-8)
 
 
 def test_the_midpoint_rule_is_of_second_order():

@@ -1,5 +1,7 @@
 """Semi-discretisation: its order and constant, helix, pitch and runout against cases with a known answer."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from machines import BENCH, CUTS, OMEGA, PRINTED, TWO, ZETA
@@ -49,6 +51,43 @@ def test_both_methods_agree_to_a_thousandth_of_depth_on_the_published_machine():
     np.testing.assert_allclose(fine + (fine - coarse) / 3, default, rtol=1e-4)
 
 
+def extrapolated(structure, cut, rpm, around, steps):
+    engagement = teeth.equal_teeth(cut)
+    coarse, fine = (
+        semidiscretisation.boundary_near(structure, engagement, rpm, around, n) for n in (steps, 2 * steps)
+    )
+    return fine + (fine - coarse) / 3
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_both_methods_agree_with_process_damping(name):
+    cut, rpm = replace(CUTS[name], damping=1e8), np.array([700.0, 1500.0])
+    default = lobes.stability_boundary(TWO, cut, rpm).depth
+    plain = lobes.stability_boundary(TWO, CUTS[name], rpm).depth
+    assert np.all(np.abs(np.log(default / plain)) > 0.05)
+    np.testing.assert_allclose(extrapolated(TWO, cut, rpm, default, 50), default, rtol=1e-4)
+
+
+def test_a_boundary_that_process_damping_lifts_far_is_not_missed():
+    # at this speed it acts more than the chip does: most eigenvalues of the cut stand for no depth at all
+    cut, rpm = replace(CUTS["one tooth of four at a time"], damping=3e8), np.array([500.0])
+    default = lobes.stability_boundary(TWO, cut, rpm).depth
+    plain = lobes.stability_boundary(TWO, replace(cut, damping=0.0), rpm).depth
+    assert 4.0 * plain[0] < default[0] < 5.0 * plain[0]
+    np.testing.assert_allclose(extrapolated(TWO, cut, rpm, default, 80), default, rtol=1e-4)
+
+
+def test_damping_of_a_helix_that_spans_a_pitch_is_its_mean_over_the_arc():
+    cut = replace(CUTS["one tooth of four at a time"], damping=2e8)
+    height = np.array([cut.pitch / LAG])
+    found = teeth.mean_damping_factors(teeth.equal_teeth(cut, LAG), height, 30)
+    phi = cut.entry + (cut.exit - cut.entry) * (np.arange(2000) + 0.5) / 2000
+    normal = np.stack([np.sin(phi), np.cos(phi)], axis=1)
+    share = (cut.exit - cut.entry) / cut.pitch
+    expected = -2e8 * share * normal.T @ normal / len(phi)
+    np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), rtol=1e-6)
+
+
 def test_a_helix_that_spans_a_pitch_leaves_nothing_of_the_period():
     # height of one axial pitch: the factors of a cut do not change with time any more
     cut = CUTS["one tooth of four at a time"]
@@ -82,6 +121,16 @@ def test_fractional_delays_converge_like_whole_ones():
     uneven = teeth.unequal_teeth(cut, np.radians([84.0, 97.0, 86.0, 93.0]))
     values = [radius(TWO, uneven, 700.0, 1.2e-4, steps) for steps in (90, 180, 360)]
     assert abs(values[2] - values[1]) < 0.45 * abs(values[1] - values[0])
+
+
+def test_delays_between_two_steps_lead_to_the_exact_radius():
+    # a third of a turn is 33 1/3 and 66 2/3 steps
+    cut = CUTS["one or two teeth of three"]
+    whole = teeth.unequal_teeth(cut, np.full(3, 2 * np.pi / 3))
+    coarse, fine = (radius(TWO, whole, 700.0, 1.5e-4, steps) for steps in (100, 200))
+    exact = lobes.spectral_radius(TWO, cut, [700.0], [1.5e-4])[0] ** 3
+    assert fine + (fine - coarse) / 3 == pytest.approx(exact, rel=2e-3)
+    assert fine == pytest.approx(exact, rel=1e-2)
 
 
 def test_uneven_pitch_steadies_the_worst_speed_of_a_light_mode():

@@ -73,6 +73,14 @@ def test_the_poles_of_the_structure_recur_and_those_of_the_noise_do_not():
         assert np.min(np.abs(np.array(found) - pole)) < 5e-3 * abs(pole)
 
 
+@pytest.mark.parametrize("order", [12, 30])
+def test_the_poles_of_the_noise_are_unstable_so_that_none_of_them_is_kept(order):
+    # with the highest coefficient as the identity nearly all of them are stable
+    frf = responses(*random_shapes(3, 2), noise=0.05)
+    found = poles(normal_equations(FREQUENCY, frf, np.ones((len(FREQUENCY), 3)), order), order)
+    assert len(found) == 3
+
+
 def test_two_modes_of_one_frequency_and_damping_are_told_apart_by_their_shapes():
     """A symmetric structure has such pairs; a single reference cannot see more than one of them."""
     omega, zeta = 2 * np.pi * np.array([70.0, 70.1]), np.array([0.02, 0.02])

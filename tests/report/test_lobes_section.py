@@ -74,6 +74,12 @@ def test_positions_share_a_panel_and_interpolated_ones_are_dashed():
     assert [line.get_linestyle() for line in lines] == ["-", "--"]
 
 
+def test_each_of_many_positions_has_a_colour_of_its_own():
+    many = pd.concat([synthetic.boundary().assign(position=str(i)) for i in range(12)])
+    lines = figures.positions_chart(many).axes[0].get_lines()
+    assert len({line.get_color() for line in lines}) == 12
+
+
 def test_the_words_give_the_differences_between_methods():
     told = " ".join(lobes.agreement(synthetic.methods(), synthetic.boundary()))
     assert "Two resolutions of the default method differ by at most 0.010 %" in told

@@ -19,6 +19,7 @@ from metro.dynamics.system import Structure
 from metro.units import Array, ComplexArray
 
 _FOLLOWED = 8
+_FOLLOWED_DAMPED = 32  # with process damping many large eigenvalues never become a crossing
 _AT_ONE = 1e-5  # half the angle of a multiplier, rad
 _RESIDUAL = 1e-4  # of an eigenvalue: below it Newton's method has converged, or will in the steps to come
 
@@ -105,15 +106,17 @@ def matrix(equation: Kernel, theta: Array) -> ComplexArray:
     return closed
 
 
-def scan(structure: Structure, equation: Kernel, count: int, followed: float = _FOLLOWED) -> Candidates:
+def scan(structure: Structure, equation: Kernel, count: int, followed: float | None = None) -> Candidates:
     """Follow the eigenvalues over theta and return the crossings, roughly and some of them twice.
 
-    At most the ``followed`` largest eigenvalues of each angle: these are the least depths.
+    At most ``followed`` eigenvalues of each angle, the largest that are not near the negative axis: these are
+    the least depths. None: so many that a boundary's lowest crossing is among them.
     """
+    followed = followed or (_FOLLOWED if equation.delayed.all() else _FOLLOWED_DAMPED)
     theta = angles(structure, equation.period, count)
     values: ComplexArray = np.linalg.eigvals(matrix(equation, theta)).astype(complex)
     keep = int(min(followed, values.shape[2]))
-    order = np.argpartition(-np.abs(values), keep - 1, axis=2)[:, :, :keep]
+    order = np.argpartition(-np.abs(values) - values.real, keep - 1, axis=2)[:, :, :keep]
     values = np.take_along_axis(values, order, axis=2)
     speed, place, left, right = _links(values)
     a, b = values[speed, place, left], values[speed, place + 1, right]

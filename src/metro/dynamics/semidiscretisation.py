@@ -3,7 +3,7 @@
 Insperger and Stépán, Semi-Discretization for Time-Delay Systems (2011). The delayed displacement is linear
 over each step; the directional factors are their exact means over it and over the height of the cut, so that
 entry and exit may fall between the steps. It takes helix, unequal pitch and runout
-(:mod:`metro.dynamics.teeth`), which the default method does not; process damping is not in it.
+(:mod:`metro.dynamics.teeth`), which the default method does not, and process damping, which both do.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from metro.dynamics import periodmap
 from metro.dynamics.periodmap import PeriodMap
 from metro.dynamics.system import Structure
-from metro.dynamics.teeth import Engagement, mean_directional_factors
+from metro.dynamics.teeth import Engagement, mean_damping_factors, mean_directional_factors
 from metro.units import Array
 
 _TOGETHER = 16  # speeds in one stack
@@ -66,12 +66,17 @@ def period_map(
 
     free, force_in, displacement_out = state_space(structure)
     n = len(free)
-    dt = (engagement.turn * 60.0 / (2.0 * np.pi * rpm * steps))[:, None]
+    spindle = 2.0 * np.pi * rpm / 60.0
+    dt = (engagement.turn / (spindle * steps))[:, None]
     factors, delays = mean_directional_factors(engagement, depth, steps)
     factors = depth[:, None, None, None, None] * factors
+    acting = factors.sum(axis=2) @ displacement_out
+    if engagement.cut.damping:
+        per_speed = mean_damping_factors(engagement, depth, steps) * (depth / spindle)[:, None, None, None]
+        acting += per_speed @ displacement_out @ free  # a force does not change the displacement at once
     # the force of the delayed displacements, linear over the step, is carried as two more pairs of states
     exponent = np.zeros((len(rpm), steps, n + 4, n + 4))
-    exponent[..., :n, :n] = free + force_in @ factors.sum(axis=2) @ displacement_out
+    exponent[..., :n, :n] = free + force_in @ acting
     exponent[..., :n, n : n + 2] = force_in
     exponent[..., n : n + 2, n + 2 :] = np.eye(2)
     step = expm(exponent * dt[..., None, None])[..., :n, :]

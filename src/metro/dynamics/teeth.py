@@ -146,18 +146,34 @@ def mean_directional_factors(engagement: Engagement, depth: Array, steps: int) -
     Exact means over each of ``steps`` equal steps of the period and over the height of ``depth`` (k,).
     """
     cut = engagement.cut
+    products, delays = _mean_products(engagement, depth, steps)
+    ss, sc, cc = np.moveaxis(products, -1, 0)
+    rows = [-(cut.ktc * sc + cut.krc * ss), -(cut.ktc * cc + cut.krc * sc)]
+    rows += [cut.ktc * ss - cut.krc * sc, cut.ktc * sc - cut.krc * cc]
+    return np.stack(rows, axis=-1).reshape(*ss.shape, 2, 2), delays
+
+
+def mean_damping_factors(engagement: Engagement, depth: Array, steps: int) -> Array:
+    """Force per depth and displacement per radian of spindle's turn (k, steps, 2, 2), N/m².
+
+    Of process damping; means as those of :func:`mean_directional_factors`.
+    """
+    products, _ = _mean_products(engagement, depth, steps)
+    ss, sc, cc = np.moveaxis(products.sum(axis=2), -1, 0)
+    return -engagement.cut.damping * np.stack([ss, sc, sc, cc], axis=-1).reshape(*ss.shape, 2, 2)
+
+
+def _mean_products(engagement: Engagement, depth: Array, steps: int) -> tuple[Array, Array]:
+    """Mean sums over the teeth in cut of sin², sin cos, cos² (k, steps, d, 3), by delay (d,), rad."""
     edges = engagement.turn * np.arange(steps + 1) / steps
     delays = sorted({window.delay for window in engagement.windows})
-    total = np.zeros((len(depth), steps, len(delays), 2, 2))
+    total = np.zeros((len(depth), steps, len(delays), 3))
     lag = engagement.lag * np.asarray(depth)[:, None]
     for window, turns in itertools.product(engagement.windows, range(-2, 2)):
         phi = edges + window.angle + 2.0 * math.pi * turns
         if phi[-1] > window.entry and phi[0] - lag.max() < window.exit:
             means = np.diff(_height_mean(phi, lag, window), axis=1) * steps / engagement.turn
-            ss, sc, cc = means[..., 0], means[..., 1], means[..., 2]
-            rows = [-(cut.ktc * sc + cut.krc * ss), -(cut.ktc * cc + cut.krc * sc)]
-            rows += [cut.ktc * ss - cut.krc * sc, cut.ktc * sc - cut.krc * cc]
-            total[:, :, delays.index(window.delay)] += np.stack(rows, axis=-1).reshape(-1, steps, 2, 2)
+            total[:, :, delays.index(window.delay)] += means
     return total, np.array(delays)
 
 

@@ -50,8 +50,7 @@ def observe_modes(read: Read, hammer: JSON) -> ModalTest:
         and response went through before they were stored.
     """
     notes: list[str] = []
-    decay = _decay(hammer, notes)
-    measured = [*from_records(read("hit"), decay, notes), *from_files(read("frf"), notes)]
+    measured, decay = receptances(read, hammer, notes), _decay(hammer)
     modes, used, diagrams = [], [], []
     for (position, direction), found in _by_direction(measured, notes).items():
         name = f"position {position}, direction {direction}"
@@ -69,17 +68,20 @@ def observe_modes(read: Read, hammer: JSON) -> ModalTest:
     return ModalTest(_joined(modes, columns), _joined(used, ()), _joined(diagrams, ()), notes)
 
 
+def receptances(read: Read, hammer: JSON, notes: list[str]) -> list[Receptance]:
+    """Return every receptance of a batch, from its hammer records and from its FRF files."""
+    if "exp" in str(hammer.get("window", "")).lower() and "time_constant_s" not in hammer:
+        notes.append("instruments.hammer: exponential window without time_constant_s: its damping stays in")
+    return [*from_records(read("hit"), _decay(hammer), notes), *from_files(read("frf"), notes)]
+
+
 def _joined(parts: list[pd.DataFrame], columns: tuple[str, ...]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(columns))
 
 
-def _decay(hammer: JSON, notes: list[str]) -> float:
+def _decay(hammer: JSON) -> float:
     """Return what the window adds to the decay of every mode, 1/s."""
-    if "time_constant_s" in hammer:
-        return 1.0 / float(hammer["time_constant_s"])
-    if "exp" in str(hammer.get("window", "")).lower():
-        notes.append("instruments.hammer: exponential window without time_constant_s: its damping stays in")
-    return 0.0
+    return 1.0 / float(hammer["time_constant_s"]) if "time_constant_s" in hammer else 0.0
 
 
 def _by_direction(measured: list[Receptance], notes: list[str]) -> dict[tuple[str, str], list[Receptance]]:

@@ -176,7 +176,13 @@ def governing_modes(methods: pd.DataFrame) -> Figure:
 
 
 def _colours(count: int) -> list[str]:
-    return [style.SERIES[i % len(style.SERIES)] for i in range(count)]
+    """Return as many colours, all different: of a scale where there are more than a series has."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    if count <= len(style.SERIES):
+        return list(style.SERIES[:count])
+    return [to_hex(colour) for colour in colormaps["turbo"](np.linspace(0.03, 0.97, count))]
 
 
 def positions_chart(boundary: pd.DataFrame) -> Figure:
