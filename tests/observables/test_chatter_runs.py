@@ -7,7 +7,7 @@ import pytest
 from metro.batch.batch import Batch
 from metro.cutting.cutter import Cutter
 from metro.dynamics.system import Structure
-from metro.observables.chatter_runs import measured, observe_chatter
+from metro.observables.chatter_runs import measured, observe_chatter, observe_records
 from metro.observables.lobe_positions import Tip
 from metro.observables.stability import Cutting, run_probabilities, solve
 
@@ -127,3 +127,52 @@ def test_without_record_and_label_nothing_is_known():
 def test_what_cannot_be_told_from_the_record_is_left_to_the_label():
     chatter = pd.DataFrame({"run": ["a", "b", "c", "d"], "probability": [0.5, 0.9, np.nan, 0.1]})
     assert measured(chatter)["unstable"].to_dict() == {"b": 1, "d": 0}
+
+
+def shown_of(made, records):
+    source = {"force": dict(zip(made.runs.index, records, strict=True))}
+
+    def read(name, run):
+        return source[name][run]
+
+    return observe_records(made, read, observe_chatter(made, read, MODES))
+
+
+def test_chatter_is_shown_beside_the_stable_cut_nearest_in_speed_then_depth():
+    speeds = [RPM, RPM, RPM, 1.5 * RPM]
+    made = batch(spindle_rpm=speeds, axial_depth_mm=[0.1, 0.02, 0.05, 0.1])
+    records = [record(2.63), record(0), record(0), record(0, rpm=speeds[3])]
+    shown = shown_of(made, records)
+    assert list(shown["run"].drop_duplicates()) == ["c0", "c2"]
+    spectrum = shown[(shown["run"] == "c0") & (shown["part"] == "spectrum")].set_index("x")
+    off = spectrum[~spectrum["on_order"]]["value"]
+    # 40 N in each of three directions; over 59 turns a line lies up to half a bin beside one
+    assert off.idxmax() == pytest.approx(2.63 * RPM / 60, abs=0.2)
+    assert 0.84 * np.sqrt(3) * 40 < off.max() < 1.02 * np.sqrt(3) * 40
+    assert spectrum["value"].idxmax() == pytest.approx(TEETH * RPM / 60, abs=0.2)
+    stable = shown[(shown["run"] == "c2") & (shown["part"] == "spectrum")]
+    assert stable["value"][~stable["on_order"]].max() < 1.0
+    trace = shown[(shown["run"] == "c0") & (shown["part"] == "force")]
+    # of the record's sixty turns the last twelve
+    assert trace["x"].min() == pytest.approx(48 * 60 / RPM, abs=0.01)
+    assert np.ptp(trace["x"]) == pytest.approx(12 * 60 / RPM, abs=0.01)
+
+
+def test_without_an_answer_no_record_is_shown():
+    made = batch(stable=["no"])
+    assert shown_of(made, [record(2.63, revolutions=25)]).empty
+
+
+@pytest.mark.parametrize("wander", [0.005, 0.02])
+def test_a_speed_that_wanders_without_a_tacho_alarms_nobody_and_hides_no_chatter(wander):
+    made = batch(dynamometer=["a.csv", "a.csv"])
+    stable, chatter = (record(order, revolutions=80) for order in (0, 2.63))
+    for table in (stable, chatter):  # the same cut, at times that run ahead and fall back
+        time = table["t_s"].to_numpy()
+        slow = 2 * np.pi / time[-1]
+        ahead = time + wander / slow * (1 - np.cos(slow * time))
+        for axis in ("fx_n", "fy_n", "fz_n"):
+            table[axis] = np.interp(ahead, time, table[axis])
+    found = observe(made, [stable, chatter])
+    assert list(found["probability"] > 0.5) == [False, True]
+    assert found["probability"]["c0"] <= 0.5

@@ -88,6 +88,37 @@ def test_every_kind_is_drawn_where_it_was_cut_and_wrong_labels_are_circled():
     assert drawn["labelled otherwise"] == [[1500.0, 1.5]]
 
 
+RECORDS = pd.DataFrame(
+    {
+        "run": ["c", "c", "c", "a", "a", "a"],
+        "part": ["spectrum", "spectrum", "force", "spectrum", "spectrum", "force"],
+        "x": [80.5, 133.3, 0.0, 50.0, 100.0, 0.0],
+        "value": [40.0, 60.0, 1.0, 2.0, 70.0, 1.0],
+        "on_order": [False, True, False, False, True, False],
+    }
+)
+
+
+def test_the_chatter_frequency_is_marked_in_the_spectrum_of_the_cut_that_chattered_alone():
+    tests = RUNS.assign(unstable=[0, 1, 1, -1, 0])
+    chattering, _, stable, _ = figures.records_chart(RECORDS, tests, 4).axes
+    assert [note.get_text() for note in chattering.texts] == ["chatter 80.5 Hz"]
+    assert chattering.texts[0].xy == (80.5, 40.0)
+    assert not stable.texts
+    assert chattering.get_title(loc="left") == "c: chatter, 2000 rpm, 1.8 mm"
+
+
+def test_a_record_of_each_kind_is_shown_where_there_is_one():
+    made = synthetic.results()
+    teeth = replace(made.batch, manifest={**made.batch.manifest, "tool": {"teeth": 4}})
+    tables = {**synthetic.tables(), "chatter_runs": RUNS, "lobe_runs": LOBES}
+    without, shown = (
+        [i for i in chatter_items(replace(made, batch=teeth, tables=t)) if isinstance(i, Picture)]
+        for t in (tables, tables | {"chatter_records": RECORDS})
+    )
+    assert len(shown) == len(without) + 1
+
+
 def test_without_records_there_is_nothing():
     assert chatter_items(synthetic.results()) == []
 

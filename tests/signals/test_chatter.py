@@ -135,16 +135,17 @@ def test_chatter_is_held_from_three_windows_on_and_released_below_a_tenth():
     assert not held(ratio, ~looks).any()
 
 
-def test_evidence_is_what_three_windows_in_a_row_reach():
-    assert evidence(np.array([0.9, 0.1, 0.9, 0.5, 0.6, 0.0])) == pytest.approx(0.0)
+def test_evidence_is_what_two_windows_in_a_row_reach():
+    assert evidence(np.array([0.9, 0.1, 0.9, 0.2, 0.15, 0.0])) == pytest.approx(np.log(0.2 / 0.8))
     assert evidence(np.array([0.9, 0.0, 0.9, 0.0, 0.9])) < -6.0
 
 
-def test_odds_are_about_even_at_the_published_threshold():
+def test_energy_without_a_sign_must_be_much_and_a_sign_without_energy_is_nothing():
     at = np.log(chatter.BEGINS / (1 - chatter.BEGINS))
-    assert probability_of(at, seen=True) == pytest.approx(0.55, abs=0.07)
-    assert probability_of(at, seen=False) < 0.1
-    assert probability_of(-7.0, seen=True) == pytest.approx(chatter.ERROR, abs=1e-3)
+    assert probability_of(at, 0.2, 0.0) < 0.1
+    assert probability_of(2.0, 0.2, 0.0) > 0.9
+    assert probability_of(at, 1.0, 1.0) > 0.95
+    assert probability_of(-7.0, 1.0, 1.0) < 0.05
 
 
 @pytest.mark.slow

@@ -58,6 +58,19 @@ def test_one_amplitude_is_a_closed_curve_and_a_mode_shaken_by_noise_is_not():
     assert scatter[2] > signs.RING
 
 
+def test_a_line_of_one_frequency_is_narrow_and_a_mode_shaken_by_noise_is_not():
+    shaken = np.random.default_rng(5).standard_normal(len(TIME))
+    pole = np.exp((-0.02 + 1j) * 4.37 * 2 * np.pi * SPEED / RATE)
+    ring = np.zeros(len(TIME), dtype=complex)
+    for i in range(1, len(TIME)):
+        ring[i] = pole * ring[i - 1] + shaken[i]
+    ring = np.column_stack([ring.real, ring.imag]) / ring.std()
+    told = [signs.kept_frequency(s := seen(x), signs.line(s)) for x in (tone(4.37), ring, 0.0 * ring)]
+    assert told[0] == pytest.approx((4.37 * SPEED, 1.0), abs=0.005)
+    assert told[1][1] < 0.6
+    assert told[2][1] < 0.2
+
+
 @pytest.mark.parametrize(("order", "kind"), [(4.5, "flip"), (4.37, "hopf"), (1.5, "flip"), (3.5, "hopf")])
 def test_half_the_tooth_passing_is_a_flip(order, kind):
     assert signs.kind_of(order, TEETH, 0.02) == kind
@@ -70,10 +83,11 @@ def test_a_flip_of_three_teeth_is_found_in_a_record():
     assert one.chatter_hz == pytest.approx(1.5 * SPEED, abs=4 * one.chatter_sd_hz)
 
 
-def test_runout_is_not_locked_chatter_but_a_strong_second_order_may_be():
+def test_runout_and_ringing_are_not_locked_chatter_but_a_second_order_that_mixes_or_grows_may_be():
     runout = tone(1, 2.0) + tone(2, 0.4) + tone(4, 0.5)
     assert not signs.locked(seen(runout), TEETH)
-    assert signs.locked(seen(tone(2, 3.0)), TEETH)
+    assert not signs.locked(seen(tone(2, 3.0)), TEETH)
+    assert signs.locked(seen(tone(2, 3.0) + tone(4, 0.6) + tone(5, 0.4)), TEETH)
     assert signs.locked(seen(tone(1, np.linspace(0.1, 4.0, len(TIME)))), TEETH)
 
 

@@ -5,6 +5,6 @@ OBSERVED: tuple[str, ...] = (
     *("tip_force", "profile_points", "observability", "arm_loads", "deformation_refused"),
     *("face_indices", "face_map", "face_points", "face_loads", "face_mass", "face_refused"),
     *("modes", "lobes", "frf_used", "stabilisation", "lobe_runs", "lobes_refused"),
-    *("lobe_methods", "lobe_islands", "lobe_stations", "chatter_runs"),
+    *("lobe_methods", "lobe_islands", "lobe_stations", "chatter_runs", "chatter_records"),
     *("published_errors", "published_modes", "published_loads", "published_forces"),
 )

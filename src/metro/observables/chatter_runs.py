@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,15 +13,19 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.observables.force_orders import orbit_rate, spindle_angle, with_orbit
 from metro.signals import orders, steady
+from metro.signals.asynchronous import whole_spectrum
 from metro.signals.chatter import UNDECIDED, Detection, detect
 from metro.signals.chatter_signs import at_a_robot_mode
+from metro.signals.wander import followed
 from metro.surface.roughness import roughness
-from metro.units import JSON, MM, UM
+from metro.units import JSON, MM, UM, Array
 
 COLUMNS = (
     *("run", "rpm", "depth_mm", "probability", "chatter_hz", "chatter_sd_hz", "kind", "separable"),
     *("energy_ratio", "signs", "labelled", "ra_um", "rz_um", "note"),
 )
+RECORD_COLUMNS = ("run", "part", "x", "value", "on_order")
+TURNS_SHOWN = 12  # of a record, in its picture
 LABELS = {"no": 1, "yes": 0}  # of the operator, in the column ``stable``: 1 is unstable
 AXES = ["fx_n", "fy_n", "fz_n"]
 
@@ -77,20 +82,90 @@ def _observed(batch: Batch, run: str, read: Read) -> JSON:
 
 def _detection(batch: Batch, run: str, record: pd.DataFrame) -> tuple[Detection | None, str]:
     """Return what the record of a run says, or why it says nothing."""
+    teeth = int(batch.manifest["tool"]["teeth"])
+    try:
+        time, angle, signal = _steady_cut(batch, run, record)
+        found = detect(time, angle, signal, teeth)
+        if found.probability <= UNDECIDED or np.isfinite(record["spindle_deg"]).all():
+            return found, ""
+        wandering = detect(time, followed(time, angle, signal, teeth), signal, teeth)
+    except ValueError as error:
+        return None, str(error)
+    if wandering.probability > UNDECIDED:
+        return found, ""
+    # chatter beside an order can be taken for wander, and wander for chatter
+    left_open = replace(
+        found,
+        probability=UNDECIDED,
+        chatter_hz=math.nan,
+        chatter_sd_hz=math.nan,
+        kind="unknown",
+        separable=False,
+    )
+    return left_open, "without a tacho a speed that wanders would look the same"
+
+
+def _steady_cut(batch: Batch, run: str, record: pd.DataFrame) -> tuple[Array, Array, Array]:
+    """Time (n,), s, angle of the spindle (n,), rad, and force (n, 3), N, of the steady cut of a run.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
     row: Any = batch.runs.loc[run]
     time, signal = record["t_s"].to_numpy(float), record[AXES].to_numpy(float)
     rate, nominal = (len(time) - 1) / (time[-1] - time[0]), float(row["spindle_rpm"]) / 60.0
     teeth, orbit = int(batch.manifest["tool"]["teeth"]), orbit_rate(row) / (2.0 * math.pi)
-    try:
-        # a cut that is still entering may chatter already: no settling is left off but a turn
-        cut = steady.segments(signal, rate / nominal, round(rate / nominal)).steady
-        time, tacho = time[cut], record["spindle_deg"].to_numpy(float)[cut]
-        signal = with_orbit(time, signal[cut], orbit)
-        highest = orders.highest_order(rate, nominal, teeth)
-        angle, _, _ = spindle_angle(time, signal, tacho, nominal=nominal, orbit=orbit, highest=highest)
-        return detect(time, angle, signal, teeth), ""
-    except ValueError as error:
-        return None, str(error)
+    # a cut that is still entering may chatter already: no settling is left off but a turn
+    cut = steady.segments(signal, rate / nominal, round(rate / nominal)).steady
+    time, tacho = time[cut], record["spindle_deg"].to_numpy(float)[cut]
+    signal = with_orbit(time, signal[cut], orbit)
+    highest = orders.highest_order(rate, nominal, teeth)
+    angle, _, _ = spindle_angle(time, signal, tacho, nominal=nominal, orbit=orbit, highest=highest)
+    return time, angle, signal
+
+
+def observe_records(batch: Batch, read: Read, chatter: pd.DataFrame) -> pd.DataFrame:
+    """Return the spectrum and the last turns of a cut that chattered, and of one beside it that did not.
+
+    They are the two that are nearest to each other in speed, and among those in depth.
+
+    Returns
+    -------
+    DataFrame
+        Columns :data:`RECORD_COLUMNS`: ``part`` is "spectrum" (``x`` in Hz, ``value`` the amplitude of a
+        sine, all directions together, N) or "force" (``x`` in s, ``value`` the strongest direction less its
+        mean, N); ``on_order`` whether a line of the spectrum cannot be told from an order of the spindle.
+    """
+    told = measured(chatter)
+    unstable, stable = (told[told["unstable"] == kind] for kind in (1, 0))
+    runs = [str(run) for run in (*unstable.index[:1], *stable.index[:1])]
+    if len(runs) == 2:
+        pairs = unstable.reset_index().merge(stable.reset_index(), how="cross", suffixes=("", "_stable"))
+        apart = {
+            name: np.abs(np.log(pairs[name].to_numpy(float) / pairs[f"{name}_stable"].to_numpy(float)))
+            for name in ("rpm", "depth_mm")
+        }
+        nearest = pairs.assign(**apart).sort_values(["rpm", "depth_mm"], kind="stable").iloc[0]
+        runs = [str(nearest["run"]), str(nearest["run_stable"])]
+    parts = [_record(batch, run, read("force", run)) for run in runs]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(RECORD_COLUMNS))
+
+
+def _record(batch: Batch, run: str, record: pd.DataFrame) -> pd.DataFrame:
+    """Spectrum and last turns of the steady cut of one run."""
+    time, angle, signal = _steady_cut(batch, run, record)
+    frequency, amplitude, on_order = whole_spectrum(time, angle, signal)
+    few = angle > angle[-1] - 2.0 * math.pi * TURNS_SHOWN
+    centred = signal - signal.mean(axis=0)
+    trace = centred[few, int(np.argmax(centred.std(axis=0)))]
+    parts = [
+        {"part": "spectrum", "x": frequency, "value": amplitude, "on_order": on_order},
+        {"part": "force", "x": time[few], "value": trace, "on_order": False},
+    ]
+    table = pd.concat([pd.DataFrame(part) for part in parts], ignore_index=True)
+    return table.assign(run=run)[list(RECORD_COLUMNS)]
 
 
 def _roughness(trace: pd.DataFrame) -> JSON:

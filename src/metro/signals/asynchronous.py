@@ -15,11 +15,11 @@ import numpy as np
 from metro.units import Array
 
 LEAST_REVOLUTIONS, MOST_REVOLUTIONS = 20, 60  # of a window
-LEAST_WINDOWS, WINDOWS = 3, 5  # of a record: at least, and wanted
+WINDOWS = 3  # of a record, at least: the longer each is, the nearer to an order it sees a line
 SIGNIFICANCE = 1e-3  # of a peak, over all bins of a window
 LOWEST_HZ = 5.0  # of the modes of robots
 _WANDER = 2e-3  # relative error of speed within a window, that widens what counts as on an order
-_NEIGHBOURS = 3.0  # orders, over which the noise floor is read
+_NEIGHBOURS = 1.0  # orders, over which the noise floor is read: it follows what rings in an instrument
 _BAND = 0.3  # of the sampling rate, up to which the record is true
 _LEAK = 1  # bins to either side into which a line at a bin spreads in a Hann window; between bins, twice that
 
@@ -39,6 +39,7 @@ class Windows:
     floor : (w, b) noise floor of ``rest``.
     p_value : (w, b) probability that noise alone makes as much as ``rest``.
     asynchronous : (revolutions of the record, samples per revolution, channels) what does not repeat.
+    time : (samples,) s, of these samples.
     """
 
     revolutions: int
@@ -51,6 +52,7 @@ class Windows:
     floor: Array
     p_value: Array
     asynchronous: Array
+    time: Array
 
     @property
     def peaks(self) -> np.ndarray:
@@ -84,15 +86,10 @@ def windows(time: Array, angle: Array, signal: Array, *, differentiated: int = 0
     """
     even = over_angle(time, angle, signal)
     length, starts = _cut(len(even))
-    speed = float((angle[-1] - angle[0]) / (2.0 * math.pi * (time[-1] - time[0])))
-    rate = (len(time) - 1) / (time[-1] - time[0])
-    order = np.arange(int(min(_BAND * rate / speed, 0.5 * even.shape[1]) * length) + 1) / length
-    looked_at = order >= max(3.0 / length, LOWEST_HZ / speed)
-    nearest = np.round(order)
-    on_order = ~looked_at | (np.abs(order - nearest) <= 1.001 / length + _WANDER * nearest)
+    speed, order, looked_at, on_order = _axis(time, angle, even.shape[1], length)
     repeated = _repeated(even)
     rest, periodic, whole = (
-        np.stack([_power(part[start : start + length], len(order)) for start in starts])
+        np.stack([power_of(part[start : start + length], len(order)) for start in starts])
         for part in (even - repeated, repeated, even)
     )
     floor = _floor(rest, on_order, length)
@@ -108,23 +105,63 @@ def windows(time: Array, angle: Array, signal: Array, *, differentiated: int = 0
         floor=floor.sum(axis=2) * weight,
         p_value=_p_value(rest, floor),
         asynchronous=even - repeated,
+        time=even_times(time, angle),
     )
+
+
+def whole_spectrum(time: Array, angle: Array, signal: Array) -> tuple[Array, Array, np.ndarray]:
+    """Frequencies (b,), Hz, amplitudes of sines (b,), all channels together, and which are on orders (b,).
+
+    Of the whole record, (n,) s, (n,) rad and (n, channels), as the detection sees it: over even angles.
+    """
+    even = over_angle(time, angle, signal)
+    speed, order, _, on_order = _axis(time, angle, even.shape[1], len(even))
+    power = power_of(even, len(order)).sum(axis=1)
+    # a Hann taper spreads the power of a sine over bins of which the highest has two thirds
+    return order * speed, np.sqrt(2.0 * 1.5 * power), on_order
 
 
 def over_angle(time: Array, angle: Array, signal: Array) -> Array:
     """Whole revolutions of a record at even angles, (revolutions, samples per revolution, channels)."""
     from scipy.interpolate import CubicSpline
 
+    when = even_times(time, angle)
+    per_turn = _per_turn(time, angle)
+    return np.asarray(CubicSpline(time, signal)(when).reshape(len(when) // per_turn, per_turn, -1))
+
+
+def even_times(time: Array, angle: Array) -> Array:
+    """Return times (samples,), s, of even angles over the whole revolutions of a record."""
     turns = (angle - angle[0]) / (2.0 * math.pi)
-    count = int(turns[-1] + 1.0 / len(turns))
-    per_turn = max(8, round((len(time) - 1) / turns[-1]))
-    when = np.interp(np.arange(count * per_turn) / per_turn, turns, time)
-    return np.asarray(CubicSpline(time, signal)(when).reshape(count, per_turn, -1))
+    count, per_turn = int(turns[-1] + 1.0 / len(turns)), _per_turn(time, angle)
+    return np.asarray(np.interp(np.arange(count * per_turn) / per_turn, turns, time))
+
+
+def _per_turn(time: Array, angle: Array) -> int:
+    """Return the samples per revolution of a record, as a whole number."""
+    return max(8, round((len(time) - 1) * 2.0 * math.pi / float(angle[-1] - angle[0])))
+
+
+def _axis(
+    time: Array, angle: Array, per_turn: int, length: int
+) -> tuple[float, Array, np.ndarray, np.ndarray]:
+    """Speed, rev/s; orders (b,) of a window's bins; which are looked at, and which are not off the orders."""
+    speed = float((angle[-1] - angle[0]) / (2.0 * math.pi * (time[-1] - time[0])))
+    rate = (len(time) - 1) / (time[-1] - time[0])
+    order = np.arange(int(min(_BAND * rate / speed, 0.5 * per_turn) * length) + 1) / length
+    looked_at = order >= max(3.0 / length, LOWEST_HZ / speed)
+    nearest = np.round(order)
+    return (
+        speed,
+        order,
+        looked_at,
+        ~looked_at | (np.abs(order - nearest) <= 1.001 / length + _WANDER * nearest),
+    )
 
 
 def _cut(revolutions: int) -> tuple[int, np.ndarray]:
     """Length and starts of the windows, in revolutions."""
-    least = LEAST_REVOLUTIONS * (LEAST_WINDOWS + 1) // 2
+    least = LEAST_REVOLUTIONS * (WINDOWS + 1) // 2
     if revolutions < least:
         raise ValueError(f"{revolutions} revolutions of steady cut: at least {least} are needed")
     length = int(np.clip(2 * revolutions // (WINDOWS + 1), LEAST_REVOLUTIONS, MOST_REVOLUTIONS))
@@ -139,7 +176,7 @@ def _repeated(even: Array) -> Array:
     return np.asarray(even.mean(axis=0) + turn[:, None, None] * slope)
 
 
-def _power(part: Array, bins: int) -> Array:
+def power_of(part: Array, bins: int) -> Array:
     """Mean-square spectrum (bins, channels) of a window, by a Hann taper."""
     flat = part.reshape(-1, part.shape[2])
     taper = 0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(len(flat)) + 0.5) / len(flat))

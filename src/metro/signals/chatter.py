@@ -13,17 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.signals import chatter_signs as signs
-from metro.signals.asynchronous import LEAST_WINDOWS, Windows, windows
+from metro.signals.asynchronous import WINDOWS, Windows, windows
 from metro.units import Array
 
 BEGINS, ENDS = 0.2, 0.1  # energy ratio at which chatter begins, and below which it has ended
+# Log-odds of chatter. With a sign that the vibration feeds itself: those of the energy ratio that two windows
+# in a row reach, within LIMITS, the share of the line that keeps one frequency, and that of the windows with
+# side bands. Logistic regression on simulated tests about the boundary of many machines, tools and metals,
+# made and fitted by ``python benchmarks/calibrate_chatter.py``; benchmarks/bench_chatter.py tells others.
+# Without a sign, the odds of energy alone, of an earlier regression that is not part of the command: even at
+# an energy ratio of 46 %, which noise that shakes a mode does not reach. The least shares were chosen.
+ALONE, PER_LOGIT, PER_KEPT, PER_SIDE_BANDS = 3.27, 1.52, 0.88, 2.68
+UNSEEN, PER_LOGIT_UNSEEN = 0.35, 2.3
+SEEN, SEEN_FAINT = 0.5, 0.7  # least share, of either sign, above and below the ratio at which chatter begins:
+# noise that shakes a mode reaches a tenth of the energy, and keeps to one frequency for two thirds
+LIMITS = (-7.0, -1.0)  # energy ratios of 0.1 % and 27 %: beyond, less or more energy says nothing new
 TINY = 1e-3  # energy ratio below which nothing more is told
-# Log-odds of chatter: where signs of it were seen, where none was, and per log-odds of the energy. Logistic
-# regression on simulated tests near the boundary, where chatter moves the tip by more than half the feed per
-# tooth from turn to turn; with signs the odds are even at an energy ratio of 18 %, without at 46 %.
-SEEN, UNSEEN, PER_LOGIT = 3.5, 0.35, 2.3
-ERROR = 0.01  # probability that the answer is wrong however clear the record
+ERROR = 0.02  # probability that the answer is wrong however clear the record: 5 of 274 in bench_chatter.py
 UNDECIDED = 0.5
+TOGETHER = 2  # windows in a row that count as evidence
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,26 +76,30 @@ def detect(time: Array, angle: Array, signal: Array, teeth: int, *, differentiat
     ratio, order = seen.energy_ratio, signs.line(seen)
     found = _signs(seen, order, teeth)
     looks = np.any(list(found.values()), axis=0)
-    chattering = held(ratio, looks)
-    probability = probability_of(evidence(ratio), seen=looks.sum() >= LEAST_WINDOWS)
-    names = tuple(name for name, mask in found.items() if mask.sum() >= LEAST_WINDOWS)
-    if chattering.any():
-        middle, sd = _mean(order[chattering & np.isfinite(order)], seen)
-        kind = signs.kind_of(middle / seen.speed, teeth, 1.0 / seen.revolutions)
-        return Detection(probability, middle, sd, kind, True, ratio, chattering, names)
-    separable = probability > UNDECIDED or not signs.locked(seen, teeth)
-    beginning = bool(ratio[-1] > BEGINS and looks[-1])  # at the record's end, too late to be held
-    if probability < UNDECIDED and (beginning or not separable):
-        probability = UNDECIDED
-    kind = "forced" if probability < UNDECIDED else "unknown"
-    return Detection(probability, math.nan, math.nan, kind, separable, ratio, chattering, names)
+    names = tuple(name for name, mask in found.items() if mask.sum() >= WINDOWS)
+    kept_hz, share = signs.kept_frequency(seen, order)
+    probability = probability_of(evidence(ratio), share, float(found["side bands"].mean()))
+    if probability > UNDECIDED:
+        chattering = held(ratio, looks)
+        # too late or too faint to be held: where the line is seen
+        vibrates = np.isfinite(order) & (chattering if chattering.any() else True)
+        kind = signs.kind_of(kept_hz / seen.speed, teeth, 1.0 / seen.revolutions)
+        return Detection(
+            probability, kept_hz, _deviation(order[vibrates], seen), kind, True, ratio, vibrates, names
+        )
+    separable = not signs.locked(seen, teeth)
+    beginning = bool(ratio[-1] > BEGINS and looks[-1])  # at the record's end, too late to be sure
+    told = separable and not beginning
+    none = np.zeros(len(ratio), dtype=bool)
+    kind, probability = ("forced", probability) if told else ("unknown", UNDECIDED)
+    return Detection(probability, math.nan, math.nan, kind, separable, ratio, none, names)
 
 
-def _mean(order: Array, seen: Windows) -> tuple[float, float]:
-    """Mean frequency of the line over windows, Hz, and its standard deviation."""
+def _deviation(order: Array, seen: Windows) -> float:
+    """Return the standard deviation, Hz, of the frequency of a line at some orders (k,) in windows."""
     # half overlapping windows: every second one is a measurement of its own
     scatter = float(order.std()) / math.sqrt(max(0.5 * len(order), 1.0))
-    return float(order.mean()) * seen.speed, math.hypot(signs.FINEST / seen.revolutions, scatter) * seen.speed
+    return math.hypot(signs.FINEST / seen.revolutions, scatter) * seen.speed
 
 
 def _signs(seen: Windows, order: Array, teeth: int) -> dict[str, np.ndarray]:
@@ -104,7 +116,7 @@ def _signs(seen: Windows, order: Array, teeth: int) -> dict[str, np.ndarray]:
 def held(ratio: Array, looks: np.ndarray) -> np.ndarray:
     """Windows (w,) in which it chatters: begun by three in a row above 20 %, over at the first below 10 %."""
     on = (ratio > BEGINS) & looks
-    begins = np.convolve(on, np.ones(LEAST_WINDOWS)) >= LEAST_WINDOWS - 0.5
+    begins = np.convolve(on, np.ones(WINDOWS)) >= WINDOWS - 0.5
     state = np.zeros(len(ratio), dtype=bool)
     for window in range(len(ratio)):
         before = window > 0 and bool(state[window - 1])
@@ -115,13 +127,25 @@ def held(ratio: Array, looks: np.ndarray) -> np.ndarray:
 
 
 def evidence(ratio: Array) -> float:
-    """Log-odds of the energy off the orders that are reached in three windows in a row."""
+    """Log-odds of the energy off the orders that are reached in two windows in a row."""
     kept = np.clip(ratio, TINY, 1.0 - TINY)
-    three = np.lib.stride_tricks.sliding_window_view(np.log(kept / (1.0 - kept)), LEAST_WINDOWS)
-    return float(three.min(axis=1).max())
+    together = np.lib.stride_tricks.sliding_window_view(np.log(kept / (1.0 - kept)), TOGETHER)
+    return float(together.min(axis=1).max())
 
 
-def probability_of(evidence: float, *, seen: bool) -> float:
-    """Probability of chatter, from the log-odds of the energy and whether a sign of chatter was seen."""
-    odds = (SEEN if seen else UNSEEN) + PER_LOGIT * evidence
+def probability_of(evidence: float, kept: float, side_bands: float) -> float:
+    """Probability of chatter.
+
+    Parameters
+    ----------
+    evidence : log-odds of the energy, see :func:`evidence`.
+    kept : share of the line that keeps one frequency.
+    side_bands : share of the windows with side bands.
+    """
+    begun = evidence > math.log(BEGINS / (1.0 - BEGINS))
+    if max(kept, side_bands) < (SEEN if begun else SEEN_FAINT):
+        odds = UNSEEN + PER_LOGIT_UNSEEN * evidence
+    else:
+        within = min(max(evidence, LIMITS[0]), LIMITS[1])
+        odds = ALONE + PER_LOGIT * within + PER_KEPT * kept + PER_SIDE_BANDS * side_bands
     return ERROR + (1.0 - 2.0 * ERROR) / (1.0 + math.exp(-odds))

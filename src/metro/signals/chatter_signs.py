@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from metro.signals.asynchronous import Windows
+from metro.signals.asynchronous import Windows, power_of
 from metro.units import Array
 
 GROWTH = 4.0  # of an energy, from the first window to the last
@@ -15,9 +15,11 @@ SIDE_BANDS = 2  # of the four nearest, at least
 FINEST = 0.05  # of a bin: what the place of a peak between bins is worth
 LOW_HZ = (5.0, 300.0)  # where the modes of robots are
 LOW_RUNS, LOW_SPEEDS, LOW_SCATTER = 3, 1.2, 0.01  # runs, ratio of their speeds, relative scatter of frequency
+_WITHIN, _ABOUT = 2, 0.3  # bins about a line that are its own; orders about it that are compared
 _BLOCK = 5  # revolutions over which an amplitude is read
 _NEAR = 2  # bins about the mean line in which it is sought in each window
 _LOCKED = 0.5  # of all energy on one order that is none of the teeth's
+_MIXED = 0.03  # of that energy, at the orders that it makes with itself and the teeth
 
 
 def line(seen: Windows) -> Array:
@@ -83,20 +85,51 @@ def amplitude_scatter(seen: Windows, order: float) -> float:
     return float(steady.std() / steady.mean())
 
 
+def kept_frequency(seen: Windows, order: Array) -> tuple[float, float]:
+    """Frequency of the line over the whole record, Hz, and the share of the energy near it that is in it.
+
+    A vibration that feeds itself keeps its frequency; a mode shaken by noise fills its own bandwidth. Without
+    a line the frequency is NaN and the share 0.
+    """
+    from scipy.interpolate import CubicSpline
+
+    if not np.isfinite(order).any():
+        return math.nan, 0.0
+    turns, per_turn, channels = seen.asynchronous.shape
+    # over even times: where the speed wanders, chatter keeps its frequency rather than its order
+    even = np.linspace(seen.time[0], seen.time[-1], turns * per_turn)
+    flat = CubicSpline(seen.time, seen.asynchronous.reshape(-1, channels))(even)
+    power = power_of(flat[None], turns * per_turn // 2).sum(axis=1)
+    middle, near = round(float(np.nanmean(order)) * turns), round(0.5 * _ABOUT * turns)
+    first = max(middle - near, 1)
+    top = first + int(np.argmax(power[first : middle + near + 1]))
+    own, about = (
+        power[max(top - reach, 0) : top + reach + 1].sum() for reach in (_WITHIN, round(_ABOUT * turns))
+    )
+    at = top + _between(power[top - 1 : top + 2])
+    return at / (float(even[1] - even[0]) * len(even)), float(own / about)
+
+
 def locked(seen: Windows, teeth: int) -> bool:
     """Whether something other than runout may vibrate at orders of the spindle that are none of the teeth's.
 
-    It does where the energy there has grown, or where one order carries half of all and is not the first,
-    which runout excites most. Its frequency does not tell it from runout or uneven teeth.
+    It does where the energy there has grown; or where one order carries half of all, is not the first, which
+    runout excites most, and mixes with itself and the teeth, as no ringing of an instrument does. Its
+    frequency does not tell it from runout or uneven teeth.
     """
     nearest = np.round(seen.order).astype(int)
     on = seen.on_order & (nearest > 0)
     energy = np.stack([np.bincount(nearest[on], power[on]) for power in seen.whole])
     number = np.arange(energy.shape[1])
-    other = energy[:, number % teeth != 0]
+    others = number % teeth != 0
+    other = energy[:, others]
     grown = _rises(other.sum(axis=1)) and other[-1].sum() > _LOCKED * energy[-1].sum()
-    total = np.where(number % teeth != 0, energy.sum(axis=0), 0.0)
-    return bool(grown or (total.argmax() > 1 and total.max() > _LOCKED * energy.sum()))
+    total, whole = np.where(others, energy.sum(axis=0), 0.0), float(energy.sum())
+    top = int(total.argmax())
+    mixed = {2 * top, top + teeth, abs(top - teeth)} - {1, top}
+    mixes = sum(total[k] for k in mixed if k < len(total)) > _MIXED * total[top]
+    single = top > 1 and total[top] > _LOCKED * whole and mixes
+    return bool(grown or single)
 
 
 def kind_of(order: float, teeth: int, width: float) -> str:

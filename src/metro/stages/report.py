@@ -23,6 +23,7 @@ TABLES = (
     "lobe_islands",
     "lobe_stations",
     "chatter_runs",
+    "chatter_records",
     "lobe_runs",
     "yielding",
     "frf_used",

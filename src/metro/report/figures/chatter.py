@@ -22,6 +22,9 @@ KINDS = {
     "unknown": ("$?$", style.MEASURED, "unknown kind, or cannot be told"),
 }
 STABLE = ((0, style.GREEN, "stable"), (1, style.BEFORE, "chatter"))
+NUMBERED = 25  # tests, up to which each has its probability beside it
+SPECTRUM_TO = 6.5  # tooth passings, of a spectrum that is drawn; at least this much of the chatter frequency:
+BEYOND_CHATTER = 1.3
 ROUGHNESS = (("ra_um", "Ra (µm)"), ("rz_um", "Rz (µm)"))
 
 
@@ -31,13 +34,15 @@ def tests_chart(boundary: pd.DataFrame, tests: pd.DataFrame) -> Figure:
     Parameters
     ----------
     boundary : as for :func:`metro.report.figures.lobes.lobes_chart`.
-    tests : ``position, rpm, depth_mm, kind, wrong_label``.
+    tests : ``position, rpm, depth_mm, kind, probability, wrong_label``.
     """
     with style.style():
         figure, panels = panels_of(boundary)
         for position, axes in panels.items():
             _, here = drawn_with_tests(axes, position, boundary, tests)
             _marks(axes, here)
+            if len(tests) <= NUMBERED:
+                _probabilities(axes, here)
         handles, labels = max(panels.values(), key=entries).get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=4)
     return figure
@@ -61,6 +66,70 @@ def _marks(axes: Axes, tests: pd.DataFrame) -> None:
             zorder=2,
             label="labelled otherwise",
         )
+
+
+def _probabilities(axes: Axes, tests: pd.DataFrame) -> None:
+    for _, test in tests.iterrows():
+        place = (test["rpm"], test["depth_mm"])
+        axes.annotate(
+            f"{test['probability']:.2f}", place, (7, 0), textcoords="offset points", va="center", fontsize=6.5
+        )
+
+
+def records_chart(records: pd.DataFrame, tests: pd.DataFrame, teeth: int) -> Figure:
+    """Draw spectrum and force of a cut that chattered and of a stable one, a row each; chatter is marked.
+
+    Parameters
+    ----------
+    records : ``run, part, x, value, on_order``, as observed.
+    tests : a row per run of the records: ``rpm, depth_mm, chatter_hz, unstable``.
+    teeth : number of teeth of the tool.
+    """
+    runs = list(records["run"].drop_duplicates())
+    with style.style():
+        figure, grid = style.new_figure(0.5 + 2.0 * len(runs), len(runs), 2)
+        for run, (left, right) in zip(runs, grid, strict=True):
+            test = tests[tests["run"] == run].iloc[0]
+            here = records[records["run"] == run]
+            _spectrum(left, here[here["part"] == "spectrum"], test, teeth)
+            trace = here[here["part"] == "force"]
+            _, colour, words = STABLE[int(test["unstable"])]
+            right.plot(trace["x"], trace["value"], color=colour, lw=0.8)
+            right.set(xlabel="time (s)", ylabel="force less its mean (N)")
+            left.set_title(f"{run}: {words}, {test['rpm']:.0f} rpm, {test['depth_mm']:g} mm", loc="left")
+        handles, labels = grid[0][0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return figure
+
+
+def _spectrum(axes: Axes, lines: pd.DataFrame, test: pd.Series, teeth: int) -> None:
+    """Draw a spectrum, on and off the orders of the spindle, with tooth passings and chatter marked."""
+    passing = teeth * float(test["rpm"]) / 60.0
+    chatter = float(test["chatter_hz"])
+    last = max(SPECTRUM_TO * passing, BEYOND_CHATTER * chatter if chatter > 0.0 else 0.0)
+    shown = lines[lines["x"] <= last]
+    for on_order, colour, label in (
+        (True, style.GREY, "orders of the spindle"),
+        (False, style.AFTER, "rest"),
+    ):
+        height = shown["value"].where(shown["on_order"].astype(bool) == on_order, 0.0)
+        axes.vlines(shown["x"], 0.0, height, color=colour, lw=0.9, label=label)
+    top = 1.22 * float(shown["value"].max())
+    multiples = [k * passing for k in range(1, int(last / passing) + 1)]
+    axes.plot(
+        multiples, [0.97 * top] * len(multiples), "v", color=style.MEASURED, ms=3, label="tooth passing"
+    )
+    if chatter > 0.0:
+        at = float(shown["value"].to_numpy(float)[(shown["x"] - chatter).abs().to_numpy(float).argmin()])
+        axes.annotate(
+            f"chatter {chatter:.1f} Hz",
+            (chatter, at),
+            (chatter + 0.06 * last, 0.8 * top),
+            color=style.BEFORE,
+            fontsize=8,
+            arrowprops={"arrowstyle": "->", "color": style.BEFORE},
+        )
+    axes.set(xlim=(0.0, last), ylim=(0.0, top), xlabel="frequency (Hz)", ylabel="force amplitude (N)")
 
 
 def roughness_chart(tests: pd.DataFrame) -> Figure:

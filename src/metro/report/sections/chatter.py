@@ -30,10 +30,11 @@ def chatter_items(results: Results) -> list[Item]:
     items: list[Item] = [Heading("Chatter in the records")]
     boundary = results.tables.get("lobes_final")
     if boundary is not None and tests["position"].notna().any():
-        caption = "Test cuts on the stability boundary, by what their own records say."
+        caption = "Test cuts on the stability boundary, by what their own records say"
+        caption += ", with the probability of chatter." if len(tests) <= figures.NUMBERED else "."
         items.append(Picture(figures.tests_chart(boundary, tests), caption, caption))
     items += [_table(tests, results.batch.manifest), *_confusion(tests), Bullets(_words(tests))]
-    return items + _roughness(tests)
+    return [*items, *_records(results, tests), *_roughness(tests)]
 
 
 def _tests(results: Results) -> pd.DataFrame | None:
@@ -133,6 +134,19 @@ def _words(tests: pd.DataFrame) -> list[str]:
     if late:
         words.append(f"Chatter may begin at the end of the record of {listing(late)}; a longer cut tells.")
     return words
+
+
+def _records(results: Results, tests: pd.DataFrame) -> list[Item]:
+    """Show the spectrum and the last turns of a cut that chattered and of one that did not."""
+    records = results.tables.get("chatter_records")
+    if records is None:
+        return []
+    caption = (
+        "Force in a cut that chattered and in a stable one: spectrum of the whole steady cut, and its last "
+        "turns. What chatters stands between the orders of the spindle."
+    )
+    chart = figures.records_chart(records, tests, int(results.batch.manifest["tool"]["teeth"]))
+    return [Picture(chart, caption, caption)]
 
 
 def _roughness(tests: pd.DataFrame) -> list[Item]:
