@@ -132,6 +132,66 @@ def test_each_kind_of_measurement_keeps_both_roles():
             assert having & set(made["validate"])
 
 
+def labels(speeds, depths=3, **more):
+    """Rows of tests at ``depths`` depths of each speed, every one a condition of its own."""
+    return [
+        {
+            "condition": f"l{speed:g}-{depth}",
+            "spindle_rpm": speed,
+            "axial_depth_mm": 1.0 + depth,
+            "stable": "yes",
+            **more,
+        }
+        for depth in range(depths)
+        for speed in speeds
+    ]
+
+
+def speeds_by_role(rows, share=0.34, seed=1):
+    made = plan(table(*rows), share, seed)
+    return tuple(
+        {rows[int(run[1:]) - 1]["spindle_rpm"] for run in made[role]} for role in ("identify", "validate")
+    )
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(4, 10), st.integers(1, 4), st.floats(0.05, 0.95), st.integers(0, 20))
+def test_of_labelled_tests_whole_speeds_are_held_out(count, depths, share, seed):
+    speeds = [2000.0 + 500.0 * i for i in range(count)]
+    kept, out = speeds_by_role(labels(speeds, depths), share, seed)
+    assert not kept & out
+    assert len(out) == min(max(1, round(share * count)), count - 2)
+    if len(out) <= count - 2:
+        assert {speeds[0], speeds[-1]} <= kept
+
+
+def test_labels_at_three_speeds_are_held_out_by_condition():
+    kept, out = speeds_by_role(labels([2000.0, 3000.0, 4000.0], 4))
+    assert kept & out
+
+
+def test_a_run_that_the_table_holds_out_leaves_the_rest_to_conditions():
+    rows = labels([2000.0, 3000.0, 4000.0, 5000.0])
+    rows[1]["role"] = "validate"
+    made = plan(table(*rows), 0.34, 1)
+    assert "r2" in made["validate"]
+    assert "whole spindle speeds" not in made["how"]
+
+
+def test_a_speed_that_the_table_gives_to_identification_stays_whole_there():
+    rows = labels([2000.0, 3000.0, 4000.0, 5000.0, 6000.0])
+    rows[2]["role"] = "identify"
+    for seed in range(10):
+        kept, out = speeds_by_role(rows, 0.34, seed)
+        assert 4000.0 in kept
+        assert not kept & out
+
+
+def test_held_out_speeds_are_told():
+    made = plan(table(*labels([2000.0, 3000.0, 4000.0, 5000.0])), 0.25, 1)
+    assert "stability: 1 of 4 whole spindle speeds held out (rev/min): " in made["how"]
+
+
 def test_the_only_condition_of_an_operation_is_kept():
     rows = [*feeds(3), {"condition": "h", "operation": "helical", "dynamometer": "d"}]
     for seed in range(20):

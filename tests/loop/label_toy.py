@@ -58,6 +58,13 @@ class Made:
         model = change(Line())
         return model.boundary(self.point_rpm), np.full(len(self.point_rpm), model.hz)
 
+    def estimates(self, changes):
+        """In error by a little that differs from speed to speed and grows with the change."""
+        models = [change(Line()) for change in changes]
+        depth = np.stack([model.boundary(self.point_rpm) for model in models])
+        error = 0.2 * np.cos(self.point_rpm / 700.0) * (1.0 + depth - np.log(1e-3))
+        return depth + error, np.outer([model.hz for model in models], np.ones(len(self.point_rpm)))
+
     def boundary_at(self, change, rpm):
         return change(Line()).boundary(rpm)
 

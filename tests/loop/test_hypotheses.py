@@ -5,19 +5,19 @@ import pytest
 from label_toy import GATES, SHIFT, SLOPE, Line, problem
 from scipy.special import logsumexp
 
-from metro.loop.hypotheses import Evidence, hypothesis, quantile
+from metro.loop.hypotheses import Evidence, changed, hypothesis, quantile
 from metro.loop.label_evidence import log_likelihood
 from metro.loop.labelled import tests_of as told_by
 
 TASK = problem(Line(slope=0.8, shift=-0.4), 5)
 TESTS, _ = told_by(TASK, "identify")
-EVIDENCE = Evidence(TASK.boundaries, TESTS, np.zeros((1, len(TASK.point_rpm))), GATES.seed)
+EVIDENCE = Evidence(TASK.boundaries, TASK.estimates, TESTS, np.zeros((1, len(TASK.point_rpm))), GATES.seed)
 
 
 def grid(effects, count):
     """Points of the prior on a fine grid, and their log-likelihood."""
     share = (np.arange(count) + 0.5) / count
-    axes = [[quantile(effect.parameters[0], u) for u in share] for effect in effects]
+    axes = [quantile(effect.parameters[0], share) for effect in effects]
     theta = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
     models = [Line(**{e.name: v for e, v in zip(effects, row, strict=True)}) for row in theta]
     depth = np.stack([model.boundary(TASK.point_rpm) for model in models])
@@ -40,11 +40,20 @@ def test_evidence_and_posterior_are_those_of_a_fine_grid(effects):
         assert told["ci95"][1] - told["ci95"][0] == pytest.approx(3.92 * sd, rel=0.4)
 
 
-def test_more_points_are_drawn_where_few_are_left():
-    assert len(hypothesis((SLOPE,), EVIDENCE).theta) > 32
-    few = problem(Line(), 1, rpm=np.array([4000.0]))
-    vague = Evidence(few.boundaries, told_by(few, "validate")[0], np.zeros((1, 1)), 1)
-    assert len(hypothesis((SLOPE,), vague).theta) == 32
+@pytest.mark.parametrize("effects", [(SLOPE,), (SHIFT, SLOPE)])
+def test_enough_points_are_left_for_the_ends_of_an_interval(effects):
+    found = hypothesis(effects, EVIDENCE)
+    assert 1.0 / np.sum(found.weights**2) > 50.0
+
+
+def test_what_is_not_solved_is_learnt_and_its_error_is_as_told():
+    found = hypothesis((SHIFT, SLOPE), EVIDENCE)
+    exact = np.stack([TASK.boundaries(changed(found, i))[0] for i in range(len(found.theta))])
+    error = found.depth - EVIDENCE.told(exact)
+    weight = found.weights[:, None] * np.ones_like(error)
+    rough = np.stack([TASK.estimates([changed(found, i)])[0][0] for i in range(len(found.theta))]) - exact
+    assert np.average(error**2, weights=weight) < 0.01 * np.average(rough**2, weights=weight)
+    assert np.average(error**2, weights=weight) < 4.0 * np.average(found.unsure**2, weights=weight)
 
 
 def test_nothing_has_one_prediction():

@@ -12,6 +12,7 @@ from metro.units import JSON
 
 FEWEST_CONDITIONS = 3  # with fewer, holding one out leaves nothing to see a trend in
 FEWEST_KEPT = 2
+FEWEST_SPEEDS = 4  # of tests with a label, from which on whole speeds are held out
 NUMBERS = ("feed_per_tooth_mm", "spindle_rpm", "axial_depth_mm", "radial_depth_mm")
 ALONE = 8  # rank of the only condition of its operation: above any number of other settings at an end
 
@@ -24,8 +25,11 @@ def plan(runs: pd.DataFrame, share: float, seed: int) -> JSON:
 
     The roles of the table stand. Where they are blank, whole conditions are held out, for each kind of
     measurement in turn, so that each keeps both roles where it can; conditions inside the range of feeds go
-    before those at its ends, since a model is held to interpolate before it is asked to extrapolate. Neither
-    the order of the rows nor any signal matters.
+    before those at its ends, since a model is held to interpolate before it is asked to extrapolate. Tests
+    that were judged stable or not, at :data:`FEWEST_SPEEDS` speeds or more, are held out by whole spindle
+    speeds, all conditions of one together, unless the table itself holds a run out: the boundary at a speed
+    is one number, which a test there at another depth gives away. Neither the order of the rows nor any
+    signal matters.
 
     Parameters
     ----------
@@ -41,7 +45,10 @@ def plan(runs: pd.DataFrame, share: float, seed: int) -> JSON:
     roles = _declared(there)
     sentences = ["roles as the run table states them"] if roles else []
     if (there["role"] == "").any():
-        ranks = {kind: _ranks(there[has], seed) for kind, has in _kinds(there).items()}
+        kinds = _kinds(there)
+        if not (there["role"] == "validate").any() and "stability" in kinds:
+            sentences += _hold_out_speeds(there[kinds["stability"]], roles, share, seed)
+        ranks = {kind: _ranks(there[has], seed) for kind, has in kinds.items()}
         fewest_first = sorted(ranks, key=lambda kind: (len(ranks[kind]), kind))
         sentences += [_hold_out(kind, ranks[kind], roles, share) for kind in fewest_first]
         sentences.append(f"drawn with seed {seed}")
@@ -73,6 +80,30 @@ def _kinds(runs: pd.DataFrame) -> dict[str, pd.Series]:
         "stability": runs["stable"] != "",
     }
     return {kind: has for kind, has in kinds.items() if has.any()}
+
+
+def _hold_out_speeds(tests: pd.DataFrame, roles: dict[str, str], share: float, seed: int) -> list[str]:
+    """Fill in the roles of the tests' conditions by whole speeds, where these are enough; say so.
+
+    A speed at which the table gives a condition to identification stays there.
+    """
+    speed = tests.groupby("condition")["spindle_rpm"].min()
+    speeds = sorted(speed.unique())
+    if len(speeds) < FEWEST_SPEEDS:
+        return []
+    taken = set(speed[speed.index.isin(list(roles))])
+
+    def rank(value: float) -> Rank:
+        draw = hashlib.sha256(f"{seed}:{value:g}".encode()).hexdigest()
+        return value in (speeds[0], speeds[-1]), 0, draw
+
+    free = sorted((value for value in speeds if value not in taken), key=rank)
+    wanted = min(max(1, round(share * len(speeds))), len(speeds) - FEWEST_KEPT)
+    out = set(free[:wanted])
+    for name, value in speed.items():
+        roles.setdefault(str(name), "validate" if value in out else "identify")
+    listed = ", ".join(f"{value:g}" for value in sorted(out)) or "none"
+    return [f"stability: {len(out)} of {len(speeds)} whole spindle speeds held out (rev/min): {listed}"]
 
 
 def _hold_out(kind: str, ranks: Mapping[str, Rank], roles: dict[str, str], share: float) -> str:

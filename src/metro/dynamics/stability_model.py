@@ -8,12 +8,14 @@ boundary depends on, so that at ``n`` it is ``f`` times what it is without softe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from metro.dynamics.lobes import stability_boundary
 from metro.dynamics.system import Cut, Structure
+from metro.dynamics.zero_order import zero_order_boundary
 from metro.units import Array
 
 
@@ -42,11 +44,33 @@ class StabilityModel:
         ValueError
             When nothing is left of the stiffness at one of the speeds.
         """
-        factor = 1.0 + self.softening * np.asarray(rpm, dtype=float)
-        if np.any(factor <= 0.0):
-            raise ValueError(f"no stiffness left at {np.max(rpm):g} rev/min")
+        factor = self._factor(rpm)
         found = [stability_boundary(self.structure, cut, rpm / np.sqrt(factor)) for cut in self.cuts]
         depth = np.stack([one.depth for one in found])
         least = (depth.argmin(axis=0), np.arange(depth.shape[1]))
         chatter = np.stack([one.chatter_hz for one in found])[least]
         return factor * depth[least], np.sqrt(factor) * chatter
+
+    def _factor(self, rpm: Array) -> Array:
+        factor: Array = 1.0 + self.softening * np.asarray(rpm, dtype=float)
+        if np.any(factor <= 0.0):
+            raise ValueError(f"no stiffness left at {np.max(rpm):g} rev/min")
+        return factor
+
+
+def estimated(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Array]:
+    """Lowest depths (t, k) and chatter frequencies there (t, k) of t models, to zeroth order.
+
+    The models have equally many modes, and cuts that differ in process damping alone.
+    """
+    factor = np.stack([model._factor(rpm) for model in models])
+    structures = [model.structure for model in models]
+    slowed = rpm / np.sqrt(factor)
+    found = [
+        zero_order_boundary(structures, cuts, slowed) for cuts in zip(*(m.cuts for m in models), strict=True)
+    ]
+    depth, chatter = (np.stack(part) for part in zip(*found, strict=True))
+    least = depth.argmin(axis=0)[None]
+    chosen = (np.take_along_axis(part, least, axis=0)[0] for part in (depth, chatter))
+    lowest, hz = chosen
+    return factor * lowest, np.sqrt(factor) * hz

@@ -73,19 +73,25 @@ def own_sd(tests: Labels) -> float:
     return tests.model_sd * float(np.sqrt(OF_SPEED + OF_TEST))
 
 
-def log_likelihood(tests: Labels, depth: Array, chatter: Array, deviations: Array) -> Array:
+def log_likelihood(
+    tests: Labels, depth: Array, chatter: Array, deviations: Array, unsure: Array | None = None
+) -> Array:
     """Log-likelihood (t, s, j) of the tests at each of j speeds.
 
     Parameters
     ----------
     depth, chatter : (t, p) log depth and chatter frequency (Hz) of t boundaries at all points.
     deviations : (s, p) deviations of the log depth, what all tests share included.
+    unsure : (t, p) standard deviations of ``depth``, where it is not known exactly.
     """
+    own = np.random.default_rng(0).standard_normal(deviations.shape)  # the same for all boundaries
     total = np.zeros((len(depth), len(deviations), len(tests.speeds)))
     for point in np.unique(tests.point):
         here = tests.take(tests.point == point)
         grid, told = _table(here)
         at = depth[:, None, point] + deviations[None, :, point]
+        if unsure is not None:
+            at = at + unsure[:, None, point] * own[None, :, point]
         speed = np.searchsorted(tests.speeds, tests.rpm[point])
         total[:, :, speed] += np.interp(at, grid, told) + _frequency(here, chatter[:, point])[:, None]
     return total

@@ -99,7 +99,7 @@ def search_labels(problem: Labelled, library: Sequence[Effect], gates: Gates) ->
     tests, _ = tests_of(problem, "identify")
     base = problem.deviations(DEVIATIONS, gates.seed)
     shared = np.random.default_rng(gates.seed).normal(size=(DEVIATIONS, 1)) * tests.model_sd * SHARED**0.5
-    evidence = Evidence(problem.boundaries, tests, base + shared, gates.seed)
+    evidence = Evidence(problem.boundaries, problem.estimates, tests, base + shared, gates.seed)
     nothing = hypothesis((), evidence)
     singles = [hypothesis((effect,), evidence) for effect in effects]
     hidden = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -68,6 +68,10 @@ class Labelled(Protocol):
 
     def boundaries(self, change: Change) -> tuple[Array, Array]:
         """Log depth and chatter frequency of the boundary at all points after a change of the models."""
+        ...
+
+    def estimates(self, changes: Sequence[Change]) -> tuple[Array, Array]:
+        """Return the same (t, p), roughly and quickly, after each of t changes."""
         ...
 
     def boundary_at(self, change: Change, rpm: Array) -> Array:

@@ -81,12 +81,12 @@ def _path_note(tool: Cutter, blocks: tuple[Block, ...]) -> str:
 
 def _give_note(spindle: pd.DataFrame) -> tuple[str, ...]:
     """Say by how much the arm gives way in side cuts, if it does."""
-    give = spindle.loc[spindle["give_mm"].abs().idxmax()]
-    if not give["give_mm"]:
+    run, give = max(zip(spindle["run"], spindle["give_mm"], strict=True), key=lambda one: abs(one[1]))
+    if not give:
         return ()
     return (
         "The radial depth of side cuts is the nominal one less what the arm gives way to the measured mean "
-        f"force by its load tests: at most {give['give_mm']:.2g} mm, in run {give['run']}.",
+        f"force by its load tests: at most {give:.2g} mm, in run {run}.",
     )
 
 

@@ -13,7 +13,7 @@ import pandas as pd
 
 from metro.dynamics.band import depth_samples
 from metro.dynamics.lobes import stability_boundary
-from metro.dynamics.stability_model import StabilityModel
+from metro.dynamics.stability_model import StabilityModel, estimated
 from metro.observables import stability
 from metro.observables.lobe_positions import Tip
 from metro.observables.stability import Cutting
@@ -61,6 +61,13 @@ def boundaries(cases: Sequence[Case], change: Change) -> tuple[Array, Array]:
     """Log depth and chatter frequency (Hz) at the speeds of all cases, one after another, after a change."""
     found = [change(case.model).boundary(case.rpm) for case in cases]
     depth, chatter = (np.concatenate(part) for part in zip(*found, strict=True))
+    return np.log(depth), chatter
+
+
+def estimates(cases: Sequence[Case], changes: Sequence[Change]) -> tuple[Array, Array]:
+    """Log depths and chatter frequencies (t, p), to zeroth order, after each of t changes."""
+    found = [estimated([change(case.model) for change in changes], case.rpm) for case in cases]
+    depth, chatter = (np.concatenate(part, axis=1) for part in zip(*found, strict=True))
     return np.log(depth), chatter
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.observables import chatter_runs, lobe_methods, lobe_positions, printed_modes, stability
-from metro.observables.lobe_cases import Case, Change, boundaries, cases_of
+from metro.observables.lobe_cases import Case, Change, boundaries, cases_of, estimates
 from metro.observables.lobe_positions import Tip
 from metro.observables.modal_test import Read, observe_modes
 from metro.observables.problem import Refusal
@@ -79,6 +79,10 @@ class LabelProblem:
         """Log depth (p,) and chatter frequency (p,), Hz, of the boundary once the models are changed."""
         return boundaries(self.cases, change)
 
+    def estimates(self, changes: Sequence[Change]) -> tuple[Array, Array]:
+        """Return the same (t, p), to zeroth order, after each of t changes."""
+        return estimates(self.cases, changes)
+
     def case_at(self, position: str | None = None) -> Case | None:
         """Return the case with most of the tests, of all or of those at a position."""
         owner = np.repeat(np.arange(len(self.cases)), [len(case.rpm) for case in self.cases])
@@ -102,8 +106,9 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
     """Identify the modes of every position and solve the lobes of the cuts that were made there.
 
     Tables ``modes``, ``frf_used``, ``stabilisation``, ``lobes`` (diagram per position), ``lobe_runs``
-    (probability per run with a depth), ``chatter_runs`` (what the runs' own records say), those of
-    :mod:`metro.observables.lobe_methods`, ``lobes_refused`` (reasons and notes).
+    (probability per run with a depth), ``chatter_runs`` (what the runs' own records say), ``chatter_records``
+    (a record of each kind), those of :mod:`metro.observables.lobe_methods`, ``lobes_refused`` (reasons and
+    notes).
     """
     test = observe_modes(read, batch.instrument("hammer"))
     modes, notes = test.modes, test.notes
@@ -118,6 +123,7 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
     tips = lobe_positions.tips(modes, notes)
     where = lobe_positions.places(read("stations"))
     chatter = chatter_runs.observe_chatter(batch, read, modes)
+    records = chatter_runs.observe_records(batch, read, chatter)
     parts: dict[str, list[pd.DataFrame]] = {}
     if not isinstance(found, Refusal):
         notes += stability.assumptions(batch)
@@ -130,7 +136,13 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
     said = [("refusal", reason)] if reason else []
     refused = pd.DataFrame([*said, *(("note", n) for n in notes)], columns=["kind", "reason"], dtype=str)
     found_modes = {"modes": modes, "frf_used": test.used, "stabilisation": test.stabilisation}
-    return {**found_modes, **tables, "chatter_runs": chatter, "lobes_refused": refused}
+    return {
+        **found_modes,
+        **tables,
+        "chatter_runs": chatter,
+        "chatter_records": records,
+        "lobes_refused": refused,
+    }
 
 
 def _joined(parts: list[pd.DataFrame], columns: tuple[str, ...]) -> pd.DataFrame:
@@ -162,6 +174,7 @@ def _solved(
                 deepest = stability.deepest(lobes, same)
                 parts["lobes"].append(stability.diagram(lobes))
                 parts["lobe_methods"].append(lobe_methods.methods(lobes, found.tool, feed))
+                notes += lobe_methods.left_out(parts["lobe_methods"][-1], found.tool)
                 parts["lobe_islands"].append(lobe_methods.islands(lobes, deepest))
     parts["lobe_stations"].append(lobe_methods.stations(solved, where))
     notes += stability.worth(solved)

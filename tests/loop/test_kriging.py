@@ -1,0 +1,41 @@
+"""Values between points where they are known."""
+
+import numpy as np
+
+from metro.loop.kriging import krige
+
+RNG = np.random.default_rng(3)
+
+
+def smooth(x):
+    return np.stack([np.sin(4.0 * x[:, 0]), np.cos(5.0 * x[:, 0]) + 2.0], axis=1)
+
+
+def test_known_values_come_back_and_are_sure():
+    at = RNG.random((12, 2))
+    mean, sd = krige(at, smooth(at))(at)
+    np.testing.assert_allclose(mean, smooth(at), atol=0.01)
+    assert sd.max() < 0.05
+
+
+def test_errors_between_the_points_are_as_large_as_told():
+    at, other = RNG.random((25, 2)), RNG.random((300, 2))
+    mean, sd = krige(at, smooth(at))(other)
+    error = mean - smooth(other)
+    assert np.sqrt(np.mean(error**2)) < 0.1
+    assert 0.05 < np.mean(error**2) / np.mean(sd**2) < 4.0
+
+
+def test_a_coordinate_that_changes_nothing_is_found_to():
+    at = RNG.random((25, 2))
+    learnt = krige(at, smooth(at))
+    assert learnt.lengths[1] > 2.0 * learnt.lengths[0]
+
+
+def test_far_from_all_points_the_trend_is_told_and_unsure():
+    at = 0.05 * RNG.random((10, 1))
+    values = RNG.standard_normal((10, 1))
+    learnt = krige(at, values)
+    mean, sd = learnt(np.array([[50.0]]))
+    np.testing.assert_allclose(mean[0], learnt.trend, atol=1e-6)
+    np.testing.assert_allclose(sd[0] ** 2, learnt.variance, rtol=1e-6)
