@@ -9,6 +9,8 @@ import argparse
 from pathlib import Path
 
 from proof.layout import Layout
+from proof.suite import DEFAULT
+from virtual_cell.blind import RECIPES
 from virtual_cell.recipes.force import STYLES
 
 
@@ -26,6 +28,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("make", help="make batches with hidden effects, and seal what they are")
     coverage = commands.add_parser("coverage", help="how often the intervals of the coefficients hold")
+    make.add_argument("--observable", choices=RECIPES, default=DEFAULT, help="what the batches are about")
     for command in (make, coverage):
         command.add_argument("--batches", type=int, default=200)
         command.add_argument("--seed", type=int, default=1)
@@ -45,7 +48,8 @@ def _parser() -> argparse.ArgumentParser:
 def _make(out: Layout, options: argparse.Namespace) -> None:
     from proof.suite import make
 
-    digest = make(out, options.batches, options.seed, options.style, options.jobs)
+    about = options.observable
+    digest = make(out, options.batches, options.seed, options.style, options.jobs, observable=about)
     print(f"{options.batches} batches in {out.raw}; what they hide is sealed as SHA-256 {digest}")
 
 

@@ -10,8 +10,12 @@ import numpy as np
 
 from metro.units import JSON
 
-# Angles that are known up to a period: that of the teeth, or a whole turn.
-ANGLES = {("tool_runout", "angle_deg"): "pitch", ("orbit_stiffness", "phase_deg"): "turn"}
+# Angles that are known up to a period: that of the teeth, a whole turn or half of one.
+ANGLES = {
+    ("tool_runout", "angle_deg"): "pitch",
+    ("orbit_stiffness", "phase_deg"): "turn",
+    ("mode_coupling", "angle_deg"): "half",
+}
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,7 @@ def estimates(effect: str, truth: Mapping[str, Any], found: JSON, teeth: int) ->
     """Compare the parameters that truth and finding both have.
 
     Which tooth is the first one cannot be observed: the angle of runout is compared modulo the pitch, and a
-    list that has an entry per tooth in the cyclic order that fits best.
+    list that has an entry per tooth in the cyclic order that fits best. Words (an axis) are not compared.
 
     Parameters
     ----------
@@ -42,7 +46,7 @@ def estimates(effect: str, truth: Mapping[str, Any], found: JSON, teeth: int) ->
     return [
         one
         for name, value in truth.items()
-        if name in found and len(_list(value)) == len(_list(found[name]))
+        if name in found and not isinstance(value, str) and len(_list(value)) == len(_list(found[name]))
         for one in _compared(effect, name, np.array(_list(value), dtype=float), _list(found[name]), teeth)
     ]
 
@@ -69,4 +73,4 @@ def _compared(effect: str, name: str, true: np.ndarray, found: list[JSON], teeth
 def _period(effect: str, name: str, teeth: int) -> float | None:
     """Period of an angle in degrees; None of anything else."""
     whole = ANGLES.get((effect, name))
-    return {"pitch": 360.0 / teeth, "turn": 360.0, None: None}[whole]
+    return {"pitch": 360.0 / teeth, "turn": 360.0, "half": 180.0, None: None}[whole]

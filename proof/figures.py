@@ -16,7 +16,7 @@ def demanded(scores: Sequence[Score]) -> list[Figure]:
     inside = [*one, *two]
     covered = [e.covered for s in inside for e in s.estimates if e.covered is not None]
     return [
-        share("nothing hidden: an effect is added", [bool(s.named) for s in none], Demand(most=0.02)),
+        share("nothing hidden: an effect is added", [s.added for s in none], Demand(most=0.02)),
         share("one effect: named, alone or first of declared rivals", [s.exact for s in one], Demand(0.95)),
         share("one effect: a wrong one named with p > 0.9", [s.surely_wrong for s in one], Demand(most=0.01)),
         share("two effects: both named", [s.both for s in two], Demand(0.85)),
@@ -70,6 +70,28 @@ def further(scores: Sequence[Score]) -> list[Figure]:
         _brier(
             "Brier score of all effects tried", [pair for s in scores for pair in (*s.stated, *s.rejected)]
         ),
+    ]
+
+
+def undecided(scores: Sequence[Score]) -> list[Figure]:
+    """Return what became of batches whose tests cannot tell, where the measurement is a label."""
+    none, outside = kind(scores, "none"), [s for s in kind(scores, "outside") if s.seen]
+    inside = [s for s in scores if s.kind in {"one", "two"}]
+    seen, small = [s for s in inside if s.seen], [s for s in inside if s.enough and not s.seen]
+    few = [s for s in scores if not s.enough]
+    pairs = [len(set(s.hidden) & set(s.named)) for s in kind(seen, "two")]
+    return [
+        share("undecided: a next experiment is named", [s.advised for s in scores if s.undecided]),
+        share("too few tests: insufficient", [s.status == "insufficient" for s in few]),
+        share("nothing hidden: clean", [s.status == "clean" for s in none]),
+        share("nothing hidden: undecided, none added", [s.undecided and not s.added for s in none]),
+        share("below what can be seen: clean", [s.status == "clean" for s in small]),
+        share("below what can be seen: undecided", [s.undecided for s in small]),
+        share("below what can be seen: named, and nothing else", [s.exact for s in small]),
+        share("seen: claimed, and nothing else", [s.claimed and s.exact for s in seen]),
+        share("seen: all named or declared rivals", [s.among for s in seen]),
+        share("two effects, seen: one or both named", [count > 0 for count in pairs]),
+        share("outside the library, seen: undecided", [s.undecided for s in outside]),
     ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -14,12 +15,14 @@ from rich.console import Console
 from metro.batch.config import load_config
 from metro.batch.processed import read_batch, write_json
 from metro.effects import library
-from metro.observables import force
+from metro.observables import force, lobes
+from metro.observables.lobes import LabelProblem
 from metro.observables.problem import Problem, Refusal
 from metro.stages.observed import read_json, read_observed
 from metro.units import JSON
 from proof import seal
 from proof.figures import demanded
+from proof.label_oracle import label_oracle
 from proof.layout import Layout
 from proof.oracle import oracle
 from proof.progress import tracked
@@ -27,7 +30,13 @@ from proof.run import CHECKOUT
 from proof.score import Score, score
 from proof.show import draw, markdown, printed
 from proof.statistics import Figure
+from proof.suite import DEFAULT
 from proof.tables import tables
+
+_PROBLEMS: Mapping[str, Callable[..., Problem | LabelProblem | Refusal]] = {
+    "force": force.problem,
+    "lobes": lobes.problem,
+}
 
 
 def opened(out: Layout, jobs: int) -> list[Figure]:
@@ -46,9 +55,10 @@ def opened(out: Layout, jobs: int) -> list[Figure]:
         raise FileNotFoundError(
             f"{len(waiting)} batches were not run, the first is {waiting[0]}: run them first"
         )
-    oracles = _oracles(out, truth["batches"], jobs)
-    scores = [_score(out, name, entry, oracles.get(name)) for name, entry in truth["batches"].items()]
-    found = tables(scores)
+    about = truth.get("observable", DEFAULT)
+    oracles = _oracles(out, truth["batches"], jobs, about)
+    scores = [_score(out, name, entry, oracles.get(name), about) for name, entry in truth["batches"].items()]
+    found = tables(scores, about)
     printed(found, Console())
     draw(scores, out.root / "figure.svg")
     (out.root / "table.md").write_text(markdown(_heading(out, truth), found))
@@ -59,34 +69,39 @@ def _finished(out: Layout, name: str) -> bool:
     return any((out.reports / name / file).is_file() for file in ("run.json", "failed.txt"))
 
 
-def _oracles(out: Layout, truths: JSON, jobs: int) -> dict[str, JSON]:
+def _oracles(out: Layout, truths: JSON, jobs: int, about: str) -> dict[str, JSON]:
     """Return the oracle's figures of every batch that hides something; those that are there are kept."""
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     asked = [
         name for name, truth in truths.items() if truth["effects"] and _read(out.reports / name / "run.json")
     ]
     with ProcessPoolExecutor(jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
-        futures = [pool.submit(_oracle, out, name, truths[name]["effects"]) for name in asked]
+        futures = [pool.submit(_oracle, out, name, truths[name]["effects"], about) for name in asked]
         return dict(future.result() for future in tracked(futures, "asking the oracle"))
 
 
-def _oracle(out: Layout, name: str, hidden: JSON) -> tuple[str, JSON]:
+def _oracle(out: Layout, name: str, hidden: JSON, about: str) -> tuple[str, JSON]:
     file, mark = out.oracle / f"{name}.json", out.reports / name / "run.json"
     if not file.is_file() or file.stat().st_mtime < mark.stat().st_mtime:
-        budget = load_config(CHECKOUT / "config/config.yaml")["loop"]["model_form_budget"]
-        write_json(file, oracle(_problem(out.processed / name), hidden, library("force"), budget))
+        gates = load_config(CHECKOUT / "config/config.yaml")["loop"]
+        task = _problem(out.processed / name, about)
+        if isinstance(task, LabelProblem):
+            found = label_oracle(task, hidden, library(about), gates["held_out_gain"])
+        else:
+            found = oracle(task, hidden, library(about), gates["model_form_budget"])
+        write_json(file, found)
     return name, _read(file) or {}
 
 
-def _problem(processed: Path) -> Problem:
+def _problem(processed: Path, about: str) -> Problem | LabelProblem:
     identified = read_json(processed / "identified.json")
-    task = force.problem(read_batch(processed), read_observed(processed), identified)
+    task = _PROBLEMS[about](read_batch(processed), read_observed(processed), identified)
     if isinstance(task, Refusal):
         raise ValueError(f"{processed}: {task.reason}")
     return task
 
 
-def _score(out: Layout, name: str, truth: JSON, told: JSON | None) -> Score:
+def _score(out: Layout, name: str, truth: JSON, told: JSON | None, about: str) -> Score:
     run = _read(out.reports / name / "run.json")
     return score(
         truth,
@@ -95,6 +110,7 @@ def _score(out: Layout, name: str, truth: JSON, told: JSON | None) -> Score:
         _read(out.processed / name / "loop.json") if run else None,
         teeth=int(yaml.safe_load((out.raw / name / "batch.yaml").read_text())["tool"]["teeth"]),
         seconds=sum(run["seconds"].values()) if run else None,
+        observable=about,
     )
 
 
@@ -105,7 +121,8 @@ def _read(path: Path) -> JSON | None:
 def _heading(out: Layout, truth: JSON) -> str:
     marks = [_read(out.reports / name / "run.json") for name in truth["batches"]]
     codes = {json.dumps(mark["code"], sort_keys=True) for mark in marks if mark}
-    words = f"# Proof\n\n{len(truth['batches'])} batches of style {truth['style']}, seed {truth['seed']}; "
+    words = f"# Proof: {truth.get('observable', DEFAULT)}\n\n"
+    words += f"{len(truth['batches'])} batches of style {truth['style']}, seed {truth['seed']}; "
     words += f"sealed as SHA-256 `{out.seal.read_text().strip()}`."
     return (
         words if len(codes) < 2 else f"{words} **The batches were run by {len(codes)} versions of the code.**"

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from metro.loop.label_search import NOTHING
 from metro.units import JSON
 from proof.estimates import Estimate, estimates
 
@@ -25,8 +26,10 @@ class Score:
     ----------
     kind : none, one, two or outside. hidden : names of the true effects. sizes : of each over the noise, once
         all else is refitted.
-    named : the effects of the verdict with their stated probabilities, in order. groups : sets that it cannot
-        tell apart. rest : whether it says that something is unexplained.
+    named : the effects of the verdict with their stated probabilities, in order. claimed : whether they are
+        added to the model, or only the first of rivals. groups : sets that it cannot tell apart. rest :
+        whether it says that something is unexplained. advised : whether it says what to measure next.
+    enough : whether the batch has tests enough for any verdict.
     before, after : rms error on held-out runs. oracle, floor : that of the fit told the truth, and the noise.
     stated, rejected : probability of every effect named, or tried and not named, and whether it was there;
         those of effects too small to be seen left out.
@@ -40,8 +43,11 @@ class Score:
     sizes: dict[str, float]
     status: str
     named: dict[str, float]
+    claimed: bool = False
     groups: tuple[frozenset[str], ...] = ()
     rest: bool = False
+    advised: bool = False
+    enough: bool = True
     before: float | None = None
     after: float | None = None
     oracle: float | None = None
@@ -55,13 +61,24 @@ class Score:
     @property
     def seen(self) -> bool:
         """Whether every hidden effect is large enough to be found, or its size is not known."""
-        return bool(self.hidden) and all(self._large(name) for name in self.hidden)
+        return bool(self.hidden) and self.enough and all(self._large(name) for name in self.hidden)
 
     @cached_property
     def extra(self) -> frozenset[str]:
-        """Effects named that are neither there nor declared a rival of one that is."""
-        rivals = frozenset().union(*(group for group in self.groups if group & set(self.hidden)))
+        """Effects named that are neither there nor declared a rival of one that is, or of nothing."""
+        true = set(self.hidden) or {NOTHING}
+        rivals = frozenset().union(*(group for group in self.groups if group & true))
         return frozenset(self.named) - frozenset(self.hidden) - rivals
+
+    @property
+    def added(self) -> bool:
+        """Whether an effect is added to the model, or is named though none of its rivals is there."""
+        return self.claimed or bool(self.extra)
+
+    @property
+    def among(self) -> bool:
+        """Whether every hidden effect is named, or declared a rival of what is."""
+        return set(self.hidden) <= set(self.named).union(*self.groups)
 
     @property
     def both(self) -> bool:
@@ -86,6 +103,11 @@ class Score:
     def detected(self) -> bool:
         """Whether the verdict says that there is something."""
         return self.status not in {"clean", "insufficient", FAILED}
+
+    @property
+    def undecided(self) -> bool:
+        """Whether the verdict says that the data cannot tell."""
+        return self.status in {"undetermined", "insufficient"}
 
     @property
     def surely_wrong(self) -> bool:
@@ -118,8 +140,9 @@ def score(
     *,
     teeth: int,
     seconds: float | None,
+    observable: str = "force",
 ) -> Score:
-    """Score a force batch.
+    """Score a batch.
 
     Parameters
     ----------
@@ -128,7 +151,7 @@ def score(
     """
     hidden: JSON = truth["effects"]
     oracle = oracle or {"after": None, "floor": None, "sizes": {}}
-    entry = (verdict or {"observables": {}})["observables"].get("force")
+    entry = (verdict or {"observables": {}})["observables"].get(observable)
     if entry is None:
         return Score(truth["batch"], truth["kind"], tuple(hidden), oracle["sizes"], FAILED, {})
     groups = tuple(frozenset(group) for group in entry["indistinguishable"])
@@ -136,7 +159,7 @@ def score(
     if not named and entry["status"] == "undetermined":
         candidates = {c["effect"]: c["probability"] for c in entry["candidates"]}
         named = {group[0]: candidates.get(group[0], 0.0) for group in entry["indistinguishable"]}
-    unseen = (told or {"observables": {}})["observables"].get("force", {}).get("cannot_be_seen", [])
+    unseen = (told or {"observables": {}})["observables"].get(observable, {}).get("cannot_be_seen", [])
     return Score(
         batch=truth["batch"],
         kind=truth["kind"],
@@ -144,8 +167,11 @@ def score(
         sizes=oracle["sizes"],
         status=entry["status"],
         named=named,
+        claimed=bool(entry["effects"]),
         groups=groups,
         rest=entry["unexplained"] is not None,
+        advised=bool(entry.get("next_experiment")),
+        enough=oracle.get("enough", True),
         before=_rms(entry["before"]),
         after=_rms(entry["after"]),
         oracle=oracle["after"],
@@ -157,7 +183,7 @@ def score(
             for one in estimates(found["effect"], hidden[found["effect"]], found["parameters"], teeth)
         ),
         stated=_stated(entry["effects"], truth["effects"], oracle["sizes"]),
-        rejected=_stated(entry["candidates"], truth["effects"], oracle["sizes"]),
+        rejected=_rejected(entry["candidates"], truth["effects"], oracle["sizes"], observable),
         cannot_be_seen=tuple(one["effect"] for one in unseen),
         seconds=seconds,
     )
@@ -169,6 +195,17 @@ def _stated(said: Iterable[JSON], hidden: JSON, sizes: Mapping[str, float]) -> t
         for one in said
         if one["probability"] is not None and sizes.get(one["effect"], SEEN) >= SEEN
     )
+
+
+def _rejected(
+    said: list[JSON], hidden: JSON, sizes: Mapping[str, float], observable: str
+) -> tuple[Stated, ...]:
+    """Return what was stated of the candidates; those of labels are whole hypotheses, "a + b" and no more."""
+    if observable != "lobes":
+        return _stated(said, hidden, sizes)
+    if any(sizes.get(name, SEEN) < SEEN for name in hidden):
+        return ()
+    return tuple((one["probability"], set(one["effect"].split(" + ")) == set(hidden)) for one in said)
 
 
 def _rms(error: JSON | None) -> float | None:

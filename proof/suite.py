@@ -16,9 +16,9 @@ from metro.units import JSON
 from proof import seal
 from proof.layout import Layout
 from proof.progress import tracked
-from virtual_cell.hidden import EFFECTS
-from virtual_cell.recipes import force
+from virtual_cell.blind import RECIPES
 
+DEFAULT = "force"  # what a suite is about that does not say
 # Share of the batches that hide nothing, one effect of the library, two, or one that the library lacks.
 SHARES = {"none": 0.25, "one": 0.35, "two": 0.2, "outside": 0.2}
 # The coefficients of the base model imitate it wholly: it can be proven neither alone nor beside another.
@@ -65,15 +65,16 @@ def draw(batches: int, seed: int, known: Sequence[str], unknown: Sequence[str]) 
     ]
 
 
-def sides() -> tuple[list[str], list[str]]:
+def sides(observable: str = DEFAULT) -> tuple[list[str], list[str]]:
     """Name what the simulator can hide: what the library has; what it lacks or knows only by likeness."""
-    inside = {effect.name for effect in library("force") if not effect.resembled}
-    known, unknown = ([name for name in EFFECTS if (name in inside) is asked] for asked in (True, False))
+    inside = {effect.name for effect in library(observable) if not effect.resembled}
+    names = RECIPES[observable].effects
+    known, unknown = ([name for name in names if (name in inside) is asked] for asked in (True, False))
     return known, unknown
 
 
-def make(out: Layout, batches: int, seed: int, style: str, jobs: int) -> str:
-    """Make the batches of a suite and seal what they hide; return the seal.
+def make(out: Layout, batches: int, seed: int, style: str, jobs: int, *, observable: str = DEFAULT) -> str:
+    """Make the batches of a suite about an observable and seal what they hide; return the seal.
 
     Raises
     ------
@@ -82,16 +83,18 @@ def make(out: Layout, batches: int, seed: int, style: str, jobs: int) -> str:
     """
     if out.batches:
         raise FileExistsError(f"{out.raw} holds batches already: give another folder")
-    drawn = draw(batches, seed, *sides())
+    drawn = draw(batches, seed, *sides(observable))
     out.raw.mkdir(parents=True, exist_ok=True)
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        waiting = [pool.submit(_made, out, one, style) for one in drawn]
+        waiting = [pool.submit(_made, out, one, style, observable) for one in drawn]
         truths = dict(future.result() for future in tracked(waiting, "making batches"))
-    content = {"seed": seed, "style": style, "batches": {name: truths[name] for name in sorted(truths)}}
+    about = {"observable": observable, "seed": seed, "style": style}
+    content = {**about, "batches": {name: truths[name] for name in sorted(truths)}}
     return seal.close(content, out.truth, out.seal)
 
 
-def _made(out: Layout, drawn: Drawn, style: str) -> tuple[str, JSON]:
-    truth = force.make(out.raw / drawn.name, dict.fromkeys(drawn.effects), drawn.seed, style)
+def _made(out: Layout, drawn: Drawn, style: str, observable: str) -> tuple[str, JSON]:
+    made = RECIPES[observable].make
+    truth = made(out.raw / drawn.name, dict.fromkeys(drawn.effects), drawn.seed, style)
     return drawn.name, {"kind": drawn.kind, **truth}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proof.estimates import ANGLES
-from proof.figures import demanded, further, kind
+from proof.figures import demanded, further, kind, undecided
 from proof.score import STATUSES, Score
 from proof.statistics import Demand, Figure, binned, share
 
@@ -32,11 +32,13 @@ class Table:
     note: str = ""
 
 
-def tables(scores: Sequence[Score]) -> list[Table]:
+def tables(scores: Sequence[Score], observable: str = "force") -> list[Table]:
     """Return every table of a proof."""
+    labels = [tabulated("What the tests cannot decide", undecided(scores), _UNDECIDED)]
     return [
-        tabulated("What is demanded", demanded(scores), NOTE),
+        tabulated("What is demanded", demanded(scores), NOTES[observable]),
         tabulated("What lies behind", further(scores), ""),
+        *(labels if observable == "lobes" else []),
         _statuses(scores),
         _effects(scores),
         confusion(scores),
@@ -48,12 +50,21 @@ def tables(scores: Sequence[Score]) -> list[Table]:
     ]
 
 
-NOTE = (
+_FORCE = (
     "Effects count from a size of 1 × the noise: the rms change of the prediction on held-out runs when the "
     "effect is left out and all else is refitted, over the rms noise of what is compared there. Of effects "
     "outside the library, the size is the base model's error beyond the declared noise. Intervals: Wilson "
     "for shares, order statistics for medians."
 )
+_LOBES = (
+    "Effects count from a size of 1: of labels drawn from the truth with the errors that the loop allows "
+    "for, 95 of 100 sets speak for the effect, at its true parameters, with the log-likelihood ratio that "
+    "the loop asks for (3). Of effects outside the library, the size is by how much less likely the labels "
+    "are than those that the base model would draw, over 3. Where there are too few tests for a verdict, "
+    "nothing counts as seen. Errors are of the probability of a held-out label."
+)
+_UNDECIDED = "Undecided: undetermined or insufficient."
+NOTES = {"force": _FORCE, "lobes": _LOBES}
 
 
 def tabulated(title: str, figures: Iterable[Figure], note: str) -> Table:
@@ -206,7 +217,7 @@ def _calibration(scores: Sequence[Score]) -> Table:
 def _wrong(scores: Sequence[Score]) -> Table:
     """Return the batches that a person should look at."""
     asked = [s for s in scores if s.seen and s.kind in {"one", "two"} and not s.exact]
-    asked += [s for s in kind(scores, "none") if s.named]
+    asked += [s for s in kind(scores, "none") if s.added]
     asked += [s for s in kind(scores, "outside") if s.misattributed or (s.seen and not s.admitted)]
     asked += [s for s in scores if s.extra and s.kind in {"one", "two"} and s not in asked]
     rows = [

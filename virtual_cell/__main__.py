@@ -2,18 +2,20 @@
 
 python -m virtual_cell bundled data/raw python -m virtual_cell force data/raw/blind-3 --effect tool_runout
 --seed 3 python -m virtual_cell force data/raw/blind-4 --effect tool_wear edge_growth_per_m=0.1 --seed 4
---truth sealed.json
+--truth sealed.json python -m virtual_cell lobes data/raw/blind-5 --effect mode_coupling --seed 5
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Collection
 from pathlib import Path
 
 from virtual_cell.batches import bundled
-from virtual_cell.hidden import EFFECTS, Parameters
-from virtual_cell.recipes import force
+from virtual_cell.blind import RECIPES
+from virtual_cell.hidden import Parameters
+from virtual_cell.recipes.force import STYLES
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -22,8 +24,9 @@ def main(arguments: list[str] | None = None) -> None:
     if options.command == "bundled":
         bundled(options.root)
         return
-    hidden = dict(_effect(words) for words in options.effect)
-    truth = force.make(options.folder, hidden, options.seed, options.style)
+    recipe = RECIPES[options.command]
+    hidden = dict(_effect(words, recipe.effects) for words in options.effect)
+    truth = recipe.make(options.folder, hidden, options.seed, options.style)
     path = options.truth or options.folder.parent / f"{options.folder.name}.truth.json"
     path.write_text(json.dumps(truth, indent=1) + "\n")
 
@@ -33,29 +36,31 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
     every = commands.add_parser("bundled", help="remake the bundled batches")
     every.add_argument("root", type=Path)
-    one = commands.add_parser(
-        "force", help="make a force batch; the truth goes beside the folder, not into it"
-    )
-    one.add_argument("folder", type=Path)
-    one.add_argument(
-        *("-e", "--effect"),
-        action="append",
-        nargs="+",
-        default=[],
-        metavar=("NAME", "PARAMETER=VALUE"),
-        help="hide an effect, its parameters as given or drawn; may be repeated: " + ", ".join(EFFECTS),
-    )
-    one.add_argument("--seed", type=int, default=0)
-    one.add_argument("--style", choices=force.STYLES, default="a", help="how it is measured")
-    one.add_argument("--truth", type=Path, help="where to write the truth")
+    for name, recipe in RECIPES.items():
+        hidden = ", ".join(recipe.effects)
+        one = commands.add_parser(
+            name, help=f"make a {name} batch; the truth goes beside the folder, not into it"
+        )
+        one.add_argument("folder", type=Path)
+        one.add_argument(
+            *("-e", "--effect"),
+            action="append",
+            nargs="+",
+            default=[],
+            metavar=("NAME", "PARAMETER=VALUE"),
+            help="hide an effect, its parameters as given or drawn; may be repeated: " + hidden,
+        )
+        one.add_argument("--seed", type=int, default=0)
+        one.add_argument("--style", choices=STYLES, default="a", help="how it is measured")
+        one.add_argument("--truth", type=Path, help="where to write the truth")
     return parser
 
 
-def _effect(words: list[str]) -> tuple[str, Parameters | None]:
+def _effect(words: list[str], known: Collection[str]) -> tuple[str, Parameters | None]:
     """Read ``NAME PARAMETER=VALUE …``; values are JSON."""
     name, *settings = words
-    if name not in EFFECTS:
-        raise SystemExit(f"no effect {name!r}; known are {', '.join(EFFECTS)}")
+    if name not in known:
+        raise SystemExit(f"no effect {name!r}; known are {', '.join(known)}")
     return name, {key: json.loads(value) for key, value in (s.split("=", 1) for s in settings)} or None
 
 

@@ -1,25 +1,32 @@
-"""Effects that a force batch may hide: how large they come, and what each changes in a session."""
+"""Effects that a batch may hide: how large they come, and what each changes.
+
+``EFFECTS`` change the session of a force batch, ``BOUNDARY_EFFECTS`` the machine of tests on either side of
+the stability boundary.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from virtual_cell.flexible import Machine
+from virtual_cell.modes import Modes
 from virtual_cell.session import Session
-from virtual_cell.units import DEG, MM, MS, N_UM, UM
+from virtual_cell.units import DEG, MM, MS, N_MM, N_UM, UM
 
 Parameters = dict[str, Any]
+Subject = TypeVar("Subject")
 
 
 @dataclass(frozen=True)
-class Hidden:
-    """How to draw an effect's parameters, in the contract's units, and how to apply them to a session."""
+class Hidden(Generic[Subject]):
+    """How to draw an effect's parameters, in the contract's units, and how to apply them to its subject."""
 
-    draw: Callable[[np.random.Generator, Session], Parameters]
-    apply: Callable[[Session, Parameters], Session]
+    draw: Callable[[np.random.Generator, Subject], Parameters]
+    apply: Callable[[Subject, Parameters], Subject]
 
 
 def _size(rng: np.random.Generator, low: float, high: float) -> float:
@@ -84,7 +91,7 @@ def _speed(session: Session, p: Parameters) -> Session:
     return replace(session, speed_exponent=p["exponent"])
 
 
-EFFECTS: Mapping[str, Hidden] = {
+EFFECTS: Mapping[str, Hidden[Session]] = {
     "tool_runout": Hidden(lambda r, _: {"radius_um": _size(r, 2.0, 25.0), "angle_deg": _angle(r)}, _runout),
     "tool_wear": Hidden(
         lambda r, _: {"edge_growth_per_m": _size(r, 0.02, 0.4)},
@@ -137,5 +144,75 @@ EFFECTS: Mapping[str, Hidden] = {
     "tilted_surface": Hidden(
         lambda r, _: {"rise_um_mm": _signed(r, 1.0, 12.0)},
         lambda s, p: replace(s, tilt=p["rise_um_mm"] * UM / MM),
+    ),
+}
+
+
+def _missing(rng: np.random.Generator, machine: Machine) -> Parameters:
+    hz = [float(f) for modes in machine.modes for f in modes.damped]
+    softest = min(float(modes.stiffness.min()) for modes in machine.modes) / N_UM
+    return {
+        "frequency_hz": _size(rng, 0.5 * min(hz), 1.2 * max(hz)),
+        "damping": _size(rng, 0.012, 0.06),
+        "stiffness_n_um": _size(rng, 0.5 * softest, 12.0 * softest),
+        "axis": str(rng.choice(["x", "y"])),
+    }
+
+
+def _with_mode(machine: Machine, p: Parameters) -> Machine:
+    """Add a mode; its frequency is undamped, as in the contract."""
+    damped = p["frequency_hz"] * float(np.sqrt(1.0 - p["damping"] ** 2))
+    added = (damped, p["damping"], p["stiffness_n_um"] * N_UM)
+    x, y = machine.modes
+    known = x if p["axis"] == "x" else y
+    parts = (known.damped, known.damping, known.stiffness)
+    more = Modes(*(np.append(part, value) for part, value in zip(parts, added, strict=True)))
+    return replace(machine, modes=(more, y) if p["axis"] == "x" else (x, more))
+
+
+def _uneven(machine: Machine, p: Parameters) -> Machine:
+    return replace(machine, uneven=tuple(angle * DEG for angle in p["pitch_deg"]))
+
+
+def _spacing(rng: np.random.Generator, machine: Machine) -> Parameters:
+    """Every other tooth out of its place, by whole steps of the march."""
+    by = 2.0 * round(_size(rng, 3.0, 24.0) / 2.0)
+    return {"pitch_deg": [by * (tooth % 2) for tooth in range(machine.teeth)]}
+
+
+BOUNDARY_EFFECTS: Mapping[str, Hidden[Machine]] = {
+    "missing_mode": Hidden(_missing, _with_mode),
+    "process_damping": Hidden(
+        lambda r, _: {"coefficient_n_mm": _size(r, 15.0, 900.0)},
+        lambda m, p: replace(m, ploughing=p["coefficient_n_mm"] * (N_MM / (0.5 * m.diameter))),
+    ),
+    "mode_coupling": Hidden(
+        lambda r, _: {"angle_deg": _signed(r, 4.0, 60.0)},
+        lambda m, p: replace(m, turned=p["angle_deg"] * DEG),
+    ),
+    "spindle_speed_softening": Hidden(
+        lambda r, m: {"change_per_krpm": _signed(r, 20.0 / m.fast, 400.0 / m.fast)},
+        lambda m, p: replace(m, softening=p["change_per_krpm"] / 1000.0),
+    ),
+    # outside of any library
+    "speed_dependence": Hidden(
+        lambda r, m: {"exponent": _signed(r, 0.1, 1.5), "reference_rpm": round(0.7 * m.fast)},
+        lambda m, p: replace(m, speed_exponent=p["exponent"], speed_reference=p["reference_rpm"]),
+    ),
+    "speed_damping": Hidden(
+        lambda r, m: {"growth_per_krpm": _size(r, 100.0 / m.fast, 3000.0 / m.fast)},
+        lambda m, p: replace(m, damping_growth=p["growth_per_krpm"] / 1000.0),
+    ),
+    "yielding_with_depth": Hidden(
+        lambda r, m: {"loss_per_mm": _size(r, 0.03 / (m.level / MM), 0.8 / (m.level / MM))},
+        lambda m, p: replace(m, yielding=p["loss_per_mm"] / MM),
+    ),
+    "wrong_labels": Hidden(
+        lambda r, _: {"share": _size(r, 0.03, 0.3)}, lambda m, p: replace(m, mislabelled=p["share"])
+    ),
+    "uneven_pitch": Hidden(_spacing, _uneven),
+    "tool_runout": Hidden(
+        lambda r, m: {"radius_um": _size(r, 0.15 * m.feed / UM, 1.5 * m.feed / UM), "angle_deg": _angle(r)},
+        lambda m, p: replace(m, runout=p["radius_um"] * UM, runout_angle=p["angle_deg"] * DEG),
     ),
 }

@@ -36,6 +36,8 @@ class Trials:
     turned : angle by which the modes are turned from x towards y, rad.
     ploughing : process damping, its coefficient over the tool's radius, N/m²: a tooth that moves into the
         work at v is pushed back by this, times depth and v over the spindle's angular speed.
+    strength : (n,) or one: how many times the force of the chip is that of the law.
+    uneven : (N,) how far teeth stand from their even pitch, rad, clockwise; to the next step of the march.
     """
 
     modes: tuple[Modes, Modes]
@@ -52,6 +54,8 @@ class Trials:
     immersion: tuple[float, float] = (0.0, math.pi)
     turned: float = 0.0
     ploughing: float = 0.0
+    strength: Array | float = 1.0
+    uneven: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,7 @@ def march(trials: Trials, turns: int, per_turn: int, seed: int = 0) -> History:
     dt = 60.0 / (trials.rpm * per_turn)
     structure = _Structure(trials.modes, dt, trials.turned)
     angle = 2.0 * math.pi * (np.arange(per_turn) + 0.5) / per_turn
-    tooth = np.arange(trials.teeth) * (per_turn // trials.teeth)
+    tooth, feed = _teeth(trials, per_turn)
     eccentric = trials.runout * np.cos(trials.runout_angle - angle[tooth] + angle[0])
     surface = np.zeros((count, per_turn))
     force, tip, acceleration = (np.zeros((count, steps, d)) for d in (3, 2, 2))
@@ -93,7 +97,7 @@ def march(trials: Trials, turns: int, per_turn: int, seed: int = 0) -> History:
         tip[:, i] = structure.tip
         reach = tip[:, i, :1] * sine + tip[:, i, 1:] * cosine + eccentric
         inside = (angle[at] > trials.immersion[0]) & (angle[at] < trials.immersion[1])
-        advance = np.where(inside, trials.feed * np.sin(angle[at] + trials.orbit * turn), 0.0)
+        advance = np.where(inside, feed * np.sin(angle[at] + trials.orbit * turn), 0.0)
         chip = cleared(surface, at, reach, advance)
         depth = trials.depth * min(1.0, (turn + 1.0 / per_turn) / max(trials.entry, 1e-9))
         depth = depth * (1.0 + trials.scatter * rng.standard_normal(count))
@@ -106,12 +110,22 @@ def march(trials: Trials, turns: int, per_turn: int, seed: int = 0) -> History:
     return History(dt, force, tip, acceleration)
 
 
+def _teeth(trials: Trials, per_turn: int) -> tuple[np.ndarray, Array]:
+    """Return where the teeth stand (N,), in steps, and the feed (N,), m, since the one before passed by."""
+    tooth = np.arange(trials.teeth) * (per_turn // trials.teeth)
+    if not trials.uneven:
+        return tooth, np.full(trials.teeth, trials.feed)
+    tooth = tooth + np.round(np.array(trials.uneven) * per_turn / (2.0 * math.pi)).astype(int)
+    ahead = np.mod(np.roll(tooth, -1) - tooth, per_turn)
+    return tooth, trials.feed * trials.teeth * ahead / per_turn
+
+
 def _per_depth(trials: Trials, chip: Array, turn: float, sine: Array, cosine: Array) -> Array:
     """Force on the tool (n, 3) per depth, N/m, of chips (n, N), m, after some turns."""
     worn = trials.coefficients.worn(trials.feed * trials.teeth * turn)
     tangential, radial, axial = trials.coefficients.per_length(chip, worn)
     parts = [-(tangential * cosine + radial * sine), tangential * sine - radial * cosine, axial]
-    return np.stack([part.sum(axis=1) for part in parts], axis=1)
+    return np.stack([part.sum(axis=1) * trials.strength for part in parts], axis=1)
 
 
 def _ploughing(trials: Trials, chip: Array, velocity: Array, sine: Array, cosine: Array) -> Array:

@@ -67,6 +67,23 @@ def write_csv(path: Path, rows: Iterable[Row], columns: Iterable[str] | None = N
         writer.writerows([_text(row.get(name)) for name in names] for row in rows)
 
 
+def impact_row(point: str, file: str, kind: str, unit: str, replicate: int = 1) -> Row:
+    """Row of impacts.csv of a tool struck and heard at ``point`` of position 1 ("1x").
+
+    ``kind``: record or frf, of a response in ``unit``, m/s2 or m.
+    """
+    return {
+        "test": "tip",
+        "position": "1",
+        "reference": point,
+        "response": point,
+        "replicate": replicate,
+        "kind": kind,
+        "file": file,
+        "response_unit": unit,
+    }
+
+
 def _text(value: Any) -> str:
     if value is None:
         return ""

@@ -73,3 +73,16 @@ def test_an_interval_that_is_not_stated_counts_neither_way():
 def test_another_form_of_an_effect_has_no_parameter_to_compare():
     found = {"time_constant_s": [quantity(1.0, 0.1)] * 3}
     assert estimates("charge_drift", {"slope_n_s": [1.0, 2.0, 3.0]}, found, 3) == []
+
+
+def test_modes_that_are_turned_by_half_a_turn_are_where_they_were():
+    found = {"angle_deg": quantity(-85.0, 5.0)}
+    one = estimates("mode_coupling", {"angle_deg": 92.0}, found, 3)[0]
+    assert one.error == pytest.approx(3.0)
+    assert one.covered
+
+
+def test_a_word_is_not_compared():
+    found = {"axis": {"value": "x", "ci95": None, "unit": ""}, "damping": quantity(0.03, 0.01)}
+    result = estimates("missing_mode", {"axis": "x", "damping": 0.03}, found, 3)
+    assert [one.parameter for one in result] == ["damping"]

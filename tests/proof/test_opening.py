@@ -103,6 +103,23 @@ def test_a_batch_that_failed_counts_against(out):
     assert rows(out, "What lies behind")["batches that the pipeline ran through"][0] == "66.7 %"
 
 
+def test_a_suite_about_lobes_is_opened_by_the_same_command(out):
+    truth = json.loads(out.truth.read_text())
+    for entry in truth["batches"].values():
+        entry["effects"] = {"mode_coupling": {"angle_deg": 20.0}} if entry["effects"] else {}
+    seal.close({**truth, "observable": "lobes"}, out.truth, out.seal)
+    for name in truth["batches"]:
+        entry = verdict("insufficient")["observables"]["force"] | {"next_experiment": "a test"}
+        write(out.reports / name / "verdict.json", {"observables": {"lobes": entry}})
+    answer = {"before": 0.4, "after": 0.3, "floor": 0.3, "sizes": {"mode_coupling": 3.0}, "enough": False}
+    write(out.oracle / "blind-2.json", answer)
+    opened(out, 1)
+    found = rows(out, "What the tests cannot decide")
+    assert found["undecided: a next experiment is named"][:1] == ["100.0 %"]
+    assert found["too few tests: insufficient"][2] == "1"
+    assert (out.root / "table.md").read_text().startswith("# Proof: lobes")
+
+
 def test_strict_fails_where_a_demand_is_missed_beyond_chance(out):
     main(["open", str(out.root), "--strict", "--jobs", "1"])
     for name in ("blind-1", "blind-3"):

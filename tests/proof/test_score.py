@@ -13,7 +13,7 @@ def oracle(after=2.0, **sizes):
     return {"before": 10.0, "after": after, "floor": 1.9, "sizes": sizes}
 
 
-def verdict(status, *named, candidates=(), groups=(), rest=None, after=2.5):
+def verdict(status, *named, candidates=(), groups=(), rest=None, after=2.5, observable="force"):
     entry = {
         "status": status,
         "before": {"rms": 10.0},
@@ -23,11 +23,11 @@ def verdict(status, *named, candidates=(), groups=(), rest=None, after=2.5):
         "indistinguishable": [list(group) for group in groups],
         "unexplained": rest,
     }
-    return {"observables": {"force": entry}}
+    return {"observables": {observable: entry}}
 
 
-def scored(hidden, asked, found, told=None):
-    return score(hidden, asked, found, told, teeth=3, seconds=1.0)
+def scored(hidden, asked, found, told=None, observable="force"):
+    return score(hidden, asked, found, told, teeth=3, seconds=1.0, observable=observable)
 
 
 RUNOUT = truth("one", tool_runout={"radius_um": 5.0})
@@ -131,3 +131,52 @@ def test_what_the_verdict_says_cannot_be_seen_is_read():
     one = scored(hidden, oracle(dynamometer_rotation=0.1), verdict("clean"), told)
     assert one.cannot_be_seen == ("dynamometer_rotation",)
     assert not one.seen
+
+
+def lobes(hidden, found, asked=None):
+    return scored(
+        hidden, asked, {"observables": {"lobes": found["observables"]["force"]}}, observable="lobes"
+    )
+
+
+COUPLED = truth("one", mode_coupling={"angle_deg": 20.0})
+
+
+def test_an_effect_that_may_as_well_be_nothing_is_not_added_unless_it_is_claimed():
+    rivals = [("process_damping", "nothing")]
+    candidates = [("process_damping", 0.6)]
+    weighed = lobes(truth("none"), verdict("undetermined", candidates=candidates, groups=rivals))
+    assert weighed.undecided
+    assert not weighed.added
+    claimed = lobes(truth("none"), verdict("undetermined", ("process_damping", 0.8), groups=rivals))
+    assert claimed.added
+    other = [("process_damping", "mode_coupling")]
+    assert lobes(truth("none"), verdict("undetermined", candidates=candidates, groups=other)).added
+
+
+def test_nothing_excuses_no_addition_where_something_is_hidden():
+    found = verdict("undetermined", ("process_damping", 0.8), groups=[("process_damping", "nothing")])
+    assert lobes(COUPLED, found, oracle(mode_coupling=3.0)).extra == {"process_damping"}
+
+
+def test_with_too_few_tests_nothing_counts_as_seen():
+    asked = oracle(mode_coupling=3.0)
+    assert lobes(COUPLED, verdict("insufficient"), asked).seen
+    assert not lobes(COUPLED, verdict("insufficient"), {**asked, "enough": False}).seen
+
+
+def test_candidates_of_labels_are_whole_hypotheses():
+    tried = [("mode_coupling", 0.2), ("process_damping", 0.1), ("mode_coupling + process_damping", 0.7)]
+    both = truth("two", process_damping={"coefficient_n_mm": 90.0}, mode_coupling={"angle_deg": 20.0})
+    found = verdict("undetermined", candidates=tried)
+    large = oracle(mode_coupling=3.0, process_damping=2.0)
+    assert lobes(COUPLED, found, large).rejected == ((0.2, True), (0.1, False), (0.7, False))
+    assert lobes(both, found, large).rejected == ((0.2, False), (0.1, False), (0.7, True))
+    assert lobes(both, found, oracle(mode_coupling=3.0, process_damping=0.5)).rejected == ()
+
+
+def test_a_rival_that_is_declared_is_among_what_is_possible():
+    found = verdict("undetermined", ("process_damping", 0.6), groups=[("process_damping", "mode_coupling")])
+    one = lobes(COUPLED, found, oracle(mode_coupling=3.0))
+    assert one.among
+    assert not one.exact

@@ -45,6 +45,13 @@ def test_what_the_library_only_knows_the_likeness_of_is_outside_of_it():
     assert not set(known) & set(unknown)
 
 
+def test_a_suite_about_lobes_hides_effects_of_the_boundary():
+    known, unknown = sides("lobes")
+    assert known == ["missing_mode", "process_damping", "mode_coupling", "spindle_speed_softening"]
+    assert len(unknown) >= 3
+    assert "tool_runout" in unknown  # it bears that name among the forces, too, and is no effect of lobes
+
+
 def test_batches_that_are_there_are_not_made_again(tmp_path):
     (tmp_path / "raw/blind-1").mkdir(parents=True)
     (tmp_path / "raw/blind-1/batch.yaml").write_text("")
@@ -64,3 +71,12 @@ def test_making_seals_what_every_batch_hides_and_leaves_no_trace_of_it_with_the_
         written = "".join(path.read_text() for path in (out.raw / name).glob("*.*"))
         assert not [effect for effect in hidden["effects"] if effect in written]
         assert hidden["kind"] not in written.split()
+
+
+def test_a_suite_says_what_it_is_about(tmp_path):
+    from proof.seal import unseal
+
+    out = Layout(tmp_path)
+    make(out, 1, 3, "a", 1, observable="lobes")
+    assert unseal(out.truth, out.seal)["observable"] == "lobes"
+    assert (out.raw / "blind-1/impacts.csv").is_file()

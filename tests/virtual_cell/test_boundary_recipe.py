@@ -5,6 +5,7 @@ import pytest
 
 from metro.dynamics.lobes import spectral_radius, stability_boundary
 from metro.dynamics.system import Cut, Structure
+from virtual_cell.hidden import BOUNDARY_EFFECTS
 from virtual_cell.recipes import boundary
 from virtual_cell.regeneration import Trials, march
 
@@ -38,7 +39,7 @@ def test_vibration_dies_out_as_fast_as_the_multipliers_say(turned, ploughing):
 
 
 def test_the_tests_lie_on_either_side_of_the_boundary():
-    done = boundary.tested({})
+    done = boundary.cut_tests({})
     model = stability_boundary(STRUCTURE, PLAIN, np.array(boundary.RPM))
     for rpm, depth in zip(boundary.RPM, model.depth, strict=True):
         here = done.rpm == rpm
@@ -58,7 +59,10 @@ def test_softening_and_a_missing_mode_change_the_modes_that_are_marched():
         "spindle_speed_softening": {"change_per_krpm": -0.05},
         "missing_mode": {"frequency_hz": 250.0, "damping": 0.03, "stiffness_n_um": 10.0, "axis": "y"},
     }
-    x, y = boundary._modes(hidden, rpm)
+    machine = boundary.MACHINE
+    for name, parameters in hidden.items():
+        machine = BOUNDARY_EFFECTS[name].apply(machine, parameters)
+    x, y = machine.modes_at(rpm, np.zeros(2))
     np.testing.assert_allclose(x.stiffness[:, 0], 9e6 * np.array([0.9, 0.8]))
     mass = x.stiffness / x.omega**2
     assert mass[0] == pytest.approx(mass[1])

@@ -96,3 +96,24 @@ def test_wear_raises_the_edge_forces_with_the_length_cut():
     assert level[-1] - level[1] == pytest.approx(
         level[1] * 50.0 * 18 * 4e-4 / (1 + 50.0 * 1.5 * 4e-4), rel=0.01
     )
+
+
+def test_a_stronger_force_is_stronger_by_its_factor():
+    k = Coefficients(1e9, 4e8, 2e8, 0.0, 0.0, 0.0)
+    trials = Trials(
+        (RIGID, RIGID), k, 3, 1e-4, np.full(2, 1000.0), np.full(2, 1e-3), strength=np.array([1.0, 1.7])
+    )
+    force = march(trials, 4, 120).force
+    np.testing.assert_allclose(force[1], 1.7 * force[0], rtol=1e-6)
+
+
+def test_teeth_of_uneven_pitch_cut_chips_in_proportion_to_the_gap_before_them():
+    k = Coefficients(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    feed, shifted = 6e-5, np.radians([0.0, 18.0, 0.0])
+    one = Trials((RIGID, RIGID), k, 3, feed, np.array([2000.0]), np.array([1.0]), uneven=tuple(shifted))
+    force = march(one, 4, 120).force[0, -120:, 2]
+    angle = 2 * np.pi * (np.arange(120) + 0.5) / 120
+    stands = np.arange(3) * 2 * np.pi / 3 + shifted  # tooth j + 1 cuts before tooth j
+    gap = np.mod(np.roll(stands, -1) - stands, 2 * np.pi) / (2 * np.pi / 3)
+    chips = gap[:, None] * feed * np.maximum(np.sin(angle + stands[:, None]), 0.0)
+    np.testing.assert_allclose(force, chips.sum(axis=0), atol=1e-9)

@@ -1,27 +1,39 @@
 """Tests on either side of the stability boundary, of a machine that hides what its impact test does not tell.
 
 The receptances are those of the machine at rest, struck along x and y, without the mode that is missing; the
-tests are made on the machine as it is. Whole spindle speeds are held out.
+tests are made on the machine as it is. Whole spindle speeds are held out. Without a seed, machine and tests
+are always the same.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from virtual_cell.dynamometer import Dynamometer, record
+from virtual_cell.flexible import Machine, Programme
 from virtual_cell.hammer import receptance
+from virtual_cell.hidden import BOUNDARY_EFFECTS, Parameters
 from virtual_cell.milling import in_millimetres
 from virtual_cell.modes import Modes
+from virtual_cell.recipes.boundary_draws import drawn_machine, drawn_programme
 from virtual_cell.regeneration import History, Trials, march
 from virtual_cell.session import write_force
-from virtual_cell.units import DEG, MM, N_MM, Array
-from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_signal, write_yaml
+from virtual_cell.units import MM, N_MM2, Array
+from virtual_cell.write import (
+    RUN_COLUMNS,
+    Row,
+    fresh_folder,
+    impact_row,
+    write_csv,
+    write_signal,
+    write_yaml,
+)
 
 MODES = (
     Modes(np.array([310.0]), np.array([0.03]), np.array([9e6])),
@@ -31,21 +43,33 @@ LAW = in_millimetres((800.0, 320.0, 100.0), (0.0, 0.0, 0.0), (0.0, 0.0))
 DIAMETER_MM, TEETH, FEED_MM, RADIAL_MM = 12.0, 3, 0.06, 5.0
 RPM = tuple(float(rpm) for rpm in range(2400, 6000, 400))
 HELD_OUT = RPM[1::3]
-DEPTHS_MM = tuple(round(float(a), 2) for a in np.geomspace(0.4, 6.8, 12))
-BESIDE = 2  # tests kept on either side of the boundary, at each speed
-_TURNS, _LAST, _PER_TURN, _ENTRY = 90, 20, 120, 5
+MACHINE = Machine(MODES, LAW, DIAMETER_MM * MM, TEETH, FEED_MM * MM, RADIAL_MM * MM, "down")
+PROGRAMME = Programme(
+    RPM,
+    HELD_OUT,
+    tuple(round(float(a), 2) * MM for a in np.geomspace(0.4, 6.8, 12)),
+    beside=2,
+    declared=(LAW.ktc, LAW.krc),
+)
+_WITHIN = 0.75  # of the speeds: a boundary within the depths that are tried
+_TURNS, _LAST, _ENTRY, _SCATTER = 90, 20, 5, 0.01
 _VISIBLE = 0.25  # of the feed per tooth: range over the last turns that is called chatter
 _RATE = 8192.0
 
 
 @dataclass(frozen=True)
 class Tested:
-    """The tests that are kept of a march: their places in it, and what they were."""
+    """The tests that are kept of a march: their places in it, and what they were.
+
+    ``within``: share of the speeds whose boundary lies within the depths that were tried.
+    """
 
     trials: Trials
     history: History
     kept: np.ndarray
     unstable: np.ndarray
+    per_turn: int
+    within: float
 
     @property
     def rpm(self) -> Array:
@@ -61,7 +85,7 @@ class Tested:
         """Strongest frequency (n,), Hz, of the tip off the orders of the spindle; NaN where it is stable."""
         found = np.full(len(self.kept), np.nan)
         for i in np.flatnonzero(self.unstable):
-            tip = self.history.tip[self.kept[i], -_LAST * _PER_TURN :]
+            tip = self.history.tip[self.kept[i], -_LAST * self.per_turn :]
             spectrum = np.abs(np.fft.rfft(tip * np.hanning(len(tip))[:, None], axis=0)).sum(axis=1)
             order = np.arange(len(spectrum)) / _LAST
             spectrum[np.abs(order - np.round(order)) < 2.5 / _LAST] = 0.0
@@ -69,135 +93,165 @@ class Tested:
         return found
 
 
-def tested(hidden: Mapping[str, Any]) -> Tested:
+def cut_tests(
+    hidden: Mapping[str, Parameters], machine: Machine = MACHINE, programme: Programme = PROGRAMME
+) -> Tested:
     """March tests at every speed and depth, and keep those on either side of the boundary.
 
     ``hidden``: effects by the names, with the parameters, of the contract.
     """
-    rpm, depth = (a.ravel() for a in np.meshgrid(RPM, np.array(DEPTHS_MM) * MM, indexing="ij"))
-    trials = Trials(
-        _modes(hidden, rpm),
-        LAW,
-        TEETH,
-        FEED_MM * MM,
-        rpm,
-        depth,
-        entry=_ENTRY,
-        scatter=0.01,
-        immersion=(math.pi - math.acos(1.0 - 2.0 * RADIAL_MM / DIAMETER_MM), math.pi),
-        turned=hidden.get("mode_coupling", {}).get("angle_deg", 0.0) * DEG,
-        ploughing=hidden.get("process_damping", {}).get("coefficient_n_mm", 0.0)
-        * (N_MM / (0.5 * DIAMETER_MM * MM)),
-    )
-    history = march(trials, _TURNS, _PER_TURN)
-    last = history.tip[:, -_LAST * _PER_TURN :].reshape(len(rpm), _LAST, _PER_TURN, 2)
-    unstable = np.ptp(last, axis=1).max(axis=(1, 2)) > _VISIBLE * FEED_MM * MM
+    for name, parameters in hidden.items():
+        machine = BOUNDARY_EFFECTS[name].apply(machine, parameters)
+    rpm, depth = (a.ravel() for a in np.meshgrid(programme.rpm, programme.depths, indexing="ij"))
+    trials = machine.trials(rpm, depth, scatter=_SCATTER, entry=_ENTRY)
+    history = march(trials, _TURNS, programme.per_turn, programme.seed)
+    last = history.tip[:, -_LAST * programme.per_turn :].reshape(len(rpm), _LAST, programme.per_turn, 2)
+    unstable = np.ptp(last, axis=1).max(axis=(1, 2)) > _VISIBLE * machine.feed
     kept: list[int] = []
-    for speed in RPM:
+    within = 0
+    for speed in programme.rpm:
         here = np.flatnonzero(rpm == speed)
         first = int(np.argmax(unstable[here])) if unstable[here].any() else len(here)
-        kept += here[max(0, first - BESIDE) : first + BESIDE].tolist()
+        within += 0 < first < len(here)
+        kept += here[max(0, first - programme.beside) : first + programme.beside].tolist()
     places = np.array(kept)
-    return Tested(trials, history, places, unstable[places])
+    label = unstable[places] ^ _wrong(len(kept), machine.mislabelled, programme.seed)
+    return Tested(trials, history, places, label, programme.per_turn, within / len(programme.rpm))
 
 
-def _modes(hidden: Mapping[str, Any], rpm: Array) -> tuple[Modes, Modes]:
-    """Modes of the machine as it is, at each speed (n, m)."""
-    change = hidden.get("spindle_speed_softening", {}).get("change_per_krpm", 0.0)
-    factor = 1.0 + change * rpm[:, None] / 1000.0
-    more = hidden.get("missing_mode")
-    found = []
-    for axis, known in zip("xy", MODES, strict=True):
-        parts = [known.damped, known.damping, known.stiffness]
-        if more and more["axis"] == axis:
-            damped = more["frequency_hz"] * math.sqrt(1.0 - more["damping"] ** 2)
-            added = (damped, more["damping"], more["stiffness_n_um"] * 1e6)
-            parts = [np.append(part, value) for part, value in zip(parts, added, strict=True)]
-        shape = np.ones_like(factor)
-        found.append(Modes(parts[0] * np.sqrt(factor), parts[1] * shape, parts[2] * factor))
-    return found[0], found[1]
+def _wrong(tests: int, share: float, seed: int) -> np.ndarray:
+    """Which labels (n,) are wrong: a share of them, at least one where it is not zero."""
+    count = max(1, round(share * tests)) if share else 0
+    wrong = np.zeros(tests, dtype=bool)
+    wrong[np.random.default_rng([seed, 5]).permutation(tests)[:count]] = True
+    return wrong
 
 
-def make(folder: Path, hidden: Mapping[str, Any] | None = None, *, records: bool = False) -> Row:
-    """Write the batch, with the record of every test where ``records``; return the truth."""
-    rng = np.random.default_rng(1911)
-    effects = dict(hidden or {})
-    done = tested(effects)
+def make(
+    folder: Path,
+    hidden: Mapping[str, Parameters | None] | None = None,
+    seed: int | None = None,
+    style: str = "a",
+    *,
+    records: bool = False,
+) -> Row:
+    """Write the batch; return the truth.
+
+    Parameters
+    ----------
+    hidden : effects by name, with their parameters; None: drawn by the seed.
+    seed : of machine and tests. None: those that are always the same.
+    style : in which the tests are drawn.
+    records : write the record of every test, whatever is drawn. Nobody errs in labels that a record tells:
+        where labels are wrong, none is drawn.
+
+    Raises
+    ------
+    KeyError
+        For an effect that is not known.
+    """
+    if seed is None:
+        machine, programme = MACHINE, replace(PROGRAMME, records=records)
+        rng = np.random.default_rng(1911)
+        effects = {name: given or {} for name, given in (hidden or {}).items()}
+        done = cut_tests(effects)
+    else:
+        machine, programme, effects, done = _drawn(hidden or {}, seed, style)
+        drawn = programme.records and "wrong_labels" not in effects
+        programme = replace(programme, records=drawn or records)
+        rng = np.random.default_rng([seed, 19])
     fresh_folder(folder)
-    rows = [_row(folder, done, i, rng if records else None) for i in range(len(done.kept))]
+    rows = [_row(machine, programme, done, i) for i in range(len(done.kept))]
+    if programme.records:
+        for i, row in enumerate(rows):
+            row["dynamometer"] = _recorded(folder, row["run"], done, i, rng)
     write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
-    write_csv(folder / "impacts.csv", _impacts(folder, rng))
-    write_yaml(folder / "batch.yaml", _manifest(folder.name))
-    return {"batch": folder.name, "effects": effects}
+    write_csv(folder / "impacts.csv", _impacts(folder, machine, programme, rng))
+    write_yaml(folder / "batch.yaml", _manifest(folder.name, machine, programme))
+    told: Row = {} if seed is None else {"seed": seed, "style": style}
+    return {"batch": folder.name, **told, "effects": effects}
 
 
-def _row(folder: Path, done: Tested, test: int, rng: np.random.Generator | None) -> Row:
+def _drawn(
+    hidden: Mapping[str, Parameters | None], seed: int, style: str
+) -> tuple[Machine, Programme, dict[str, Parameters], Tested]:
+    """Draw machine, tests and effects until the depths hold the boundary at most speeds."""
+    for attempt in itertools.count():
+        rng = np.random.default_rng([seed, 17, attempt])
+        machine = drawn_machine(rng)
+        programme = drawn_programme(rng, machine, style, seed)
+        effects = {name: given or BOUNDARY_EFFECTS[name].draw(rng, machine) for name, given in hidden.items()}
+        done = cut_tests(effects, machine, programme)
+        if done.within >= _WITHIN:
+            break
+    return machine, programme, effects, done
+
+
+def _row(machine: Machine, programme: Programme, done: Tested, test: int) -> Row:
     rpm, depth = float(done.rpm[test]), round(float(done.depth[test]) / MM, 3)
-    name = f"t{test + 1:02d}"
-    row: Row = {
-        "run": name,
-        "role": "validate" if rpm in HELD_OUT else "identify",
+    return {
+        "run": f"t{test + 1:02d}",
+        "role": "validate" if rpm in programme.held_out else "identify",
         "condition": f"{rpm:g}",
         "replicate": 1,
         "order": test + 1,
-        "operation": "side",
+        "operation": "slot" if machine.direction == "slot" else "side",
         "spindle_rpm": rpm,
-        "feed_per_tooth_mm": FEED_MM,
+        "feed_per_tooth_mm": round(machine.feed / MM, 6),
         "axial_depth_mm": depth,
-        "radial_depth_mm": RADIAL_MM,
-        "direction": "down",
+        "radial_depth_mm": round(machine.radial / MM, 6),
+        "direction": machine.direction,
         "feed_direction_deg": 0.0,
-        "cut_length_mm": round(FEED_MM * TEETH * _TURNS, 1),
+        "cut_length_mm": round(machine.feed / MM * machine.teeth * _TURNS, 1),
         "pose": "1",
         "stable": "no" if done.unstable[test] else "yes",
     }
-    if rng is not None:
-        start, place = _ENTRY * 60.0 / rpm, done.kept[test]
-        sensor = Dynamometer(_RATE, "work", np.eye(3), noise=1.0)
-        seconds = (_TURNS - _ENTRY - 2) * 60.0 / rpm
-        time, read = record(sensor, lambda t: done.history.at(place, t + start), seconds, rng)
-        row["dynamometer"] = write_force(folder, name, time, read)
-    return row
 
 
-def _impacts(folder: Path, rng: np.random.Generator) -> list[Row]:
-    """Write the receptances along x and y, of the tool at rest, with half a percent of noise."""
-    frequency = np.arange(60.0, 900.0, 1.0)
+def _recorded(folder: Path, run: str, done: Tested, test: int, rng: np.random.Generator) -> str:
+    """Write the record of the force of a test; return its file."""
+    rpm, place = float(done.rpm[test]), done.kept[test]
+    start, seconds = _ENTRY * 60.0 / rpm, (_TURNS - _ENTRY - 2) * 60.0 / rpm
+    sensor = Dynamometer(_RATE, "work", np.eye(3), noise=1.0)
+    time, read = record(sensor, lambda t: done.history.at(place, t + start), seconds, rng)
+    return write_force(folder, run, time, read)
+
+
+def _impacts(folder: Path, machine: Machine, programme: Programme, rng: np.random.Generator) -> list[Row]:
+    """Write the receptances along x and y, of the tool at rest, with their noise."""
+    frequency = np.arange(*programme.band, 1.0)
     rows: list[Row] = []
-    for axis, modes in zip("xy", MODES, strict=True):
+    for axis, modes in zip("xy", machine.modes, strict=True):
         frf = receptance(modes, frequency)
-        noise = rng.normal(size=(2, len(frequency))) * 0.005 * np.abs(frf).max() / math.sqrt(2.0)
-        file, point = f"impacts/1{axis}.parquet", f"1{axis}"
+        sd = programme.hammer_noise * np.abs(frf).max() / math.sqrt(2.0)
+        noise = rng.normal(size=(2, len(frequency))) * sd
+        file = f"impacts/1{axis}.parquet"
         columns = {"frequency_hz": frequency, "real": frf.real + noise[0], "imag": frf.imag + noise[1]}
         write_signal(folder / file, columns)
-        rows.append(
-            {
-                "test": "tip",
-                "position": "1",
-                "reference": point,
-                "response": point,
-                "replicate": 1,
-                "kind": "frf",
-                "file": file,
-                "response_unit": "m",
-            }
-        )
+        rows.append(impact_row(f"1{axis}", file, "frf", "m"))
     return rows
 
 
-def _manifest(name: str) -> Row:
+def _manifest(name: str, machine: Machine, programme: Programme) -> Row:
+    how = "slots" if machine.direction == "slot" else f"{machine.direction} milling"
+    ktc, krc = (round(k / N_MM2) for k in programme.declared)
     return {
         "format": 1,
         "batch": name,
-        "title": "Tests on either side of the stability boundary, down milling",
+        "title": f"Tests on either side of the stability boundary, {how}",
         "source": "simulated",
         "cell": "unknown",
-        "tool": {"diameter_mm": DIAMETER_MM, "teeth": TEETH, "helix_deg": 0, "pitch_deg": [120, 120, 120]},
+        "tool": {
+            "diameter_mm": round(machine.diameter / MM, 6),
+            "teeth": machine.teeth,
+            "helix_deg": 0,
+            "pitch_deg": [round(360 / machine.teeth)] * machine.teeth,
+        },
         "work": {"material": "AA7075", "size_mm": [100, 60, 30]},
         "coefficients": {
-            "ktc_n_mm2": 800,
-            "krc_n_mm2": 320,
-            "kac_n_mm2": 100,
+            "ktc_n_mm2": ktc,
+            "krc_n_mm2": krc,
+            "kac_n_mm2": round(machine.law.kac / N_MM2),
             "kte_n_mm": 0,
             "kre_n_mm": 0,
             "kae_n_mm": 0,

@@ -16,7 +16,15 @@ from virtual_cell.milling import in_millimetres
 from virtual_cell.modes import Modes
 from virtual_cell.session import Plan, Session, cut_all
 from virtual_cell.units import DEG, MM, UM
-from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_signal, write_yaml
+from virtual_cell.write import (
+    RUN_COLUMNS,
+    Row,
+    fresh_folder,
+    impact_row,
+    write_csv,
+    write_signal,
+    write_yaml,
+)
 
 TITANIUM = in_millimetres((10145.0, 11036.5, 5000.0), (591.92, 100.03, 214.32), (243.47, 33.072))
 HOLE_MM = 19.05
@@ -167,19 +175,7 @@ def impacts(folder: Path, rng: np.random.Generator) -> list[Row]:
         for replicate in range(1, 6):
             file = f"impacts/1{direction}-{replicate}.parquet"
             write_signal(folder / file, hit(modes, 2048.0, 2.0, rng))
-            point = f"1{direction}"
-            rows.append(
-                {
-                    "test": "tip",
-                    "position": "1",
-                    "reference": point,
-                    "response": point,
-                    "replicate": replicate,
-                    "kind": "record",
-                    "file": file,
-                    "response_unit": "m/s2",
-                }
-            )
+            rows.append(impact_row(f"1{direction}", file, "record", "m/s2", replicate))
     return rows
 
 

@@ -1,0 +1,163 @@
+"""The oracle where the measurement is a label: what a reader could tell who knows the true effects.
+
+Nothing is fitted to labels, so none is refitted here: boundaries are predicted with the batch's own modes and
+coefficients and the true parameters, and labels are drawn from them with the errors that the loop itself
+allows for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from metro.dynamics.stability_model import StabilityModel
+from metro.effects.effect import Effect, fitted_to
+from metro.loop.label_evidence import (
+    FREQUENCY_SD,
+    OF_SPEED,
+    OF_TEST,
+    SHARED,
+    STRAY,
+    STRAY_WIDTH,
+    Labels,
+    log_evidence,
+    log_likelihood,
+    own_sd,
+    unstable_probability,
+)
+from metro.loop.label_search import LEAST_SPEEDS, LEAST_TESTS
+from metro.loop.labelled import tests_of
+from metro.observables.lobes import LabelProblem
+from metro.units import JSON, Array
+
+DEVIATIONS, DRAWS, ASSURED = 128, 100, 0.05
+SEED = 11
+
+
+@dataclass(frozen=True)
+class _Boundary:
+    """Log depth and chatter frequency (Hz) at all points, each (p,)."""
+
+    depth: Array
+    chatter: Array
+
+
+def label_oracle(
+    task: LabelProblem, hidden: Mapping[str, JSON], effects: Sequence[Effect], gain: float
+) -> JSON:
+    """Say how large the hidden effects are, and how well held-out labels can be predicted.
+
+    Parameters
+    ----------
+    hidden : true effects and their parameters, as in the contract's table.
+    effects : the library.
+    gain : log-likelihood that an effect must gain, in the loop.
+
+    Returns
+    -------
+    ``before`` and ``after`` (rms error of the probability of the held-out labels without and with the
+    effects), ``floor`` (that of labels drawn from the latter), ``enough`` (whether there are tests enough for
+    any verdict), and ``sizes``: the log-likelihood ratio, with the effect at its true parameters over
+    without, that 95 % of identification labels drawn from the truth exceed, over ``gain``. Where the library
+    lacks one of the effects: ``after`` is None, and the size is by how much less likely all labels are than
+    those that the base model would draw, over ``gain``.
+    """
+    able, _ = fitted_to(tuple(effects), task)
+    known = {effect.name: effect for effect in able}
+    mine, _ = tests_of(task, "identify")
+    held, _ = tests_of(task, "validate")
+    deviations = _deviations(task, SEED)
+    base = _told(task, known, {})
+    counts = (len(mine.depth), len(held.depth))
+    found: JSON = {"enough": min(counts) >= LEAST_TESTS and len(mine.speeds) >= LEAST_SPEEDS}
+    if not counts[0]:
+        return found | dict.fromkeys(("before", "after", "floor")) | {"sizes": dict.fromkeys(hidden, 0.0)}
+    if set(hidden) - set(known):
+        every = _every(task)
+        drawn = [_evidence(one, base, deviations) for one in _drawn(task, every, base)]
+        size = (float(np.mean(drawn)) - _evidence(every, base, deviations)) / gain
+        before, floor = _errors(held, base, deviations)
+        sizes = dict.fromkeys(hidden, max(0.0, size))
+        return found | {"before": before, "after": None, "floor": floor, "sizes": sizes}
+    truth = _told(task, known, hidden)
+    drawn_labels = _drawn(task, mine, truth)
+    full = np.array([_evidence(one, truth, deviations) for one in drawn_labels])
+    sizes = {}
+    for name in hidden:
+        without = _told(task, known, {other: hidden[other] for other in hidden if other != name})
+        ratio = full - [_evidence(one, without, deviations) for one in drawn_labels]
+        sizes[name] = max(0.0, float(np.quantile(ratio, ASSURED))) / gain
+    before, _ = _errors(held, base, deviations)
+    after, floor = _errors(held, truth, deviations)
+    return found | {"before": before, "after": after, "floor": floor, "sizes": sizes}
+
+
+def _deviations(task: LabelProblem, seed: int) -> Array:
+    """(s, p) of the log depth: what modes and coefficients are uncertain of, and what all tests share."""
+    shared = np.random.default_rng(seed).normal(size=(DEVIATIONS, 1)) * task.model_sd * SHARED**0.5
+    return np.asarray(task.deviations(DEVIATIONS, seed) + shared)
+
+
+def _every(task: LabelProblem) -> Labels:
+    """All tests at places whose modes are known, of either role."""
+    same = replace(task, roles=("identify",) * len(task.roles))
+    return tests_of(same, "identify")[0]
+
+
+def _told(task: LabelProblem, known: Mapping[str, Effect], hidden: Mapping[str, JSON]) -> _Boundary:
+    """Boundary of the batch's model with effects at their true parameters."""
+    changes = [_change(known[name], values) for name, values in hidden.items()]
+
+    def change(model: StabilityModel) -> StabilityModel:
+        for one in changes:
+            model = one(model)
+        return model
+
+    return _Boundary(*task.boundaries(change))
+
+
+def _change(effect: Effect, values: JSON) -> Callable[[StabilityModel], StabilityModel]:
+    choices = {parameter.name: parameter.choices for parameter in effect.parameters if parameter.choices}
+    numbers = {name: choices[name].index(v) if name in choices else v for name, v in values.items()}
+    return lambda model: effect.apply(model, numbers)
+
+
+def _evidence(tests: Labels, boundary: _Boundary, deviations: Array) -> float:
+    found = log_likelihood(tests, boundary.depth[None], boundary.chatter[None], deviations)
+    return log_evidence(found, np.ones(1))
+
+
+def _drawn(task: LabelProblem, tests: Labels, truth: _Boundary) -> list[Labels]:
+    """Return the tests with labels drawn from the truth; with frequencies where records told any."""
+    rng = np.random.default_rng([SEED, 2])
+    heard = bool(np.isfinite(task.chatter_hz).any())
+    speeds = np.searchsorted(tests.speeds, tests.rpm[tests.point])
+    deviations = _deviations(task, SEED + 1)
+    drawn = []
+    for _ in range(DRAWS):
+        wrong = deviations[rng.integers(DEVIATIONS)][tests.point]
+        wrong = wrong + tests.model_sd * OF_SPEED**0.5 * rng.standard_normal(len(tests.speeds))[speeds]
+        wrong = wrong + tests.model_sd * OF_TEST**0.5 * rng.standard_normal(len(speeds))
+        unstable = tests.depth > truth.depth[tests.point] + wrong
+        unstable ^= rng.random(len(speeds)) < tests.label_error
+        stray = rng.random(len(speeds)) < STRAY
+        spread = np.where(
+            stray,
+            STRAY_WIDTH * rng.uniform(-0.5, 0.5, len(speeds)),
+            FREQUENCY_SD * rng.standard_normal(len(speeds)),
+        )
+        chatter = np.where(unstable & heard, truth.chatter[tests.point] * np.exp(spread), np.nan)
+        drawn.append(replace(tests, unstable=unstable.astype(float), chatter_hz=chatter))
+    return drawn
+
+
+def _errors(held: Labels, boundary: _Boundary, deviations: Array) -> tuple[float | None, float | None]:
+    """Rms error of the predicted probability of held-out labels, and what it would be of drawn ones."""
+    if not len(held.depth):
+        return None, None
+    depth = boundary.depth[held.point] + deviations[:, held.point]
+    chance = unstable_probability(held, depth, own_sd(held)).mean(axis=0)
+    error = float(np.sqrt(np.mean((held.unstable - chance) ** 2)))
+    return error, float(np.sqrt(np.mean(chance * (1.0 - chance))))
