@@ -65,8 +65,8 @@ def give_of(batch: Batch, run: str, read: Read, arm: GivingArm | Refusal, force:
     The force is the measured one, as the speed is that of the record: what the model predicts changes by a
     few per cent with it.
     """
-    face = wall(batch, run)
     if isinstance(arm, Refusal) or not np.isfinite(force).all():
         return 0.0
+    face = wall(batch, run)
     cut, _ = tip_force.logs(read("robot", run), arm.model.arm)
     return arm.give(arm.log(batch, run, cut, face), face, force)
