@@ -150,5 +150,7 @@ def test_all_stages_of_the_package_are_hashed_fast():
         "import sys, time; from metro import codehash; start = time.process_time(); "
         "[codehash.code_hash(stage) for stage in sys.argv[1:]]; print(time.process_time() - start)"
     )
-    spent = subprocess.run([sys.executable, "-c", code, *real_stages()], capture_output=True, check=True)
-    assert float(spent.stdout) < 1.0
+    command = [sys.executable, "-c", code, *real_stages()]
+    # The least of three: what else the machine does can only add.
+    spent = [subprocess.run(command, capture_output=True, check=True).stdout for _ in range(3)]
+    assert min(map(float, spent)) < 1.0

@@ -17,6 +17,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent
 PACKAGE = "metro"
+IMPORTS = (ast.Import, ast.ImportFrom)
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 PLUGINS = "metro.effects"  # finds its modules by itself, so that no import statement names them
 
 
@@ -71,11 +73,13 @@ def imported_modules(start: str) -> dict[str, Path]:
     is counted whole as soon as anything of it is imported.
     """
     found: dict[str, Path] = {}
+    seen: set[str] = set()  # most names are named often, and many are no module
     waiting = [start]
     while waiting:
         name = waiting.pop()
-        path = _file(name)
-        if name in found or path is None:
+        path = None if name in seen else _file(name)
+        seen.add(name)
+        if path is None:
             continue
         found[name] = path
         waiting += [*_parents(name), *_imports(path, name)]
@@ -95,12 +99,13 @@ class _Module:
 @cache
 def _module(path: Path) -> _Module:
     tree = ast.parse(path.read_bytes(), filename=str(path))
-    nodes = list(ast.walk(tree))
-    imports = tuple(node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom))
-    for node in nodes:
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+    imports = []
+    for node in ast.walk(tree):
+        if isinstance(node, IMPORTS):
+            imports.append(node)
+        elif isinstance(node, DOCUMENTED):
             del node.body[: int(ast.get_docstring(node, clean=False) is not None)]
-    return _Module(_sha256(ast.dump(tree).encode()), imports)
+    return _Module(_sha256(ast.dump(tree).encode()), tuple(imports))
 
 
 def _imports(path: Path, name: str) -> Iterator[str]:
