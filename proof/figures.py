@@ -65,6 +65,7 @@ def further(scores: Sequence[Score]) -> list[Figure]:
         share("outside, below the noise: clean", [s.status == "clean" for s in outside if not s.seen]),
         share("outside, whatever its size: wrong attribution", [s.misattributed for s in outside]),
         median("error of the oracle on held-out runs, over the noise", oracle),
+        median("held-out error after, over the floor that the verdict states", over_stated(inside)),
         median("nothing hidden: held-out error over that before", unchanged(kind(scores, "none"))),
         _brier("Brier score of the effects named", [pair for s in scores for pair in s.stated]),
         _brier(
@@ -103,6 +104,11 @@ def kind(scores: Sequence[Score], name: str) -> list[Score]:
 def over_floor(scores: Sequence[Score]) -> list[float]:
     """Held-out error after the loop over the noise."""
     return [s.after / s.floor for s in scores if s.after is not None and s.floor]
+
+
+def over_stated(scores: Sequence[Score]) -> list[float]:
+    """Held-out error after the loop over the floor of the verdict."""
+    return [s.after / s.expected for s in scores if s.after is not None and s.expected]
 
 
 def unchanged(scores: Sequence[Score]) -> list[float]:

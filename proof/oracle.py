@@ -29,11 +29,11 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
 
     Returns
     -------
-    ``before`` and ``after`` (rms error on the held-out runs without and with the effects), ``floor`` (rms
-    there of the noise, and of what no run tells of the base model) and ``sizes``: of each effect, how much
-    the prediction changes when it is left out and all else is refitted, over the noise alone. Where the
-    library lacks one of them: ``after`` is None, the floor that of the declared noise (the fitted one has
-    swallowed some of the effect), and the size what of the error is beyond the floor, over the noise.
+    ``before`` and ``after`` (rms error on the held-out runs without and with the effects), ``floor`` (rms of
+    the noise there; what no run tells of the base model is none) and ``sizes``: of each effect, how much the
+    prediction changes when it is left out and all else is refitted, over the floor. Where the library lacks
+    one of them: ``after`` is None, the floor that of the declared noise (the fitted one has swallowed some of
+    the effect), and the size what of the error is neither noise nor untold, over the floor.
     """
     blocks = task.role("identify", "calibrate")
     prior = first_noise(budget, task.scatter, blocks)
@@ -43,9 +43,9 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
     told = [effect for effect in known if effect is not None]
     if len(told) < len(hidden):
         rows = _rows(task, base, replace(base, noise=prior))
-        before, floor = _rms(rows["measured"] - rows["before"]), _rms(rows["sigma"])
-        noise = _rms(_rows(_all_told(task), base, replace(base, noise=prior))["sigma"])
-        size = float(np.sqrt(max(0.0, before**2 - floor**2))) / noise
+        before, expected = _rms(rows["measured"] - rows["before"]), _rms(rows["sigma"])
+        floor = _rms(_rows(_all_told(task), base, replace(base, noise=prior))["sigma"])
+        size = float(np.sqrt(max(0.0, before**2 - expected**2))) / floor
         return {"before": before, "after": None, "floor": floor, "sizes": dict.fromkeys(hidden, size)}
 
     def fitted(chosen: list[Effect]) -> Fit:
@@ -53,15 +53,15 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
 
     full = fitted(told)
     rows = _rows(task, base, full)
-    noise = _rms(_rows(_all_told(task), base, full)["sigma"])
+    floor = _rms(_rows(_all_told(task), base, full)["sigma"])
     sizes = {}
     for effect in told:
         without = _rows(task, fitted([other for other in told if other is not effect]), full)
-        sizes[effect.name] = _rms(without["after"] - without["before"]) / noise
+        sizes[effect.name] = _rms(without["after"] - without["before"]) / floor
     return {
         "before": _rms(rows["measured"] - rows["before"]),
         "after": _rms(rows["measured"] - rows["after"]),
-        "floor": _rms(rows["sigma"]),
+        "floor": floor,
         "sizes": sizes,
     }
 

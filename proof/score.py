@@ -31,6 +31,7 @@ class Score:
         whether it says that something is unexplained. advised : whether it says what to measure next.
     enough : whether the batch has tests enough for any verdict.
     before, after : rms error on held-out runs. oracle, floor : that of the fit told the truth, and the noise.
+    expected : that the verdict states as its floor, with what no run tells of the base model.
     stated, rejected : probability of every effect named, or tried and not named, and whether it was there;
         those of effects too small to be seen left out.
     cannot_be_seen : effects of which the verdict says that these data cannot speak.
@@ -52,6 +53,7 @@ class Score:
     after: float | None = None
     oracle: float | None = None
     floor: float | None = None
+    expected: float | None = None
     estimates: tuple[Estimate, ...] = ()
     stated: tuple[Stated, ...] = ()
     rejected: tuple[Stated, ...] = ()
@@ -176,6 +178,7 @@ def score(
         after=_rms(entry["after"]),
         oracle=oracle["after"],
         floor=oracle["floor"],
+        expected=entry["noise_floor"],
         estimates=tuple(
             one
             for found in entry["effects"]

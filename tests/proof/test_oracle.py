@@ -93,7 +93,7 @@ def test_what_the_library_lacks_has_no_oracle_but_a_size():
 
 
 @pytest.mark.parametrize(("name", "library"), [("bump", LIBRARY), ("chip", LIBRARY[:1])])
-def test_what_no_run_tells_of_the_base_model_belongs_to_the_floor_but_not_to_the_noise(name, library):
+def test_what_no_run_tells_of_the_base_model_is_no_noise(name, library):
     task = problem(Wave(bump=0.6))
     untold = 3.0 * SIGMA * np.full((POINTS, 1), 1.0)
     blocks = [replace(b, untold=untold) if b.role == "validate" else b for b in task.blocks]
@@ -101,6 +101,7 @@ def test_what_no_run_tells_of_the_base_model_belongs_to_the_floor_but_not_to_the
     sure, unsure = (
         oracle(one, values, library, BUDGET) for one in (task, replace(task, blocks=tuple(blocks)))
     )
-    assert unsure["floor"] == pytest.approx(np.hypot(1.0, 3.0) * SIGMA, rel=0.05)
-    size = np.sqrt(max(0.0, sure["before"] ** 2 - unsure["floor"] ** 2)) / SIGMA if name == "chip" else None
-    assert unsure["sizes"][name] == pytest.approx(size or sure["sizes"][name], rel=0.05)
+    assert unsure["floor"] == pytest.approx(sure["floor"], rel=1e-9)
+    # of what the library lacks, the size is what is beyond noise and untold together
+    beyond = np.sqrt(max(0.0, sure["before"] ** 2 - 10.0 * SIGMA**2)) / SIGMA
+    assert unsure["sizes"][name] == pytest.approx(beyond if name == "chip" else sure["sizes"][name], rel=0.05)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from proof.figures import over_floor, over_stated
 from proof.score import FAILED, score
 
 
@@ -16,6 +17,7 @@ def oracle(after=2.0, **sizes):
 def verdict(status, *named, candidates=(), groups=(), rest=None, after=2.5, observable="force"):
     entry = {
         "status": status,
+        "noise_floor": 2.0,
         "before": {"rms": 10.0},
         "after": {"rms": after},
         "effects": [{"effect": name, "probability": p, "parameters": {}} for name, p in named],
@@ -40,6 +42,8 @@ def test_one_effect_named_alone_is_right():
     assert one.seen
     assert not one.surely_wrong
     assert one.share == pytest.approx(7.5 / 8.0)
+    assert over_floor([one]) == [pytest.approx(2.5 / 1.9)]  # the noise alone
+    assert over_stated([one]) == [pytest.approx(2.5 / 2.0)]
 
 
 def test_one_effect_with_a_false_one_beside_it_is_not():
