@@ -23,6 +23,7 @@ FOUND = {
 def verdict(status, *named):
     entry = {
         "status": status,
+        "noise_floor": 2.0,
         "before": {"rms": 10.0},
         "after": {"rms": 2.0 if named else 10.0},
         "effects": [{"effect": name, "probability": 0.97, "parameters": FOUND} for name in named],
