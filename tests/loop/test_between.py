@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import stats
-from toy import BEND, GATES, SCATTER, problem
+from toy import BEND, GATES, SCATTER, Wave, problem
 
 from metro.loop.between import between_conditions
 from metro.loop.candidate import Candidate
@@ -69,3 +69,23 @@ def test_runs_that_scatter_by_themselves_are_no_difference_between_conditions():
     task = problem(6, phased=False, scatter=5 * SCATTER)
     assert fitted(task).noise.scatter.max() > 2 * SCATTER
     assert between_conditions(fitted(task)).p_value > 0.01
+
+
+def test_a_rest_between_conditions_takes_from_the_belief_in_an_effect():
+    """The effect may be the shape that the unknown difference has: what both leave is weighed together."""
+    task = problem(7, truth=Wave(bend=0.08), phased=False, scatter=0.002)
+    alone, beside = (search(each, (BEND,), GATES) for each in (task, scaled(task, 3.0, 1.08)))
+    assert alone.probability("bend") > 0.99
+    assert beside.between is not None
+    assert beside.weight["bend"] > 0.99
+    assert 0.5 < beside.probability("bend") < 0.8
+
+
+def test_an_effect_is_withdrawn_where_more_stays_unexplained_than_it_explains():
+    task = scaled(problem(7, truth=Wave(bend=0.03), phased=False, scatter=0.002), 3.0, 1.08)
+    verdict = closed(task)
+    assert verdict["status"] == "unexplained"
+    assert not verdict["effects"]
+    assert verdict["after"] == verdict["before"]
+    (candidate,) = verdict["candidates"]
+    assert "stays unexplained" in candidate["why_not"]

@@ -8,7 +8,7 @@ against its rivals. The validation runs are not read here.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from metro.effects.effect import Effect, fitted_to
 from metro.loop import signature as rest
@@ -27,6 +27,8 @@ __all__ = ["Gates", "Outcome", "Trial", "search"]
 MOST_EFFECTS = 4
 NOT_VISIBLE = 0.02
 ABSORBED = "the base parameters imitate all but {:.1f} % of its signature"
+UNBELIEVED = "more stays unexplained with it than it explains"
+EVEN = 0.5  # least share explained by effects that are claimed
 SESSION = 0.005  # p-value of a step along the session that counts
 SESSION_SIZE = 0.01
 CONDITIONS = 0.001  # p-value of differences between conditions that count
@@ -39,9 +41,9 @@ class Outcome:
     ``base`` and ``final`` are fits of the identification runs; ``steps`` the fits after each addition;
     ``trials`` the last trial of each effect, ``weight`` the probability of each effect found against its
     rivals and against nothing; ``rivals`` effects that explain the rest as well as a chosen one; ``lines``
-    the signature of the rest, ``step`` that along the session, ``between`` that from condition to condition;
-    ``not_visible`` why effects cannot be seen; ``likeness`` the fit with what the rest resembles and is no
-    effect of the library (``final`` is without).
+    the signature of the rest, ``step`` that along the session, ``between`` that from condition to condition
+    (of the base: ``base_between``); ``not_visible`` why effects cannot be seen; ``likeness`` the fit with
+    what the rest resembles and is no effect of the library (``final`` is without).
     """
 
     base: Fit
@@ -53,6 +55,7 @@ class Outcome:
     base_lines: tuple[rest.Line, ...]
     lines: tuple[rest.Line, ...]
     step: Step | None = None
+    base_between: Between | None = None
     between: Between | None = None
     offered: tuple[Effect, ...] = ()
     not_visible: dict[str, str] = field(default_factory=dict)
@@ -62,6 +65,24 @@ class Outcome:
     def names(self) -> tuple[str, ...]:
         """Names of the effects found, in the order of their addition."""
         return tuple(effect.name for effect in self.final.candidate.effects)
+
+    @property
+    def explained(self) -> float:
+        """Share of the base model's significant rest, in and between conditions, that the effects took."""
+        left, first = (
+            rest.share_left(lines) ** 2 + (between.relative**2 if between else 0.0)
+            for lines, between in ((self.lines, self.between), (self.base_lines, self.base_between))
+        )
+        return 1.0 - left / max(first, left) if left else 1.0
+
+    def probability(self, name: str) -> float:
+        """Return the probability that an effect found is the cause.
+
+        Its weight against its rivals and against nothing; where a significant rest stays, the library lacks
+        a cause, and what is missing may have lent the effect its part: the weight counts by the share
+        explained.
+        """
+        return self.weight[name] * self.explained
 
 
 def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome:
@@ -104,9 +125,7 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
     if final not in (base, *steps):
         steps.append(final)
     step, floor = scan(likeness, gates.seed), max(least, gates.model_form_budget)
-    between = between_conditions(likeness)
-    differ = between and between.p_value < CONDITIONS and between.relative > floor
-    return Outcome(
+    outcome = Outcome(
         base=base,
         final=final,
         steps=tuple(steps),
@@ -116,11 +135,35 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
         base_lines=tuple(rest.signature(base, floor)),
         lines=tuple(rest.signature(final, floor)),
         step=step if step and step.p_value < SESSION and abs(step.relative) > SESSION_SIZE else None,
-        between=between if differ else None,
+        base_between=_differing(base, floor),
+        between=_differing(likeness, floor),
         offered=tuple(library),
         not_visible=unable | absorbed,
         likeness=likeness if likeness is not final else None,
     )
+    return outcome if outcome.rivals or outcome.explained > EVEN else _withdrawn(outcome)
+
+
+def _withdrawn(outcome: Outcome) -> Outcome:
+    """Return an outcome without effects: a correction that is less likely than not is not applied."""
+    return replace(
+        outcome,
+        final=outcome.base,
+        steps=(),
+        trials=tuple(
+            replace(trial, why_not=UNBELIEVED) if trial.effect.name in outcome.names else trial
+            for trial in outcome.trials
+        ),
+        weight={},
+        lines=outcome.base_lines or outcome.lines,  # what only the effect laid bare is there all the same
+        between=outcome.base_between or outcome.between,
+    )
+
+
+def _differing(fitted: Fit, least: float) -> Between | None:
+    """Return how the conditions differ, where that counts."""
+    found = between_conditions(fitted)
+    return found if found and found.p_value < CONDITIONS and found.relative > least else None
 
 
 def _pruned(current: Fit, prior: Noise, gates: Gates, least: float) -> tuple[Fit, set[str]]:

@@ -158,22 +158,9 @@ def _status(outcome: Outcome, remaining: bool, enough: bool) -> str:
 def _effect(outcome: Outcome, name: str) -> JSON:
     return {
         "effect": name,
-        "probability": probability(outcome, name),
+        "probability": outcome.probability(name),
         "parameters": parameters(outcome.final, name),
     }
-
-
-def probability(outcome: Outcome, name: str) -> float:
-    """Return the probability that an effect found is the cause.
-
-    Its weight against its rivals and against nothing; where a significant rest stays, the library lacks a
-    cause, and what is missing may have lent the effect its part: the weight counts by the share explained.
-    """
-    left, first = (
-        sum(line.excess**2 for line in lines if line.significant)
-        for lines in (outcome.lines, outcome.base_lines)
-    )
-    return outcome.weight[name] * (1.0 - left / max(first, left) if left else 1.0)
 
 
 def parameters(fitted: Fit, name: str) -> JSON:
