@@ -1,6 +1,7 @@
 """How far an arm gives way to a side cut, and the radial depth that is left."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,18 @@ def test_the_forces_of_an_arm_that_gives_way_leave_no_misfit(cell):
     assert spindle["give_mm"].max() < 0.3
     assert max(misfit(spindle).values()) < 0.002
     assert max(misfit(spindle.assign(give_mm=0.0)).values()) > 0.01
+
+
+def test_an_arm_of_unknown_stiffness_is_said_to_be_one(cell):
+    batch, read = cell
+    observed = force.observe(batch, read, {})
+    assert any("less what the arm gives way" in note for note in force.problem(batch, observed, {}).notes)
+    stiff = observed | {"spindle": observed["spindle"].assign(give_mm=0.0)}
+    assert any(
+        "gives way in side cuts is not known" in note for note in force.problem(batch, stiff, {}).notes
+    )
+    machine = replace(batch, cell={"cell": "mill"})
+    assert not any("arm" in note for note in force.problem(machine, stiff, {}).notes)
 
 
 def test_nothing_is_added_to_the_forces_of_an_arm_that_gives_way(cell):

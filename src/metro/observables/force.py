@@ -22,6 +22,7 @@ from metro.observables.force_orders import observe, recorded
 from metro.observables.force_proposals import feasible
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
+from metro.observables.wall import wall
 from metro.units import JSON, MM, N_MM2, UM, Array
 
 __all__ = ["OBSERVABLE", "observe", "problem", "report"]
@@ -56,7 +57,7 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
         "The chip thickness is that of the true tooth paths, the force law linear in it; "
         "tool, machine and dynamometer are rigid in the base model.",
         _path_note(tool, blocks),
-        *_give_note(observed["spindle"]),
+        *_give_note(batch, observed["spindle"]),
         f"Forces are compared per revolution up to spindle order {blocks[0].setting.highest}, "
         "in the work frame"
         + (" (helical runs: in the frame that turns with the orbit)." if helical else "."),
@@ -79,15 +80,21 @@ def _path_note(tool: Cutter, blocks: tuple[Block, ...]) -> str:
     )
 
 
-def _give_note(spindle: pd.DataFrame) -> tuple[str, ...]:
-    """Say by how much the arm gives way in side cuts, if it does."""
+def _give_note(batch: Batch, spindle: pd.DataFrame) -> tuple[str, ...]:
+    """Say by how much an arm gives way in side cuts, or that nobody knows."""
     run, give = max(zip(spindle["run"], spindle["give_mm"], strict=True), key=lambda one: abs(one[1]))
-    if not give:
-        return ()
-    return (
-        "The radial depth of side cuts is the nominal one less what the arm gives way to the measured mean "
-        f"force by its load tests: at most {give:.2g} mm, in run {run}.",
-    )
+    if give:
+        return (
+            "The radial depth of side cuts is the nominal one less what the arm gives way to the measured "
+            f"mean force by its load tests: at most {give:.2g} mm, in run {run}.",
+        )
+    if "arm" in batch.cell and any(wall(batch, name).normal.any() for name in spindle["run"]):
+        return (
+            "How far the arm gives way in side cuts is not known (no load tests of it where it stood): their "
+            "radial depth is taken as programmed, and what the arm gives way is in the forces of up and "
+            "down milling with opposite signs.",
+        )
+    return ()
 
 
 def _bottom_edges(blocks: tuple[Block, ...]) -> tuple[str, ...]:
