@@ -1,5 +1,7 @@
 """Labels against predicted probabilities."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -112,6 +114,23 @@ def test_an_effect_found_is_told_with_its_size_and_mends_the_held_out_prediction
     ]
     assert {c["effect"]: c["verdict"] for c in story["candidates"]}["slope"] == "added"
     assert change(Line()).slope == pytest.approx(0.9, abs=0.3)
+
+
+def test_what_the_held_out_tests_speak_against_is_not_claimed():
+    """On whole speeds that no fit has seen, the boundary is that of the base model after all."""
+    task = problem(Line(slope=0.9), 1)
+    held = np.array(task.roles) == "validate"
+    base = Line().boundary(task.point_rpm)[task.point]
+    task = replace(task, unstable=np.where(held, np.log(task.depth) > base, task.unstable))
+    before = norm.cdf((np.log(task.depth) - base) / 0.15)[held]
+    rows = pd.DataFrame(
+        {"run": np.array(task.runs)[held], "measured": task.unstable[held].astype(float), "before": before}
+    ).assign(after=before)
+    after, verdict, _, change = judge_labels(task, rows, [], (SHIFT, SLOPE), GATES)
+    assert verdict["status"] == "undetermined"
+    assert not verdict["effects"]
+    assert change is None
+    assert (after["after"] == after["before"]).all()
 
 
 def test_twins_are_undetermined_and_a_next_test_is_named():

@@ -9,7 +9,7 @@ from metro.batch.processed import read_table
 from metro.dynamics.hits import Hit, gate
 from metro.formats.uff import FRF, Function
 from metro.formats.uff_writer import write_functions
-from metro.observables.modal_test import observe_modes
+from metro.observables.modal_test import clear_of_drift, observe_modes
 from metro.observables.receptance import arranged, from_files
 from metro.stages.ingest import ingest
 
@@ -233,3 +233,20 @@ def test_a_row_that_names_a_pair_takes_that_pair_out_of_the_file(tmp_path):
     frf = read_table(tmp_path / "processed" / "frf.parquet")
     assert list(frf["response"].unique()) == ["2x"]
     np.testing.assert_allclose(frf["real_m_n"], functions[1].values.real, rtol=1e-11)
+
+
+def test_a_resonance_low_in_the_band_is_no_drift():
+    """Of an integrated acceleration the first lines rise; a lightly damped mode stands by itself."""
+    frequency = np.arange(60.0, 1260.0)
+
+    def receptance(hz, damping, stiffness):
+        ratio = frequency / hz
+        return 1.0 / (stiffness * (1.0 - ratio**2 + 2j * damping * ratio))
+
+    mode = receptance(256.0, 0.02, 2e7)[:, None]
+    drift = (2e-7 * (60.0 / frequency) ** 4 * 30)[:, None]
+    assert clear_of_drift(frequency, mode).all()
+    clear = clear_of_drift(frequency, mode + drift)
+    first = frequency[clear][0]
+    assert 60.0 < first < 230.0
+    assert clear[frequency >= first].all()

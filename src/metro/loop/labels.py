@@ -32,6 +32,7 @@ from metro.loop.verdict import DRAWS, error
 from metro.units import JSON, Array
 
 SIGNIFICANT = 0.01
+REFUTED = -1.0  # log-likelihood of the held-out tests that a correction may cost: more is no chance
 FEW = "effects of the boundary need {} tests with a label that no fit holds out, at {} speeds or more"
 
 
@@ -61,6 +62,7 @@ class _Judged:
     outcome: LabelOutcome | None
     surprises: tuple[float, float, float]
     upstream: bool
+    refuted: bool
     tests: list[NextTest]
 
     @property
@@ -68,7 +70,8 @@ class _Judged:
         """Whether the lead has passed the gates, its own tests agree, and held-out tests have judged it."""
         lead = self.outcome.lead if self.outcome else None
         agrees = self.surprises[2] >= SIGNIFICANT
-        return lead is not None and not lead.rejected and agrees and len(self.rows) >= LEAST_TESTS
+        passed = lead is not None and not lead.rejected and agrees and not self.refuted
+        return passed and len(self.rows) >= LEAST_TESTS
 
     @property
     def status(self) -> str:
@@ -141,11 +144,15 @@ def _judged(task: Labelled, rows: pd.DataFrame, library: Sequence[Effect], gates
     before, refitted = surprised("before"), surprised("after")
     lead = outcome.lead if outcome else None
     within = _within(outcome, gates) if outcome else 1.0
+    refuted = False
     if outcome and lead and not lead.rejected and within >= SIGNIFICANT:
-        rows = _with_effects(task, rows, outcome)
+        corrected = _with_effects(task, rows, outcome)
+        old, new = (log_likelihood(label, each["after"].to_numpy(float)) for each in (rows, corrected))
+        refuted = bool(new - old < REFUTED)
+        rows = rows if refuted else corrected
     suggested = next_tests(task, outcome) if outcome and (lead or len(rows) < LEAST_TESTS) else []
     upstream = before < SIGNIFICANT <= refitted
-    return _Judged(rows, outcome, (before, surprised("after"), within), upstream, suggested)
+    return _Judged(rows, outcome, (before, surprised("after"), within), upstream, refuted, suggested)
 
 
 def _with_effects(task: Labelled, rows: pd.DataFrame, outcome: LabelOutcome) -> pd.DataFrame:

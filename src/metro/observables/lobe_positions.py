@@ -65,11 +65,12 @@ def _tip(position: str, rows: pd.DataFrame, letters: np.ndarray) -> Tip:
     omega = 2 * np.pi * rows["frequency_hz"].to_numpy(float)
     axis = np.where(letters == "x", 0, 1)
     structure = Structure(axis, omega, rows["damping"].to_numpy(float), rows["stiffness_n_m"].to_numpy(float))
-    relative = [
-        rows["frequency_sd_hz"] / rows["frequency_hz"],
-        rows["damping_sd"] / rows["damping"],
-        rows["stiffness_sd"] / rows["stiffness_n_m"],
-    ]
+    pairs = (
+        ("frequency_sd_hz", "frequency_hz"),
+        ("damping_sd", "damping"),
+        ("stiffness_sd", "stiffness_n_m"),
+    )
+    relative = [rows[sd].to_numpy(float) / rows[value].to_numpy(float) for sd, value in pairs]
     names = tuple(f"{d}{1 + int(np.sum(letters[:i] == d))}" for i, d in enumerate(letters))
     return Tip(position, structure, names, np.concatenate(relative))
 

@@ -21,6 +21,7 @@ MODE_COLUMNS = (
 _MORE_COLUMNS = ("mass_sd", "viscous_n_s_m", "viscous_sd", "collinearity", "resolved")
 Read = Callable[..., pd.DataFrame]
 _LEAST_LINES = 40
+_QUIET_LINES = 5  # in a row, below which a drift has ended
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def _identified(group: list[Receptance], inputs: int, decay: float) -> tuple[Mod
     known = [item.variance for item in group if item.variance is not None]
     variance = np.stack(known, axis=1) if len(known) == len(group) else None
     driving = next((i for i, item in enumerate(group) if item.driving), None)
-    clear = _clear_of_drift(group[0].frequency, frf) if variance is None else _clear_of_noise(frf, variance)
+    clear = clear_of_drift(group[0].frequency, frf) if variance is None else _clear_of_noise(frf, variance)
     usable = np.logical_and.reduce([item.usable for item in group])
     keep = np.flatnonzero(clear & usable)[:: max(item.redundancy for item in group)]
     model = identify_modes(
@@ -140,11 +141,15 @@ def _identified(group: list[Receptance], inputs: int, decay: float) -> tuple[Mod
     return model, keep
 
 
-def _clear_of_drift(frequency: Array, frf: ComplexArray) -> np.ndarray:
-    """Lines above an integrated acceleration's drift: low ones with |H| above 30 times its median."""
+def clear_of_drift(frequency: Array, frf: ComplexArray) -> np.ndarray:
+    """Lines above an integrated acceleration's drift: |H| above 30 times its median from the first line on.
+
+    A drift grows towards the first line; a resonance low in the band does not, however high.
+    """
     level = np.sqrt(np.mean(np.abs(frf) ** 2, axis=1))
-    drift = np.flatnonzero((level > 30.0 * np.median(level)) & (frequency < 0.25 * frequency[-1]))
-    return np.arange(len(frequency)) > (drift[-1] if len(drift) else -1)
+    low = (level < 30.0 * np.median(level)) | (frequency > 0.25 * frequency[-1])
+    quiet = np.flatnonzero(np.convolve(low, np.ones(_QUIET_LINES), mode="valid") == _QUIET_LINES)
+    return np.arange(len(frequency)) >= (quiet[0] if len(quiet) else 0)
 
 
 def _clear_of_noise(frf: ComplexArray, variance: Array) -> np.ndarray:
