@@ -77,8 +77,9 @@ def test_a_rest_between_conditions_takes_from_the_belief_in_an_effect():
     alone, beside = (search(each, (BEND,), GATES) for each in (task, scaled(task, 3.0, 1.08)))
     assert alone.probability("bend") > 0.99
     assert beside.between is not None
-    assert beside.weight["bend"] > 0.99
-    assert 0.5 < beside.probability("bend") < 0.8
+    assert 0.5 < beside.explained < 0.9 < alone.explained
+    assert beside.probability("bend") == pytest.approx(beside.weight["bend"] * beside.explained)
+    assert beside.probability("bend") < 0.8
 
 
 def test_an_effect_is_withdrawn_where_more_stays_unexplained_than_it_explains():

@@ -60,8 +60,27 @@ def test_log_likelihood_is_that_of_the_dense_gaussian():
     for block in blocks:
         covariance = dense_covariance(block, noise, task.base, found.nuisance[block.run], found.beta)
         dense = stats.multivariate_normal(found.predict(block), covariance).logpdf(block.measured)
-        constant = 0.5 * len(block.measured) * np.log(2 * np.pi)
+        # in units of the variance that no model shares, and one for each element
+        constant = 0.5 * len(block.measured) * (np.log(2 * np.pi) + 1.0)
+        constant += 0.5 * np.log(noise_room.diagonal(block, noise)).sum()
         assert reached.log_likelihood[block.run] == pytest.approx(dense + constant, abs=1e-6)
+
+
+def test_the_evidence_does_not_depend_on_the_unit():
+    """In mN, the same runs speak as much for an effect, whatever the smaller model misses."""
+    task = problem(3, truth=Wave(bend=0.2, ripple=0.1))
+    statistic = []
+    for unit in (1.0, 1e3, 1e-6):
+        blocks = tuple(
+            replace(block, measured=unit * block.measured, sigma=unit * block.sigma)
+            for block in task.role("identify")
+        )
+        prior = prior_of(task, blocks)
+        base = fit(Candidate(task.base), blocks, prior)
+        assert max(base.noise.misfit.values()) > 0.01
+        statistic.append(fit(Candidate(task.base, (BEND,)), blocks, prior, base).total - base.total)
+    assert statistic[0] > 10.0
+    assert statistic[1:] == pytest.approx([statistic[0]] * 2, rel=1e-3)
 
 
 def test_with_effect_and_phases_the_descent_ends_where_a_general_optimiser_does():

@@ -115,12 +115,11 @@ def test_misfit_weighs_many_neighbours_as_one_element():
     assert diagonal(one, noise) - SIGMA**2 == pytest.approx(
         np.full(POINTS, noise_room.MISFIT_CORRELATION * rms2)
     )
-    # Counted as elements, each still has its own variance, a twelfth as often.
-    assert noise_room.log_scale(one, replace(noise, misfit={})) == pytest.approx(POINTS * np.log(SIGMA**2))
+    # Counted as elements, each still has its own variance, a twelfth as often, in units of the noise.
+    assert noise_room.log_scale(one, replace(noise, misfit={})) == pytest.approx(-POINTS)
     once = SIGMA**2 + rms2
-    assert noise_room.log_scale(one, noise) == pytest.approx(
-        POINTS * once / (SIGMA**2 + noise_room.MISFIT_CORRELATION * rms2) * np.log(once)
-    )
+    count = POINTS * once / (SIGMA**2 + noise_room.MISFIT_CORRELATION * rms2)
+    assert noise_room.log_scale(one, noise) == pytest.approx(count * (np.log(once / SIGMA**2) - 1.0))
 
 
 def test_sigma_of_the_comparison_is_the_spread_of_simulated_runs():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, problem
+from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, effect, problem
 
 from metro.loop import search as search_room
 from metro.loop import trial as trial_room
@@ -14,7 +14,7 @@ from metro.loop.fit import fit
 from metro.loop.noise import first_noise
 from metro.loop.search import search
 from metro.loop.signature import in_words, q_values
-from metro.loop.verdict import BEATEN, RESEMBLED, comparison, held_out, judge, why_not
+from metro.loop.verdict import BEATEN, RESEMBLED, comparison, held_out, judge, parameters, why_not
 
 
 def judged(task, library, gates=GATES):
@@ -223,3 +223,26 @@ def test_conditions_that_an_effect_does_not_touch_say_nothing_of_it(gains, share
     held_out = {f"condition {i}": gain for i, gain in enumerate(gains)}
     evidence = Evidence(1.0, 0.5, held_out, 0.1, 0.0)
     assert evidence.better_share == pytest.approx(share)
+
+
+FORMS = tuple(
+    replace(effect("bent", attribute), form=f"joint {i}", where={"joint": i})
+    for i, attribute in ((1, "bend"), (2, "ripple"), (3, "bend"))
+)
+
+
+def test_of_the_forms_of_an_effect_the_right_one_is_found():
+    task = problem(5, truth=Wave(ripple=0.3))
+    outcome = search(task, FORMS[:2], GATES)
+    (found,) = outcome.final.candidate.effects
+    assert found.form == "joint 2"
+    assert not outcome.rivals
+    assert [trial.effect.name for trial in outcome.trials] == ["bent"]
+    assert parameters(outcome.final, "bent")["joint"] == 2
+
+
+def test_forms_that_the_runs_do_not_tell_apart_are_rivals_by_their_form():
+    outcome = search(problem(5, truth=Wave(bend=0.3)), FORMS, GATES)
+    (rival,) = outcome.rivals
+    assert set(rival.pair) == {"bent (joint 1)", "bent (joint 3)"}
+    assert 0.3 < outcome.probability("bent") < 0.7

@@ -20,10 +20,13 @@ def library(observable: str | None = None) -> tuple[Effect, ...]:
     effect under the entry point group ``metro.effects``.
     """
     own = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
-    effects: list[Effect] = [module.EFFECT for module in own if hasattr(module, "EFFECT")]
-    effects += [entry.load() for entry in entry_points(group="metro.effects")]
+    offered = [module.EFFECT for module in own if hasattr(module, "EFFECT")]
+    offered += [entry.load() for entry in entry_points(group="metro.effects")]
+    effects: list[Effect] = []
+    for effect in offered:
+        effects += [effect] if isinstance(effect, Effect) else effect  # several forms of one
     chosen = [effect for effect in effects if observable is None or observable in effect.observables]
-    return tuple(sorted(chosen, key=lambda effect: effect.name))
+    return tuple(sorted(chosen, key=lambda effect: effect.key))
 
 
 def told_of(problem: Problem, known: Mapping[str, Mapping[str, Any]]) -> Problem:
@@ -35,9 +38,16 @@ def told_of(problem: Problem, known: Mapping[str, Mapping[str, Any]]) -> Problem
     effects, unable = fitted_to(library(problem.observable), problem)
     base, notes = problem.base, []
     for name, values in known.items():
-        matching = [e for e in effects if e.name == name and set(e.names) == set(values)]
+        matching = [
+            e
+            for e in effects
+            if e.name == name
+            and set(e.names) | set(e.where) == set(values)
+            and all(values[key] == value for key, value in e.where.items())
+        ]
         if matching:
-            base = matching[0].apply(base, matching[0].spread(values))
+            given = {key: value for key, value in values.items() if key not in matching[0].where}
+            base = matching[0].apply(base, matching[0].spread(given))
             notes.append(f"The base model is told of {name.replace('_', ' ')} (batch.yaml, known).")
         elif name in unable:
             notes.append(f"batch.yaml declares {name.replace('_', ' ')}, but {unable[name]}.")

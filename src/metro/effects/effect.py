@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -67,7 +67,9 @@ class Effect:
         fewer (pitch errors add up to nothing); empty: they are the same.
     resembled : true of a cause that is not one of the contract's: it is tried like the others, so that none
         of them is taken for it, but the verdict only says that the rest resembles it.
-    form : where one cause has two models of which a batch has one: what tells them apart, for the report.
+    form : where one cause has several models of which a batch has one (a drift in steps or in time; another
+        joint): what tells them apart, for the report.
+    where : what of the contract's parameters the form says (``joint``): reported as it is.
     """
 
     name: str
@@ -81,6 +83,12 @@ class Effect:
     mixing: tuple[tuple[float, ...], ...] = ()
     form: str = ""
     resembled: bool = False
+    where: Mapping[str, int | str] = field(default_factory=dict, hash=False)
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What tells it from every other effect and form: its name and its form."""
+        return self.name, self.form
 
     @property
     def reported(self) -> tuple[EffectParameter, ...]:
@@ -108,6 +116,13 @@ class Effect:
     def values(self, theta: Array) -> dict[str, Any]:
         """Return the values by name, those of one name as a list; ``theta`` (parameters,)."""
         return by_name(self.reported, [float(value) for value in self.matrix @ theta])
+
+
+def per_joint(of_joint: Callable[[int], Effect]) -> tuple[Effect, ...]:
+    """Return the forms of an effect of one joint, for each joint (0 … 5) of an arm: ``of_joint(joint)``."""
+    return tuple(
+        replace(of_joint(joint), form=f"joint {joint + 1}", where={"joint": joint + 1}) for joint in range(6)
+    )
 
 
 def by_name(parameters: tuple[EffectParameter, ...], entries: list[Any]) -> dict[str, Any]:

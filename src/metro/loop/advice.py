@@ -126,7 +126,8 @@ def _undecided(problem: Problem, outcome: Outcome, rivals: Sequence[Rival]) -> s
             f"{_cut(best.proposal, best.repeats)}: the best of the runs tried to tell {_pair(first)}, "
             f"but it decides with a probability of {_chance(best.probability)} only"
         )
-    texts = {effect.name: effect.experiment for effect in outcome.offered if effect.name in first.pair}
+    plain = {name.partition(" (")[0] for name in first.pair}
+    texts = {effect.name: effect.experiment for effect in outcome.offered if effect.name in plain}
     names = " or ".join(_pair(rival) for rival in rivals)
     tried = f"no run of the kinds tried tells {names}; " if problem.feasible else ""
     return tried + "; or ".join(f"for {_words(name)}: {text}" for name, text in texts.items())

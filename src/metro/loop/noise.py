@@ -100,9 +100,13 @@ def all_alike(noise: Noise) -> Noise:
 
 
 def log_scale(block: Block, noise: Noise) -> float:
-    """Logarithm of the determinant of the unshared variance, elements counted as in :func:`diagonal`."""
-    once = diagonal(block, noise, correlation=1.0)
-    return float(np.sum(once / diagonal(block, noise) * np.log(once)))
+    """Logarithm of the determinant of the unshared variance, elements counted as in :func:`diagonal`.
+
+    In units of the variance without a misfit, which is that of every model, and less one for each element:
+    elements that a misfit leaves uncounted must gain nothing by it, whatever the unit.
+    """
+    once, known = diagonal(block, noise, correlation=1.0), diagonal(block, replace(noise, misfit={}))
+    return float(np.sum(once / diagonal(block, noise) * (np.log(once / known) - 1.0)))
 
 
 def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:

@@ -22,7 +22,10 @@ HOPELESS = 12.0  # log-likelihood on the runs of the fit by which a rival may be
 
 @dataclass(frozen=True)
 class Rival:
-    """An effect in the place of one that was found: names of both, weight of the other, and its fit."""
+    """An effect in the place of one that was found: names of both, weight of the other, and its fit.
+
+    The names are with their forms (``friction_reversal (joint 3)``) where two forms of one effect are rivals.
+    """
 
     found: str
     other: str
@@ -51,17 +54,24 @@ def believed(effect: Effect, weight: float) -> tuple[bool, float]:
 
 def contested(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> Contest:
     """Weigh every effect found against each other effect in its place, and put the better one there."""
-    swapped: set[str] = set()
+    swapped: set[tuple[str, str]] = set()
     while True:
         contest, better = _round(current, effects, prior, gates)
-        if better is None or set(_names(better)) <= swapped:
+        if better is None or set(_keys(better)) <= swapped:
             return contest
-        swapped |= set(_names(current)) | set(_names(better))
+        swapped |= set(_keys(current)) | set(_keys(better))
         current = better
 
 
-def _names(fitted: Fit) -> list[str]:
-    return [effect.name for effect in fitted.candidate.effects]
+def _titles(found: Effect, other: Effect) -> tuple[str, str]:
+    """Names of two effects, with their forms where the name is the same."""
+    if found.name != other.name:
+        return found.name, other.name
+    return f"{found.name} ({found.form})", f"{other.name} ({other.form})"
+
+
+def _keys(fitted: Fit) -> list[tuple[str, str]]:
+    return [effect.key for effect in fitted.candidate.effects]
 
 
 def _round(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> tuple[Contest, Fit | None]:
@@ -79,7 +89,7 @@ def _round(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) 
         weight[effect.name] = float(share[0])
         for fitted, other in zip(others, share[1:], strict=True):
             if other > RIVAL_WEIGHT:
-                rivals.append(Rival(effect.name, fitted.candidate.effects[-1].name, float(other), fitted))
+                rivals.append(Rival(*_titles(effect, fitted.candidate.effects[-1]), float(other), fitted))
         in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
         belief = [believed(one, float(part)) for one, part in zip(in_place, share, strict=True)]
         first = belief.index(max(belief))
@@ -90,10 +100,11 @@ def _round(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) 
 
 def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Noise) -> list[Fit]:
     """Fit every other effect in place of the one that ``smaller`` lacks; those not far behind."""
-    names = set(_names(current))
+    others = {effect.name for effect in smaller.candidate.effects}
+    present = set(_keys(current))
     fits = []
     for effect in effects:
-        if effect.name not in names:
+        if effect.name not in others and effect.key not in present:
             candidate = Candidate(current.candidate.base, (*smaller.candidate.effects, effect))
             fitted = fit(candidate, current.blocks, prior, smaller)
             if fitted.total > current.total - HOPELESS and not unlike(effect, fitted):

@@ -7,7 +7,7 @@ against its rivals. The validation runs are not read here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from metro.effects.effect import Effect, fitted_to
@@ -93,20 +93,22 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
     base = fit(Candidate(problem.base), blocks, prior)
     least = max(gates.materiality, 2.0 * problem.systematic)
     visible = {
-        e.name: surviving_share(Candidate(problem.base, (e,)), base) for e in effects if not e.resembled
+        e.key: surviving_share(Candidate(problem.base, (e,)), base) for e in effects if not e.resembled
     }
+    seen = [effect for effect in effects if visible.get(effect.key, 1.0) >= NOT_VISIBLE]
     absorbed = {
-        name: ABSORBED.format(100.0 * share) for name, share in visible.items() if share < NOT_VISIBLE
+        name: ABSORBED.format(100.0 * share)
+        for (name, _), share in visible.items()
+        if name not in {effect.name for effect in seen}
     }
-    seen = [effect for effect in effects if effect.name not in absorbed]
     current, steps = base, []
     trials: dict[tuple[str, str], Trial] = {}
-    barred: set[str] = set(absorbed)
+    barred: set[str] = set()
     while len(current.candidate.effects) < MOST_EFFECTS:
         taken = {effect.name for effect in current.candidate.effects} | barred
-        open_effects = [effect for effect in effects if effect.name not in taken]
+        open_effects = [effect for effect in seen if effect.name not in taken]
         round_trials = tried(current, open_effects, prior, gates, least)
-        trials |= {(trial.effect.name, trial.effect.form): trial for trial in round_trials}
+        trials |= {trial.effect.key: trial for trial in round_trials}
         passed = [trial for trial in round_trials if not trial.why_not]
         if not passed:
             break
@@ -129,7 +131,7 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
         base=base,
         final=final,
         steps=tuple(steps),
-        trials=tuple(trials.values()),
+        trials=_foremost(trials.values(), final),
         weight=compared.weight,
         rivals=compared.rivals,
         base_lines=tuple(rest.signature(base, floor)),
@@ -158,6 +160,21 @@ def _withdrawn(outcome: Outcome) -> Outcome:
         lines=outcome.base_lines or outcome.lines,  # what only the effect laid bare is there all the same
         between=outcome.base_between or outcome.between,
     )
+
+
+def _foremost(trials: Iterable[Trial], final: Fit) -> tuple[Trial, ...]:
+    """Return one trial of each effect: of its forms, the one that was added or came nearest to it."""
+    added = {effect.key for effect in final.candidate.effects}
+    best: dict[str, Trial] = {}
+    for trial in trials:
+        name, rank = trial.effect.name, _rank(trial, added)
+        if name not in best or rank > _rank(best[name], added):
+            best[name] = trial
+    return tuple(best.values())
+
+
+def _rank(trial: Trial, added: set[tuple[str, str]]) -> tuple[bool, float, float]:
+    return trial.effect.key in added, trial.weight, trial.fit.total
 
 
 def _differing(fitted: Fit, least: float) -> Between | None:

@@ -87,11 +87,11 @@ def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> 
     weighed = [trial for trial in trials if not trial.why_not]
     nothing = dict.fromkeys(out, 0.0)
     share = weights([nothing, *(trial.evidence.held_out for trial in weighed)], gates.seed)[1:]
-    weight = {trial.effect.name: float(value) for trial, value in zip(weighed, share, strict=True)}
+    weight = {trial.effect.key: float(value) for trial, value in zip(weighed, share, strict=True)}
     return [
         replace(
             trial,
-            weight=weight.get(trial.effect.name, 0.0),
+            weight=weight.get(trial.effect.key, 0.0),
             why_not=trial.why_not or _not_held_out(trial.evidence, gates),
         )
         for trial in trials

@@ -48,7 +48,7 @@ def held_out(problem: Problem, fitted: Fit) -> Held:
     predicted, sigma = {}, {}
     for block in blocks:
         matrix, offset = model.design(block, scored.nuisance[block.run], scored.beta)
-        predicted[block.run] = block.to_rows(offset + matrix @ scored.beta) / problem.si
+        predicted[block.run] = block.compared(offset + matrix @ scored.beta) / problem.si
         sigma[block.run] = block_sigma(block, fitted.noise, matrix, fitted.beta) / problem.si
     return Held(predicted, sigma)
 
@@ -57,7 +57,7 @@ def comparison(problem: Problem, before: Held, after: Held | None = None) -> pd.
     """Return the held-out runs' rows of comparison.parquet; ``after`` is None before the loop has run."""
     parts = []
     for block in problem.role("validate"):
-        measured = block.to_rows(block.measured) / problem.si
+        measured = block.compared(block.measured) / problem.si
         rows: dict[str, object] = dict.fromkeys(COMPARISON)
         rows |= {
             "observable": problem.observable,
@@ -181,7 +181,7 @@ def parameters(fitted: Fit, name: str) -> JSON:
             _bounded(parameter, float(value), float(sd), dof)
             for parameter, value, sd in zip(effect.reported, values, deviation, strict=True)
         ]
-        return by_name(effect.reported, entries)
+        return {**effect.where, **by_name(effect.reported, entries)}
     raise KeyError(name)
 
 

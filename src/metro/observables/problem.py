@@ -58,6 +58,7 @@ class Block:
     slow : how what repeats may change along the run, by its name in the report: (repeats, k) each.
     synthesis : (m, n) map from ``measured`` to the rows of the comparison table; None where they are the
         same.
+    anchor : (m,) what ``synthesis`` is counted from in the rows of the comparison; None: zero.
     coordinates : column of the comparison table (axis, t_s, angle_deg, s_mm, x_mm, y_mm) → its (m,) values.
     """
 
@@ -73,6 +74,7 @@ class Block:
     zero_sd: Array
     coordinates: Mapping[str, np.ndarray]
     synthesis: Array | None = None
+    anchor: Array | None = None
     scale: Array | None = None
     repeats: int = 1
     labels: np.ndarray | None = None
@@ -81,8 +83,13 @@ class Block:
     slow: Mapping[str, Array] = field(default_factory=dict)
 
     def to_rows(self, values: Array) -> Array:
-        """Express a vector of the fit's basis, shape (n,) or (n, k), in the rows of the comparison table."""
+        """Express differences in the fit's basis, (n,) or (n, k), in the rows of the comparison table."""
         return values if self.synthesis is None else self.synthesis @ values
+
+    def compared(self, values: Array) -> Array:
+        """Express a vector of the fit's basis, (n,), as rows of the comparison table, anchor and all."""
+        rows = self.to_rows(values)
+        return rows if self.anchor is None else self.anchor + rows
 
 
 class Model(Protocol):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,20 @@ from metro.batch.batch import Batch
 from metro.observables import cutting_force
 from metro.observables.problem import Refusal
 from metro.observables.wall import Wall
+from metro.robot.drive_torques import TURNING
 from metro.robot.kinematics import Arm
-from metro.robot.sensorless import LEAST_INDEX, observability, tip_force
+from metro.robot.sensorless import (
+    LEAST_INDEX,
+    TipForce,
+    Torques,
+    noise_of_bins,
+    observability,
+    smoothed_torque,
+    tip_force,
+)
 from metro.robot.statics import tip_jacobian
-from metro.signals import align, kalman, steady
+from metro.signals import align, steady
+from metro.signals.path_match import match
 from metro.units import DEG, JSON, MM, Array
 
 Read = Callable[..., pd.DataFrame]
@@ -38,12 +48,16 @@ SYSTEMATIC = {"torque": 0.05, "dynamometer": 0.01, "coefficients": 0.03}
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """The moving part of a robot log: joint angles (n, 6) rad, torques (n, 6) N m, commanded tip (n, 3) m."""
+    """The moving part of a robot log: joint angles (n, 6) rad, torques (n, 6) N m, commanded tip (n, 3) m.
+
+    ``time`` (n,) s from the start of the log; empty where there is none.
+    """
 
     commanded: Array
     actual: Array
     torque: Array
     tip: Array
+    time: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def logs(table: pd.DataFrame, arm: Arm) -> tuple[Log, Log]:
@@ -57,7 +71,70 @@ def _log(table: pd.DataFrame, arm: Arm) -> Log:
     tip = arm.tip(commanded)
     moves = align.moving(tip) if len(tip) > 2 else np.zeros(len(tip), dtype=bool)
     actual, torque = table[ACTUAL].to_numpy(dtype=float) * DEG, table[TORQUE].to_numpy(dtype=float)
-    return Log(commanded[moves], actual[moves], torque[moves], tip[moves])
+    time = table["t_s"].to_numpy(dtype=float)
+    time = time - time[:1]
+    return Log(commanded[moves], actual[moves], torque[moves], tip[moves], time[moves])
+
+
+@dataclass(frozen=True, eq=False)
+class Sensorless:
+    """What the torques of the joints tell of the force on the tip of a run, over m bins of its path.
+
+    Attributes
+    ----------
+    s, x : (m,) along the path, and along the wall from its start, m. steady : (m,) bool.
+    torques : the smoothed torque of the cut less that of the idle run. index : (6,) observability.
+    found : force; None where ``refusal`` says why. remarks : what idle run and cut do not share.
+    """
+
+    s: Array
+    x: Array
+    steady: np.ndarray
+    torques: Torques
+    index: Array
+    found: TipForce | None
+    refusal: str
+    remarks: tuple[str, ...]
+
+
+def sensorless(
+    cut: Log, idle: Log, arm: Arm, wall: Wall, least_index: float = LEAST_INDEX
+) -> Sensorless | Refusal:
+    """Solve for the force on the tip from the torques of the cut less those of the idle run.
+
+    ``least_index``: observability that a joint needs to be used.
+    """
+    if not len(cut.tip) or not len(idle.tip):
+        return Refusal(f"no {'idle_log' if len(cut.tip) else 'robot_log'}")
+    alike = match(cut.tip, cut.time, idle.tip, idle.time)
+    if alike.refusal is not None:
+        return Refusal(alike.refusal)
+    places = [align.along_path(log.tip, cut.tip) for log in (cut, idle)]
+    steps = [float(np.median(np.abs(np.diff(place[np.isfinite(place)])))) for place in places]
+    width = max(BIN, 3 * max(steps))
+    channels = [
+        np.column_stack([log.torque, log.commanded, log.tip @ wall.along - wall.start]) for log in (cut, idle)
+    ]
+    try:
+        pair = align.align(places[0], channels[0], places[1], channels[1], width)
+    except ValueError as error:
+        return Refusal(str(error))
+    x, joints = pair.first[:, 12], pair.first[:, 6:12]
+    steady = wall.steady(x)
+    if steady.sum() < LEAST_BINS:
+        return Refusal(f"the logs hold {int(steady.sum())} mm of the cut; at least {LEAST_BINS} are needed")
+    samples = (width / steps[0], width / steps[1])
+    turning = np.tanh(np.gradient(idle.commanded, idle.time, axis=0) / TURNING)
+    noise = np.maximum(noise_of_bins(cut.torque, idle.torque, samples, turning), LEAST_NOISE**2)
+    torques = smoothed_torque(pair.first[:, :6] - pair.second[:, :6], noise)
+    index = observability((pair.first[:, :6] - pair.second[:, :6])[steady], pair.second[steady, :6])
+    remarks = tuple(alike.remarks(np.gradient(cut.commanded, cut.time, axis=0)))
+    moves = tip_jacobian(arm, joints)
+    try:
+        found, refusal = tip_force(torques.level, torques.variance, moves, index, least_index), ""
+    except ValueError as error:
+        return Sensorless(pair.s, x, steady, torques, index, None, str(error), remarks)
+    return Sensorless(pair.s, x, steady, torques, index, found, refusal, remarks)
 
 
 def from_torques(
@@ -69,49 +146,50 @@ def from_torques(
     -------
     tuple
         The force, ``s_mm, x_mm, fx_n … sd_fz_n, condition_number`` per bin, or why there is none; and as far
-        as the logs could be aligned ``joint, index, used, noise_nm, drift_nm`` per joint.
+        as the logs could be aligned ``joint, index, used, noise_nm, drift_nm, whiteness, remark`` per joint.
     """
-    if not len(cut.tip) or not len(idle.tip):
-        return Refusal(f"no {'idle_log' if len(cut.tip) else 'robot_log'}"), None
-    step = float(np.median(np.linalg.norm(np.diff(cut.tip, axis=0), axis=1)))
-    places = [align.along_path(log.tip, cut.tip) for log in (cut, idle)]
-    channels = [
-        np.column_stack([log.torque, log.commanded, log.tip @ wall.along - wall.start]) for log in (cut, idle)
-    ]
-    try:
-        pair = align.align(places[0], channels[0], places[1], channels[1], max(BIN, 3 * step))
-    except ValueError as error:
-        return Refusal(str(error)), None
-    x, joints = pair.first[:, 12], pair.first[:, 6:12]
-    working = wall.steady(x)
-    if working.sum() < LEAST_BINS:
-        return Refusal(
-            f"the logs hold {int(working.sum())} mm of the cut; at least {LEAST_BINS} are needed"
-        ), None
-    difference, idling = pair.first[:, :6] - pair.second[:, :6], pair.second[:, :6]
-    noise = np.maximum(2.0 * kalman.noise_variance(idling), LEAST_NOISE**2)
-    drift = kalman.likeliest_drift(difference, noise)
-    level, variance = kalman.smooth(difference, noise, drift)
-    index = observability(difference[working], idling[working])
+    told = sensorless(cut, idle, arm, wall)
+    if isinstance(told, Refusal):
+        return told, None
+    found = told.found
     per_joint = pd.DataFrame(
         {
             "joint": list(JOINTS),
-            "index": index,
-            "used": index >= LEAST_INDEX,
-            "noise_nm": np.sqrt(noise),
-            "drift_nm": np.sqrt(drift),
+            "index": told.index,
+            "used": told.index >= LEAST_INDEX if found is None else found.used,
+            "noise_nm": np.sqrt(told.torques.noise),
+            "drift_nm": np.sqrt(told.torques.drift),
+            "whiteness": told.torques.whiteness,
+            "remark": "; ".join(told.remarks),
         }
     )
-    try:
-        found = tip_force(level, variance, tip_jacobian(arm, joints), index)
-    except ValueError as error:
-        return Refusal(str(error)), per_joint
+    if found is None:
+        return Refusal(told.refusal), per_joint
     sd = np.sqrt(np.einsum("maa->ma", found.covariance))
-    return _table(pair.s, x, found.force, sd, found.condition), per_joint
+    return _table(told.s, told.x, found.force, sd, found.condition), per_joint
 
 
 def from_dynamometer(batch: Batch, run: str, record: pd.DataFrame, wall: Wall) -> pd.DataFrame | Refusal:
     """Mean force of the steady cut, about the zero of the air where there is any; constant along the wall."""
+    found = about_air(batch, run, record, wall)
+    if isinstance(found, Refusal):
+        return found
+    cut = found.signal[found.steady]
+    turns = len(cut) * (found.time[1] - found.time[0]) * batch.runs.loc[run, "spindle_rpm"] / 60.0
+    return _constant(cut.mean(axis=0), cut.std(axis=0) / math.sqrt(turns), wall)
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Dynamometer record about the zero of the air: ``time`` (n,) s, ``signal`` (n, 3) N, the steady cut."""
+
+    time: Array
+    signal: Array
+    steady: slice
+
+
+def about_air(batch: Batch, run: str, record: pd.DataFrame, wall: Wall) -> Record | Refusal:
+    """Take the zero of a record from where the tool is in the air, if it is anywhere."""
     row: Any = batch.runs.loc[run]
     signal, time = record[FORCE].to_numpy(dtype=float), record["t_s"].to_numpy(dtype=float)
     if len(time) < 2:
@@ -124,10 +202,7 @@ def from_dynamometer(batch: Batch, run: str, record: pd.DataFrame, wall: Wall) -
     except ValueError as error:
         return Refusal(str(error))
     zero = signal[found.air].mean(axis=0) if found.air.any() else np.zeros(3)
-    cut = signal[found.steady]
-    return _constant(
-        cut.mean(axis=0) - zero, cut.std(axis=0) / math.sqrt(len(cut) * 60.0 / row["spindle_rpm"]), wall
-    )
+    return Record(time - time[0], signal - zero, found.steady)
 
 
 def from_coefficients(

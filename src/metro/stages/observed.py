@@ -12,13 +12,13 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.layout import OBSERVED
 from metro.effects import told_of
-from metro.observables import deformation, flatness, force, lobes, published
+from metro.observables import deformation, flatness, force, joint_force, lobes, published
 from metro.observables.lobes import LabelProblem
 from metro.observables.problem import Problem, Refusal
 from metro.units import JSON
 
 # Force first: the others may need its coefficients.
-MODULES: tuple[ModuleType, ...] = (force, deformation, flatness, lobes)
+MODULES: tuple[ModuleType, ...] = (force, joint_force, deformation, flatness, lobes)
 # Those whose observed tables depend on the cutting coefficients.
 OBSERVED_WITH_COEFFICIENTS: tuple[ModuleType, ...] = (deformation, lobes)
 

@@ -1,0 +1,30 @@
+"""A joint whose Coulomb friction is not that of the idle run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from metro.effects.effect import Effect, EffectParameter, per_joint
+
+
+def _of(joint: int) -> Effect:
+    def apply(model: Any, values: Mapping[str, float]) -> Any:
+        return replace(model, drives=model.drives.with_friction(joint, reversal=values["torque_nm"]))
+
+    return Effect(
+        name="friction_reversal",
+        observables=("joint_force", "waviness"),
+        parameters=(EffectParameter("torque_nm", "N m", -300.0, 300.0, 3.0, starts=(-10.0, 10.0)),),
+        apply=apply,
+        signature=(
+            "Torque of one joint off by a constant that changes its sign where the joint turns round; "
+            "a joint that turns one way in every run shows it as a force that does not go with the cut."
+        ),
+        literature="[K] section 4: waviness and force error at the reversal of joint 6",
+        experiment="a path on which the joint turns round in the middle of the cut, cut and idle, both ways",
+    )
+
+
+EFFECT = per_joint(_of)

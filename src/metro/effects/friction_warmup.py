@@ -1,0 +1,30 @@
+"""A joint whose Coulomb friction changes while the cut goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from metro.effects.effect import Effect, EffectParameter, per_joint
+
+
+def _of(joint: int) -> Effect:
+    def apply(model: Any, values: Mapping[str, float]) -> Any:
+        return replace(model, drives=model.drives.with_friction(joint, warmup=values["slope_nm_s"]))
+
+    return Effect(
+        name="friction_warmup",
+        observables=("joint_force",),
+        parameters=(EffectParameter("slope_nm_s", "N m/s", -50.0, 50.0, 0.3, starts=(-0.5, 0.5)),),
+        apply=apply,
+        signature=(
+            "Torque of one joint that grows along the log with the sign of the joint's speed, "
+            "from nothing at its start."
+        ),
+        literature="Bittencourt and Gunnarsson, J. Dyn. Sys. Meas. Control 134 (2012) 051013",
+        experiment="a long idle run of the same path from cold, and the same after a quarter of an hour",
+    )
+
+
+EFFECT = per_joint(_of)

@@ -1,0 +1,233 @@
+"""Force on the tool by the torques of the joints, against the dynamometer's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.observables import tip_force
+from metro.observables.arm_give import Read
+from metro.observables.clock import Clock, clock
+from metro.observables.joint_force_model import JointForceModel, TorqueRun, in_waves, running
+from metro.observables.problem import BaseFit, Block, Problem, Refusal
+from metro.observables.quantity import quantity
+from metro.observables.tip_force import ACTUAL, FORCE, JOINTS, TORQUE
+from metro.observables.wall import wall
+from metro.robot.drive_torques import TURNING
+from metro.robot.kinematics import Arm, arm_of_cell
+from metro.robot.statics import tip_jacobian
+from metro.signals import align, kalman
+from metro.signals.waves import variance, wandering, waves
+from metro.units import DEG, JSON, MM, MS, Array
+
+OBSERVABLE = "joint_force"
+SCATTER = 0.01
+REPEATABLE = 0.1  # of the torque's noise: how well the friction of the cut is that of the idle run
+
+GRID = 5 * MS
+RATE = [f"rate{i}_deg_s" for i in JOINTS]
+NOISE = [f"noise{i}_nm" for i in JOINTS]
+WANDER = [f"wander{i}_nm" for i in JOINTS]
+WORK = ("x", "y", "z")
+LONG, SHORT = 50.0, 5.0  # mm, of waves along the path as the report names them
+
+
+def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
+    """Torques of each cut less those of its idle run, and the dynamometer's force beside them.
+
+    Tables ``joint_torque`` (per bin of the path), ``tool_force`` (per 5 ms), ``joint_force_refused``.
+    """
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    if arm is None:
+        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
+    torques, forces, refused = [], [], []
+    for run in _runs(batch):
+        force = _force(batch, run, read("force", run))
+        torque = force if isinstance(force, Refusal) else _torque(batch, run, read("robot", run), arm)
+        if isinstance(torque, Refusal) or isinstance(force, Refusal):
+            reason = torque.reason if isinstance(torque, Refusal) else ""
+            refused.append({"run": run, "reason": reason})
+        else:
+            torques.append(torque.assign(run=run))
+            forces.append(force.assign(run=run))
+    if not torques and not refused:
+        return Refusal("no run has a robot_log, an idle_log and a dynamometer record")
+    return {
+        **({"joint_torque": pd.concat(torques, ignore_index=True)} if torques else {}),
+        **({"tool_force": pd.concat(forces, ignore_index=True)} if forces else {}),
+        "joint_force_refused": pd.DataFrame(refused, columns=["run", "reason"], dtype=str),
+    }
+
+
+def _runs(batch: Batch) -> list[str]:
+    """List the runs that have all three files, in the order of cutting."""
+    table = batch.runs.sort_values("order", kind="stable")
+    named = table[["robot_log", "idle_log", "dynamometer"]].map(
+        lambda file: isinstance(file, str) and file != ""
+    )
+    return [str(run) for run in table.index[named.all(axis=1).to_numpy(dtype=bool)]]
+
+
+def _force(batch: Batch, run: str, record: pd.DataFrame) -> pd.DataFrame | Refusal:
+    """Force about the zero of the air, each value the mean over a revolution of the spindle."""
+    found = tip_force.about_air(batch, run, record, wall(batch, run))
+    if isinstance(found, Refusal):
+        return found
+    row: Any = batch.runs.loc[run]
+    turn = 60.0 / row["spindle_rpm"]
+    grid = np.arange(0.0, found.time[-1], GRID)
+    mean = running(found.time, found.signal).mean(grid, np.full(len(grid), turn))
+    return pd.DataFrame({"t_s": grid, **dict(zip(FORCE, mean.T, strict=True))})
+
+
+def _torque(batch: Batch, run: str, table: pd.DataFrame, arm: Arm) -> pd.DataFrame | Refusal:
+    """Bins of the path: where the arm was, when, and the torques of the cut less those of the idle run."""
+    cut, idle = tip_force.logs(table, arm)
+    if len(cut.tip) < 2:
+        return Refusal("the log of the cut does not move")
+    step = float(np.median(np.linalg.norm(np.diff(cut.tip, axis=0), axis=1)))
+    rate = np.gradient(cut.commanded, cut.time, axis=0)
+    channels = [
+        np.column_stack([cut.torque, cut.actual, rate, cut.time, cut.tip @ wall(batch, run).along]),
+        np.column_stack([idle.torque, np.zeros((len(idle.torque), 14))]),
+    ]
+    places = [align.along_path(log.tip, cut.tip) for log in (cut, idle)]
+    width = max(tip_force.BIN, 3 * step)
+    try:
+        pair = align.align(places[0], channels[0], places[1], channels[1], width)
+    except ValueError as error:
+        return Refusal(str(error))
+    period = float(np.median(np.diff(cut.time)))
+    samples = width / step
+    white = [np.maximum(kalman.noise_variance(log.torque), tip_force.LEAST_NOISE**2) for log in (cut, idle)]
+    # what wanders in the idle run wanders as much in the cut, where the force hides it
+    idling = wandering(pair.second[:, :6], white[1] / samples, np.tanh(pair.first[:, 12:18] / TURNING))
+    start = wall(batch, run).start
+    columns = {"s_mm": pair.s / MM, "x_mm": (pair.first[:, 19] - start) / MM, "t_s": pair.first[:, 18]}
+    columns |= {"width_s": np.full(len(pair.s), samples * period), "samples": np.full(len(pair.s), samples)}
+    columns |= dict(zip(TORQUE, (pair.first[:, :6] - pair.second[:, :6]).T, strict=True))
+    columns |= dict(zip(ACTUAL, pair.first[:, 6:12].T / DEG, strict=True))
+    columns |= dict(zip(RATE, pair.first[:, 12:18].T / DEG, strict=True))
+    columns |= dict(zip(NOISE, np.sqrt(white[0] + white[1]), strict=True))
+    columns |= dict(zip(WANDER, np.sqrt(2.0 * idling), strict=True))
+    return pd.DataFrame(columns)
+
+
+def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSON) -> Problem | Refusal:
+    """Torques per run as blocks, and the model of what the dynamometer's force makes of them."""
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    if arm is None:
+        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
+    left_out = [
+        f"Run {row.run} is left out: {row.reason}." for row in observed["joint_force_refused"].itertuples()
+    ]
+    if "joint_torque" not in observed:
+        return Refusal(" ".join(left_out))
+    forces = dict(tuple(observed["tool_force"].groupby("run")))
+    roles = batch.runs["role"].to_dict()
+    # one run tells little of its slow noise: all of them together do
+    wander = np.sqrt((observed["joint_torque"].groupby("run")[WANDER].first() ** 2).mean().to_numpy())
+    blocks = tuple(
+        _block(batch, str(run), table, forces[run], arm, wander)
+        for run, table in observed["joint_torque"].groupby("run", sort=False)
+        if roles[run] in {"identify", "validate"}
+    )
+    notes = (
+        "The torques of the cut less those of the idle run at the same place are what the dynamometer's "
+        "force asks of the joints; friction and gravity are those of the idle run.",
+        "The sensorless force is solved from all joints by weighted least squares.",
+        *left_out,
+    )
+    model = JointForceModel(arm)
+    return Problem(OBSERVABLE, "N", 1.0, model, blocks, np.array([SCATTER]), notes=notes)
+
+
+def _block(
+    batch: Batch, run: str, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander: Array
+) -> Block:
+    row: Any = batch.runs.loc[run]
+    setting, count = torque_run(table, force), len(table)
+    noise = table[NOISE].to_numpy()[0]
+    white = noise**2 / table["samples"].iloc[0]
+    turning = np.tanh(setting.rate / TURNING)
+    zeros = np.stack([in_waves(turning * joint) for joint in np.eye(6)], axis=1)
+    solve = _least_squares(arm, setting, np.sqrt(white))
+    torque = table[TORQUE].to_numpy()
+    known = setting.force.mean(setting.t, setting.width)
+    return Block(
+        run=run,
+        condition=str(row["condition"]),
+        role="validate" if row["role"] == "validate" else "identify",
+        order=int(row["order"]),
+        measured=in_waves(torque),
+        sigma=np.sqrt(variance(count, white, wander**2)).T.ravel(),
+        setting=setting,
+        axis=np.repeat([f"joint {i}" for i in JOINTS], count),
+        zeros=zeros,
+        zero_sd=REPEATABLE * noise,
+        labels=np.tile(_lengths(table["s_mm"].to_numpy()), 6),
+        synthesis=-solve,
+        anchor=known.T.ravel() + solve @ in_waves(torque),
+        coordinates={
+            "axis": np.repeat(WORK, count),
+            "t_s": np.tile(setting.t, 3),
+            "s_mm": np.tile(table["s_mm"].to_numpy(), 3),
+            "x_mm": np.tile(table["x_mm"].to_numpy(), 3),
+        },
+    )
+
+
+def torque_run(table: pd.DataFrame, force: pd.DataFrame) -> TorqueRun:
+    """Return what the model needs of a run's rows of ``joint_torque`` and ``tool_force``."""
+    record = running(force["t_s"].to_numpy(), force[FORCE].to_numpy())
+    q, rate = table[ACTUAL].to_numpy() * DEG, table[RATE].to_numpy() * DEG
+    return TorqueRun(q, rate, table["t_s"].to_numpy(), table["width_s"].to_numpy(), record)
+
+
+def _lengths(s_mm: Array) -> np.ndarray:
+    """Name the waves of a path in the words of the report, (m,)."""
+    length = 2.0 * float(np.ptp(s_mm)) / np.maximum(np.arange(len(s_mm)), 1)
+    words = [f"waves over {LONG:g} mm", f"waves of {SHORT:g} to {LONG:g} mm", f"waves under {SHORT:g} mm"]
+    return np.select([length > LONG, length > SHORT], words[:2], words[2])
+
+
+def _least_squares(arm: Arm, setting: TorqueRun, sigma: Array) -> Array:
+    """Map (3 m, 6 m) from waves of the torques to the force on the tip: weighted least squares in each bin.
+
+    ``sigma`` (6,) of the joints, N m.
+    """
+    count = len(setting.q)
+    system = -np.swapaxes(tip_jacobian(arm, setting.q), 1, 2) / sigma[:, None]
+    solve = np.linalg.pinv(system) / sigma
+    back = waves(np.eye(count)).T  # orthonormal: its transpose makes series of waves
+    return np.asarray(np.einsum("mai,mw->amiw", solve, back).reshape(3 * count, 6 * count))
+
+
+def report(
+    batch: Batch,
+    observed: Mapping[str, pd.DataFrame],
+    _identified: JSON,
+    task: Problem | Refusal,
+    fit: BaseFit | None,
+) -> JSON:
+    """Return the part of the ``arm`` block: by how much later the robot's log stamps an event, per run."""
+    if isinstance(task, Refusal) or fit is None:
+        reason = task.reason if isinstance(task, Refusal) else "no run to fit"
+        return {"arm": {"not_identified": {"clock_offset_s": reason}}}
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    assert arm is not None  # else there were no problem
+    found: dict[str, Clock] = {block.run: clock(block, arm, float(fit.beta[0])) for block in task.blocks}
+    return {
+        "arm": {
+            "clock_offset_s": {
+                run: quantity(one.offset, one.offset_sd, "s", one.dof) for run, one in found.items()
+            },
+            "clock_drift": {
+                run: quantity(one.drift, one.drift_sd, "s/s", one.dof) for run, one in found.items()
+            },
+        }
+    }

@@ -1,0 +1,110 @@
+"""The joint force model: what the motors carry in the cut beyond the idle run, given the force on the tool.
+
+Per joint and bin of the path: torque = gain × (−Jᵀ f) + drives + payload (virtual work), with f the
+dynamometer's force, averaged over a revolution of the spindle and over the bin. The rows of the comparison
+are forces: the dynamometer's, and beside it the sensorless one, which is that plus what the rest of the
+torques makes at the tip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from metro.observables.problem import Block, Parameter
+from metro.robot.drive_torques import DriveTorques
+from metro.robot.kinematics import Arm
+from metro.robot.payload import Payload, gravity_torque
+from metro.robot.statics import joint_torque, tip_jacobian
+from metro.signals.waves import waves
+from metro.units import Array
+
+
+@dataclass(frozen=True, eq=False)
+class ForceRecord:
+    """The force on the tool, work frame, through the running integral of its record.
+
+    ``t`` (k,) s from the record's start; ``integral`` (k, 3), N s, of the force averaged over a revolution;
+    before and after the record there is none.
+    """
+
+    t: Array
+    integral: Array
+
+    def mean(self, middle: Array, width: Array) -> Array:
+        """Mean force (m, 3), N, over windows of ``width`` (m,) s about ``middle`` (m,) s."""
+        ends = np.stack([middle - width / 2, middle + width / 2])
+        sums = np.stack([np.interp(ends, self.t, column) for column in self.integral.T], axis=-1)
+        return np.asarray((sums[1] - sums[0]) / width[:, None])
+
+
+def running(t: Array, force: Array) -> ForceRecord:
+    """Return a record (k, 3), N, at times ``t`` (k,), s, as its running integral (trapezia)."""
+    steps = 0.5 * (force[1:] + force[:-1]) * np.diff(t)[:, None]
+    return ForceRecord(t, np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]))
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueRun:
+    """What a run's torques follow from, at m bins of the path.
+
+    Attributes
+    ----------
+    q, rate : (m, 6) joint angles, rad, and speeds, rad/s. t, width : (m,) middle and length of the bin's time
+        in the log of the cut, s.
+    force : the dynamometer's record.
+    """
+
+    q: Array
+    rate: Array
+    t: Array
+    width: Array
+    force: ForceRecord
+
+
+@dataclass(frozen=True, eq=False)
+class JointForceModel:
+    """Torques of the cut less those of the idle run.
+
+    Attributes
+    ----------
+    arm : geometry: DH, tip in the flange, work in the base.
+    drives : torques of friction and gears that the idle run does not have.
+    payload : mass on the flange that the idle run does not have.
+    offset : by how much later the robot log of the cut stamps an event than the dynamometer, s.
+    """
+
+    arm: Arm
+    drives: DriveTorques = field(default_factory=DriveTorques)
+    payload: Payload = field(default_factory=Payload)
+    offset: float = 0.0
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """One factor that all torques may be off by."""
+        return (Parameter("torque_gain", "1"),)
+
+    def nuisance_starts(self, _block: Block) -> Array:
+        """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
+        return np.zeros((1, 0))
+
+    def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
+        """Torque (6 m, 1) per gain, and what the force does not make (6 m,), N m: waves along the path."""
+        run: Any = block.setting
+        other = self.drives.at(run.q, run.rate, run.t) + gravity_torque(self.arm, run.q, self.payload)
+        return carried(self.arm, run, self.offset)[:, None], in_waves(other)
+
+
+@lru_cache(maxsize=256)
+def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
+    """Waves (6 m,), N m, of the torque that the force asks for; the log stamps it ``offset`` s later."""
+    force = run.force.mean(run.t - offset, run.width)
+    return in_waves(joint_torque(tip_jacobian(arm, run.q), force))
+
+
+def in_waves(torque: Array) -> Array:
+    """Return torques (m, 6) as waves along the path (6 m,), joint after joint."""
+    return waves(torque).T.ravel()

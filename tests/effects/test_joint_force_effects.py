@@ -1,0 +1,123 @@
+"""Effects of the joint force: each put into the logs of the bundled robot batch by formulas of the test."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from metro.batch.processed import read_batch, read_table
+from metro.effects import library
+from metro.loop.search import Gates, search
+from metro.observables import joint_force
+from metro.observables.joint_force import RATE
+from metro.observables.tip_force import ACTUAL, TORQUE
+from metro.robot.kinematics import arm_of_cell, forward
+from metro.stages.ingest import ingest
+
+ROOT = Path(__file__).parents[2]
+GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    """The bundled batch of the robot's side cuts, and what was observed of its joints."""
+    out = tmp_path_factory.mktemp("kr160") / "out"
+    ingest(ROOT / "data" / "raw" / "kr160-side", ROOT / "config" / "cells", out, {}, "test")
+    batch = read_batch(out)
+    return batch, joint_force.observe(
+        batch, lambda name, run=None: read_table(out / f"{name}.parquet", run), {}
+    )
+
+
+def found(cell, torque=None, *, force=None, manifest=None):
+    """Search with other torques, force or manifest; name and values of the one effect found."""
+    batch, observed = cell
+    batch = replace(batch, manifest=manifest or batch.manifest)
+    observed = observed | {
+        "joint_torque": observed["joint_torque"] if torque is None else torque,
+        "tool_force": observed["tool_force"] if force is None else force,
+    }
+    outcome = search(joint_force.problem(batch, observed, {}), library("joint_force"), GATES)
+    assert not outcome.rivals
+    assert not any(line.significant for line in outcome.lines)
+    return [
+        (effect.name, dict(effect.where), effect.values(outcome.final.theta[place]))
+        for effect, place in outcome.final.candidate.parts(outcome.final.theta)
+    ]
+
+
+def torques(cell, joint, extra):
+    """The torques of a joint (1 … 6) with something added, by the table's rows."""
+    table = cell[1]["joint_torque"].copy()
+    table[TORQUE[joint - 1]] += extra(table)
+    return table
+
+
+def turning(table, joint):
+    """Direction of a joint, softened where it turns round."""
+    return np.tanh(np.radians(table[RATE[joint - 1]].to_numpy()) / 2e-4)
+
+
+def test_nothing_is_found_where_nothing_is_hidden(cell):
+    assert found(cell) == []
+
+
+@pytest.mark.parametrize(("joint", "size"), [pytest.param(2, 6.0, marks=pytest.mark.slow), (6, -10.0)])
+def test_friction_that_differs_from_the_idle_run_is_found_in_its_joint(cell, joint, size):
+    ((name, where, values),) = found(cell, torques(cell, joint, lambda t: size * turning(t, joint)))
+    assert (name, where) == ("friction_reversal", {"joint": joint})
+    assert values["torque_nm"] == pytest.approx(size, abs=1.2)
+
+
+@pytest.mark.slow
+def test_friction_that_grows_along_the_log_is_found_with_its_slope(cell):
+    ((name, where, values),) = found(cell, torques(cell, 3, lambda t: 1.5 * t["t_s"] * turning(t, 3)))
+    assert (name, where) == ("friction_warmup", {"joint": 3})
+    assert values["slope_nm_s"] == pytest.approx(1.5, abs=0.2)
+
+
+def test_a_gear_that_ripples_is_found_with_its_order(cell):
+    ((name, where, values),) = found(
+        cell, torques(cell, 1, lambda t: 6.0 * np.sin(800.0 * np.radians(t[ACTUAL[0]]) + 1.0))
+    )
+    assert (name, where) == ("gear_ripple", {"joint": 1})
+    assert values["order"] == pytest.approx(800.0, abs=5.0)
+    assert values["torque_nm"] == pytest.approx(6.0, rel=0.15)
+
+
+def test_a_clock_that_is_late_is_found_to_a_few_milliseconds(cell):
+    force = cell[1]["tool_force"].copy()
+    force["t_s"] -= 0.2  # the log stamps everything 0.2 s later than the dynamometer
+    ((name, _, values),) = found(cell, force=force)
+    assert name == "clock_offset"
+    assert values["offset_ms"] == pytest.approx(200.0, abs=4.0)
+
+
+@pytest.mark.slow
+def test_a_weight_on_the_flange_is_found_with_its_place(cell):
+    batch, observed = cell
+    arm, table = arm_of_cell(batch.cell, batch.manifest), observed["joint_torque"].copy()
+    q, centre, step = np.radians(table[ACTUAL].to_numpy()), np.array([0.1, 0.05, 0.2]), 1e-6
+
+    def energy(angles):  # potential: its slope by an angle is the torque that holds the weight
+        flange = forward(arm.dh, angles)
+        return 4.0 * 9.81 * (flange[..., :3, :3] @ centre + flange[..., :3, 3])[..., 2]
+
+    for joint in range(6):
+        move = step * np.eye(6)[joint]
+        table[TORQUE[joint]] += (energy(q + move) - energy(q - move)) / (2.0 * step)
+    ((name, _, values),) = found(cell, table)
+    assert name == "payload_error"
+    assert values["mass_kg"] == pytest.approx(4.0, abs=0.3)
+    assert values["com_mm"][1:] == pytest.approx([50.0, 200.0], abs=60.0)
+
+
+@pytest.mark.slow
+def test_a_tip_that_is_not_where_it_was_declared_is_found(cell):
+    declared = dict(cell[0].manifest)
+    x, y, z = declared["tool_in_flange_mm"]
+    declared["tool_in_flange_mm"] = [x, y - 120.0, z]  # the true tip lies 120 mm further along y
+    ((name, _, values),) = found(cell, manifest=declared)
+    assert name == "tool_offset_error"
+    assert values["dy_mm"] == pytest.approx(120.0, abs=20.0)

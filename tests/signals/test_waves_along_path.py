@@ -1,0 +1,42 @@
+"""Waves of a series along a path, and the level of noise whose variance goes with their length."""
+
+import numpy as np
+import pytest
+
+from metro.signals.waves import variance, wandering, waves
+
+RNG = np.random.default_rng(5)
+
+
+def test_a_half_wave_of_the_path_is_one_wave():
+    place = (np.arange(64) + 0.5) / 64
+    found = waves(np.cos(3.0 * np.pi * place)[:, None])[:, 0]
+    assert np.flatnonzero(np.abs(found) > 1e-9).tolist() == [3]
+    assert found[3] ** 2 == pytest.approx(32.0)  # orthonormal: the power of the series
+
+
+def test_white_noise_is_white_in_waves():
+    found = waves(RNG.normal(size=(128, 400)))
+    assert found.var(axis=1) == pytest.approx(np.ones(128), abs=0.3)
+    assert np.corrcoef(found)[np.triu_indices(128, 1)].std() == pytest.approx(400**-0.5, rel=0.1)
+
+
+def drawn(count, white, wander, channels):
+    """Series drawn from the waves that the noise is said to have."""
+    sd = np.sqrt(variance(count, np.full(channels, white), np.full(channels, wander)))
+    basis = waves(np.eye(count))
+    return basis.T @ (sd * RNG.normal(size=(count, channels)))
+
+
+@pytest.mark.parametrize("wander", [0.0, 5.0, 50.0])
+def test_the_level_is_found_beside_a_smooth_signal_and_a_step(wander):
+    place = np.linspace(-1.0, 1.0, 140)
+    step = np.sign(place - 0.2)[:, None]
+    series = drawn(140, 1.0, wander, 300) + (800.0 + 30.0 * place**2)[:, None] + 26.0 * step
+    found = wandering(series, np.ones(300), step)
+    # runs are averaged; as no level is below zero, little noise is told a little too large
+    assert found.mean() == pytest.approx(wander, rel=0.2, abs=1.0)
+
+
+def test_a_short_series_tells_nothing():
+    assert wandering(RNG.normal(size=(12, 3)), np.ones(3), np.zeros((12, 0))).tolist() == [0.0, 0.0, 0.0]
