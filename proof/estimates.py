@@ -15,6 +15,8 @@ ANGLES = {
     ("tool_runout", "angle_deg"): "pitch",
     ("orbit_stiffness", "phase_deg"): "turn",
     ("mode_coupling", "angle_deg"): "half",
+    ("gear_ripple", "phase_deg"): "turn",
+    ("path_vibration", "phase_deg"): "turn",
 }
 
 
@@ -36,7 +38,8 @@ def estimates(effect: str, truth: Mapping[str, Any], found: JSON, teeth: int) ->
     """Compare the parameters that truth and finding both have.
 
     Which tooth is the first one cannot be observed: the angle of runout is compared modulo the pitch, and a
-    list that has an entry per tooth in the cyclic order that fits best. Words (an axis) are not compared.
+    list that has an entry per tooth in the cyclic order that fits best. Words (an axis) and the number of a
+    joint are not compared.
 
     Parameters
     ----------
@@ -46,7 +49,8 @@ def estimates(effect: str, truth: Mapping[str, Any], found: JSON, teeth: int) ->
     return [
         one
         for name, value in truth.items()
-        if name in found and not isinstance(value, str) and len(_list(value)) == len(_list(found[name]))
+        if name in found and name != "joint" and not isinstance(value, str)
+        if len(_list(value)) == len(_list(found[name]))
         for one in _compared(effect, name, np.array(_list(value), dtype=float), _list(found[name]), teeth)
     ]
 

@@ -55,7 +55,7 @@ def further(scores: Sequence[Score]) -> list[Figure]:
         share("a false one beside two true effects", [bool(s.extra) for s in two]),
         share("two effects, not both above the noise: those above are named", [s.seen_named for s in half]),
         share("one effect: right, with declared rivals", [s.exact and bool(s.groups) for s in one]),
-        share("below the noise: right", [s.exact for s in small]),
+        share("below the noise: clean, or named and nothing else", [s.right for s in small]),
         share("below the noise: called clean", [s.status == "clean" for s in small]),
         share("below the noise: a false one named", [bool(s.extra) for s in small]),
         share(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
+from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -15,7 +15,6 @@ from rich.console import Console
 from metro.batch.config import load_config
 from metro.batch.processed import read_batch, write_json
 from metro.effects import library
-from metro.observables import force, lobes
 from metro.observables.lobes import LabelProblem
 from metro.observables.problem import Problem, Refusal
 from metro.stages.observed import read_json, read_observed
@@ -32,11 +31,6 @@ from proof.show import draw, markdown, printed
 from proof.statistics import Figure
 from proof.suite import DEFAULT
 from proof.tables import tables
-
-_PROBLEMS: Mapping[str, Callable[..., Problem | LabelProblem | Refusal]] = {
-    "force": force.problem,
-    "lobes": lobes.problem,
-}
 
 
 def opened(out: Layout, jobs: int) -> list[Figure]:
@@ -95,7 +89,8 @@ def _oracle(out: Layout, name: str, hidden: JSON, about: str) -> tuple[str, JSON
 
 def _problem(processed: Path, about: str) -> Problem | LabelProblem:
     identified = read_json(processed / "identified.json")
-    task = _PROBLEMS[about](read_batch(processed), read_observed(processed), identified)
+    pose = import_module(f"metro.observables.{about}").problem
+    task: Problem | LabelProblem | Refusal = pose(read_batch(processed), read_observed(processed), identified)
     if isinstance(task, Refusal):
         raise ValueError(f"{processed}: {task.reason}")
     return task

@@ -16,6 +16,7 @@ from metro.loop.noise import first_noise
 from metro.loop.verdict import comparison, held_out
 from metro.observables.problem import Problem
 from metro.units import JSON
+from proof.score import joint
 
 
 def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect], budget: float) -> JSON:
@@ -72,9 +73,13 @@ def _all_told(task: Problem) -> Problem:
 
 
 def _told(able: Sequence[Effect], name: str, values: JSON) -> Effect | None:
-    """Return an effect that starts from its true parameters; None where the library lacks it."""
+    """Return an effect that starts from its true parameters; None where the library lacks it.
+
+    Of an effect of one joint it is the form of that joint. The truth may tell more than the effect has (a
+    phase that is another unknown of every run).
+    """
     for effect in able:
-        if effect.name == name and {parameter.name for parameter in effect.reported} == set(values):
+        if effect.name == name and set(effect.names) <= set(values) and joint(effect.where) == joint(values):
             theta = np.linalg.lstsq(effect.matrix, _flat(effect, values), rcond=None)[0]
             started = zip(effect.parameters, theta.tolist(), strict=True)
             return replace(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from metro.loop.label_search import NOTHING
 from metro.units import JSON
@@ -16,6 +18,8 @@ SURE = 0.9
 SEEN = 1.0  # size over noise from which an effect must be found
 
 Stated = tuple[float, bool]  # a probability, and whether it came true
+ELSEWHERE = "{}, another joint"
+_FORM = re.compile(r"(?P<name>\w+) \((?:joint (?P<joint>\d)|all joints)\)")
 
 
 @dataclass(frozen=True)
@@ -26,9 +30,10 @@ class Score:
     ----------
     kind : none, one, two or outside. hidden : names of the true effects. sizes : of each over the noise, once
         all else is refitted.
-    named : the effects of the verdict with their stated probabilities, in order. claimed : whether they are
-        added to the model, or only the first of rivals. groups : sets that it cannot tell apart. rest :
-        whether it says that something is unexplained. advised : whether it says what to measure next.
+    named : the effects of the verdict with their stated probabilities, in order; one that is hidden, but in
+        another joint, is named so. claimed : whether they are added to the model, or only the first of
+        rivals. groups : sets that it cannot tell apart. rest : whether it says that something is unexplained.
+        advised : whether it says what to measure next.
     enough : whether the batch has tests enough for any verdict.
     before, after : rms error on held-out runs. oracle, floor : that of the fit told the truth, and the noise.
     expected : that the verdict states as its floor, with what no run tells of the base model.
@@ -94,6 +99,13 @@ class Score:
         return self.status != FAILED and set(first) == set(self.hidden) and not self.extra
 
     @property
+    def right(self) -> bool:
+        """Whether it is exact; of what is too small to be found, "clean" is right as well."""
+        if self.exact or self.seen:
+            return self.exact
+        return self.seen_named and not self.extra and (bool(self.named) or self.status == "clean")
+
+    @property
     def seen_named(self) -> bool:
         """Whether those of the hidden effects that are large enough are named."""
         return all(name in self.named for name in self.hidden if self._large(name))
@@ -156,11 +168,15 @@ def score(
     entry = (verdict or {"observables": {}})["observables"].get(observable)
     if entry is None:
         return Score(truth["batch"], truth["kind"], tuple(hidden), oracle["sizes"], FAILED, {})
-    groups = tuple(frozenset(group) for group in entry["indistinguishable"])
-    named = {found["effect"]: found["probability"] for found in entry["effects"]}
+    pairs = [[_without_form(name, hidden) for name in group] for group in entry["indistinguishable"]]
+    groups = tuple(frozenset(group) for group in pairs)
+    effects = [
+        one | {"effect": attributed(one["effect"], one["parameters"], hidden)} for one in entry["effects"]
+    ]
+    named = {found["effect"]: found["probability"] for found in effects}
     if not named and entry["status"] == "undetermined":
         candidates = {c["effect"]: c["probability"] for c in entry["candidates"]}
-        named = {group[0]: candidates.get(group[0], 0.0) for group in entry["indistinguishable"]}
+        named = {group[0]: candidates.get(group[0].split(",")[0], 0.0) for group in pairs}
     unseen = (told or {"observables": {}})["observables"].get(observable, {}).get("cannot_be_seen", [])
     return Score(
         batch=truth["batch"],
@@ -181,15 +197,34 @@ def score(
         expected=entry["noise_floor"],
         estimates=tuple(
             one
-            for found in entry["effects"]
+            for found in effects
             if found["effect"] in hidden
             for one in estimates(found["effect"], hidden[found["effect"]], found["parameters"], teeth)
         ),
-        stated=_stated(entry["effects"], truth["effects"], oracle["sizes"]),
+        stated=_stated(effects, truth["effects"], oracle["sizes"]),
         rejected=_rejected(entry["candidates"], truth["effects"], oracle["sizes"], observable),
         cannot_be_seen=tuple(one["effect"] for one in unseen),
         seconds=seconds,
     )
+
+
+def joint(parameters: Mapping[str, Any]) -> Any:
+    """Return the joint that an effect is of; "all" where it is not one joint's."""
+    return parameters.get("joint", "all")
+
+
+def attributed(effect: str, parameters: Mapping[str, Any], hidden: JSON) -> str:
+    """Name an effect of a verdict: one that is hidden in another joint is not the one that is hidden."""
+    other = effect in hidden and joint(parameters) != joint(hidden[effect])
+    return ELSEWHERE.format(effect) if other else effect
+
+
+def _without_form(name: str, hidden: JSON) -> str:
+    """Name an effect of which a verdict writes the joint behind its name."""
+    found = _FORM.fullmatch(name)
+    if not found:
+        return name
+    return attributed(found["name"], {"joint": int(found["joint"])} if found["joint"] else {}, hidden)
 
 
 def _stated(said: Iterable[JSON], hidden: JSON, sizes: Mapping[str, float]) -> tuple[Stated, ...]:

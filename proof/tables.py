@@ -12,6 +12,7 @@ from proof.estimates import ANGLES
 from proof.figures import demanded, further, kind, undecided
 from proof.score import STATUSES, Score
 from proof.statistics import Demand, Figure, binned, share
+from virtual_cell.arm_effects import SHOWN
 
 NOTHING, REST = "(clean)", "(unexplained)"
 KINDS = {
@@ -63,8 +64,9 @@ _LOBES = (
     "are than those that the base model would draw, over 3. Where there are too few tests for a verdict, "
     "nothing counts as seen. Errors are of the probability of a held-out label."
 )
+_ARM = _FORCE.replace("Intervals:", "An effect named in a wrong joint is a wrong effect. Intervals:")
 _UNDECIDED = "Undecided: undetermined or insufficient."
-NOTES = {"force": _FORCE, "lobes": _LOBES}
+NOTES = {"force": _FORCE, "lobes": _LOBES, **dict.fromkeys(SHOWN, _ARM)}
 
 
 def tabulated(title: str, figures: Iterable[Figure], note: str) -> Table:
@@ -122,7 +124,7 @@ def _effects(scores: Sequence[Score]) -> Table:
         rows.append(
             (
                 *(name, str(len(group)), f"{np.median(sizes):.2g}" if sizes else "–", str(len(seen))),
-                *(_of([s.exact for s in seen]), _of([s.exact for s in group if not s.seen])),
+                *(_of([s.exact for s in seen]), _of([s.right for s in group if not s.seen])),
                 ", ".join(f"{other} {count}" for other, count in instead.most_common()) or "–",
             )
         )

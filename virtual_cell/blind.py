@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from virtual_cell.arm_effects import SHOWN
 from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Parameters
-from virtual_cell.recipes import boundary, force
+from virtual_cell.recipes import arm, boundary, force
 from virtual_cell.write import Row
 
 
@@ -22,4 +23,5 @@ class Recipe:
 RECIPES = {
     "force": Recipe(force.make, tuple(EFFECTS)),
     "lobes": Recipe(boundary.make, tuple(BOUNDARY_EFFECTS)),
+    **{observable: Recipe(arm.make, effects) for observable, effects in SHOWN.items()},
 }

@@ -29,23 +29,25 @@ class Hidden(Generic[Subject]):
     apply: Callable[[Subject, Parameters], Subject]
 
 
-def _size(rng: np.random.Generator, low: float, high: float) -> float:
+def drawn_size(rng: np.random.Generator, low: float, high: float) -> float:
     """Log-uniform, three digits."""
     return float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.3g}")
 
 
-def _angle(rng: np.random.Generator) -> float:
+def drawn_angle(rng: np.random.Generator) -> float:
+    """Uniform over a turn, degrees."""
     return float(round(rng.uniform(0.0, 360.0), 1))
 
 
-def _signed(rng: np.random.Generator, low: float, high: float) -> float:
-    return _size(rng, low, high) * float(rng.choice([-1.0, 1.0]))
+def drawn_signed(rng: np.random.Generator, low: float, high: float) -> float:
+    """Log-uniform, three digits, of either sign."""
+    return drawn_size(rng, low, high) * float(rng.choice([-1.0, 1.0]))
 
 
 def _pitch(rng: np.random.Generator, session: Session) -> Parameters:
     raw = rng.standard_normal(session.tool.teeth)
     raw -= raw.mean()
-    return {"pitch_deg": [round(float(e), 3) for e in raw / np.abs(raw).max() * _size(rng, 0.3, 2.0)]}
+    return {"pitch_deg": [round(float(e), 3) for e in raw / np.abs(raw).max() * drawn_size(rng, 0.3, 2.0)]}
 
 
 def _runout(session: Session, p: Parameters) -> Session:
@@ -74,13 +76,13 @@ def _sensor(session: Session, **changes: Any) -> Session:
 
 def _resonance(rng: np.random.Generator, _: Session) -> Parameters:
     return {
-        "frequency_hz": [_size(rng, 600.0, 1600.0) for _ in range(3)],
-        "damping": [_size(rng, 0.02, 0.08) for _ in range(3)],
+        "frequency_hz": [drawn_size(rng, 600.0, 1600.0) for _ in range(3)],
+        "damping": [drawn_size(rng, 0.02, 0.08) for _ in range(3)],
     }
 
 
 def _drift(rng: np.random.Generator, _: Session) -> Parameters:
-    return {"slope_n_s": [_signed(rng, 1.0, 12.0) for _ in range(3)]}
+    return {"slope_n_s": [drawn_signed(rng, 1.0, 12.0) for _ in range(3)]}
 
 
 def _warm(session: Session, p: Parameters) -> Session:
@@ -92,23 +94,25 @@ def _speed(session: Session, p: Parameters) -> Session:
 
 
 EFFECTS: Mapping[str, Hidden[Session]] = {
-    "tool_runout": Hidden(lambda r, _: {"radius_um": _size(r, 2.0, 25.0), "angle_deg": _angle(r)}, _runout),
+    "tool_runout": Hidden(
+        lambda r, _: {"radius_um": drawn_size(r, 2.0, 25.0), "angle_deg": drawn_angle(r)}, _runout
+    ),
     "tool_wear": Hidden(
-        lambda r, _: {"edge_growth_per_m": _size(r, 0.02, 0.4)},
+        lambda r, _: {"edge_growth_per_m": drawn_size(r, 0.02, 0.4)},
         lambda s, p: replace(s, coefficients=replace(s.coefficients, wear=p["edge_growth_per_m"])),
     ),
-    "chip_size_effect": Hidden(lambda r, _: {"exponent": _size(r, 0.06, 0.35)}, _size_effect),
+    "chip_size_effect": Hidden(lambda r, _: {"exponent": drawn_size(r, 0.06, 0.35)}, _size_effect),
     "tool_deflection": Hidden(
-        lambda r, _: {"kx_n_um": _size(r, 1.5, 12.0), "ky_n_um": _size(r, 1.5, 12.0)},
+        lambda r, _: {"kx_n_um": drawn_size(r, 1.5, 12.0), "ky_n_um": drawn_size(r, 1.5, 12.0)},
         lambda s, p: replace(s, stiffness=(p["kx_n_um"] * N_UM, p["ky_n_um"] * N_UM)),
     ),
     "orbit_stiffness": Hidden(
-        lambda r, _: {"amplitude": _size(r, 0.03, 0.25), "phase_deg": _angle(r)},
+        lambda r, _: {"amplitude": drawn_size(r, 0.03, 0.25), "phase_deg": drawn_angle(r)},
         lambda s, p: replace(s, orbit_stiffness=(p["amplitude"], p["phase_deg"] * DEG)),
     ),
     "pitch_error": Hidden(_pitch, _angles),
     "dynamometer_rotation": Hidden(
-        lambda r, _: {"angle_deg": _signed(r, 0.7, 8.0)},
+        lambda r, _: {"angle_deg": drawn_signed(r, 0.7, 8.0)},
         lambda s, p: _sensor(s, rotation=s.dynamometer.rotation + p["angle_deg"] * DEG),
     ),
     "dynamometer_resonance": Hidden(
@@ -125,24 +129,27 @@ EFFECTS: Mapping[str, Hidden[Session]] = {
     ),
     # outside of any library
     "chipped_tooth": Hidden(
-        lambda r, s: {"tooth": int(r.integers(s.tool.teeth)), "length_um": _size(r, 8.0, 60.0)}, _chipped
+        lambda r, s: {"tooth": int(r.integers(s.tool.teeth)), "length_um": drawn_size(r, 8.0, 60.0)}, _chipped
     ),
     "hard_spot": Hidden(
-        lambda r, _: {"ktc_step": _signed(r, 0.04, 0.15), "from_share": round(float(r.uniform(0.3, 0.7)), 2)},
+        lambda r, _: {
+            "ktc_step": drawn_signed(r, 0.04, 0.15),
+            "from_share": round(float(r.uniform(0.3, 0.7)), 2),
+        },
         lambda s, p: replace(s, hard_spot=p["ktc_step"], hard_from=p["from_share"]),
     ),
-    "speed_dependence": Hidden(lambda r, _: {"exponent": _size(r, 0.05, 0.3)}, _speed),
+    "speed_dependence": Hidden(lambda r, _: {"exponent": drawn_size(r, 0.05, 0.3)}, _speed),
     "sensor_lag": Hidden(
-        lambda r, _: {"time_constant_ms": _size(r, 0.03, 0.5)},
+        lambda r, _: {"time_constant_ms": drawn_size(r, 0.03, 0.5)},
         lambda s, p: _sensor(s, lag=p["time_constant_ms"] * MS),
     ),
     "second_orbit_stiffness": Hidden(
-        lambda r, _: {"amplitude": _size(r, 0.03, 0.25), "phase_deg": _angle(r)},
+        lambda r, _: {"amplitude": drawn_size(r, 0.03, 0.25), "phase_deg": drawn_angle(r)},
         lambda s, p: replace(s, orbit_stiffness=(p["amplitude"], p["phase_deg"] * DEG), orbit_harmonic=2),
     ),
-    "slow_growth": Hidden(lambda r, _: {"growth_um": _size(r, 10.0, 120.0)}, _warm),
+    "slow_growth": Hidden(lambda r, _: {"growth_um": drawn_size(r, 10.0, 120.0)}, _warm),
     "tilted_surface": Hidden(
-        lambda r, _: {"rise_um_mm": _signed(r, 1.0, 12.0)},
+        lambda r, _: {"rise_um_mm": drawn_signed(r, 1.0, 12.0)},
         lambda s, p: replace(s, tilt=p["rise_um_mm"] * UM / MM),
     ),
 }
@@ -152,9 +159,9 @@ def _missing(rng: np.random.Generator, machine: Machine) -> Parameters:
     hz = [float(f) for modes in machine.modes for f in modes.damped]
     softest = min(float(modes.stiffness.min()) for modes in machine.modes) / N_UM
     return {
-        "frequency_hz": _size(rng, 0.5 * min(hz), 1.2 * max(hz)),
-        "damping": _size(rng, 0.012, 0.06),
-        "stiffness_n_um": _size(rng, 0.5 * softest, 12.0 * softest),
+        "frequency_hz": drawn_size(rng, 0.5 * min(hz), 1.2 * max(hz)),
+        "damping": drawn_size(rng, 0.012, 0.06),
+        "stiffness_n_um": drawn_size(rng, 0.5 * softest, 12.0 * softest),
         "axis": str(rng.choice(["x", "y"])),
     }
 
@@ -176,43 +183,46 @@ def _uneven(machine: Machine, p: Parameters) -> Machine:
 
 def _spacing(rng: np.random.Generator, machine: Machine) -> Parameters:
     """Every other tooth out of its place, by whole steps of the march."""
-    by = 2.0 * round(_size(rng, 3.0, 24.0) / 2.0)
+    by = 2.0 * round(drawn_size(rng, 3.0, 24.0) / 2.0)
     return {"pitch_deg": [by * (tooth % 2) for tooth in range(machine.teeth)]}
 
 
 BOUNDARY_EFFECTS: Mapping[str, Hidden[Machine]] = {
     "missing_mode": Hidden(_missing, _with_mode),
     "process_damping": Hidden(
-        lambda r, _: {"coefficient_n_mm": _size(r, 15.0, 900.0)},
+        lambda r, _: {"coefficient_n_mm": drawn_size(r, 15.0, 900.0)},
         lambda m, p: replace(m, ploughing=p["coefficient_n_mm"] * (N_MM / (0.5 * m.diameter))),
     ),
     "mode_coupling": Hidden(
-        lambda r, _: {"angle_deg": _signed(r, 4.0, 60.0)},
+        lambda r, _: {"angle_deg": drawn_signed(r, 4.0, 60.0)},
         lambda m, p: replace(m, turned=p["angle_deg"] * DEG),
     ),
     "spindle_speed_softening": Hidden(
-        lambda r, m: {"change_per_krpm": _signed(r, 20.0 / m.fast, 400.0 / m.fast)},
+        lambda r, m: {"change_per_krpm": drawn_signed(r, 20.0 / m.fast, 400.0 / m.fast)},
         lambda m, p: replace(m, softening=p["change_per_krpm"] / 1000.0),
     ),
     # outside of any library
     "speed_dependence": Hidden(
-        lambda r, m: {"exponent": _signed(r, 0.1, 1.5), "reference_rpm": round(0.7 * m.fast)},
+        lambda r, m: {"exponent": drawn_signed(r, 0.1, 1.5), "reference_rpm": round(0.7 * m.fast)},
         lambda m, p: replace(m, speed_exponent=p["exponent"], speed_reference=p["reference_rpm"]),
     ),
     "speed_damping": Hidden(
-        lambda r, m: {"growth_per_krpm": _size(r, 100.0 / m.fast, 3000.0 / m.fast)},
+        lambda r, m: {"growth_per_krpm": drawn_size(r, 100.0 / m.fast, 3000.0 / m.fast)},
         lambda m, p: replace(m, damping_growth=p["growth_per_krpm"] / 1000.0),
     ),
     "yielding_with_depth": Hidden(
-        lambda r, m: {"loss_per_mm": _size(r, 0.03 / (m.level / MM), 0.8 / (m.level / MM))},
+        lambda r, m: {"loss_per_mm": drawn_size(r, 0.03 / (m.level / MM), 0.8 / (m.level / MM))},
         lambda m, p: replace(m, yielding=p["loss_per_mm"] / MM),
     ),
     "wrong_labels": Hidden(
-        lambda r, _: {"share": _size(r, 0.03, 0.3)}, lambda m, p: replace(m, mislabelled=p["share"])
+        lambda r, _: {"share": drawn_size(r, 0.03, 0.3)}, lambda m, p: replace(m, mislabelled=p["share"])
     ),
     "uneven_pitch": Hidden(_spacing, _uneven),
     "tool_runout": Hidden(
-        lambda r, m: {"radius_um": _size(r, 0.15 * m.feed / UM, 1.5 * m.feed / UM), "angle_deg": _angle(r)},
+        lambda r, m: {
+            "radius_um": drawn_size(r, 0.15 * m.feed / UM, 1.5 * m.feed / UM),
+            "angle_deg": drawn_angle(r),
+        },
         lambda m, p: replace(m, runout=p["radius_um"] * UM, runout_angle=p["angle_deg"] * DEG),
     ),
 }

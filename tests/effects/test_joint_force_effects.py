@@ -72,7 +72,7 @@ def test_friction_that_differs_from_the_idle_run_is_found_in_its_joint(cell, joi
 
 @pytest.mark.slow
 def test_friction_that_grows_along_the_log_is_found_with_its_slope(cell):
-    ((name, where, values),) = found(cell, torques(cell, 3, lambda t: 1.5 * t["t_s"] * turning(t, 3)))
+    ((name, where, values),) = found(cell, torques(cell, 3, lambda t: 1.5 * t["since_s"] * turning(t, 3)))
     assert (name, where) == ("friction_warmup", {"joint": 3})
     assert values["slope_nm_s"] == pytest.approx(1.5, abs=0.2)
 

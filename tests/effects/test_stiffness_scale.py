@@ -8,7 +8,7 @@ import pytest
 
 from metro.batch.processed import read_batch, read_table
 from metro.effects import library
-from metro.effects.stiffness_scale import EFFECT, apply
+from metro.effects.stiffness_scale import OF_ARM, apply
 from metro.loop.candidate import Candidate
 from metro.loop.fit import fit
 from metro.loop.noise import first_noise
@@ -70,7 +70,7 @@ def springs(factor, seed):
 
 @pytest.mark.parametrize("factor", [0.7, 0.9, 1.3])
 def test_a_factor_on_the_stiffness_is_recovered_beside_load_tests(factor):
-    outcome = search(springs(factor, 1), (EFFECT,), GATES)
+    outcome = search(springs(factor, 1), (OF_ARM,), GATES)
     assert outcome.names == ("stiffness_scale",)
     found = parameters(outcome.final, "stiffness_scale")["factor"]
     assert found["ci95"][0] < factor < found["ci95"][1]
@@ -80,13 +80,13 @@ def test_a_factor_on_the_stiffness_is_recovered_beside_load_tests(factor):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_nothing_is_found_where_cut_and_load_tests_agree(seed):
-    assert search(springs(1.0, seed), (EFFECT,), GATES).names == ()
+    assert search(springs(1.0, seed), (OF_ARM,), GATES).names == ()
 
 
 def test_without_load_tests_it_cannot_be_seen():
     task = springs(0.8, 2)
     alone = replace(task, blocks=tuple(block for block in task.blocks if block.role != "calibrate"))
-    outcome = search(alone, (EFFECT,), GATES)
+    outcome = search(alone, (OF_ARM,), GATES)
     assert outcome.names == ()
     assert "stiffness_scale" in outcome.not_visible
 
@@ -116,6 +116,7 @@ def arm_outcome(folder, out):
 def test_the_arm_of_the_bundled_batch_is_softer_in_the_cut_than_in_its_load_tests(tmp_path):
     outcome = arm_outcome(ROOT / "data" / "raw" / "kr160-side", tmp_path / "out")
     assert "stiffness_scale" in outcome.names
+    assert parameters(outcome.final, "stiffness_scale")["joint"] == "all"
     found = parameters(outcome.final, "stiffness_scale")["factor"]
     assert found["ci95"][0] < 0.85 < found["ci95"][1]
     assert found["value"] == pytest.approx(0.85, rel=0.05)

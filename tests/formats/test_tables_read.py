@@ -116,7 +116,7 @@ def test_a_file_that_is_not_there_is_said_to_be_so(tmp_path):
     assert "cannot be opened" in failure(tmp_path / "none.csv")
 
 
-@pytest.mark.parametrize("suffix", [".tdms", ".mat", ".xml", ".pts", ".e57", ".stl", ".X3P"])
+@pytest.mark.parametrize("suffix", [".tdms", ".mat", ".pts", ".e57", ".stl", ".X3P"])
 def test_formats_without_a_reader_say_what_to_export(tmp_path, suffix):
     message = failure(written(tmp_path, "x", f"file{suffix}"))
     assert "files are not read yet; export it as" in message

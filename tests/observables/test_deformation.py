@@ -403,23 +403,64 @@ def test_the_report_holds_the_truth_within_its_intervals_and_is_json(cell, built
     np.testing.assert_allclose(found, expected, rtol=0.05, atol=2e-3)
     assert arm["tip_force"]["r1"]["x"]["value"] == pytest.approx(-150, abs=3)
     assert len(arm["observability"]["r1"]) == 6
-    assert "clock_offset_s" in arm["not_identified"]
 
 
-def test_waviness_that_the_tip_strayed_is_recognised():
-    cell = Cell(tracking=0.0)
-    for run, table in cell.logs.items():
-        q = table[[f"q{i}_set_deg" for i in range(1, 7)]].to_numpy() * DEG
-        s = cell.arm.tip(q)[:, 1] / MM
-        wave = 2e-5 * np.sin(2 * np.pi * s / 3)
-        cell.logs[run] = table.assign(q6_deg=table["q6_set_deg"] + wave / DEG)
-        lever = moves(cell.arm, q[len(q) // 4])[:, 5] @ wall(cell.batch, run).normal
-        x = cell.profiles[run]["x_mm"]
-        cell.profiles[run]["z_mm"] += lever * 2e-5 * np.sin(2 * np.pi * x / 3) / MM
-    observed, task = cell.task()
-    arm = deformation.report(
-        cell.batch, observed, {}, task, BaseFit(1 / STIFFNESS, np.eye(6) * 1e-20, 9.0, {})
-    )["arm"]
-    found = arm["waviness"]["r1"]
-    assert found["correlation"] > 0.95
-    assert found["wa_predicted"]["value"] == pytest.approx(found["wa_measured"]["value"], rel=0.15)
+def test_each_wall_is_reported_with_its_error_and_where_its_deformation_comes_from(cell, built):
+    observed, task = built
+    beta, covariance = solved(task)
+    arm = deformation.report(cell.batch, observed, {}, task, BaseFit(beta, covariance, 20.0, {}))["arm"]
+    for run, figures in arm["walls"].items():
+        measured, predicted = figures["measured"], figures["predicted"]
+        assert figures["error_percent"]["ci95"][0] < 0 < figures["error_percent"]["ci95"][1]
+        assert figures["error_percent"]["value"] == pytest.approx(
+            100 * (predicted["value"] / measured["value"] - 1)
+        )
+        normal = wall(cell.batch, run).normal
+        tip = np.array([figures["tip"][axis] for axis in "xyz"])
+        expected = [arm["deformation"][run][axis]["value"] for axis in "xyz"]
+        np.testing.assert_allclose(tip, expected, rtol=1e-9)
+        # the flange alone: the same twists on an arm without a tool
+        setting = next(block.setting for block in task.blocks if block.run == run)
+        moved = moves(replace(cell.arm, tool=np.zeros(3)), setting.commanded)
+        torque = np.einsum("mai,ma->mi", moves(cell.arm, setting.commanded), setting.force)
+        flange = np.einsum("mai,mi->ma", moved, torque * beta)[setting.kept].mean(axis=0) / MM
+        np.testing.assert_allclose([figures["flange"][axis] for axis in "xyz"], flange, atol=1e-6)
+        assert figures["without_flange_rotation"] == pytest.approx(normal @ flange, abs=1e-6)
+        assert len(figures["curve"]["x_mm"]) == len(figures["curve"]["predicted_mm"])
+        assert figures["curve"]["x_mm"][0] < 2.0
+
+
+def test_what_the_load_tests_tell_of_the_joints_is_reported(cell, built):
+    observed, task = built
+    told = deformation.report(cell.batch, observed, {}, task, None)["arm"]["joint_observability"]
+    assert len(told["relative_sd"]) == 6
+    worst = int(np.argmax(told["relative_sd"])) + 1
+    assert told["worst_joint"] == told["next_load"]["joint"] == worst
+    assert told["next_load"]["relative_sd_after"] < told["next_load"]["relative_sd_before"]
+    assert told["sentence"] in task.notes
+
+
+def test_walls_and_loads_that_could_come_next_are_proposed(built):
+    _, task = built
+    words = [proposal.words for proposal in task.feasible]
+    assert len(set(words)) == len(words)
+    assert any("pose of load tests p1" in each and "with a dynamometer" in each for each in words)
+    assert any("times the force" in each for each in words)
+    for proposal in task.feasible:
+        for block in proposal.blocks:
+            matrix, _ = task.base.design(block, np.zeros(0), 1 / STIFFNESS)
+            assert len(matrix) == len(block.measured) == len(block.sigma)
+
+
+def test_a_repeat_without_a_dynamometer_takes_the_force_of_the_one_that_had_it(cell):
+    table = pd.DataFrame({"run": ["r1"] * 2, "fx_n": [1.0, 2.0], "source": ["dynamometer"] * 2})
+    other = table.assign(run="r2", fx_n=9.0, source="coefficients")
+    runs = cell.batch.runs.assign(condition=["a", "a", "b"])
+    batch = replace(cell.batch, runs=runs)
+    taken = deformation.by_repeat(batch, other, [table, other])
+    assert list(taken["fx_n"]) == [1.0, 2.0]
+    assert set(taken["run"]) == {"r2"}
+    assert set(taken["source"]) == {"repeat"}
+    apart = replace(cell.batch, runs=runs.assign(condition=["a", "c", "b"]))
+    assert deformation.by_repeat(apart, other, [table, other]) is other
+    assert deformation.by_repeat(batch, table, [table, other]) is table

@@ -121,6 +121,31 @@ def test_a_suite_about_lobes_is_opened_by_the_same_command(out):
     assert (out.root / "table.md").read_text().startswith("# Proof: lobes")
 
 
+def test_a_suite_about_an_arm_tells_wrong_joints_from_right_ones(out):
+    truth = json.loads(out.truth.read_text())
+    for entry in truth["batches"].values():
+        entry["effects"] = {"joint_backlash": {"joint": 3, "angle_mdeg": 5.0}} if entry["effects"] else {}
+    seal.close({**truth, "observable": "deformation"}, out.truth, out.seal)
+    write(
+        out.oracle / "blind-2.json",
+        {"before": 9.0, "after": 1.9, "floor": 1.9, "sizes": {"joint_backlash": 5.0}},
+    )
+    for name in truth["batches"]:
+        hidden = truth["batches"][name]["effects"]
+        entry = verdict("explained", "joint_backlash") if hidden else verdict("clean")
+        for found in entry["observables"]["force"]["effects"]:
+            found["parameters"] = {"joint": 2}
+        write(
+            out.reports / name / "verdict.json",
+            {"observables": {"deformation": entry["observables"]["force"]}},
+        )
+    opened(out, 1)
+    assert rows(out, "What is demanded")["one effect: a wrong one named with p > 0.9"][0] == "100.0 %"
+    assert rows(out, "Confusion")["joint_backlash"][0] == "1"
+    assert "| joint_backlash, another joint |" in (out.root / "table.md").read_text()
+    assert "wrong joint" in (out.root / "table.md").read_text()
+
+
 def test_strict_fails_where_a_demand_is_missed_beyond_chance(out):
     main(["open", str(out.root), "--strict", "--jobs", "1"])
     for name in ("blind-1", "blind-3"):

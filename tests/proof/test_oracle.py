@@ -86,6 +86,17 @@ def test_of_two_effects_each_has_its_own_size():
     assert found["sizes"]["ripple"] == pytest.approx(0.9 / np.sqrt(2.0) / SIGMA, rel=0.1)
 
 
+def test_of_an_effect_of_one_joint_the_oracle_is_told_the_form_of_that_joint():
+    bump, ripple = (
+        replace(e, name="gap", form=f"joint {i}", where={"joint": i}) for i, e in enumerate(LIBRARY[1:], 1)
+    )
+    task = problem(Wave(ripple=0.9))
+    found = oracle(task, {"gap": {"joint": 2, "ripple": 0.9, "phase_deg": 3.0}}, (bump, ripple), BUDGET)
+    assert found["sizes"]["gap"] == pytest.approx(0.9 / np.sqrt(2.0) / SIGMA, rel=0.1)
+    assert found["after"] == pytest.approx(SIGMA, rel=0.1)
+    assert oracle(task, {"gap": {"joint": 3, "ripple": 0.9}}, (bump, ripple), BUDGET)["after"] is None
+
+
 def test_what_the_library_lacks_has_no_oracle_but_a_size():
     found = oracle(problem(Wave(bump=0.6)), {"chip": {"length_um": 20.0}}, LIBRARY[:1], BUDGET)
     assert found["after"] is None

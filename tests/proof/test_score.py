@@ -84,6 +84,63 @@ def test_two_effects_may_be_named_in_any_order_and_one_is_not_both():
     assert not scored(BOTH, asked, verdict("explained", ("tool_wear", 0.9))).both
 
 
+BACKLASH = truth("one", joint_backlash={"joint": 3, "angle_mdeg": 5.0})
+
+
+def in_joint(joint, groups=(), status="explained"):
+    found = verdict(status, ("joint_backlash", 0.97), groups=groups)
+    where = {} if joint is None else {"joint": joint}
+    size = {"angle_mdeg": {"value": 5.1, "ci95": [4.9, 5.3]}}
+    found["observables"]["force"]["effects"][0]["parameters"] = {**where, **size}
+    return scored(BACKLASH, oracle(joint_backlash=3.0), found)
+
+
+def test_the_right_effect_in_a_wrong_joint_is_a_wrong_attribution():
+    right, wrong = in_joint(3), in_joint(2)
+    assert right.exact
+    assert not right.surely_wrong
+    assert right.stated == ((0.97, True),)
+    assert [one.parameter for one in right.estimates] == ["angle_mdeg"]
+    assert not wrong.exact
+    assert wrong.surely_wrong
+    assert wrong.extra == {"joint_backlash, another joint"}
+    assert wrong.stated == ((0.97, False),)
+    assert not wrong.estimates
+
+
+def test_of_joints_that_are_declared_rivals_the_right_one_must_come_first():
+    rivals = [("joint_backlash (joint 3)", "joint_backlash (joint 2)")]
+    first = in_joint(3, rivals, "undetermined")
+    second = in_joint(2, [rivals[0][::-1]], "undetermined")
+    assert first.exact
+    assert not second.exact
+    assert second.among
+    assert not second.extra
+
+
+def test_an_effect_of_all_joints_is_not_that_of_one():
+    scale = truth("one", stiffness_scale={"factor": 0.8, "joint": "all"})
+    asked = oracle(stiffness_scale=3.0)
+    for parameters, exact in (({}, True), ({"joint": "all"}, True), ({"joint": 2}, False)):
+        found = verdict("explained", ("stiffness_scale", 0.97))
+        found["observables"]["force"]["effects"][0]["parameters"] = parameters
+        assert scored(scale, asked, found).exact is exact
+
+
+@pytest.mark.parametrize(
+    ("found", "right"),
+    [
+        (verdict("clean"), True),
+        (verdict("explained", ("tool_runout", 0.9)), True),
+        (verdict("explained", ("pitch_error", 0.9)), False),
+        (verdict("unexplained", rest={}), False),
+    ],
+)
+def test_below_the_noise_clean_is_right_and_a_false_one_is_not(found, right):
+    assert scored(RUNOUT, oracle(tool_runout=0.4), found).right is right
+    assert scored(RUNOUT, oracle(tool_runout=2.0), verdict("clean")).right is False
+
+
 def test_an_effect_below_the_noise_is_not_asked_for_nor_does_its_probability_count():
     found = verdict("explained", ("tool_wear", 0.9), candidates=[("tool_runout", 0.3), ("pitch_error", 0.1)])
     one = scored(BOTH, oracle(tool_runout=0.5, tool_wear=2.0), found)

@@ -52,6 +52,15 @@ def test_a_suite_about_lobes_hides_effects_of_the_boundary():
     assert "tool_runout" in unknown  # it bears that name among the forces, too, and is no effect of lobes
 
 
+@pytest.mark.parametrize("observable", ["joint_force", "deformation", "waviness"])
+def test_a_suite_about_an_arm_hides_what_is_seen_in_its_observable(observable):
+    known, unknown = sides(observable)
+    assert len(known) >= 3
+    assert len(unknown) >= 3
+    assert ("stiffness_hardening" in known) == (observable == "deformation")
+    assert ("payload_error" in known) == (observable == "joint_force")
+
+
 def test_batches_that_are_there_are_not_made_again(tmp_path):
     (tmp_path / "raw/blind-1").mkdir(parents=True)
     (tmp_path / "raw/blind-1/batch.yaml").write_text("")

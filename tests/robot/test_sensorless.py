@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from metro.robot.kinematics import arm_of_cell
-from metro.robot.sensorless import observability, tip_force
+from metro.robot.sensorless import mean_force, noise_of_bins, observability, smoothed_torque, tip_force
 from metro.robot.statics import tip_jacobian
 
 DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
@@ -66,3 +69,72 @@ def test_two_joints_are_not_enough():
     q, torque = torques(3)
     with pytest.raises(ValueError, match="only 2 of 6 joints reach the observability index 2; at least 3"):
         tip_force(torque, np.ones_like(torque), tip_jacobian(ARM, q), np.array([3, 1, 1, 1, 9, 0.2]))
+
+
+def test_a_joint_that_adds_next_to_nothing_is_left_out():
+    q, torque = torques(10)
+    jacobian = tip_jacobian(ARM, q)
+    variance = np.ones_like(torque)
+    variance[:, 3] = 1e4
+    found = tip_force(torque, variance, jacobian, np.full(6, 9.0))
+    assert not found.used[3]
+
+    def error(joints):
+        system = np.swapaxes(jacobian[:, :, joints], 1, 2) / np.sqrt(variance[:, joints])[:, :, None]
+        information = np.swapaxes(system, 1, 2) @ system
+        if np.linalg.cond(information).max() > 1e12:
+            return np.inf
+        return np.sqrt(np.trace(np.linalg.inv(information), axis1=1, axis2=2).mean())
+
+    used = np.flatnonzero(found.used)
+    best = error(np.arange(6))
+    assert error(used) <= 1.02 * best
+    smaller = [error(np.array(c)) for c in combinations(range(6), len(used) - 1)] if len(used) > 3 else []
+    assert all(e > 1.02 * best for e in smaller)
+    same = [error(np.array(c)) for c in combinations(range(6), len(used))]
+    assert error(used) == pytest.approx(min(same))
+
+
+def test_three_joints_that_leave_an_axis_open_are_refused():
+    jacobian = np.tile(np.array([[1.0, 0.5, 0.3], [0.0, 0.4, 0.1], [0.0, 0.0, 0.0]]), (4, 1, 1))
+    with pytest.raises(ValueError, match="joints 1, 2, 3 do not tell the three axes apart"):
+        tip_force(np.ones((4, 3)), np.ones((4, 3)), jacobian, np.full(3, 5.0))
+
+
+def logged(rng, persistence, walk, shaken):
+    """Idle and cut of 8 samples a bin: coloured noise on slow friction, and a force that wanders."""
+    bins, per = 100, 8
+    sd = np.array([3.0, 3.0, 2.0, 1.0, 1.0, 0.5])
+    force = FORCE + np.cumsum(rng.normal(0, walk, (bins, 3)), axis=0)
+    torque = -np.einsum("mai,ma->mi", JACOBIAN, force)
+
+    def noise():
+        white = rng.normal(size=(bins * per + 200, 6))
+        return sd * lfilter([np.sqrt(1 - persistence**2)], [1.0, -persistence], white, axis=0)[200:]
+
+    friction = np.array([10.0, 40, 20, 5, 5, 3]) * np.sin(np.linspace(0, 1.5, bins * per))[:, None]
+    return force, friction + shaken * noise() + np.repeat(torque, per, axis=0), friction + noise()
+
+
+PATH = np.array([0.1, -0.9, 1.2, 0.3, 0.8, 0.2]) + np.linspace(0, 0.05, 100)[:, None]
+MOVES = [(ARM.tip(PATH + 1e-6 * e) - ARM.tip(PATH - 1e-6 * e)) / 2e-6 for e in np.eye(6)]
+JACOBIAN = np.stack(MOVES, axis=2)
+
+
+@pytest.mark.parametrize(("persistence", "walk", "shaken"), [(0.5, 2.0, 1.0), (0.7, 0.5, 2.0)])
+def test_the_interval_of_the_steady_mean_holds_the_truth_19_times_in_20(persistence, walk, shaken):
+    inside, naive = [], []
+    steady = np.arange(100) >= 10
+    for seed in range(400):
+        force, cut, idle = logged(np.random.default_rng(seed), persistence, walk, shaken)
+        difference = (cut - idle).reshape(100, 8, 6).mean(axis=1)
+        torque = smoothed_torque(difference, noise_of_bins(cut, idle, (8, 8)))
+        found = tip_force(torque.level, torque.variance, JACOBIAN, np.full(6, 9.0))
+        mean, covariance = mean_force(found, torque, steady)
+        error = np.abs(mean - force[steady].mean(axis=0))
+        inside.append(error < 1.96 * np.sqrt(np.diag(covariance)))
+        sd = np.sqrt(np.einsum("maa->ma", found.covariance))[steady].mean(axis=0)
+        naive.append(error < 1.96 * sd)
+    assert 0.93 <= np.mean(inside) <= 0.97
+    # the error of a single place, taken for that of the mean, always holds it
+    assert np.mean(naive) > 0.995

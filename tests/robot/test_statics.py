@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from metro.robot.kinematics import Arm, arm_of_cell
 from metro.robot.statics import (
+    deflections,
     flange_jacobian,
     joint_contributions,
     joint_torque,
@@ -102,3 +103,29 @@ def test_a_series_of_poses_and_forces_is_taken_at_once():
     np.testing.assert_allclose(joint_contributions(ARM, q, force), singly, atol=1e-15)
     singly = [tip_compliance(ARM, a, COMPLIANCE) for a in q]
     np.testing.assert_allclose(tip_compliance(ARM, q, COMPLIANCE), singly, atol=1e-18)
+
+
+def test_tip_and_flange_go_where_the_twisted_arm_takes_them():
+    """[K] eq. 16 to 18 against the forward kinematics of the arm with its joints twisted, both ways."""
+    rng = np.random.default_rng(8)
+    q, twist = rng.uniform(-1, 1, (5, 6)), rng.normal(0, 1e-3, (5, 6))
+    flange, turned, tip = deflections(ARM, q, twist)
+    on_flange = Arm(ARM.dh, np.zeros(3), ARM.work)
+    small = 1e-3
+    for arm, moved in ((on_flange, flange), (ARM, tip)):
+        expected = (arm.tip(q + small * twist) - arm.tip(q - small * twist)) / (2 * small)
+        np.testing.assert_allclose(moved, expected, rtol=1e-5, atol=1e-9)
+    for axis in np.eye(3):
+        pointer = Arm(ARM.dh, axis, ARM.work)
+        ahead = pointer.tip(q) - on_flange.tip(q)
+        after = pointer.tip(q + small * twist) - on_flange.tip(q + small * twist)
+        before = pointer.tip(q - small * twist) - on_flange.tip(q - small * twist)
+        np.testing.assert_allclose(
+            np.cross(turned, ahead), (after - before) / (2 * small), rtol=1e-5, atol=1e-9
+        )
+
+
+def test_half_of_the_rotation_of_the_flange_moves_the_tip_half_way():
+    q, force = np.array([0.1, -0.9, 1.2, 0.3, 0.8, 0.2]), np.array([100.0, -180.0, 40.0])
+    none, half, whole = (joint_contributions(ARM, q, force, flange_rotation=s) for s in (0.0, 0.5, 1.0))
+    np.testing.assert_allclose(half, (none + whole) / 2, atol=1e-12)

@@ -5,7 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from metro.robot.stations import MARGIN, PLANE, SPLINE, Stations, beyond_hull, leave_one_out, stiffness_at
+from metro.robot.stations import (
+    MARGIN,
+    PLANE,
+    SPLINE,
+    Stations,
+    beyond_hull,
+    leave_one_out,
+    leave_one_out_interval,
+    left_out,
+    stiffness_at,
+)
 
 # [T] table 5
 PLACES = 1e-3 * np.array(
@@ -98,3 +108,19 @@ def test_a_place_far_beyond_the_stations_is_refused():
     assert stiffness_at(stations, near).beyond == pytest.approx(0.95 * reach, rel=1e-3)
     with pytest.raises(ValueError, match="mm beyond the stations, expected at most"):
         stiffness_at(stations, far)
+
+
+def test_the_interval_of_the_leave_one_out_error_holds_what_other_stations_would_have_told():
+    """Stations scatter by 5 % about an exponential: the rms over many tables is within, mostly."""
+    rng = np.random.default_rng(4)
+    tables = [Stations(PLACES, exponential(PLACES) * np.exp(rng.normal(0, 0.05, (7, 3)))) for _ in range(300)]
+    usual = np.sqrt(np.mean([leave_one_out(table) ** 2 for table in tables], axis=0))
+    inside = [(low <= usual) & (usual <= high) for low, high in map(leave_one_out_interval, tables)]
+    assert 0.9 <= np.mean(inside) <= 1.0
+
+
+def test_each_stations_own_error_is_signed():
+    stations = Stations(PLACES, exponential(PLACES) * np.where(np.arange(7) == 3, 1.2, 1.0)[:, None])
+    errors = left_out(stations)
+    np.testing.assert_allclose(errors[3], 1 / 1.2 - 1, rtol=1e-9)
+    np.testing.assert_allclose(np.sqrt((errors**2).mean(axis=0)), leave_one_out(stations))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from metro.signals.align import align, along_path, bin_means, moving
+from metro.signals.align import align, along_path, bin_means, moving, projected
 
 
 def log(start, end, speed=0.01, period=0.012, offset=0.0):
@@ -78,3 +78,19 @@ def test_bins_below_half_a_millimetre_are_refused():
     s = np.linspace(0, 0.05, 400)
     with pytest.raises(ValueError, match=r"0\.5 mm"):
         align(s, torque(s), s, torque(s), width=4e-4)
+
+
+def test_logs_whose_samples_lie_apart_agree_to_a_thousandth_of_a_sample_on_a_slope():
+    step = 3e-4
+    s_cut, s_idle = np.arange(0, 0.05, step) + 0.31 * step, np.arange(0, 0.05, step) + 0.83 * step
+    steep = 2000.0
+    found = align(s_cut, steep * s_cut[:, None], s_idle, steep * s_idle[:, None])
+    np.testing.assert_allclose(found.first - found.second, 0.0, atol=1e-3 * steep * step)
+    plain = [bin_means(s, steep * s[:, None], 1e-3 * np.arange(50)) for s in (s_cut, s_idle)]
+    assert np.nanmax(np.abs(plain[0] - plain[1])) > 0.2 * steep * step
+
+
+def test_the_distance_from_a_path_is_that_of_its_chords():
+    reference = np.column_stack([np.linspace(0, 1, 11), np.zeros(11), np.zeros(11)])
+    _, away = projected(np.array([[0.55, 0.3, 0.4], [1.2, 0.0, 0.0]]), reference)
+    np.testing.assert_allclose(away, [0.5, 0.2])

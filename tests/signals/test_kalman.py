@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from metro.signals.kalman import likeliest_drift, log_likelihood, noise_variance, smooth
+from metro.signals.kalman import (
+    combined_covariance,
+    innovations,
+    likeliest_drift,
+    log_likelihood,
+    long_run_variance,
+    noise_variance,
+    smooth,
+    whiteness,
+)
 
 
 def walk(n, r, q, seed):
@@ -67,3 +76,105 @@ def test_noise_is_told_from_a_smooth_signal_under_it():
     smooth_part = 300 * np.sin(np.linspace(0, 4, 2000))[:, None]
     noisy = smooth_part + rng.normal(0, [3.0, 0.5], (2000, 2))
     np.testing.assert_allclose(noise_variance(noisy), [9.0, 0.25], rtol=0.1)
+
+
+@pytest.fixture(scope="module")
+def local_level():
+    """Return the same walk by statsmodels' local level, its start unknown."""
+    structural = pytest.importorskip("statsmodels.tsa.statespace.structural", reason="statsmodels is missing")
+
+    r, q = 4.0, 0.5
+    _, z = walk(300, np.array([r]), np.array([q]), 6)
+    model = structural.UnobservedComponents(z[:, 0], "llevel", use_exact_diffuse=True)
+    return z, np.array([r]), np.array([q]), model
+
+
+def test_level_variance_likelihood_and_innovations_are_those_of_an_independent_filter(local_level):
+    z, r, q, model = local_level
+    told = model.smooth([r[0], q[0]])
+    level, variance = smooth(z, r, q)
+    np.testing.assert_allclose(level[:, 0], told.smoothed_state[0], atol=1e-8)
+    np.testing.assert_allclose(variance[:, 0], told.smoothed_state_cov[0, 0], rtol=1e-9)
+    own = log_likelihood(z, r, q[None])[0, 0]
+    # statsmodels drops the first sample's likelihood, but not its constant
+    assert own == pytest.approx(told.llf + 0.5 * np.log(2 * np.pi), abs=1e-6)
+    forecast = told.filter_results.standardized_forecasts_error[0, 1:]
+    np.testing.assert_allclose(innovations(z, r, q)[:, 0], forecast, atol=1e-8)
+
+
+def test_the_likeliest_drift_is_that_of_an_independent_optimiser(local_level):
+    from scipy.optimize import minimize_scalar
+
+    z, r, _, model = local_level
+    best = minimize_scalar(
+        lambda log_q: -model.loglike([r[0], np.exp(log_q)]), bounds=(-6, 4), method="bounded"
+    )
+    assert likeliest_drift(z, r)[0] == pytest.approx(np.exp(best.x), rel=0.02)
+
+
+def test_smoothing_is_that_of_filterpy():
+    from filterpy.kalman import KalmanFilter
+
+    r, q = 2.0, 0.05
+    _, z = walk(120, np.array([r]), np.array([q]), 7)
+    one = KalmanFilter(dim_x=1, dim_z=1)
+    one.F = one.H = np.eye(1)
+    one.R, one.Q, one.x, one.P = np.array([[r]]), np.array([[q]]), z[:1].copy(), np.array([[r]])
+    mean, covariance, _, _ = one.batch_filter(z[1:])
+    mean = np.concatenate([z[:1, None], mean])
+    mean, covariance, _, _ = one.rts_smoother(mean, np.concatenate([[[[r]]], covariance]))
+    level, variance = smooth(z, np.array([r]), np.array([q]))
+    np.testing.assert_allclose(level[:, 0], mean[:, 0, 0], rtol=1e-9)
+    np.testing.assert_allclose(variance[:, 0], covariance[:, 0, 0], rtol=1e-9)
+
+
+def test_a_nearly_constant_level_keeps_its_variance_to_all_digits():
+    _, variance = smooth(np.zeros((50, 1)), np.ones(1), np.full(1, 1e-12))
+    np.testing.assert_allclose(variance, 1 / 50, rtol=1e-6)
+
+
+def test_the_error_of_a_mean_of_levels_is_that_of_the_inverse_information_matrix():
+    r, q, n = np.array([4.0, 1.0]), np.array([0.5, 0.02]), 40
+    weights = np.random.default_rng(8).normal(size=(3, n, 2))
+    step = np.diff(np.eye(n), axis=0)
+    expected = np.zeros((3, 3))
+    for k in range(2):
+        inverse = np.linalg.inv(np.eye(n) / r[k] + step.T @ step / q[k])
+        expected += weights[:, :, k] @ inverse @ weights[:, :, k].T
+    np.testing.assert_allclose(combined_covariance(weights, r, q), expected, rtol=1e-9)
+
+
+def test_the_whiteness_test_is_ljung_and_box_on_the_drifts_degrees_of_freedom():
+    diagnostic = pytest.importorskip("statsmodels.stats.diagnostic", reason="statsmodels is missing")
+
+    found = np.random.default_rng(9).normal(size=(200, 2))
+    expected = [
+        diagnostic.acorr_ljungbox(channel, lags=[10], model_df=1)["lb_pvalue"].iloc[0] for channel in found.T
+    ]
+    np.testing.assert_allclose(whiteness(found), expected, rtol=1e-9)
+
+
+def test_innovations_of_the_model_are_white_and_those_of_a_wrong_noise_are_not():
+    r, q = np.array([4.0]), np.array([0.5])
+    right, wrong = [], []
+    for seed in range(200):
+        _, z = walk(150, r, q, seed)
+        right.append(whiteness(innovations(z, r, likeliest_drift(z, r)))[0])
+        small = 0.05 * r
+        wrong.append(whiteness(innovations(z, small, likeliest_drift(z, small)))[0])
+    assert 0.01 <= np.mean(np.array(right) < 0.05) <= 0.10
+    assert np.mean(np.array(wrong) < 0.05) > 0.8
+
+
+@pytest.mark.parametrize("persistence", [0.0, 0.4, 0.7])
+def test_the_long_run_variance_of_coloured_noise_on_a_slow_channel(persistence):
+    from scipy.signal import lfilter
+
+    rng = np.random.default_rng(10)
+    found = []
+    for _ in range(60):
+        noise = lfilter([1.0], [1.0, -persistence], rng.normal(0, 2.0, (1100, 2)), axis=0)[200:]
+        slow = np.array([30.0, -80.0]) * np.sin(np.linspace(0, 2, 900))[:, None]
+        found.append(long_run_variance(noise + slow))
+    # spectral density of the autoregression at zero frequency
+    np.testing.assert_allclose(np.mean(found, axis=0), (2.0 / (1 - persistence)) ** 2, rtol=0.08)

@@ -111,6 +111,7 @@ LOADS = (
     *_numbers("fx_n", "fy_n", "fz_n", required=True),
     *_numbers("dx_mm", "dy_mm", "dz_mm"),
     _REPLICATE,
+    *_positive("sigma_mm"),
 )
 
 MASS = (

@@ -3,6 +3,7 @@
 OBSERVED: tuple[str, ...] = (
     *("orders", "spindle", "force_refused", "yielding"),
     *("joint_torque", "tool_force", "joint_force_refused"),
+    *("waviness_points", "waviness_runs", "waviness_refused"),
     *("tip_force", "profile_points", "observability", "arm_loads", "deformation_refused"),
     *("face_indices", "face_map", "face_points", "face_loads", "face_mass", "face_refused"),
     *("modes", "lobes", "frf_used", "stabilisation", "lobe_runs", "lobes_refused"),

@@ -12,6 +12,7 @@ from metro.observables.problem import Refusal
 from metro.units import Array
 
 Values = Mapping[str, Any]
+JOINTS = 6  # of an arm
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,8 @@ class Effect:
     form : where one cause has several models of which a batch has one (a drift in steps or in time; another
         joint): what tells them apart, for the report.
     where : what of the contract's parameters the form says (``joint``): reported as it is.
+    prior : its weight before anything is known, against that of an effect with one form: that of a cause is
+        shared by its forms.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Effect:
     form: str = ""
     resembled: bool = False
     where: Mapping[str, int | str] = field(default_factory=dict, hash=False)
+    prior: float = 1.0
 
     @property
     def key(self) -> tuple[str, str]:
@@ -121,7 +125,8 @@ class Effect:
 def per_joint(of_joint: Callable[[int], Effect]) -> tuple[Effect, ...]:
     """Return the forms of an effect of one joint, for each joint (0 … 5) of an arm: ``of_joint(joint)``."""
     return tuple(
-        replace(of_joint(joint), form=f"joint {joint + 1}", where={"joint": joint + 1}) for joint in range(6)
+        replace(of_joint(joint), form=f"joint {joint + 1}", where={"joint": joint + 1}, prior=1.0 / JOINTS)
+        for joint in range(JOINTS)
     )
 
 
@@ -135,12 +140,16 @@ def by_name(parameters: tuple[EffectParameter, ...], entries: list[Any]) -> dict
 
 
 def fitted_to(effects: tuple[Effect, ...], problem: Any) -> tuple[tuple[Effect, ...], dict[str, str]]:
-    """Fit effects to a batch's ``problem``: those that it may show, and of the others why it cannot."""
-    able, unable = [], {}
+    """Fit effects to a batch's ``problem``: those that it may show, and of the others why it cannot.
+
+    Of what the base model has already (a refusal without a reason) nothing is said.
+    """
+    able: list[Effect] = []
+    unable: dict[str, str] = {}
     for effect in effects:
         adapted = effect.adapt(effect, problem) if effect.adapt else effect
         if isinstance(adapted, Refusal):
-            unable[effect.name] = adapted.reason
+            unable |= {effect.name: adapted.reason} if adapted.reason else {}
         else:
             able.append(adapted)
     return tuple(able), {name: why for name, why in unable.items() if name not in {e.name for e in able}}

@@ -9,35 +9,39 @@ from typing import Any
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, Values, per_joint
+from metro.effects.periodogram import peaks
 from metro.observables.problem import Problem, Refusal
 from metro.robot.drive_torques import Ripple
-from metro.units import DEG
+from metro.units import DEG, Array
 
-LEAST_CYCLES, LEAST_POINTS = 2.0, 4.0  # per run; a path must show, a cycle must hold
+LEAST_CYCLES, LEAST_POINTS = 2.0, 4.0  # that the longest run must show; that a cycle must hold
+HIGHEST = 3000.0  # several times the ratio of any gear of an arm
+STEPS = 2.0  # per width of a line: the reciprocal of the range of angles of all runs
+MOST = 4  # lines that are followed
 
 
 def _of(joint: int) -> Effect:
+    def added(model: Any, order: float, sine: float, cosine: float) -> Any:
+        ripple = (*model.drives.ripple, Ripple(joint, order, sine, cosine))
+        return replace(model, drives=replace(model.drives, ripple=ripple))
+
     def apply(model: Any, values: Values) -> Any:
         phase, torque = values["phase_deg"] * DEG, values["torque_nm"]
-        ripple = Ripple(joint, values["order"], torque * math.cos(phase), torque * math.sin(phase))
-        return replace(model, drives=replace(model.drives, ripple=(*model.drives.ripple, ripple)))
+        return added(model, values["order"], torque * math.cos(phase), torque * math.sin(phase))
 
     def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
-        """Start from orders that the paths resolve: two cycles at least, four points in each."""
-        runs: list[Any] = [
-            block.setting for block in problem.role("identify") if hasattr(block.setting, "rate")
-        ]
-        spans = np.array([np.ptp(run.q[:, joint]) for run in runs])
-        if not len(spans) or spans.max() <= 0.0:
-            return Refusal(f"joint {joint + 1} does not move in any run")
-        points = len(runs[int(spans.argmax())].q)
-        cycle = 2.0 * math.pi / spans.max()  # order that has one cycle in the longest run
-        low, high = LEAST_CYCLES * cycle, points / LEAST_POINTS * cycle
-        starts = np.arange(low, high, 0.5 * cycle)
-        if not len(starts):
-            return Refusal(f"joint {joint + 1} turns too little in these cuts to show a ripple")
+        """Start from the strongest lines, along the joint's angle, of what the base model leaves."""
+        angles = [block.setting.q[:, joint] for block in problem.role("identify")]
+        orders = _resolved(angles)
+        if not len(orders):
+            return Refusal("no joint turns enough in these cuts to show a ripple of its gear")
+        found, size = peaks(
+            problem, lambda m, order, quarter: added(m, order, 1 - quarter, quarter), orders, MOST
+        )
         torque, order, phase = effect.parameters
-        order = replace(order, lower=low / 2, upper=2 * high, scale=0.1 * low, starts=tuple(starts.tolist()))
+        step = float(orders[1] - orders[0]) if len(orders) > 1 else order.scale
+        order = replace(order, upper=2.0 * HIGHEST, scale=step, starts=tuple(found.tolist()))
+        torque = replace(torque, starts=(max(float(np.median(size)), torque.scale),))
         return replace(effect, parameters=(torque, order, phase))
 
     return Effect(
@@ -59,6 +63,19 @@ def _of(joint: int) -> Effect:
         experiment="the same path at half and at twice the feed: a ripple stays where it is along the path",
         adapt=adapt,
     )
+
+
+def _resolved(angles: list[Array]) -> Array:
+    """Orders that a joint's angles, one array per run, rad, resolve."""
+    spans = np.array([float(np.ptp(one)) for one in angles])
+    if not len(spans) or spans.min() <= 0.0:
+        return np.zeros(0)
+    low = 2.0 * math.pi * LEAST_CYCLES / spans.max()
+    high = max(
+        2.0 * math.pi * len(one) / LEAST_POINTS / span for one, span in zip(angles, spans, strict=True)
+    )
+    step = 2.0 * math.pi / (STEPS * float(np.ptp(np.concatenate(angles))))
+    return np.asarray(np.arange(low, min(high, HIGHEST), step))
 
 
 EFFECT = per_joint(_of)

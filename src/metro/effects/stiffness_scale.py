@@ -1,4 +1,4 @@
-"""Stiffness in the cut that is not the stiffness of the load tests."""
+"""Stiffness in the cut that is not the stiffness of the load tests: of the whole machine, or of one joint."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from metro.effects.effect import Effect, EffectParameter
+from metro.effects.effect import Effect, EffectParameter, per_joint
+from metro.effects.elastic_joints import with_joints
 
 
 def apply(model: Any, values: Mapping[str, float]) -> Any:
@@ -15,9 +16,9 @@ def apply(model: Any, values: Mapping[str, float]) -> Any:
     return replace(model, structure=scaled)
 
 
-EFFECT = Effect(
+OF_MACHINE = Effect(
     name="stiffness_scale",
-    observables=("deformation", "flatness"),
+    observables=("flatness",),
     parameters=(EffectParameter("factor", "1", 0.2, 5.0, 0.05, starts=(0.8, 1.2)),),
     apply=apply,
     signature=(
@@ -29,3 +30,24 @@ EFFECT = Effect(
         "load tests at the force level of the cut, and a dynamometer in one cut to part force from stiffness"
     ),
 )
+OF_ARM = replace(OF_MACHINE, observables=("deformation",), form="all joints", where={"joint": "all"})
+
+
+def _of(joint: int) -> Effect:
+    def of_joint(model: Any, values: Mapping[str, float]) -> Any:
+        return replace(model, torsion=model.torsion.with_joint(joint, factor=values["factor"]))
+
+    return replace(
+        OF_MACHINE,
+        observables=("deformation",),
+        apply=of_joint,
+        signature=(
+            "Deformation in proportion to the part of one joint, which is a constant share of the whole in "
+            "cuts that load the arm alike: then no joint is told from another."
+        ),
+        experiment="cuts in poses, or in directions of feed, in which the joints' shares are others",
+        adapt=with_joints,
+    )
+
+
+EFFECT = (OF_MACHINE, OF_ARM, *per_joint(_of))

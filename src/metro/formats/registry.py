@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from metro.formats import rosbag, rsi
 from metro.formats.dynoware import read_dynoware
 from metro.formats.errors import FormatError
 from metro.formats.kinds import KINDS, Kind, Raw, checked
@@ -54,6 +55,8 @@ FORMATS = (
     Format("PLY", (".ply",), (b"ply\n", b"ply\r"), ("cloud",), read_ply),
     Format("PCD", (".pcd",), (b"# .PCD", b"#.PCD", b"VERSION"), ("cloud",), read_pcd),
     Format("universal", (".uff", ".unv", ".uf"), _UNIVERSAL, ("frf",), read_uff),
+    Format("KUKA RSI recording", (".rsi", ".xml"), rsi.STARTS, ("robot",), rsi.read_rsi),
+    Format("ROS 2 bag", (".mcap", ".db3"), rosbag.STARTS, ("robot",), rosbag.read_rosbag),
     Format("DynoWare text export", (".txt", ".csv"), (b"DynoWare",), ("force",), read_dynoware),
     Format("point list", (".xyz", ".txt", ".asc", ".csv"), _ANY, ("cloud",), read_xyz),
     Format("CSV", (".csv", ".txt"), _ANY, tuple(kind for kind in _TABLES if kind != "cloud"), read_csv),
@@ -63,7 +66,6 @@ FORMATS = (
 UNREAD = {
     ".tdms": "CSV or Parquet",
     ".mat": "CSV, Parquet or (for an FRF) npz",
-    ".xml": "CSV or Parquet",
     ".pts": "PLY, PCD or XYZ",
     ".e57": "PLY, PCD or XYZ",
     ".stl": "PLY, PCD or XYZ",

@@ -130,12 +130,15 @@ def _told(fitted: Fit) -> int:
     return int(np.isfinite(np.diag(fitted.covariance)[: len(fitted.beta)]).sum())
 
 
-def weights(held_out: Sequence[dict[str, float]], seed: int, draws: int = 2000) -> Array:
+def weights(
+    held_out: Sequence[dict[str, float]], seed: int, draws: int = 2000, prior: Sequence[float] | None = None
+) -> Array:
     """Pseudo-BMA weights of candidates by Bayesian bootstrap over conditions, (candidates,).
 
     Parameters
     ----------
     held_out : for each candidate, its held-out log-likelihood (or gain over a common reference) by condition.
+    prior : weight of each candidate before anything is known; None: all alike.
     """
     names = list(held_out[0])
     table = np.array([[candidate[name] for name in names] for candidate in held_out])
@@ -145,7 +148,7 @@ def weights(held_out: Sequence[dict[str, float]], seed: int, draws: int = 2000) 
         else table * 0.0
     )
     share = np.random.default_rng(seed).dirichlet(np.ones(len(names)), size=draws) * len(names)
-    total = share @ table.T
+    total = share @ table.T + np.log(np.ones(len(table)) if prior is None else prior)
     likelihood = np.exp(total - total.max(axis=1, keepdims=True))
     return np.asarray((likelihood / likelihood.sum(axis=1, keepdims=True)).mean(axis=0))
 

@@ -83,14 +83,13 @@ def _round(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) 
     for effect in current.candidate.effects:
         smaller = without(current, tuple(e for e in current.candidate.effects if e is not effect), prior)
         others = _replaced(current, smaller, effects, prior)
-        share = weights(
-            [leave_out(smaller, prior), out, *(leave_out(fitted, prior) for fitted in others)], gates.seed
-        )[1:]
+        in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
+        left_out = [leave_out(smaller, prior), out, *(leave_out(fitted, prior) for fitted in others)]
+        share = weights(left_out, gates.seed, prior=[1.0, *(one.prior for one in in_place)])[1:]
         weight[effect.name] = float(share[0])
         for fitted, other in zip(others, share[1:], strict=True):
             if other > RIVAL_WEIGHT:
                 rivals.append(Rival(*_titles(effect, fitted.candidate.effects[-1]), float(other), fitted))
-        in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
         belief = [believed(one, float(part)) for one, part in zip(in_place, share, strict=True)]
         first = belief.index(max(belief))
         if better is None and first > 0:

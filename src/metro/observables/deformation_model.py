@@ -1,19 +1,24 @@
 """The deformation model: how far the joints give way under the cutting force, and the tip strays by itself.
 
-Linear in the six joint compliances: the wall at x stands proud by n · Σ_i c_i ∂δ/∂c_i (force), plus the
-tracking error of the tip along the wall's normal n (no unknown). Load tests are the same sum without a cut.
+The wall at x stands proud by n · Σ_i j_i x_i: the force twists joint i by x_i, which moves the tip by j_i,
+the column of its Jacobian; plus the tracking error of the tip along the wall's normal n (no unknown). Load
+tests are the same sum without a cut. Joints that are linear springs, x_i = c_i T_i, make it linear in their
+compliances; of others the model is linear about given compliances.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from metro.observables.problem import Block, Parameter
 from metro.robot.kinematics import Arm
-from metro.robot.statics import joint_contributions
+from metro.robot.statics import joint_torque, moving_jacobian, tip_jacobian
+from metro.robot.torsion import Torsion
 from metro.structure import Structure
 from metro.surface.profile import gaussian_filter
 from metro.units import Array
@@ -61,14 +66,17 @@ class DeformationModel:
 
     Attributes
     ----------
-    arm : geometry: DH, tip in the flange, work in the base.
+    arm : geometry: DH, tip in the flange, work in the base. The force acts on this tip, and this tip cuts;
+        the path of the joints is that of the log, whichever tip it was programmed for.
     structure : stiffness in the cut relative to the load tests.
-    flange_rotation : whether the tip also moves because the flange turns, as it does in truth.
+    flange_rotation : how much of what the flange turns moves the tip: all of it, in truth.
+    torsion : what the joints do beyond linear springs.
     """
 
     arm: Arm
     structure: Structure = field(default_factory=Structure)
-    flange_rotation: bool = True
+    flange_rotation: float = 1.0
+    torsion: Torsion = field(default_factory=Torsion)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -79,29 +87,106 @@ class DeformationModel:
         """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
         return np.zeros((1, 0))
 
-    def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
+    def design(self, block: Block, _nuisance: Array, beta: Array | None = None) -> tuple[Array, Array]:
         """Design matrix (n, 6), m per rad/(N m), and offset (n,), m, of a cut, load test or known joints."""
         setting: Any = block.setting
+        about = np.zeros(len(self.arm.dh)) if beta is None else beta
         if isinstance(setting, CutWall):
-            return self._cut(setting)
+            return self._cut(setting, about)
         if isinstance(setting, LoadTest):
-            rows = self.contributions(setting.joints, setting.force)[setting.measured]
-        else:
-            rows = np.eye(len(self.arm.dh))[setting.joints]
+            return self._loaded(setting, about)
+        rows = np.eye(len(self.arm.dh))[setting.joints]
         return rows, np.zeros(len(rows))
+
+    def torques(self, joints: Array, force: Array) -> Array:
+        """Torque on the link of each joint that a force on the tip makes, (m, 6), N m."""
+        return -joint_torque(tip_jacobian(self.arm, joints), force)
 
     def contributions(self, joints: Array, force: Array) -> Array:
         """Deflection of the tip per joint compliance, (m, 3, 6), work frame, by the load tests' stiffness."""
-        return joint_contributions(self.arm, joints, force, flange_rotation=self.flange_rotation)
+        moved = moving_jacobian(self.arm, joints, self.flange_rotation)
+        return moved * self.torques(joints, force)[..., None, :]
 
     def deflection(self, setting: CutWall, compliance: Array) -> Array:
         """Deflection of the tip in the cut, (m, 3) m, work frame, for joint compliances (6,)."""
-        return self.structure.in_cut(self.contributions(setting.commanded, setting.force) @ compliance)
+        moved, _ = _static(self.arm, self.flange_rotation, setting)
+        return np.asarray(np.einsum("mai,mi->ma", moved, self.twists(setting, compliance)))
 
-    def _cut(self, setting: CutWall) -> tuple[Array, Array]:
-        rows = np.einsum("a,mai->mi", setting.normal, self.contributions(setting.commanded, setting.force))
-        strayed = (self.arm.tip(setting.actual) - self.arm.tip(setting.commanded)) @ setting.normal
+    def twists(self, setting: CutWall, compliance: Array) -> Array:
+        """How far the joints are twisted in the cut, (m, 6) rad."""
+        _, torque = _static(self.arm, self.flange_rotation, setting)
+        return self.torsion.in_cut(self.structure.in_cut(torque), compliance)[0]
+
+    def per_newton(self, setting: CutWall, compliance: Array) -> Array:
+        """How far the wall stands proud per newton more in x, y and z where the tool cuts, (n, 3) m/N.
+
+        By linear springs; the error of the force is taken to come and go along the wall as the force does.
+        """
+        moved, _ = _static(self.arm, self.flange_rotation, setting)
+        at_tip = tip_jacobian(self.arm, setting.commanded)
+        size = np.linalg.norm(setting.force, axis=1)
+        share = size / max(float(size.max()), np.finfo(float).tiny)
+        columns = np.einsum("m,a,mai,i,mbi->mb", share, setting.normal, moved, compliance, at_tip)
+        return np.asarray(_filter(len(size), setting.spacing, setting.cutoff)[setting.kept] @ columns)
+
+    def largest_twists(self, blocks: Sequence[Block]) -> tuple[Array, Array]:
+        """Roughly how soft each joint is, (6,) rad/(N m), and the largest torsion of it in a batch, (6,) rad.
+
+        By linear springs fitted to the evidence on the joints alone; one that this tells nothing of is taken
+        to be a hundredth as soft as the softest.
+        """
+        rows = [self.design(block, np.zeros(0))[0] / block.sigma[:, None] for block in _calibrating(blocks)]
+        right = [block.measured / block.sigma for block in _calibrating(blocks)]
+        size = np.linalg.norm(matrix := np.vstack(rows), axis=0)
+        scale = np.where(size > 0.0, size, 1.0)
+        found = np.linalg.lstsq(matrix / scale, np.concatenate(right), rcond=1e-6)[0] / scale
+        compliance = np.maximum(found, 0.01 * found.max())
+        settings: list[Any] = [block.setting for block in blocks]
+        forced = [one for one in settings if isinstance(one, CutWall | LoadTest)]
+        torque = np.vstack([_static(self.arm, self.flange_rotation, one)[1] for one in forced])
+        return compliance, np.abs(torque).max(axis=0) * compliance
+
+    def _cut(self, setting: CutWall, compliance: Array) -> tuple[Array, Array]:
+        out, torque = _outwards(self.arm, self.flange_rotation, setting)
+        twist, slope = self.torsion.in_cut(self.structure.in_cut(torque), compliance)
         # what the profile was filtered by, the prediction is filtered by: at the entry that matters
-        columns = np.column_stack([self.structure.in_cut(rows), strayed])
-        smooth = gaussian_filter(columns, setting.spacing, setting.cutoff)[setting.kept]
-        return smooth[:, :-1], smooth[:, -1]
+        smooth = _filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
+        rest = (out * (twist - slope * compliance)).sum(axis=1) + _strayed(self.arm, setting)
+        return smooth @ (out * slope), smooth @ rest
+
+    def _loaded(self, setting: LoadTest, compliance: Array) -> tuple[Array, Array]:
+        moved, torque = _static(self.arm, self.flange_rotation, setting)
+        twist, slope = self.torsion.at_rest(torque, compliance)
+        rest = np.einsum("mai,mi->ma", moved, twist - slope * compliance)
+        return (moved * slope[:, None, :])[setting.measured], rest[setting.measured]
+
+
+def _calibrating(blocks: Sequence[Block]) -> list[Block]:
+    return [block for block in blocks if block.role == "calibrate"]
+
+
+@lru_cache(maxsize=1024)
+def _static(arm: Arm, flange_rotation: float, setting: CutWall | LoadTest) -> tuple[Array, Array]:
+    """Where a turn of each joint takes the tip (m, 3, 6), and the torques of the force on it (m, 6)."""
+    joints = setting.commanded if isinstance(setting, CutWall) else setting.joints
+    torque = -joint_torque(tip_jacobian(arm, joints), setting.force)
+    return moving_jacobian(arm, joints, flange_rotation), torque
+
+
+@lru_cache(maxsize=1024)
+def _outwards(arm: Arm, flange_rotation: float, setting: CutWall) -> tuple[Array, Array]:
+    """How far a turn of each joint takes the tip out of the wall (m, 6), and the torques of the force."""
+    moved, torque = _static(arm, flange_rotation, setting)
+    return np.einsum("a,mai->mi", setting.normal, moved), torque
+
+
+@lru_cache(maxsize=256)
+def _strayed(arm: Arm, setting: CutWall) -> Array:
+    """Tracking error of the tip along the wall's normal, (m,) m."""
+    return np.asarray((arm.tip(setting.actual) - arm.tip(setting.commanded)) @ setting.normal)
+
+
+@lru_cache(maxsize=32)
+def _filter(points: int, spacing: float, cutoff: float) -> Array:
+    """Return the filter of the profile as a matrix (points, points)."""
+    return gaussian_filter(np.eye(points), spacing, cutoff)

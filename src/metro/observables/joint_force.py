@@ -47,7 +47,7 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
     torques, forces, refused = [], [], []
     for run in _runs(batch):
         force = _force(batch, run, read("force", run))
-        torque = force if isinstance(force, Refusal) else _torque(batch, run, read("robot", run), arm)
+        torque = force if isinstance(force, Refusal) else _torque(batch, run, read("robot", run), arm, force)
         if isinstance(torque, Refusal) or isinstance(force, Refusal):
             reason = torque.reason if isinstance(torque, Refusal) else ""
             refused.append({"run": run, "reason": reason})
@@ -84,15 +84,20 @@ def _force(batch: Batch, run: str, record: pd.DataFrame) -> pd.DataFrame | Refus
     return pd.DataFrame({"t_s": grid, **dict(zip(FORCE, mean.T, strict=True))})
 
 
-def _torque(batch: Batch, run: str, table: pd.DataFrame, arm: Arm) -> pd.DataFrame | Refusal:
+def _torque(
+    batch: Batch, run: str, table: pd.DataFrame, arm: Arm, force: pd.DataFrame
+) -> pd.DataFrame | Refusal:
     """Bins of the path: where the arm was, when, and the torques of the cut less those of the idle run."""
     cut, idle = tip_force.logs(table, arm)
     if len(cut.tip) < 2:
         return Refusal("the log of the cut does not move")
     step = float(np.median(np.linalg.norm(np.diff(cut.tip, axis=0), axis=1)))
     rate = np.gradient(cut.commanded, cut.time, axis=0)
+    begun = float(table["t_s"][table["log"] == "cut"].min())
+    meet = cut.time[0] < force["t_s"].iloc[-1] and cut.time[-1] > 0.0
+    time = cut.time if meet else cut.time - begun
     channels = [
-        np.column_stack([cut.torque, cut.actual, rate, cut.time, cut.tip @ wall(batch, run).along]),
+        np.column_stack([cut.torque, cut.actual, rate, time, cut.tip @ wall(batch, run).along]),
         np.column_stack([idle.torque, np.zeros((len(idle.torque), 14))]),
     ]
     places = [align.along_path(log.tip, cut.tip) for log in (cut, idle)]
@@ -108,6 +113,7 @@ def _torque(batch: Batch, run: str, table: pd.DataFrame, arm: Arm) -> pd.DataFra
     idling = wandering(pair.second[:, :6], white[1] / samples, np.tanh(pair.first[:, 12:18] / TURNING))
     start = wall(batch, run).start
     columns = {"s_mm": pair.s / MM, "x_mm": (pair.first[:, 19] - start) / MM, "t_s": pair.first[:, 18]}
+    columns |= {"since_s": columns["t_s"] - (begun if meet else 0.0), "meet": np.full(len(pair.s), meet)}
     columns |= {"width_s": np.full(len(pair.s), samples * period), "samples": np.full(len(pair.s), samples)}
     columns |= dict(zip(TORQUE, (pair.first[:, :6] - pair.second[:, :6]).T, strict=True))
     columns |= dict(zip(ACTUAL, pair.first[:, 6:12].T / DEG, strict=True))
@@ -132,24 +138,28 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     # one run tells little of its slow noise: all of them together do
     wander = np.sqrt((observed["joint_torque"].groupby("run")[WANDER].first() ** 2).mean().to_numpy())
     blocks = tuple(
-        _block(batch, str(run), table, forces[run], arm, wander)
+        _block(batch.runs.loc[str(run)], table, forces[run], arm, wander)
         for run, table in observed["joint_torque"].groupby("run", sort=False)
         if roles[run] in {"identify", "validate"}
     )
+    apart = [str(run) for run, rows in observed["joint_torque"].groupby("run") if not rows["meet"].all()]
     notes = (
         "The torques of the cut less those of the idle run at the same place are what the dynamometer's "
         "force asks of the joints; friction and gravity are those of the idle run.",
         "The sensorless force is solved from all joints by weighted least squares.",
+        *(
+            f"Run {run}: the robot log is of another time than the dynamometer's record; it is taken to "
+            "start with it."
+            for run in apart
+        ),
         *left_out,
     )
     model = JointForceModel(arm)
     return Problem(OBSERVABLE, "N", 1.0, model, blocks, np.array([SCATTER]), notes=notes)
 
 
-def _block(
-    batch: Batch, run: str, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander: Array
-) -> Block:
-    row: Any = batch.runs.loc[run]
+def _block(row: Any, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander: Array) -> Block:
+    """Torques of the run whose row of the run table is ``row``, in waves along its path."""
     setting, count = torque_run(table, force), len(table)
     noise = table[NOISE].to_numpy()[0]
     white = noise**2 / table["samples"].iloc[0]
@@ -159,7 +169,7 @@ def _block(
     torque = table[TORQUE].to_numpy()
     known = setting.force.mean(setting.t, setting.width)
     return Block(
-        run=run,
+        run=str(row.name),
         condition=str(row["condition"]),
         role="validate" if row["role"] == "validate" else "identify",
         order=int(row["order"]),
@@ -185,7 +195,8 @@ def torque_run(table: pd.DataFrame, force: pd.DataFrame) -> TorqueRun:
     """Return what the model needs of a run's rows of ``joint_torque`` and ``tool_force``."""
     record = running(force["t_s"].to_numpy(), force[FORCE].to_numpy())
     q, rate = table[ACTUAL].to_numpy() * DEG, table[RATE].to_numpy() * DEG
-    return TorqueRun(q, rate, table["t_s"].to_numpy(), table["width_s"].to_numpy(), record)
+    time, since, width = (table[name].to_numpy() for name in ("t_s", "since_s", "width_s"))
+    return TorqueRun(q, rate, time, since, width, record)
 
 
 def _lengths(s_mm: Array) -> np.ndarray:
@@ -209,7 +220,7 @@ def _least_squares(arm: Arm, setting: TorqueRun, sigma: Array) -> Array:
 
 def report(
     batch: Batch,
-    observed: Mapping[str, pd.DataFrame],
+    _observed: Mapping[str, pd.DataFrame],
     _identified: JSON,
     task: Problem | Refusal,
     fit: BaseFit | None,

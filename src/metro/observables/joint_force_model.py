@@ -53,14 +53,15 @@ class TorqueRun:
 
     Attributes
     ----------
-    q, rate : (m, 6) joint angles, rad, and speeds, rad/s. t, width : (m,) middle and length of the bin's time
-        in the log of the cut, s.
+    q, rate : (m, 6) joint angles, rad, and speeds, rad/s. t, width : (m,) middle and length of the bin's
+        time, s, by the dynamometer's clock. since : (m,) the same from the start of the log.
     force : the dynamometer's record.
     """
 
     q: Array
     rate: Array
     t: Array
+    since: Array
     width: Array
     force: ForceRecord
 
@@ -94,7 +95,8 @@ class JointForceModel:
     def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
         """Torque (6 m, 1) per gain, and what the force does not make (6 m,), N m: waves along the path."""
         run: Any = block.setting
-        other = self.drives.at(run.q, run.rate, run.t) + gravity_torque(self.arm, run.q, self.payload)
+        drives = self.drives.at(run.q, run.rate, run.since, run.width)
+        other = drives + gravity_torque(self.arm, run.q, self.payload)
         return carried(self.arm, run, self.offset)[:, None], in_waves(other)
 
 

@@ -8,6 +8,8 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.observables.deformation_model import DeformationModel, KnownJoints, LoadTest
 from metro.observables.problem import Block, Refusal
+from metro.robot import identifiability
+from metro.robot.identifiability import NextLoad, Told
 from metro.robot.stiffness import Compliances, joint_compliances
 from metro.units import DEG, MM, UM, Array
 
@@ -37,11 +39,14 @@ def calibration(
         value = 1.0 / np.asarray(known, dtype=float)
         note = f"Joint stiffnesses are those of the cell file, taken to be within {KNOWN:.0%}."
         return [_known_block(np.arange(len(value)), value, KNOWN * value)], (note,)
-    sigma = max(tests.scatter, GAUGE)
+    sigma = max(tests.scatter, GAUGE) * _relative(loads)
     blocks = [
-        _load_block(str(pose), rows, sigma) for pose, rows in loads.groupby("pose", sort=False, dropna=False)
+        _load_block(str(pose), loads.iloc[at], sigma[at])
+        for pose, at in loads.groupby("pose", sort=False, dropna=False).indices.items()
     ]
     notes = [f"Load tests scatter by {tests.scatter / UM:.2g} µm about linear joints ({tests.dof} dof)."]
+    seen = joint_observability(model, loads)
+    notes += [] if isinstance(seen, Refusal) else [in_words(*seen)]
     weak = np.flatnonzero(tests.sd > tests.value.max())
     if len(weak):
         names = ", ".join(str(i + 1) for i in weak)
@@ -73,9 +78,49 @@ def fitted_loads(model: DeformationModel, loads: pd.DataFrame) -> Compliances | 
         return Refusal("loads.csv has no test with joint angles and force")
     joints, force, moved = _load_arrays(loads)
     try:
-        return joint_compliances(model.contributions(joints, force), moved)
+        return joint_compliances(model.contributions(joints, force), moved, _relative(loads))
     except ValueError as error:
         return Refusal(f"loads.csv: {error}")
+
+
+def joint_observability(model: DeformationModel, loads: pd.DataFrame) -> tuple[Told, NextLoad] | Refusal:
+    """Return what the load tests tell of each joint, and the test that would tell the worst one best.
+
+    The next test is one with the largest force so far, in a pose of the tests or with one joint turned by 30°
+    from it. A joint that is not seen is taken to be as soft as the softest.
+    """
+    tests = fitted_loads(model, loads)
+    if isinstance(tests, Refusal):
+        return tests
+    joints, force, moved = _load_arrays(loads)
+    softest = float(tests.value.max())
+    size = np.where(tests.value > 0.01 * softest, tests.value, softest)
+    sigma = max(tests.scatter, GAUGE)
+    rows = model.contributions(joints, force)
+    matrix = identifiability.information(rows, np.isfinite(moved), sigma * _relative(loads), size)
+    newton = float(np.linalg.norm(force, axis=1).max())
+    poses = identifiability.around(np.unique(joints, axis=0))
+    return identifiability.told(matrix), identifiability.next_load(
+        model.arm, matrix, poses, newton=newton, sigma=sigma, size=size
+    )
+
+
+def in_words(told: Told, load: NextLoad) -> str:
+    """Say what load tests tell of the joints, and what to pull at next."""
+    unseen = [str(i + 1) for i in np.flatnonzero(~np.isfinite(told.relative))]
+    if unseen:
+        known = f"The load tests do not see joint {', '.join(unseen)} apart from the others."
+    else:
+        known = (
+            f"The load tests tell every joint; joint {told.worst + 1} least, "
+            f"to {100 * told.relative[told.worst]:.2g} %."
+        )
+    angles = ", ".join(f"{value:.0f}" for value in load.joints / DEG)
+    pull = ", ".join(f"{value:.0f}" for value in load.force)
+    return (
+        f"{known} A load of ({pull}) N on the tip in the pose ({angles})° would tell joint {load.joint + 1} "
+        f"to {100 * load.after:.2g} %."
+    )
 
 
 def _load_arrays(loads: pd.DataFrame) -> tuple[Array, Array, Array]:
@@ -83,13 +128,28 @@ def _load_arrays(loads: pd.DataFrame) -> tuple[Array, Array, Array]:
     return angles * DEG, force, moved * MM
 
 
-def _load_block(pose: str, loads: pd.DataFrame, sigma: float) -> Block:
+def _relative(loads: pd.DataFrame) -> Array:
+    """Size of the error of each test's readings relative to the mean, (m, 1), as ``sigma_mm`` says.
+
+    A test whose error is not stated is as good as the average of the others.
+    """
+    if "sigma_mm" not in loads or loads["sigma_mm"].isna().all():
+        return np.ones((len(loads), 1))
+    stated = loads["sigma_mm"].to_numpy(dtype=float)
+    return np.asarray(np.where(np.isfinite(stated), stated / np.nanmean(stated), 1.0)[:, None])
+
+
+def _load_block(pose: str, loads: pd.DataFrame, sigma: Array) -> Block:
     joints, force, moved = _load_arrays(loads)
     measured = np.isfinite(moved)
     axis = np.broadcast_to(["load x", "load y", "load z"], moved.shape)[measured]
     name = f"load tests {pose}"
     return _evidence(
-        name, moved[measured], np.full(int(measured.sum()), sigma), LoadTest(joints, force, measured), axis
+        name,
+        moved[measured],
+        np.broadcast_to(sigma, moved.shape)[measured],
+        LoadTest(joints, force, measured),
+        axis,
     )
 
 

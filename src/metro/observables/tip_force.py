@@ -50,7 +50,7 @@ SYSTEMATIC = {"torque": 0.05, "dynamometer": 0.01, "coefficients": 0.03}
 class Log:
     """The moving part of a robot log: joint angles (n, 6) rad, torques (n, 6) N m, commanded tip (n, 3) m.
 
-    ``time`` (n,) s from the start of the log; empty where there is none.
+    ``time`` (n,) s by the dynamometer's clock; empty where there is none.
     """
 
     commanded: Array
@@ -72,7 +72,6 @@ def _log(table: pd.DataFrame, arm: Arm) -> Log:
     moves = align.moving(tip) if len(tip) > 2 else np.zeros(len(tip), dtype=bool)
     actual, torque = table[ACTUAL].to_numpy(dtype=float) * DEG, table[TORQUE].to_numpy(dtype=float)
     time = table["t_s"].to_numpy(dtype=float)
-    time = time - time[:1]
     return Log(commanded[moves], actual[moves], torque[moves], tip[moves], time[moves])
 
 

@@ -38,7 +38,7 @@ def wall_points(
     except ValueError as error:
         return Refusal(str(error))
     place = log.tip @ wall.along - wall.start
-    cutting = _in_the_cut(log.tip, place, wall)
+    cutting = in_the_cut(log.tip, place, wall)
     if cutting.sum() < 2:
         return Refusal("the log of the cut does not pass the block")
     place, commanded, actual = place[cutting], log.commanded[cutting], log.actual[cutting]
@@ -77,7 +77,7 @@ def in_one_pose(joints: Array, wall: Wall, arm: Arm) -> Log:
     return Log(still, still, np.zeros_like(still), on_line)
 
 
-def _in_the_cut(tip: Array, place: Array, wall: Wall) -> np.ndarray:
+def in_the_cut(tip: Array, place: Array, wall: Wall) -> np.ndarray:
     """Find the samples on the line of the cut: a log may also hold the approach and the way back."""
     over = (place >= 0.0) & (place <= wall.length)
     if not over.any():

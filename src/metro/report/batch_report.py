@@ -11,6 +11,7 @@ from metro.report.sections.loop import loop
 from metro.report.sections.provenance import provenance
 from metro.report.sections.published import published
 from metro.report.sections.quality import quality
+from metro.report.sections.robot import robot
 from metro.report.sections.verdict import summary
 
 
@@ -21,6 +22,7 @@ def batch_report(results: Results) -> bytes:
         quality(results),
         published(results),
         identification(results),
+        robot(results),
         comparison(results),
         loop(results),
         provenance(results),

@@ -49,8 +49,8 @@ class DriveTorques:
             warmup=_raised(self.warmup, joint, warmup),
         )
 
-    def at(self, q: Array, rate: Array, t: Array) -> Array:
-        """Torque (m, 6), N m, on top of that of the idle run.
+    def at(self, q: Array, rate: Array, t: Array, width: Array | float = 0.0) -> Array:
+        """Torque (m, 6), N m, on top of that of the idle run, each the mean over ``width`` s.
 
         Parameters
         ----------
@@ -60,7 +60,9 @@ class DriveTorques:
         torque: Array = turning * (np.array(self.reversal) + np.outer(t, self.warmup))
         for one in self.ripple:
             angle = one.order * q[:, one.joint]
-            torque[:, one.joint] += one.sine * np.sin(angle) + one.cosine * np.cos(angle)
+            cycles = one.order * rate[:, one.joint] * width / (2.0 * np.pi)
+            mean = one.sine * np.sin(angle) + one.cosine * np.cos(angle)
+            torque[:, one.joint] += np.sinc(cycles) * mean
         return torque
 
 

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
+from metro.signals import kalman
 from metro.units import Array
 
 LEAST_INDEX = 2.0
 LEAST_JOINTS = 3
+SPARE = 0.02  # a joint that lowers the force's error by less may only add what its friction gets wrong
+SINGULAR = 1e-12  # share of the largest eigenvalue of the information below which the least one is nothing
+_PLACES = 25
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,11 +26,56 @@ class TipForce:
     force : (m, 3) N, frame of the Jacobian that was given.
     covariance : (m, 3, 3) N².
     condition : (m,) of the weighted system; the larger, the less one direction of the force rests on.
+    used : (n,) joints that the force was solved from.
+    solve : (m, 3, n) N/(N m): force = solve @ torque.
     """
 
     force: Array
     covariance: Array
     condition: Array
+    used: np.ndarray
+    solve: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Torques:
+    """The torque of the cut beyond the idle run, smoothed, of n joints over m bins of the path.
+
+    Attributes
+    ----------
+    level, variance : (m, n) N m, N² m². noise, drift : (n,) R and Q.
+    whiteness : (n,) probability of the innovations' autocorrelation in white noise.
+    """
+
+    level: Array
+    variance: Array
+    noise: Array
+    drift: Array
+    whiteness: Array
+
+
+def noise_of_bins(
+    cut: Array, idle: Array, samples: tuple[float, float], turning: Array | None = None
+) -> Array:
+    """R (n,), N² m², of the difference of two logs averaged over bins.
+
+    The colour of the noise is that of the idle run, where nothing else happens; its size is each log's own,
+    by the second differences: the cut shakes the arm as the idle run does not.
+
+    Parameters
+    ----------
+    cut, idle : (m, n), (m', n) torques sample by sample. samples : in a bin, of the cut and of the idle run.
+    turning : (m', n) sign of the joints' speeds in the idle run: friction steps where a joint turns round.
+    """
+    shaken = np.maximum(kalman.noise_variance(cut) / kalman.noise_variance(idle), 1.0)
+    return np.asarray(kalman.long_run_variance(idle, turning) * (shaken / samples[0] + 1.0 / samples[1]))
+
+
+def smoothed_torque(difference: Array, noise: Array) -> Torques:
+    """Smooth torques (m, n), N m, by the random walk whose drift is likeliest given their noise R (n,)."""
+    drift = kalman.likeliest_drift(difference, noise)
+    probability = kalman.whiteness(kalman.innovations(difference, noise, drift))
+    return Torques(*kalman.smooth(difference, noise, drift), noise, drift, probability)
 
 
 def observability(cutting: Array, idle: Array) -> Array:
@@ -39,28 +89,82 @@ def observability(cutting: Array, idle: Array) -> Array:
     return np.asarray(np.abs(cutting.mean(axis=0)) / np.ptp(idle, axis=0))
 
 
-def tip_force(torque: Array, variance: Array, jacobian_at_tip: Array, index: Array) -> TipForce:
-    """Solve τ = −Jᵀ f for the force, by weighted least squares over the joints that pass the index.
+def choose_joints(
+    jacobian_at_tip: Array, variance: Array, index: Array, least: float = LEAST_INDEX
+) -> np.ndarray:
+    """Choose the joints (n,) that the force is solved from.
+
+    Of all sets of at least three joints that pass the index, the smallest whose error of the force (root of
+    the trace of its covariance, mean of the path) is within 2 % of the least. With true variances every
+    further joint lowers the error, so the least is that of all joints together; ill-conditioned sets have
+    large errors and lose.
+
+    Parameters
+    ----------
+    jacobian_at_tip : (m, 3, n). variance : (m, n) of the torques. index : (n,) of :func:`observability`.
+    least : index that a joint needs.
+
+    Raises
+    ------
+    ValueError
+        If fewer than three joints pass, or no three of them tell the three axes apart.
+    """
+    passing = np.flatnonzero(index >= least)
+    if len(passing) < LEAST_JOINTS:
+        raise ValueError(
+            f"only {len(passing)} of {len(index)} joints reach the observability index {least:g}; "
+            f"at least {LEAST_JOINTS} are needed"
+        )
+    places = np.unique(np.linspace(0, len(variance) - 1, _PLACES).astype(int))
+    part = np.einsum("min,mjn,mn->nmij", *2 * (jacobian_at_tip[places],), 1 / variance[places])
+    sizes = range(LEAST_JOINTS, len(passing) + 1)
+    sets = np.array([np.isin(range(len(index)), c) for size in sizes for c in combinations(passing, size)])
+    values = np.linalg.eigvalsh(np.tensordot(sets.astype(float), part, axes=1))
+    singular = (values[..., 0] <= SINGULAR * values[..., -1]).any(axis=1)
+    if singular.all():
+        raise ValueError(f"joints {', '.join(str(j + 1) for j in passing)} do not tell the three axes apart")
+    errors = np.full(len(sets), np.inf)
+    errors[~singular] = np.sqrt((1.0 / values[~singular]).sum(axis=-1).mean(axis=-1))
+    enough = errors <= (1 + SPARE) * errors.min()
+    fewest = enough & (sets.sum(axis=1) == sets[enough].sum(axis=1).min())
+    return np.asarray(sets[np.argmin(np.where(fewest, errors, np.inf))])
+
+
+def tip_force(
+    torque: Array, variance: Array, jacobian_at_tip: Array, index: Array, least: float = LEAST_INDEX
+) -> TipForce:
+    """Solve τ = −Jᵀ f for the force, by weighted least squares over the joints of :func:`choose_joints`.
 
     Parameters
     ----------
     torque : (m, n) torque of the cut less that of the idle run, N m.
     variance : (m, n) its variance.
-    jacobian_at_tip : (m, 3, n). index : (n,) of :func:`observability`.
+    jacobian_at_tip : (m, 3, n). index : (n,) of :func:`observability`. least : that a joint needs.
 
     Raises
     ------
     ValueError
-        If fewer than three joints pass.
+        If fewer than three joints pass, or those that do cannot tell the three axes apart.
     """
-    use = index >= LEAST_INDEX
-    if use.sum() < LEAST_JOINTS:
-        raise ValueError(
-            f"only {int(use.sum())} of {len(index)} joints reach the observability index {LEAST_INDEX:g}; "
-            f"at least {LEAST_JOINTS} are needed"
-        )
-    weight = 1 / np.sqrt(variance[:, use])
-    system = -np.swapaxes(jacobian_at_tip[:, :, use], 1, 2) * weight[:, :, None]
-    solve: Array = np.asarray(np.linalg.pinv(system), dtype=float)
-    force: Array = np.einsum("mai,mi->ma", solve, torque[:, use] * weight)
-    return TipForce(force, solve @ np.swapaxes(solve, 1, 2), np.asarray(np.linalg.cond(system), dtype=float))
+    use = choose_joints(jacobian_at_tip, variance, index, least)
+    weighted = jacobian_at_tip * use / variance[:, None, :]
+    values, axes = np.linalg.eigh(weighted @ np.swapaxes(jacobian_at_tip, 1, 2))
+    covariance = (axes / values[:, None, :]) @ np.swapaxes(axes, 1, 2)
+    solve = -covariance @ weighted
+    force: Array = np.einsum("mai,mi->ma", solve, torque)
+    return TipForce(force, covariance, np.sqrt(values[:, -1] / values[:, 0]), use, solve)
+
+
+def mean_force(
+    found: TipForce, torques: Torques, steady: np.ndarray, repeatability: Array | float = 0.0
+) -> tuple[Array, Array]:
+    """Mean (3,) of the force over bins ``steady`` (m,) bool, N, and its covariance (3, 3), N².
+
+    Neighbouring levels of a smoothed torque share their error: the covariance is that of the sum.
+    ``repeatability`` (n,) N m is how well the friction of the cut is that of the idle run, the same all
+    along.
+    """
+    weights = np.where(steady[:, None, None], found.solve, 0.0) / steady.sum()
+    covariance = kalman.combined_covariance(np.moveaxis(weights, 1, 0), torques.noise, torques.drift)
+    common = weights.sum(axis=0) * repeatability
+    return found.force[steady].mean(axis=0), covariance + common @ common.T

@@ -11,6 +11,8 @@ import numpy as np
 from metro.robot.kinematics import Arm, jacobian
 from metro.units import Array
 
+ROUNDING = 1e-12  # m/rad
+
 
 def wrench_map(lever: Array) -> Array:
     """W = [I; [p]×], (..., 6, 3): the wrench at the flange of a unit force at the end of ``lever`` (..., 3).
@@ -44,7 +46,22 @@ def joint_torque(jacobian_at_tip: Array, force: Array) -> Array:
     return np.asarray(-np.einsum("...ai,...a->...i", jacobian_at_tip, force))
 
 
-def joint_contributions(arm: Arm, q: Array, force: Array, *, flange_rotation: bool = True) -> Array:
+def moving_jacobian(arm: Arm, q: Array, flange_rotation: float = 1.0) -> Array:
+    """Where a turn of each joint takes the tip, work frame, m/rad, (..., 3, n).
+
+    ``flange_rotation``: how much of the flange's rotation counts; 1 is the truth, 0 moves the tip as the
+    flange's origin is moved ([K] eq. 16 without its turn).
+    """
+    at_tip = tip_jacobian(arm, q)
+    if flange_rotation == 1.0:
+        return at_tip
+    at_flange = flange_jacobian(arm, q)
+    moved = at_flange + flange_rotation * (at_tip - at_flange)
+    # the last joint does not move the flange's origin: what rounding leaves must not pass for a lever
+    return np.where(np.abs(moved) > ROUNDING, moved, 0.0)
+
+
+def joint_contributions(arm: Arm, q: Array, force: Array, *, flange_rotation: float = 1.0) -> Array:
     """Return what each joint adds to the deflection of the tip under a force there, per unit of compliance.
 
     The deflection is this times the compliances: δ = Σ_i c_i j_i (j_iᵀ f), j_i the columns of the tip's
@@ -53,19 +70,37 @@ def joint_contributions(arm: Arm, q: Array, force: Array, *, flange_rotation: bo
     Parameters
     ----------
     q : (..., n) rad. force : (..., 3) N, work frame.
-    flange_rotation : False leaves out that the flange turns: the tip moves as the flange's origin does.
+    flange_rotation : as of :func:`moving_jacobian`.
 
     Returns
     -------
     Array
         (..., 3, n), work frame, m per rad/(N m).
     """
-    at_tip = tip_jacobian(arm, q)
-    moved = at_tip if flange_rotation else flange_jacobian(arm, q)
-    return moved * -joint_torque(at_tip, force)[..., None, :]
+    torque = -joint_torque(tip_jacobian(arm, q), force)
+    return moving_jacobian(arm, q, flange_rotation) * torque[..., None, :]
 
 
-def tip_compliance(arm: Arm, q: Array, compliance: Array, *, flange_rotation: bool = True) -> Array:
+def deflections(arm: Arm, q: Array, twist: Array) -> tuple[Array, Array, Array]:
+    """Return where joints that are twisted take flange and tip ([K] eq. 16 to 18), each (..., 3), work frame.
+
+    Parameters
+    ----------
+    q, twist : (..., n) rad.
+
+    Returns
+    -------
+    tuple
+        displacement of the flange, m; its rotation, rad; displacement of the tip, m: that of the flange and
+        ω × p.
+    """
+    in_work = arm.work[:3, :3].T
+    moved = in_work @ jacobian(arm.dh, q).reshape(*np.shape(q)[:-1], 2, 3, np.shape(q)[-1])
+    flange, turned = np.moveaxis(np.einsum("...cai,...i->...ca", moved, twist), -2, 0)
+    return flange, turned, flange + np.cross(turned, arm.lever(q) @ arm.work[:3, :3])
+
+
+def tip_compliance(arm: Arm, q: Array, compliance: Array, *, flange_rotation: float = 1.0) -> Array:
     """Compliance of the tip, m/N, (..., 3, 3), work frame, from joint compliances (n,) in rad/(N m).
 
     Symmetric with ``flange_rotation``: C = Wᵀ J diag(c) Jᵀ W.

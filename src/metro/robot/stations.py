@@ -79,9 +79,14 @@ def leave_one_out(stations: Stations) -> Array:
     Stations on the hull are extrapolated to, so this is no less than the error between stations. NaN for a
     single station.
     """
+    return np.asarray(np.sqrt(np.mean(left_out(stations) ** 2, axis=0)))
+
+
+def left_out(stations: Stations) -> Array:
+    """Relative error (n, 3) of each station's stiffness as told by all others; NaN for a single station."""
     count = len(stations.place)
     if count < 2:
-        return np.full(3, np.nan)
+        return np.full((count, 3), np.nan)
     others = [np.arange(count) != i for i in range(count)]
     told = [
         _interpolated(
@@ -89,7 +94,22 @@ def leave_one_out(stations: Stations) -> Array:
         )
         for i, rest in enumerate(others)
     ]
-    return np.asarray(np.sqrt(np.mean((np.stack(told) / stations.stiffness - 1.0) ** 2, axis=0)))
+    return np.asarray(np.stack(told) / stations.stiffness - 1.0)
+
+
+def leave_one_out_interval(stations: Stations, level: float = 0.95) -> Array:
+    """Interval (2, 3) of the rms leave-one-out error: of the few stations that it rests on.
+
+    χ² of normal errors, with the freedoms that the surface leaves: the stations less the four of a plane
+    (less in the directions that they do not span), and no fewer than one.
+    """
+    from scipy.stats import chi2
+
+    offset = stations.place - stations.place.mean(axis=0)
+    spanned = int(np.linalg.matrix_rank(offset, tol=1e-6 * max(stations.extent, 1e-12)))
+    freedoms = max(len(offset) - 1 - spanned, 1)
+    edges = np.sqrt(freedoms / chi2.ppf([(1 + level) / 2, (1 - level) / 2], freedoms))
+    return np.asarray(edges[:, None] * leave_one_out(stations))
 
 
 def beyond_hull(points: Array, place: Array) -> float:

@@ -18,7 +18,8 @@ class Compliances:
     value : (n,) rad/(N m), none negative; 0 for a joint that the tests do not see.
     covariance : (n, n); infinite variance, no covariance, for a joint that the tests do not see.
     seen : (n,) whether the tests tell this joint from the others at all.
-    scatter : standard deviation of a displacement about the fit, m; ``dof`` its degrees of freedom.
+    scatter : standard deviation of a displacement about the fit, m (where errors differ: of one of relative
+        size one); ``dof`` its degrees of freedom.
     """
 
     value: Array
@@ -33,13 +34,16 @@ class Compliances:
         return np.sqrt(np.diag(self.covariance))
 
 
-def joint_compliances(contributions: Array, displacement: Array) -> Compliances:
+def joint_compliances(
+    contributions: Array, displacement: Array, relative: Array | float = 1.0
+) -> Compliances:
     """Fit joint compliances to displacements of the tip under known forces.
 
     Parameters
     ----------
     contributions : (m, 3, n) of :func:`metro.robot.statics.joint_contributions`, one per load.
     displacement : (m, 3) m, NaN where a component was not measured.
+    relative : (m, 1) or (m, 3), size of the error of each displacement relative to the others'.
 
     Raises
     ------
@@ -49,7 +53,8 @@ def joint_compliances(contributions: Array, displacement: Array) -> Compliances:
     from scipy.optimize import nnls
 
     measured = np.isfinite(displacement)
-    design, target = contributions[measured], displacement[measured]
+    weight = 1.0 / np.broadcast_to(relative, measured.shape)[measured]
+    design, target = contributions[measured] * weight[:, None], displacement[measured] * weight
     joints = design.shape[1]
     seen = distinguishable(design)
     dof = len(target) - int(seen.sum())

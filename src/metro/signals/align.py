@@ -40,10 +40,15 @@ def moving(path: Array) -> np.ndarray:
 
 
 def along_path(points: Array, reference: Array) -> Array:
-    """Arc length (n,) along a polyline ``reference`` (r, 3) at the places nearest to ``points`` (n, 3).
+    """Arc length (n,) of the places nearest to points, as :func:`projected`."""
+    return projected(points, reference)[0]
 
-    NaN beyond the polyline's ends. Its successive points must differ, and it must not come back to where it
-    was.
+
+def projected(points: Array, reference: Array) -> tuple[Array, Array]:
+    """Arc length along a polyline ``reference`` (r, 3) nearest to ``points`` (n, 3), and how far away it is.
+
+    Both (n,), m; the first NaN beyond the polyline's ends. Its successive points must differ, and it must not
+    come back to where it was.
     """
     from scipy.spatial import cKDTree
 
@@ -58,16 +63,22 @@ def along_path(points: Array, reference: Array) -> Array:
     )
     inside = np.clip(share, 0.0, 1.0)
     foot = reference[candidates] + inside[:, :, None] * chord[candidates]
-    best = np.argmin(np.linalg.norm(points - foot, axis=2), axis=0)
+    away = np.linalg.norm(points - foot, axis=2)
+    best = np.argmin(away, axis=0)
     pick = (best, np.arange(len(points)))
     beyond = ((candidates[pick] == 0) & (share[pick] < -1e-9)) | (
         (candidates[pick] == last) & (share[pick] > 1 + 1e-9)
     )
-    return np.where(beyond, np.nan, arc[candidates[pick]] + inside[pick] * length[candidates[pick]])
+    place = arc[candidates[pick]] + inside[pick] * length[candidates[pick]]
+    return np.where(beyond, np.nan, place), away[pick]
 
 
 def align(s_first: Array, first: Array, s_second: Array, second: Array, width: float = 1 * MM) -> Aligned:
-    """Average two logs over common bins along the path.
+    """Average two logs over common bins along the path, and bring the means to the middles of the bins.
+
+    The samples of a bin lie about its middle as the log happens to have been taken, up to half a sample's
+    step off: the slope between the neighbouring means takes them there. Channels that are linear in s come
+    out exact.
 
     Parameters
     ----------
@@ -92,9 +103,22 @@ def align(s_first: Array, first: Array, s_second: Array, second: Array, width: f
         )
     count = max(int(shared / width), 1)
     edges: Array = max(start, start_2) + width * np.arange(count + 1, dtype=float)
-    mean_1, mean_2 = bin_means(s_first, first, edges), bin_means(s_second, second, edges)
+    mean_1, mean_2 = (
+        bin_means(s, np.column_stack([channels, s]), edges)
+        for s, channels in ((s_first, first), (s_second, second))
+    )
     full = np.isfinite(mean_1).all(axis=1) & np.isfinite(mean_2).all(axis=1)
-    return Aligned((edges[:-1] + width / 2)[full], mean_1[full], mean_2[full])
+    middle = (edges[:-1] + width / 2)[full]
+    return Aligned(middle, _at(middle, mean_1[full]), _at(middle, mean_2[full]))
+
+
+def _at(middle: Array, means: Array) -> Array:
+    """Channels (m, k) at the middles of bins, from their means and, in the last column, where these lie."""
+    values, place = means[:, :-1], means[:, -1]
+    if len(place) < 2:
+        return values
+    slope = np.stack([np.gradient(channel, place) for channel in values.T], axis=1)
+    return np.asarray(values + slope * (middle - place)[:, None])
 
 
 def bin_means(s: Array, values: Array, edges: Array) -> Array:

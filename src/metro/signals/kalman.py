@@ -1,6 +1,9 @@
 """A slowly wandering level in noise: random-walk Kalman filter and smoother, its drift by maximum likelihood.
 
 x_{k+1} = x_k + w, z_k = x_k + v, per channel ([K] §3.1); R = var v is known, Q = var w comes from the signal.
+Cosines over the record are the eigenvectors of the walk's steps, D Dᵀ with l_j = 2 − 2 cos(π j / n), so that
+over a whole record the likelihood (parts j are independent, of variance R + Q / l_j), the smoothed level
+(part j times Q / (Q + R l_j)) and its covariance are closed forms: no loop over time.
 """
 
 from __future__ import annotations
@@ -19,6 +22,34 @@ def noise_variance(signal: Array) -> Array:
     return np.asarray((np.diff(signal, n=2, axis=0) ** 2).mean(axis=0) / 6.0)
 
 
+def long_run_variance(signal: Array, steps: Array | None = None, longest: int = 100) -> Array:
+    """Return n times the variance (k,) of a mean of n samples of coloured noise on smooth channels (m, k).
+
+    An autoregression of first order by Whittle's likelihood over the periods up to ``longest`` samples: what
+    is slower is the channel itself (friction and gravity along a path), and so is what follows ``steps`` (m,
+    k) (friction that turns round). For white noise it is the variance.
+    """
+    from scipy.fft import dct
+
+    count = len(signal)
+    place = np.linspace(-1.0, 1.0, count)
+    slow = np.vander(place, min(4, count))
+    rest = np.empty_like(signal, dtype=float)
+    for k, channel in enumerate(signal.T):
+        known = slow if steps is None else np.column_stack([slow, steps[:, k]])
+        rest[:, k] = channel - known @ np.linalg.lstsq(known, channel, rcond=1e-9)[0]
+    first = max(1, 2 * count // longest)
+    power = dct(rest, axis=0, norm="ortho")[first:] ** 2
+    cosine = np.cos(np.pi * np.arange(first, count) / count)
+    persistence = np.linspace(-0.5, 0.98, 149)[:, None]
+    # the band's mean of 1 − 2 ρ cos + ρ² times the power, and of its logarithm (smooth: on some of the band)
+    driving = (1.0 + persistence**2) * power.mean(axis=0) - 2.0 * persistence * (cosine @ power / len(power))
+    shape = 1.0 - 2.0 * persistence * cosine[:: max(1, len(cosine) // 1000)] + persistence**2
+    likelihood = np.log(shape).mean(axis=1)[:, None] - np.log(np.maximum(driving, 1e-300))
+    best = np.argmax(likelihood, axis=0)
+    return np.asarray(driving[best, range(signal.shape[1])] / (1.0 - persistence[best, 0]) ** 2)
+
+
 def log_likelihood(signal: Array, measurement: Array, drift: Array) -> Array:
     """Log-likelihood of each channel given its first sample, for every pair of variances.
 
@@ -31,50 +62,110 @@ def log_likelihood(signal: Array, measurement: Array, drift: Array) -> Array:
     Array
         (g, k).
     """
-    level, variance = signal[0] + 0 * drift, measurement + 0 * drift
-    total = np.zeros_like(drift)
-    for z in signal[1:]:
-        predicted = variance + drift
-        spread = predicted + measurement
-        innovation = z - level
-        total -= 0.5 * (np.log(2 * np.pi * spread) + innovation**2 / spread)
-        level = level + predicted / spread * innovation
-        variance = predicted * measurement / spread
-    return total
+    step, part = _parts(signal)
+    energy = step[1:, None] * part[1:] ** 2
+    slow = step[1:, None] * measurement
+    constant = 0.5 * (len(signal) - 1) * math.log(2 * math.pi)
+    found = np.empty(drift.shape)
+    for row, q in enumerate(drift):  # one at a time: all at once would not fit the cache
+        spread = slow + q
+        found[row] = -0.5 * (np.log(spread) + energy / spread).sum(axis=0) - constant
+    return found
 
 
 def likeliest_drift(signal: Array, measurement: Array) -> Array:
     """Q (k,) that makes the channels (n, k) likeliest, given R (k,): searched over Q/R from 1e-8 to 1e4."""
     lowest, highest = math.log(RATIOS[0]), math.log(RATIOS[1])
-    grid = np.tile(np.linspace(lowest, highest, 56)[:, None], (1, signal.shape[1]))
+    grid = np.tile(np.linspace(lowest, highest, 29)[:, None], (1, signal.shape[1]))
     half = grid[1] - grid[0]
-    for _ in range(2):
+    for _ in range(3):
         best = np.argmax(log_likelihood(signal, measurement, np.exp(grid) * measurement), axis=0)
         centre = np.take_along_axis(grid, best[None], axis=0)
-        grid = centre + np.linspace(-half, half, 26)
-        half = half / 12.5
+        grid = centre + np.linspace(-half, half, 15)
+        half = half / 7.0
     best = np.argmax(log_likelihood(signal, measurement, np.exp(grid) * measurement), axis=0)
     return np.asarray(np.exp(np.take_along_axis(grid, best[None], axis=0)[0]) * measurement)
 
 
 def smooth(signal: Array, measurement: Array, drift: Array) -> tuple[Array, Array]:
-    """Level (n, k) of each channel and its variance (n, k), from all samples (filter, then RTS smoother)."""
-    level, variance = np.empty_like(signal), np.empty_like(signal)
-    for channel, (r, q) in enumerate(zip(measurement, drift, strict=True)):
-        level[:, channel], variance[:, channel] = _smooth_one(signal[:, channel], float(r), float(q))
-    return level, variance
+    """Level (n, k) of each channel and its variance (n, k), from all samples: those of an RTS smoother."""
+    from scipy.fft import idct
+
+    step, part = _parts(signal)
+    passed = drift / (drift + step[:, None] * measurement)
+    level: Array = idct(part * passed, axis=0, norm="ortho")
+    return level, _variance(len(signal), measurement, drift)
 
 
-def _smooth_one(signal: Array, r: float, q: float) -> tuple[Array, Array]:
-    from filterpy.kalman import KalmanFilter
+def combined_covariance(weights: Array, measurement: Array, drift: Array) -> Array:
+    """Covariance (c, c) of sums over samples and channels, Σ w x, of smoothed levels.
 
-    walk = KalmanFilter(dim_x=1, dim_z=1)
-    walk.F = walk.H = np.eye(1)
-    walk.R, walk.Q = np.array([[r]]), np.array([[q]])
-    walk.x, walk.P = np.array([[signal[0]]]), np.array([[r]])
-    # the first sample is the start itself: filterpy predicts before each update
-    mean, covariance, _, _ = walk.batch_filter(signal[1:])
-    mean = np.concatenate([[[[signal[0]]]], mean])
-    covariance = np.concatenate([[[[r]]], covariance])
-    mean, covariance, _, _ = walk.rts_smoother(mean, covariance)
-    return mean[:, 0, 0], covariance[:, 0, 0]
+    Neighbours share most of their error: over a stretch it is not that of independent samples, nor that of
+    one.
+
+    Parameters
+    ----------
+    weights : (c, n, k). measurement, drift : (k,) R and Q.
+    """
+    from scipy.fft import dct
+
+    part = dct(weights, axis=1, norm="ortho")
+    spread = measurement * drift / (drift + _steps(weights.shape[1])[:, None] * measurement)
+    return np.asarray(np.einsum("ank,nk,bnk->ab", part, spread, part, optimize=True))
+
+
+def innovations(signal: Array, measurement: Array, drift: Array) -> Array:
+    """Return what each sample brings beyond the filter's forecast, (n - 1, k), in standard deviations."""
+    level, variance = signal[0], measurement
+    found = np.empty((len(signal) - 1, signal.shape[1]))
+    for row, z in enumerate(signal[1:]):
+        predicted = variance + drift
+        spread = predicted + measurement
+        innovation = z - level
+        gain = predicted / spread
+        found[row] = innovation / np.sqrt(spread)
+        level = level + gain * innovation
+        variance = gain * measurement
+    return found
+
+
+def whiteness(found: Array, lags: int = 10, fitted: int = 1) -> Array:
+    """Probability (k,) of autocorrelations at least as large in white noise (Ljung & Box 1978).
+
+    Parameters
+    ----------
+    found : (n, k) innovations. lags : how many, at most a fifth of the samples.
+    fitted : parameters that were fitted to the channel, here its drift.
+    """
+    from scipy.stats import chi2
+
+    count = len(found)
+    lags = max(fitted + 1, min(lags, count // 5))
+    centred = found - found.mean(axis=0)
+    power = (centred**2).sum(axis=0)
+    r = np.stack([(centred[h:] * centred[:-h]).sum(axis=0) / power for h in range(1, lags + 1)])
+    statistic = count * (count + 2) * (r**2 / (count - np.arange(1, lags + 1))[:, None]).sum(axis=0)
+    return np.asarray(chi2.sf(statistic, lags - fitted))
+
+
+def _steps(count: int) -> Array:
+    """Eigenvalues l (n,) of the walk's squared steps, 2 − 2 cos: without its cancellation at small angles."""
+    return np.asarray(4.0 * np.sin(0.5 * np.pi * np.arange(count) / count) ** 2)
+
+
+def _parts(signal: Array) -> tuple[Array, Array]:
+    from scipy.fft import dct
+
+    return _steps(len(signal)), np.asarray(dct(signal, axis=0, norm="ortho"))
+
+
+def _variance(count: int, measurement: Array, drift: Array) -> Array:
+    """Diagonal (n, k) of the smoothed level's covariance, the inverse of 1 / R + D Dᵀ / Q.
+
+    Q / (2 sinh θ) · (coth nθ + cosh((n + 1 − 2k) θ) / sinh nθ) with 2 cosh θ = 2 + Q / R, sample k from 1.
+    """
+    angle = 2.0 * np.arcsinh(0.5 * np.sqrt(drift / measurement))
+    off = np.abs(count + 1.0 - 2.0 * np.arange(1, count + 1))[:, None]
+    end = -np.expm1(-2.0 * count * angle)
+    rise = np.exp((off - count) * angle) * (1.0 + np.exp(-2.0 * off * angle)) / end
+    return np.asarray(drift / (2.0 * np.sinh(angle)) * ((2.0 - end) / end + rise))

@@ -12,15 +12,15 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.layout import OBSERVED
 from metro.effects import told_of
-from metro.observables import deformation, flatness, force, joint_force, lobes, published
+from metro.observables import deformation, flatness, force, joint_force, lobes, published, waviness
 from metro.observables.lobes import LabelProblem
 from metro.observables.problem import Problem, Refusal
 from metro.units import JSON
 
 # Force first: the others may need its coefficients.
-MODULES: tuple[ModuleType, ...] = (force, joint_force, deformation, flatness, lobes)
+MODULES: tuple[ModuleType, ...] = (force, joint_force, deformation, waviness, flatness, lobes)
 # Those whose observed tables depend on the cutting coefficients.
-OBSERVED_WITH_COEFFICIENTS: tuple[ModuleType, ...] = (deformation, lobes)
+OBSERVED_WITH_COEFFICIENTS: tuple[ModuleType, ...] = (deformation, waviness, lobes)
 
 Task = Problem | LabelProblem | Refusal
 
@@ -56,5 +56,9 @@ def merged(identified: JSON, blocks: JSON) -> JSON:
     result = dict(identified)
     for name, block in blocks.items():
         known = result.get(name)
-        result[name] = {**known, **block} if isinstance(block, dict) and isinstance(known, dict) else block
+        if not (isinstance(block, dict) and isinstance(known, dict)):
+            result[name] = block
+            continue
+        lacking = {**known.get("not_identified", {}), **block.get("not_identified", {})}
+        result[name] = {**known, **block} | ({"not_identified": lacking} if lacking else {})
     return result

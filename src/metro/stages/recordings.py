@@ -116,6 +116,7 @@ def robot(batch: Batch, recordings: Recordings) -> Iterator[Part]:
             time, own = _from_zero(table)
             zero = recordings.zeros.get(run, own) if log == "cut" else own
             recordings.note(file, run, [_starts_at(zero), *quality.sampling(time, rate)])
+            recordings.note(file, run, [quality.Finding(*found) for found in table.attrs.get("notes", ())])
             recordings.note(file, run, [quality.dead(name, table[name].to_numpy()) for name in TORQUES])
             angles = {str(name): table[name] for name in table.columns.drop("t_s")}
             yield {"run": run, "log": log, "t_s": time + (own - zero), **angles}

@@ -9,8 +9,10 @@ from typing import Any
 import pandas as pd
 
 from metro.batch.batch import Batch
-from metro.batch.processed import read_batch, write_atomically
+from metro.batch.processed import read_batch, read_table, write_atomically
 from metro.observables import force_metrics
+from metro.observables.end_stiffness import end_stiffness
+from metro.observables.robot_tables import robot_tables
 from metro.report.batch_report import batch_report
 from metro.report.results import Results
 from metro.units import JSON
@@ -28,6 +30,7 @@ TABLES = (
     "yielding",
     "frf_used",
     "stabilisation",
+    "waviness_points",
     "face_map",
     "published_errors",
     "published_modes",
@@ -47,10 +50,17 @@ def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> R
     tables = {name: pd.read_parquet(p) for name in TABLES if (p := processed / f"{name}.parquet").exists()}
     batch = read_batch(processed)
     tables = {name: table for name, table in tables.items() if len(table)}
+    tables |= _force_figures(batch, tables.get("comparison"))
+    identified = _json(reports / "identified.json")
+
+    def read(name: str, run: str | None = None) -> pd.DataFrame:
+        return read_table(processed / f"{name}.parquet", run)
+
+    tables |= robot_tables(batch, read, identified, tables.get("waviness_points"))
     return Results(
         batch=batch,
-        tables=tables | _force_figures(batch, tables.get("comparison")),
-        identified=_json(reports / "identified.json"),
+        tables=tables | end_stiffness(read),
+        identified=identified,
         verdict=_json(reports / "verdict.json"),
         loop=_json(processed / "loop.json"),
         sources=_sources(processed),

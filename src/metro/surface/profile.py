@@ -19,7 +19,7 @@ class Bands:
     """A profile parted by wavelength, each (n,) and in the profile's unit; together they are the profile.
 
     ``deformation`` is longer than the cut-off, ``roughness`` shorter than 0.8 mm, ``waviness`` between the
-    two.
+    two. Each may also be (n, k), of profiles side by side.
     """
 
     deformation: Array
@@ -56,10 +56,18 @@ def gaussian_filter(profile: Array, spacing: float, cutoff: float) -> Array:
     return smooth.reshape(profile.shape)
 
 
-def part(profile: Array, spacing: float, cutoff: float) -> Bands:
-    """Part an evenly spaced profile (n,) by wavelength; ``spacing`` and ``cutoff`` in m."""
+def transmission(wavelength: Array, cutoff: float) -> Array:
+    """Share of a wave's amplitude that :func:`gaussian_filter` passes: exp(−π (α cutoff/wavelength)²)."""
+    return np.asarray(np.exp(-np.pi * (ALPHA * cutoff / wavelength) ** 2))
+
+
+def part(profile: Array, spacing: float, cutoff: float, shortest: float = ROUGHNESS_CUTOFF) -> Bands:
+    """Part an evenly spaced profile (n,) or profiles (n, k) by wavelength.
+
+    ``spacing`` and ``cutoff`` in m; waves below ``shortest``, m, are roughness.
+    """
     deformation = gaussian_filter(profile, spacing, cutoff)
-    smooth = gaussian_filter(profile, spacing, ROUGHNESS_CUTOFF)
+    smooth = gaussian_filter(profile, spacing, shortest)
     return Bands(deformation, smooth - deformation, profile - smooth)
 
 

@@ -34,6 +34,7 @@ RUN_BLOCKS = {
     "waviness": "waviness",
     "observability": "observability of the joints",
 }
+OF_ROBOT = ("observability", "waviness")  # the robot's own section shows them
 LONGEST, ABREAST = 30, 3
 
 
@@ -135,7 +136,7 @@ def _arm(arm: JSON) -> list[Item]:
             Table(["joint", "stiffness (N m/rad)"], rows, "Joint stiffness with 95 % intervals.", [1, 3])
         )
     for key, name in RUN_BLOCKS.items():
-        if arm.get(key):
+        if arm.get(key) and key not in OF_ROBOT:
             items.append(_by_run(arm[key], name, f"{name.capitalize()}, run by run."))
     return [Heading("Robot"), *items] if items else []
 

@@ -1,0 +1,193 @@
+"""Robot logs in ROS 2 bags (a file .mcap or .db3): JointState for what was measured, and the set-points.
+
+Angles are in rad and efforts in N m, as the messages' definitions say; times are those of the headers.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from metro.formats.errors import FormatError
+from metro.formats.kinds import JOINTS, Kind, Raw
+from metro.formats.packets import Note, in_order
+from metro.units import DEG, Array
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
+    from rosbags.interfaces import Connection
+
+STARTS = (b"\x89MCAP", b"SQLite format 3\x00")
+
+_STATE = "sensor_msgs/msg/JointState"
+_CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
+_SET = re.compile(r"set|command|cmd|reference|desired|target", re.IGNORECASE)
+_NS = 1e-9
+_GAP = 1.5  # set-points further apart than so many of their steps do not say what was commanded between
+
+
+class _Series(NamedTuple):
+    """Messages of one topic, in order: stamps (n,) ns, values (n, k), and where each stands."""
+
+    ns: npt.NDArray[np.int64]
+    values: Array
+    place: Callable[[int], str]
+    notes: list[Note]
+
+
+def read_rosbag(path: Path, kind: Kind, rows: int | None) -> Raw:
+    """Read measured angles and torques of a JointState topic, and set angles at the same times.
+
+    Set-points come from a topic of JointTrajectoryControllerState (``reference``, before Humble ``desired``),
+    or else of JointState by a name that says set, command, reference, desired or target. They are
+    interpolated linearly to the times of the measured states; states without set-points around them are left
+    out.
+
+    Raises
+    ------
+    FormatError
+        Where the file is no whole bag, or the topics, joints 1 … 6 or efforts are not there.
+    """
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    try:
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+            state, target = _topics(path, kind, bag.connections)
+            measured = _series(path, bag, state, _measured, rows)
+            commanded = _series(path, bag, target, _commanded, rows)
+    except FormatError:
+        raise
+    except Exception as error:  # whatever a damaged bag makes its reader stumble over
+        raise FormatError(path, f"is not a readable ROS 2 bag: {error or type(error).__name__}") from error
+    return _joined(measured, commanded, kind, whole=rows is None)
+
+
+def _topics(
+    path: Path, kind: Kind, connections: Sequence[Connection]
+) -> tuple[list[Connection], list[Connection]]:
+    """Pick the connections of the measured states and of the set-points."""
+    by_topic: dict[str, list[Connection]] = {}
+    for each in connections:
+        by_topic.setdefault(each.topic, []).append(each)
+    states = [topic for topic, (first, *_) in by_topic.items() if first.msgtype == _STATE]
+    measured = [topic for topic in states if not _SET.search(topic)]
+    measured = [topic for topic in measured if topic.endswith("/joint_states")] or measured
+    targets = [topic for topic, (first, *_) in by_topic.items() if first.msgtype == _CONTROLLER]
+    targets = targets or [topic for topic in states if _SET.search(topic)]
+    listed = ", ".join(f"{topic} ({first.msgtype})" for topic, (first, *_) in by_topic.items()) or "no topic"
+    if len(measured) != 1:
+        expected = (
+            f"expected one topic /joint_states of type {_STATE} for the measured angles of {kind.title}"
+        )
+        raise FormatError(path, f"found {listed}, {expected}")
+    if len(targets) != 1:
+        named = (
+            f"one topic of type {_CONTROLLER}, or one of type {_STATE} named setpoint, command, reference,"
+        )
+        raise FormatError(path, f"found {listed}, expected {named} desired or target, for q1_set_deg …")
+    return by_topic[measured[0]], by_topic[targets[0]]
+
+
+def _series(
+    path: Path,
+    bag: AnyReader,
+    connections: Sequence[Connection],
+    values_of: Callable[[Any, list[int]], list[float]],
+    rows: int | None,
+) -> _Series:
+    """Read a topic's messages that name joints 1 … 6; others (a gripper's) are passed over."""
+    topic = connections[0].topic
+    stamps: list[int] = []
+    values: list[list[float]] = []
+    seen: tuple[str, ...] = ()
+    for connection, _, data in bag.messages(connections):
+        message: Any = bag.deserialize(data, connection.msgtype)
+        seen = tuple(message.name if connection.msgtype == _STATE else message.joint_names)
+        joints = _joints(seen)
+        if joints is not None:
+            stamp = message.header.stamp
+            stamps.append(stamp.sec * 1_000_000_000 + stamp.nanosec)
+            try:
+                values.append(values_of(message, joints))
+            except IndexError:
+                found = "found positions or efforts that are empty, expected one per joint (rad, N m)"
+                raise FormatError(path, f"message {len(stamps)} of {topic}: {found}") from None
+        if len(stamps) == rows:
+            break
+    if not stamps:
+        found = f"found the joints {', '.join(seen)}" if seen else "found no message"
+        raise FormatError(path, f"{topic}: {found}, expected six joints whose names end in 1 … 6")
+
+    def place(row: int) -> str:
+        return f"message {row + 1} of {topic}"
+
+    ns, table = np.array(stamps, np.int64), np.array(values)
+    take, notes = in_order(path, "header.stamp [ns]", (ns, _NS), table, place)
+    return _Series(ns[take], table[take], lambda row: place(int(take[row])), notes)
+
+
+@cache
+def _joints(names: tuple[str, ...]) -> list[int] | None:
+    """Give the places of joints 1 … 6: the names of one stem that end so; None where there are none."""
+    stems: dict[str, dict[int, int]] = {}
+    for index, name in enumerate(names):
+        match = re.fullmatch(r"(.*?)0*([1-6])", name)
+        if match:
+            stems.setdefault(match[1], {})[int(match[2])] = index
+    arms = [places for places in stems.values() if len(places) == len(JOINTS)]
+    return [arms[0][i] for i in JOINTS] if len(arms) == 1 else None
+
+
+def _measured(message: Any, joints: Iterable[int]) -> list[float]:
+    order = list(joints)
+    return [message.position[i] / DEG for i in order] + [message.effort[i] for i in order]
+
+
+def _commanded(message: Any, joints: Iterable[int]) -> list[float]:
+    if hasattr(message, "joint_names"):
+        point = message.reference if hasattr(message, "reference") else message.desired
+        return [point.positions[i] / DEG for i in joints]
+    return [message.position[i] / DEG for i in joints]
+
+
+def _joined(measured: _Series, commanded: _Series, kind: Kind, *, whole: bool) -> Raw:
+    """Put set-points beside the measured states; the head of a file (not ``whole``) need not hold both."""
+    keep = np.flatnonzero(_covered(measured.ns, commanded.ns)) if whole else np.arange(len(measured.ns))
+    ns = measured.ns[keep]
+    # nanoseconds since 1970 do not fit a float: times are interpolated from the first one on
+    at, known = (ns - commanded.ns[0]) * _NS, (commanded.ns - commanded.ns[0]) * _NS
+    columns: dict[str, Array] = {"t_s": np.asarray(ns * _NS, dtype=np.float64)}
+    for i, angles in zip(JOINTS, commanded.values.T, strict=True):
+        columns[f"q{i}_set_deg"] = np.interp(at, known, angles)
+    names = [*(f"q{i}_deg" for i in JOINTS), *(f"tau{i}_nm" for i in JOINTS)]
+    columns |= dict(zip(names, measured.values[keep].T, strict=True))
+    frame = pd.DataFrame(columns)[list(kind.required)]
+    frame.attrs["notes"] = [*measured.notes, *commanded.notes, *_left_out(len(measured.ns) - len(keep))]
+    return Raw(frame, lambda row: measured.place(int(keep[row])))
+
+
+def _covered(ns: npt.NDArray[np.int64], known: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+    """Tell which times lie on a set-point, or between two that follow each other at their usual step."""
+    after = np.searchsorted(known, ns)
+    exact = known[np.minimum(after, len(known) - 1)] == ns
+    if len(known) == 1:
+        return np.asarray(exact)
+    steps = np.diff(known)
+    between = (after > 0) & (after < len(known))
+    usual = steps[np.clip(after - 1, 0, len(steps) - 1)] <= _GAP * np.median(steps)
+    return np.asarray(exact | (between & usual))
+
+
+def _left_out(count: int) -> list[Note]:
+    if not count:
+        return []
+    message = f"{count} joint states have no set-points around them and were left out"
+    return [Note("set-points", float(count), 0.0, False, message)]

@@ -1,0 +1,211 @@
+"""The robot: force from the joints' torques, stiffness around the work, waviness and path error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from metro.report import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+AXES = (("x", style.AFTER), ("y", style.BEFORE), ("z", style.GREEN))
+RUNS = 4
+SHADES = {"cut-in": 0.16, "cut-out": 0.16, "steady": 0.06}
+DOMAINS = (("time", "frequency (Hz)", "µm²/Hz"), ("path", "waves per mm", "µm² mm"))
+NORMAL = 1.96
+
+
+def courses(force: pd.DataFrame, means: pd.DataFrame, runs: Sequence[str]) -> Figure:
+    """Draw the sensorless force along the wall with its 95 % band, and the dynamometer's steady mean.
+
+    Parameters
+    ----------
+    force : rows of ``robot_force``. means : of ``robot_means``. runs : to draw.
+    """
+    columns = min(2, len(runs))
+    rows = -(-len(runs) // columns)
+    with style.style():
+        figure, grid = style.new_figure(0.5 + 2.1 * rows, rows, columns)
+        flat = [axes for row in grid for axes in row]
+        for axes, run in zip(flat, runs, strict=False):
+            _course(axes, force[force["run"] == run], means[means["run"] == run])
+            axes.set_title(f"run {run}", loc="left")
+            axes.set(xlabel="along the wall (mm)", ylabel="force (N)")
+        for axes in flat[len(runs) :]:
+            axes.set_visible(False)
+        style.legend_above(figure, flat[0])
+    return figure
+
+
+def _course(axes: Axes, course: pd.DataFrame, means: pd.DataFrame) -> None:
+    x, part = course["x_mm"].to_numpy(float), course["part"].to_numpy(str)
+    for name, alpha in SHADES.items():
+        inside = x[part == name]
+        for piece in np.split(inside, np.flatnonzero(np.diff(inside) > 3 * np.median(np.diff(x))) + 1):
+            if len(piece):
+                axes.axvspan(piece[0], piece[-1], color=style.GREY, alpha=alpha, lw=0)
+    steady = x[part == "steady"]
+    for name, colour in AXES:
+        value, sd = (course[f"{start}f{name}_n"].to_numpy(float) for start in ("", "sd_"))
+        axes.fill_between(x, value - NORMAL * sd, value + NORMAL * sd, color=colour, alpha=0.25, lw=0)
+        axes.plot(x, value, color=colour, label=f"{name}, from the torques")
+        measured = means.loc[means["axis"] == name, "dynamometer_n"].to_numpy(float)
+        if len(steady) and np.isfinite(measured).all() and len(measured):
+            axes.hlines(
+                measured,
+                steady[0],
+                steady[-1],
+                color=style.MEASURED,
+                ls="--",
+                lw=0.9,
+                zorder=3,
+                label="dynamometer, steady mean" if name == "z" else "",
+            )
+
+
+def stiffness(chart: pd.DataFrame, ellipsoids: pd.DataFrame) -> Figure:
+    """Draw the least stiffness over the work with its direction, and the stiffness ellipsoid from two sides.
+
+    Parameters
+    ----------
+    chart : rows of ``arm_map``. ellipsoids : of ``arm_ellipsoids``; the first pose is drawn.
+    """
+    with style.style():
+        figure, [row] = style.new_figure(2.5, 1, 3)
+        _map(figure, row[0], chart)
+        first = ellipsoids[ellipsoids["pose"] == ellipsoids["pose"].iloc[0]]
+        for axes, seen in zip(row[1:], ((0, 1), (0, 2)), strict=True):
+            _outline(axes, first, seen)
+    return figure
+
+
+def _map(figure: Figure, axes: Axes, chart: pd.DataFrame) -> None:
+    x, y = np.unique(chart["x_mm"]), np.unique(chart["y_mm"])
+    table = chart.sort_values(["x_mm", "y_mm"])
+    value = table["k_least_n_um"].to_numpy(float).reshape(len(x), len(y)).T
+    filled = axes.contourf(x, y, value, levels=12, cmap=style.SEQUENTIAL)
+    bar = figure.colorbar(filled, ax=axes, location="bottom", shrink=0.9, pad=0.02)
+    bar.set_label("least stiffness (N/µm)")
+    bar.ax.locator_params(nbins=4)
+    some = table[table["x_mm"].isin(x[1::3]) & table["y_mm"].isin(y[1::3])]
+    axes.quiver(
+        some["x_mm"],
+        some["y_mm"],
+        some["soft_x"],
+        some["soft_y"],
+        color="white",
+        pivot="middle",
+        headwidth=0,
+        headlength=0,
+        headaxislength=0,
+        width=0.012,
+        scale=9.0,
+    )
+    axes.set_aspect("equal")
+    axes.grid(visible=False)
+    axes.set(xlabel="x (mm)", ylabel="y (mm)")
+
+
+def stations(surface: pd.DataFrame, told: pd.DataFrame) -> Figure:
+    """Draw the end stiffness of a tabulated machine over its workspace, a panel per axis; dots are stations.
+
+    Parameters
+    ----------
+    surface : rows of ``end_surface``. told : of ``end_stations``.
+    """
+    first, second = (f"{surface[name].iloc[0]}_mm" for name in ("first", "second"))
+    x, y = np.unique(surface[first]), np.unique(surface[second])
+    table = surface.sort_values([first, second])
+    with style.style():
+        figure, [row] = style.new_figure(2.6, 1, 3, sharey=True)
+        for axes, name in zip(row, "xyz", strict=True):
+            value = table[f"k{name}_n_um"].to_numpy(float).reshape(len(x), len(y)).T
+            filled = axes.contourf(x, y, value, levels=10, cmap=style.SEQUENTIAL)
+            bar = figure.colorbar(filled, ax=axes, location="bottom", shrink=0.9, pad=0.02)
+            bar.set_label(f"k {name} (N/µm)")
+            bar.ax.locator_params(nbins=4)
+            axes.plot(told[first], told[second], "o", color=style.MEASURED, mfc="white", ms=4, clip_on=False)
+            axes.grid(visible=False)
+            axes.set_xlabel(f"{first[0]} (mm)")
+        row[0].set_ylabel(f"{second[0]} (mm)")
+    return figure
+
+
+def _outline(axes: Axes, pose: pd.DataFrame, seen: tuple[int, int]) -> None:
+    """Outline of the ellipsoid as it is seen along the axis that is left out: a unit circle through P K."""
+    vectors = pose[["axis_x", "axis_y", "axis_z"]].to_numpy(float).T
+    matrix = (vectors * pose["stiffness_n_um"].to_numpy(float)) @ vectors.T
+    left, size, _ = np.linalg.svd(matrix[list(seen)])
+    angle = np.linspace(0, 2 * np.pi, 200)
+    outline = left @ np.diag(size[:2]) @ np.stack([np.cos(angle), np.sin(angle)])
+    axes.fill(*outline, color=style.SKY, alpha=0.35, lw=0)
+    axes.plot(*outline, color=style.AFTER)
+    for k in range(3):
+        arm = pose["stiffness_n_um"].to_numpy(float)[k] * vectors[list(seen), k]
+        axes.plot(*np.stack([-arm, arm], axis=1), color=style.MEASURED, lw=0.8)
+    axes.set_aspect("equal", adjustable="datalim")
+    names = "xyz"
+    axes.set(xlabel=f"{names[seen[0]]} (N/µm)", ylabel=f"{names[seen[1]]} (N/µm)")
+
+
+def waviness(waves: pd.DataFrame, runs: Sequence[str]) -> Figure:
+    """Draw the waves of walls, of the tip's tracking error in the cut, and of that in the idle run.
+
+    Parameters
+    ----------
+    waves : rows of ``robot_waves``. runs : to draw.
+    """
+    drawn = (
+        ("wall_um", style.MEASURED, "-", "wall, by the profiler"),
+        ("tip_um", style.AFTER, "-", "tip in the cut, by the encoders"),
+        ("idle_um", style.GREY, "--", "tip in the idle run"),
+    )
+    with style.style():
+        figure, grid = style.new_figure(0.5 + 1.35 * len(runs), len(runs), 1)
+        for (axes,), run in zip(grid, runs, strict=True):
+            part = waves[waves["run"] == run]
+            for column, colour, look, label in drawn:
+                if part[column].notna().any():
+                    axes.plot(part["x_mm"], part[column], color=colour, ls=look, lw=0.9, label=label)
+            axes.set_ylabel("height (µm)")
+            axes.set_title(f"run {run}", loc="left")
+        grid[-1][0].set_xlabel("along the wall (mm)")
+        style.legend_above(figure, grid[0][0])
+    return figure
+
+
+def spectra(table: pd.DataFrame, lines: pd.DataFrame | None) -> Figure:
+    """Draw the spectra of the tip's path error over time and along the path, all runs; lines are marked.
+
+    Parameters
+    ----------
+    table : rows of ``robot_spectra``. lines : of ``robot_lines``; None where there are none.
+    """
+    domains = [domain for domain in DOMAINS if (table["domain"] == domain[0]).any()]
+    with style.style():
+        figure, [row] = style.new_figure(2.5, 1, len(domains))
+        for axes, (domain, label, unit) in zip(row, domains, strict=True):
+            part = table[table["domain"] == domain]
+            for name, colour in AXES:
+                for i, (_, one) in enumerate(part[part["axis"] == name].groupby("run", sort=False)):
+                    axes.loglog(
+                        one["frequency"],
+                        one["density_um2"],
+                        color=colour,
+                        lw=0.5,
+                        alpha=0.6,
+                        label=name if i == 0 else None,
+                    )
+                if lines is not None:
+                    found = lines[(lines["domain"] == domain) & (lines["axis"] == name)]
+                    height = np.full(len(found), 2.0 * float(part["density_um2"].max()))
+                    axes.plot(found["frequency"], height, "v", color=colour, ms=4)
+            axes.set(xlabel=label, ylabel=f"density ({unit})")
+        style.legend_above(figure, row[0])
+    return figure

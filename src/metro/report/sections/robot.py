@@ -1,0 +1,285 @@
+"""The robot: sensorless force beside the dynamometer, deformation, stiffness, waviness, path error."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
+from metro.report.figures import robot as figures
+from metro.report.numbers import listing, number, percent, probability, quantity
+from metro.report.results import Results
+from metro.report.sections.stiffness import LONGEST, arm_stiffness, band, more, stations
+from metro.units import JSON
+
+SETTLED = 0.9  # of the wall's deformation in its middle: from where on it is steady
+WHITE = 0.05
+_WAVES = ("wa", "wq", "wt")
+
+
+def robot(results: Results) -> Section | None:
+    """Write what a batch with an arm has; None for one without."""
+    items = [
+        *_force(results),
+        *_deformation(results.compared("deformation")),
+        *arm_stiffness(results),
+        *stations(results),
+        *_waviness(results),
+        *_spectra(results),
+    ]
+    return (
+        Section("The machine" if "end_stations" in results.tables else "The robot", items) if items else None
+    )
+
+
+def _force(results: Results) -> list[Item]:
+    means, refused = results.tables.get("robot_means"), results.tables.get("robot_refused")
+    items: list[Item] = [Heading("Force from the joints' torques")]
+    if means is not None:
+        items += _means(means)
+    if (joints := results.tables.get("robot_joints")) is not None:
+        items += _joints(joints)
+    if means is not None:
+        items += _course(results, means)
+    if refused is not None:
+        groups = refused.groupby("reason", sort=False)["run"]
+        items.append(Bullets([f"{listing(list(runs))}: {reason}." for reason, runs in groups]))
+    return items if len(items) > 1 else []
+
+
+def _means(means: pd.DataFrame) -> list[Item]:
+    """Tabulate the steady means as [K] table 7, and those of runs without a dynamometer."""
+    items: list[Item] = []
+    caption = (
+        "Mean force of the steady cut by the torques of the joints, with its 95 % interval (noise of the "
+        "torques, "
+        "and friction repeatable to a tenth of it)"
+    )
+    star = "" if means["by_index"].all() else " * Fewer than three joints pass the index of 2: of all joints."
+    beside = means[means["dynamometer_n"].notna()]
+    if len(beside):
+        rows = [
+            [
+                _starred(r),
+                str(r["axis"]),
+                number(r["dynamometer_n"]),
+                band(r["sensorless_n"], r["sensorless_sd_n"]),
+                *_error(r["dynamometer_n"], r["sensorless_n"]),
+            ]
+            for _, r in beside.head(LONGEST).iterrows()
+        ]
+        error = (beside["sensorless_n"] - beside["dynamometer_n"]).abs()
+        told = (
+            f"{caption}, against the dynamometer's. Mean of the absolute errors: "
+            f"{number(float(error.mean()), 2)} N.{star}{more(len(beside))}"
+        )
+        header = ["run", "axis", "dynamometer (N)", "sensorless (N)", "error (N)", "error (%)"]
+        items.append(Table(header, rows, told, [1, 0.6, 1.3, 1.6, 1, 1], numeric=[2, 3, 4, 5]))
+    alone = means[means["dynamometer_n"].isna()]
+    if len(alone):
+        rows = [
+            [
+                _starred(part.iloc[0]),
+                *(band(r["sensorless_n"], r["sensorless_sd_n"]) for _, r in part.iterrows()),
+            ]
+            for _, part in alone.groupby("run", sort=False)
+        ]
+        where = " of the runs without a dynamometer" if len(beside) else ""
+        told = f"{caption},{where or ' run by run'}.{star}{more(len(rows))}"
+        header = ["run", "x (N)", "y (N)", "z (N)"]
+        items.append(Table(header, rows[:LONGEST], told, [1, 1.5, 1.5, 1.5], numeric=[1, 2, 3]))
+    return items
+
+
+def _starred(row: pd.Series) -> str:
+    return str(row["run"]) + ("" if row["by_index"] else " *")
+
+
+def _error(measured: float, predicted: float) -> tuple[str, str]:
+    if not math.isfinite(measured) or measured == 0:
+        return "–", "–"
+    return number(predicted - measured, 2), number(100 * (predicted / measured - 1), 2)
+
+
+def _course(results: Results, means: pd.DataFrame) -> list[Item]:
+    force = results.tables.get("robot_force")
+    if force is None:
+        return []
+    beside = means.loc[means["dynamometer_n"].notna(), "run"].drop_duplicates()
+    runs = [str(r) for r in dict.fromkeys([*beside, *force["run"].drop_duplicates()])][: figures.RUNS]
+    caption = (
+        "Force on the tool along the wall from the torques of the joints, smoothed, with the 95 % band "
+        "of each "
+        f"place; cut-in and cut-out shaded. Runs {listing(runs)} of {force['run'].nunique()}."
+    )
+    return [Picture(figures.courses(force, means, runs), caption, caption)]
+
+
+def _joints(joints: pd.DataFrame) -> list[Item]:
+    """Observability and use per joint, runs side by side, and whether the innovations are white."""
+    rows = []
+    for run, part in joints.sort_values("joint", kind="stable").groupby("run", sort=False):
+        cells = [
+            f"{number(i, 2)}{'' if u else ' –'}{' †' if p < WHITE else ''}"
+            for i, u, p in zip(part["index"], part["used"], part["whiteness"], strict=True)
+        ]
+        rows.append([str(run), *cells])
+    coloured = joints[joints["whiteness"] < WHITE]
+    caption = (
+        "Observability index of the joints: mean torque of the steady cut over the range of the idle run. "
+        "– not used for the force. † Innovations of the filter are not white (Ljung–Box, p below "
+        f"{WHITE:g}): {len(coloured)} of {len(joints)}; there the torque does not wander as a random "
+        f"walk does "
+        "(it steps where the tool enters and leaves), and the band is no more than its estimate."
+    )
+    header = ["run", *(f"joint {i}" for i in range(1, 7))]
+    noise = joints.groupby("joint")[["noise_nm", "drift_nm"]].median()
+    drawn = [
+        [str(joint), number(r["noise_nm"], 2), number(r["drift_nm"], 2)] for joint, r in noise.iterrows()
+    ]
+    items: list[Item] = [
+        Table(header, rows[:LONGEST], caption + more(len(rows)), [0.7, *([1.0] * 6)]),
+        Table(
+            ["joint", "noise of a bin (N m)", "drift from bin to bin (N m)"],
+            drawn,
+            "The random walk behind the filter, medians over the runs: noise from the idle run, drift by "
+            "maximum "
+            "likelihood.",
+            [0.6, 1.4, 1.6],
+            numeric=[1, 2],
+        ),
+    ]
+    said = joints[joints["remark"] != ""].drop_duplicates(["run", "remark"])
+    groups = said.groupby("remark", sort=False)["run"]
+    if len(said):
+        items.append(Bullets([f"{listing(list(runs))}: {remark}." for remark, runs in groups]))
+    return items
+
+
+def _deformation(compared: pd.DataFrame | None) -> list[Item]:
+    """Tabulate the steady deformation of held-out walls as [K] table 8."""
+    if compared is None:
+        return []
+    rows = []
+    for run, part in compared.sort_values("s_mm").groupby("run"):
+        measured, predicted = (part[name].to_numpy(float) for name in ("measured", "after"))
+        middle = float(np.median(measured))
+        steady = np.abs(measured) >= SETTLED * abs(middle)
+        if steady.sum() < 2:
+            continue
+        m, p = float(measured[steady].mean()), float(predicted[steady].mean())
+        base = float(part["before"].to_numpy(float)[steady].mean())
+        sd = float(part["sigma"].to_numpy(float)[steady].mean()) / math.sqrt(int(steady.sum()))
+        rows.append(
+            [
+                str(run),
+                band(m, sd),
+                number(base),
+                number(p),
+                number(100 * (base / m - 1), 2),
+                number(100 * (p / m - 1), 2),
+            ]
+        )
+    if not rows:
+        return []
+    caption = (
+        "Steady deformation of held-out walls: mean where the wall is beyond nine tenths of its median; the "
+        "interval is that of the measured mean."
+    )
+    header = ["run", "measured (mm)", "base model", "with effects", "error of base (%)", "with effects (%)"]
+    return [
+        Heading("Deformation, steady value"),
+        Table(header, rows, caption, [0.8, 1.4, 1, 1, 1.1, 1.1], numeric=[1, 2, 3, 4, 5]),
+    ]
+
+
+def _waviness(results: Results) -> list[Item]:
+    blocks: JSON = (results.identified.get("arm") or {}).get("waviness") or {}
+    items: list[Item] = [Heading("Waviness of the walls")]
+    if blocks:
+        items.append(_waves(blocks))
+        items += _shares(blocks)
+    points = results.tables.get("robot_waves")
+    if points is not None:
+        held = results.batch.runs.index[results.batch.runs["role"] == "validate"]
+        known = list(points["run"].drop_duplicates())
+        runs = [str(r) for r in [*(r for r in held if r in known), *(r for r in known if r not in held)]]
+        shown = runs[: figures.RUNS]
+        caption = (
+            "Waves of the wall beside those of the tip's tracking error in the cut and in the idle run, "
+            "all through "
+            "the profile's filter; the encoders' noise is in the latter two. "
+            f"Runs {listing(shown)} of {len(runs)}."
+        )
+        items.append(Picture(figures.waviness(points, shown), caption, caption))
+    return items if len(items) > 1 else []
+
+
+def _waves(blocks: JSON) -> Table:
+    shown = [wave for wave in _WAVES if any(f"{wave}_measured" in block for block in blocks.values())]
+    rows = []
+    for run, block in list(blocks.items())[:LONGEST]:
+        cells = [
+            "–" if (q := block.get(f"{wave}_{kind}")) is None else quantity(q, with_unit=False)
+            for wave in shown
+            for kind in ("measured", "predicted")
+        ]
+        alike = block.get("correlation")
+        text = quantity(alike, with_unit=False) if isinstance(alike, dict) else number(alike, 2)
+        rows.append([str(run), *cells, text])
+    names = [f"{wave.capitalize()} {kind}" for wave in shown for kind in ("wall", "told")]
+    caption = "Waviness (µm) of the wall and as told by the model, with 95 % intervals where known."
+    header = ["run", *names, "correlation"]
+    return Table(header, rows, caption + more(len(blocks)), [0] * len(header), small=len(names) > 2)
+
+
+def _shares(blocks: JSON) -> list[Item]:
+    known = {run: b["joint_share"] for run, b in blocks.items() if b.get("joint_share")}
+    if not known:
+        return []
+    rows = [[run, *(percent(share) for share in shares)] for run, shares in list(known.items())[:LONGEST]]
+    caption = (
+        "Share of each joint in the variance of the tip's waves; below zero: it works against the others."
+    )
+    header = ["run", *(f"joint {i}" for i in range(1, 7))]
+    return [Table(header, rows, caption + more(len(known)), [0.7, *([1.0] * 6)], numeric=[1, 2, 3, 4, 5, 6])]
+
+
+def _spectra(results: Results) -> list[Item]:
+    table, lines = results.tables.get("robot_spectra"), results.tables.get("robot_lines")
+    if table is None:
+        return []
+    caption = (
+        "Spectra of the tip's path error by the encoders (multitaper), all runs: over time and along the "
+        "path. "
+        "Marks: significant lines."
+    )
+    items: list[Item] = [
+        Heading("Spectra of the path error"),
+        Picture(figures.spectra(table, lines), caption, caption),
+    ]
+    if lines is None:
+        items.append(
+            Paragraph("No line stands out of the noise at a chance of one in a hundred per spectrum.")
+        )
+        return items
+    strongest = lines.sort_values("amplitude_um", ascending=False).head(LONGEST // 2)
+    rows = [
+        [
+            str(r["run"]),
+            str(r["axis"]),
+            f"{band(r['frequency'], r['frequency_sd'])} {'Hz' if r['domain'] == 'time' else '1/mm'}",
+            band(r["amplitude_um"], r["amplitude_sd_um"]),
+            probability(r["probability"]),
+        ]
+        for _, r in strongest.iterrows()
+    ]
+    about = (
+        "Lines in the path error with 95 % intervals, and the chance of one as significant in noise "
+        "(Thomson's F "
+        f"test, all frequencies together). The strongest {len(rows)} of {len(lines)}."
+    )
+    header = ["run", "axis", "frequency", "amplitude (µm)", "chance"]
+    return [*items, Table(header, rows, about, [0.8, 0.5, 1.6, 1.2, 1])]

@@ -1,0 +1,78 @@
+"""What waviness tells of friction, gaps and vibration: each found where it is, and nothing where not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from wavy import GATES, problem
+
+from metro.effects import library
+from metro.effects.path_vibration import EFFECT as VIBRATION
+from metro.loop.search import search
+from metro.loop.verdict import parameters
+from metro.observables.waviness_model import Vibration, WavinessModel
+from metro.robot.drive_torques import DriveTorques
+from metro.robot.torsion import Torsion
+
+MDEG = np.pi / 180e3
+STEPS = tuple(e for e in library("waviness") if e.name in {"friction_reversal", "joint_backlash"})
+LIBRARY = (*(e for e in STEPS if e.form in {"joint 4", "joint 5"}), VIBRATION)
+
+
+def test_nothing_is_found_where_the_wall_follows_the_tip():
+    assert search(problem(seed=0), LIBRARY, GATES).names == ()
+
+
+def test_the_transfer_is_found():
+    outcome = search(problem(transfer=0.8, seed=5), (), GATES)
+    assert outcome.names == ()
+    assert outcome.final.beta[0] == pytest.approx(0.8, abs=0.03)
+
+
+def test_more_friction_is_found_in_the_joint_that_turns_round():
+    torque = -40.0
+    truth = WavinessModel(drives=DriveTorques().with_friction(3, reversal=torque))
+    outcome = search(problem(truth, seed=1), LIBRARY, GATES)
+    assert [(e.name, e.form) for e in outcome.final.candidate.effects] == [("friction_reversal", "joint 4")]
+    found = parameters(outcome.final, "friction_reversal")["torque_nm"]
+    assert found["ci95"][0] < torque < found["ci95"][1]
+    assert found["value"] == pytest.approx(torque, rel=0.15)
+
+
+def test_friction_of_a_joint_that_turns_one_way_makes_no_waves():
+    blocks = problem(seed=1).role("identify")
+    friction = WavinessModel(drives=DriveTorques().with_friction(5, reversal=30.0))
+    for block in blocks:
+        waves = friction.design(block, np.zeros(0))[1] - WavinessModel().design(block, np.zeros(0))[1]
+        assert np.abs(waves).max() < 0.2 * block.sigma[0]
+
+
+def test_a_gap_is_found_where_the_torque_of_its_joint_changes_sign():
+    truth = WavinessModel(torsion=Torsion().with_joint(4, gap=6.0 * MDEG))
+    outcome = search(problem(truth, seed=2), LIBRARY, GATES)
+    assert [(e.name, e.form) for e in outcome.final.candidate.effects] == [("joint_backlash", "joint 5")]
+    found = parameters(outcome.final, "joint_backlash")["angle_mdeg"]
+    assert found["value"] == pytest.approx(6.0, rel=0.15)
+
+
+def test_a_vibration_is_found_by_its_frequency_in_time():
+    frequency, amplitude = 8.7, 0.8
+    truth = WavinessModel(vibration=Vibration(frequency, amplitude * 1e-6, 1.0))
+    outcome = search(problem(truth, seed=3), LIBRARY, GATES)
+    assert outcome.names == ("path_vibration",)
+    found = parameters(outcome.final, "path_vibration")
+    assert found["frequency_hz"]["value"] == pytest.approx(frequency, abs=0.03)
+    assert found["amplitude_um"]["ci95"][0] < amplitude < found["amplitude_um"]["ci95"][1]
+    assert found["amplitude_um"]["value"] == pytest.approx(amplitude, rel=0.2)
+
+
+def test_waves_of_the_same_length_at_every_feed_are_no_vibration():
+    """A wave along the wall, whatever the feed: its frequency in time differs from run to run."""
+    task = problem(seed=4)
+    wave = 2e-6 * np.sin(2 * np.pi * 400.0 * np.arange(0.0, 0.06, 0.2e-3))
+    blocks = tuple(
+        replace(block, measured=block.measured + block.setting.filtered @ wave) for block in task.blocks
+    )
+    outcome = search(replace(task, blocks=blocks), LIBRARY, GATES)
+    assert outcome.names == ()
+    assert outcome.lines

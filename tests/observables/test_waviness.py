@@ -1,0 +1,56 @@
+"""Waviness from raw logs and traces to blocks and report, on the batch that the deformation's tests make."""
+
+import numpy as np
+import pytest
+from test_deformation import Cell
+
+from metro.observables import waviness
+from metro.observables.problem import BaseFit, Problem
+from metro.observables.waviness_report import joint_share
+
+
+@pytest.fixture(scope="module")
+def made():
+    cell = Cell(tracking=1e-4)
+    observed = waviness.observe(cell.batch, cell.read, {})
+    return cell, observed, waviness.problem(cell.batch, observed, {})
+
+
+def test_each_wall_is_a_block_of_waves_within_the_band(made):
+    _, observed, task = made
+    assert isinstance(task, Problem)
+    assert observed["waviness_refused"].empty
+    assert {block.run for block in task.blocks} == {"r1", "r2", "r3"}
+    assert [block.run for block in task.role("validate")] == ["r3"]
+    for block in task.blocks:
+        assert block.to_rows(block.measured).shape == block.coordinates["x_mm"].shape
+        assert np.isfinite(block.sigma).all()
+
+
+def test_the_report_gives_wall_and_prediction_with_intervals(made):
+    cell, observed, task = made
+    fit = BaseFit(np.array([1.0]), np.array([[1e-4]]), 2.0, {})
+    arm = waviness.report(cell.batch, observed, {}, task, fit)["arm"]
+    for found in arm["waviness"].values():
+        low, high = found["wa_measured"]["ci95"]
+        assert low <= found["wa_measured"]["value"] <= high
+        assert found["wa_predicted"]["unit"] == "um"
+        assert -1.0 <= found["correlation"]["value"] <= 1.0
+        assert sum(found["joint_share"]) == pytest.approx(1.0)
+        assert int(np.argmax(found["joint_share"])) == 5  # the only joint that strays
+
+
+def test_a_run_without_a_direction_is_refused_with_the_reason(made):
+    cell, _, _ = made
+    runs = cell.batch.runs.assign(direction="slot")
+    batch = type(cell.batch)("b", cell.batch.manifest, cell.batch.cell, runs, {})
+    observed = waviness.observe(batch, cell.read, {})
+    assert observed["waviness_refused"]["reason"].str.contains("neither up nor down").all()
+    assert "waviness_points" not in observed
+
+
+def test_shares_of_joints_are_those_of_independent_waves():
+    x = np.arange(1000)
+    by_joint = np.zeros((1000, 6))
+    by_joint[:, 1], by_joint[:, 5] = 2.0 * np.sin(2 * np.pi * x / 100), np.sin(2 * np.pi * x / 50)
+    np.testing.assert_allclose(joint_share(by_joint), [0, 0.8, 0, 0, 0, 0.2], atol=1e-12)

@@ -1,0 +1,165 @@
+"""The robot in the report: what is said from which table, and nothing where there is none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import synthetic_results as synthetic
+
+from metro.report.content import Bullets, Paragraph, Picture, Table
+from metro.report.figures import robot as figures
+from metro.report.sections.robot import robot
+from metro.report.style import to_svg
+
+X = np.arange(-10.0, 60.0)
+
+
+def force():
+    shape = np.interp(X, [-5, 0, 50, 55], [0, 1, 1, 0])
+    part = np.select([X < -5, X < 0, X <= 50, X <= 55], ["air", "cut-in", "steady", "cut-out"], "air")
+    columns = {f"f{a}_n": f * shape for a, f in zip("xyz", (50.0, -170.0, -30.0), strict=True)}
+    errors = {f"sd_f{a}_n": 2.0 for a in "xyz"}
+    return pd.DataFrame({"run": "r1", "x_mm": X, "part": part, **columns, **errors})
+
+
+def means():
+    frame = pd.DataFrame({"run": "r1", "axis": list("xyz"), "sensorless_n": [50.0, -170.0, -30.0]})
+    frame = frame.assign(sensorless_sd_n=2.0, dynamometer_n=[48.0, -160.0, -31.0], by_index=True)
+    return pd.concat([frame, frame.assign(run="r2", dynamometer_n=np.nan, by_index=False)])
+
+
+def joints():
+    frame = pd.DataFrame({"run": "r1", "joint": range(1, 7), "index": [9.0, 0.1, 4.0, 0.3, 5.0, 2.1]})
+    frame = frame.assign(used=frame["index"] > 2, noise_nm=1.5, drift_nm=0.4, remark="")
+    frame.loc[0, "remark"] = "the idle run was +10.0 % faster than the cut"
+    return frame.assign(whiteness=[0.001, 0.5, 0.5, 0.5, 0.5, 0.5])
+
+
+def ellipsoids():
+    axes = np.eye(3)
+    columns = {f"axis_{a}": axes[i] for i, a in enumerate("xyz")}
+    return pd.DataFrame({"pose": "cut", "stiffness_n_um": [0.4, 0.6, 7.0], "sd_n_um": 0.01, **columns})
+
+
+def chart():
+    x, y = (g.ravel() for g in np.meshgrid(np.linspace(0, 100, 7), np.linspace(0, 60, 7)))
+    frame = pd.DataFrame({"x_mm": x, "y_mm": y, "k_least_n_um": 0.4 + 1e-3 * x, "soft_x": 1.0, "soft_y": 0.0})
+    frame.loc[3, "k_least_n_um"] = np.nan
+    return frame
+
+
+def spectra():
+    f = np.linspace(0.1, 40, 100)
+    rows = [
+        pd.DataFrame({"run": "r1", "domain": d, "axis": a, "frequency": f, "density_um2": 1 / f})
+        for d in ("time", "path")
+        for a in "xyz"
+    ]
+    return pd.concat(rows)
+
+
+LINES = pd.DataFrame(
+    {"run": ["r1"], "domain": "time", "axis": "z", "frequency": 0.6, "frequency_sd": 0.002,
+     "amplitude_um": 8.0, "amplitude_sd_um": 0.5, "probability": 1e-6}
+)  # fmt: skip
+WAVES = pd.DataFrame(
+    {"run": "r1", "x_mm": X, "wall_um": np.sin(X), "tip_um": 0.9 * np.sin(X), "idle_um": np.nan}
+)
+
+
+def results(**tables):
+    return replace(synthetic.results(), tables=tables)
+
+
+def content(**tables):
+    section = robot(results(**tables))
+    return [] if section is None else list(section.items)
+
+
+def table_with(items, word):
+    return next(i for i in items if isinstance(i, Table) and word in i.caption)
+
+
+def test_a_batch_without_an_arm_has_no_such_section():
+    bare = replace(synthetic.results(), tables={}, identified={})
+    assert robot(bare) is None
+
+
+def test_the_steady_means_stand_beside_the_dynamometers_with_their_error():
+    items = content(robot_means=means(), robot_force=force(), robot_joints=joints())
+    table = table_with(items, "against the dynamometer")
+    assert table.rows[1] == ["r1", "y", "−160", "−170.0 ± 3.9", "−10", "6.2"]
+    assert "Mean of the absolute errors: 4.3 N" in table.caption
+    alone = table_with(items, "without a dynamometer")
+    assert alone.rows == [["r2 *", "50.0 ± 3.9", "−170.0 ± 3.9", "−30.0 ± 3.9"]]
+
+
+def test_unused_joints_coloured_innovations_and_remarks_are_told():
+    items = content(robot_means=means(), robot_joints=joints())
+    table = table_with(items, "Observability")
+    assert table.rows == [["r1", "9.0 †", "0.10 –", "4.0", "0.30 –", "5.0", "2.1"]]
+    assert "1 of 6" in table.caption
+    said = [text for item in items if isinstance(item, Bullets) for text in item.items]
+    assert said == ["r1: the idle run was +10.0 % faster than the cut."]
+
+
+def test_the_steady_deformation_is_compared_as_a_share_of_the_measured():
+    s = np.arange(0, 60.0)
+    shape = 0.2 * np.clip(s / 8, 0, 1)
+    frame = pd.DataFrame({"s_mm": s, "measured": shape, "before": 0.8 * shape, "after": 1.01 * shape})
+    frame = frame.assign(observable="deformation", run="r9", axis="z", sigma=0.004, unit="mm")
+    [row] = table_with(content(comparison=frame), "Steady deformation").rows
+    assert row[0] == "r9"
+    assert row[-2:] == ["−20", "1.0"]
+
+
+def test_stiffness_is_drawn_with_its_principal_axes():
+    items = content(arm_map=chart(), arm_ellipsoids=ellipsoids())
+    assert table_with(items, "Principal").rows[0][:2] == ["cut", "0.400 ± 0.020"]
+    [figure] = [item.figure for item in items if isinstance(item, Picture)]
+    outline = figure.axes[1].get_lines()[0].get_xydata()
+    np.testing.assert_allclose(np.abs(outline).max(axis=0), [0.4, 0.6], rtol=1e-3)
+    assert to_svg(figure)
+
+
+def test_a_line_is_tabulated_and_none_is_said():
+    items = content(robot_spectra=spectra(), robot_lines=LINES)
+    row = table_with(items, "Lines in the path error").rows[0]
+    assert row[:4] == ["r1", "z", "0.6000 ± 0.0039 Hz", "8.00 ± 0.98"]
+    said = [item.text for item in content(robot_spectra=spectra()) if isinstance(item, Paragraph)]
+    assert any("No line" in text for text in said)
+
+
+def test_waves_are_drawn_without_an_idle_run_too():
+    figure = figures.waviness(WAVES, ["r1"])
+    assert [line.get_label() for line in figure.axes[0].get_lines()] == [
+        "wall, by the profiler",
+        "tip in the cut, by the encoders",
+    ]
+    assert to_svg(figure)
+
+
+def test_courses_hold_the_dynamometers_level_over_the_steady_cut():
+    figure = figures.courses(force(), means(), ["r1"])
+    level = figure.axes[0].collections
+    spans = [c.get_segments()[0] for c in level if hasattr(c, "get_segments") and len(c.get_segments())]
+    np.testing.assert_allclose(sorted(s[0][1] for s in spans), [-160.0, -31.0, 48.0])
+    assert all(s[0][0] == 0.0 and s[1][0] == 50.0 for s in spans)
+    assert to_svg(figure)
+
+
+def test_stations_are_tabulated_with_what_the_others_make_of_them():
+    told = pd.DataFrame({"position": ["1", "2"], "x_mm": [0.0, 100.0], "y_mm": 0.0, "z_mm": [0.0, -300.0]})
+    told = told.assign(method="linear polynomial")
+    x, z = (g.ravel() for g in np.meshgrid([0.0, 50.0, 100.0], [-300.0, -150.0, 0.0]))
+    surface = pd.DataFrame({"first": "x", "second": "z", "x_mm": x, "y_mm": 0.0, "z_mm": z})
+    for a in "xyz":
+        told[f"k{a}_n_um"], told[f"error_{a}_percent"] = [1.0, 0.8], [3.0, -4.0]
+        told[f"rms_{a}_percent"], told[f"rms_{a}_low_percent"], told[f"rms_{a}_high_percent"] = 3.5, 2.0, 9.0
+        surface[f"k{a}_n_um"] = 1 + 1e-3 * x
+    items = content(end_stations=told, end_surface=surface)
+    table = table_with(items, "End stiffness at the stations")
+    assert table.rows[1] == ["2", "100", "0", "−300", *3 * ["0.800"], *3 * ["−4.00"]]
+    assert "x 3.5 % (2.0 … 9.0)" in table.caption
+    [figure] = [item.figure for item in items if isinstance(item, Picture) and len(item.figure.axes) == 6]
+    assert figure.axes[0].get_lines()[0].get_xydata().tolist() == [[0.0, 0.0], [100.0, -300.0]]

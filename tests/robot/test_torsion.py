@@ -1,0 +1,79 @@
+"""How far joints twist, against a root finder, differences and limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+
+from metro.robot.torsion import Torsion, passed, spring, spring_slope
+
+STIFFNESS = np.array([1.8e6, 2.1e6, 1.3e6, 3.1e5, 3.9e5, 2.3e5])
+torques = st.floats(-3e3, 3e3)
+stiffnesses = st.floats(1e4, 1e7)
+shares = st.floats(1e-12, 1e3)  # of the cubic part at the linear torsion
+
+
+@given(torques, stiffnesses, shares)
+@settings(max_examples=200, deadline=None)
+def test_the_torsion_balances_the_torque(torque, k, share):
+    far = abs(torque) / k
+    cubic = share * k / max(far, 1e-9) ** 2
+    root = brentq(lambda x: k * x + cubic * x**3 - torque, -far - 1e-12, far + 1e-12, xtol=1e-18, rtol=1e-14)
+    assert spring(np.float64(torque), np.float64(1 / k), np.float64(cubic)) == pytest.approx(root, rel=1e-9)
+
+
+@given(torques, stiffnesses, st.floats(0.0, 10.0))
+@settings(max_examples=100, deadline=None)
+def test_the_slope_is_the_derivative_by_the_compliance(torque, k, share):
+    c, cubic = 1 / k, share * k**3 / max(abs(torque), 1.0) ** 2
+    step = 1e-5 * c
+    torque, cubic = np.float64(torque), np.float64(cubic)
+    difference = (spring(torque, c + step, cubic) - spring(torque, c - step, cubic)) / (2 * step)
+    found = spring_slope(torque, spring(torque, c, cubic), c, cubic)
+    assert found == pytest.approx(difference, rel=1e-5, abs=1e-6)
+
+
+def test_without_hardening_it_is_a_linear_spring_even_of_no_or_negative_compliance():
+    torque = np.array([-200.0, 0.0, 350.0])
+    for compliance in (0.0, 3e-6, -1e-7):
+        np.testing.assert_array_equal(spring(torque, compliance, np.float64(0.0)), torque * compliance)
+    assert spring(np.float64(100.0), -1e-7, np.float64(1e12)) == pytest.approx(-1e-5)
+    assert spring_slope(np.float64(100.0), np.float64(0.0), 0.0, np.float64(1e12)) == 100.0
+
+
+def test_weak_hardening_leaves_no_rounding_and_strong_leaves_the_cube_root():
+    c, torque = 1e-6, np.float64(500.0)
+    assert spring(torque, c, np.float64(1e-3)) == pytest.approx(c * 500.0, rel=1e-14)
+    assert spring(torque, c, np.float64(1e24)) == pytest.approx((500.0 / 1e24) ** (1 / 3), rel=1e-3)
+
+
+def test_a_gap_is_passed_by_half_to_the_side_of_the_torque_whatever_its_size():
+    torque = np.array([[40.0, -8.0], [400.0, -80.0], [-400.0, 0.0]])
+    found = passed(torque, np.array([2e-4, 6e-4]))
+    np.testing.assert_allclose(found, [[1e-4, -3e-4], [1e-4, -3e-4], [-1e-4, 0.0]], rtol=0.02)
+    assert (passed(np.zeros((3, 2)), np.array([2e-4, 6e-4])) == 0).all()
+    assert (passed(torque, np.zeros(2)) == 0).all()
+
+
+def test_gap_and_factor_act_in_the_cut_alone_and_hardening_in_both():
+    torque = np.tile([300.0, -200.0, 150.0, -60.0, 50.0, 40.0], (4, 1))
+    odd = Torsion().with_joint(1, gap=1e-4).with_joint(1, factor=0.5).with_joint(4, cubic=5e11)
+    rest, _ = odd.at_rest(torque, 1 / STIFFNESS)
+    cut, _ = odd.in_cut(torque, 1 / STIFFNESS)
+    linear = torque / STIFFNESS
+    np.testing.assert_allclose(np.delete(rest, 4, axis=1), np.delete(linear, 4, axis=1))
+    assert (rest[:, 4] < 0.99 * linear[:, 4]).all()
+    np.testing.assert_allclose(cut[:, 4], rest[:, 4])
+    np.testing.assert_allclose(cut[:, 1], 2 * linear[:, 1] - 0.5e-4)
+    np.testing.assert_allclose(STIFFNESS[4] * rest[:, 4] + 5e11 * rest[:, 4] ** 3, torque[:, 4])
+
+
+def test_what_is_told_twice_of_a_joint_adds_up():
+    twice = Torsion().with_joint(2, gap=1e-4, factor=0.8).with_joint(2, gap=2e-4, factor=0.5)
+    assert twice.gap[2] == pytest.approx(3e-4)
+    assert twice.factor[2] == pytest.approx(0.4)
+    assert twice.gap[:2] == (0.0, 0.0)
+    assert twice.cubic == Torsion().cubic
