@@ -62,7 +62,8 @@ def loads() -> pd.DataFrame:
                 rows.append(
                     ["A", f"P{number}", *[np.nan] * 6, x, y, 0.0, *force, *np.round(matrix @ force, 4), 1]
                 )  # gauges read to 0.1 µm
-    return pd.DataFrame(rows, columns=list(COLUMNS["loads"]))
+    known = [name for name in COLUMNS["loads"] if name != "sigma_mm"]
+    return pd.DataFrame(rows, columns=known).assign(sigma_mm=np.nan)[list(COLUMNS["loads"])]
 
 
 def make_batch(manifest: dict = MANIFEST, declared: float = 0.0) -> Batch:

@@ -78,6 +78,7 @@ def test_mean_forces_of_all_five_feeds_give_the_published_coefficients(slotting)
 
 
 @real
+@pytest.mark.slow  # the workflow's loop on the same batch is in every run of the main job
 @pytest.mark.xdist_group("slotting")
 def test_told_nothing_the_loop_finds_runout_in_the_real_slots_and_predicts_a_feed_better(slotting):
     outcome, rows, _ = slotting.closed()
