@@ -33,6 +33,7 @@ def told(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> JSO
         "noise": _noise(problem, outcome, verdict, gates),
         "candidates": [_tried(problem, trial, outcome) for trial in outcome.trials],
         "path": _path(problem, outcome),
+        "signature_unit": problem.basis_unit or problem.unit,
         "signature": [_line(line, problem.si) for line in outcome.lines],
         "cannot_be_seen": [{"effect": name, "why": why} for name, why in outcome.not_visible.items()],
         "experiments": _experiments(problem, outcome),

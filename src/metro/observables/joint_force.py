@@ -155,7 +155,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         *left_out,
     )
     model = JointForceModel(arm)
-    return Problem(OBSERVABLE, "N", 1.0, model, blocks, np.array([SCATTER]), notes=notes)
+    return Problem(OBSERVABLE, "N", 1.0, model, blocks, np.array([SCATTER]), notes=notes, basis_unit="N m")
 
 
 def _block(row: Any, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander: Array) -> Block:

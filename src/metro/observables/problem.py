@@ -139,6 +139,8 @@ class Problem:
         a gauge); an effect must change the prediction by more than twice this to be told from it.
     notes : sentences on what this problem had to leave out or assume, for the report.
     feasible : runs that could be made next, among which the loop looks for the one that would tell most.
+    basis_unit : unit of what blocks measure, where it is not that of the comparison (torques, compared as
+        forces).
     """
 
     observable: str
@@ -150,6 +152,7 @@ class Problem:
     systematic: float = 0.0
     notes: tuple[str, ...] = field(default=())
     feasible: tuple[Proposal, ...] = ()
+    basis_unit: str | None = None
 
     def role(self, *roles: Role) -> tuple[Block, ...]:
         """Return the blocks that have one of ``roles``."""

@@ -134,7 +134,9 @@ def _rest(entry: JSON, told: JSON, shown: str | None, left: str) -> list[Item]:
         full = [f"{e.get('axis') or ''} {e['label']}".strip() for e in entries if e.get("significant")]
         alt = "Significant: " + (", ".join(full[:6]) if full else "nothing") + "."
         caption = "Signature of what is left, by axis and pattern; full bars are significant."
-        items.append(Picture(figures.signature(entries, shown or ""), caption, alt))
+        items.append(
+            Picture(figures.signature(entries, told.get("signature_unit") or shown or ""), caption, alt)
+        )
     rest = entry.get("unexplained") or {}
     if rest.get("signature"):
         size = f"{number(rest.get('rms'))} {unit(shown)} rms"
