@@ -2,10 +2,11 @@
 
 import json
 
+import pandas as pd
 import pypdfium2
 import synthetic_results as synthetic
 
-from metro.batch.processed import write_batch, write_table
+from metro.batch.processed import COLUMNS, write_batch, write_table
 from metro.stages.report import read_results, report
 
 
@@ -13,6 +14,8 @@ def write_results(processed, reports):
     write_batch(processed, synthetic.batch(), {"sources": json.dumps({"runs.csv": "ab" * 32})})
     for name, table in synthetic.tables().items():
         write_table(processed / f"{name}.parquet", table, {"sources": json.dumps({f"{name}.csv": "cd" * 32})})
+    for name in {"stations", "robot"} - set(synthetic.tables()):  # ingest writes every table, empty or not
+        write_table(processed / f"{name}.parquet", pd.DataFrame(columns=list(COLUMNS[name])), {})
     reports.mkdir()
     (reports / "identified.json").write_text(json.dumps(synthetic.identified()))
     (reports / "verdict.json").write_text(json.dumps(synthetic.verdict()))
