@@ -14,6 +14,7 @@ from metro.cutting.engagement import Engagement
 from metro.cutting.force import COEFFICIENTS, Cut
 from metro.cutting.law import EdgeLaw
 from metro.effects import library, told_of
+from metro.effects.effect import fitted_to
 from metro.observables.dynamometer import Recording
 from metro.observables.force_model import ForceModel, ForceSetting
 from metro.observables.problem import Block, Problem
@@ -115,3 +116,12 @@ def test_the_base_model_is_told_of_what_the_manifest_declares():
     assert told.base.law.edge(2.0) == pytest.approx(1.4)
     assert told.base.structure == base.structure
     assert any("orbit stiffness" in note and "helical" in note for note in told.notes)
+
+
+def test_a_model_without_the_part_that_an_effect_changes_is_not_asked_for_it():
+    """A printed table is predicted without an arm: its problem has the observable and none of the parts."""
+    printed = SimpleNamespace(base=object())
+    able, unable = fitted_to(library("joint_force"), printed)
+    assert able == ()
+    assert unable["payload_error"] == "what is predicted here has no payload"
+    assert set(unable) == {effect.name for effect in library("joint_force")}

@@ -22,6 +22,7 @@ EFFECT = Effect(
     observables=("joint_force",),
     parameters=(EffectParameter("offset_ms", "ms", -2000.0, 2000.0, 5.0, starts=STARTS),),
     apply=apply,
+    part="offset",
     signature=(
         "Torques that follow the force by a constant time: seen where the tool enters and leaves the work, "
         "and nowhere in the steady cut."

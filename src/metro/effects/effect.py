@@ -71,6 +71,8 @@ class Effect:
     form : where one cause has several models of which a batch has one (a drift in steps or in time; another
         joint): what tells them apart, for the report.
     where : what of the contract's parameters the form says (``joint``): reported as it is.
+    part : field of the model that it changes, where not every model of its observables has it (a printed
+        table is predicted without an arm).
     prior : its weight before anything is known, against that of an effect with one form: that of a cause is
         shared by its forms.
     """
@@ -87,6 +89,7 @@ class Effect:
     form: str = ""
     resembled: bool = False
     where: Mapping[str, int | str] = field(default_factory=dict, hash=False)
+    part: str = ""
     prior: float = 1.0
 
     @property
@@ -147,6 +150,9 @@ def fitted_to(effects: tuple[Effect, ...], problem: Any) -> tuple[tuple[Effect, 
     able: list[Effect] = []
     unable: dict[str, str] = {}
     for effect in effects:
+        if effect.part and not hasattr(problem.base, effect.part):
+            unable[effect.name] = f"what is predicted here has no {effect.part}"
+            continue
         adapted = effect.adapt(effect, problem) if effect.adapt else effect
         if isinstance(adapted, Refusal):
             unable |= {effect.name: adapted.reason} if adapted.reason else {}

@@ -18,6 +18,7 @@ def _of(joint: int) -> Effect:
         observables=("joint_force", "waviness"),
         parameters=(EffectParameter("torque_nm", "N m", -300.0, 300.0, 3.0, starts=(-10.0, 10.0)),),
         apply=apply,
+        part="drives",
         signature=(
             "Torque of one joint off by a constant that changes its sign where the joint turns round; "
             "a joint that turns one way in every run shows it as a force that does not go with the cut."

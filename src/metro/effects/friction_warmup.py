@@ -18,6 +18,7 @@ def _of(joint: int) -> Effect:
         observables=("joint_force",),
         parameters=(EffectParameter("slope_nm_s", "N m/s", -50.0, 50.0, 0.3, starts=(-0.5, 0.5)),),
         apply=apply,
+        part="drives",
         signature=(
             "Torque of one joint that grows along the log with the sign of the joint's speed, "
             "from nothing at its start."

@@ -55,6 +55,7 @@ def _of(joint: int) -> Effect:
             ),
         ),
         apply=apply,
+        part="drives",
         signature=(
             "Torque of one joint that swings with its own angle, the same swing per angle at every feed "
             "and in every run."

@@ -77,6 +77,7 @@ EFFECT = Effect(
         EffectParameter("phase_deg", "deg", 0.0, 360.0, 20.0, starts=(0.0, 120.0, 240.0), period=360.0),
     ),
     apply=apply,
+    part="vibration",
     adapt=adapt,
     signature=(
         "Waves on the wall of one frequency in time, so that their length goes with the feed; the encoders "

@@ -27,6 +27,7 @@ EFFECT = Effect(
         ),
     ),
     apply=apply,
+    part="payload",
     signature=(
         "Torques that are there in the air, too, constant along a short path, in the proportions of a weight "
         "on the flange."

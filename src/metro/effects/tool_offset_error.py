@@ -27,6 +27,7 @@ EFFECT = Effect(
         EffectParameter(name, "mm", -200.0, 200.0, 1.0, starts=(0.0,), plausible=20.0) for name in AXES
     ),
     apply=apply,
+    part="arm",
     signature=(
         "Torques of the wrist off in proportion to the force, by its lever arm: as large as the offset "
         "against the distance of the joint."
