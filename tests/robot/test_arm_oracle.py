@@ -23,7 +23,7 @@ SEEDS = range(8)
 
 @cache
 def pinocchio():
-    return pytest.importorskip("pinocchio", reason="pinocchio (pin) of the dev extra is not installed")
+    return pytest.importorskip("pinocchio", reason="pinocchio (pin) is not installed (development only)")
 
 
 def random_arm(seed):
