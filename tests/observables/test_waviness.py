@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
-from test_deformation import Cell
+from test_deformation import Cell, moves
 
 from metro.observables import waviness
 from metro.observables.problem import BaseFit, Problem
+from metro.observables.wall import wall
 from metro.observables.waviness_report import joint_share
+from metro.units import DEG, MM
 
 
 @pytest.fixture(scope="module")
@@ -54,3 +56,22 @@ def test_shares_of_joints_are_those_of_independent_waves():
     by_joint = np.zeros((1000, 6))
     by_joint[:, 1], by_joint[:, 5] = 2.0 * np.sin(2 * np.pi * x / 100), np.sin(2 * np.pi * x / 50)
     np.testing.assert_allclose(joint_share(by_joint), [0, 0.8, 0, 0, 0, 0.2], atol=1e-12)
+
+
+def test_waviness_that_the_tip_strayed_is_recognised():
+    """Joint 6 strays by a wave of 3 mm, and the wall has it by the lever of that joint."""
+    cell = Cell(tracking=0.0)
+    for run, table in cell.logs.items():
+        q = table[[f"q{i}_set_deg" for i in range(1, 7)]].to_numpy() * DEG
+        s = cell.arm.tip(q)[:, 1] / MM
+        wave = 2e-5 * np.sin(2 * np.pi * s / 3)
+        cell.logs[run] = table.assign(q6_deg=table["q6_set_deg"] + wave / DEG)
+        lever = moves(cell.arm, q[len(q) // 4])[:, 5] @ wall(cell.batch, run).normal
+        x = cell.profiles[run]["x_mm"]
+        cell.profiles[run]["z_mm"] += lever * 2e-5 * np.sin(2 * np.pi * x / 3) / MM
+    observed = waviness.observe(cell.batch, cell.read, {})
+    task = waviness.problem(cell.batch, observed, {})
+    fit = BaseFit(np.array([1.0]), np.array([[1e-4]]), 2.0, {})
+    found = waviness.report(cell.batch, observed, {}, task, fit)["arm"]["waviness"]["r1"]
+    assert found["correlation"]["value"] > 0.95
+    assert found["wa_predicted"]["value"] == pytest.approx(found["wa_measured"]["value"], rel=0.15)
