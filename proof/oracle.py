@@ -68,7 +68,12 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
 
 
 def _all_told(task: Problem) -> Problem:
-    """Take the parameters of the base model as told by the runs: what is left is noise."""
+    """Take the parameters of the base model of the force as told by the runs: what is left is noise.
+
+    What is untold of a wall is the error of its force, which is noise of an instrument.
+    """
+    if task.observable != "force":
+        return task
     return replace(task, blocks=tuple(replace(block, untold=None) for block in task.blocks))
 
 

@@ -58,7 +58,7 @@ def test_the_systematic_error_of_the_inputs_raises_the_bar():
 
 
 def test_an_effect_must_predict_conditions_left_out():
-    outcome = search(problem(4, truth=Wave(bend=0.2)), (BEND,), replace(GATES, held_out_gain=1e6))
+    outcome = search(problem(4, truth=Wave(bend=0.2)), (BEND,), replace(GATES, held_out_gain=1e9))
     assert outcome.names == ()
     assert "left-out" in outcome.trials[0].why_not
 
@@ -246,3 +246,14 @@ def test_forms_that_the_runs_do_not_tell_apart_are_rivals_by_their_form():
     (rival,) = outcome.rivals
     assert set(rival.pair) == {"bent (joint 1)", "bent (joint 3)"}
     assert 0.3 < outcome.probability("bent") < 0.7
+
+
+def test_the_best_of_many_places_must_be_better_than_chance_makes_it():
+    """An effect whose place was sought among a thousand million needs as much more evidence."""
+    task = problem(6, truth=Wave(bend=0.02))
+    plain, sought = (search(task, (replace(BEND, sought=places),), GATES) for places in (1.0, 1e9))
+    before, after = plain.trials[0].evidence, sought.trials[0].evidence
+    assert plain.names == ("bend",)
+    assert sought.names == ()
+    assert after.p_value == pytest.approx(min(1.0, -np.expm1(1e9 * np.log1p(-before.p_value))))
+    assert after.gain - sum(after.held_out.values()) == pytest.approx(-np.log(1e9))

@@ -75,6 +75,8 @@ class Effect:
         table is predicted without an arm).
     prior : its weight before anything is known, against that of an effect with one form: that of a cause is
         shared by its forms.
+    sought : number of independent places (lines of a spectrum) among which ``adapt`` looked for it. The best
+        of many is good by chance: the evidence is discounted by so many tries.
     """
 
     name: str
@@ -91,6 +93,12 @@ class Effect:
     where: Mapping[str, int | str] = field(default_factory=dict, hash=False)
     part: str = ""
     prior: float = 1.0
+    sought: float = 1.0
+
+    @property
+    def odds(self) -> float:
+        """Its weight before anything is known, at the one place where it is found."""
+        return self.prior / self.sought
 
     @property
     def key(self) -> tuple[str, str]:

@@ -41,8 +41,9 @@ def _of(joint: int) -> Effect:
         torque, order, phase = effect.parameters
         step = float(orders[1] - orders[0]) if len(orders) > 1 else order.scale
         order = replace(order, upper=2.0 * HIGHEST, scale=step, starts=tuple(found.tolist()))
-        torque = replace(torque, starts=(max(float(np.median(size)), torque.scale),))
-        return replace(effect, parameters=(torque, order, phase))
+        start = float(np.clip(np.median(size), torque.scale, torque.upper))
+        torque = replace(torque, starts=(start,))
+        return replace(effect, parameters=(torque, order, phase), sought=max(1.0, len(orders) / STEPS))
 
     return Effect(
         name="gear_ripple",
@@ -51,7 +52,7 @@ def _of(joint: int) -> Effect:
             EffectParameter("torque_nm", "N m", 0.0, 300.0, 2.0, starts=(1.0,)),
             EffectParameter("order", "1", 1.0, 5000.0, 10.0, starts=(100.0,)),
             EffectParameter(
-                "phase_deg", "deg", -720.0, 720.0, 20.0, starts=(0.0, 120.0, 240.0), period=360.0
+                "phase_deg", "deg", -180.0, 180.0, 20.0, starts=(-120.0, 0.0, 120.0), period=360.0
             ),
         ),
         apply=apply,

@@ -60,6 +60,12 @@ def left_over(outcome: Outcome) -> str:
             f"the base parameters differ between conditions by {100 * between.relative:.2g} % of the signal, "
             f"more than repeats scatter, most in {between.condition}"
         )
+    if outcome.restless:
+        restless = outcome.restless
+        parts.append(
+            f"runs scatter by {100 * restless.relative:.2g} % of the signal, {restless.times:.0f} times what "
+            "is usual: something changes from run to run (a drift, another clamping)"
+        )
     return "; ".join(part for part in parts if part)
 
 

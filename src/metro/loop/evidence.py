@@ -33,6 +33,7 @@ class Evidence:
         not worth computing.
     size : rms change of the prediction over the rms of the signal. missed : rms of what the larger candidate
         misses beyond the noise, over that of the signal.
+    sought : number of places among which the additional effects were sought, on all runs.
     """
 
     statistic: float
@@ -40,11 +41,12 @@ class Evidence:
     held_out: dict[str, float]
     size: float
     missed: float
+    sought: float = 1.0
 
     @property
     def gain(self) -> float:
-        """Sum of the held-out gains."""
-        return sum(self.held_out.values())
+        """Sum of the held-out gains, less what the best of the places sought gains by chance."""
+        return sum(self.held_out.values()) - math.log(self.sought)
 
     @property
     def better_share(self) -> float:
@@ -62,14 +64,19 @@ def compare(smaller: Fit, larger: Fit) -> Evidence:
     runs = sum(block.role != "calibrate" for block in larger.blocks)
     statistic = 2.0 * (larger.total - smaller.total)
     parameters = len(larger.theta) - len(smaller.theta)
-    p_value = _tail(statistic, parameters, runs)
-    return Evidence(statistic, p_value, {}, change(smaller, larger), missed(larger))
+    sought = _sought(larger) / _sought(smaller)
+    p_value = -math.expm1(sought * math.log1p(-min(_tail(statistic, parameters, runs), 1.0 - 1e-16)))
+    return Evidence(statistic, p_value, {}, change(smaller, larger), missed(larger), sought)
 
 
 def hold_out(evidence: Evidence, smaller_out: Mapping[str, float], larger: Fit, prior: Noise) -> Evidence:
     """Add each condition's gain when left out; ``smaller_out`` is :func:`leave_out` of the smaller fit."""
     out = leave_out(larger, prior)
     return replace(evidence, held_out={name: out[name] - value for name, value in smaller_out.items()})
+
+
+def _sought(fitted: Fit) -> float:
+    return math.prod(effect.sought for effect in fitted.candidate.effects)
 
 
 def _tail(statistic: float, parameters: int, runs: int) -> float:

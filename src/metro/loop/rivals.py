@@ -85,7 +85,7 @@ def _round(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) 
         others = _replaced(current, smaller, effects, prior)
         in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
         left_out = [leave_out(smaller, prior), out, *(leave_out(fitted, prior) for fitted in others)]
-        share = weights(left_out, gates.seed, prior=[1.0, *(one.prior for one in in_place)])[1:]
+        share = weights(left_out, gates.seed, prior=[1.0, *(one.odds for one in in_place)])[1:]
         weight[effect.name] = float(share[0])
         for fitted, other in zip(others, share[1:], strict=True):
             if other > RIVAL_WEIGHT:

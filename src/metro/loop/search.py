@@ -17,6 +17,7 @@ from metro.loop.candidate import Candidate
 from metro.loop.evidence import compare, hold_out, leave_out, surviving_share
 from metro.loop.fit import Fit, fit
 from metro.loop.noise import Noise, first_noise
+from metro.loop.restless import Restless, restless
 from metro.loop.rivals import Rival, believed, contested
 from metro.loop.session import Step, scan
 from metro.loop.trial import Gates, Trial, tried, without
@@ -32,6 +33,7 @@ EVEN = 0.5  # least share explained by effects that are claimed
 SESSION = 0.005  # p-value of a step along the session that counts
 SESSION_SIZE = 0.01
 CONDITIONS = 0.001  # p-value of differences between conditions that count
+RUNS = 0.001  # p-value of a scatter between runs that counts
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,10 @@ class Outcome:
     ``base`` and ``final`` are fits of the identification runs; ``steps`` the fits after each addition;
     ``trials`` the last trial of each effect, ``weight`` the probability of each effect found against its
     rivals and against nothing; ``rivals`` effects that explain the rest as well as a chosen one; ``lines``
-    the signature of the rest, ``step`` that along the session, ``between`` that from condition to condition
-    (of the base: ``base_between``); ``not_visible`` why effects cannot be seen; ``likeness`` the fit with
-    what the rest resembles and is no effect of the library (``final`` is without).
+    the signature of the rest, ``step`` that along the session, ``between`` that from condition to condition,
+    ``restless`` that from run to run (of the base: ``base_between``, ``base_restless``); ``not_visible`` why
+    effects cannot be seen; ``likeness`` the fit with what the rest resembles and is no effect of the library
+    (``final`` is without).
     """
 
     base: Fit
@@ -57,6 +60,8 @@ class Outcome:
     step: Step | None = None
     base_between: Between | None = None
     between: Between | None = None
+    base_restless: Restless | None = None
+    restless: Restless | None = None
     offered: tuple[Effect, ...] = ()
     not_visible: dict[str, str] = field(default_factory=dict)
     likeness: Fit | None = None
@@ -68,10 +73,13 @@ class Outcome:
 
     @property
     def explained(self) -> float:
-        """Share of the base model's significant rest, in and between conditions, that the effects took."""
+        """Share of the significant rest of the base model, within and between runs, that effects took."""
         left, first = (
-            rest.share_left(lines) ** 2 + (between.relative**2 if between else 0.0)
-            for lines, between in ((self.lines, self.between), (self.base_lines, self.base_between))
+            rest.share_left(lines) ** 2 + sum(found.relative**2 for found in others if found)
+            for lines, *others in (
+                (self.lines, self.between, self.restless),
+                (self.base_lines, self.base_between, self.base_restless),
+            )
         )
         return 1.0 - left / max(first, left) if left else 1.0
 
@@ -139,6 +147,8 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
         step=step if step and step.p_value < SESSION and abs(step.relative) > SESSION_SIZE else None,
         base_between=_differing(base, floor),
         between=_differing(likeness, floor),
+        base_restless=_unsteady(base, prior, floor),
+        restless=_unsteady(likeness, prior, floor),
         offered=tuple(library),
         not_visible=unable | absorbed,
         likeness=likeness if likeness is not final else None,
@@ -159,6 +169,7 @@ def _withdrawn(outcome: Outcome) -> Outcome:
         weight={},
         lines=outcome.base_lines or outcome.lines,  # what only the effect laid bare is there all the same
         between=outcome.base_between or outcome.between,
+        restless=outcome.base_restless or outcome.restless,
     )
 
 
@@ -181,6 +192,12 @@ def _differing(fitted: Fit, least: float) -> Between | None:
     """Return how the conditions differ, where that counts."""
     found = between_conditions(fitted)
     return found if found and found.p_value < CONDITIONS and found.relative > least else None
+
+
+def _unsteady(fitted: Fit, prior: Noise, least: float) -> Restless | None:
+    """Return how the runs scatter, where that is beyond the usual and counts."""
+    found = restless(fitted, prior)
+    return found if found and found.p_value < RUNS and found.relative > least else None
 
 
 def _pruned(current: Fit, prior: Noise, gates: Gates, least: float) -> tuple[Fit, set[str]]:

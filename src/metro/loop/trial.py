@@ -86,7 +86,7 @@ def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> 
     ]
     weighed = [trial for trial in trials if not trial.why_not]
     nothing = dict.fromkeys(out, 0.0)
-    odds = [1.0, *(trial.effect.prior for trial in weighed)]
+    odds = [1.0, *(trial.effect.odds for trial in weighed)]
     gains = [nothing, *(trial.evidence.held_out for trial in weighed)]
     share = weights(gains, gates.seed, prior=odds)[1:]
     weight = {trial.effect.key: float(value) for trial, value in zip(weighed, share, strict=True)}

@@ -240,7 +240,7 @@ def _unexplained(
     problem: Problem, outcome: Outcome, rows: pd.DataFrame, words: str, lines: Sequence[Line]
 ) -> JSON:
     """Describe the rest; its size is the share left on the runs that tell of it, of the held-out signal."""
-    whole = [abs(found.relative) for found in (outcome.step, outcome.between) if found]
+    whole = [abs(found.relative) for found in (outcome.step, outcome.between, outcome.restless) if found]
     share = max(share_left(lines), *whole) if whole else share_left(lines)
     over = share * float(np.sqrt((rows["measured"] ** 2).mean())) if len(rows) else None
     if outcome.likeness and len(rows):
