@@ -68,6 +68,7 @@ ASCII = "".join("1 2 3\n" for _ in POINTS).encode()
         (ply_header("binary_little_endian", XYZ) + b"\0" * 40, ["ends early", "found 3", "expected 4"]),
         (ply_header("binary_little_endian", XYZ), ["ends early", "found 0", "expected 4"]),
         (ply_header("ascii", XYZ) + b"1 2 3\n", ["ends early", "found 1", "expected 4"]),
+        (ply_header("ascii", XYZ), ["ends early", "found 0", "expected 4"]),
         (ply_header("ascii", XYZ) + b"1 2 x\n" + ASCII, ["line 11, column z", "'x'"]),
         (ply_header("ascii", ["float x", "float y"]) + ASCII, ["lacks the column z_mm"]),
         (ply_header("ascii", []) + ASCII, ["vertex properties"]),

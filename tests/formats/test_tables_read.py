@@ -31,12 +31,14 @@ def failure(path, kind="force", call=read):
 def example(kind, rows=12):
     random = np.random.default_rng(1)
     table = pd.DataFrame(
-        {name: random.normal(size=rows) for name in (*KINDS[kind].required, *KINDS[kind].optional)}
+        {name: random.uniform(-0.9, 0.9, rows) for name in (*KINDS[kind].required, *KINDS[kind].optional)}
     )
     for name in KINDS[kind].whole:
         table[name] = np.arange(rows)
     if KINDS[kind].rising:
         table[KINDS[kind].rising] = np.arange(rows) * 0.25
+    if "coherence" in table:
+        table["coherence"] = table["coherence"].abs()
     return table
 
 
@@ -116,7 +118,7 @@ def test_a_file_that_is_not_there_is_said_to_be_so(tmp_path):
     assert "cannot be opened" in failure(tmp_path / "none.csv")
 
 
-@pytest.mark.parametrize("suffix", [".tdms", ".mat", ".pts", ".e57", ".stl", ".X3P"])
+@pytest.mark.parametrize("suffix", [".tdms", ".MAT"])
 def test_formats_without_a_reader_say_what_to_export(tmp_path, suffix):
     message = failure(written(tmp_path, "x", f"file{suffix}"))
     assert "files are not read yet; export it as" in message

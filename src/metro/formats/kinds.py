@@ -47,12 +47,16 @@ KINDS: dict[str, Kind] = {
         ),
         rising="t_s",
     ),
-    "path": Kind("a path", ("point", "pass", "x_mm", "y_mm", "z_mm"), whole=("point", "pass"), least=1),
-    "profile": Kind("a profile", ("x_mm", "z_mm")),
+    "path": Kind("a path", ("point", "pass", "x_mm", "y_mm", "z_mm"), whole=("point", "pass"), least=2),
+    "profile": Kind("a profile", ("x_mm", "z_mm"), rising="x_mm"),
     "cloud": Kind("a point cloud", ("x_mm", "y_mm", "z_mm"), least=3),
     "record": Kind("a hammer record", ("t_s", "force_n", "response"), rising="t_s"),
     "frf": Kind("an FRF", ("frequency_hz", "real", "imag"), ("coherence",), rising="frequency_hz"),
 }
+
+
+# Column → what its values lie between, where nothing else is possible.
+RANGES = {"frequency_hz": (0.0, np.inf), "coherence": (0.0, 1.0 + 1e-6)}
 
 
 @dataclass(frozen=True)
@@ -101,13 +105,21 @@ def checked(path: Path, kind: Kind, raw: Raw, least: int) -> pd.DataFrame:
         frame = _without_missing(frame)
     else:
         _check_finite(path, frame, raw.place)
-    if len(frame) < least:
-        raise FormatError(path, f"found {len(frame)} rows, expected at least {least} in {kind.title}")
+    at_least(path, kind, len(frame), least)
     if kind.rising:
         _check_rising(path, frame, kind.rising, raw.place)
     for name in kind.whole:
         _check_whole(path, frame, name, raw.place)
+    for name, (low, high) in RANGES.items():
+        if name in frame:
+            _check_range(path, frame, name, (low, high), raw.place)
     return frame.astype(dict.fromkeys(kind.whole, np.int64)) if kind.whole else frame
+
+
+def at_least(path: Path, kind: Kind, found: int, least: int) -> None:
+    """Raise a FormatError where a table has fewer than ``least`` rows."""
+    if found < least:
+        raise FormatError(path, f"found {found} rows, expected at least {least} in {kind.title}")
 
 
 def _without_missing(frame: pd.DataFrame) -> pd.DataFrame:
@@ -139,6 +151,21 @@ def _check_rising(path: Path, frame: pd.DataFrame, name: str, place: Callable[[i
         row = int(np.argmax(falls)) + 1
         found = f"found {values[row]:.9g} after {values[row - 1]:.9g}"
         raise FormatError(path, f"{place(row)}, column {name}: {found}, expected a larger value in every row")
+
+
+def _check_range(
+    path: Path, frame: pd.DataFrame, name: str, limits: tuple[float, float], place: Callable[[int], str]
+) -> None:
+    values = frame[name].to_numpy()
+    outside = (values < limits[0]) | (values > limits[1])
+    if outside.any():
+        row = int(np.argmax(outside))
+        expected = (
+            f"expected {limits[0]:g} to {limits[1]:g}"
+            if np.isfinite(limits[1])
+            else f"expected ≥ {limits[0]:g}"
+        )
+        raise FormatError(path, f"{place(row)}, column {name}: found {values[row]:g}, {expected}")
 
 
 def _check_whole(path: Path, frame: pd.DataFrame, name: str, place: Callable[[int], str]) -> None:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from metro.formats.cloud import points
+from metro.formats.cloud import counted, number_of, own_names, piece, record_pieces, slices
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
-from metro.formats.text import SPACES, Layout, numbers
+from metro.formats.text import SPACES, Layout, number_pieces
 
 _KEYS = ("fields", "size", "type", "points", "data")
 _ENCODINGS = ("ascii", "binary", "binary_compressed")
@@ -30,7 +31,7 @@ class Header:
     size: int
 
 
-def read_pcd(path: Path, kind: Kind, rows: int | None) -> Raw:
+def pcd_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     """Read the coordinates of a PCD file; other fields are ignored.
 
     Raises
@@ -39,20 +40,16 @@ def read_pcd(path: Path, kind: Kind, rows: int | None) -> Raw:
         Where the header is not one of a PCD file, x, y or z is missing, or the file ends early.
     """
     header = read_header(path)
-    names = list(header.columns)
-    count = header.points if rows is None else min(rows, header.points)
+    own = own_names(path, kind, header.columns)
     if header.encoding == "ascii":
         layout = Layout(header.columns, SPACES, header.lines)
-        raw = points(path, kind, names, lambda use: numbers(path, layout, use, count))
+        found = number_pieces(path, layout, list(own.values()), rows, header.points)
+        pieces: Iterator[Raw] = (piece(own, raw.frame, raw.place) for raw in found)
     elif header.encoding == "binary":
-        data = np.fromfile(path, header.record, count, offset=header.size)
-        raw = points(path, kind, names, lambda use: {name: data[name] for name in use})
+        pieces = record_pieces(path, own, header.record, rows, offset=header.size, count=header.points)
     else:
-        coordinates = _decompressed(path)[:count]
-        raw = points(path, kind, names, lambda use: {name: coordinates[:, "xyz".index(name)] for name in use})
-    if len(raw.frame) < count:
-        raise FormatError(path, f"ends early: found {len(raw.frame)} points, expected {header.points}")
-    return raw
+        pieces = _decompressed(path, own, rows)
+    yield from counted(path, "points", pieces, rows, header.points)
 
 
 def read_header(path: Path) -> Header:
@@ -94,8 +91,11 @@ def _fields(entries: dict[str, list[str]]) -> tuple[np.dtype[np.void], tuple[str
     return np.dtype([field if field[2] > 1 else field[:2] for field in record]), tuple(columns)
 
 
-def _decompressed(path: Path) -> npt.NDArray[np.float64]:
-    """Let Open3D undo the LZF compression."""
+def _decompressed(path: Path, own: Mapping[str, str], rows: int | None) -> Iterator[Raw]:
+    """Let Open3D undo the LZF compression; the whole cloud is in memory then."""
     import open3d
 
-    return np.asarray(open3d.io.read_point_cloud(path, format="pcd").points)
+    coordinates = np.asarray(open3d.io.read_point_cloud(path, format="pcd").points)
+    for part in slices(len(coordinates), rows):
+        columns = {name: coordinates[part, "xyz".index(name)] for name in own.values()}
+        yield piece(own, columns, partial(number_of, part.start))

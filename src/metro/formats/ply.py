@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from metro.formats.cloud import points
+from metro.formats.cloud import counted, own_names, piece, record_pieces
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
-from metro.formats.text import SPACES, Layout, numbers
+from metro.formats.text import SPACES, Layout, number_pieces
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
@@ -32,7 +33,7 @@ class Header:
     size: int
 
 
-def read_ply(path: Path, kind: Kind, rows: int | None) -> Raw:
+def ply_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     """Read the coordinates of the vertices; other properties and other elements are ignored.
 
     Raises
@@ -43,21 +44,16 @@ def read_ply(path: Path, kind: Kind, rows: int | None) -> Raw:
     """
     header = read_header(path)
     names = [name for name, _ in header.properties]
-    count = header.vertices if rows is None else min(rows, header.vertices)
+    own = own_names(path, kind, names)
     if header.encoding == "ascii":
         layout = Layout(tuple(names), SPACES, header.lines)
-        raw = points(path, kind, names, lambda use: numbers(path, layout, use, count))
-        found = len(raw.frame)
+        found = number_pieces(path, layout, list(own.values()), rows, header.vertices)
+        pieces: Iterator[Raw] = (piece(own, raw.frame, raw.place) for raw in found)
     else:
         order = _BYTE_ORDERS[header.encoding]
         record = np.dtype([(name, order + code) for name, code in header.properties])
-        found = min((path.stat().st_size - header.size) // record.itemsize, count)
-        # a map of the file, so that a large cloud is in memory once and not twice
-        vertices = np.memmap(path, record, "r", header.size, (found,)) if found else np.empty(0, record)
-        raw = points(path, kind, names, lambda use: {name: vertices[name] for name in use})
-    if found < count:
-        raise FormatError(path, f"ends early: found {found} vertices, expected {header.vertices}")
-    return raw
+        pieces = record_pieces(path, own, record, rows, offset=header.size, count=header.vertices)
+    yield from counted(path, "vertices", pieces, rows, header.vertices)
 
 
 def read_header(path: Path) -> Header:

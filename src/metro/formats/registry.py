@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,13 +13,19 @@ import pandas as pd
 
 from metro.formats import rosbag, rsi
 from metro.formats.dynoware import read_dynoware
+from metro.formats.e57 import SIGNATURE, e57_pieces
 from metro.formats.errors import FormatError
-from metro.formats.kinds import KINDS, Kind, Raw, checked
-from metro.formats.pcd import read_pcd
-from metro.formats.ply import read_ply
+from metro.formats.kinds import KINDS, Kind, Raw, at_least, checked
+from metro.formats.pcd import pcd_pieces
+from metro.formats.ply import ply_pieces
+from metro.formats.pts import pts_pieces
 from metro.formats.signals import read_csv, read_npz, read_parquet
+from metro.formats.stl import stl_pieces
 from metro.formats.uff import COHERENCE, FRF, Function, read_functions, read_uff
-from metro.formats.xyz import read_xyz
+from metro.formats.x3p import read_x3p
+from metro.formats.xyz import xyz_pieces
+
+Pieces = Callable[[Path, Kind, int | None], Iterator[Raw]]
 
 _HEAD = 512
 _FIRST_ROWS = 32
@@ -39,6 +45,7 @@ class Format:
     starts : what the content starts with; plain text starts with anything.
     kinds : the kinds of table it can hold.
     read : ``(path, kind, rows) -> Raw``; reads all rows where ``rows`` is None.
+    pieces : ``(path, kind, rows) -> iterator of Raw``, all rows by so many; None where a file is read whole.
     """
 
     title: str
@@ -46,19 +53,29 @@ class Format:
     starts: tuple[bytes, ...]
     kinds: tuple[str, ...]
     read: Callable[[Path, Kind, int | None], Raw]
+    pieces: Pieces | None = None
+
+
+def _cloud(title: str, suffixes: tuple[str, ...], starts: tuple[bytes, ...], pieces: Pieces) -> Format:
+    """Describe a format of clouds: its first piece is what :attr:`Format.read` gives."""
+    return Format(title, suffixes, starts, ("cloud",), lambda *asked: next(pieces(*asked)), pieces)
 
 
 # Content is asked first, in this order; plain text comes last because it has no mark of its own.
 FORMATS = (
     Format("Parquet", (".parquet", ".pq"), (b"PAR1",), _TABLES, read_parquet),
     Format("NumPy archive", (".npz",), (b"PK\x03\x04",), ("frf",), read_npz),
-    Format("PLY", (".ply",), (b"ply\n", b"ply\r"), ("cloud",), read_ply),
-    Format("PCD", (".pcd",), (b"# .PCD", b"#.PCD", b"VERSION"), ("cloud",), read_pcd),
+    _cloud("PLY", (".ply",), (b"ply\n", b"ply\r"), ply_pieces),
+    _cloud("PCD", (".pcd",), (b"# .PCD", b"#.PCD", b"VERSION"), pcd_pieces),
+    _cloud("E57", (".e57",), (SIGNATURE,), e57_pieces),
     Format("universal", (".uff", ".unv", ".uf"), _UNIVERSAL, ("frf",), read_uff),
     Format("KUKA RSI recording", (".rsi", ".xml"), rsi.STARTS, ("robot",), rsi.read_rsi),
     Format("ROS 2 bag", (".mcap", ".db3"), rosbag.STARTS, ("robot",), rosbag.read_rosbag),
     Format("DynoWare text export", (".txt", ".csv"), (b"DynoWare",), ("force",), read_dynoware),
-    Format("point list", (".xyz", ".txt", ".asc", ".csv"), _ANY, ("cloud",), read_xyz),
+    Format("X3P", (".x3p",), (b"PK\x03\x04",), ("profile",), read_x3p),
+    _cloud("PTS", (".pts",), _ANY, pts_pieces),
+    _cloud("STL", (".stl",), _ANY, stl_pieces),
+    _cloud("point list", (".xyz", ".txt", ".asc", ".csv"), _ANY, xyz_pieces),
     Format("CSV", (".csv", ".txt"), _ANY, tuple(kind for kind in _TABLES if kind != "cloud"), read_csv),
 )
 
@@ -66,10 +83,6 @@ FORMATS = (
 UNREAD = {
     ".tdms": "CSV or Parquet",
     ".mat": "CSV, Parquet or (for an FRF) npz",
-    ".pts": "PLY, PCD or XYZ",
-    ".e57": "PLY, PCD or XYZ",
-    ".stl": "PLY, PCD or XYZ",
-    ".x3p": "CSV or Parquet",
 }
 
 
@@ -91,6 +104,21 @@ def read(path: Path, kind: str) -> pd.DataFrame:
         Naming file, place, column, what was found and what was expected.
     """
     return checked(path, KINDS[kind], _format_of(path, kind).read(path, KINDS[kind], None), KINDS[kind].least)
+
+
+def read_cloud(path: Path, rows: int) -> Iterator[pd.DataFrame]:
+    """Read a point cloud in pieces of so many points, for what is larger than memory; as :func:`read`.
+
+    Parquet, compressed PCD and STL are read whole.
+    """
+    kind, found = KINDS["cloud"], 0
+    format_ = _format_of(path, "cloud")
+    whole = (format_.read(path, kind, None) for _ in range(1))
+    for raw in format_.pieces(path, kind, rows) if format_.pieces else whole:
+        table = checked(path, kind, raw, 0)
+        found += len(table)
+        yield table
+    at_least(path, kind, found, kind.least)
 
 
 def sniff(path: Path, kind: str) -> None:
@@ -162,7 +190,8 @@ def _format_of(path: Path, kind: str) -> Format:
         if kind in each.kinds:
             return each
     if known or named:
-        raise FormatError(path, f"found a {(known or named)[0].title} file, expected {title}")
+        found = max(known or named, key=lambda each: suffix in each.suffixes)  # archives all start alike
+        raise FormatError(path, f"found a {found.title} file, expected {title}")
     marked = [each.title for each in FORMATS if suffix in each.suffixes]
     if marked:
         raise FormatError(

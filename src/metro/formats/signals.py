@@ -77,6 +77,8 @@ def read_npz(path: Path, kind: Kind, rows: int | None) -> Raw:
         if name in ("freq_hz", "frf", "coherence") and array.shape != arrays["freq_hz"].shape:
             shape = f"found shape {array.shape}, expected {arrays['freq_hz'].shape} as freq_hz has"
             raise FormatError(path, f"array {name}: {shape}")
+        if name in ("freq_hz", "frf", "coherence") and not np.issubdtype(array.dtype, np.number):
+            raise FormatError(path, f"array {name}: found values of type {array.dtype}, expected numbers")
     frf = arrays["frf"]
     columns = {"frequency_hz": arrays["freq_hz"], "real": frf.real, "imag": frf.imag}
     if "coherence" in arrays:

@@ -6,6 +6,7 @@ import csv
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -86,24 +87,36 @@ def numbers(path: Path, layout: Layout, use: Sequence[str], rows: int | None) ->
     FormatError
         With line and column where a field is not a number, or a line has more fields than the header.
     """
+    return next(number_pieces(path, layout, use, rows))
 
-    def place(row: int) -> str:
-        number, _ = next(islice(lines(path, layout.skip), row, None))
-        return f"line {number}"
 
+def number_pieces(
+    path: Path, layout: Layout, use: Sequence[str], rows: int | None, limit: int | None = None
+) -> Iterator[Raw]:
+    """Read as :func:`numbers` in pieces of so many rows, ``limit`` rows together; there is always one."""
+    start = 0
     try:
-        return Raw(_parse(path, layout, use, rows, np.float64), place)
+        for frame in _parse(path, layout, use, rows, limit=limit, dtype=np.float64):
+            yield Raw(frame, partial(_place, path, layout, start))
+            start += len(frame)
     except pd.errors.ParserError as error:
         raise FormatError(path, _ragged(str(error))) from error
     except ValueError as error:
-        row, column, found = _not_a_number(_parse(path, layout, use, rows, str))
+        row, column, found = _first_fault(_parse(path, layout, use, rows, limit=limit, dtype=str))
         hint = f"; {DECIMAL_COMMA}" if re.match(r"[-+]?\d+,\d", found) else ""
-        message = f"{place(row)}, column {column}: found {found!r}, expected a number{hint}"
+        message = f"{_place(path, layout, 0, row)}, column {column}: found {found!r}, expected a number{hint}"
         raise FormatError(path, message) from error
 
 
-def _parse(path: Path, layout: Layout, use: Sequence[str], rows: int | None, dtype: type) -> pd.DataFrame:
-    frame = pd.read_csv(
+def _place(path: Path, layout: Layout, start: int, row: int) -> str:
+    number, _ = next(islice(lines(path, layout.skip), start + row, None))
+    return f"line {number}"
+
+
+def _parse(
+    path: Path, layout: Layout, use: Sequence[str], rows: int | None, *, limit: int | None, dtype: type
+) -> Iterator[pd.DataFrame]:
+    with pd.read_csv(
         path,
         sep=layout.parted_by,
         header=None,
@@ -111,14 +124,30 @@ def _parse(path: Path, layout: Layout, use: Sequence[str], rows: int | None, dty
         index_col=False,
         dtype=dict.fromkeys(use, dtype),
         skiprows=layout.skip,
-        nrows=rows,
+        nrows=limit,
+        iterator=True,
         comment="#",
         skipinitialspace=True,
         low_memory=False,
         encoding="utf-8-sig",
         encoding_errors="replace",
-    )
-    return frame[list(use)]
+    ) as reader:
+        if rows is None:
+            yield reader.read(limit)[list(use)]
+            return
+        frame = _next_chunk(reader, rows)
+        if frame is None:
+            yield pd.DataFrame({name: np.empty(0) for name in use})
+        while frame is not None:
+            yield frame[list(use)]
+            frame = _next_chunk(reader, rows)
+
+
+def _next_chunk(reader: pd.io.parsers.TextFileReader, rows: int) -> pd.DataFrame | None:
+    try:
+        return reader.get_chunk(rows)
+    except StopIteration:
+        return None
 
 
 def _labels(path: Path, layout: Layout, use: Sequence[str]) -> list[str]:
@@ -141,8 +170,13 @@ def _ragged(message: str) -> str:
     return f"line {line}: found {saw} fields, expected {expected} as in the header; {DECIMAL_COMMA}"
 
 
-def _not_a_number(text: pd.DataFrame) -> tuple[int, str, str]:
+def _first_fault(pieces: Iterator[pd.DataFrame]) -> tuple[int, str, str]:
     """Find row, column and content of the first field that is not a number."""
-    wrong = text.apply(pd.to_numeric, errors="coerce").isna().to_numpy() & text.notna().to_numpy()
-    row, column = divmod(int(np.argmax(wrong)), wrong.shape[1])
-    return row, str(text.columns[column]), str(text.iloc[row, column])
+    start = 0
+    for text in pieces:
+        wrong = text.apply(pd.to_numeric, errors="coerce").isna().to_numpy() & text.notna().to_numpy()
+        if wrong.any():
+            row, column = divmod(int(np.argmax(wrong)), wrong.shape[1])
+            return start + row, str(text.columns[column]), str(text.iloc[row, column])
+        start += len(text)
+    raise AssertionError("no field fails where a column did")

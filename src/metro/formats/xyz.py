@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
-from metro.formats.cloud import points
+from metro.formats.cloud import own_names, piece
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
-from metro.formats.text import SPACES, Layout, fields, is_number, lines, numbers
+from metro.formats.text import SPACES, Layout, fields, is_number, lines, number_pieces
 
 _HEADER_LINES = 100
 
 
-def read_xyz(path: Path, kind: Kind, rows: int | None) -> Raw:
+def xyz_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     """Read a cloud of one point a line, parted by spaces, tabs, commas or semicolons.
 
     Comments (``//`` or ``#``), a line with the number of points and a header may come before the points.
     Without a header that names x, y and z these are the first three columns.
     """
     layout = _layout(path, kind)
-    return points(path, kind, layout.names, lambda use: numbers(path, layout, use, rows))
+    own = own_names(path, kind, layout.names)
+    for found in number_pieces(path, layout, list(own.values()), rows):
+        yield piece(own, found.frame, found.place)
 
 
 def _layout(path: Path, kind: Kind) -> Layout:

@@ -15,18 +15,21 @@ from metro.batch.batch import Batch
 from metro.batch.canonical import Part
 from metro.batch.findings import Finding as Problem
 from metro.batch.manifest import signed_axes
+from metro.dynamics.hits import Hit, fault
 from metro.formats import FormatError
-from metro.formats.registry import ReadFrf, read, read_frfs
-from metro.signals import quality
-from metro.signals.conversion import driving_point_sign, moved, receptance, response_si, sensor_to_tool
+from metro.formats.registry import ReadFrf, read, read_cloud, read_frfs
+from metro.signals import plausible, quality
+from metro.signals.conversion import driving_point_sign, receptance, response_si, sensor_to_tool
 from metro.units import MS, Array
 
 FORCES = ("fx_n", "fy_n", "fz_n")
 POINT = ("x_mm", "y_mm", "z_mm")
+SET = tuple(f"q{i}_set_deg" for i in range(1, 7))
+ACTUAL = tuple(f"q{i}_deg" for i in range(1, 7))
 TORQUES = tuple(f"tau{i}_nm" for i in range(1, 7))
 
-# A cloud this much smaller than the work is in metres: a factor of 1000, and room for a scan of a small part.
-METRES = 0.005
+# Checks that a recording must pass to be used; one that does not is left out, and the report says so.
+MUST_PASS = frozenset({"dead channel", "clipping", "channels alike", "motion", "FRF convention"})
 
 
 @dataclass
@@ -39,6 +42,8 @@ class Recordings:
     problems : files that could not be read; they give no part.
     findings : rows of the quality table.
     zeros : run → the dynamometer's first time stamp, s: the zero of all clocks of that run.
+    paths : run → extents (2,) of its programmed path in x and y, mm.
+    left_out : run and column of runs.csv of each recording that is not fit for use.
     """
 
     folder: Path
@@ -46,6 +51,8 @@ class Recordings:
     problems: list[Problem] = field(default_factory=list)
     findings: list[dict[str, object]] = field(default_factory=list)
     zeros: dict[str, float] = field(default_factory=dict)
+    paths: dict[str, Array] = field(default_factory=dict)
+    left_out: list[tuple[str, str]] = field(default_factory=list)
 
     def table(self, file: str, kind: str) -> pd.DataFrame | None:
         """Read a file; None, and a problem gathered, where that is impossible."""
@@ -54,6 +61,15 @@ class Recordings:
         except FormatError as error:
             self.problems.append(Problem("error", file, error.message))
             return None
+        finally:
+            self.advance()
+
+    def cloud(self, file: str, rows: int) -> Iterator[pd.DataFrame]:
+        """Read a point cloud in pieces of so many points; what cannot be read ends it, a problem gathered."""
+        try:
+            yield from read_cloud(self.folder / file, rows)
+        except FormatError as error:
+            self.problems.append(Problem("error", file, error.message))
         finally:
             self.advance()
 
@@ -70,6 +86,22 @@ class Recordings:
     def note(self, file: str, run: str, findings: list[quality.Finding]) -> None:
         """Add findings on a file to the quality table."""
         self.findings += [{"file": file, "run": run, **finding._asdict()} for finding in findings]
+
+    def doubt(self, file: str, message: str) -> bool:
+        """Gather a problem of a file, where there is one (""); tell whether there is."""
+        self.problems += [Problem("error", file, message)] if message else []
+        return bool(message)
+
+    def fit(self, file: str, run: str, column: str, findings: list[quality.Finding]) -> bool:
+        """Note findings on a run's recording; tell whether it can be used, and leave it out otherwise."""
+        failed = [each.check in MUST_PASS and not each.ok for each in findings]
+        told = [
+            each._replace(message=f"{each.message}; the recording is left out") if bad else each
+            for each, bad in zip(findings, failed, strict=True)
+        ]
+        self.note(file, run, told)
+        self.left_out += [(run, column)] if any(failed) else []
+        return not any(failed)
 
 
 def files(batch: Batch, column: str) -> Iterator[tuple[str, str]]:
@@ -92,11 +124,14 @@ def force(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         recordings.zeros[run] = zero
         readings = table[list(FORCES)].to_numpy()
         names = ("Fx", "Fy", "Fz")
+        unit = plausible.clock(time, sensor.get("rate_hz")) or _force_unit(batch, run, readings)
+        if recordings.doubt(file, unit):
+            continue
         recordings.note(file, run, [_starts_at(zero), *quality.sampling(time, sensor.get("rate_hz"))])
-        for name, values in zip(names, readings.T, strict=True):
-            checks = [quality.dead(name, values), quality.flat_tops(name, values, sensor.get("range_n"))]
-            recordings.note(file, run, checks)
         recordings.note(file, run, quality.air_offset(names, readings))
+        full_scale = sensor.get("range_n")
+        if not recordings.fit(file, run, "dynamometer", _channels(names, readings, full_scale)):
+            continue
         part = {"run": run, "t_s": time, **dict(zip(FORCES, to_tool @ readings.T, strict=True))}
         yield part | ({"spindle_deg": table["spindle_deg"]} if "spindle_deg" in table else {})
 
@@ -108,16 +143,26 @@ def robot(batch: Batch, recordings: Recordings) -> Iterator[Part]:
     """
     period_ms = batch.instrument("robot_log").get("period_ms")
     rate = None if period_ms is None else 1.0 / (period_ms * MS)
+    places: dict[str, Array] = {}
     for column, log in (("robot_log", "cut"), ("idle_log", "idle")):
         for run, file in files(batch, column):
             table = recordings.table(file, "robot")
             if table is None:
                 continue
             time, own = _from_zero(table)
+            goes = table[list(SET)].to_numpy()
+            doubt = plausible.clock(time, rate) or _joint_doubt(table)
+            if log == "idle" and run in places:
+                doubt = doubt or plausible.same_place(places[run], goes)
+            if recordings.doubt(file, doubt):
+                continue
+            places |= {run: goes} if log == "cut" else {}
             zero = recordings.zeros.get(run, own) if log == "cut" else own
             recordings.note(file, run, [_starts_at(zero), *quality.sampling(time, rate)])
             recordings.note(file, run, [quality.Finding(*found) for found in table.attrs.get("notes", ())])
-            recordings.note(file, run, [quality.dead(name, table[name].to_numpy()) for name in TORQUES])
+            checks = [quality.motion(goes), *_channels(TORQUES, table[list(TORQUES)].to_numpy(), None)]
+            if not recordings.fit(file, run, column, checks):
+                continue
             angles = {str(name): table[name] for name in table.columns.drop("t_s")}
             yield {"run": run, "log": log, "t_s": time + (own - zero), **angles}
 
@@ -127,6 +172,12 @@ def path(batch: Batch, recordings: Recordings) -> Iterator[Part]:
     for run, file in files(batch, "path"):
         table = recordings.table(file, "path")
         if table is not None:
+            size = (batch.manifest.get("work") or {}).get("size_mm")
+            if size is not None:
+                recordings.doubt(
+                    file, plausible.tip_path(table[list(POINT)].to_numpy(), np.array(size, float))
+                )
+            recordings.paths[run] = np.asarray(np.ptp(table[["x_mm", "y_mm"]].to_numpy(), axis=0))
             yield {"run": run, **{str(name): table[name] for name in table}}
 
 
@@ -135,27 +186,12 @@ def profile(batch: Batch, recordings: Recordings) -> Iterator[Part]:
     for run, file in files(batch, "profile"):
         table = recordings.table(file, "profile")
         if table is not None:
-            recordings.note(file, run, [quality.dead("z", table["z_mm"].to_numpy())])
-            yield {"run": run, "x_mm": table["x_mm"], "z_mm": table["z_mm"]}
-
-
-def scan(batch: Batch, recordings: Recordings) -> Iterator[Part]:
-    """Yield each point cloud, in the work frame where ``to_work`` is known."""
-    to_work = batch.instrument("scanner").get("to_work")
-    size_mm = (batch.manifest.get("work") or {}).get("size_mm")
-    for run, file in files(batch, "scan"):
-        table = recordings.table(file, "cloud")
-        if table is None:
-            continue
-        problem = _in_metres(table, size_mm)
-        if problem:
-            recordings.problems.append(Problem("error", file, problem))
-            continue
-        recordings.note(file, run, [quality.missing_points(table.attrs["dropped"], len(table))])
-        columns = [table[name].to_numpy() for name in POINT]
-        if to_work is not None:
-            columns = list(moved(np.column_stack(columns), np.array(to_work, float)).T)
-        yield {"run": run, **dict(zip(POINT, columns, strict=True))}
+            x, z = table["x_mm"].to_numpy(), table["z_mm"].to_numpy()
+            cut = float(batch.runs["cut_length_mm"][run])
+            recordings.doubt(file, plausible.trace(x, z, None if np.isnan(cut) else cut))
+            recordings.note(file, run, [quality.sampling(x)[-1]])
+            if recordings.fit(file, run, "profile", _channels(("z",), z[:, None], None)):
+                yield {"run": run, "x_mm": x, "z_mm": z}
 
 
 def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:
@@ -168,8 +204,12 @@ def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator
             continue
         time, zero = _from_zero(table)
         recordings.note(file, "", [_starts_at(zero), *quality.sampling(time, rate)])
+        force_n = table["force_n"].to_numpy()
+        if recordings.doubt(file, plausible.clock(time, rate) or plausible.hammer_force(force_n)):
+            continue
         response = response_si(table["response"].to_numpy(), unit)
-        for name, values in (("hammer force", table["force_n"].to_numpy()), ("response", response)):
+        recordings.note(file, "", [_hit(Hit(force_n, response, 1.0 / float(np.mean(np.diff(time)))))])
+        for name, values in (("hammer force", force_n), ("response", response)):
             recordings.note(file, "", [quality.dead(name, values), quality.flat_tops(name, values)])
         si_unit = "m/s2" if unit == "g" else unit
         columns: Part = {"t_s": time, "force_n": table["force_n"], "response_si": response}
@@ -184,9 +224,11 @@ def frf(impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:
     """
     for row in impacts[impacts["kind"] != "record"].to_dict("records"):
         repeats: Counter[tuple[str, str]] = Counter()
+        others: list[str] = []
         for one in recordings.frfs(str(row["file"])):
             pair = one.reference or str(row["reference"]), one.response or str(row["response"])
             if one.reference and not _asked(row, pair):
+                others.append(f"{pair[0]} to {pair[1]}")
                 continue
             repeats[pair] += 1
             place = _place(row) | {"reference": pair[0], "response": pair[1]}
@@ -194,7 +236,13 @@ def frf(impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:
                 place["replicate"] = repeats[pair]
             unit = one.unit or str(row["response_unit"]) or "m"
             driving = pair[0] == pair[1]
-            yield place | _receptance(str(row["file"]), one.table, unit, recordings, driving=driving)
+            part = _receptance(str(row["file"]), one.table, unit, recordings, driving=driving)
+            if part is not None:
+                yield place | part
+        if others and not repeats:
+            asked = f"{row['reference'] or 'any'} to {row['response'] or 'any'}"
+            found = f"found FRFs of {', '.join(dict.fromkeys(others))}, expected {asked}"
+            recordings.doubt(str(row["file"]), f"{found} as impacts.csv says")
 
 
 def _asked(row: Mapping[Hashable, Any], pair: tuple[str, str]) -> bool:
@@ -203,14 +251,21 @@ def _asked(row: Mapping[Hashable, Any], pair: tuple[str, str]) -> bool:
 
 def _receptance(
     file: str, table: pd.DataFrame, unit: str, recordings: Recordings, *, driving: bool
-) -> dict[str, np.ndarray | pd.Series | str | int]:
-    """Columns of the canonical table of one FRF; its convention is noted where it is a driving point's."""
+) -> dict[str, np.ndarray | pd.Series | str | int] | None:
+    """Columns of the canonical table of one FRF; None where it is not fit for use.
+
+    The sign of its imaginary part is checked where it is a driving point's.
+    """
     frequency = table["frequency_hz"].to_numpy()
     values = receptance(frequency, table["real"].to_numpy() + 1j * table["imag"].to_numpy(), unit)
     keep = np.isfinite(values)
+    if recordings.doubt(file, plausible.frf(frequency[keep], values[keep])):
+        return None
+    checks = [quality.dead("the FRF", np.abs(values[keep]))]
     if driving:
-        sign = driving_point_sign(frequency[keep], values[keep])
-        recordings.note(file, "", [quality.conjugated(sign)])
+        checks.append(quality.conjugated(driving_point_sign(frequency[keep], values[keep])))
+    if not recordings.fit(file, "", "file", checks):
+        return None
     coherence = {"coherence": table["coherence"].to_numpy()[keep]} if "coherence" in table else {}
     values = values[keep]
     return {"frequency_hz": frequency[keep], "real_m_n": values.real, "imag_m_n": values.imag, **coherence}
@@ -219,6 +274,34 @@ def _receptance(
 def _place(row: Mapping[Hashable, Any]) -> dict[str, np.ndarray | pd.Series | str | int]:
     texts = {name: str(row[name]) for name in ("test", "position", "reference", "response")}
     return {**texts, "replicate": 1 if np.isnan(row["replicate"]) else int(row["replicate"])}
+
+
+def _channels(names: tuple[str, ...], values: Array, full_scale: float | None) -> list[quality.Finding]:
+    """Check channels (n, k): each moves, none is clipped, and no two are the same."""
+    columns = list(zip(names, values.T, strict=True))
+    checks = [
+        check
+        for name, v in columns
+        for check in (quality.dead(name, v), quality.flat_tops(name, v, full_scale))
+    ]
+    return [*checks, quality.alike(names, values)]
+
+
+def _force_unit(batch: Batch, run: str, readings: Array) -> str:
+    chip = float(batch.runs["axial_depth_mm"][run]) * float(batch.runs["feed_per_tooth_mm"][run])
+    return plausible.cutting_force(readings, chip, batch.manifest["coefficients"].get("ktc_n_mm2"))
+
+
+def _joint_doubt(table: pd.DataFrame) -> str:
+    names = [*SET, *ACTUAL]
+    doubt = plausible.angles(names, table[names].to_numpy())
+    return doubt or plausible.following(table[list(SET)].to_numpy(), table[list(ACTUAL)].to_numpy())
+
+
+def _hit(hit: Hit) -> quality.Finding:
+    reason = fault(hit)
+    message = f"{reason}: the hit is left out; hit again" if reason else "one clean hit"
+    return quality.Finding("hit", np.nan, np.nan, not reason, message)
 
 
 def _from_zero(table: pd.DataFrame) -> tuple[Array, float]:
@@ -230,12 +313,3 @@ def _from_zero(table: pd.DataFrame) -> tuple[Array, float]:
 def _starts_at(zero: float) -> quality.Finding:
     message = f"t_s is counted from {zero:.6g} s of the file's clock"
     return quality.Finding("time zero", zero, np.nan, True, message)
-
-
-def _in_metres(table: pd.DataFrame, size_mm: list[float] | None) -> str:
-    """Say so where a cloud's extent is that of the work in metres."""
-    extent = max(float(np.ptp(table[name].to_numpy())) for name in POINT)
-    if size_mm is None or extent >= METRES * max(size_mm):
-        return ""
-    found = f"the points span {extent:.4g}, the work is {max(size_mm):g} mm long"
-    return f"{found}: coordinates seem to be in metres, expected millimetres"

@@ -1,0 +1,140 @@
+"""Point clouds in E57 (ASTM E2807), read by pye57 (libE57Format): several scans, each with its pose.
+
+The standard's unit of length is the metre. Pages carry checksums, which the library verifies.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from metro.formats.cloud import number_of, piece
+from metro.formats.errors import FormatError
+from metro.formats.kinds import Kind, Raw
+from metro.formats.packets import Note
+from metro.units import MM, Array
+
+SIGNATURE = b"ASTM-E57"
+
+_HEADER = struct.Struct("<8s2L4Q")  # signature, version, file length, offset and length of the XML, page size
+_CHECKSUM = 4
+_LARGEST_XML = 1 << 26
+_CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
+_SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
+_STATE = {_CARTESIAN: "cartesianInvalidState", _SPHERICAL: "sphericalInvalidState"}
+_OWN = {"x_mm": "x", "y_mm": "y", "z_mm": "z"}
+
+
+def e57_pieces(path: Path, _kind: Kind, rows: int | None) -> Iterator[Raw]:
+    """Read the points of all scans, moved by their poses into the frame of the file, in millimetres.
+
+    Points that a scan marks as invalid have no coordinates. A note of the first piece says what was joined.
+
+    Raises
+    ------
+    FormatError
+        Where header, pages or XML are damaged, entities are declared, or a scan has neither Cartesian nor
+        spherical coordinates.
+    """
+    import pye57
+
+    _check_header(path)
+    try:
+        with pye57.E57(str(path)) as file:
+            yield from _scans(path, file, rows)
+    except (pye57.libe57.E57Exception, RuntimeError) as error:
+        raise FormatError(path, f"is not a readable E57 file: {' '.join(str(error).split())}") from error
+
+
+def _check_header(path: Path) -> None:
+    """Check the file's length, and that its XML declares no entities, which could unfold to any size."""
+    with path.open("rb") as stream:
+        head = stream.read(_HEADER.size)
+        if len(head) < _HEADER.size:
+            raise FormatError(
+                path, f"ends early: found {len(head)} bytes, expected a header of {_HEADER.size}"
+            )
+        _, _, _, length, start, size, page = _HEADER.unpack(head)
+        there = path.stat().st_size
+        if there < length:
+            raise FormatError(path, f"ends early: found {there} bytes, expected {length}")
+        if page <= _CHECKSUM or size > _LARGEST_XML:
+            message = f"found an XML section of {size} bytes on pages of {page}"
+            raise FormatError(path, f"{message}, expected at most {_LARGEST_XML} on pages of 1024")
+        stream.seek(start - start % page)
+        pages = (start % page + size) // (page - _CHECKSUM) + 1
+        held = b"".join(stream.read(page)[:-_CHECKSUM] for _ in range(pages))
+        xml = held[start % page : start % page + size]
+    if b"<!DOCTYPE" in xml or b"<!ENTITY" in xml or b"\0" in xml:
+        raise FormatError(path, "its XML declares a document type or is not UTF-8, expected neither")
+
+
+def _scans(path: Path, file: Any, rows: int | None) -> Iterator[Raw]:
+    count = int(file.scan_count)
+    headers = [file.get_header(index) for index in range(count)]
+    posed = sum(bool(header.has_pose()) for header in headers)
+    note = Note(
+        "joined scans", float(count), np.nan, True, f"{count} scans were joined, {posed} by their poses"
+    )
+    parts: Iterator[Array] = (points for header in headers for points in _points(path, file, header, rows))
+    if rows is None:
+        parts = iter([np.concatenate([np.empty((0, 3)), *parts])])
+    start = 0
+    for points in parts:
+        raw = piece(_OWN, dict(zip("xyz", points.T, strict=True)), partial(number_of, start))
+        if not start:
+            raw.frame.attrs["notes"] = [note]
+        start += len(points)
+        yield raw
+    if not start and rows is not None:
+        yield piece(_OWN, dict(zip("xyz", np.empty((3, 0)), strict=True)), partial(number_of, 0))
+
+
+def _points(path: Path, file: Any, header: Any, rows: int | None) -> Iterator[Array]:
+    """Yield the points (n, 3) of a scan in mm, so many at a time."""
+    fields = set(header.point_fields)
+    names = next((group for group in _STATE if fields.issuperset(group)), None)
+    if names is None:
+        found = ", ".join(header.point_fields)
+        raise FormatError(path, f"found a scan with {found}, expected {', '.join(_CARTESIAN)}")
+    state = _STATE[names]
+    turn, shift = _pose(header)
+    wanted = [*names, *([state] if state in fields else [])]
+    capacity = max(1, header.point_count if rows is None else min(rows, header.point_count))
+    data, buffers = file.make_buffers(wanted, capacity)
+    reader = header.points.reader(buffers)
+    while size := reader.read():
+        points = np.column_stack([data[name][:size] for name in names])
+        if names is _SPHERICAL:
+            points = _from_spherical(points)
+        if state in data:
+            points[data[state][:size] != 0] = np.nan
+        yield (points @ turn.T + shift) / MM
+    reader.close()
+
+
+def _pose(header: Any) -> tuple[Array, Array]:
+    """Return rotation (3, 3) and translation (3,) in m of a scan in the frame of the file."""
+    turn, shift = np.eye(3), np.zeros(3)
+    if not header.has_pose():
+        return turn, shift
+    pose = header["pose"]
+    if pose.isDefined("translation"):
+        shift = np.array([float(pose["translation"][name].value()) for name in "xyz"])
+    if pose.isDefined("rotation"):
+        w, x, y, z = (float(pose["rotation"][name].value()) for name in "wxyz")
+        across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        turn += 2 * (w * across + across @ across) / (w * w + x * x + y * y + z * z)  # Rodrigues
+    return turn, shift
+
+
+def _from_spherical(points: Array) -> Array:
+    """Range, azimuth from x towards y, elevation from the xy plane → x, y, z."""
+    distance, azimuth, elevation = points.T
+    across = distance * np.cos(elevation)
+    return np.column_stack([across * np.cos(azimuth), across * np.sin(azimuth), distance * np.sin(elevation)])

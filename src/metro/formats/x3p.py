@@ -1,0 +1,50 @@
+"""Profiles in X3P (ISO 25178-72): a ZIP archive of XML and binary heights, in metres."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from metro.formats.errors import FormatError
+from metro.formats.kinds import Kind, Raw
+from metro.units import MM
+
+LARGEST = 1 << 30  # bytes unpacked: a profile has thousands of points, not so many
+
+
+def read_x3p(path: Path, kind: Kind, rows: int | None) -> Raw:
+    """Read a profile of one layer: ``x_mm`` along the trace, ``z_mm``; checksums are verified.
+
+    Points that were not measured are left out at the ends of the trace; within it they are an error, as in
+    every other profile.
+
+    Raises
+    ------
+    FormatError
+        Where the archive is damaged or unpacks to more than 1 GiB, or holds no single profile.
+    """
+    import x3pio
+
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > LARGEST:
+            raise FormatError(path, f"unpacks to {size} bytes, expected at most {LARGEST} in {kind.title}")
+        content = x3pio.read(path)
+    except (x3pio.X3pError, zipfile.BadZipFile, OSError) as error:
+        raise FormatError(path, f"is not a readable X3P file: {error}") from error
+    if not isinstance(content, x3pio.Profile):
+        found = type(content).__name__.lower()
+        raise FormatError(path, f"found a {found} of ISO 25178-72, expected {kind.title}")
+    if len(content.layers) != 1:
+        raise FormatError(path, f"found {len(content.layers)} layers, expected one: a trace per file")
+    points = np.asarray(content.layers[0].points(), dtype=np.float64).reshape(-1, 3)
+    measured = np.flatnonzero(np.isfinite(points).all(axis=1))
+    first, last = (measured[0], measured[-1] + 1) if len(measured) else (0, 0)
+    trace = points[first:last][:rows] / MM
+    return Raw(
+        pd.DataFrame({"x_mm": trace[:, 0], "z_mm": trace[:, 2]}), lambda row: f"point {first + row + 1}"
+    )

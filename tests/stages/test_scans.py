@@ -1,0 +1,123 @@
+"""Scans as parts of the canonical table: their unit, their part, their size, and the memory they take."""
+
+import tracemalloc
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from metro.batch.batch import Batch
+from metro.stages import scans
+from metro.stages.recordings import Recordings
+
+EYE = np.eye(4).tolist()
+
+
+def raster(width, height, pitch=1.0):
+    x, y = np.meshgrid(np.arange(0.5, width, pitch), np.arange(0.5, height, pitch))
+    return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+
+
+def batch(size=(100, 60, 30), **scanner):
+    manifest = {"instruments": {"scanner": scanner}} | ({"work": {"size_mm": list(size)}} if size else {})
+    return Batch("b", manifest, {}, pd.DataFrame({"scan": ["s.ply"]}, index=["r"]), {})
+
+
+def write(folder, points):
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+    header += "".join(f"property float {name}\n" for name in "xyz") + "end_header\n"
+    (folder / "s.ply").write_bytes(header.encode() + np.asarray(points, "<f4").tobytes())
+
+
+def scanned(folder, points, described, path=None):
+    """Return the parts, and what the stage has to say of a scan with these points."""
+    write(folder, points)
+    recordings = Recordings(folder, lambda: None)
+    if path is not None:
+        recordings.paths["r"] = np.array(path, float)
+    parts = list(scans.scan(described, recordings))
+    return parts, recordings
+
+
+def problem(folder, points, described, path=None):
+    (found,) = scanned(folder, points, described, path)[1].problems
+    assert found.file == "s.ply"
+    return found.message
+
+
+def test_a_scan_of_the_work_is_taken_as_it_is(tmp_path):
+    points = raster(100, 60)
+    parts, recordings = scanned(tmp_path, points, batch())
+    assert recordings.problems == []
+    np.testing.assert_array_equal(np.concatenate([part["x_mm"] for part in parts]), points[:, 0])
+    assert [finding["check"] for finding in recordings.findings] == ["missing points"]
+
+
+@pytest.mark.parametrize(
+    ("size", "unit"), [(1e3, "metres"), (25.4, "inches"), (10.0, "centimetres"), (1e-3, "micrometres")]
+)
+@pytest.mark.parametrize("placed", [True, False])
+def test_a_scan_in_another_unit_is_refused_with_what_was_expected(tmp_path, size, unit, placed):
+    described = batch(to_work=EYE) if placed else batch()
+    message = problem(tmp_path, raster(100, 60) / size, described)
+    assert message.endswith(
+        f"the work is 100 × 60 mm: coordinates seem to be in {unit}, expected millimetres"
+    )
+
+
+@pytest.mark.parametrize("sides", [(100, 40), (140, 60), (70, 42)])
+def test_a_scan_of_another_part_is_refused(tmp_path, sides):
+    message = problem(tmp_path, raster(*sides), batch())
+    assert "the work is 100 × 60 mm, expected 80 × 48 to 125 × 75 mm" in message
+    assert "another part" in message
+
+
+def test_a_scan_that_was_turned_by_its_transform_is_of_another_part(tmp_path):
+    assert "another part" in problem(tmp_path, raster(60, 100), batch(to_work=EYE))
+    assert scanned(tmp_path, raster(60, 100), batch())[1].problems == []
+
+
+def test_the_margin_is_declared(tmp_path):
+    assert scanned(tmp_path, raster(50, 30), batch(extent_margin=1.1))[1].problems == []
+    assert "expected 50 × 30 to 200 × 120 mm" in problem(tmp_path, raster(45, 30), batch(extent_margin=1.0))
+
+
+def test_without_a_size_the_path_tells_the_unit(tmp_path):
+    nothing = batch(size=None)
+    assert scanned(tmp_path, raster(100, 60), nothing)[1].problems == []
+    assert scanned(tmp_path, raster(100, 60), nothing, path=(130, 50))[1].problems == []
+    assert "in metres" in problem(tmp_path, raster(100, 60) / 1e3, nothing, path=(130, 50))
+    assert "another part" in problem(tmp_path, raster(100, 60), nothing, path=(330, 50))
+
+
+def test_a_few_wild_points_do_not_hide_the_unit(tmp_path):
+    wild = np.vstack([raster(100, 60) / 1e3, np.random.default_rng(0).uniform(-500, 500, (20, 3))])
+    assert "in metres" in problem(tmp_path, wild, batch())
+
+
+def test_the_pieces_of_a_scan_are_put_in_the_work_frame_alike(tmp_path, monkeypatch):
+    monkeypatch.setattr(scans, "PIECE", 1000)
+    turn = [[0.0, -1.0, 0.0, 60.0], [1.0, 0.0, 0.0, 5.0], [0.0, 0.0, 1.0, 7.0], [0.0, 0.0, 0.0, 1.0]]
+    points = raster(100, 60)
+    parts, recordings = scanned(tmp_path, points, batch(size=(60, 100, 30), to_work=turn))
+    assert recordings.problems == []
+    assert [len(part["x_mm"]) for part in parts] == [1000] * 6
+    found = np.vstack([np.column_stack([part[f"{axis}_mm"] for axis in "xyz"]) for part in parts])
+    np.testing.assert_array_equal(
+        found, np.column_stack([60 - points[:, 1], points[:, 0] + 5, points[:, 2] + 7])
+    )
+
+
+def test_the_memory_a_scan_takes_does_not_grow_with_its_points(tmp_path):
+    """Twice and eight times a piece: the same peak; a table of the larger one would be 50 MB."""
+    peaks = []
+    for pieces in (2, 8):
+        write(tmp_path, np.resize(raster(100, 60, 0.2), (pieces * scans.PIECE, 3)))
+        recordings = Recordings(tmp_path, lambda: None)
+        tracemalloc.start()
+        count = sum(len(part["x_mm"]) for part in scans.scan(batch(), recordings))
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert count == pieces * scans.PIECE
+    assert peaks[1] < 1.1 * peaks[0]
+    assert peaks[1] < 40e6
