@@ -8,9 +8,9 @@ from metro.surface.tip_stiffness import (
     choose_basis,
     fit_z_row,
     heights_design,
-    interpolate_compliance,
     nonlinearity,
     point_compliance,
+    points_compliance,
     visible_entries,
     z_rows,
 )
@@ -104,9 +104,8 @@ def test_a_load_direction_that_was_never_applied_leaves_its_entry_out() -> None:
     assert visible_entries(rows).tolist() == [False, True, True]
 
 
-def test_whole_matrices_are_interpolated_over_the_face() -> None:
-    loads = loads_over_the_face()
-    rows = z_rows(loads[0][:, 0], loads[0][:, 1], loads[1], loads[2])
-    basis, _ = choose_basis(rows, np.full(3, True))
-    x, y = np.array([0.05, 0.15]), np.array([0.02, 0.08])
-    np.testing.assert_allclose(interpolate_compliance(loads, basis, x, y), compliance(x, y), rtol=1e-9)
+def test_the_compliance_of_each_load_point_is_that_of_its_own_tests() -> None:
+    place, force, moved = loads_over_the_face()
+    mixed = np.random.default_rng(4).permutation(len(place))
+    places, found = points_compliance(place[mixed], force[mixed], moved[mixed])
+    np.testing.assert_allclose([each.matrix for each in found], compliance(*places.T), rtol=1e-9)

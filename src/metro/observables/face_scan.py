@@ -6,13 +6,19 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.observables.face_path import beside
+from metro.observables.face_placing import Placed, place
 from metro.surface.face import NESTING_INDEX, Face, measure_face
-from metro.surface.footprint import sample
+from metro.surface.face_noise import Noise
+from metro.surface.footprint import RADIUS, sample
 from metro.units import JSON, MM, UM, Array
 
 MAP_CELLS = 60
-PLACED_WITHIN = 3 * MM  # how far a cloud without a declared transform may miss the outline of the work
 
+POINT_COLUMNS: tuple[str, ...] = (
+    *("run", "point", "pass", "x_mm", "y_mm", "s_mm"),
+    *("programmed_z_mm", "z_mm", "sigma_mm", "k", "coverage"),
+)
 FACE_TABLES: dict[str, tuple[str, ...]] = {
     "face_indices": (
         *("run", "index_name", "value_um", "bias_um", "corrected_um", "u_um", "sigma_um", "sigma_source"),
@@ -27,56 +33,56 @@ FACE_TABLES: dict[str, tuple[str, ...]] = {
         ),
     ),
     "face_map": ("run", "x_mm", "y_mm", "deviation_um"),
-    "face_points": (
-        *(
-            "run",
-            "point",
-            "pass",
-            "x_mm",
-            "y_mm",
-            "s_mm",
-            "programmed_z_mm",
-            "z_mm",
-            "sigma_mm",
-            "k",
-            "coverage",
-        ),
-    ),
+    "face_contacts": ("run", "side", "x_mm", "y_mm", "deviation_um"),
+    "face_placed": ("run", "method", "x_sd_um", "y_sd_um", "remark"),
+    "face_points": POINT_COLUMNS,
+    "face_beside": POINT_COLUMNS,  # beside the path, where the groove of a pass rises
 }
 
 
 def measured_run(
-    batch: Batch, run: str, scan: pd.DataFrame, path: pd.DataFrame
+    batch: Batch, run: str, scan: pd.DataFrame, path: pd.DataFrame, repeats: Noise | None = None
 ) -> tuple[dict[str, pd.DataFrame], str | None]:
     """Return the tables of one face, and why some are lacking.
 
-    Without a path or a place in the work frame there are indices and a map only.
+    Without a path or a place in the work frame there are indices and a map only. ``repeats``: noise by more
+    scans of the face.
     """
     cloud = scan[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
     if not len(cloud):
         return {}, "its scan holds no points"
+    step = float(np.spacing(np.float32(np.abs(cloud).max())))
+    points = path[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
+    placed = place(batch, cloud, points if len(points) else None)
+    cloud = placed.cloud
     scanner = batch.instrument("scanner")
     sigma = float(scanner["sigma_mm"]) * MM if "sigma_mm" in scanner else None
     nesting = float(scanner.get("nesting_index_mm", NESTING_INDEX / MM)) * MM
-    step = float(np.spacing(np.float32(np.abs(cloud).max())))
     try:
-        face = measure_face(cloud, sigma, "scanner.sigma_mm of batch.yaml", nesting, step)
+        face = measure_face(cloud, sigma, "scanner.sigma_mm of batch.yaml", nesting, step, repeats=repeats)
     except ValueError as error:
         return {}, f"its scan: {error}"
     tables = {
         "face_indices": _indices(run, face),
         "face_map": _map(run, face.map_points, face.map_deviations),
+        "face_contacts": _contacts(run, face),
+        "face_placed": _placed(run, placed),
     }
     if path.empty:
         return tables, "it has no path file, so its face cannot be paired with a prediction"
-    points = path[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
-    if "to_work" not in scanner and not _lies_on_the_work(batch, cloud, points):
-        return (
-            tables,
-            "instruments.scanner.to_work is not given and the scan does not lie on the work's outline",
-        )
+    if not placed.method:
+        return tables, placed.remark
     tables["face_points"] = _points(run, cloud[~face.rejected], path, points)
+    aside = beside(path, RADIUS)
+    if len(aside):
+        at = aside[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
+        tables["face_beside"] = _points(run, cloud[~face.rejected], aside, at)
     return tables, None
+
+
+def _placed(run: str, placed: Placed) -> pd.DataFrame:
+    row = [run, placed.method, placed.sd[0] / UM, placed.sd[1] / UM, placed.remark]
+    return pd.DataFrame([row], columns=list(FACE_TABLES["face_placed"]))
 
 
 def _indices(run: str, face: Face) -> pd.DataFrame:
@@ -86,7 +92,7 @@ def _indices(run: str, face: Face) -> pd.DataFrame:
         "local_sigma_um": face.local_sigma / UM,
         "nesting_index_mm": face.nesting_index / MM if face.nesting_index else float("nan"),
         "points": face.points,
-        "outliers": int(face.rejected.sum()),
+        "outliers": len(face.outliers),
         "spacing_mm": face.spacing / MM,
         "margin_mm": face.margin / MM,
         "crop_holds": face.crop_holds,
@@ -100,30 +106,31 @@ def _indices(run: str, face: Face) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(FACE_TABLES["face_indices"]))
 
 
+def _contacts(run: str, face: Face) -> pd.DataFrame:
+    """Points that the two planes of the minimum zone touch."""
+    rows = [
+        (run, side, *(face.map_points[at, :2] / MM), face.map_deviations[at] / UM)
+        for side, touched in (("upper", face.zone.upper), ("lower", face.zone.lower))
+        for at in touched
+    ]
+    return pd.DataFrame(rows, columns=list(FACE_TABLES["face_contacts"]))
+
+
 def _map(run: str, points: Array, deviations: Array) -> pd.DataFrame:
-    """Means over at most 60 × 60 cells of the face's extents in x and y."""
+    """Means over at most 60 × 60 cells of the face's extents in x and y, none finer than the points."""
     corner, extent = points[:, :2].min(axis=0), np.ptp(points[:, :2], axis=0)
-    number = np.minimum((points[:, :2] - corner) / extent * MAP_CELLS, MAP_CELLS - 1).astype(np.intp)
-    cell = number[:, 0] * MAP_CELLS + number[:, 1]
-    count = np.bincount(cell, minlength=MAP_CELLS**2)
-    total = np.bincount(cell, weights=deviations, minlength=MAP_CELLS**2)
+    pitch = float(np.sqrt(np.prod(extent) / len(points)))
+    cells = np.clip((0.9 * extent / pitch).astype(np.intp), 1, MAP_CELLS)
+    number = np.minimum((points[:, :2] - corner) / extent * cells, cells - 1).astype(np.intp)
+    cell = number[:, 0] * cells[1] + number[:, 1]
+    count = np.bincount(cell, minlength=int(np.prod(cells)))
+    total = np.bincount(cell, weights=deviations, minlength=len(count))
     seen = np.flatnonzero(count)
-    centre = corner + (np.column_stack(np.divmod(seen, MAP_CELLS)) + 0.5) / MAP_CELLS * extent
+    centre = corner + (np.column_stack(np.divmod(seen, cells[1])) + 0.5) / cells * extent
     means = total[seen] / count[seen] / UM
     return pd.DataFrame(
         {"run": run, "x_mm": centre[:, 0] / MM, "y_mm": centre[:, 1] / MM, "deviation_um": means}
     )
-
-
-def _lies_on_the_work(batch: Batch, cloud: Array, path: Array) -> bool:
-    """Whether the outline of a cloud is that of the work in its own frame (its corner is the origin)."""
-    size = (batch.manifest.get("work") or {}).get("size_mm")
-    if size:
-        low, high = np.zeros(2), np.array(size[:2], dtype=float) * MM
-    else:
-        low, high = path[:, :2].min(axis=0), path[:, :2].max(axis=0)
-    misses = [np.abs(cloud[:, :2].min(axis=0) - low).max(), np.abs(cloud[:, :2].max(axis=0) - high).max()]
-    return bool(max(misses) <= PLACED_WITHIN)
 
 
 def _points(run: str, cloud: Array, path: pd.DataFrame, points: Array) -> pd.DataFrame:

@@ -2,7 +2,7 @@
 
 Points are summed into square cells, and the filter runs over sums and counts alike: their quotient is the
 weighted Gaussian regression of order zero over the points themselves, so empty cells and uneven density need
-no special case.
+no special case. Only the sums are kept, so that a face needs no more memory the more points it has.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from metro.surface.plane import Moments
 from metro.units import Array
 
 GAUSSIAN = (
@@ -18,21 +19,28 @@ GAUSSIAN = (
 )
 TRUNCATE = 4.5
 MOST_REJECTED = 0.01
+FINEST = 6  # cells within a nesting index: more of them add nothing that passes the filter
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Square cells over a face: their size, the ``corner`` (2,) of the first, and each point's cell (n,)."""
+    """Square cells over a face: their size, the ``corner`` (2,) of the first, and rows and columns."""
 
     cell: float
     corner: Array
     shape: tuple[int, int]
-    cells: np.ndarray
 
-    def sums(self, values: Array | None = None) -> Array:
+    def cells(self, u: Array, v: Array) -> np.ndarray:
+        """Return the number (n,) of the cell of each point in the flattened grid."""
+        row: np.ndarray = ((u - self.corner[0]) * (1 / self.cell)).astype(np.intp)
+        row *= self.shape[1]
+        row += ((v - self.corner[1]) * (1 / self.cell)).astype(np.intp)
+        return row
+
+    def sums(self, cells: np.ndarray, values: Array | None = None) -> Array:
         """Return the sum of ``values`` (n,) per cell, or the number of points, in the grid's shape."""
         size = self.shape[0] * self.shape[1]
-        return np.bincount(self.cells, weights=values, minlength=size).astype(np.float64).reshape(self.shape)
+        return np.bincount(cells, weights=values, minlength=size).astype(np.float64).reshape(self.shape)
 
     def centres(self) -> Array:
         """In-plane coordinates (cells, 2) of the cells' centres, in the order of the flattened grid."""
@@ -40,37 +48,55 @@ class Grid:
         return self.corner + (number + 0.5) * self.cell
 
 
-def make_grid(coordinates: Array, cell: float) -> Grid:
-    """Lay a grid over in-plane ``coordinates`` (n, 2)."""
-    corner = coordinates.min(axis=0)
-    number = ((coordinates - corner) / cell).astype(np.intp)
-    rows, columns = (int(n) + 1 for n in number.max(axis=0))
-    return Grid(cell, corner, (rows, columns), number[:, 0] * columns + number[:, 1])
+@dataclass(frozen=True)
+class CellSums:
+    """Number of points and sum of their deviations in each cell of ``grid``, both in its shape."""
+
+    grid: Grid
+    count: Array
+    total: Array
+
+    def without(self, cells: np.ndarray, values: Array) -> CellSums:
+        """Return the sums less those of the points with ``values`` (m,) in ``cells`` (m,)."""
+        gone = self.grid.sums(cells), self.grid.sums(cells, values)
+        return CellSums(self.grid, self.count - gone[0], self.total - gone[1])
 
 
-def point_spacing(coordinates: Array) -> float:
-    """Pitch of a square lattice that has as many points over the bounding rectangle."""
-    return float(np.sqrt(np.prod(np.ptp(coordinates, axis=0)) / len(coordinates)))
+def make_grid(low: Array, high: Array, cell: float) -> Grid:
+    """Lay a grid over the in-plane rectangle from ``low`` to ``high`` (2,)."""
+    rows, columns = (int(n) + 1 for n in (high - low) / cell)
+    return Grid(cell, low, (rows, columns))
 
 
-def gaussian_s_filter(grid: Grid, values: Array, nesting_index: float) -> Array:
+def cell_size(spacing: float, nesting_index: float) -> float:
+    """Size of a cell: two pitches, so that few are empty, but no finer than the filter needs."""
+    return max(2 * spacing, nesting_index / FINEST)
+
+
+def point_spacing(gathered: Moments) -> float:
+    """Pitch of a square lattice with as many points on a rectangle of the same moments: 12 √(λ₁ λ₂)."""
+    spread = np.linalg.eigvalsh(gathered.scatter)[1:] / gathered.count
+    return float(np.sqrt(12 * np.sqrt(np.prod(np.maximum(spread, 0.0))) / gathered.count))
+
+
+def gaussian_s_filter(sums: CellSums, nesting_index: float) -> Array:
     """Return the low-pass filtered surface on the grid's cells; NaN where no point is in reach.
 
     Parameters
     ----------
-    values : (n,) deviations of the points from a plane that takes out the tilt.
+    sums : of deviations from a plane that takes out the tilt.
     nesting_index : wavelength of half transmission, in the unit of the coordinates; at least three cells.
     """
     from scipy.ndimage import gaussian_filter
 
-    width = _width(grid, nesting_index)
-    total = gaussian_filter(grid.sums(values), width, mode="constant", truncate=TRUNCATE)
-    weight = gaussian_filter(grid.sums(), width, mode="constant", truncate=TRUNCATE)
+    width = filter_width(sums.grid.cell, nesting_index)
+    total = gaussian_filter(sums.total, width, mode="constant", truncate=TRUNCATE)
+    weight = gaussian_filter(sums.count, width, mode="constant", truncate=TRUNCATE)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(weight > 1e-6, total / weight, np.nan)
 
 
-def point_weights(grid: Grid, nesting_index: float) -> tuple[float, float]:
+def point_weights(sums: CellSums, nesting_index: float) -> tuple[float, float]:
     """Return the weight of a point in the filtered value of its cell, and the sum of squares of all weights.
 
     With independent noise of variance v, a filtered value has the variance ``v × squares``, and the rest of a
@@ -78,25 +104,25 @@ def point_weights(grid: Grid, nesting_index: float) -> tuple[float, float]:
     """
     from scipy.ndimage import gaussian_filter1d
 
-    impulse = np.zeros(2 * int(5 * nesting_index / grid.cell) + 1)
+    impulse = np.zeros(2 * int(5 * nesting_index / sums.grid.cell) + 1)
     impulse[len(impulse) // 2] = 1.0
-    response = gaussian_filter1d(impulse, _width(grid, nesting_index), mode="constant", truncate=TRUNCATE)
-    counts = grid.sums()
-    per_cell = float(counts.sum() / np.count_nonzero(counts))
+    width = filter_width(sums.grid.cell, nesting_index)
+    response = gaussian_filter1d(impulse, width, mode="constant", truncate=TRUNCATE)
+    per_cell = float(sums.count.sum() / np.count_nonzero(sums.count))
     return float(response.max() ** 2 / per_cell), float((response @ response) ** 2 / per_cell)
 
 
-def _width(grid: Grid, nesting_index: float) -> float:
+def filter_width(cell: float, nesting_index: float) -> float:
     """Deviation of the weighting function in cells; averaging over a cell has a variance of 1/12 itself."""
-    return float(np.sqrt((GAUSSIAN * nesting_index / grid.cell) ** 2 - 1 / 12))
+    return float(np.sqrt((GAUSSIAN * nesting_index / cell) ** 2 - 1 / 12))
 
 
-def interior(grid: Grid, margin: float) -> np.ndarray:
+def interior(sums: CellSums, margin: float) -> np.ndarray:
     """Mask of the cells at least ``margin`` inside the outline of the points (holes of one cell closed)."""
     from scipy.ndimage import maximum_filter, minimum_filter
 
-    covered = maximum_filter(grid.sums() > 0, size=3)
-    reach = 2 * (int(np.ceil(margin / grid.cell)) + 1) + 1
+    covered = maximum_filter(sums.count > 0, size=3)
+    reach = 2 * (int(np.ceil(margin / sums.grid.cell)) + 1) + 1
     mask: np.ndarray = minimum_filter(covered, size=reach, mode="constant", cval=False)
     return mask
 
@@ -106,31 +132,44 @@ def crop_margin(spacing: float, nesting_index: float, least: float) -> float:
     return max(3 * spacing, least, nesting_index / 2)
 
 
-def local_outliers(grid: Grid, values: Array, nesting_index: float) -> tuple[np.ndarray, float]:
-    """Return a mask (n,) of points that stand out of their surroundings, and the local noise of the others.
+@dataclass(frozen=True)
+class Readings:
+    """Some points of a face: their cell (m,) and deviation (m,)."""
+
+    cells: np.ndarray
+    deviations: Array
+
+
+def local_outliers(
+    sums: CellSums, sample: Readings, suspects: Readings, points: int, nesting_index: float
+) -> tuple[np.ndarray, float, CellSums]:
+    """Return which suspects (m,) stand out of their surroundings, the local noise, and the sums without them.
 
     A point is rejected when its residual from the filtered surface exceeds k robust standard deviations with
     ``2 n Φ(−k) = 0.05`` (at most one false rejection in twenty faces). The worst point of a cell goes first,
     since it pulls the filtered surface and makes its sound neighbours look wrong. Where more than one point
     in a hundred would go, they are not single points but a feature of the face, and none is rejected.
+
+    Parameters
+    ----------
+    sample : points that stand for all in the estimate of the noise. suspects : all that may be rejected.
+    points : number of all points.
     """
     from scipy.special import ndtri
 
-    rejected = np.zeros(len(values), dtype=bool)
-    limit = -float(ndtri(0.025 / len(values)))
+    rejected = np.zeros(len(suspects.cells), dtype=bool)
+    limit, kept = -float(ndtri(0.025 / points)), sums
     sigma = 0.0
     for _ in range(20):
-        kept = Grid(grid.cell, grid.corner, grid.shape, grid.cells[~rejected])
-        smooth = gaussian_s_filter(kept, values[~rejected], nesting_index).ravel()
-        residual = np.where(rejected, 0.0, np.abs(values - smooth[grid.cells]))
-        sigma = 1.4826 * float(np.median(residual))
-        suspects = np.flatnonzero(residual > limit * sigma)
-        if not len(suspects) or not sigma:
+        smooth = gaussian_s_filter(kept, nesting_index).ravel()
+        sigma = 1.4826 * float(np.median(np.abs(sample.deviations - smooth[sample.cells])))
+        residual = np.where(rejected, 0.0, np.abs(suspects.deviations - smooth[suspects.cells]))
+        over = np.flatnonzero(residual > limit * sigma)
+        if not len(over) or not sigma:
             break
-        worst_last = suspects[np.argsort(residual[suspects])]
-        rejected[
-            list(dict(zip(grid.cells[worst_last].tolist(), worst_last.tolist(), strict=True)).values())
-        ] = True
-    if rejected.mean() > MOST_REJECTED:
-        rejected[:] = False
-    return rejected, sigma
+        worst_first = over[np.argsort(-residual[over])]
+        rejected[worst_first[np.unique(suspects.cells[worst_first], return_index=True)[1]]] = True
+        kept = sums.without(suspects.cells[rejected], suspects.deviations[rejected])
+    if np.count_nonzero(rejected) > MOST_REJECTED * points:
+        return np.zeros_like(rejected), sigma, sums
+    return rejected, sigma, kept

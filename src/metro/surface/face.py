@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from metro.surface.areal import (
+    CellSums,
+    Grid,
+    cell_size,
     crop_margin,
     gaussian_s_filter,
     interior,
@@ -15,16 +18,28 @@ from metro.surface.areal import (
     point_spacing,
     point_weights,
 )
+from metro.surface.cloud_passes import (
+    Points,
+    Residuals,
+    Survey,
+    box_in_plane,
+    cell_sums,
+    raw_readings,
+    residuals,
+    survey,
+)
+from metro.surface.face_noise import PITCHES, Noise, dense_noise, filterable, sparse_noise
 from metro.surface.indices import iso_indices, raw_indices
 from metro.surface.minimum_zone import MinimumZone, minimum_zone
-from metro.surface.noise import field_peaks, noise_bias, shrink
-from metro.surface.plane import Plane, fit_plane
+from metro.surface.noise import noise_bias, shrink
+from metro.surface.noise_spectrum import Modes, field, modes_of_scan
+from metro.surface.plane import Plane, fit_plane, moments_of_columns, plane_of_moments
 from metro.units import MM, Array
 
 NESTING_INDEX = 2.5 * MM
-FORM = 3.2  # nesting index of what stands for the true surface in estimates of bias, over the filter's
 CROP_TOLERANCE = 0.05
-BIAS_OF = {"fltt": "xm", "fltp": "peak", "fltv": "valley", "fltq": "xq", "minimum_zone": "xm"}
+# where noise adds in quadrature a second helping adds √2 − 1 of the first, and √2 times that is left
+LEFT = 1.4142
 
 
 @dataclass(frozen=True)
@@ -53,10 +68,11 @@ class Face:
         crop, with ``map_deviations`` (c,) from its least-squares plane.
     zone : minimum zone of ``map_points``.
     nesting_index : of the areal filter; None where it was not applied.
-    sigma, sigma_source : noise of one point, and where the figure comes from.
-    local_sigma : robust residual of the points from the filtered surface; lower than sigma where noise is
+    noise : of one point, and where the figure comes from.
+    local_sigma : robust residual of the points from the filtered surface; lower than the noise where that is
         correlated.
-    rejected : (n,) mask of the points that stand out of their surroundings.
+    scanned, outliers : number of all points; places, ascending, of those that stand out of their
+        surroundings.
     points, spacing, margin : number used within the crop; pitch; width of the rim cropped.
     xm_inner : X_m with one more millimetre cropped; ``crop_holds`` where it changes by less than 5 %.
     """
@@ -67,14 +83,31 @@ class Face:
     map_deviations: Array
     zone: MinimumZone
     nesting_index: float | None
-    sigma: float
-    sigma_source: str
+    noise: Noise
     local_sigma: float
-    rejected: np.ndarray
+    scanned: int
+    outliers: np.ndarray
     points: int
     spacing: float
     margin: float
     xm_inner: float
+
+    @property
+    def sigma(self) -> float:
+        """Noise of one point."""
+        return self.noise.sigma
+
+    @property
+    def sigma_source(self) -> str:
+        """Where the noise of one point comes from, in words."""
+        return self.noise.source
+
+    @property
+    def rejected(self) -> np.ndarray:
+        """Mask (n,) of the points that stand out of their surroundings."""
+        mask = np.zeros(self.scanned, dtype=bool)
+        mask[self.outliers] = True
+        return mask
 
     @property
     def crop_holds(self) -> bool:
@@ -83,114 +116,189 @@ class Face:
 
 
 def measure_face(
-    cloud: Array, sigma: float | None, source: str, nesting_index: float = NESTING_INDEX, step: float = 0.0
+    cloud: Points,
+    sigma: float | None = None,
+    source: str = "",
+    nesting_index: float = NESTING_INDEX,
+    step: float = 0.0,
+    *,
+    repeats: Noise | None = None,
+    uncertainty: bool = True,
 ) -> Face:
-    """Measure the flatness of ``cloud`` (n, 3) in metres.
+    """Measure the flatness of ``cloud`` (n, 3) in metres, read slice by slice.
 
     Parameters
     ----------
-    sigma, source : noise of one point and where it comes from (repeat scans, the manifest); None: the local
-        residual is taken, a lower bound, since noise that is correlated over the filter's width cannot be
-        told from the surface.
+    sigma, source : noise of one point and where it comes from (the manifest); None: the local residual is
+        taken, a lower bound, since noise that is correlated over the filter's width cannot be told from the
+        surface (of a face of a few touched points: their scatter, where it has no order).
     nesting_index : of the areal Gaussian filter, m; raised to six pitches where the cloud is too sparse for
         it.
     step : rounding step of the coordinates, m.
+    repeats : what scans of the same face say of the noise; goes before ``sigma``.
+    uncertainty : False leaves bias and deviation of the indices of a filtered face NaN, and is faster.
 
     Raises
     ------
     ValueError
         Where the points define no plane.
     """
-    plane = fit_plane(cloud)
-    coordinates, deviations = plane.coordinates(cloud), plane.deviations(cloud)
-    spacing = point_spacing(coordinates)
-    if 6 * spacing > 4 * nesting_index:
-        return _sparse_face(cloud, plane, spacing, (sigma, source) if sigma else (0.0, "unknown"), step)
-    nesting_index = max(nesting_index, 6 * spacing)
-    grid = make_grid(coordinates, 2 * spacing)
-    rejected, local_sigma = local_outliers(grid, deviations, nesting_index)
-    kept = ~rejected
-    grid = replace(grid, cells=grid.cells[kept])
-    own, squares = point_weights(grid, nesting_index)
-    local_sigma /= np.sqrt(1 - 2 * own + squares)  # the filtered surface follows each point a little
-    noise, source = (sigma, source) if sigma else (local_sigma, "local residual, a lower bound")
-    margin = crop_margin(spacing, nesting_index, MM)
-    inside = interior(grid, margin)
-    if not inside.any():
-        raise ValueError(f"the face is narrower than the rim of {margin / MM:.2f} mm that its edges disturb")
-    surface = gaussian_s_filter(grid, deviations[kept], nesting_index)[inside]
-    points = _points_in_space(plane, grid.centres()[inside.ravel()], surface)
-    smooth_plane = fit_plane(points)
-    smooth, zone = smooth_plane.deviations(points), minimum_zone(points)
-    raw = _deviations_within(cloud[kept], inside.ravel()[grid.cells])
-    inner = interior(grid, margin + MM).ravel()[grid.cells]
-    readings = raw_indices(raw, step) | iso_indices(smooth) | {"minimum_zone": zone.width}
-    white = min(local_sigma, noise)
-    # what the declared noise has beyond the local residual is correlated, and passes the filter
-    passed = float(np.sqrt(max(white**2 * squares, noise**2 - white**2)))
-    cells = len(raw) * squares
-    # the noise that passes acts on the true surface; the filtered one has it: a smoother one stands in
-    form = gaussian_s_filter(grid, deviations[kept], FORM * nesting_index)[inside]
-    low = noise_bias(form, passed, cells, field_peaks(cells))
-    high = noise_bias(smooth, white, len(raw), len(raw))
-    return Face(
-        plane=smooth_plane,
-        indices={name: _index(name, value, low, high) for name, value in readings.items()},
-        map_points=points,
-        map_deviations=smooth,
-        zone=zone,
-        nesting_index=nesting_index,
-        sigma=noise,
-        sigma_source=source,
-        local_sigma=local_sigma,
-        rejected=rejected,
-        points=len(raw),
-        spacing=spacing,
-        margin=margin,
-        xm_inner=float(np.ptp(_deviations_within(cloud[kept], inner))) if inner.any() else float("nan"),
+    noise = repeats if repeats is not None else Noise(sigma, source) if sigma else None
+    seen = survey(cloud)
+    plane = plane_of_moments(seen.moments)
+    spacing = point_spacing(seen.moments)
+    if not filterable(spacing, nesting_index):
+        return _sparse_face(np.asarray(cloud[:], dtype=np.float64), plane, spacing, noise, step)
+    return _dense_face(
+        cloud,
+        seen,
+        plane,
+        nesting_index=max(nesting_index, PITCHES * spacing),
+        noise=noise,
+        step=step,
+        uncertainty=uncertainty,
     )
 
 
-def _points_in_space(plane: Plane, coordinates: Array, deviations: Array) -> Array:
-    return plane.point + coordinates @ plane.axes + deviations[:, None] * plane.normal
+def _dense_face(
+    cloud: Points,
+    seen: Survey,
+    plane: Plane,
+    *,
+    nesting_index: float,
+    noise: Noise | None,
+    step: float,
+    uncertainty: bool,
+) -> Face:
+    spacing = point_spacing(seen.moments)
+    sums = cell_sums(cloud, plane, make_grid(*box_in_plane(plane, seen), cell_size(spacing, nesting_index)))
+    margin = crop_margin(spacing, nesting_index, MM)
+    inside = interior(sums, margin)
+    if not inside.any():
+        raise ValueError(f"the face is narrower than the rim of {margin / MM:.2f} mm that its edges disturb")
+    smooth = gaussian_s_filter(sums, nesting_index)
+    rest = residuals(cloud, plane, sums.grid, smooth.ravel(), inside.ravel())
+    rejected, local_sigma, sums = local_outliers(
+        sums, rest.sample, rest.suspects, seen.moments.count, nesting_index
+    )
+    depth = inside.astype(np.uint8) + (inside & interior(sums, margin + MM))
+    gone = np.sort(rest.place[rejected])
+    exact = _plane_of_crop(plane, rest, rejected, inside)
+    raw, xm_inner, points = raw_readings(
+        cloud, (plane, exact), sums.grid, depth.ravel(), rejected=gone, sample=rest.sample, step=step
+    )
+    own, squares = point_weights(sums, nesting_index)
+    local_sigma /= np.sqrt(1 - 2 * own + squares)  # the filtered surface follows each point a little
+    told, spectrum = dense_noise(noise, float(local_sigma), spacing)
+    smooth = gaussian_s_filter(sums, nesting_index)
+    map_points = _in_space(sums.grid, plane, smooth, inside)
+    smooth_plane = fit_plane(map_points)
+    deviations, zone = smooth_plane.deviations(map_points), minimum_zone(map_points)
+    readings = raw | iso_indices(deviations) | {"minimum_zone": zone.width}
+    indices = {name: Index(value, float("nan"), float("nan")) for name, value in readings.items()}
+    if uncertainty:
+        modes = modes_of_scan(sums, smooth, spectrum)
+        indices = _with_bias(
+            readings, modes, sums=sums, plane=plane, inside=inside, nesting_index=nesting_index
+        )
+    return Face(
+        plane=smooth_plane,
+        indices=indices,
+        map_points=map_points,
+        map_deviations=deviations,
+        zone=zone,
+        nesting_index=nesting_index,
+        noise=told,
+        local_sigma=float(local_sigma),
+        scanned=seen.moments.count,
+        outliers=gone,
+        points=points,
+        spacing=spacing,
+        margin=margin,
+        xm_inner=xm_inner,
+    )
 
 
-def _deviations_within(cloud: Array, inside: np.ndarray) -> Array:
-    """Deviations of the points inside the crop from the plane of just these."""
-    face = cloud[inside]
-    return fit_plane(face).deviations(face)
+def _plane_of_crop(frame: Plane, rest: Residuals, rejected: np.ndarray, inside: np.ndarray) -> Plane:
+    """Plane of all points within the crop but those rejected, in space."""
+    back = ~rejected & inside.ravel()[rest.suspects.cells]
+    found = rest.sound
+    if back.any():
+        found = found.merge(moments_of_columns(rest.coordinates[:, back]))
+    local = plane_of_moments(found)
+    turn = np.vstack([frame.axes, frame.normal])
+    return Plane(frame.point + local.point @ turn, local.normal @ turn, local.axes @ turn)
 
 
-def _index(
-    name: str, value: float, low: dict[str, tuple[float, float]], high: dict[str, tuple[float, float]]
-) -> Index:
-    """Bias of an index: true → filtered surface (``low``), and for the raw ones filtered → raw (``high``)."""
-    if name in BIAS_OF:
-        return Index(value, *low[BIAS_OF[name]])
-    if name not in high:  # a percentile range has no bias model: read as it is
-        return Index(value, 0.0, float("nan"))
-    return Index(value, low[name][0] + high[name][0], float(np.hypot(low[name][1], high[name][1])))
+def _with_bias(
+    readings: dict[str, float],
+    modes: Modes,
+    *,
+    sums: CellSums,
+    plane: Plane,
+    inside: np.ndarray,
+    nesting_index: float,
+) -> dict[str, Index]:
+    """Correct each reading by what is estimated of the surface under the noise, and the bias of that.
+
+    The indices of the estimated surface are corrected by how far those of estimates from new noise on it are
+    from them, and as uncertain as these scatter (parametric bootstrap, Efron & Tibshirani 1993).
+    """
+    flat = np.linalg.qr(np.stack([np.ones(inside.shape), *np.indices(inside.shape)], axis=-1)[inside])[0]
+    flat, passes = flat.astype(np.float32), modes.through(nesting_index)
+
+    def read(estimate: Array) -> dict[str, float]:
+        raw, filtered = (field(each)[inside] for each in (estimate, estimate * passes))
+        raw, filtered = (each - flat @ (flat.T @ each) for each in (raw, filtered))
+        return raw_indices(raw, 0.0) | iso_indices(filtered)
+
+    middle = modes.estimate()
+    estimated = read(middle)
+    zone = minimum_zone(_in_space(sums.grid, plane, field(middle * passes), inside)).width
+    drawn = [read(estimate) for estimate in modes.again()]
+    found = {}
+    for name, value in estimated.items():
+        draws = np.array([draw[name] for draw in drawn])
+        bias = float(draws.mean()) - value
+        sd = float(np.hypot(draws.std(), LEFT * bias))
+        found[name] = Index(readings[name], readings[name] - (value - bias), sd)
+    # the zone of every estimate would take too long: taken to be off as the range is
+    bias = estimated["fltt"] - (found["fltt"].value - found["fltt"].bias)
+    read_zone = readings["minimum_zone"]
+    return found | {"minimum_zone": Index(read_zone, read_zone - (zone - bias), found["fltt"].sd)}
 
 
-def _sparse_face(cloud: Array, plane: Plane, spacing: float, noise: tuple[float, str], step: float) -> Face:
+def _in_space(grid: Grid, plane: Plane, field: Array, inside: np.ndarray) -> Array:
+    """Points (c, 3) of a surface over the grid's cells, within the mask."""
+    points = plane.point + grid.centres()[inside.ravel()] @ plane.axes
+    return np.asarray(points + field[inside][:, None] * plane.normal)
+
+
+def _sparse_face(cloud: Array, plane: Plane, spacing: float, told: Noise | None, step: float) -> Face:
     """Measure a face of a few touched points: no filter, so no ISO index; noise taken out by shrinkage."""
-    sigma, source = noise
     deviations, zone = plane.deviations(cloud), minimum_zone(cloud)
+    noise = sparse_noise(plane.coordinates(cloud), deviations, told)
     readings = raw_indices(deviations, step)
-    bias = noise_bias(shrink(deviations, sigma), sigma, len(cloud), len(cloud))
-    none = dict.fromkeys(bias, (0.0, 0.0))
-    indices = {name: _index(name, value, none, bias) for name, value in readings.items()}
+
+    def bias(sigma: float) -> dict[str, tuple[float, float]]:
+        return noise_bias(shrink(deviations, sigma), sigma, len(cloud), len(cloud))
+
+    at, off = bias(noise.sigma), bias(noise.sigma * (1 + noise.relative))
+    indices = {"percentile_range": Index(readings.pop("percentile_range"), 0.0, float("nan"))}
+    for name, value in readings.items():  # what is not known of the noise is not known of the bias
+        indices[name] = Index(value, at[name][0], float(np.hypot(at[name][1], off[name][0] - at[name][0])))
+    xm = indices["xm"]
     return Face(
         plane=plane,
-        indices=indices | {"minimum_zone": Index(zone.width, *bias["xm"])},
+        indices=indices | {"minimum_zone": Index(zone.width, xm.bias, xm.sd)},
         map_points=cloud,
         map_deviations=deviations,
         zone=zone,
         nesting_index=None,
-        sigma=sigma,
-        sigma_source=source,
+        noise=noise,
         local_sigma=float("nan"),
-        rejected=np.zeros(len(cloud), dtype=bool),
+        scanned=len(cloud),
+        outliers=np.empty(0, dtype=np.intp),
         points=len(cloud),
         spacing=spacing,
         margin=0.0,

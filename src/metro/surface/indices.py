@@ -27,7 +27,7 @@ def raw_indices(deviations: Array, step: float) -> dict[str, float]:
     """
     size = np.abs(deviations)
     xa = float(size.mean())
-    floored = np.where(size < step / 2, log_mean_floor(step), size)
+    floored = np.maximum(np.where(size < step / 2, log_mean_floor(step), size), np.finfo(float).tiny)
     low, high = np.percentile(deviations, PERCENTILES)
     return {
         "xm": float(np.ptp(deviations)),

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from metro.surface.plane import fit_plane
 from metro.units import Array
 
 BINS = 300
-NODES = 401
+NODES = 200  # even, so that none is at zero, where ln |d| is not defined
+LEVELS = 160
 
 
 def repeat_sigma(first: Array, second: Array) -> float:
@@ -27,8 +29,9 @@ def repeat_sigma(first: Array, second: Array) -> float:
         raise ValueError(
             f"repeat scans need the same points, more than three: found {len(first)} and {len(second)}"
         )
-    basis = np.column_stack([np.ones(len(first)), first[:, :2] - first[:, :2].mean(axis=0)])
-    difference = first[:, 2] - second[:, 2]
+    plane = fit_plane(first)
+    basis = np.column_stack([np.ones(len(first)), plane.coordinates(first)])
+    difference = (first - second) @ plane.normal
     rest = difference - basis @ np.linalg.lstsq(basis, difference, rcond=None)[0]
     return float(np.sqrt(rest @ rest / (len(rest) - 3) / 2))
 
@@ -40,16 +43,6 @@ def shrink(deviations: Array, sigma: float) -> Array:
     return deviations * float(np.sqrt(kept))
 
 
-def field_peaks(cells: float) -> float:
-    """Return how many independent readings have the extremes of a Gaussian field over ``cells``.
-
-    A resolution cell is 4πσ² of a Gaussian filter of deviation σ; a filtered field peaks between cells too,
-    u² times as often at a level of u deviations (expected Euler characteristic, Adler & Taylor 2007), with u²
-    ≈ 2 ln(cells) at the extremes.
-    """
-    return cells * max(1.0, 2 * float(np.log(max(cells, 1.0))))
-
-
 def noise_bias(surface: Array, sigma: float, count: float, peaks: float) -> dict[str, tuple[float, float]]:
     """Return index → (bias, standard deviation) when noise is added to ``surface``.
 
@@ -57,9 +50,7 @@ def noise_bias(surface: Array, sigma: float, count: float, peaks: float) -> dict
     ----------
     surface : (n,) true deviations; only their distribution matters.
     sigma : standard deviation of the independent noise, in their unit.
-    count : number of independent readings (points of a raw cloud; resolution cells of a filtered one).
-    peaks : number of independent readings that the extremes are taken of (:func:`field_peaks` of a filtered
-        one).
+    count : number of independent readings. peaks : number of those that the extremes are taken of.
 
     Returns
     -------
@@ -97,11 +88,15 @@ def _maximum(heights: Array, number: Array, sigma: float) -> tuple[float, float]
     """Mean and deviation of the largest of ``number`` (b,) noisy readings at each of ``heights`` (b,)."""
     from scipy.special import log_ndtr
 
-    level = np.linspace(heights.min() - 4 * sigma, heights.max() + 9 * sigma, 1200)
+    top = heights.max()
+    near = heights > top - 16 * sigma  # lower ones have no part in the maximum
+    heights, number = heights[near], number[near]
+    level = np.linspace(max(heights.min() - 4 * sigma, top - 7 * sigma), top + 9 * sigma, LEVELS)
     below = np.exp(log_ndtr((level[:, None] - heights) / sigma) @ number)  # P(max < level)
     mean = level[-1] - np.trapezoid(below, level)
-    square = level[-1] ** 2 - np.trapezoid(2 * level * below, level)
-    return float(mean), float(np.sqrt(max(square - mean**2, 0.0)))
+    # about the top, where the squares do not cancel
+    square = 81 * sigma**2 - np.trapezoid(2 * (level - top) * below, level)
+    return float(mean), float(np.sqrt(max(square - (mean - top) ** 2, 0.0)))
 
 
 def _mean_biases(heights: Array, share: Array, sigma: float, count: float) -> dict[str, tuple[float, float]]:

@@ -31,6 +31,8 @@ class Moments:
     def merge(self, other: Moments) -> Moments:
         """Return the moments of both sets together (Chan, Golub & LeVeque 1983)."""
         count = self.count + other.count
+        if not self.count:
+            return other
         step = other.mean - self.mean
         mean = self.mean + step * (other.count / count)
         between = np.outer(step, step) * (self.count * other.count / count)
@@ -94,12 +96,19 @@ def fit_plane(points: npt.NDArray[np.floating] | Iterable[npt.NDArray[np.floatin
     return plane_of_moments(reduce(Moments.merge, (moments(chunk) for chunk in points if len(chunk))))
 
 
+def moments_of_columns(xyz: Array) -> Moments:
+    """Return the moments of points as columns (3, n), n ≥ 1; ``xyz`` is moved to its centroid in place."""
+    shift = xyz[:, :1].copy()
+    xyz -= shift
+    mean = xyz.mean(axis=1)
+    xyz -= mean[:, None]
+    # six products of rows: BLAS is slow on matrices that are three wide
+    scatter = np.array([[xyz[i] @ xyz[j] for j in range(3)] for i in range(3)])
+    return Moments(xyz.shape[1], shift[:, 0] + mean, scatter)
+
+
 def _moments_of_chunk(points: npt.NDArray[np.floating]) -> Moments:
-    shift = points[0].astype(np.float64)
-    shifted = points.astype(np.float64) - shift
-    mean = shifted.mean(axis=0)
-    shifted -= mean
-    return Moments(len(points), shift + mean, shifted.T @ shifted)
+    return moments_of_columns(np.array(points.T, dtype=np.float64, order="C"))
 
 
 def _chunks(count: int) -> Iterator[slice]:

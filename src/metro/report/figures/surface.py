@@ -1,4 +1,4 @@
-"""Faces, drawn over a plane, and frequency responses."""
+"""Faces, drawn over a plane."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from metro.report.numbers import unit as shown_unit
 from metro.units import Array
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 RUNS = 2
+MAPS = 16
 
 
 def face_points(frame: pd.DataFrame) -> Figure:
@@ -56,32 +58,51 @@ def face_points(frame: pd.DataFrame) -> Figure:
     return figure
 
 
-def face_maps(frame: pd.DataFrame) -> Figure:
-    """Draw the deviation of whole faces from their least-squares planes.
+def face_maps(frame: pd.DataFrame, contacts: pd.DataFrame | None = None) -> Figure:
+    """Draw the deviation of whole faces from their least-squares planes, small where there are many.
 
     Parameters
     ----------
     frame : ``face_map`` rows: ``run, x_mm, y_mm, deviation_um``.
+    contacts : ``face_contacts`` rows: ``run, side, x_mm, y_mm``, of the planes of the minimum zone.
     """
-    runs = [str(run) for run in frame["run"].drop_duplicates()][: 3 * RUNS]
-    rows = -(-len(runs) // 2)
+    runs = [str(run) for run in frame["run"].drop_duplicates()][:MAPS]
+    columns = min(len(runs), 2 if len(runs) <= 4 else 4)
+    rows = -(-len(runs) // columns)
+    frame = frame[frame["run"].isin(runs)]
     limit = float(np.nanquantile(np.abs(frame["deviation_um"]), 0.995)) or 1.0
     shape = float(np.ptp(frame["y_mm"]) / (np.ptp(frame["x_mm"]) or 1.0))
+    height = 0.45 + min(max(shape, 0.25), 1.2) * 4.8 / columns
     with style.style():
-        figure, grid = style.new_figure(0.3 + rows * (0.5 + 2.2 * min(max(shape, 0.2), 1.2)), rows, 2)
+        figure, grid = style.new_figure(0.6 + rows * height, rows, columns, sharex=True, sharey=True)
         flat = [axes for row in grid for axes in row]
         for axes, run in zip(flat, runs, strict=False):
             x, y, z = _raster(frame[frame["run"] == run])
             image = axes.pcolormesh(
                 x, y, z, cmap=style.DIVERGING, vmin=-limit, vmax=limit, shading="nearest", rasterized=True
             )
+            _mark(axes, contacts, run)
             axes.set_title(run, loc="left")
-            axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
+            axes.set(aspect="equal")
             axes.grid(visible=False)
         for axes in flat[len(runs) :]:
             axes.set_visible(False)
-        figure.colorbar(image, ax=flat[: len(runs)], label="deviation (µm)", fraction=0.04, pad=0.02)
+        for row in grid:
+            row[0].set_ylabel("y (mm)")
+        for axes in flat[max(0, len(runs) - columns) : len(runs)]:
+            axes.set_xlabel("x (mm)")
+            axes.tick_params(labelbottom=True)
+        figure.colorbar(image, ax=flat[: len(runs)], label="deviation (µm)", fraction=0.03, pad=0.01)
     return figure
+
+
+def _mark(axes: Axes, contacts: pd.DataFrame | None, run: str) -> None:
+    """Mark where the planes of the minimum zone touch: the upper with triangles up, the lower down."""
+    if contacts is None:
+        return
+    for side, marker in (("upper", "^"), ("lower", "v")):
+        part = contacts[(contacts["run"] == run) & (contacts["side"] == side)]
+        axes.plot(part["x_mm"], part["y_mm"], marker, ms=5, mfc="white", mec=style.MEASURED, mew=0.8)
 
 
 def _raster(part: pd.DataFrame) -> tuple[Array, Array, Array]:

@@ -1,0 +1,56 @@
+"""Scans of one face: which runs of a batch show a face again that was not cut in between, and their noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.surface.face import NESTING_INDEX
+from metro.surface.face_noise import Noise, repeat_noise
+from metro.units import MM, Array
+
+
+def repeat_scans(batch: Batch) -> dict[str, tuple[str, ...]]:
+    """Return, for each run whose face was scanned more than once, the runs with these scans, itself included.
+
+    Runs of one condition show one face where no more than one of them was cut: a row without an operation is
+    a scan and no cut. (Replicates that were cut each have a face of their own; what differs between them is
+    cutting and noise together.)
+    """
+    runs = batch.runs
+    scans = runs[runs["scan"].fillna("").astype(str) != ""]
+    found: dict[str, tuple[str, ...]] = {}
+    for _, group in scans.groupby("condition", sort=False):
+        cut = group["operation"].fillna("").astype(str) != ""
+        if len(group) > 1 and cut.sum() <= 1:
+            found |= dict.fromkeys(map(str, group.index), tuple(map(str, group.index)))
+    return found
+
+
+def scanned_again(batch: Batch, run: str) -> bool:
+    """Whether a run is another scan of a face that a run before it shows: not one more face."""
+    same = repeat_scans(batch).get(run, (run,))
+    operation = batch.runs["operation"].fillna("").astype(str)
+    first = next((name for name in same if operation[name]), same[0])
+    return run != first
+
+
+def noise_by_repeats(batch: Batch, read: Callable[..., pd.DataFrame]) -> Callable[[str], Noise | str | None]:
+    """Return a function of the run: the noise by repeat scans, why they tell none, or None without them."""
+    groups = repeat_scans(batch)
+    nesting = float(batch.instrument("scanner").get("nesting_index_mm", NESTING_INDEX / MM)) * MM
+
+    @cache
+    def of_group(runs: tuple[str, ...]) -> Noise | str:
+        clouds: list[Array] = [
+            read("scan", run)[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM for run in runs
+        ]
+        try:
+            return repeat_noise(clouds, nesting)
+        except ValueError as error:
+            return f"its repeat scans tell no noise: {error}"
+
+    return lambda run: of_group(groups[run]) if run in groups else None

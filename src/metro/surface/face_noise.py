@@ -1,0 +1,143 @@
+"""Where the noise of a face comes from: repeat scans, the manifest, or the scan itself.
+
+A scan alone tells the noise that differs from point to point; noise that is correlated over the filter's
+width looks like the surface. Two scans of one face tell both: what differs between their filtered surfaces is
+noise that the filter passes, whatever its correlation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from metro.surface.areal import cell_size, crop_margin, interior, make_grid, point_spacing
+from metro.surface.cloud_passes import Points, box_in_plane, cell_sums, survey
+from metro.surface.noise import repeat_sigma
+from metro.surface.noise_spectrum import BANDS, Spectrum, assumed, difference_spectrum
+from metro.surface.plane import plane_of_moments
+from metro.units import MM, UM, Array
+
+PITCHES = 6  # least nesting index of the filter
+COARSEST = 4.0  # times the nesting index asked for: a cloud that needs a longer one is not filtered
+NEIGHBOURS = 4
+ORDER = 0.05  # chance of as much spatial order in noise below which a face is taken to have a shape
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of one point and where the figure comes from.
+
+    Attributes
+    ----------
+    sigma : standard deviation of a point. source : in words.
+    relative : standard uncertainty of ``sigma``, relative.
+    repeated : whether it comes from repeat scans. spectrum : of these, where they are dense.
+    """
+
+    sigma: float
+    source: str
+    relative: float = 0.0
+    repeated: bool = False
+    spectrum: Spectrum | None = None
+
+
+def dense_noise(noise: Noise | None, local_sigma: float, spacing: float) -> tuple[Noise, Spectrum]:
+    """Return the noise of a dense scan, and its spectrum.
+
+    Parameters
+    ----------
+    noise : as told. local_sigma : noise that differs from point to point. spacing : pitch of the points.
+    """
+    density = spacing**-2
+    if noise is None:
+        return Noise(local_sigma, "local residual, a lower bound"), assumed(local_sigma, 0.0, density)
+    if noise.spectrum is not None:
+        return noise, noise.spectrum
+    # what the declared noise has beyond the local residual is correlated: how far is not told
+    white = min(local_sigma, noise.sigma)
+    return noise, assumed(white, float(np.sqrt(noise.sigma**2 - white**2)), density)
+
+
+def repeat_noise(scans: Sequence[Points], nesting_index: float) -> Noise:
+    """Return the noise by scans of one face that was not touched between them, (n, 3) each, in one frame.
+
+    Of touched points that are too few for a filter, the same points are needed in the same order.
+
+    Raises
+    ------
+    ValueError
+        Where the scans do not show the same part of a plane, or not the same points.
+    """
+    seen = survey(scans[0])
+    spacing = point_spacing(seen.moments)
+    source = f"{'two' if len(scans) == 2 else len(scans)} scans of the face"
+    if not filterable(spacing, nesting_index):
+        clouds = [np.asarray(scan[:], dtype=np.float64) for scan in scans]
+        sigmas = [repeat_sigma(*pair) for pair in pairwise(clouds)]
+        sigma, dof = float(np.sqrt(np.mean(np.square(sigmas)))), len(sigmas) * (len(clouds[0]) - 3)
+        return Noise(sigma, source, float(1 / np.sqrt(2 * dof)), repeated=True)
+    frame = plane_of_moments(seen.moments)
+    boxes = [box_in_plane(frame, survey(scan)) for scan in scans]
+    low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+    grid = make_grid(low, high, cell_size(spacing, max(nesting_index, PITCHES * spacing)))
+    sums = [cell_sums(scan, frame, grid) for scan in scans]
+    inside = np.all([interior(each, crop_margin(spacing, nesting_index, MM)) for each in sums], axis=0)
+    if np.count_nonzero(inside) < 10 * BANDS:
+        raise ValueError("the scans do not show the same part of the face")
+    spectra = [difference_spectrum(*pair, inside) for pair in pairwise(sums)]
+    spectrum = Spectrum(spectra[0].wavenumber, np.mean([each.density for each in spectra], axis=0))
+    white = spectrum.density[-1] / spacing**2  # at the cells' own wavelength noise is white
+    correlated = spectrum.density - spectrum.density[-1]
+    k = spectrum.wavenumber
+    variance = white + max(0.0, float(np.trapezoid(2 * np.pi * k * correlated, k)))
+    return Noise(float(np.sqrt(variance)), source, repeated=True, spectrum=spectrum)
+
+
+def filterable(spacing: float, nesting_index: float) -> bool:
+    """Whether points of this pitch are dense enough for the filter, or one not much longer."""
+    return PITCHES * spacing <= COARSEST * nesting_index
+
+
+def sparse_noise(coordinates: Array, deviations: Array, noise: Noise | None) -> Noise:
+    """Return the noise of a few touched points ``coordinates`` (n, 2), ``deviations`` (n,).
+
+    Where neighbours are no more alike than points far apart, no shape is told from noise, and all of the
+    scatter counts as noise: an error that both of two scans have at the same points looks like a shape to
+    their difference, not to this.
+    """
+    if noise is not None and not noise.repeated:
+        return noise
+    dof = len(deviations) - 3
+    if dof >= 10 and (chance := spatial_order(coordinates, deviations)) > ORDER:
+        scatter = float(np.sqrt(deviations @ deviations / dof))
+        source = f"scatter of the points, without order over the face (p = {chance:.2f})"
+        if noise is not None:
+            source += f"; {noise.source} differ by {noise.sigma / UM:.1f} µm per point"
+        if noise is None or scatter > noise.sigma:
+            return Noise(scatter, source, float(1 / np.sqrt(2 * dof)), noise is not None)
+    return noise or Noise(0.0, "unknown")
+
+
+def spatial_order(coordinates: Array, deviations: Array) -> float:
+    """Return the chance that noise shows as much likeness of neighbours: Moran's I, four nearest neighbours.
+
+    Normal approximation of I under independence (Cliff & Ord 1981), one-sided.
+    """
+    from scipy.spatial import cKDTree
+    from scipy.special import ndtr
+
+    number = len(deviations)
+    near = cKDTree(coordinates).query(coordinates, NEIGHBOURS + 1)[1][:, 1:]
+    one, other = np.repeat(np.arange(number), NEIGHBOURS), near.ravel()
+    pair, times = np.unique(np.concatenate([one * number + other, other * number + one]), return_counts=True)
+    weight, (i, j) = times / 2, np.divmod(pair, number)
+    centred = deviations - deviations.mean()
+    total, mean = float(weight.sum()), -1 / (number - 1)
+    likeness = number / total * float(weight @ (centred[i] * centred[j])) / float(centred @ centred)
+    s1 = 2 * float(weight @ weight)
+    s2 = 4 * float(np.sum(np.bincount(i, weights=weight, minlength=number) ** 2))
+    variance = (number**2 * s1 - number * s2 + 3 * total**2) / ((number**2 - 1) * total**2) - mean**2
+    return float(ndtr(-(likeness - mean) / np.sqrt(variance)))
