@@ -18,6 +18,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.observables.problem import Block, Parameter, Problem, Refusal
 from metro.observables.published_forces import forces
+from metro.observables.published_matrices import matrices
 from metro.structure import Structure
 from metro.units import JSON, MM, UM, Array
 
@@ -77,6 +78,7 @@ def observe(
         "published_errors": errors(published),
         "published_modes": modes(published),
         "published_loads": loads(published),
+        "published_matrices": matrices(published),
         "published_forces": forces(batch, published),
     }
 

@@ -61,6 +61,12 @@ class Basis:
         return np.column_stack([u**i * v**j for i, j in POWERS[: self.terms]])
 
 
+def basis_over(x: Array, y: Array, terms: int) -> Basis:
+    """Return the basis of so many ``terms`` over the extent of points ``x``, ``y`` (n,), m."""
+    centre = np.array([np.mean([c.min(), c.max()]) for c in (x, y)])
+    return Basis(centre, np.array([np.ptp(c) / 2 or 1.0 for c in (x, y)]), terms)
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """Evidence on the z row of C: displacements (n,) in m at ``x``, ``y`` by the effective ``force`` (n, 3).
@@ -128,6 +134,17 @@ def _symmetric(values: Array) -> Array:
     return matrix
 
 
+def points_compliance(
+    position: Array, force: Array, displacement: Array
+) -> tuple[Array, list[PointCompliance]]:
+    """Return the places (k, 2) m of load tests, and the compliance at each; arguments (m, 3) each."""
+    places, point = np.unique(position[:, :2].round(6), axis=0, return_inverse=True)
+    return places, [
+        point_compliance(force[point.ravel() == i], displacement[point.ravel() == i])
+        for i in range(len(places))
+    ]
+
+
 def nonlinearity(force: Array, displacement: Array) -> list[Nonlinearity]:
     """Compare, for each direction that has several, the compliance at the least and the greatest load.
 
@@ -189,12 +206,10 @@ def choose_basis(rows: Rows, entries: np.ndarray) -> tuple[Basis, float]:
 
     A higher degree must be better by 5 %: a tie goes to the simpler field. One load point gives a constant.
     """
-    centre = np.array([np.mean([c.min(), c.max()]) for c in (rows.x, rows.y)])
-    half = np.array([np.ptp(c) / 2 or 1.0 for c in (rows.x, rows.y)])
-    best = Basis(centre, half, TERMS[0])
+    best = basis_over(rows.x, rows.y, TERMS[0])
     least = leave_one_out(rows, best, entries)
     for terms in TERMS[1:]:
-        basis = Basis(centre, half, terms)
+        basis = basis_over(rows.x, rows.y, terms)
         error = leave_one_out(rows, basis, entries)
         if error < 0.95 * least:
             best, least = basis, error
@@ -210,23 +225,3 @@ def fit_z_row(rows: Rows, basis: Basis, entries: np.ndarray) -> tuple[Array, flo
     coefficients = np.zeros(len(used))
     coefficients[used] = values
     return coefficients, float(np.sqrt(rest @ rest / max(1, len(rest) - design.shape[1])))
-
-
-def interpolate_compliance(
-    tests: tuple[Array, Array, Array], basis: Basis, x: Array, y: Array
-) -> Array | None:
-    """Return whole matrices (n, 3, 3) at ``x``, ``y`` from load tests by the terms of ``basis``.
-
-    ``tests`` are positions, forces and displacements, (m, 3) each. Entries that no load shows are zero; None
-    where a load point lacks an entry on the diagonal.
-    """
-    position, force, displacement = tests
-    places, point = np.unique(position[:, :2].round(6), axis=0, return_inverse=True)
-    found = [point_compliance(force[point == i], displacement[point == i]).matrix for i in range(len(places))]
-    matrices = np.array(found)
-    if not np.isfinite(np.diagonal(matrices, axis1=1, axis2=2)).all():
-        return None
-    terms = np.linalg.pinv(basis(places[:, 0], places[:, 1])) @ np.nan_to_num(matrices).reshape(
-        len(places), 9
-    )
-    return np.asarray((basis(x, y) @ terms).reshape(-1, 3, 3))

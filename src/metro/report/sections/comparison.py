@@ -10,6 +10,7 @@ from metro.report.figures import comparison as figures
 from metro.report.figures import surface
 from metro.report.numbers import listing, number, percent, unit
 from metro.report.results import OBSERVABLES, Results, title
+from metro.report.sections.face_pairing import pairing_items
 from metro.report.sections.force import force_items
 from metro.report.sections.lobes import cut_items
 
@@ -27,6 +28,7 @@ def comparison(results: Results) -> Section:
             items.append(Heading(name[0].upper() + name[1:]))
             merit = force_items(results) if observable == "force" else []
             items += cut_items(results, frame) if observable == "lobes" else _values(frame, name, merit)
+            items += pairing_items(frame) if observable == "flatness" else []
     if not items:
         nothing = "No held-out run has both a measurement and a prediction: there is nothing to compare."
         return Section("Predicted against measured", [Paragraph(nothing)])

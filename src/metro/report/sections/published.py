@@ -10,6 +10,7 @@ from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Sec
 from metro.report.figures import force as figures
 from metro.report.numbers import number, unit
 from metro.report.results import Results
+from metro.report.sections.printed_bias import bias
 
 CONVENTION = {"measured": "(m − p)/m", "predicted": "(m − p)/p"}
 
@@ -19,20 +20,25 @@ def published(results: Results) -> Section | None:
     table = results.tables.get("published_errors")
     if table is None:
         return None
-    items: list[Item] = [*_errata(table)]
+    tip = results.tables.get("published_matrices")
+    items: list[Item] = [*_errata(table, tip)]
     for name, rows in table.groupby("table", sort=False):
         pairs = rows[rows["predicted"].notna()]
         items += _pairs(str(name), pairs) if len(pairs) else []
     items += _single(table[table["predicted"].isna()], results)
     items += _modes(results.tables.get("published_modes"))
+    items += _matrices(tip)
     items += _loads(results.tables.get("published_loads"))
     items += _forces(results, table)
     return Section("Published tables", items)
 
 
-def _errata(table: pd.DataFrame) -> list[Item]:
+def _errata(table: pd.DataFrame, tip: pd.DataFrame | None) -> list[Item]:
     flagged = table[table["flag"].fillna("") != ""]
     found = [f"Table {r['table']}, {r['row']}, {r['quantity']}: {r['flag']}." for _, r in flagged.iterrows()]
+    if tip is not None:
+        wrong = tip[tip["flag"] != ""]
+        found += [f"Section {r['table']}, {r['row']}: {r['flag']}." for _, r in wrong.iterrows()]
     noted = table[table["note"].fillna("").str.contains("erratum: ")]
     rest = noted[~noted.index.isin(flagged.index)]
     texts = [f"Table {r['table']}: {str(r['note']).partition('erratum: ')[2]}." for _, r in rest.iterrows()]
@@ -72,12 +78,17 @@ def _pairs(name: str, pairs: pd.DataFrame) -> list[Item]:
     strong = [i for i, flag in enumerate(pairs["flag"].fillna("")) if flag]
     bold = " Rows in bold cannot be right as printed." if strong else ""
     caption = f"Table {name}: printed pairs and recomputed errors.{says}{bold}"
-    return [Table(header, rows, caption, [1, 1.5, 1, 1, 1, 1, 1], numeric=[2, 3, 4, 5, 6], strong=strong)]
+    table = Table(header, rows, caption, [1, 1.5, 1, 1, 1, 1, 1], numeric=[2, 3, 4, 5, 6], strong=strong)
+    return [table, *bias(name, pairs)]
 
 
 def _single(rows: pd.DataFrame, results: Results) -> list[Item]:
     """Tabulate printed values without a prediction that no other table of this section shows."""
-    derived = [t for n in ("published_modes", "published_loads") if (t := results.tables.get(n)) is not None]
+    derived = [
+        t
+        for n in ("published_modes", "published_loads", "published_matrices")
+        if (t := results.tables.get(n)) is not None
+    ]
     elsewhere = {str(name) for t in derived for name in t["table"]}
     rest = rows[~rows["table"].astype(str).isin(elsewhere)]
     items: list[Item] = []
@@ -125,6 +136,19 @@ def _modes(modes: pd.DataFrame | None) -> list[Item]:
     header = ["mode", "printed (Hz)", "undamped (Hz)", "damped (Hz)", "the print is"]
     caption = "Printed frequencies against those of the printed stiffness, mass and damping ratio."
     return [Table(header, rows, caption, [1, 1, 1, 1, 1], numeric=[1, 2, 3])]
+
+
+def _matrices(tip: pd.DataFrame | None) -> list[Item]:
+    if tip is None or tip.empty:
+        return []
+    columns = ["a0", "a1", "missed_percent", "a0_printed", "a1_printed", "printed_missed_percent"]
+    rows = [[str(r["row"]), *(number(float(r[c]), 4) for c in columns)] for _, r in tip.iterrows()]
+    header = ["point", "a0 (1/s)", "a1 (s)", "misses C by (%)", "a0 printed", "a1 printed", "misses C by (%)"]
+    caption = (
+        "Damping C = a0 M + a1 K: least squares over the printed matrices of mass, stiffness and damping, "
+        "and the coefficients as printed; what each misses of the printed C."
+    )
+    return [Table(header, rows, caption, [1.2, 1, 1, 1, 1, 1, 1], numeric=[1, 2, 3, 4, 5, 6])]
 
 
 def _loads(loads: pd.DataFrame | None) -> list[Item]:

@@ -1,0 +1,99 @@
+"""Printed pairs of measured and predicted values: what gain, if any, lies between the two."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from metro.report.content import Bullets, Item, Table
+from metro.report.numbers import probability, unit, with_interval
+from metro.units import Array
+
+LEAST = 3  # pairs of one quantity and axis, all of one sign
+LEAST_LINE = 10  # pairs of either sign
+SURE = 0.05  # over all quantities of a table (Holm)
+CANNOT = (
+    "A printed value has no error of its own: the rows are taken as repeats, and their scatter is all that "
+    "an interval can be made of. Whether a gain is the model's (stiffness, coefficients, the frame that "
+    "forces are turned into) or the instrument's, the pairs cannot tell."
+)
+Told = tuple[float, float, float, float]  # value, low and high end of 95 %, p-value
+
+
+def bias(name: str, pairs: pd.DataFrame) -> list[Item]:
+    """Tell the gain and the difference of each quantity and axis of a printed table, where there are enough.
+
+    The p-values of gains are Holm's, over the quantities of the table.
+    """
+    told = []
+    axis = pairs["axis"].fillna("").astype(str)
+    for (quantity, along), rows in pairs.groupby([pairs["quantity"], axis], sort=False):
+        measured, predicted = (rows[c].to_numpy(dtype=float) for c in ("measured", "predicted"))
+        gain = _gain(measured, predicted)
+        if gain is not None and math.isfinite(gain[3]):
+            less = _mean(measured - predicted)
+            told.append(
+                (f"{quantity} {along}".strip(), unit(str(rows["unit"].iloc[0])), len(rows), gain, less)
+            )
+    if not told:
+        return []
+    p_values = _holm(np.array([gain[3] for *_, gain, _ in told]))
+    body, found = [], []
+    for (what, shown, count, gain, less), p in zip(told, p_values, strict=True):
+        ratio, offset = _written(gain), f"{_written(less)} {shown}".strip()
+        body.append([what, str(count), ratio, probability(p), offset, probability(less[3])])
+        if p <= SURE:
+            found.append(f"Table {name}, {what}: measured is {ratio} times what was predicted.")
+        else:
+            found.append(f"Table {name}, {what}: no gain is shown; it may be {ratio}.")
+    header = ["quantity", "pairs", "measured / predicted", "p (Holm)", "measured − predicted", "p"]
+    caption = (
+        f"Table {name}: what the pairs have in common, with 95 % intervals from the scatter of the rows."
+    )
+    return [Table(header, body, caption, [1.5, 0.6, 1.4, 0.8, 1.6, 0.7]), Bullets([*found, CANNOT])]
+
+
+def _gain(measured: Array, predicted: Array) -> Told | None:
+    """Return measured over predicted with its interval, and the p-value of one; None of too few pairs.
+
+    Of one sign: the geometric mean. Of either sign: the slope of a line with an offset, least squares; rows
+    that follow each other may be alike (Newey and West, Econometrica 55 (1987) 703).
+    """
+    if len(measured) >= LEAST and (measured * predicted > 0.0).all():
+        value, low, high, p = _mean(np.log(measured / predicted))
+        return math.exp(value), math.exp(low), math.exp(high), p
+    if len(measured) < LEAST_LINE or np.ptp(predicted) == 0.0:
+        return None
+    from statsmodels.api import OLS
+
+    lags = int(4.0 * (len(measured) / 100.0) ** (2.0 / 9.0))
+    design = np.stack([np.ones_like(predicted), predicted], axis=1)
+    options = {"maxlags": lags, "use_correction": True}
+    fitted = OLS(measured, design).fit(cov_type="HAC", cov_kwds=options, use_t=True)
+    low, high = np.asarray(fitted.conf_int())[1]
+    return float(fitted.params[1]), float(low), float(high), float(fitted.t_test("x1 = 1").pvalue)
+
+
+def _mean(values: Array) -> Told:
+    """Return the mean with its interval by Student's t, and the p-value of zero."""
+    from scipy.stats import ttest_1samp
+
+    test = ttest_1samp(values, 0.0)
+    low, high = test.confidence_interval(0.95)
+    return float(np.mean(values)), float(low), float(high), float(test.pvalue)
+
+
+def _written(told: Told) -> str:
+    value, low, high, _ = told
+    return with_interval(value, [low, high])
+
+
+def _holm(p: Array) -> list[float]:
+    """Return p-values (n,) for any of n tests being a false alarm (Holm, Scand. J. Stat. 6 (1979) 65)."""
+    order = np.argsort(p)
+    raised = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)).clip(max=1.0)
+    found = np.empty(len(p))
+    found[order] = raised
+    return [float(value) for value in found]
