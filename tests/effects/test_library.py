@@ -63,6 +63,8 @@ def test_every_effect_is_described_and_can_be_started(effect):
         assert parameter.starts
         assert all(parameter.lower <= start <= parameter.upper for start in parameter.starts)
         assert parameter.scale > 0
+        # an angle is turned into the one turn that its bounds span
+        assert parameter.period in {None, parameter.upper - parameter.lower}
 
 
 def test_an_effect_of_another_package_is_found_by_its_entry_point(third_party):

@@ -7,7 +7,7 @@ import pytest
 from wavy import GATES, problem
 
 from metro.effects import library
-from metro.effects.path_vibration import EFFECT as VIBRATION
+from metro.effects.path_vibration import ON_WALLS as VIBRATION
 from metro.loop.search import search
 from metro.loop.verdict import parameters
 from metro.observables.waviness_model import Vibration, WavinessModel

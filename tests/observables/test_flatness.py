@@ -137,9 +137,9 @@ def fitted(task: Problem, factor: float = 1.0) -> tuple[BaseFit, float]:
     (held,) = task.role("validate")
     rest = held.measured - design(held)[1] - design(held)[0] @ beta
     covariance = np.linalg.pinv(rows.T @ rows)
-    return BaseFit(beta, covariance, 10.0, {b.run: np.zeros(0) for b in task.blocks}), float(
-        np.sqrt((rest**2).mean()) * 1e3
-    )
+    return BaseFit(
+        beta, covariance, 10.0, {b.run: task.base.nuisance_starts(b)[0] for b in task.blocks}
+    ), float(np.sqrt((rest**2).mean()) * 1e3)
 
 
 @pytest.fixture(scope="module")
@@ -174,7 +174,7 @@ def test_load_tests_are_calibration_that_the_factor_does_not_touch(plate: tuple)
     soft = replace(task.base, structure=Structure(0.5))
     np.testing.assert_allclose(soft.design(loaded, np.zeros(0))[0], task.base.design(loaded, np.zeros(0))[0])
     np.testing.assert_allclose(
-        soft.design(face, np.zeros(0))[0], 2 * task.base.design(face, np.zeros(0))[0], rtol=0.01
+        soft.design(face, np.zeros(1))[0], 2 * task.base.design(face, np.zeros(1))[0], rtol=0.01
     )
 
 
@@ -257,7 +257,7 @@ def test_what_is_lacking_is_named(missing: str, word: str, plate: tuple) -> None
 
 def test_a_batch_without_scans_is_refused() -> None:
     batch = make_batch()
-    batch = replace(batch, runs=batch.runs.assign(scan=""))
+    batch = replace(batch, runs=batch.runs.assign(scan="", path=""))  # with a path they would be planned
     assert isinstance(flatness.observe(batch, reader(batch), {}), Refusal)
 
 

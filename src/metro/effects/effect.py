@@ -33,6 +33,8 @@ class EffectParameter:
         those of later groups ``neutral`` meanwhile.
     neutral : value at which the parameter's group changes nothing.
     choices : what the values 0, 1, … stand for, where the parameter is a choice among these.
+    local : whether it is another quantity in each observable (an amplitude along another axis): where one
+        cause shows in several, the others are shared.
     """
 
     name: str
@@ -46,6 +48,7 @@ class EffectParameter:
     group: int = 0
     neutral: float = 0.0
     choices: tuple[str, ...] = ()
+    local: bool = False
 
 
 @dataclass(frozen=True)

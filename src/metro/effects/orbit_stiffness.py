@@ -31,7 +31,13 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("amplitude", "1", 0.0, 1.0, 0.02, starts=(0.03, 0.15)),
         EffectParameter(
-            "phase_deg", "deg", 0.0, 360.0, 20.0, starts=tuple(45.0 * i for i in range(8)), period=360.0
+            "phase_deg",
+            "deg",
+            -180.0,
+            180.0,
+            20.0,
+            starts=tuple(45.0 * i for i in range(-4, 4)),
+            period=360.0,
         ),
     ),
     apply=apply,

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, Values
-from metro.effects.periodogram import peaks
-from metro.observables.problem import Problem, Refusal
+from metro.effects.periodogram import middle_start, own_peaks, peaks
+from metro.observables.problem import Block, Problem, Refusal
 from metro.observables.waviness_model import Vibration
-from metro.units import DEG, UM, Array
+from metro.units import DEG, MM, UM, Array
 
 LEAST_CYCLES, LEAST_POINTS = (
     2.0,
     4.0,
 )  # that the shortest run must show; that a cycle of the fastest must hold
+LEAST_WAVES, LEAST_BINS = 1.0, 2.0  # that a pass must show; that a wave must hold
+SHORTEST = 12 * MM  # wave of which the discs of path points keep all but some per cent
 STEPS = 3.0  # per width of a line: the longest run's reciprocal
 MOST = 4  # lines that are followed
 
@@ -53,6 +56,7 @@ def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
             replace(amplitude, starts=(start,)),
             phase,
         ),
+        sought=max(1.0, len(frequencies) / STEPS),
     )
 
 
@@ -68,13 +72,70 @@ def _unit(model: Any, frequency: float, quarter: float) -> Any:
     return replace(model, vibration=Vibration(frequency, 1.0, quarter * math.pi / 2))
 
 
-EFFECT = Effect(
+def on_faces(model: Any, values: Values) -> Any:
+    """Let the tip swing along z; time starts with the first pass, the phase is each face's own."""
+    return replace(model, vibration=Vibration(values["frequency_hz"], values["amplitude_um"] * UM))
+
+
+def adapt_to_faces(effect: Effect, problem: Problem) -> Effect | Refusal:
+    """Start from the strongest lines in time of what the base model leaves, each face with its own phase."""
+    base: Any = problem.base
+    blocks = problem.role("identify")
+    frequencies = _seen_on_faces([block.setting for block in blocks])
+    if len(frequencies) < 2:
+        return Refusal("its passes are too short, or its points too far apart, for a wave of 12 mm or more")
+    found, size = own_peaks(problem, [_times(base, block) for block in blocks], frequencies, MOST)
+    frequency, amplitude = effect.parameters
+    step = float(frequencies[1] - frequencies[0])
+    return replace(
+        effect,
+        parameters=(
+            replace(
+                frequency,
+                lower=float(frequencies[0]),
+                upper=float(frequencies[-1]),
+                scale=step,
+                starts=tuple(found.tolist()),
+            ),
+            replace(amplitude, starts=(max(float(np.median(size)) / UM, amplitude.scale),)),
+        ),
+        sought=max(1.0, len(frequencies) / STEPS),
+    )
+
+
+def _seen_on_faces(settings: list[Any]) -> Array:
+    """Frequencies, Hz, whose waves along a pass are no longer than it and are resolved by the points.
+
+    From pass to pass a wave is seen once per period, so that its frequency is told modulo the rate of the
+    passes; which of these it is, the waves along the passes tell, and faces with passes of another length.
+    """
+    low, high, spans = [], [], []
+    for setting in settings:
+        pace, passages = setting.pace, setting.passages
+        times = pace.time(passages)[passages.valid]
+        spans.append(float(np.ptp(times)))
+        low.append(LEAST_WAVES * pace.speed / float(np.ptp(passages.along[passages.valid])))
+        apart = np.hypot(np.diff(setting.mean(setting.x)), np.diff(setting.mean(setting.y)))
+        high.append(pace.speed / max(SHORTEST, LEAST_BINS * float(np.median(apart))))
+    return np.asarray(np.arange(max(low), min(high), 1.0 / (STEPS * max(spans))))
+
+
+def _times(base: Any, block: Block) -> tuple[Array, Callable[[Array], Array]]:
+    """When the rim finished the points of a face by the base model, and how these make its elements."""
+    setting = block.setting
+    chosen, _ = base.finished(setting, middle_start(base, block))
+    return setting.pace.time(setting.passages)[chosen], setting.mean
+
+
+ON_WALLS = Effect(
     name="path_vibration",
-    observables=("waviness",),  # flatness shows it too, but its model has no part for it
+    observables=("waviness",),
     parameters=(
         EffectParameter("frequency_hz", "Hz", 0.1, 500.0, 0.05, starts=(5.0,)),
-        EffectParameter("amplitude_um", "um", 0.0, 500.0, 0.5, starts=(2.0,)),
-        EffectParameter("phase_deg", "deg", 0.0, 360.0, 20.0, starts=(0.0, 120.0, 240.0), period=360.0),
+        EffectParameter("amplitude_um", "um", 0.0, 500.0, 0.5, starts=(2.0,), local=True),
+        EffectParameter(
+            "phase_deg", "deg", -180.0, 180.0, 20.0, (-120.0, 0.0, 120.0), period=360.0, local=True
+        ),
     ),
     apply=apply,
     part="vibration",
@@ -86,3 +147,20 @@ EFFECT = Effect(
     literature="Schneider et al., Prod. Eng. 8 (2014) 59: structural modes of industrial robots in milling",
     experiment="the same cut at two feeds that differ by a third, with an accelerometer on the spindle",
 )
+ON_FACES = replace(
+    ON_WALLS,
+    observables=("flatness",),
+    parameters=(
+        EffectParameter("frequency_hz", "Hz", 0.01, 500.0, 0.003, starts=(2.0,)),
+        EffectParameter("amplitude_um", "um", 0.0, 500.0, 0.5, starts=(2.0,), local=True),
+    ),
+    apply=on_faces,
+    adapt=adapt_to_faces,
+    signature=(
+        "Waves along every pass of one frequency in time, that go on from pass to pass and from where they "
+        "were in no other face. Waves shorter than 12 mm are lost between the points of the path: at 40 mm/s "
+        "up to 3 Hz are seen. The ringing of the arm's modes dies out behind the entry."
+    ),
+    form="faces",
+)
+EFFECT = (ON_WALLS, ON_FACES)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,21 +38,60 @@ def peaks(
         normal, right = np.zeros((2, 2)), np.zeros(2)
         for block, rest, offset in zip(blocks, rests, known, strict=True):
             columns = np.stack([_offset(model, block) - offset for model in models], axis=1)
-            columns /= block.sigma[:, None]
+            columns /= block.error[:, None]
             normal += columns.T @ columns
             right += columns.T @ rest
         found = np.linalg.lstsq(normal, right, rcond=1e-9)[0]
         power[i], amplitude[i] = found @ right, np.linalg.norm(found)
+    return _strongest(frequencies, power, amplitude, most)
+
+
+def own_peaks(
+    problem: Problem,
+    times: Sequence[tuple[Array, Callable[[Array], Array]]],
+    frequencies: Array,
+    most: int,
+) -> tuple[Array, Array]:
+    """Return what :func:`peaks` does of waves in time whose phase is each run's own.
+
+    The zeros of a run take their part of each wave first.
+
+    Parameters
+    ----------
+    times : for each block of the identification (m,) times, s, and what makes its elements of values there.
+    """
+    blocks = problem.role("identify")
+    power, square = np.zeros(len(frequencies)), np.zeros(len(frequencies))
+    for block, left, (time, mean) in zip(blocks, _rests(problem.base, blocks)[0], times, strict=True):
+        zeros = np.linalg.qr(block.zeros / block.sigma[:, None])[0]
+        rest = left - zeros @ (zeros.T @ left)
+        for i, frequency in enumerate(frequencies):
+            angle = 2.0 * np.pi * frequency * time
+            waves = mean(np.stack([np.sin(angle), np.cos(angle)], axis=1)) / block.sigma[:, None]
+            waves -= zeros @ (zeros.T @ waves)
+            found = np.linalg.lstsq(waves, rest, rcond=1e-9)[0]
+            power[i] += found @ (waves.T @ rest)
+            square[i] += found @ found
+    return _strongest(frequencies, power, np.sqrt(square / len(blocks)), most)
+
+
+def _strongest(frequencies: Array, power: Array, amplitude: Array, most: int) -> tuple[Array, Array]:
     rises = np.diff(power, prepend=-np.inf, append=-np.inf)
     tops = np.flatnonzero((rises[:-1] > 0.0) & (rises[1:] <= 0.0))
     chosen = tops[np.argsort(power[tops])[::-1][:most]]
     return frequencies[chosen], amplitude[chosen]
 
 
+def middle_start(base: Model, block: Block) -> Array:
+    """Return the middle one of the starts of a block's unknowns."""
+    starts = base.nuisance_starts(block)
+    return np.asarray(starts[len(starts) // 2], dtype=float)
+
+
 def _rests(base: Model, blocks: tuple[Block, ...]) -> tuple[list[Array], list[Array]]:
     """Return what the base model leaves of each block, in units of its error, and its offset there."""
-    designs = [base.design(block, np.zeros(0), None) for block in blocks]
-    sigma = [block.sigma for block in blocks]
+    designs = [base.design(block, middle_start(base, block), None) for block in blocks]
+    sigma = [block.error for block in blocks]
     scaled = np.vstack([matrix / s[:, None] for (matrix, _), s in zip(designs, sigma, strict=True)])
     target = np.concatenate(
         [(b.measured - offset) / s for b, (_, offset), s in zip(blocks, designs, sigma, strict=True)]

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.observables import cutting_force
-from metro.observables.face_path import Path, force_over_period, make_path, passages, turn_from_declared
-from metro.observables.flatness_model import FaceSetting, LoadSetting, PoseField, Ringing
+from metro.observables.face_doubt import damping_doubt
+from metro.observables.face_dynamics import TipDynamics, tip_dynamics
+from metro.observables.face_noise import bin_sigma
+from metro.observables.face_path import Path, make_pace, make_path, passages, turn_from_declared, work_size
+from metro.observables.face_patterns import patterns
+from metro.observables.face_ringing import Ringing, make_ringing
+from metro.observables.flatness_model import ACROSS, PHASES, FaceSetting, LoadSetting, PoseField
 from metro.observables.problem import Block, Refusal
 from metro.surface.footprint import RADIUS
 from metro.surface.tip_stiffness import (
     choose_basis,
     fit_z_row,
-    interpolate_compliance,
     nonlinearity,
     visible_entries,
     z_rows,
@@ -28,8 +32,8 @@ from metro.units import DEG, MM, UM, Array
 REGISTERED_SD = 10 * UM
 UNREGISTERED_SD = 1 * MM
 GAUGE_SD = 0.1 * UM
-MOST_POINTS = 400
-LEAST_COVERAGE = 0.75
+MOST_POINTS = 1200
+LEAST_COVERAGE, SECTORS = 0.75, 8
 LOADS = ("x_mm", "y_mm", "z_mm", "fx_n", "fy_n", "fz_n", "dx_mm", "dy_mm", "dz_mm")
 
 
@@ -38,15 +42,13 @@ class Pose:
     """What the load tests say of the arm at one pose.
 
     ``field``: how the z row of the compliance varies; ``loaded``: its coefficients by the loads alone;
-    ``block``: the loads as evidence; ``loads``: positions, forces, displacements (n, 3) SI; ``mass`` (3, 3)
-    kg or None; ``notes``.
+    ``block``: the loads as evidence; ``dynamics``: what rings, None where it is not known; ``notes``.
     """
 
     field: PoseField
     loaded: Array
     block: Block
-    loads: tuple[Array, Array, Array]
-    mass: Array | None
+    dynamics: TipDynamics | None
     notes: tuple[str, ...]
 
 
@@ -56,8 +58,8 @@ def load_arrays(loads: pd.DataFrame) -> tuple[Array, Array, Array]:
     return values[:, :3] * MM, values[:, 3:6], values[:, 6:] * MM
 
 
-def pose_of_loads(pose: str, loads: pd.DataFrame, mass: pd.DataFrame) -> Pose | Refusal:
-    """Gather what the load tests and the reduced mass of one pose say."""
+def pose_of_loads(pose: str, loads: pd.DataFrame, mass: pd.DataFrame, modes: pd.DataFrame) -> Pose | Refusal:
+    """Gather what the load tests and the reduced mass of one pose say; ``modes``: of all impacts."""
     position, force, displacement = arrays = load_arrays(loads)
     rows = z_rows(position[:, 0], position[:, 1], force, displacement)
     entries = visible_entries(rows)
@@ -90,7 +92,8 @@ def pose_of_loads(pose: str, loads: pd.DataFrame, mass: pd.DataFrame) -> Pose | 
         coordinates={},
     )
     field = PoseField(pose, basis, tuple(bool(seen) for seen in entries))
-    return Pose(field, loaded, block, arrays, _mass(mass), tuple(notes))
+    dynamics, said = tip_dynamics(pose, basis, arrays, mass, modes)
+    return Pose(field, loaded, block, dynamics, (*notes, *said))
 
 
 def _linearity(pose: str, loads: pd.DataFrame) -> list[str]:
@@ -112,62 +115,80 @@ def _linearity(pose: str, loads: pd.DataFrame) -> list[str]:
     ]
 
 
-def _mass(table: pd.DataFrame) -> Array | None:
-    """Mean reduced mass matrix of a pose's rows; None where there are none."""
-    if table.empty:
-        return None
-    xx, xy, xz, yy, yz, zz = table[["mxx", "mxy", "mxz", "myy", "myz", "mzz"]].mean()
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
 def face_block(
     batch: Batch, run: str, table: pd.DataFrame, pose: Pose, values: Mapping[str, float]
 ) -> tuple[Block, list[str]] | Refusal:
-    """Return the heights of a face at its path points, and what the report should say of them."""
-    path = make_path(table)
+    """Return the heights of a face at its path points and beside, and what the report should say of them.
+
+    ``table``: rows of face_points, then those of face_beside, with ``aside`` telling them apart.
+    """
+    path = make_path(table[~table["aside"]])
     if path.spread > 45 * DEG:
         return Refusal("its passes run in different directions; the force model knows one-way passes only")
-    radius = batch.manifest["tool"]["diameter_mm"] * MM / 2
-    table = table[_compared(table, path, radius)]
+    tool = cutting_force.cutter(batch)
+    if isinstance(tool, Refusal):
+        return tool
+    bin_number = _bins(table["pass"].to_numpy())
+    compared = _compared(table, path, tool.radius)
+    table, bin_number = table[compared], bin_number[compared]
     if len(table) < 4:
         return Refusal(
             "fewer than four path points lie on the scanned face, a radius away from entry and exit"
         )
-    x, y = table["x_mm"].to_numpy() * MM, table["y_mm"].to_numpy() * MM
+    x, y = _places(table, path)
     turn = turn_from_declared(batch, run, path)
     force = cutting_force.turn_about_z(turn) @ cutting_force.mean_force_on_tool(batch, run, values)
-    ringing = _ringing(batch, run, path, pose, values)
-    first = _bins(table["pass"].to_numpy())
+    ringing = make_ringing(batch, run, path, pose.dynamics, values, full=force)
     setting = FaceSetting(
-        pose.field.pose, x, y, first, passages(path, x, y, radius), force, pose.loaded, ringing
+        pose=pose.field.pose,
+        x=x,
+        y=y,
+        first=np.flatnonzero(np.diff(bin_number, prepend=-1)),
+        passages=passages(path, x, y, tool.radius),
+        pace=make_pace(batch, run, path, tool),
+        size=work_size(batch),
+        force=force,
+        loaded=pose.loaded,
+        ringing=ringing,
     )
-    return _block(batch, run, table, setting), _said(run, turn, ringing)
+    block = _block(batch, run, table, setting, path)
+    return replace(block, untold=damping_doubt(pose.field, setting)), _said(run, turn, ringing)
 
 
-def _block(batch: Batch, run: str, table: pd.DataFrame, setting: FaceSetting) -> Block:
+def _places(table: pd.DataFrame, path: Path) -> tuple[Array, Array]:
+    """Return the places (3 n,) that stand for the discs of the points of a table, m."""
+    across = RADIUS * np.array(ACROSS)
+    x = table["x_mm"].to_numpy()[:, None] * MM - across * path.direction.imag
+    y = table["y_mm"].to_numpy()[:, None] * MM + across * path.direction.real
+    return x.ravel(), y.ravel()
+
+
+def _block(batch: Batch, run: str, table: pd.DataFrame, setting: FaceSetting, path: Path) -> Block:
     row = batch.runs.loc[run]
     deviation = (table["z_mm"] - table["programmed_z_mm"]).to_numpy() * MM
-    variance = setting.mean((table["sigma_mm"].to_numpy() * MM) ** 2)
-    count = np.diff(np.append(setting.first, len(table)))
     x, y = setting.mean(setting.x), setting.mean(setting.y)
+    measured = setting.binned(deviation)
     placed = "to_work" in batch.instrument("scanner")
+    own = 0 if setting.ringing is None else setting.ringing.starts.shape[1]
     return Block(
         run=run,
         condition=str(row["condition"]),
         role="validate" if row["role"] == "validate" else "identify",
         order=int(batch.runs["order"].astype(int)[run]),
-        measured=setting.mean(deviation),
-        sigma=np.sqrt(variance / count),
+        measured=measured,
+        sigma=bin_sigma(measured, table, setting),
         setting=setting,
         axis=np.full(len(x), "z"),
         zeros=plane_directions(x, y),
         zero_sd=np.full(3, REGISTERED_SD if placed else UNREGISTERED_SD),
         coordinates={
             "axis": np.full(len(x), "z"),
-            "s_mm": setting.mean(table["s_mm"].to_numpy()),
+            "s_mm": setting.binned(table["s_mm"].to_numpy()),
             "x_mm": x / MM,
             "y_mm": y / MM,
         },
+        patterns=patterns(x, y, table["pass"].to_numpy()[setting.first], path.along(x, y)),
+        symmetries=np.array([[*np.zeros(own), phase] for phase in PHASES]),
     )
 
 
@@ -181,35 +202,36 @@ def _said(run: str, turn: float, ringing: Ringing | None) -> list[str]:
         notes.append(
             "Without mass.csv and work.size_mm the tip is taken to follow the force without ringing."
         )
+    elif ringing.teeth is not None:
+        notes.append(
+            f"Run {run}: the teeth pass at less than ten times the highest mode of the arm, so that the tip "
+            "moves at their rhythm, too; it is in the prediction."
+        )
     return notes
 
 
-def _ringing(batch: Batch, run: str, path: Path, pose: Pose, values: Mapping[str, float]) -> Ringing | None:
-    tool = cutting_force.cutter(batch)
-    if pose.mass is None or isinstance(tool, Refusal) or "size_mm" not in (batch.manifest.get("work") or {}):
-        return None
-    middle = path.start + 0.5 * path.length[:, None] * [path.direction.real, path.direction.imag]
-    compliance = interpolate_compliance(pose.loads, pose.field.basis, middle[:, 0], middle[:, 1])
-    if compliance is None:
-        return None
-    return Ringing(pose.mass, compliance, *force_over_period(batch, run, values, path, tool), RADIUS)
-
-
 def _compared(table: pd.DataFrame, path: Path, radius: float) -> np.ndarray:
-    """Mask of the path points that the scan shows well, a radius or more from entry and exit."""
-    seen = np.isfinite(table["z_mm"].to_numpy()) & (table["coverage"].to_numpy() >= LEAST_COVERAGE)
+    """Mask of the points that the scan shows well, a radius or more from entry and exit.
+
+    A disc over an edge is half empty: it holds fewer points than others do, in fewer of its sectors than so
+    many points fall into by chance.
+    """
+    count, coverage = table["k"].to_numpy(dtype=float), table["coverage"].to_numpy()
+    expected = 1.0 - (1.0 - 1.0 / SECTORS) ** count
+    seen = np.isfinite(table["z_mm"].to_numpy()) & (coverage >= LEAST_COVERAGE * expected)
     if not seen.any():
         return np.asarray(seen)
+    seen &= count >= LEAST_COVERAGE * np.median(count[seen])
     along = path.along(table["x_mm"].to_numpy() * MM, table["y_mm"].to_numpy() * MM)
     return np.asarray(seen & (along >= along[seen].min() + radius) & (along <= along[seen].max() - radius))
 
 
 def _bins(number: np.ndarray) -> np.ndarray:
-    """First index of each bin: neighbours within a pass, for at most about ``MOST_POINTS`` bins."""
+    """Return the number of each point's bin: neighbours within a pass, some ``MOST_POINTS`` at most."""
     width = math.ceil(len(number) / MOST_POINTS)
-    begins = np.flatnonzero(np.append(True, np.diff(number) != 0))
+    begins = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
     within = np.arange(len(number)) - np.repeat(begins, np.diff(np.append(begins, len(number))))
-    return np.flatnonzero(within % width == 0)
+    return np.cumsum(within % width == 0)
 
 
 def plane_directions(x: Array, y: Array) -> Array:

@@ -16,7 +16,6 @@ from metro.cutting.engagement import Engagement
 from metro.cutting.force import COEFFICIENTS, Cut, mean_force
 from metro.cutting.law import EdgeLaw
 from metro.observables import cutting_force
-from metro.observables.flatness_model import Passages
 from metro.units import DEG, MM, Array
 
 RETURN_SPEED, RETURN_PAUSE = 0.2, 0.6  # m/s, s: what the contract takes where return_s is blank
@@ -43,6 +42,50 @@ class Path:
     def aside(self, x: Array, y: Array) -> Array:
         """Position of points across the direction of travel, to its left, m."""
         return np.asarray(y * self.direction.real - x * self.direction.imag)
+
+
+@dataclass(frozen=True, eq=False)
+class Passages:
+    """Every time that the cutter's rim went over each point of a face.
+
+    Attributes
+    ----------
+    x, y : (n, k) where the tool's centre then was, m.
+    rim : (n, k) where on the rim the point then was: angle from the left of the feed clockwise, rad.
+    number : (n, k) index of the pass; along : (n, k) way from the start of the pass, m.
+    valid : (n, k) whether there is such a passage (points are passed over a different number of times).
+    """
+
+    x: Array
+    y: Array
+    rim: Array
+    number: np.ndarray
+    along: Array
+    valid: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Pace:
+    """When the axis is where on a face.
+
+    Attributes
+    ----------
+    speed : feed, m/s. period : from the start of a pass to that of the next, s.
+    edge : (passes,) way of the axis from the start of a pass to the block's edge, m; NaN where the size of
+        the work is not known.
+    """
+
+    speed: float
+    period: float
+    edge: Array
+
+    def time(self, passages: Passages) -> Array:
+        """Time of each passage from the start of the first pass, (n, k) s."""
+        return np.asarray(passages.number * self.period + passages.along / self.speed)
+
+    def inside(self, passages: Passages) -> Array:
+        """How far the axis is past the block's edge at each passage, (n, k) m."""
+        return np.asarray(passages.along - self.edge[passages.number])
 
 
 def make_path(table: pd.DataFrame) -> Path:
@@ -83,13 +126,58 @@ def passages(path: Path, x: Array, y: Array, radius: float) -> Passages:
     way = along.reshape(len(x), -1)[rows, kept]
     centre_x = path.start[taken, 0] + way * path.direction.real
     centre_y = path.start[taken, 1] + way * path.direction.imag
-    return Passages(centre_x, centre_y, taken, way, flat[rows, kept])
+    sides = np.stack([half, -half], axis=2)  # the point is ahead of the axis, then behind it
+    rim = np.arctan2(sides, across[:, :, None]).reshape(len(x), -1)[rows, kept]
+    return Passages(centre_x, centre_y, rim, taken, way, flat[rows, kept])
+
+
+def beside(table: pd.DataFrame, disc: float) -> pd.DataFrame:
+    """Return the points of a path table moved aside by a third of the spacing of its passes, to either side.
+
+    A dished cutter leaves a groove along each pass: its shape is only seen beside the middle. Empty where
+    discs of radius ``disc``, m, would overlap those of the path.
+    """
+    path = make_path(table)
+    gaps = np.diff(np.sort(path.aside(*path.start.T)))
+    third = float(np.median(gaps[gaps > 0])) / 3 if (gaps > 0).any() else 0.0
+    if third < 2 * disc:
+        return table[:0]
+    left = third / MM * np.array([-path.direction.imag, path.direction.real])
+    return pd.concat(
+        [
+            table.assign(x_mm=table["x_mm"] + side * left[0], y_mm=table["y_mm"] + side * left[1])
+            for side in (-1, 1)
+        ],
+        ignore_index=True,
+    )
 
 
 def turn_from_declared(batch: Batch, run: str, path: Path) -> float:
     """Angle from the declared feed direction to that of the path, rad; the path is trusted."""
     declared = float(batch.runs["feed_direction_deg"].astype(float).fillna(0.0)[run])
     return math.remainder(cmath.phase(path.direction) - declared * DEG, 2 * math.pi)
+
+
+def make_pace(batch: Batch, run: str, path: Path, tool: Cutter) -> Pace:
+    """Return when the axis is where: passes at the feed of the run table, then returns."""
+    rate = float(batch.runs["spindle_rpm"].astype(float)[run]) / 60
+    speed = cutting_force.cut(batch, run, tool.radius).feed_per_tooth * tool.teeth * rate
+    way = float(path.length.max())
+    pause = float(batch.runs["return_s"].astype(float)[run]) if "return_s" in batch.runs else math.nan
+    period = way / speed + (pause if pause >= 0 else way / RETURN_SPEED + RETURN_PAUSE)
+    return Pace(speed, period, _corners(batch, path).min() - path.along(*path.start.T))
+
+
+def work_size(batch: Batch) -> tuple[float, float]:
+    """Length of the work along x and y, m; NaN where the manifest does not give it."""
+    size = (batch.manifest.get("work") or {}).get("size_mm") or (math.nan, math.nan)
+    return float(size[0]) * MM, float(size[1]) * MM
+
+
+def _corners(batch: Batch, path: Path) -> Array:
+    """Position along the direction of travel of the work's corners, (4,) m; one is the origin."""
+    x, y = work_size(batch)
+    return path.along(*np.array([[0, 0], [x, 0], [0, y], [x, y]]).T)
 
 
 def force_over_period(
@@ -100,15 +188,10 @@ def force_over_period(
     The force rises while the cutter enters the block, whose corner is the work frame's origin, and falls
     while it leaves.
     """
-    rate = float(batch.runs["spindle_rpm"].astype(float)[run]) / 60
-    speed = cutting_force.cut(batch, run, tool.radius).feed_per_tooth * tool.teeth * rate
-    way = float(path.length.max())
-    pause = float(batch.runs["return_s"].astype(float)[run]) if "return_s" in batch.runs else math.nan
-    period = way / speed + (pause if pause >= 0 else way / RETURN_SPEED + RETURN_PAUSE)
-    count = round(period / STEP)
-    size = np.array(batch.manifest["work"]["size_mm"][:2], dtype=float) * MM
-    corners = path.along(*np.array([[0, 0], [size[0], 0], [0, size[1]], size]).T)
-    centre = path.along(*path.start[0]) + speed * period * np.arange(count) / count
+    pace, way = make_pace(batch, run, path, tool), float(path.length.max())
+    corners = _corners(batch, path)
+    count = round(pace.period / STEP)
+    centre = path.along(*path.start[0]) + pace.speed * pace.period * np.arange(count) / count
     ramp = np.linspace(-tool.radius, 0.0, RAMP_POINTS)
     entering, leaving = _ramps(batch, run, values, tool, -ramp / tool.radius)
     cutting = centre <= path.along(*path.start[0]) + way
@@ -118,7 +201,7 @@ def force_over_period(
         fall = np.interp(centre - corners.max(), ramp, leaving[:, axis])
         force[:, axis] = np.where(cutting, rise + fall - leaving[0, axis], 0.0)
     turn = cutting_force.turn_about_z(cmath.phase(path.direction))
-    return force @ turn.T, period, speed
+    return force @ turn.T, pace.period, pace.speed
 
 
 def _ramps(

@@ -10,19 +10,23 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.observables import cutting_force
+from metro.observables.face_advice import advice, planned_points, studied
 from metro.observables.face_blocks import (
     LOADS,
     Pose,
     face_block,
     load_arrays,
-    plane_directions,
     pose_of_loads,
 )
+from metro.observables.face_dynamics import tip_block
+from metro.observables.face_pairing import paired
+from metro.observables.face_repeats import noise_by_repeats, scanned_again
 from metro.observables.face_scan import FACE_TABLES, measured_run
 from metro.observables.flatness_model import FlatnessModel
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.observables.quantity import quantity
-from metro.surface.plane import fit_plane
+from metro.surface.face_noise import Noise
+from metro.surface.tip_damping import Rayleigh
 from metro.surface.tip_stiffness import point_compliance
 from metro.units import JSON, MM, UM
 
@@ -36,20 +40,26 @@ Read = Callable[..., pd.DataFrame]
 def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Measure each scanned face: indices, deviation map, heights at the path points; and keep the load tests.
 
-    Tables ``face_indices``, ``face_map``, ``face_points``, ``face_loads``, ``face_mass``, ``face_refused``.
+    Tables ``face_indices``, ``face_map``, ``face_points``, ``face_beside``, ``face_loads``, ``face_mass``,
+    ``face_planned``, ``face_refused``.
     """
-    runs = scanned(batch)
-    if not runs:
+    runs, planned = scanned(batch), planned_points(batch, read)
+    if not runs and planned.empty:
         return Refusal("runs.csv names no scan")
     parts: dict[str, list[pd.DataFrame]] = {name: [] for name in FACE_TABLES}
     refused = []
+    repeated = noise_by_repeats(batch, read)
     for run in runs:
-        tables, reason = measured_run(batch, run, read("scan", run), read("path", run))
+        noise = repeated(run)
+        path = read("path", run)
+        # another scan of a face is no second piece of evidence on how it was cut
+        path = path.iloc[:0] if scanned_again(batch, run) else path
+        repeats = noise if isinstance(noise, Noise) else None
+        tables, reason = measured_run(batch, run, read("scan", run), path, repeats)
         for name, table in tables.items():
             parts[name].append(table)
-        if reason:
-            refused.append((run, reason))
-    if not parts["face_indices"]:
+        refused += [(run, why) for why in (reason, noise) if isinstance(why, str)]
+    if not parts["face_indices"] and planned.empty:
         return Refusal("; ".join(f"run {run}: {reason}" for run, reason in refused))
     joined = {
         name: pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=[*FACE_TABLES[name]])
@@ -58,6 +68,7 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
     return joined | {
         "face_loads": read("loads")[["pose", "point", *LOADS]],
         "face_mass": read("mass"),
+        "face_planned": planned,
         "face_refused": pd.DataFrame(refused, columns=["run", "reason"], dtype=str),
     }
 
@@ -74,7 +85,10 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
     if isinstance(coefficients, Refusal):
         return coefficients
     notes = [f"Run {row.run} is left out: {row.reason}." for row in observed["face_refused"].itertuples()]
-    faces = {str(run): table for run, table in observed["face_points"].groupby("run", sort=False)}
+    points = observed["face_points"].assign(aside=False)
+    if len(observed["face_beside"]):  # an empty table has no types, and would take those of the other
+        points = pd.concat([points, observed["face_beside"].assign(aside=True)])
+    faces = {str(run): table for run, table in points.groupby("run", sort=False)}
     poses, blocks = {}, []
     for run, table in faces.items():
         name = _pose_name(batch, run, observed["face_loads"])
@@ -87,9 +101,16 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
         else:
             blocks.append(found[0])
             notes += found[1]
-    if not blocks:
-        return Refusal(" ".join(notes))
+    planned = observed["face_planned"]["run"].unique()
+    for name in dict.fromkeys(_pose_name(batch, run, observed["face_loads"]) for run in planned):
+        poses[name] = poses.get(name) or _pose(name, observed)
     known = [pose for pose in poses.values() if isinstance(pose, Pose)]
+    if not blocks and not (known and len(planned)):
+        return Refusal(
+            " ".join([*notes, *(pose.reason for pose in poses.values() if isinstance(pose, Refusal))])
+        )
+    remarks = observed["face_placed"][["run", "remark"]].to_numpy(dtype=object).tolist()
+    notes += [f"Run {run}: {remark}." for run, remark in remarks if remark]
     notes += [note for pose in known for note in pose.notes] + _limits(batch)
     model = FlatnessModel(tuple(pose.field for pose in known))
     scatter = np.full(len(model.parameters), SCATTER)
@@ -105,7 +126,7 @@ def _what_it_needs(
     """Return the cutting coefficients, or which of the things that a prediction takes are lacking."""
     if "face_points" not in observed:
         return Refusal("no face was measured")
-    if observed["face_points"].empty:
+    if observed["face_points"].empty and observed["face_planned"].empty:
         reasons = observed["face_refused"].itertuples()
         return Refusal("; ".join(f"run {row.run}: {row.reason}" for row in reasons))
     if observed["face_loads"].empty:
@@ -127,14 +148,15 @@ def _pose(name: str, observed: Mapping[str, pd.DataFrame]) -> Pose | Refusal:
     )
     if loads.empty:
         return Refusal(f"loads.csv has no tests at its pose {name!r}")
-    return pose_of_loads(name, loads, mass)
+    return pose_of_loads(name, loads, mass, observed.get("modes", pd.DataFrame()))
 
 
 def _limits(batch: Batch) -> list[str]:
     placed = "to_work" in batch.instrument("scanner")
     return [
         "The face is compared where the cutter is fully engaged (one radius from entry and exit); the "
-        "spindle stands square to it, and the modes of the arm share one damping ratio, fitted to each face.",
+        "spindle stands square to it. Where no impacts at the pose tell the damping of the arm, its modes "
+        "share one ratio, fitted to each face.",
         "Scans are placed by the declared scanner-to-work transform (offset and tilts known to 10 µm)."
         if placed
         else "No scanner-to-work transform is declared: offset and tilt are free, only the shape counts.",
@@ -142,21 +164,26 @@ def _limits(batch: Batch) -> list[str]:
 
 
 def report(
-    _batch: Batch,
+    batch: Batch,
     observed: Mapping[str, pd.DataFrame],
-    _identified: JSON,
+    identified: JSON,
     task: Problem | Refusal,
     fit: BaseFit | None,
 ) -> JSON:
     """Return each face's indices (as read, and less the bias), X_m as predicted, and the compliance."""
-    predicted = {} if isinstance(task, Refusal) or fit is None else _predicted_xm(task, fit)
+    predicted = {} if isinstance(task, Refusal) or fit is None else paired(task, fit)
     faces: JSON = {}
     for run, table in observed["face_indices"].groupby("run", sort=False):
         faces[str(run)] = _face_json(table) | predicted.get(str(run), {})
-    blocks: JSON = {"faces": faces}
+    blocks: JSON = {"faces": faces} | ({} if isinstance(task, Refusal) else tip_block(_damping(task)))
     if len(observed["face_loads"]):
         blocks["tip_compliance"] = _compliance_json(observed["face_loads"])
-    return blocks
+    advised = advice(
+        *(batch, observed, identified, task, fit),
+        pose_of=lambda run: _pose(_pose_name(batch, run, observed["face_loads"]), observed),
+    )
+    xm = {run: face["xm_predicted"]["value"] for run, face in faces.items() if "xm_predicted" in face}
+    return blocks | studied(batch, observed, xm, advised)
 
 
 def _face_json(table: pd.DataFrame) -> JSON:
@@ -180,23 +207,11 @@ def _face_json(table: pd.DataFrame) -> JSON:
     return entry | {"points": int(first["points"]), "outliers": int(first["outliers"])}
 
 
-def _predicted_xm(task: Problem, fit: BaseFit) -> dict[str, JSON]:
-    """Range of the predicted heights at the compared points about their plane, interval by the base fit."""
-    result = {}
-    for block in task.role("identify", "validate"):
-        if block.run not in fit.nuisance:
-            continue
-        design, offset = task.base.design(block, fit.nuisance[block.run], fit.beta)
-        heights = offset + design @ fit.beta
-        x, y = block.coordinates["x_mm"] * MM, block.coordinates["y_mm"] * MM
-        points = np.column_stack([x, y, heights])
-        deviations = fit_plane(points).deviations(points)
-        basis = plane_directions(x, y)
-        shape = design - basis @ np.linalg.lstsq(basis, design, rcond=None)[0]
-        across = shape[deviations.argmax()] - shape[deviations.argmin()]
-        sd = math.sqrt(max(0.0, float(across @ fit.covariance @ across)))
-        result[block.run] = {"xm_predicted": quantity(float(np.ptp(deviations)) / UM, sd / UM, "um", fit.dof)}
-    return result
+def _damping(task: Problem) -> dict[str, Rayleigh]:
+    """Return a0 and a1 by pose, where impacts told them."""
+    settings = [block.setting for block in task.role("identify", "validate")]
+    rung = [(each.pose, each.ringing.damping) for each in settings if each.ringing is not None]
+    return {pose: damping for pose, damping in rung if damping is not None}
 
 
 def _compliance_json(loads: pd.DataFrame) -> JSON:

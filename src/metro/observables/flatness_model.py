@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
+from metro.observables.face_path import Pace, Passages
+from metro.observables.face_ringing import Ringing
+from metro.observables.face_setup import Setup, swung
 from metro.observables.problem import Block, Parameter
+from metro.observables.waviness_model import Vibration
 from metro.structure import Structure
-from metro.surface.tip_response import tip_heights
 from metro.surface.tip_stiffness import POWERS, Basis, Rows, heights_design
 from metro.units import UM, Array
 
 ENTRIES = ("zx", "zy", "zz")
-DAMPING_RATIOS = (0.02, 0.05, 0.12)
+# Places across the feed, in radii of a disc, and their weights: Gauss's rule for the mean over a disc.
+ACROSS, WEIGHTS = (-math.sqrt(0.5), 0.0, math.sqrt(0.5)), (0.25, 0.5, 0.25)
+NODES = 0.1  # apart, of the logarithm of the damping ratio between which the ringing is interpolated
+PHASES = tuple(2 * math.pi * third / 3 for third in range(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,64 +39,15 @@ class PoseField:
 
 
 @dataclass(frozen=True, eq=False)
-class Passages:
-    """Every time that the cutter's rim went over each point of a face.
-
-    Attributes
-    ----------
-    x, y : (n, k) where the tool's centre then was, m.
-    number : (n, k) index of the pass; along : (n, k) way from the start of the pass, m.
-    valid : (n, k) whether there is such a passage (points are passed over a different number of times).
-    """
-
-    x: Array
-    y: Array
-    number: np.ndarray
-    along: Array
-    valid: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Ringing:
-    """What the transients of a face follow from.
-
-    ``mass`` (3, 3) kg; ``compliance`` (passes, 3, 3) m/N of the load tests at the middle of each pass;
-    ``force`` (n, 3) N on the tip over one ``period`` (s) of pass and return, at the feed ``speed`` (m/s);
-    ``disc`` radius of the footprint, m.
-    """
-
-    mass: Array
-    compliance: Array
-    force: Array
-    period: float
-    speed: float
-    disc: float
-
-    def heights(self, structure: Structure, damping: float) -> Array:
-        """Height of the tip less the static one under the full force, (passes, n) m."""
-        compliance = structure.in_cut(self.compliance)
-        stiffness = np.asarray(np.linalg.inv(compliance), dtype=np.float64)
-        disc = self.disc / self.speed
-        return tip_heights(self.mass, stiffness, damping, force=self.force, period=self.period, disc=disc)
-
-    def at(self, heights: Array, passages: Passages) -> Array:
-        """Interpolate ``heights`` (passes, n) at passages, (points, k)."""
-        place = passages.along / self.speed / self.period * heights.shape[1]
-        before = np.clip(np.floor(place).astype(np.intp), 0, heights.shape[1] - 2)
-        share = place - before
-        low, high = heights[passages.number, before], heights[passages.number, before + 1]
-        return np.asarray(low + share * (high - low))
-
-
-@dataclass(frozen=True, eq=False)
 class FaceSetting:
-    """A face at the points of its path.
+    """A face at the points of its path, and beside it.
 
     Attributes
     ----------
-    pose : of the arm. x, y : (n,) the points, m; ``first``: index of the first point of each bin that is
-        compared.
-    passages : of the rim over the points.
+    pose : of the arm. x, y : (3 n,) places of n points, m: each one's middle between two to its sides, which
+        stand for its disc. first : index of the first point of each bin that is compared.
+    passages : of the rim over the points; ``pace``: when. size : of the work along x and y, m; NaN where
+        it is not known.
     force : (3,) mean force on the tool in full engagement, N, work frame.
     loaded : (3 · terms,) coefficients of the compliance by the load tests alone: they say which passage was
         the lowest.
@@ -101,13 +59,20 @@ class FaceSetting:
     y: Array
     first: np.ndarray
     passages: Passages
+    pace: Pace
+    size: tuple[float, float]
     force: Array
     loaded: Array
     ringing: Ringing | None
 
     def mean(self, values: Array) -> Array:
+        """Average the values of places, (3 n,) or (3 n, p), over the discs, and these over the bins."""
+        discs = values.reshape(-1, len(ACROSS), *values.shape[1:])
+        return self.binned(np.tensordot(WEIGHTS, discs, axes=(0, 1)))
+
+    def binned(self, values: Array) -> Array:
         """Average the values of points, (n,) or (n, p), over the bins."""
-        count = np.diff(np.append(self.first, len(self.x)))
+        count = np.diff(np.append(self.first, len(self.x) // len(ACROSS)))
         return np.asarray((np.add.reduceat(values, self.first, axis=0).T / count).T)
 
 
@@ -131,10 +96,14 @@ class FlatnessModel:
     ----------
     fields : the compliance over (x, y) at each pose, known from load tests.
     structure : how stiff the arm is in the cut, relative to these tests.
+    setup : how spindle, tool and work depart from what is programmed.
+    vibration : of the tip, from the start of the first pass; its phase is each face's own.
     """
 
     fields: tuple[PoseField, ...]
     structure: Structure = field(default_factory=Structure)
+    setup: Setup = field(default_factory=Setup)
+    vibration: Vibration = field(default_factory=Vibration)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -148,18 +117,22 @@ class FlatnessModel:
         )
 
     def nuisance_starts(self, block: Block) -> Array:
-        """Logarithm of the damping ratio, (3, 1), where transients are predicted; else nothing, (1, 0)."""
-        if isinstance(block.setting, FaceSetting) and block.setting.ringing is not None:
-            return np.log(DAMPING_RATIOS)[:, None]
-        return np.zeros((1, 0))
+        """Return starts of what a face has to tell, (k, m): for its transients, and a vibration's phase."""
+        if not isinstance(block.setting, FaceSetting):
+            return np.zeros((1, 0))
+        ringing = block.setting.ringing
+        starts = np.zeros((1, 0)) if ringing is None else ringing.starts
+        phases = PHASES if self.vibration.amplitude else PHASES[:1]
+        return np.array([[*start, phase] for phase in phases for start in starts])
 
     def design(self, block: Block, nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
-        """Matrix (n, p) in m per (m/N), and the ringing (n,) m."""
+        """Matrix (n, p) in m per (m/N), and what rings, swings or is set up otherwise (n,) m."""
         setting = block.setting
         if isinstance(setting, LoadSetting):
             parts = [self._own(part, setting.pose, setting.rows.design(part.basis)) for part in self.fields]
             return np.hstack(parts), np.zeros(len(block.measured))
-        x, y, rest = self._finished(setting, nuisance)
+        chosen, rest = self.finished(setting, nuisance)
+        x, y = setting.passages.x[chosen], setting.passages.y[chosen]
         parts = [
             self._own(
                 part,
@@ -168,24 +141,57 @@ class FlatnessModel:
             )
             for part in self.fields
         ]
-        return np.hstack(parts), setting.mean(rest)
+        bowed = self.setup.bowed(setting.x, setting.y, setting.size)
+        return np.hstack(parts), setting.mean(rest[chosen] + bowed)
 
     def _own(self, part: PoseField, pose: str, columns: Array) -> Array:
         return columns[:, part.used] * float(part.pose == pose)
 
-    def _finished(self, setting: FaceSetting, nuisance: Array) -> tuple[Array, Array, Array]:
-        """Centre of the tool when its rim finished each point, and the tip's height over the static one."""
+    def finished(self, setting: FaceSetting, nuisance: Array) -> tuple[tuple[np.ndarray, np.ndarray], Array]:
+        """Index of the passage that finished each point, and what each cuts over the static height, (n, k) m.
+
+        The passages whose cut is lowest; ``nuisance`` as :meth:`nuisance_starts` has it.
+        """
         passages = setting.passages
-        basis = next(part.basis for part in self.fields if part.pose == setting.pose)
-        shape = passages.x.shape
-        rows = heights_design(basis, passages.x.ravel(), passages.y.ravel(), setting.force)
-        static = self.structure.in_cut((rows @ setting.loaded).reshape(shape))
-        rest = np.zeros(shape)
+        rest = self.setup.cuts(setting.x, setting.y, passages, setting.pace)
+        rest = rest + swung(self.vibration, float(nuisance[-1]), passages, setting.pace)
         if setting.ringing is not None:
-            ringing = setting.ringing
-            full = self.structure.in_cut(ringing.compliance) @ setting.force
-            moved = ringing.heights(self.structure, math.exp(nuisance[0])) - full[:, 2:]
-            rest = ringing.at(moved, passages)
+            own = tuple(float(value) for value in nuisance[:-1])
+            rest = rest + _rung(setting.ringing, self.structure, own, passages)
+        static = self.structure.in_cut(self._static(setting))
         lowest = np.where(passages.valid, static + rest, np.inf).argmin(axis=1)
-        chosen = (np.arange(shape[0]), lowest)
-        return passages.x[chosen], passages.y[chosen], rest[chosen]
+        return (np.arange(len(lowest)), lowest), rest
+
+    def _static(self, setting: FaceSetting) -> Array:
+        basis = next(part.basis for part in self.fields if part.pose == setting.pose)
+        return _static(basis, setting)
+
+
+@lru_cache(maxsize=64)
+def _static(basis: Basis, setting: FaceSetting) -> Array:
+    """Return the static height of the tip by the load tests, at each passage, (n, k) m."""
+    at = setting.passages
+    rows = heights_design(basis, at.x.ravel(), at.y.ravel(), setting.force)
+    return np.asarray((rows @ setting.loaded).reshape(at.x.shape))
+
+
+def _rung(ringing: Ringing, structure: Structure, own: tuple[float, ...], passages: Passages) -> Array:
+    """Return the height over the static one at passages.
+
+    With the stiffness of the load tests, which most fits keep, by cubic interpolation over the logarithm of
+    the damping: to 1e-5 of the ringing.
+    """
+    if not own or structure != Structure():
+        return _rung_at(ringing, structure, own, passages)
+    place = own[0] / NODES
+    first = math.floor(place) - 1
+    share = place - first
+    weights = [math.prod((share - j) / (i - j) for j in range(4) if j != i) for i in range(4)]
+    nodes = [_rung_at(ringing, structure, ((first + i) * NODES,), passages) for i in range(4)]
+    return np.asarray(sum(weight * node for weight, node in zip(weights, nodes, strict=True)))
+
+
+@lru_cache(maxsize=512)
+def _rung_at(ringing: Ringing, structure: Structure, own: tuple[float, ...], passages: Passages) -> Array:
+    """Whatever else shapes the face, this is the same, and slow to have."""
+    return ringing.rest(structure, np.array(own), passages)

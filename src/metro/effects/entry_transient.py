@@ -1,0 +1,53 @@
+"""Entry transient: behind the edge of the block every pass begins high, and comes down over some way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.problem import Problem, Refusal
+from metro.units import MM, UM
+
+LONGEST = 0.5  # of the shortest pass: what fades more slowly is a tilt
+
+
+def apply(model: Any, values: Values) -> Any:
+    """Lift the tip by ``amplitude_um`` as the axis comes to the block's edge; fades over ``length_mm``."""
+    return replace(
+        model,
+        setup=replace(model.setup, entry=(values["amplitude_um"] * UM, values["length_mm"] * MM)),
+    )
+
+
+def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
+    """Look for lengths between the spacing of the compared points and half a pass."""
+    settings: list[Any] = [block.setting for block in problem.role("identify")]
+    if not all(np.isfinite(setting.pace.edge).all() for setting in settings):
+        return Refusal("work.size_mm, which says where a pass enters the block, is not given")
+    amplitude, length = effect.parameters
+    whole = min(float(setting.passages.along[setting.passages.valid].max()) for setting in settings)
+    longest = max(LONGEST * whole / MM, 2.0 * length.lower)
+    starts = tuple(start for start in length.starts if start < longest)
+    return replace(effect, parameters=(amplitude, replace(length, upper=longest, starts=starts)))
+
+
+EFFECT = Effect(
+    name="entry_transient",
+    observables=("flatness",),
+    parameters=(
+        EffectParameter("amplitude_um", "um", -1000.0, 1000.0, 1.0, starts=(-10.0, 10.0)),
+        EffectParameter("length_mm", "mm", 2.0, 500.0, 2.0, starts=(5.0, 15.0, 40.0)),
+    ),
+    apply=apply,
+    part="setup",
+    adapt=adapt,
+    signature=(
+        "The same decay behind the entry of every pass, whatever the depth of cut and the pose. The ringing "
+        "of the arm's modes is at the same place, but swings, and goes with the force."
+    ),
+    literature="Altintas et al., CIRP Ann. 60 (2011) 779: feed drives under load",
+    experiment="the same pass at two feeds and at two depths: a drive that droops does so with the force",
+)

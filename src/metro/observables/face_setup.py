@@ -1,0 +1,74 @@
+"""What shapes a face beside the force: how spindle, tool and work depart from what is programmed.
+
+All of it is zero in a base model; each part is what one effect of the library sets.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from metro.observables.face_path import Pace, Passages
+from metro.observables.waviness_model import Vibration
+from metro.surface.footprint import RADIUS
+from metro.units import Array
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Departures of spindle, tool and work.
+
+    Attributes
+    ----------
+    tilt : of the spindle about work x and y through the tool's tip, rad.
+    growth : of tool and spindle from the start of the first pass, m/s.
+    bow : (xx, xy, yy) of the work, m: height xx u² + xy u v + yy v², with u, v from −1 to 1 over the work.
+    entry : how much higher the tip is when the axis has come to the block's edge, m, and the way over which
+        that fades to 1/e, m.
+    """
+
+    tilt: tuple[float, float] = (0.0, 0.0)
+    growth: float = 0.0
+    bow: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    entry: tuple[float, float] = (0.0, 1.0)
+
+    def cuts(self, x: Array, y: Array, passages: Passages, pace: Pace) -> Array:
+        """How much higher the rim cuts the points ``x``, ``y`` (n,) at each passage, (n, k) m."""
+        about_x, about_y = self.tilt
+        higher = (y[:, None] - passages.y) * about_x - (x[:, None] - passages.x) * about_y
+        if self.growth:
+            higher = higher - self.growth * pace.time(passages)
+        amplitude, length = self.entry
+        if amplitude:
+            inside = pace.inside(passages)
+            higher = higher + amplitude * np.where(inside >= 0.0, np.exp(-np.abs(inside) / length), 0.0)
+        return np.asarray(higher)
+
+    def bowed(self, x: Array, y: Array, size: tuple[float, float]) -> Array:
+        """How much higher the work lies at points, (n,) m; ``size`` (m) of the work, whose corner is zero."""
+        if not any(self.bow):
+            return np.zeros(len(x))
+        u, v = 2.0 * x / size[0] - 1.0, 2.0 * y / size[1] - 1.0
+        xx, xy, yy = self.bow
+        return np.asarray(xx * u**2 + xy * u * v + yy * v**2)
+
+
+def swung(vibration: Vibration, phase: float, passages: Passages, pace: Pace) -> Array:
+    """Height of a tip that swings, at passages (n, k), m, as the mean over a footprint keeps it.
+
+    ``phase`` is the face's own, rad.
+    """
+    if not vibration.amplitude:
+        return np.zeros(passages.along.shape)
+    kept = _kept(2 * math.pi * vibration.frequency * RADIUS / pace.speed)
+    turn = 2 * math.pi * vibration.frequency * pace.time(passages) + phase
+    return np.asarray(kept * vibration.amplitude * np.sin(turn))
+
+
+def _kept(wave: float) -> float:
+    """Share of a wave that its mean over a disc keeps; ``wave`` = 2π radius over wavelength."""
+    from scipy.special import j1
+
+    return 2.0 * float(j1(wave)) / wave

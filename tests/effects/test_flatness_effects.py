@@ -1,0 +1,128 @@
+"""Effects of flatness in faces made by formulas: found where they are, unseen where zeros hide them."""
+
+import numpy as np
+import pytest
+from face_batch import GATES, problem
+
+from metro.effects import library
+from metro.effects.effect import fitted_to
+from metro.loop.candidate import Candidate
+from metro.loop.fit import fit, score
+from metro.loop.noise import first_noise
+from metro.loop.search import search
+from metro.loop.signature import in_words, signature
+from metro.loop.verdict import parameters
+
+
+def tilted(dx, dy, **_cut):
+    return 0.9e-3 * dy + 0.6e-3 * dx
+
+
+def grown(time, **_cut):
+    return -25e-3 / 60.0 * time
+
+
+def entered(way, **_cut):
+    return np.where(way >= 0.0, 40e-3 * np.exp(-np.abs(way) / 15.0), 0.0)
+
+
+def swung(time, phase, **_cut):
+    return 8e-3 * np.sin(2 * np.pi * 1.7 * time + phase)
+
+
+def bowed(x, y):
+    u, v = x / 60.0 - 1.0, y / 30.0 - 1.0
+    return 12e-3 * u**2 - 5e-3 * u * v + 8e-3 * v**2
+
+
+def spot(x, y):
+    return 40e-3 * np.exp(-((x - 80.0) ** 2 + (y - 30.0) ** 2) / 200.0)
+
+
+HIDDEN = [
+    ("spindle_tilt", {"hidden": tilted}, {"about_x_mrad": 0.9, "about_y_mrad": -0.6}),
+    ("thermal_growth", {"hidden": grown}, {"um_per_min": 25.0}),
+    ("entry_transient", {"hidden": entered}, {"amplitude_um": 40.0, "length_mm": 15.0}),
+    ("path_vibration", {"hidden": swung}, {"frequency_hz": 1.7, "amplitude_um": 8.0}),
+    ("fixture_bow", {"work": bowed}, {"xx_um": 12.0, "xy_um": -5.0, "yy_um": 8.0}),
+    ("stiffness_scale", {"factor": 0.75}, {"factor": 0.75}),
+]
+
+
+def base_fit(task):
+    blocks = task.role("identify", "calibrate")
+    prior = first_noise(GATES.model_form_budget, task.scatter, blocks)
+    return fit(Candidate(task.base), blocks, prior), prior
+
+
+def effect_of(task, name):
+    return next(e for e in fitted_to(library("flatness"), task)[0] if e.name == name)
+
+
+@pytest.fixture(scope="module")
+def clean():
+    task = problem(seed=5)
+    return task, *base_fit(task)
+
+
+@pytest.mark.parametrize(("name", "made", "truth"), HIDDEN, ids=[case[0] for case in HIDDEN])
+def test_an_effect_comes_back_with_its_size_inside_its_interval(name, made, truth):
+    task = problem(**made)
+    base, prior = base_fit(task)
+    found = fit(Candidate(task.base, (effect_of(task, name),)), base.blocks, prior, base)
+    assert found.total > base.total + 8.0
+    for parameter, value in truth.items():
+        low, high = parameters(found, name)[parameter]["ci95"]
+        assert low < value < high
+        assert high - low < 1.5 * abs(value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "made", "truth"), HIDDEN, ids=[case[0] for case in HIDDEN])
+def test_the_search_names_the_effect_alone(name, made, truth):
+    outcome = search(problem(**made), library("flatness"), GATES)
+    assert name in (*outcome.names, *(rival.other for rival in outcome.rivals))
+    assert len(outcome.names) == 1
+
+
+@pytest.mark.slow
+def test_nothing_is_found_in_a_clean_batch():
+    outcome = search(problem(seed=7), library("flatness"), GATES)
+    assert outcome.names == ()
+    assert not any(line.significant for line in outcome.lines)
+
+
+def test_the_noise_is_that_of_faces_which_no_fit_has_seen(clean):
+    task, base, _ = clean
+    held = score(base, task.role("validate"))
+    ratio = sum(held.chi2.values()) / sum(held.elements.values())
+    assert ratio == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_clean_batch_has_no_pattern(clean):
+    _, base, _ = clean
+    assert not any(line.significant for line in signature(base, 0.04))
+
+
+@pytest.mark.parametrize("name", ["thermal_growth", "fixture_bow", "spindle_tilt"])
+def test_a_slope_that_the_place_of_an_unplaced_scan_takes_is_not_found(name):
+    task = problem(work=lambda x, y: 30e-3 * (x / 60.0 - 1.0) - 20e-3 * (y / 30.0 - 1.0), placed=False)
+    base, prior = base_fit(task)
+    found = fit(Candidate(task.base, (effect_of(task, name),)), base.blocks, prior, base)
+    assert found.total < base.total + 6.0
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        ({"hidden": lambda number, **_cut: 15e-3 * (number >= 3)}, "pass"),
+        ({"hidden": lambda number, **_cut: -20e-3 * (number == 2)}, "pass 3"),
+        ({"work": spot}, "is a bump at x"),
+    ],
+    ids=["step", "one pass deeper", "hard spot"],
+)
+def test_what_is_outside_the_library_is_described(made, words):
+    base, _ = base_fit(problem(**made))
+    lines = signature(base, 0.04)
+    assert any(line.significant for line in lines)
+    assert words in in_words(lines)
