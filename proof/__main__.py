@@ -1,6 +1,7 @@
 """``python -m proof``: make batches that hide sealed effects, run the pipeline on them, open the truth.
 
-``coverage`` needs no seal: its batches hide nothing, and what is counted is how often intervals hold.
+``coverage`` needs no seal: its batches hide nothing, and what is counted is how often intervals hold. Nor
+does ``faces``: what is compared is the faces that are predicted with those that are scanned.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ def main(arguments: list[str] | None = None) -> None:
     if options.command == "coverage":
         _coverage(options)
     else:
-        {"make": _make, "run": _run, "open": _open}[options.command](Layout(options.out), options)
+        {"make": _make, "run": _run, "open": _open, "faces": _faces}[options.command](
+            Layout(options.out), options
+        )
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -38,7 +41,10 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--reports", action="store_true", help="write the PDF reports, too")
     opening = commands.add_parser("open", help="check the seal and compare the verdicts with the truth")
     opening.add_argument("--strict", action="store_true", help="fail where a demand is missed beyond chance")
-    for command in (make, run, opening):
+    faces = commands.add_parser("faces", help="how predicted faces of eight cases resemble the scanned ones")
+    faces.add_argument("--seed", type=int, default=1)
+    faces.add_argument("--replicates", type=int, default=3)
+    for command in (make, run, opening, faces):
         command.add_argument("out", type=Path, help="folder of this proof")
     for command in (make, coverage, run, opening):
         command.add_argument("--jobs", type=int, default=2, help="worker processes")
@@ -67,6 +73,15 @@ def _open(out: Layout, options: argparse.Namespace) -> None:
     missed = [figure.label for figure in opened(out, options.jobs) if figure.missed_for_sure]
     if options.strict and missed:
         raise SystemExit("missed by more than chance: " + "; ".join(missed))
+
+
+def _faces(out: Layout, options: argparse.Namespace) -> None:
+    from rich.console import Console
+
+    from proof.faces import eight_cases, tables
+    from proof.show import printed
+
+    printed(tables(*eight_cases(out, options.seed, options.replicates)), Console())
 
 
 def _coverage(options: argparse.Namespace) -> None:

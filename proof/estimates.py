@@ -18,14 +18,16 @@ ANGLES = {
     ("gear_ripple", "phase_deg"): "turn",
     ("path_vibration", "phase_deg"): "turn",
 }
+# Effects whose parameters are the entries of one vector: an entry's error is relative to the largest of them.
+VECTORS = ("spindle_tilt", "fixture_bow")
 
 
 @dataclass(frozen=True)
 class Estimate:
     """One true value and what was found for it.
 
-    ``error`` is relative (in a list: to its largest value), of an angle that has a period in degrees;
-    ``covered``: whether the 95 % interval holds the truth, None where none is stated.
+    ``error`` is relative (in a list or a vector: to its largest value), of an angle that has a period in
+    degrees; ``covered``: whether the 95 % interval holds the truth, None where none is stated.
     """
 
     effect: str
@@ -46,12 +48,20 @@ def estimates(effect: str, truth: Mapping[str, Any], found: JSON, teeth: int) ->
     truth, found : as in the contract's table of effects and in verdict.json: a value or a list of values by
         name.
     """
+    largest = max(abs(value) for value in truth.values()) if effect in VECTORS else None
     return [
         one
         for name, value in truth.items()
         if name in found and name != "joint" and not isinstance(value, str)
         if len(_list(value)) == len(_list(found[name]))
-        for one in _compared(effect, name, np.array(_list(value), dtype=float), _list(found[name]), teeth)
+        for one in _compared(
+            effect,
+            name,
+            np.array(_list(value), dtype=float),
+            _list(found[name]),
+            teeth=teeth,
+            largest=largest,
+        )
     ]
 
 
@@ -59,7 +69,9 @@ def _list(value: Any) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
 
-def _compared(effect: str, name: str, true: np.ndarray, found: list[JSON], teeth: int) -> Iterator[Estimate]:
+def _compared(
+    effect: str, name: str, true: np.ndarray, found: list[JSON], *, teeth: int, largest: float | None
+) -> Iterator[Estimate]:
     value = np.array([entry["value"] for entry in found], dtype=float)
     period = _period(effect, name, teeth)
     if period is not None:
@@ -67,7 +79,7 @@ def _compared(effect: str, name: str, true: np.ndarray, found: list[JSON], teeth
     elif effect == "pitch_error":
         turned = [np.roll(true, shift) for shift in range(len(true))]
         true = min(turned, key=lambda order: float(np.sum((order - value) ** 2)))
-    scale = 1.0 if period is not None else float(np.abs(true).max())
+    scale = 1.0 if period is not None else largest or float(np.abs(true).max())
     for right, error, entry in zip(true.tolist(), ((value - true) / scale).tolist(), found, strict=True):
         low, high = entry["ci95"]
         covered = None if low is None or high is None else bool(low <= right <= high)

@@ -131,7 +131,9 @@ class Score:
     @property
     def admitted(self) -> bool:
         """Whether the verdict says that something is left that the library does not account for."""
-        return self.status in {"unexplained", "partly_explained"}
+        return self.status in {"unexplained", "partly_explained"} or (
+            self.status == "undetermined" and self.rest
+        )
 
     @property
     def misattributed(self) -> bool:

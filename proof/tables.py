@@ -66,7 +66,7 @@ _LOBES = (
 )
 _ARM = _FORCE.replace("Intervals:", "An effect named in a wrong joint is a wrong effect. Intervals:")
 _UNDECIDED = "Undecided: undetermined or insufficient."
-NOTES = {"force": _FORCE, "lobes": _LOBES, **dict.fromkeys(SHOWN, _ARM)}
+NOTES = {"force": _FORCE, "flatness": _FORCE, "lobes": _LOBES, **dict.fromkeys(SHOWN, _ARM)}
 
 
 def tabulated(title: str, figures: Iterable[Figure], note: str) -> Table:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from virtual_cell.arm_effects import SHOWN
+from virtual_cell.face_effects import FACE_EFFECTS
 from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Parameters
-from virtual_cell.recipes import arm, boundary, force
+from virtual_cell.recipes import arm, boundary, faces, force
 from virtual_cell.write import Row
 
 
@@ -23,5 +24,6 @@ class Recipe:
 RECIPES = {
     "force": Recipe(force.make, tuple(EFFECTS)),
     "lobes": Recipe(boundary.make, tuple(BOUNDARY_EFFECTS)),
+    "flatness": Recipe(faces.make, tuple(FACE_EFFECTS)),
     **{observable: Recipe(arm.make, effects) for observable, effects in SHOWN.items()},
 }

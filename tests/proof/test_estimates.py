@@ -86,3 +86,13 @@ def test_a_word_is_not_compared():
     found = {"axis": {"value": "x", "ci95": None, "unit": ""}, "damping": quantity(0.03, 0.01)}
     result = estimates("missing_mode", {"axis": "x", "damping": 0.03}, found, 3)
     assert [one.parameter for one in result] == ["damping"]
+
+
+def test_entries_of_a_vector_are_off_relative_to_the_largest_of_them():
+    true = {"about_x_mrad": -2.0, "about_y_mrad": 0.01}
+    found = {"about_x_mrad": quantity(-2.2, 0.1), "about_y_mrad": quantity(0.11, 0.2)}
+    x, y = estimates("spindle_tilt", true, found, 3)
+    assert x.error == pytest.approx(-0.1)
+    assert y.error == pytest.approx(0.05)
+    assert not x.covered
+    assert y.covered

@@ -61,6 +61,15 @@ def test_a_suite_about_an_arm_hides_what_is_seen_in_its_observable(observable):
     assert ("payload_error" in known) == (observable == "joint_force")
 
 
+def test_a_suite_about_faces_hides_the_effects_of_faces_and_what_no_library_has():
+    known, unknown = sides("flatness")
+    assert set(known) == {
+        *("spindle_tilt", "thermal_growth", "fixture_bow", "path_vibration", "entry_transient"),
+        "stiffness_scale",
+    }
+    assert len(unknown) == 8
+
+
 def test_batches_that_are_there_are_not_made_again(tmp_path):
     (tmp_path / "raw/blind-1").mkdir(parents=True)
     (tmp_path / "raw/blind-1/batch.yaml").write_text("")

@@ -35,9 +35,10 @@ def batch(request):
     )
 
 
-def test_remaking_a_batch_gives_the_same_bytes(tmp_path):
-    BUNDLED["clean-slot"](tmp_path / "clean-slot")
-    assert digest(tmp_path / "clean-slot") == digest(RAW / "clean-slot")
+@pytest.mark.parametrize("name", ["clean-slot", "irb6640-face"])
+def test_remaking_a_batch_gives_the_same_bytes(name, tmp_path):
+    BUNDLED[name](tmp_path / name)
+    assert digest(tmp_path / name) == digest(RAW / name)
 
 
 def test_the_simulator_imports_nothing_of_the_pipeline():

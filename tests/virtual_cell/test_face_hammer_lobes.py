@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from virtual_cell.face import Passes, Scanner, Surroundings, Tip, scan, surface, tip_heights
+from virtual_cell.face import Passes, Surroundings, surface
 from virtual_cell.hammer import acceleration, hit, receptance
 from virtual_cell.lobes import stable
 from virtual_cell.milling import Coefficients
 from virtual_cell.modes import Modes
+from virtual_cell.scanner import Scanner, scan
+from virtual_cell.tip import Tip, tip_heights
 from virtual_cell.units import MM, UM
 
 PASSES = Passes((0.06, 0.03), 0, 0.01, 0.008, 0.04, 0.012)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,10 +12,14 @@ import numpy as np
 
 from virtual_cell.arm import Arm, rotation_rpy
 from virtual_cell.chips import Engagement, Tool
-from virtual_cell.face import Passes, Scanner, Surroundings, Tip, scan, surface, tip_heights
+from virtual_cell.face import Passes, Surroundings, surface
+from virtual_cell.face_tables import load_rows, mass_row, path_rows
 from virtual_cell.milling import Cut, forces, in_millimetres, scattered
 from virtual_cell.motion import Straight
+from virtual_cell.scanner import Scanner, scan
 from virtual_cell.session import spread
+from virtual_cell.tip import Tip, tip_heights
+from virtual_cell.tip_compliance import tip_compliance
 from virtual_cell.units import DEG, MM, RPM, UM, Array
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_ply, write_yaml
 
@@ -44,6 +49,7 @@ ARM = Arm(
     np.array([2.6e6, 3.4e6, 2.5e6, 6.0e5, 6.6e5, 4.4e5]),
     np.zeros(6),
 )
+NEAR = np.array([-8.0, 10.0, 10.0, 5.0, -20.0, 5.0]) * DEG
 WRIST_YAW_DEG = {"A": 180.0, "B": 145.0}
 # published at the plate's middle, by wrist: mass (kg), a0 (1/s), a1 (s)
 MASS = {
@@ -55,6 +61,7 @@ TO_WORK = np.array(
     [[0.0, -1.0, 0.0, 260.0], [1.0, 0.0, 0.0, -35.0], [0.0, 0.0, 1.0, -120.0], [0.0, 0.0, 0.0, 1.0]]
 )
 _SCANNER = Scanner(1.1 * MM, 19.0 * UM, TO_WORK)
+_PLACES_MM = [(x, y) for x in (10.0, 100.0, 190.0) for y in (10.0, 50.0, 90.0)]
 
 
 @dataclass(frozen=True)
@@ -93,10 +100,15 @@ def make(folder: Path, around: Surroundings | None = None, factor: float = FACTO
         )
         rows.append(_row(case, run, place, replicate))
     for orientation in ("L", "T"):
-        write_csv(folder / f"path/{orientation}.csv", _path(_passes(orientation)))
+        write_csv(folder / f"path/{orientation}.csv", path_rows(_passes(orientation)))
     write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
-    write_csv(folder / "loads.csv", _loads(compliance, rng))
-    write_csv(folder / "mass.csv", _mass())
+    newtons, gauge = (150.0, 250.0), 2.0 * UM
+    loads = [
+        load_rows(pose, of, _PLACES_MM, newtons, gauge=gauge, rng=rng) for pose, of in compliance.items()
+    ]
+    write_csv(folder / "loads.csv", itertools.chain(*loads))
+    middle = (SIZE_MM[0] / 2.0, SIZE_MM[1] / 2.0)
+    write_csv(folder / "mass.csv", [mass_row(pose, "P5", middle, mass) for pose, mass in MASS.items()])
     write_yaml(folder / "cell.yaml", {"cell": "irb6640"})
     write_yaml(folder / "batch.yaml", _manifest(folder.name))
     return {"batch": folder.name, "effects": {"stiffness_scale": {"factor": factor}}}
@@ -110,19 +122,9 @@ def _passes(orientation: str) -> Passes:
 
 
 def _compliance(wrist: str) -> Callable[[Array], Array]:
-    """Compliance (n, 3, 3), m/N, of the tip over points (n, 2) of the plate, from 5 × 4 poses of the arm."""
-    from scipy.interpolate import RectBivariateSpline
-
+    """Compliance (n, 3, 3), m/N, of the tip over points (n, 2) of the plate."""
     axes = rotation_rpy(0.0, 0.0, WRIST_YAW_DEG[wrist] * DEG)
-    grid = [np.linspace(0.0, extent, n) for extent, n in zip(_SIZE, (5, 4), strict=True)]
-    found = np.empty((5, 4, 3, 3))
-    q: Array = np.array([-8.0, 10.0, 10.0, 5.0, -20.0, 5.0]) * DEG
-    for i, x in enumerate(grid[0]):
-        for j, y in enumerate(grid[1]):
-            q = ARM.reach(np.array([x, y, 0.0]) + np.array(WORK_MM) * MM, axes, q)
-            found[i, j] = np.column_stack([ARM.yields(q, unit) for unit in np.eye(3)])
-    splines = [RectBivariateSpline(*grid, found[:, :, i, j], kx=3, ky=3) for i in range(3) for j in range(3)]
-    return lambda points: np.stack([s.ev(*points.T) for s in splines], axis=-1).reshape(-1, 3, 3)
+    return tip_compliance(ARM, np.array(WORK_MM) * MM, axes, _SIZE, NEAR)
 
 
 def _cut(
@@ -182,46 +184,6 @@ def _row(case: Case, run: str, place: int, replicate: int) -> Row:
         "path": f"path/{case.orientation}.csv",
         "scan": f"scan/{run}.ply",
     }
-
-
-def _path(passes: Passes) -> list[Row]:
-    """Programmed tip path, a point every 2 mm."""
-    count = round((passes.length + 2.0 * passes.lead) / (2.0 * MM)) + 1
-    s = -passes.lead + np.arange(count) * 2.0 * MM
-    rows: list[Row] = []
-    for number in range(len(passes.axes)):
-        for x, y in passes.points(s, number) / MM:
-            at = {"x_mm": round(float(x), 3), "y_mm": round(float(y), 3), "z_mm": 0}
-            rows.append({"point": len(rows) + 1, "pass": number + 1, **at})
-    return rows
-
-
-def _loads(compliance: dict[str, Callable[[Array], Array]], rng: np.random.Generator) -> list[Row]:
-    """150 and 250 N along x, y and upwards at a grid of nine points, displacement by gauges (2 µm)."""
-    places = [(x, y) for x in (10.0, 100.0, 190.0) for y in (10.0, 50.0, 90.0)]
-    rows = []
-    for pose, of in compliance.items():
-        for point, place in enumerate(places, start=1):
-            matrix = of(np.array([place]) * MM)[0]
-            for axis in range(3):
-                for newton in (150.0, 250.0):
-                    moved = matrix[:, axis] * newton + rng.normal(0.0, 2.0 * UM, 3)
-                    row: Row = {"pose": pose, "point": f"P{point}"}
-                    row |= {"x_mm": place[0], "y_mm": place[1], "z_mm": 0.0}
-                    row |= {f"f{name}_n": newton if i == axis else 0.0 for i, name in enumerate("xyz")}
-                    row |= {f"d{name}_mm": round(float(moved[i] / MM), 4) for i, name in enumerate("xyz")}
-                    rows.append(row | {"replicate": 1})
-    return rows
-
-
-def _mass() -> list[Row]:
-    """Reduced mass at the middle of the plate, by pose."""
-    upper = {"mxx": (0, 0), "mxy": (0, 1), "mxz": (0, 2), "myy": (1, 1), "myz": (1, 2), "mzz": (2, 2)}
-    middle = {"x_mm": SIZE_MM[0] / 2.0, "y_mm": SIZE_MM[1] / 2.0, "z_mm": 0.0}
-    return [
-        {"pose": pose, "point": "P5", **middle, **{name: float(mass[at]) for name, at in upper.items()}}
-        for pose, mass in MASS.items()
-    ]
 
 
 def _manifest(name: str) -> Row:

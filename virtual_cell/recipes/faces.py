@@ -1,0 +1,213 @@
+"""Milled faces for blind tests: scans of every face, load tests, reduced mass, now and then hammer tests.
+
+Faces are cut in random order, repeats spread over the session. A pass of the mean force over a turn is traced
+from the true chips at entry, in full cut and at exit.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from virtual_cell.face import surface
+from virtual_cell.face_effects import applied, pass_gains, pass_levels
+from virtual_cell.face_tables import load_rows, mass_row, path_rows
+from virtual_cell.hidden import Parameters
+from virtual_cell.milling import scattered
+from virtual_cell.recipes.faces_draws import Case, FaceCell, Pose, drawn, eight_cases
+from virtual_cell.scanner import scan
+from virtual_cell.session import spread
+from virtual_cell.side_force import SideCut, SideForce, side_force
+from virtual_cell.tip import Tip, tip_heights
+from virtual_cell.units import DEG, MM, Array
+from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_ply, write_yaml
+
+_SCATTER, _SPEED_ERROR = 0.01, 0.003
+_THICK_MM = 10.0
+_HAMMER_HZ, _HAMMER_NOISE = np.arange(0.5, 60.0, 0.125), 0.01
+
+
+def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style: str = "a") -> Row:
+    """Write a batch that hides effects (name → parameters, or None: drawn by the seed); return the truth.
+
+    Raises
+    ------
+    KeyError
+        For an effect that is not known.
+    """
+    rng = np.random.default_rng([seed, 41])
+    truth = _made(folder, drawn(rng, style), hidden, rng)
+    return {**truth, "seed": seed, "style": style}
+
+
+def make_eight_cases(
+    folder: Path, hidden: Mapping[str, Parameters | None], seed: int, replicates: int = 3
+) -> Row:
+    """Write a batch of all eight configurations on a fixed bench, half of them held out; return the truth."""
+    rng = np.random.default_rng([seed, 43])
+    return _made(folder, drawn(rng, "a", eight_cases(replicates)), hidden, rng) | {"seed": seed}
+
+
+def _made(
+    folder: Path, cell: FaceCell, hidden: Mapping[str, Parameters | None], rng: np.random.Generator
+) -> Row:
+    cell, effects = applied(cell, hidden, rng.spawn(1)[0])
+    fresh_folder(folder)
+    rows = []
+    for place, (case, replicate) in enumerate(spread(cell.cases, rng), start=1):
+        run = f"r{place:02d}"
+        write_ply(folder / f"scan/{run}.ply", _cut(cell, case, *rng.spawn(3)))
+        rows.append(_row(cell, case, run, place, replicate))
+    for orientation in sorted({case.orientation for case in cell.cases}):
+        write_csv(folder / f"path/{orientation}.csv", path_rows(cell.passes(orientation)))
+    write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
+    _write_tests(folder, cell, rng)
+    write_yaml(folder / "cell.yaml", {"cell": "milling-arm"})
+    write_yaml(folder / "batch.yaml", _manifest(folder.name, cell))
+    return {"batch": folder.name, "effects": effects}
+
+
+def _cut(
+    cell: FaceCell,
+    case: Case,
+    settings: np.random.Generator,
+    hiding: np.random.Generator,
+    scanning: np.random.Generator,
+) -> Array:
+    """Mill one face and scan it, each with its own chance."""
+    passes, pose, depth = cell.passes(case.orientation), cell.poses[case.pose], case.depth_mm * MM
+    tip = Tip(pose.mass, pose.a0, pose.a1, lambda at: cell.factor * np.linalg.inv(pose.compliance(at)))
+    force = _force(cell, case, settings)
+
+    def load(s: Array) -> Array:
+        seen = force.mean_at(s)
+        return seen if passes.along == 0 else np.column_stack([-seen[:, 1], seen[:, 0], seen[:, 2]])
+
+    count = len(passes.axes)
+    heights = tip_heights(passes, tip, load, pass_gains(cell, count, depth))
+    phase, levels = hiding.uniform(0.0, 2.0 * math.pi), pass_levels(cell, count, hiding)
+    around = replace(cell.around, phase=phase, levels=levels)
+    return scan(cell.scanner, cell.size, lambda at: surface(passes, heights, around, at), scanning)
+
+
+def _force(cell: FaceCell, case: Case, rng: np.random.Generator) -> SideForce:
+    """Mean force along a pass; the metal and the spindle are a little different in every face."""
+    mill = cell.milling
+    metal, length = scattered(mill.metal, _SCATTER, rng), cell.passes(case.orientation).length
+    rpm, axial = mill.spindle_rpm, case.depth_mm * MM
+    cut = SideCut(mill.tool, metal, rpm, mill.speed, axial, mill.width, "down", length)
+    return side_force(cut, lambda _: 0.0, speed_error=_SPEED_ERROR * rng.uniform(-1.0, 1.0), phase=0.0)
+
+
+def _row(cell: FaceCell, case: Case, run: str, place: int, replicate: int) -> Row:
+    return {
+        "run": run,
+        "role": case.role,
+        "condition": case.condition,
+        "replicate": replicate,
+        "order": place,
+        "operation": "face",
+        "spindle_rpm": cell.milling.spindle_rpm,
+        "feed_per_tooth_mm": cell.milling.feed / MM,
+        "axial_depth_mm": case.depth_mm,
+        "radial_depth_mm": cell.milling.width / MM,
+        "direction": "down",
+        "feed_direction_deg": 0 if case.orientation == "L" else 90,
+        "cut_length_mm": cell.size[0] * cell.size[1] / cell.milling.width / MM,
+        "wrist": case.wrist,
+        "location": case.location,
+        "orientation": case.orientation,
+        "pose": case.pose,
+        "path": f"path/{case.orientation}.csv",
+        "scan": f"scan/{run}.ply",
+    }
+
+
+def _write_tests(folder: Path, cell: FaceCell, rng: np.random.Generator) -> None:
+    """Write load tests, reduced mass and, where the tip was struck, the hammer tests of every pose."""
+    tests, middle = cell.loads, np.array(cell.size) / 2.0
+    at = (float(middle[0] / MM), float(middle[1] / MM))
+    loads = [
+        load_rows(
+            name,
+            pose.compliance,
+            tests.places,
+            tests.newtons,
+            gauge=tests.gauge,
+            rng=rng,
+            repeats=tests.repeats,
+        )
+        for name, pose in cell.poses.items()
+    ]
+    write_csv(folder / "loads.csv", itertools.chain(*loads))
+    write_csv(folder / "mass.csv", [mass_row(name, "P5", at, pose.mass) for name, pose in cell.poses.items()])
+    if cell.hammered:
+        rows = [row for name, pose in cell.poses.items() for row in _struck(folder, name, pose, middle, rng)]
+        write_csv(folder / "impacts.csv", rows)
+
+
+def _struck(folder: Path, name: str, pose: Pose, at: Array, rng: np.random.Generator) -> list[Row]:
+    """Write the receptances of the tip, struck and heard along each axis at the middle of the plate."""
+    rows = []
+    seen = receptance(pose, at, _HAMMER_HZ)
+    for axis, word in enumerate("xyz"):
+        true = seen[:, axis, axis]
+        noise = rng.standard_normal((len(true), 2)) @ np.array([1.0, 1j]) * math.sqrt(0.5)
+        read = true + _HAMMER_NOISE * np.abs(true).mean() * noise
+        file = f"frf/{name}-{word}.csv"
+        columns = {"frequency_hz": _HAMMER_HZ, "real": read.real, "imag": read.imag}
+        write_csv(
+            folder / file,
+            [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
+        )
+        point = {"reference": f"1{word}", "response": f"1{word}", "replicate": 1}
+        rows.append(
+            {
+                "test": f"tip-{name}",
+                "position": name,
+                **point,
+                "kind": "frf",
+                "file": file,
+                "response_unit": "m",
+            }
+        )
+    return rows
+
+
+def receptance(pose: Pose, at: Array, frequency: Array) -> Array:
+    """Receptance (n, 3, 3), complex, m/N, of the tip at a point (2,), m; ``frequency`` (n,), Hz; e^{+iωt}."""
+    omega = 2.0 * math.pi * frequency[:, None, None]
+    stiffness = np.linalg.inv(pose.compliance(at[None])[0])
+    damping = pose.a0 * pose.mass + pose.a1 * stiffness
+    return np.asarray(np.linalg.inv(stiffness - omega**2 * pose.mass + 1j * omega * damping))
+
+
+def _manifest(name: str, cell: FaceCell) -> Row:
+    tool, scanner = cell.milling.tool, cell.scanner
+    return {
+        "format": 1,
+        "batch": name,
+        "title": f"Faces milled by an arm, {tool.teeth}-tooth {2.0 * tool.radius / MM:g} mm cutter",
+        "source": "simulated",
+        "cell": "milling-arm",
+        "tool": {
+            "diameter_mm": round(2.0 * tool.radius / MM, 6),
+            "teeth": tool.teeth,
+            "helix_deg": round(tool.helix / DEG, 6),
+            "pitch_deg": [round(360 / tool.teeth)] * tool.teeth,
+        },
+        "work": {"material": "AW-5013", "size_mm": [*(round(v / MM, 6) for v in cell.size), _THICK_MM]},
+        "coefficients": dict(cell.milling.declared),
+        "instruments": {
+            "scanner": {
+                "spacing_mm": round(scanner.spacing / MM, 6),
+                "sigma_mm": round(scanner.sigma / MM, 6),
+                "to_work": [[round(float(v), 9) for v in row] for row in scanner.to_work],
+            }
+        },
+    }
