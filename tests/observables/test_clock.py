@@ -48,3 +48,16 @@ def test_offset_and_drift_are_found_within_their_errors(offset, drift):
     assert 0.5 < np.sqrt(np.mean(standard**2)) < 1.5
     assert np.mean([c.offset for c in found]) == pytest.approx(offset, abs=0.001)
     assert max(c.offset_sd for c in found) < 0.002
+
+
+def test_noise_beyond_the_stated_widens_the_errors():
+    """Torques that scatter three times as much as they are said to: so do the errors told."""
+    rng = np.random.default_rng(5)
+    one = block(0.1, 0.0, rng)
+    honest = clock(one, ARM, 1.0)
+    one.sigma = one.sigma / 3.0
+    bold = clock(one, ARM, 1.0)
+    assert bold.offset == pytest.approx(honest.offset, abs=1e-6)
+    assert (bold.offset_sd, bold.drift_sd) == pytest.approx((honest.offset_sd, honest.drift_sd), rel=0.05)
+    one.sigma = one.sigma * 9.0
+    assert clock(one, ARM, 1.0).offset_sd == pytest.approx(3.0 * honest.offset_sd, rel=0.05)

@@ -250,3 +250,11 @@ def test_a_resonance_low_in_the_band_is_no_drift():
     first = frequency[clear][0]
     assert 60.0 < first < 230.0
     assert clear[frequency >= first].all()
+
+
+def test_a_drift_is_not_sought_beyond_a_quarter_of_the_band():
+    frequency = np.arange(1.0, 1001.0)
+    level = np.where(frequency < 400.0, 1.0, 1e-3)[:, None] * np.ones(1, dtype=complex)
+    clear = clear_of_drift(frequency, level)
+    assert frequency[clear][0] == 251.0
+    assert clear[frequency >= 251.0].all()

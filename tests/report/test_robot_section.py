@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import pytest
 import synthetic_results as synthetic
 
 from metro.report.content import Bullets, Paragraph, Picture, Table
@@ -163,3 +164,35 @@ def test_stations_are_tabulated_with_what_the_others_make_of_them():
     assert "x 3.5 % (2.0 … 9.0)" in table.caption
     [figure] = [item.figure for item in items if isinstance(item, Picture) and len(item.figure.axes) == 6]
     assert figure.axes[0].get_lines()[0].get_xydata().tolist() == [[0.0, 0.0], [100.0, -300.0]]
+
+
+def frictions():
+    table = pd.DataFrame({"joint": range(1, 7), "fastest_deg_s": 2.0, "noise_nm": 1.5, "remark": ""})
+    table = table.assign(coulomb=45.0, coulomb_low=44.7, coulomb_high=45.3)
+    table = table.assign(viscous=900.0, viscous_low=870.0, viscous_high=930.0)
+    blank = [name for name in table if name.startswith("coulomb")]
+    table.loc[[0, 2], blank], table.loc[[0, 2], "remark"] = np.nan, "one way only"
+    speed = np.array([-2.0, -1.0, 1.0, 2.0])
+    curve = pd.concat(
+        [pd.DataFrame({"joint": joint, "speed_deg_s": speed, "sd_nm": 1.0}) for joint in range(1, 6)]
+    )
+    return table, curve.assign(friction_nm=45.0 * np.sign(curve["speed_deg_s"]) + 16.0 * curve["speed_deg_s"])
+
+
+def test_friction_is_tabulated_and_what_the_runs_cannot_tell_is_said():
+    table, curve = frictions()
+    items = content(joint_friction=table, joint_friction_curve=curve)
+    rows = table_with(items, "Friction of the joints").rows
+    assert rows[1] == ["2", "45.00 ± 0.30", "900 ± 30", "31.4 ± 1.0", "2.00", "1.5"]
+    assert rows[0][1] == "–"
+    said = [text for item in items if isinstance(item, Bullets) for text in item.items]
+    assert said == ["Joints 1 and 3: one way only."]
+
+
+def test_the_line_of_friction_jumps_at_standstill_and_a_joint_without_points_has_none():
+    table, curve = frictions()
+    figure = figures.friction(curve, table)
+    left, right = (line.get_ydata() for line in figure.axes[1].get_lines()[-2:])
+    assert right[0] - left[-1] == pytest.approx(2 * (45.0 + 900.0 * np.pi / 180))
+    assert len(figure.axes[5].get_lines()) == len(figure.axes[1].get_lines()) - 2
+    assert to_svg(figure)

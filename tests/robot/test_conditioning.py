@@ -2,20 +2,11 @@
 
 import numpy as np
 import pytest
+from kr160_arm import DH
 
 from metro.robot.conditioning import characteristic_length, conditioning
 from metro.robot.kinematics import jacobian
 
-KR160 = np.array(
-    [
-        [0, 90, 500, 250],
-        [90, 0, 0, 610],
-        [-180, -90, 0, 70],
-        [0, 90, 710, 0],
-        [0, -90, 0, 0],
-        [0, 0, 215, 0],
-    ]
-) * (np.pi / 180, np.pi / 180, 1e-3, 1e-3)
 Q = np.array([0.1, -0.4, 0.7, 0.3, 0.9, -0.2])
 
 
@@ -37,7 +28,7 @@ def test_a_planar_arm_has_the_manipulability_of_its_parallelogram():
 def test_the_manipulability_of_a_wrist_arm_falls_as_the_sine_of_joint_5():
     bent = np.tile(Q, (8, 1))
     bent[:, 4] = np.linspace(0.05, 1.5, 8)
-    at_wrist = KR160.copy()
+    at_wrist = DH.copy()
     at_wrist[5, 2] = 0.0  # seen at the wrist, whose place joint 5 does not change
     found = conditioning(jacobian(at_wrist, bent), 1.0).manipulability
     np.testing.assert_allclose(found / np.sin(bent[:, 4]), found[0] / np.sin(0.05), rtol=1e-10)
@@ -47,7 +38,7 @@ def test_the_manipulability_of_a_wrist_arm_falls_as_the_sine_of_joint_5():
 def test_a_straight_wrist_is_singular_and_the_lost_direction_is_a_turn(joint, angle):
     q = Q.copy()
     q[joint] = angle
-    at_wrist = KR160.copy()
+    at_wrist = DH.copy()
     at_wrist[5, 2] = 0.0
     matrix = jacobian(at_wrist, q)
     found = conditioning(matrix, 0.5)
@@ -67,7 +58,7 @@ def test_an_isotropic_jacobian_has_condition_one():
 
 
 def test_a_rotation_of_the_base_changes_nothing_and_a_length_unit_only_scales():
-    matrix = jacobian(KR160, Q)
+    matrix = jacobian(DH, Q)
     turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
     turned = np.vstack([turn @ matrix[:3], turn @ matrix[3:]])
     length = characteristic_length(matrix)
@@ -80,6 +71,6 @@ def test_a_rotation_of_the_base_changes_nothing_and_a_length_unit_only_scales():
 
 def test_a_series_is_taken_at_once():
     q = np.random.default_rng(1).uniform(-2, 2, (7, 6))
-    found = conditioning(jacobian(KR160, q), 0.6)
-    singly = [conditioning(jacobian(KR160, row), 0.6).condition for row in q]
+    found = conditioning(jacobian(DH, q), 0.6)
+    singly = [conditioning(jacobian(DH, row), 0.6).condition for row in q]
     np.testing.assert_allclose(found.condition, singly, rtol=1e-9)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from metro.robot.friction import curvature, identify, of_idle_run, rigid_columns, weight_columns
+from metro.robot.friction import curvature, identify, of_idle_runs, rigid_columns, weight_columns
 from metro.robot.motion import encoder_step, motion
 
 PERIOD = 1e-3
@@ -146,7 +146,41 @@ def test_the_idle_run_of_a_slow_arm_needs_its_weight_alone_and_gaps_are_bridged(
     keep = np.ones(len(t), dtype=bool)
     keep[700:720] = False
     q = np.column_stack([0 * slow, np.round(slow / STEP) * STEP])
-    friction = of_idle_run(LEVEL, t[keep], q[keep], np.column_stack([0 * slow, drive])[keep])
+    friction, _ = of_idle_runs(LEVEL, [(t[keep], q[keep], np.column_stack([0 * slow, drive])[keep])])
     assert friction.value[1, 0] == pytest.approx(COULOMB, abs=4 * friction.sd[1, 0])
     assert friction.sd[1, 0] < 0.3
     assert weight_columns(LEVEL, record(slow[:50], drive[:50])).shape[-1] == 8
+
+
+def idle_run(rng, forth, speed, bump=0.0):
+    """Idle run of joint 2 that goes one way at a speed of its own, or back and forth."""
+    t = np.arange(0, 20.0, 0.012)
+    slow = speed * (0.5 * np.sin(0.6 * t) if forth else t / 20.0)
+    rate = np.gradient(slow, t)
+    drive = 12.0 * np.cos(slow) + line(rate) + rng.normal(0, 0.5, len(t))
+    turns = np.flatnonzero(np.diff(np.sign(rate)))
+    after = [bump * np.where(t > t[i], np.exp(-(t - t[i]) / 0.05), 0.0) for i in turns]
+    drive -= np.sign(rate) * np.sum(after, axis=0) if after else 0.0
+    q = np.column_stack([0 * slow, np.round(slow / STEP) * STEP])
+    return t, q, np.column_stack([0 * slow, drive])
+
+
+def test_runs_at_several_speeds_tell_viscous_friction_though_each_goes_one_way():
+    rng = np.random.default_rng(5)
+    friction, log = of_idle_runs(
+        LEVEL, [idle_run(rng, False, speed) for speed in (0.3141, 0.6172, 0.9213, 0.5234)]
+    )
+    assert np.isnan(friction.value[1, 0])
+    assert friction.value[1, 1] == pytest.approx(VISCOUS, abs=4 * friction.sd[1, 1])
+    assert (friction.forward[1], friction.backward[1]) == (True, False)
+    assert len(log.rate) == len(friction.residual)
+
+
+def test_what_a_gear_does_while_it_winds_up_after_a_turn_is_no_friction():
+    """Just behind a turn the torque is only on its way to the Coulomb level."""
+    rng = np.random.default_rng(6)
+    friction, _ = of_idle_runs(LEVEL, [idle_run(rng, True, 1.0, bump=COULOMB) for _ in range(3)])
+    assert friction.value[1, 0] == pytest.approx(COULOMB, rel=0.01)
+    assert friction.noise[1] < 0.3
+    assert friction.forward[1]
+    assert friction.backward[1]

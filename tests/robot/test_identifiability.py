@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kr160_arm import arm_with_tool
 
 from metro.robot import identifiability
-from metro.robot.kinematics import arm_of_cell
 from metro.robot.statics import joint_contributions
 from metro.robot.stiffness import joint_compliances
 
-DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
-ARM = arm_of_cell({"arm": {"dh": DH}}, {"tool_in_flange_mm": [212.5, 0.0, 279.91]})
+ARM = arm_with_tool()
 TRUE = 1 / np.array([1.8e6, 2.1e6, 1.3e6, 3.1e5, 3.9e5, 2.3e5])
 NEAR = np.radians([-20.3, -13.9, -4.4, -61.7, 34.9, 56.7])
 SIGMA = 5e-6
@@ -43,7 +42,7 @@ def test_the_relative_deviation_is_that_of_repeated_noisy_tests():
 
 
 def test_a_joint_whose_axis_every_force_passes_is_the_unseen_direction():
-    no_lever = arm_of_cell({"arm": {"dh": DH}}, {"tool_in_flange_mm": [0.0, 0.0, 279.91]})
+    no_lever = arm_with_tool(tool_in_flange_mm=[0.0, 0.0, 279.91])
     rows, measured = loads_of(some_poses(3), arm=no_lever)
     found = identifiability.told(identifiability.information(rows, measured, SIGMA, TRUE))
     np.testing.assert_allclose(np.abs(found.unseen), [[0, 0, 0, 0, 0, 1]], atol=1e-5)

@@ -6,23 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kr160_arm import TOOL_MM, arm_with_tool
 
 from metro.robot.kinematics import arm_of_cell, forward, jacobian, link_frames, rotation
 
-KR160 = [
-    [0, 90, 500, 250],
-    [90, 0, 0, 610],
-    [-180, -90, 0, 70],
-    [0, 90, 710, 0],
-    [0, -90, 0, 0],
-    [0, 0, 215, 0],
-]
-CELL = {"cell": "kr160", "arm": {"dh": KR160}}
-MANIFEST = {
-    "tool_in_flange_mm": [212.5, 0.0, 279.91],
-    "work_in_base": {"xyz_mm": [1200, -80, 500], "rpy_deg": [0, 0, 30]},
-}
-ARM = arm_of_cell(CELL, MANIFEST)
+ARM = arm_with_tool(work_in_base={"xyz_mm": [1200, -80, 500], "rpy_deg": [0, 0, 30]})
 angles = st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6).map(np.array)
 
 
@@ -93,4 +81,15 @@ def test_time_series_of_poses_are_taken_at_once():
 
 
 def test_a_cell_of_which_nothing_is_known_has_no_arm():
-    assert arm_of_cell({"cell": "mystery"}, MANIFEST) is None
+    assert arm_of_cell({"cell": "mystery"}, {"tool_in_flange_mm": TOOL_MM}) is None
+
+
+def test_the_printed_equation_2_is_no_rotation():
+    """[K] eq. 2 has cos θ cos α where sin θ sin α belongs: its axes are not at right angles."""
+    theta, alpha = 0.7, 1.1
+    (c, s), (ca, sa) = ((np.cos(a), np.sin(a)) for a in (theta, alpha))
+    printed = np.array([[c, -s * ca, c * ca], [s, c * ca, -c * sa], [0, sa, ca]])
+    ours = link_frames(np.array([[0.0, alpha, 0.3, 0.2]]), np.array([theta]))[1, :3, :3]
+    np.testing.assert_allclose(ours.T @ ours, np.eye(3), atol=1e-15)
+    assert np.abs(printed.T @ printed - np.eye(3)).max() > 0.1
+    np.testing.assert_array_equal(ours[:, :2], printed[:, :2])

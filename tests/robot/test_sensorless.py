@@ -6,14 +6,13 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from kr160_arm import arm_with_tool
 from scipy.signal import lfilter
 
-from metro.robot.kinematics import arm_of_cell
 from metro.robot.sensorless import mean_force, noise_of_bins, observability, smoothed_torque, tip_force
 from metro.robot.statics import tip_jacobian
 
-DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
-ARM = arm_of_cell({"arm": {"dh": DH}}, {"tool_in_flange_mm": [212.5, 0.0, 279.91]})
+ARM = arm_with_tool()
 FORCE = np.array([80.0, -170.0, -35.0])
 
 
@@ -138,3 +137,35 @@ def test_the_interval_of_the_steady_mean_holds_the_truth_19_times_in_20(persiste
     assert 0.93 <= np.mean(inside) <= 0.97
     # the error of a single place, taken for that of the mean, always holds it
     assert np.mean(naive) > 0.995
+
+
+def test_joints_that_leave_an_axis_open_do_not_count_as_enough():
+    """Two of the three that pass pull nearly alike: of all joints the force is told far better."""
+    passing = [[1.0, 1.0, 0.0], [0.5, 0.5, 1.0], [0.2, 0.21, 0.0]]
+    jacobian = np.tile(np.hstack([passing, np.eye(3)]), (4, 1, 1))
+    torque = -np.einsum("mai,a->mi", jacobian, FORCE)
+    index = np.array([5.0, 5.0, 5.0, 1.0, 1.0, 1.0])
+    with pytest.raises(
+        ValueError, match=r"joints 1, 2, 3, .* leave an axis of the force open: .* of all joints"
+    ):
+        tip_force(torque, np.ones((4, 6)), jacobian, index)
+    found = tip_force(torque, np.ones((4, 6)), jacobian, index, least=0.0)
+    np.testing.assert_allclose(found.force, np.tile(FORCE, (4, 1)), atol=1e-6)
+
+
+def test_slow_noise_widens_the_interval_of_the_mean_by_what_it_does_to_it():
+    """Half of the path is steady: slow waves, which average out over the whole, do not over a half."""
+    rng, count, level = np.random.default_rng(12), 100, np.array([4.0, 3.0, 2.0, 1.0, 1.0, 1.0])
+    number = np.arange(1, count)
+    shapes = np.sqrt(2 / count) * np.cos(np.pi * np.outer(np.arange(count) + 0.5, number) / count)
+    steady = np.arange(count) >= count // 2
+    white = np.full(6, 1e-6)
+    found = tip_force(np.zeros((count, 6)), np.ones((count, 6)), JACOBIAN, np.full(6, 9.0))
+    draws = []
+    for _ in range(2000):
+        slow = shapes @ (rng.normal(size=(count - 1, 6)) * np.sqrt(level / number[:, None]))
+        draws.append(np.einsum("mai,mi->ma", found.solve, slow)[steady].mean(axis=0))
+    still = smoothed_torque(rng.normal(0.0, 1e-3, (count, 6)), white)
+    told = mean_force(found, still, steady, 0.0, level)[1]
+    np.testing.assert_allclose(np.diag(told), np.var(draws, axis=0), rtol=0.12)
+    assert np.diag(mean_force(found, still, steady)[1]).max() < 1e-3 * np.diag(told).min()

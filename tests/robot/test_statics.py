@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kr160_arm import arm_with_tool
 
-from metro.robot.kinematics import Arm, arm_of_cell
+from metro.robot.kinematics import Arm
 from metro.robot.statics import (
     deflections,
     flange_jacobian,
@@ -18,14 +19,7 @@ from metro.robot.statics import (
     wrench_map,
 )
 
-DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
-ARM = arm_of_cell(
-    {"arm": {"dh": DH}},
-    {
-        "tool_in_flange_mm": [212.5, 0.0, 279.91],
-        "work_in_base": {"xyz_mm": [1200, 0, 500], "rpy_deg": [10, -20, 30]},
-    },
-)
+ARM = arm_with_tool(work_in_base={"xyz_mm": [1200, 0, 500], "rpy_deg": [10, -20, 30]})
 COMPLIANCE = 1 / np.array([4.6e6, 4.8e6, 3.3e6, 5.2e5, 6.1e5, 3.9e5])
 angles = st.lists(st.floats(-2.5, 2.5), min_size=6, max_size=6).map(np.array)
 vectors = st.lists(st.floats(-300, 300), min_size=3, max_size=3).map(np.array)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kr160_arm import arm_with_tool
 
-from metro.robot.kinematics import arm_of_cell
 from metro.robot.statics import joint_contributions
 from metro.robot.stiffness import distinguishable, joint_compliances
 
-DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
-ARM = arm_of_cell({"arm": {"dh": DH}}, {"tool_in_flange_mm": [212.5, 0.0, 279.91]})
+ARM = arm_with_tool()
 TRUE = 1 / np.array([4.6e6, 4.8e6, 3.3e6, 5.2e5, 6.1e5, 3.9e5])
 
 
@@ -48,7 +47,7 @@ def test_the_stated_covariance_is_that_of_repeated_noisy_tests():
 
 def test_a_joint_that_no_load_turns_is_said_to_be_unseen_and_leaves_the_others_alone():
     """Forces through the axis of joint 6 do not turn it."""
-    no_lever = arm_of_cell({"arm": {"dh": DH}}, {"tool_in_flange_mm": [0.0, 0.0, 279.91]})
+    no_lever = arm_with_tool(tool_in_flange_mm=[0.0, 0.0, 279.91])
     rng = np.random.default_rng(5)
     q, force = rng.uniform(-1, 1, (30, 6)), rng.normal(0, 150, (30, 3))
     design = joint_contributions(no_lever, q, force)

@@ -4,24 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kr160_arm import DH
 from scipy.spatial.transform import Rotation
 
 from metro.robot.kinematics import Arm, forward, jacobian, rotation, transform
 from metro.robot.tracking import rotation_vector, tracking_error
 
-KR160 = np.array(
-    [
-        [0, 90, 500, 250],
-        [90, 0, 0, 610],
-        [-180, -90, 0, 70],
-        [0, 90, 710, 0],
-        [0, -90, 0, 0],
-        [0, 0, 215, 0],
-    ]
-) * (np.pi / 180, np.pi / 180, 1e-3, 1e-3)
-ARM = Arm(
-    KR160, np.array([0.2125, 0.0, 0.27991]), transform(np.array([1.2, -0.1, 0.5]), rotation(0.1, -0.3, 2))
-)
+ARM = Arm(DH, np.array([0.2125, 0.0, 0.27991]), transform(np.array([1.2, -0.1, 0.5]), rotation(0.1, -0.3, 2)))
 angles = st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6).map(np.array)
 vectors = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3).map(np.array)
 
@@ -41,9 +30,9 @@ def test_the_rotation_vector_is_axis_times_angle_from_nothing_to_half_a_turn(ang
 def test_a_joint_that_lags_moves_flange_and_tip_on_their_circles_about_its_axis():
     """Joint 1 alone: a chord 2 r sin(Δ/2), r the distance from its vertical axis, and a turn about z."""
     q, lag = np.array([0.3, -0.5, 0.8, 0.4, 0.7, -0.2]), 1e-4
-    arm = Arm(KR160, ARM.tool, np.eye(4))
+    arm = Arm(DH, ARM.tool, np.eye(4))
     error = tracking_error(arm, q + lag * np.eye(6)[0], q)
-    radius = np.linalg.norm(forward(KR160, q)[:2, 3]), np.linalg.norm(arm.tip(q)[:2])
+    radius = np.linalg.norm(forward(DH, q)[:2, 3]), np.linalg.norm(arm.tip(q)[:2])
     chords = np.linalg.norm(error.flange), np.linalg.norm(error.tip)
     np.testing.assert_allclose(chords, 2 * np.array(radius) * np.sin(lag / 2), rtol=1e-9)
     np.testing.assert_allclose(error.rotation, [0, 0, lag], atol=1e-15)
@@ -58,14 +47,14 @@ def test_the_tip_moves_where_the_flange_stands_still_when_joint_6_lags():
 def test_ten_micrometres_at_the_flange_are_forty_at_the_tip():
     """[K]: the tip adds φ × p to the flange's 10 µm: 30 µm more where φ = 30 µm/|p| across the lever."""
     q = np.array([0.3, -0.5, 0.8, 0.4, 0.7, -0.2])
-    wanted = forward(KR160, q)
+    wanted = forward(DH, q)
     lever = wanted[:3, :3] @ ARM.tool
     across = np.cross(lever, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
     upward = np.cross(across, lever) / np.linalg.norm(lever)
     turn = 30e-6 / np.linalg.norm(lever)
     twist = np.r_[10e-6 * upward, turn * across]
-    error = tracking_error(ARM, q + np.linalg.solve(jacobian(KR160, q), twist), q)
+    error = tracking_error(ARM, q + np.linalg.solve(jacobian(DH, q), twist), q)
     assert np.linalg.norm(error.flange) == pytest.approx(10e-6, rel=1e-3)
     assert np.linalg.norm(error.rotation) == pytest.approx(turn, rel=1e-3)
     assert np.linalg.norm(error.tip) == pytest.approx(40e-6, rel=1e-3)

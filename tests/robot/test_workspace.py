@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kr160_arm import arm_with_tool
 
-from metro.robot.kinematics import Arm, arm_of_cell, forward
+from metro.robot.kinematics import Arm, forward
 from metro.robot.workspace import ellipsoid, principal_sd, reach, stiffness_map
 
-DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
-FRAME = {"work_in_base": {"xyz_mm": [1200, 50, 600], "rpy_deg": [5, -10, 40]}}
-ARM = arm_of_cell({"arm": {"dh": DH}}, {"tool_in_flange_mm": [212.5, 0.0, 279.91], **FRAME})
+ARM = arm_with_tool(work_in_base={"xyz_mm": [1200, 50, 600], "rpy_deg": [5, -10, 40]})
 HOME = np.array([0.1, -0.9, 0.2, 0.3, 0.8, 0.2])
 SOFT = 1e-6 * np.array([0.8, 0.5, 1.1, 4.0, 5.0, 6.0])
 

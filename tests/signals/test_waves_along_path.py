@@ -43,4 +43,11 @@ def test_a_level_about_the_white_noise_is_told_to_the_size_of_that(wander, low, 
 
 
 def test_a_short_series_tells_nothing():
-    assert wandering(np.ones((12, 3)), np.ones(3), np.zeros((12, 0))).tolist() == [0.0, 0.0, 0.0]
+    series = 30.0 * np.random.default_rng(3).normal(size=(19, 3))
+    assert wandering(series, np.ones(3), np.zeros((19, 0))).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_slow_noise_goes_with_the_length_of_the_wave_and_the_mean_is_a_wave_of_twice_the_longest():
+    found = variance(5, np.array([1.0, 0.0]), np.array([0.0, 6.0]))
+    assert found[:, 0] == pytest.approx(np.ones(5))
+    assert found[:, 1] == pytest.approx([12.0, 6.0, 3.0, 2.0, 1.5])

@@ -39,7 +39,7 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
         return arm
     found: dict[str, list[pd.DataFrame]] = {"tip_force": [], "profile_points": [], "observability": []}
     refused: list[JSON] = []
-    for run in _runs(batch, "robot_log", "profile"):
+    for run in batch.with_files("robot_log", "profile", any_of=True):
         for name, table in _observed(batch, run, read, arm, identified).items():
             if isinstance(table, Refusal):
                 refused.append({"run": run, "what": name.replace("_", " "), "reason": table.reason})
@@ -72,7 +72,7 @@ def _observed(
         give = partial(known.give, log, face)
         force, source = tip_force.from_coefficients(batch, run, identified, face, give), "coefficients"
     tables["tip_force"] = force if isinstance(force, Refusal) else force.assign(source=source)
-    if run in _runs(batch, "profile"):
+    if run in batch.with_files("profile"):
         tables["profile_points"] = _points(batch, read("profile", run), log, face, arm)
     return tables
 
@@ -98,15 +98,6 @@ def _points(
     if not face.normal.any():
         return Refusal("direction is neither up nor down: which wall was traced is not known")
     return wall_points(profile, log, arm, face, cutoff=cutoff(batch), noise=_noise(batch))
-
-
-def _runs(batch: Batch, *columns: str) -> list[str]:
-    """List the runs that have a file in one of ``columns``, in the order of cutting."""
-    table = batch.runs.sort_values("order", kind="stable")
-    named = table[list(columns)].apply(
-        lambda column: column.map(lambda file: isinstance(file, str) and file != "")
-    )
-    return [str(run) for run in table.index[named.any(axis=1).to_numpy(dtype=bool)]]
 
 
 def _noise(batch: Batch) -> float:

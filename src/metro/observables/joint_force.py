@@ -45,7 +45,7 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
     if arm is None:
         return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
     torques, forces, refused = [], [], []
-    for run in _runs(batch):
+    for run in batch.with_files("robot_log", "idle_log", "dynamometer"):
         force = _force(batch, run, read("force", run))
         torque = force if isinstance(force, Refusal) else _torque(batch, run, read("robot", run), arm, force)
         if isinstance(torque, Refusal) or isinstance(force, Refusal):
@@ -61,15 +61,6 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
         **({"tool_force": pd.concat(forces, ignore_index=True)} if forces else {}),
         "joint_force_refused": pd.DataFrame(refused, columns=["run", "reason"], dtype=str),
     }
-
-
-def _runs(batch: Batch) -> list[str]:
-    """List the runs that have all three files, in the order of cutting."""
-    table = batch.runs.sort_values("order", kind="stable")
-    named = table[["robot_log", "idle_log", "dynamometer"]].map(
-        lambda file: isinstance(file, str) and file != ""
-    )
-    return [str(run) for run in table.index[named.all(axis=1).to_numpy(dtype=bool)]]
 
 
 def _force(batch: Batch, run: str, record: pd.DataFrame) -> pd.DataFrame | Refusal:

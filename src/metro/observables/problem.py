@@ -47,6 +47,8 @@ class Block:
     zero_sd : (q,) prior standard deviations of the amplitudes of ``zeros``, SI.
     untold : (n, u) directions in which the base model may be off here since no run of the fit tells a
         parameter that matters only here, each of one standard deviation, SI; None: none.
+    alike : (n,) standard error of ``measured`` less predicted that is the same in all repeats of a condition
+        and does not average out over them, as the model-form budget does not; None: none.
     scale : (n,) size of the signal around each element, whose fraction the model-form budget is; None: rms of
         its axis.
     symmetries : (k, m) shifts of the nuisance that leave the base model as it is (which tooth is the first
@@ -56,6 +58,7 @@ class Block:
     repeats : how many times the block repeats one waveform (its time blocks): what a model gets wrong is the
         same in each.
     slow : how what repeats may change along the run, by its name in the report: (repeats, k) each.
+    patterns : shapes that the rest is tested for, by their name in the report: (n, k) each.
     synthesis : (m, n) map from ``measured`` to the rows of the comparison table; None where they are the
         same.
     anchor : (m,) what ``synthesis`` is counted from in the rows of the comparison; None: zero.
@@ -80,7 +83,14 @@ class Block:
     labels: np.ndarray | None = None
     symmetries: Array | None = None
     untold: Array | None = None
+    alike: Array | None = None
     slow: Mapping[str, Array] = field(default_factory=dict)
+    patterns: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def error(self) -> Array:
+        """Standard error of ``measured`` less predicted, (n,), be it the run's own or shared by repeats."""
+        return self.sigma if self.alike is None else np.hypot(self.sigma, self.alike)
 
     def to_rows(self, values: Array) -> Array:
         """Express differences in the fit's basis, (n,) or (n, k), in the rows of the comparison table."""

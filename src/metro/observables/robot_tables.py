@@ -9,6 +9,7 @@ the tip's tracking error), ``arm_map`` and ``arm_ellipsoids`` (stiffness over th
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from metro.observables import tip_force
 from metro.observables.joint_force import REPEATABLE
 from metro.observables.problem import Refusal
 from metro.observables.tip_force import FORCE, JOINTS, Log, Sensorless
-from metro.observables.wall import wall
+from metro.observables.wall import Wall, wall
 from metro.observables.waviness_points import GRID as SPACING
 from metro.observables.waviness_points import IDLE, STRAYED
 from metro.robot.kinematics import Arm, arm_of_cell
@@ -52,26 +53,51 @@ def robot_tables(
     parts: dict[str, list[pd.DataFrame]] = {}
     start = None
     logged = set(read("robot")["run"].astype(str))
+    found: dict[str, _Found] = {}
     for run in [str(r) for r in batch.runs.sort_values("order", kind="stable").index if str(r) in logged]:
         cut, idle = tip_force.logs(read("robot", run), arm)
         if not len(cut.tip):
             continue
         start = cut.commanded[len(cut.commanded) // 2] if start is None else start
-        for name, table in (_forces(batch, run, read, (cut, idle), arm) | _spectra(cut, arm)).items():
-            parts.setdefault(name, []).append(table.assign(run=run))
+        found[run] = _found(cut, idle, arm, wall(batch, run))
+        _add(parts, run, _spectra(cut, arm))
+    told = [one.told.wander for one in found.values() if isinstance(one.told, Sensorless)]
+    # one run tells little of its slow noise: all of them together do
+    wander = np.mean(told, axis=0) if told else np.zeros(len(JOINTS))
+    for run, one in found.items():
+        _add(parts, run, _forces(batch, run, read, one, wander))
     tables = {name: pd.concat(tables, ignore_index=True) for name, tables in parts.items()}
     if points is not None:
         tables["robot_waves"] = _waves(batch, points)
     return tables | _stiffness(batch, read, arm, start, identified)
 
 
-def _forces(batch: Batch, run: str, read: Read, pair: tuple[Log, Log], arm: Arm) -> dict[str, pd.DataFrame]:
-    """Sensorless force of a run; where fewer than three joints pass the index, of all joints."""
-    (cut, idle), face = pair, wall(batch, run)
+def _add(parts: dict[str, list[pd.DataFrame]], run: str, tables: dict[str, pd.DataFrame]) -> None:
+    for name, table in tables.items():
+        parts.setdefault(name, []).append(table.assign(run=run))
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Sensorless force of a run, whether its joints pass the index, and how sure friction is, (6,) N m."""
+
+    told: Sensorless | Refusal
+    by_index: bool
+    friction: Array
+
+
+def _found(cut: Log, idle: Log, arm: Arm, face: Wall) -> _Found:
+    """Solve for the force of a run; where the joints that pass the index cannot tell it, from all joints."""
     told = tip_force.sensorless(cut, idle, arm, face)
     by_index = not isinstance(told, Refusal) and told.found is not None
     if not by_index:
         told = tip_force.sensorless(cut, idle, arm, face, 0.0)
+    return _Found(told, by_index, REPEATABLE * np.sqrt(noise_variance(cut.torque)))
+
+
+def _forces(batch: Batch, run: str, read: Read, one: _Found, wander: Array) -> dict[str, pd.DataFrame]:
+    """Tables of the sensorless force of a run, or why there is none; ``wander`` (6,) of all runs."""
+    told = one.told
     if isinstance(told, Refusal):
         return {"robot_refused": pd.DataFrame({"reason": [told.reason]})}
     used = told.index >= LEAST_INDEX if told.found is None else told.found.used
@@ -92,18 +118,14 @@ def _forces(batch: Batch, run: str, read: Read, pair: tuple[Log, Log], arm: Arm)
     names = knees(told.x, told.found.force).names(told.x)
     course = pd.DataFrame({"x_mm": told.x / MM, "part": names})
     course[FORCE], course[[f"sd_{name}" for name in FORCE]] = told.found.force, sd
-    means = _means(batch, run, read, told, cut).assign(by_index=by_index)
+    mean, covariance = mean_force(told.found, told.torques, told.steady, one.friction, wander)
+    means = _means(batch, run, read, mean, np.sqrt(np.diag(covariance))).assign(by_index=one.by_index)
     return {"robot_joints": joints, "robot_force": course, "robot_means": means}
 
 
-def _means(batch: Batch, run: str, read: Read, told: Sensorless, cut: Log) -> pd.DataFrame:
-    """Mean force of the steady cut by axis, with standard errors, and the dynamometer's where it was on."""
-    assert told.found is not None
-    friction = REPEATABLE * np.sqrt(noise_variance(cut.torque))
-    mean, covariance = mean_force(told.found, told.torques, told.steady, friction)
-    table = pd.DataFrame(
-        {"axis": list("xyz"), "sensorless_n": mean, "sensorless_sd_n": np.sqrt(np.diag(covariance))}
-    )
+def _means(batch: Batch, run: str, read: Read, mean: Array, sd: Array) -> pd.DataFrame:
+    """Mean force (3,) of the steady cut by axis, its standard errors, and the dynamometer's where it is."""
+    table = pd.DataFrame({"axis": list("xyz"), "sensorless_n": mean, "sensorless_sd_n": sd})
     record = tip_force.from_dynamometer(batch, run, read("force", run), wall(batch, run))
     if isinstance(record, Refusal):
         return table.assign(dynamometer_n=np.nan, dynamometer_sd_n=np.nan)

@@ -27,7 +27,9 @@ from metro.robot.sensorless import (
 )
 from metro.robot.statics import tip_jacobian
 from metro.signals import align, steady
+from metro.signals.kalman import noise_variance
 from metro.signals.path_match import match
+from metro.signals.waves import wandering
 from metro.units import DEG, JSON, MM, Array
 
 Read = Callable[..., pd.DataFrame]
@@ -82,7 +84,8 @@ class Sensorless:
     Attributes
     ----------
     s, x : (m,) along the path, and along the wall from its start, m. steady : (m,) bool.
-    torques : the smoothed torque of the cut less that of the idle run. index : (6,) observability.
+    torques : the smoothed torque of the cut less that of the idle run. wander : (6,) level of its slow noise,
+        N² m² (:mod:`metro.signals.waves`), as the idle run has it. index : (6,) observability.
     found : force; None where ``refusal`` says why. remarks : what idle run and cut do not share.
     """
 
@@ -90,6 +93,7 @@ class Sensorless:
     x: Array
     steady: np.ndarray
     torques: Torques
+    wander: Array
     index: Array
     found: TipForce | None
     refusal: str
@@ -112,7 +116,8 @@ def sensorless(
     steps = [float(np.median(np.abs(np.diff(place[np.isfinite(place)])))) for place in places]
     width = max(BIN, 3 * max(steps))
     channels = [
-        np.column_stack([log.torque, log.commanded, log.tip @ wall.along - wall.start]) for log in (cut, idle)
+        np.column_stack([log.torque, log.commanded, log.tip @ wall.along - wall.start, _turning(log)])
+        for log in (cut, idle)
     ]
     try:
         pair = align.align(places[0], channels[0], places[1], channels[1], width)
@@ -123,8 +128,10 @@ def sensorless(
     if steady.sum() < LEAST_BINS:
         return Refusal(f"the logs hold {int(steady.sum())} mm of the cut; at least {LEAST_BINS} are needed")
     samples = (width / steps[0], width / steps[1])
-    turning = np.tanh(np.gradient(idle.commanded, idle.time, axis=0) / TURNING)
-    noise = np.maximum(noise_of_bins(cut.torque, idle.torque, samples, turning), LEAST_NOISE**2)
+    noise = np.maximum(noise_of_bins(cut.torque, idle.torque, samples, _turning(idle)), LEAST_NOISE**2)
+    white = np.maximum(noise_variance(idle.torque), LEAST_NOISE**2) / samples[1]
+    # what wanders in the idle run wanders as much in the cut, where the force hides it
+    wander = 2.0 * wandering(pair.second[:, :6], white, pair.second[:, 13:])
     torques = smoothed_torque(pair.first[:, :6] - pair.second[:, :6], noise)
     index = observability((pair.first[:, :6] - pair.second[:, :6])[steady], pair.second[steady, :6])
     remarks = tuple(alike.remarks(np.gradient(cut.commanded, cut.time, axis=0)))
@@ -132,8 +139,13 @@ def sensorless(
     try:
         found, refusal = tip_force(torques.level, torques.variance, moves, index, least_index), ""
     except ValueError as error:
-        return Sensorless(pair.s, x, steady, torques, index, None, str(error), remarks)
-    return Sensorless(pair.s, x, steady, torques, index, found, refusal, remarks)
+        return Sensorless(pair.s, x, steady, torques, wander, index, None, str(error), remarks)
+    return Sensorless(pair.s, x, steady, torques, wander, index, found, refusal, remarks)
+
+
+def _turning(log: Log) -> Array:
+    """Which way the joints turn, (n, 6): the shape of their Coulomb friction."""
+    return np.asarray(np.tanh(np.gradient(log.commanded, log.time, axis=0) / TURNING))
 
 
 def from_torques(

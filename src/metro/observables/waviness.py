@@ -37,7 +37,7 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
     if arm is None:
         return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
     points, facts, refused = [], [], []
-    for run in _runs(batch):
+    for run in batch.with_files("profile"):
         face = wall(batch, run)
         cut, idle = tip_force.logs(read("robot", run), arm)
         found: Any = Refusal("no robot_log: how the tip strayed is not known")
@@ -57,12 +57,6 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
         tables["waviness_points"] = pd.concat(points, ignore_index=True)
         tables["waviness_runs"] = pd.DataFrame(facts)
     return tables
-
-
-def _runs(batch: Batch) -> list[str]:
-    table = batch.runs.sort_values("order", kind="stable")
-    named = table["profile"].map(lambda file: isinstance(file, str) and file != "")
-    return [str(run) for run in table.index[named.to_numpy(dtype=bool)]]
 
 
 def _cutoff(batch: Batch) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
@@ -44,6 +45,7 @@ def wave_block(
     ----------
     points, facts : the run's rows of ``waviness_points`` and ``waviness_runs``. force : on the tip along the
         path (table ``tip_force``); None where it is not known. compliance : (6,) of the joints, rad/(N m).
+    What of the tracking error drowns in the noise of the encoders is the same in all repeats.
     """
     row: Any = batch.runs.loc[run]
     kept = points["kept"].to_numpy(dtype=bool)
@@ -69,7 +71,8 @@ def wave_block(
         role="validate" if row["role"] == "validate" else "identify",
         order=int(row["order"]),
         measured=waves @ profile,
-        sigma=passes * np.sqrt(traced + coded * share),
+        sigma=np.broadcast_to(passes * math.sqrt(traced), length.shape),
+        alike=passes * np.sqrt(coded * share),
         setting=WavyCut(
             by_joint=by_joint,
             idle=_known(waves @ band @ (points[IDLE].to_numpy() * UM)),

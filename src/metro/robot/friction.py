@@ -12,11 +12,12 @@ samples of a torque are not independent.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from metro.robot.motion import Motion, encoder_step, motion
+from metro.robot.motion import EDGE, PER_PERIOD, Motion, encoder_step, motion
 from metro.robot.rigid_body import gravity_regressor, torque_regressor
 from metro.units import Array
 
@@ -60,6 +61,7 @@ class Friction:
     ----------
     value : (n, 3) Coulomb, viscous, offset. sd : (n, 3) their standard errors. dof : of their t-intervals.
     residual : (m, n) what is left of the torques, N m. noise : (n,) its rms where joints move.
+    forward, backward : (n,) bool, whether a joint turns that way fast enough at all.
     """
 
     value: Array
@@ -67,6 +69,8 @@ class Friction:
     dof: int
     residual: Array
     noise: Array
+    forward: np.ndarray
+    backward: np.ndarray
 
     def interval(self, level: float = 0.95) -> Array:
         """Lower and upper end, (n, 3, 2), of Student's t-intervals."""
@@ -93,27 +97,47 @@ class Curvature:
     p: Array
 
 
-def of_idle_run(dh: Array, time: Array, q: Array, torque: Array) -> Friction:
-    """Identify the friction of an idle run, so slow that beside it the motors only carry the arm's weight.
+def of_idle_runs(dh: Array, runs: Sequence[tuple[Array, Array, Array]]) -> tuple[Friction, Motion]:
+    """Identify the friction of idle runs, so slow that beside it the motors only carry the arm's weight.
 
-    Joints that keep their direction throughout have no Coulomb friction of their own in such a log, since it
-    looks like weight: theirs is NaN.
+    Joints that keep their direction throughout have no Coulomb friction of their own in such logs, since it
+    looks like weight: theirs is NaN. Where a joint has just turned round, its gear still winds up and the
+    filter still sees the step: these samples count as standstill.
 
     Parameters
     ----------
-    dh : (n, 4). time : (m,) s, strictly rising, gaps are bridged. q, torque : (m, n) measured, rad, N m.
+    dh : (n, 4). runs : time (m,) s, strictly rising, gaps are bridged; q, torque (m, n) measured, rad, N m.
+
+    Returns
+    -------
+    tuple
+        the friction, and the motion of all runs, one after the other, that it was identified from.
 
     Raises
     ------
     ValueError
         If no joint moves.
     """
+    logs = [_settled(_slow_motion(*run)) for run in runs]
+    parts = {f.name: np.concatenate([getattr(log, f.name) for log in logs]) for f in fields(Motion)}
+    log = Motion(**parts)
+    return identify(log, weight_columns(dh, log)), log
+
+
+def _slow_motion(time: Array, q: Array, torque: Array) -> Motion:
     period = float(np.median(np.diff(time)))
     regular = np.arange(time[0], time[-1], period)
     columns = [np.interp(regular, time, column) for column in (*q.T, *torque.T)]
     n, step = q.shape[1], encoder_step(q)  # before gaps are bridged by straight lines
-    log = motion(np.array(columns[:n]).T, np.array(columns[n:]).T, period, IDLE_CUTOFF_HZ, step)
-    return identify(log, weight_columns(dh, log))
+    return motion(np.array(columns[:n]).T, np.array(columns[n:]).T, period, IDLE_CUTOFF_HZ, step)
+
+
+def _settled(log: Motion) -> Motion:
+    """Count a joint as moving only where it has moved, and goes on to move, for two periods of the filter."""
+    from scipy.ndimage import binary_erosion
+
+    around = np.ones((2 * int(EDGE * PER_PERIOD) + 1, 1))
+    return replace(log, moving=binary_erosion(log.moving, around, border_value=1))
 
 
 def rigid_columns(dh: Array, log: Motion) -> Array:
@@ -146,7 +170,8 @@ def identify(log: Motion, others: Array) -> Friction:
     value, sd = (np.where(found.known[own], x, np.nan) for x in (found.value[own], sd))
     shape = (len(TERMS), n)
     dof = len(found.replicates) - 1
-    return Friction(value.reshape(shape).T, sd.reshape(shape).T, dof, found.residual, found.noise)
+    ways = [np.asarray((log.moving & (sign * log.rate > 0)).any(axis=0)) for sign in (1, -1)]
+    return Friction(value.reshape(shape).T, sd.reshape(shape).T, dof, found.residual, found.noise, *ways)
 
 
 def curvature(log: Motion, others: Array) -> Curvature:

@@ -15,6 +15,7 @@ from metro.units import Array
 
 STEPS = 10.0  # encoder steps per sample that tell a speed, and with it its sign, to 10 %
 BANDWIDTH = 0.1  # of the samples' rate, at most
+PER_PERIOD = 5  # samples that are kept per period of the cut-off
 EDGE = 2.0  # periods of the cut-off at both ends, where the filter has to guess what lies beyond
 
 
@@ -56,7 +57,7 @@ def motion(q: Array, torque: Array, period: float, cutoff_hz: float, step: Array
     slowest = STEPS * (encoder_step(q) if step is None else step) / period
     direction = smooth(np.clip(rate / slowest, -1.0, 1.0))
     edge = min(int(EDGE / (cutoff * period)), len(q) // 4)
-    keep = slice(edge, len(q) - edge, max(1, int(0.2 / (cutoff * period))))
+    keep = slice(edge, len(q) - edge, max(1, int(1 / PER_PERIOD / (cutoff * period))))
     return Motion(
         angle[keep],
         rate[keep],

@@ -8,11 +8,14 @@ from itertools import combinations
 import numpy as np
 
 from metro.signals import kalman
+from metro.signals.waves import variance as variance_of_waves
+from metro.signals.waves import waves
 from metro.units import Array
 
 LEAST_INDEX = 2.0
 LEAST_JOINTS = 3
 SPARE = 0.02  # a joint that lowers the force's error by less may only add what its friction gets wrong
+POOR = 30.0  # times the error of all joints: friction is repeatable to a few parts in a hundred
 SINGULAR = 1e-12  # share of the largest eigenvalue of the information below which the least one is nothing
 _PLACES = 25
 
@@ -107,7 +110,8 @@ def choose_joints(
     Raises
     ------
     ValueError
-        If fewer than three joints pass, or no three of them tell the three axes apart.
+        If fewer than three joints pass, or no three of them tell the three axes apart, or only 30 times
+        worse than all joints do.
     """
     passing = np.flatnonzero(index >= least)
     if len(passing) < LEAST_JOINTS:
@@ -121,10 +125,17 @@ def choose_joints(
     sets = np.array([np.isin(range(len(index)), c) for size in sizes for c in combinations(passing, size)])
     values = np.linalg.eigvalsh(np.tensordot(sets.astype(float), part, axes=1))
     singular = (values[..., 0] <= SINGULAR * values[..., -1]).any(axis=1)
+    named = f"joints {', '.join(str(j + 1) for j in passing)}"
     if singular.all():
-        raise ValueError(f"joints {', '.join(str(j + 1) for j in passing)} do not tell the three axes apart")
+        raise ValueError(f"{named} do not tell the three axes apart")
     errors = np.full(len(sets), np.inf)
     errors[~singular] = np.sqrt((1.0 / values[~singular]).sum(axis=-1).mean(axis=-1))
+    of_all = np.sqrt((1.0 / np.linalg.eigvalsh(part.sum(axis=0))).sum(axis=-1).mean())
+    if errors.min() > POOR * of_all:
+        raise ValueError(
+            f"{named}, which reach the observability index {least:g}, leave an axis of the force open: "
+            f"its error is {errors.min() / of_all:.0f} times that of all joints"
+        )
     enough = errors <= (1 + SPARE) * errors.min()
     fewest = enough & (sets.sum(axis=1) == sets[enough].sum(axis=1).min())
     return np.asarray(sets[np.argmin(np.where(fewest, errors, np.inf))])
@@ -156,15 +167,23 @@ def tip_force(
 
 
 def mean_force(
-    found: TipForce, torques: Torques, steady: np.ndarray, repeatability: Array | float = 0.0
+    found: TipForce,
+    torques: Torques,
+    steady: np.ndarray,
+    repeatability: Array | float = 0.0,
+    wander: Array | float = 0.0,
 ) -> tuple[Array, Array]:
     """Mean (3,) of the force over bins ``steady`` (m,) bool, N, and its covariance (3, 3), N².
 
     Neighbouring levels of a smoothed torque share their error: the covariance is that of the sum.
     ``repeatability`` (n,) N m is how well the friction of the cut is that of the idle run, the same all
-    along.
+    along; ``wander`` (n,) N² m² the level of the slow noise that changes along the path
+    (:mod:`metro.signals.waves`), which the smoother takes for the cut's.
     """
     weights = np.where(steady[:, None, None], found.solve, 0.0) / steady.sum()
     covariance = kalman.combined_covariance(np.moveaxis(weights, 1, 0), torques.noise, torques.drift)
     common = weights.sum(axis=0) * repeatability
+    slow = waves(weights)
+    spread = variance_of_waves(len(weights), np.zeros(1), np.broadcast_to(wander, weights.shape[2]))
+    covariance = covariance + np.einsum("man,mn,mbn->ab", slow[1:], spread[1:], slow[1:])
     return found.force[steady].mean(axis=0), covariance + common @ common.T

@@ -154,6 +154,43 @@ def _outline(axes: Axes, pose: pd.DataFrame, seen: tuple[int, int]) -> None:
     axes.set(xlabel=f"{names[seen[0]]} (N/µm)", ylabel=f"{names[seen[1]]} (N/µm)")
 
 
+def friction(curve: pd.DataFrame, table: pd.DataFrame) -> Figure:
+    """Draw the friction torque of each joint over its speed, and the identified line where there is one.
+
+    Parameters
+    ----------
+    curve : rows of ``joint_friction_curve``. table : of ``joint_friction``.
+    """
+    with style.style():
+        figure, grid = style.new_figure(3.6, 2, 3)
+        for axes, (_, joint) in zip([a for row in grid for a in row], table.iterrows(), strict=False):
+            part = curve[curve["joint"] == joint["joint"]].sort_values("speed_deg_s")
+            speed = part["speed_deg_s"].to_numpy(float)
+            axes.errorbar(
+                speed,
+                part["friction_nm"],
+                part["sd_nm"],
+                fmt="o",
+                ms=2.5,
+                color=style.MEASURED,
+                elinewidth=0.6,
+                label="measured",
+            )
+            level = np.nan_to_num(float(joint["coulomb"])) * np.sign(speed)
+            line = level + float(joint["viscous"]) * np.radians(speed)
+            for way in (speed < 0, speed > 0):
+                if way.any():
+                    label = "Coulomb and viscous" if way[0] else None
+                    axes.plot(speed[way], line[way], color=style.AFTER, label=label)
+            axes.set_title(f"joint {joint['joint']}", loc="left")
+        for axes in grid[-1]:
+            axes.set_xlabel("speed (°/s)")
+        for row in grid:
+            row[0].set_ylabel("torque (N m)")
+        style.legend_above(figure, grid[0][0])
+    return figure
+
+
 def waviness(waves: pd.DataFrame, runs: Sequence[str]) -> Figure:
     """Draw the waves of walls, of the tip's tracking error in the cut, and of that in the idle run.
 

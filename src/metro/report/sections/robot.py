@@ -11,6 +11,7 @@ from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Sec
 from metro.report.figures import robot as figures
 from metro.report.numbers import listing, number, percent, probability, quantity
 from metro.report.results import Results
+from metro.report.sections.friction import friction
 from metro.report.sections.stiffness import LONGEST, arm_stiffness, band, more, stations
 from metro.units import JSON
 
@@ -23,6 +24,7 @@ def robot(results: Results) -> Section | None:
     """Write what a batch with an arm has; None for one without."""
     items = [
         *_force(results),
+        *friction(results),
         *_deformation(results.compared("deformation")),
         *arm_stiffness(results),
         *stations(results),
@@ -54,10 +56,13 @@ def _means(means: pd.DataFrame) -> list[Item]:
     items: list[Item] = []
     caption = (
         "Mean force of the steady cut by the torques of the joints, with its 95 % interval (noise of the "
-        "torques, "
-        "and friction repeatable to a tenth of it)"
+        "torques, slow noise as in the idle runs, and friction repeatable to a tenth of the noise)"
     )
-    star = "" if means["by_index"].all() else " * Fewer than three joints pass the index of 2: of all joints."
+    star = (
+        ""
+        if means["by_index"].all()
+        else " * The joints that pass the index of 2 do not tell all three axes: of all joints."
+    )
     beside = means[means["dynamometer_n"].notna()]
     if len(beside):
         rows = [

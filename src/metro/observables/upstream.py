@@ -1,0 +1,58 @@
+"""The force that an observable starts from, put in as it was measured and as it was predicted.
+
+A wall or a face follows from the mean force on the tool. Where a dynamometer was on a run, the error of the
+predicted force is known, and the run can be predicted with both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from metro.observables.deformation_model import CutWall
+from metro.observables.flatness_model import FaceSetting
+from metro.observables.problem import Block
+from metro.units import Array
+
+AXES = ["x", "y", "z"]
+COLUMNS = ("measured", "before", "after")
+Forces = Mapping[str, Array]
+
+
+def mean_forces(comparison: pd.DataFrame) -> dict[str, Forces]:
+    """Mean force on the tool of each held-out run, (3,) N, work frame: ``measured``, ``before``, ``after``.
+
+    ``comparison``: rows of the comparison table. In helical runs, whose frame turns, no wall and no face is
+    compared: they are not asked for.
+    """
+    rows = comparison[(comparison["observable"] == "force") & comparison["angle_deg"].notna()]
+    means = rows.groupby(["run", "axis"])[list(COLUMNS)].mean()
+    return {
+        str(run): {name: part[name].droplevel("run").loc[AXES].to_numpy(dtype=float) for name in COLUMNS}
+        for run, part in means.groupby(level="run")
+        if set(AXES) <= set(part.index.get_level_values("axis"))
+    }
+
+
+def with_forces(block: Block, forces: Forces, sources: Mapping[str, str]) -> dict[str, Block] | None:
+    """Return a block fed with the force as measured, and as predicted before and after; None: it takes none.
+
+    ``sources``: by run, where the force of a wall is taken from; it is changed by what the prediction is off,
+    where it is measured. The transients of a face stay those of the force that it was made with: what the
+    forces differ by is followed as it stands.
+    """
+    setting: Any = block.setting
+    if isinstance(setting, CutWall) and sources.get(block.run) == "dynamometer":
+        values = {name: setting.force + (force - forces["measured"]) for name, force in forces.items()}
+    elif isinstance(setting, FaceSetting):
+        values = dict(forces)
+    else:
+        return None
+    return {
+        name: replace(block, setting=replace(setting, force=np.asarray(force)))
+        for name, force in values.items()
+    }
