@@ -7,10 +7,20 @@ import pypdfium2
 import pytest
 import synthetic_results as synthetic
 
+from metro.batch.batch import Batch
+from metro.batch.processed import write_batch
 from metro.report.campaign import campaign_report, campaign_table
-from metro.stages.campaign import campaign
+from metro.stages.campaign import campaign, first_start
 
 EMPTY = {"format": 1, "batch": "modes-only", "metro": "0", "observables": {}}
+
+
+def processed(folder, started=""):
+    folder.mkdir(parents=True)
+    runs = pd.DataFrame({"run": ["r1"], "started_at": [started]}).set_index("run")
+    manifest = {"cell": "cell-a", "source": "measured"}
+    write_batch(folder, Batch(folder.name, manifest, {"cell": "cell-a"}, runs, {}), {})
+    (folder / "loop.json").write_text(json.dumps({"observables": {}}))
 
 
 @pytest.fixture
@@ -41,7 +51,8 @@ def test_the_stage_writes_both_files_and_the_pdf_names_what_could_not_be_told(tm
         (folder / "verdict.json").write_text(json.dumps(verdict))
         (folder / "identified.json").write_text(json.dumps({"not_identified": {"force": "no runs.csv"}}))
         folders.append(folder)
-    campaign(folders, tmp_path / "out", {}, "c0de")
+        processed(tmp_path / "processed" / name)
+    campaign(folders, tmp_path / "processed", tmp_path / "out", {}, "c0de")
     assert len(pd.read_parquet(tmp_path / "out" / "summary.parquet")) == 4
     document = pypdfium2.PdfDocument(tmp_path / "out" / "summary.pdf")
     text = " ".join(
@@ -59,3 +70,10 @@ def test_the_stage_writes_both_files_and_the_pdf_names_what_could_not_be_told(tm
 def test_the_summary_is_the_same_whatever_the_order_of_the_batches(verdicts):
     backwards = dict(reversed(list(verdicts.items())))
     assert campaign_report(verdicts, {}) == campaign_report(backwards, {})
+
+
+def test_a_batch_starts_with_the_first_of_its_runs_that_tells_when():
+    runs = pd.DataFrame({"started_at": ["2024-05-01T10:00:00+02:00", "", "2024-05-01T07:30:00Z"]})
+    assert first_start(runs) == pd.Timestamp("2024-05-01T07:30:00Z").timestamp()
+    assert first_start(pd.DataFrame({"started_at": ["", ""]})) is None
+    assert first_start(pd.DataFrame({"feed": [1.0]})) is None

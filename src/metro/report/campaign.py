@@ -14,10 +14,12 @@ from metro.report.figures import verdicts as figures
 from metro.report.numbers import listing, number, unit, words
 from metro.report.phrases import plain
 from metro.report.results import OBSERVABLES, title
+from metro.report.sections.memory import memory_section
 from metro.report.sections.verdict import STATUS, change, effect_words, error_cell, known_interval
 from metro.units import JSON
 
 PER_FIGURE = 24
+MOST_LINES = 6
 TEXT = (
     "batch",
     "observable",
@@ -28,6 +30,7 @@ TEXT = (
     "rivals",
     "unexplained",
     "next_experiment",
+    "error",
 )
 NUMBERS = (
     *("noise_floor", "before_rms", "before_lo", "before_hi", "before_nrmse"),
@@ -35,34 +38,68 @@ NUMBERS = (
 )
 
 
-def campaign_table(verdicts: Mapping[str, JSON]) -> pd.DataFrame:
+def campaign_table(verdicts: Mapping[str, JSON], failed: Mapping[str, str] | None = None) -> pd.DataFrame:
     """Return one row per batch and observable: status, errors before and after with intervals, effects.
 
     Parameters
     ----------
     verdicts : content of ``verdict.json`` by batch.
+    failed : batches without a result, and why: a row each, of status ``failed`` with the reason as its error.
     """
     rows = [_row(batch, name, entry) for batch, name, entry in _entries(verdicts)]
+    blank = dict.fromkeys(TEXT, "")
+    rows += [
+        {**blank, "batch": batch, "status": "failed", "error": why} for batch, why in (failed or {}).items()
+    ]
     table = pd.DataFrame(rows, columns=[*TEXT[:4], *NUMBERS, *TEXT[4:]])
     return table.astype({**dict.fromkeys(TEXT, str), **dict.fromkeys(NUMBERS, float)})
 
 
-def campaign_report(verdicts: Mapping[str, JSON], identified: Mapping[str, JSON]) -> bytes:
-    """Return the campaign's summary as a PDF; the same bytes for the same results."""
+def campaign_report(
+    verdicts: Mapping[str, JSON],
+    identified: Mapping[str, JSON],
+    memory: JSON | None = None,
+    failed: Mapping[str, str] | None = None,
+) -> bytes:
+    """Return the campaign's summary as a PDF; the same bytes for the same results.
+
+    ``memory``: content of ``memory.json``; ``failed``: batches without a result, and why.
+    """
     entries = _entries(verdicts)
     nexts = [
         f"{b}, {title(n)}: {plain(e['next_experiment'])}" for b, n, e in entries if e.get("next_experiment")
     ]
     sections = [
+        *_failed(failed or {}),
         *([Section("What to measure next", [Bullets(nexts)])] if nexts else []),
         Section(
             "Verdicts", [Paragraph(_overview(verdicts), "verdict"), *_verdicts(entries), *_pictures(entries)]
         ),
+        *memory_section(memory or {}),
         Section("What could not be told", _untold(entries, identified)),
     ]
     return compile_pdf(
         Cover("Campaign summary", f"{len(verdicts)} batches", f"metro {__version__}"), sections
     )
+
+
+def _failed(failed: Mapping[str, str]) -> list[Section]:
+    """List the batches that have no result, with what stopped each: nothing below is of them."""
+    if not failed:
+        return []
+    lines = {batch: why.splitlines() for batch, why in failed.items()}
+    rows = [
+        [
+            batch,
+            "; ".join(told[:MOST_LINES])
+            + (f"; and {len(told) - MOST_LINES} more" * (len(told) > MOST_LINES)),
+        ]
+        for batch, told in sorted(lines.items())
+    ]
+    one = len(failed) == 1
+    text = f"{len(failed)} {'batch' if one else 'batches'} failed; the summary is of the others."
+    table = Table(["batch", "what stopped it"], rows, "Batches without a result.", [1, 4])
+    return [Section("Batches that failed", [Paragraph(text, "warning"), table])]
 
 
 def _entries(verdicts: Mapping[str, JSON]) -> list[tuple[str, str, JSON]]:
@@ -90,6 +127,7 @@ def _row(batch: str, observable: str, entry: JSON) -> JSON:
         "rivals": "; ".join(rivals),
         "unexplained": str((entry.get("unexplained") or {}).get("signature") or ""),
         "next_experiment": entry.get("next_experiment") or "",
+        "error": "",
     }
     for when in ("before", "after"):
         error = entry.get(when) or {}
