@@ -10,6 +10,7 @@ from metro.batch.findings import BatchError, Finding
 from metro.codehash import code_hash
 from metro.formats import FormatError
 
+COMMANDS = ("check", "new-batch", "simulate", "status", "explain", "query", "verify", "frf-export")
 STAGES = ("ingest", "identify", "predict", "loop", "report", "campaign")
 
 
@@ -25,11 +26,11 @@ def test_it_says_its_version():
 
 def test_the_help_shows_every_command_what_people_call_first():
     output = call("--help").output
-    places = [output.index(f" {name} ") for name in ("check", "new-batch", "frf-export", *STAGES)]
+    places = [output.index(f"│ {name} ") for name in (*COMMANDS, *STAGES)]
     assert places == sorted(places)
 
 
-@pytest.mark.parametrize("command", ["check", "new-batch", "frf-export", *STAGES])
+@pytest.mark.parametrize("command", [*COMMANDS, *STAGES])
 def test_every_command_and_option_has_a_help_text(command):
     import typer
 
@@ -117,3 +118,24 @@ def test_a_stage_does_nothing_when_the_code_is_not_the_planned_one(tmp_path, mon
     )
     assert result.exit_code == 1
     assert "call snakemake again" in result.stderr
+
+
+@pytest.mark.parametrize(
+    "command", ["check", "new-batch", "simulate", "status", "explain", "query", "verify"]
+)
+def test_a_command_that_people_call_shows_an_example_and_can_print_json(command):
+    output = call(command, "--help").output
+    assert f"Example: metro {command}" in output
+    assert "--json" in output
+
+
+def test_checks_and_new_batches_can_be_read_by_programs(tmp_path):
+    made = json.loads(call("new-batch", "first-cut", "--root", tmp_path, "--json").stdout)
+    assert made == {"batch": "first-cut", "folder": str(tmp_path / "first-cut")}
+    (found,) = json.loads(call("check", tmp_path / "first-cut", "--json").stdout)
+    assert found["ok"] is True
+    assert {"name", "source", "missing"} <= set(found["observables"][0])
+    (tmp_path / "first-cut/batch.yaml").write_text("format: 2\n")
+    result = call("check", tmp_path / "first-cut", "--json")
+    assert result.exit_code == 1
+    assert json.loads(result.stdout)[0]["problems"][0]["severity"] == "error"

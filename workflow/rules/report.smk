@@ -6,6 +6,7 @@ rule report:
         rules.loop.output,
     output:
         "reports/{batch}/report.pdf",
+        "reports/{batch}/provenance.json",
     log:
         "logs/report/{batch}.log",
     conda:

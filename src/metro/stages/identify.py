@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import partial
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from metro.loop.candidate import Candidate
 from metro.loop.fit import fit
 from metro.loop.noise import first_noise
 from metro.loop.verdict import identified_fit
-from metro.observables import published
+from metro.observables import joint_friction, published
+from metro.observables.printed_study import printed_study
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.observables.yielding_table import yielding_table
 from metro.stages.observed import MODULES, merged, task_of
@@ -43,11 +45,15 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
         identified = merged(identified, module.report(batch, found, identified, task, fitted))
         if isinstance(task, Refusal):
             lacking[module.OBSERVABLE] = task.reason
+    friction = joint_friction.observe(batch, read)
+    observed |= {} if isinstance(friction, Refusal) else friction
+    identified = merged(identified, joint_friction.report(friction))
     printed = published.observe(batch, read, identified)
     observed |= {} if isinstance(printed, Refusal) else printed
+    identified = merged(identified, printed_study(batch, observed))
     feedback = yielding_table(batch, read, identified)
     observed |= {} if isinstance(feedback, Refusal) else {"yielding": feedback}
-    _write(processed, batch, observed, code)
+    _write(processed, batch, observed, {"code": code, "settings": json.dumps(settings, sort_keys=True)})
     write_json(processed / "identified.json", {**identified, "not_identified": lacking})
 
 
@@ -63,9 +69,11 @@ def base_fit(task: Problem, budget: float) -> BaseFit | None:
     return identified_fit(task, fit(Candidate(task.base), blocks, first_noise(budget, task.scatter, blocks)))
 
 
-def _write(processed: Path, batch: Batch, observed: dict[str, pd.DataFrame], code: str) -> None:
+def _write(
+    processed: Path, batch: Batch, observed: dict[str, pd.DataFrame], provenance: dict[str, str]
+) -> None:
     unknown = set(observed) - set(OBSERVED)
     if unknown:
         raise KeyError(f"{batch.name}: observed tables that batch.layout does not name: {sorted(unknown)}")
     for name in OBSERVED:
-        write_table(processed / f"{name}.parquet", observed.get(name, pd.DataFrame()), {"code": code})
+        write_table(processed / f"{name}.parquet", observed.get(name, pd.DataFrame()), provenance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pandas as pd
@@ -28,7 +29,8 @@ def predict(processed: Path, settings: JSON, code: str) -> None:
     tables = [_predicted(task, settings["model_form_budget"]) for task in tasks.values()]
     filled = [table for table in tables if len(table)]
     joined = pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(COMPARISON))
-    write_table(processed / "prediction.parquet", typed(joined), {"code": code})
+    provenance = {"code": code, "settings": json.dumps(settings, sort_keys=True)}
+    write_table(processed / "prediction.parquet", typed(joined), provenance)
 
 
 def _predicted(task: Task, budget: float) -> pd.DataFrame:

@@ -8,8 +8,9 @@ from typing import Any
 
 import pandas as pd
 
+from metro.batch import provenance
 from metro.batch.batch import Batch
-from metro.batch.processed import read_batch, read_table, write_atomically
+from metro.batch.processed import read_batch, read_table, write_atomically, write_json
 from metro.observables import force_metrics
 from metro.observables.end_stiffness import end_stiffness
 from metro.observables.robot_tables import robot_tables
@@ -20,6 +21,8 @@ from metro.units import JSON
 TABLES = (
     "qc",
     "comparison",
+    "face_indices",
+    "face_contacts",
     "lobes_final",
     "lobe_methods",
     "lobe_islands",
@@ -31,6 +34,8 @@ TABLES = (
     "frf_used",
     "stabilisation",
     "waviness_points",
+    "joint_friction",
+    "joint_friction_curve",
     "face_map",
     "published_errors",
     "published_modes",
@@ -40,9 +45,10 @@ TABLES = (
 
 
 def report(processed: Path, reports: Path, settings: JSON, code: str) -> None:
-    """Write ``report.pdf`` of a batch from its processed tables, identified quantities and verdict."""
+    """Write a batch's ``report.pdf``, and ``provenance.json``: the hashes of all that it was made from."""
     pdf = batch_report(read_results(processed, reports, settings, code))
     write_atomically(reports / "report.pdf", lambda stream: stream.write(pdf))
+    write_json(reports / provenance.FILE, provenance.record(processed, reports, settings, code))
 
 
 def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> Results:

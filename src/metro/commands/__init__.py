@@ -1,0 +1,1 @@
+"""What people call: one module for each command that shows results; the stages' are in ``metro.stages``."""

@@ -1,0 +1,67 @@
+"""``metro simulate``: a batch of the virtual cell, to try everything on.
+
+The simulator shares no code with the models that are to find what it hides: it is another program, and is
+called as one.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from metro.batch.discover import NAME, NAME_IN_WORDS
+from metro.batch.findings import BatchError, ContractError, Finding
+from metro.commands.output import print_json
+
+PROGRAM = "virtual_cell"
+
+
+def simulate(
+    name: str,
+    *,
+    kind: str,
+    effects: Sequence[str],
+    seed: int,
+    style: str,
+    root: Path,
+    truth: Path,
+    as_json: bool,
+) -> None:
+    """Write a simulated batch, and beside the raw root what it hides.
+
+    Parameters
+    ----------
+    kind : what is measured in it: force, lobes, flatness, joint_force, deformation or waviness.
+    effects : ``NAME``, its parameters drawn, or ``NAME:PARAMETER=VALUE,…``, all of them given.
+
+    Raises
+    ------
+    ContractError
+        The name is not one of a batch, the folder is there already, or the simulator is not, or refuses.
+    """
+    folder = root / name
+    if not NAME.fullmatch(name):
+        raise BatchError([Finding("error", name, f"is no name for a batch: it is made of {NAME_IN_WORDS}")])
+    if folder.exists():
+        raise BatchError([Finding("error", str(folder), "is there already: choose another name")])
+    if importlib.util.find_spec(PROGRAM) is None:
+        message = "the simulator is not installed: it comes with metro-machining; install that package again"
+        raise ContractError([Finding("error", PROGRAM, message)])
+    truth.mkdir(parents=True, exist_ok=True)
+    secret = truth / f"{name}.truth.json"
+    command = [sys.executable, "-m", PROGRAM, kind, str(folder), "--seed", str(seed), "--style", style]
+    for effect in effects:
+        hidden, _, settings = effect.partition(":")
+        command += ["--effect", hidden, *filter(None, settings.split(","))]
+    done = subprocess.run([*command, "--truth", str(secret)], capture_output=True, text=True, check=False)
+    if done.returncode:
+        said = (done.stderr.strip() or "it failed without a word").splitlines()[-1]
+        wrong = " (the parameters of an effect are given all, or none)" if said.startswith("KeyError") else ""
+        raise ContractError([Finding("error", PROGRAM, said + wrong)])
+    if as_json:
+        print_json({"batch": name, "folder": str(folder), "truth": str(secret)})
+        return
+    sys.stdout.write(f"{folder} is there. What it hides stands in {secret}. Call: snakemake\n")

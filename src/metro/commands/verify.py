@@ -1,0 +1,170 @@
+"""``metro verify``: whether a report is still that of the files, code and settings that are here now."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+from metro.batch import provenance
+from metro.batch.cell import read_cell, stations_path
+from metro.batch.discover import batch_files
+from metro.batch.findings import ContractError, Finding
+from metro.batch.provenance import Difference, compare, hashes, sha256
+from metro.codehash import code_hash
+from metro.commands.output import print_json
+from metro.units import JSON
+from metro.workflow import Plan
+
+# Files that are part of a batch by their name alone: nothing has to name them.
+BY_NAME = {
+    f"{stem}{suffix}"
+    for stem in ("runs", "impacts", "loads", "mass", "published", "cell")
+    for suffix in (".csv", ".parquet", ".yaml")
+}
+
+
+def verify_command(
+    reports: Path, raw: Path | None, processed: Path | None, config: Path, as_json: bool
+) -> int:
+    """Print what changed since a report was made; return the exit code, 1 where a file differs."""
+    import typer
+
+    name = reports.resolve().name
+    raw, processed = raw or Path("data/raw") / name, processed or Path("data/processed") / name
+    made, found = verify(reports, raw, processed, config)
+    broken = any(difference.in_files for difference in found)
+    digest = sha256(reports / provenance.FILE)
+    if as_json:
+        content = {"batch": name, "unchanged": not broken, "provenance_sha256": digest, "recorded": made}
+        print_json({**content, "differences": [asdict(difference) for difference in found]})
+        return int(broken)
+    for one in found:
+        typer.echo(f"{one.kind:<10}{one.change:<9}{one.name}{_values(one)}")
+    counts = ", ".join(f"{len(made[kind])} {kind}" for kind in ("raw", "processed", "results"))
+    typer.echo(
+        f"{reports}: "
+        + (
+            "files changed since the report was made"
+            if broken
+            else f"the files are those it was made of: {counts}"
+        )
+    )
+    typer.echo(f"SHA-256 of {provenance.FILE}: {digest}")
+    return int(broken)
+
+
+def verify(reports: Path, raw: Path, processed: Path, config: Path) -> tuple[JSON, list[Difference]]:
+    """Recompute every hash of a report's provenance.
+
+    Parameters
+    ----------
+    reports, raw, processed : the batch's folders.
+    config : config.yaml, for the settings in force and the folder of cells; where it is not there, settings
+        are not compared, and cells are looked for in ``config/cells``.
+
+    Returns
+    -------
+    made : content of ``provenance.json``.
+    differences : what is not as it was: files first, then code, settings and packages.
+
+    Raises
+    ------
+    ContractError
+        There is no ``provenance.json``, or the raw folder is not there.
+    """
+    file = reports / provenance.FILE
+    if not file.is_file():
+        message = "is not there: the report was not finished, or made by an earlier version; call snakemake"
+        raise ContractError([Finding("error", str(file), message)])
+    if not raw.is_dir():
+        message = "is not there: name the folder of the raw files with --raw"
+        raise ContractError([Finding("error", str(raw), message)])
+    made: JSON = json.loads(file.read_text(encoding="utf-8"))
+    plan = _plan(config)
+    return made, [
+        *_raw(made["raw"], raw),
+        *_cell(raw, processed, Path(plan.cells)),
+        *compare(
+            "processed", made["processed"], hashes(processed, (path.name for path in processed.glob("*")))
+        ),
+        *compare("result", made["results"], hashes(reports, made["results"])),
+        *_stages(made["stages"], plan),
+        *compare("package", _versions(made), _versions(_here())),
+    ]
+
+
+def _raw(was: dict[str, str], folder: Path) -> list[Difference]:
+    """Compare the raw files that were read, and look for files that would be read now."""
+    there = {str(path.relative_to(folder)) for path in batch_files(folder)}
+    return compare("raw", was, hashes(folder, {*was, *(there & BY_NAME)}))
+
+
+def _cell(raw: Path, processed: Path, cells: Path) -> Iterator[Difference]:
+    """Compare a shared cell, and a cell's stations, with what was read: no raw file need hold them."""
+    path = processed / "batch.json"
+    was = json.loads(path.read_text(encoding="utf-8"))["cell"] if path.is_file() else {}
+    name = str(was.get("cell", ""))
+    if not name:
+        return
+    now, source, _ = read_cell(raw, cells, name)
+    if not (raw / "cell.yaml").is_file() and json.loads(json.dumps(now, default=str)) != was:
+        yield Difference("cell", name, "changed" if source else "missing", _short(was), _short(now))
+    stations = stations_path(now, source)
+    if stations is not None and not _same_stations(stations, processed / "stations.parquet"):
+        yield Difference("cell", stations.name, "changed" if stations.is_file() else "missing", "", "")
+
+
+def _same_stations(now: Path, was: Path) -> bool:
+    """Tell whether the table of stations has the rows that ingest read."""
+    import pandas as pd
+
+    from metro.batch.processed import COLUMNS
+    from metro.batch.tables import read_table
+
+    if not (now.is_file() and was.is_file()):
+        return False
+    frames = [read_table(now.parent, "stations", now.stem)[0].frame, pd.read_parquet(was)]
+    first, second = (frame[list(COLUMNS["stations"])].astype(str).to_numpy().tolist() for frame in frames)
+    return bool(first == second)
+
+
+def _stages(made: JSON, plan: Plan) -> Iterator[Difference]:
+    """Compare the code of every stage, and its settings where there are some to compare with."""
+    yield from compare("code", {s: m["code"] for s, m in made.items()}, {s: code_hash(s) for s in made})
+    if plan.config:
+        was = {stage: json.dumps(m["settings"], sort_keys=True) for stage, m in made.items()}
+        yield from compare("settings", was, {stage: plan.settings(stage) for stage in made})
+
+
+def _plan(config: Path) -> Plan:
+    """Return the settings in force, without looking for batches."""
+    from metro.batch.config import load_config
+
+    content = load_config(config) if config.is_file() else {}
+    return Plan({}, content, content.get("cells", "config/cells"))
+
+
+def _versions(made: JSON) -> dict[str, str]:
+    return {"python": made["python"], "metro": made["metro"], **made["packages"]}
+
+
+def _here() -> JSON:
+    import platform
+
+    from metro import __version__
+
+    return {"python": platform.python_version(), "metro": __version__, "packages": provenance.packages()}
+
+
+def _values(one: Difference) -> str:
+    """Say from what to what: hashes by their beginning."""
+    if one.kind == "cell" or not (one.was or one.now):
+        return ""
+    short = 12 if one.kind in {"raw", "processed", "result", "code"} else None
+    return f"  {one.was[:short] or '–'} → {one.now[:short] or '–'}"
+
+
+def _short(content: JSON) -> str:
+    return json.dumps(content, sort_keys=True, default=str)

@@ -1,0 +1,64 @@
+"""A command imports nothing that it does not use: the import graph is looked at, not the clock."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+# Packages that take long to import.
+HEAVY = {
+    *("duckdb", "jsonschema", "matplotlib", "numpy", "open3d", "pandas", "pyarrow", "rich", "rosbags"),
+    *("scipy", "snakemake", "statsmodels", "typst", "yaml"),
+}
+# Heavy packages → the modules that may have them, and no others, once they are imported. What a function
+# imports does not count: it is there when it is used. (numpy comes with metro.units.)
+MODULES = {
+    (): ("", "cli", "codehash", "commands.completion", "commands.output"),
+    ("numpy",): ("commands.query", "commands.status", "dataset.results", "dataset.views"),
+    ("numpy", "yaml"): ("workflow", "commands.simulate", "commands.verify"),
+    ("numpy", "pandas", "pyarrow"): ("commands.explain",),
+    ("numpy", "pandas", "pyarrow", "yaml"): (
+        "commands.check",
+        *(f"stages.{name}" for name in ("ingest", "identify", "predict", "loop", "report", "campaign")),
+        "stages.frf_export",
+    ),
+}
+
+
+def imported(statement):
+    """Return the packages that a fresh interpreter has imported after a statement."""
+    tops = "sorted({name.partition('.')[0] for name in sys.modules})"
+    script = f"import sys, json\n{statement}\nprint(json.dumps({tops}))"
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert done.returncode == 0, done.stderr
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+@pytest.mark.parametrize("allowed", MODULES)
+def test_a_module_imports_no_heavy_package_that_is_not_listed(allowed):
+    names = [".".join(filter(None, ("metro", module))) for module in MODULES[allowed]]
+    assert imported(f"import {', '.join(names)}") & HEAVY <= set(allowed)
+
+
+def test_every_command_and_stage_is_listed():
+    commands = {f"commands.{path.stem}" for path in ROOT.glob("src/metro/commands/*.py")} - {
+        "commands.__init__"
+    }
+    stages = {f"stages.{path.stem}" for path in ROOT.glob("workflow/rules/*.smk")}
+    assert commands | stages <= {module for names in MODULES.values() for module in names}
+
+
+def test_the_help_needs_nothing_but_what_draws_it():
+    call = "import metro.cli\ntry:\n    metro.cli.app(['--help'])\nexcept SystemExit:\n    pass"
+    assert imported(call) & HEAVY == {"rich"}
+
+
+def test_a_list_of_what_is_imported_finds_what_is():
+    assert imported("import scipy") & HEAVY >= {"numpy", "scipy"}

@@ -1,0 +1,87 @@
+"""What must run, as snakemake says it, and the verdicts that are there."""
+
+import json
+import subprocess
+from types import SimpleNamespace
+
+import pytest
+from typer.testing import CliRunner
+
+from metro.batch.findings import ContractError
+from metro.cli import app
+from metro.commands.status import planned
+
+HEADER = "output_file\tdate\trule\tlog-file(s)\tstatus\tplan"
+LINES = [
+    HEADER,
+    "reports/late/report.pdf\tnow\treport\t\tok\tupdate pending",
+    "data/processed/late/force.parquet\tnow\tingest\t\tok\tno update",
+    "data/processed/late/lobes.parquet\tnow\tidentify\t\tparams changed\tupdate pending",
+    "data/processed/late/modes.parquet\tnow\tidentify\t\tparams changed\tupdate pending",
+    "data/processed/early/force.parquet\tnow\tingest\t\tok\tno update",
+    "reports/early/report.pdf\tnow\treport\t\tok\tno update",
+    "reports/summary.pdf\t-\tcampaign\t\tmissing\tupdate pending",
+]
+
+
+@pytest.fixture
+def snakemake(own_campaign, monkeypatch):
+    """Put an answer in snakemake's place; return what was asked."""
+    (own_campaign / "Snakefile").write_text("")
+    answer = SimpleNamespace(returncode=0, stdout="\n".join(LINES), stderr="", asked=[])
+
+    def run(command, **_):
+        answer.asked.append(command)
+        return answer
+
+    monkeypatch.setattr(subprocess, "run", run)
+    return answer
+
+
+def test_stages_stand_in_their_order_with_snakemakes_reason():
+    batches, summary = planned(LINES)
+    assert list(batches) == ["early", "late"]
+    assert batches["early"].needs == {}
+    assert batches["late"].needs == {"identify": "params changed", "report": "a stage before it"}
+    assert summary
+
+
+def test_nothing_waits_where_every_line_says_so():
+    batches, summary = planned([line.replace("update pending", "no update") for line in LINES])
+    assert not summary
+    assert not any(batch.needs for batch in batches.values())
+
+
+def test_a_summary_of_another_form_is_refused_not_misread():
+    with pytest.raises(ContractError, match="lacks the columns plan"):
+        planned([line.rpartition("\t")[0] for line in LINES])
+
+
+def test_verdicts_stand_beside_what_must_run(snakemake):
+    result = CliRunner().invoke(app, ["status", "--json"])
+    assert result.exit_code == 0, result.output
+    content = json.loads(result.stdout)
+    assert content["up_to_date"] is False
+    assert content["batches"]["early"] == {"up_to_date": True, "needs": {}, "verdicts": {"force": "clean"}}
+    assert content["batches"]["late"]["verdicts"] == {"force": "explained"}
+    assert "--summary" in snakemake.asked[0]
+
+
+def test_people_are_told_in_a_table(snakemake):
+    printed = CliRunner(env={"COLUMNS": "120"}).invoke(app, ["status"]).stdout
+    assert "identify, report (params changed)" in printed
+    assert "1 of 2 batches need snakemake, and so does the summary" in printed
+
+
+def test_what_snakemake_complains_of_is_passed_on(snakemake):
+    snakemake.returncode, snakemake.stderr = 1, "Building\nBatchError: data/raw: holds no batch"
+    result = CliRunner().invoke(app, ["status"])
+    assert result.exit_code == 1
+    assert "data/raw: holds no batch" in result.stderr
+
+
+def test_a_folder_without_a_workflow_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, ["status"])
+    assert result.exit_code == 1
+    assert "--snakefile" in result.stderr
