@@ -15,6 +15,7 @@ from metro.loop.signature import Line, share_left
 from metro.loop.story import SENTENCES, in_words, told
 from metro.loop.verdict import (
     COMPARISON,
+    REFUTED,
     UNTESTED,
     comparison,
     error,
@@ -22,6 +23,7 @@ from metro.loop.verdict import (
     identified_fit,
     judge,
     run_dof,
+    stands,
 )
 
 STATUSES = {"clean", "explained", "partly_explained", "undetermined", "unexplained", "insufficient"}
@@ -241,3 +243,18 @@ def test_the_identified_fit_hands_over_the_base_parameters_and_every_runs_phase(
     assert found.beta == pytest.approx(BETA, rel=0.03)
     assert found.covariance.shape == (2, 2)
     assert set(found.nuisance) == {block.run for block in task.blocks}
+
+
+def test_an_effect_that_held_out_runs_speak_against_is_withdrawn():
+    """The runs of the fit bend their wave, those held out do not: whatever it was, it does not predict."""
+    bent, straight = problem(9, truth=Wave(bend=0.1)), problem(9)
+    mixed = replace(bent, blocks=(*bent.role("identify"), *straight.role("validate")))
+    found = search(mixed, (BEND,), GATES)
+    assert found.names == ("bend",)
+    assert stands(bent, search(bent, (BEND,), GATES)).names == ("bend",)
+    refuted = stands(mixed, found)
+    assert refuted.names == ()
+    rows = comparison(mixed, held_out(mixed, refuted.base), held_out(mixed, refuted.final))
+    verdict = judge(mixed, refuted, rows, GATES)
+    assert verdict["status"] == "unexplained"
+    assert verdict["candidates"][0]["why_not"] == REFUTED

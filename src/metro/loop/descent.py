@@ -139,8 +139,9 @@ def normal_equations(system: System) -> tuple[Array, Array]:
     """Return normal matrix and right side of base and effects, each block's own unknowns eliminated."""
     p, q = (part.shape[1] for part in system.rows[0][1:3])
     normal, right = np.zeros((p + q, p + q)), np.zeros(p + q)
-    for rest, base, effect, own in system.rows:
+    for rest, base, effect, unknowns in system.rows:
         columns = np.hstack([base, effect])
+        own = unknowns[:, unknowns.any(axis=0)]  # what changes nothing has no direction to take out
         if own.shape[1]:
             basis = np.linalg.qr(own)[0]
             columns = columns - basis @ (basis.T @ columns)

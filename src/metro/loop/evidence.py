@@ -6,7 +6,7 @@ The unit of evidence is the run, and for generality the condition; never the sam
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -65,7 +65,7 @@ def compare(smaller: Fit, larger: Fit) -> Evidence:
     statistic = 2.0 * (larger.total - smaller.total)
     parameters = len(larger.theta) - len(smaller.theta)
     sought = _sought(larger) / _sought(smaller)
-    p_value = -math.expm1(sought * math.log1p(-min(_tail(statistic, parameters, runs), 1.0 - 1e-16)))
+    p_value = -math.expm1(sought * math.log1p(-min(tail(statistic, parameters, runs), 1.0 - 1e-16)))
     return Evidence(statistic, p_value, {}, change(smaller, larger), missed(larger), sought)
 
 
@@ -79,7 +79,8 @@ def _sought(fitted: Fit) -> float:
     return math.prod(effect.sought for effect in fitted.candidate.effects)
 
 
-def _tail(statistic: float, parameters: int, runs: int) -> float:
+def tail(statistic: float, parameters: int, runs: int) -> float:
+    """P-value of twice a gain in log-likelihood by so many parameters: F on run-level degrees of freedom."""
     from scipy.stats import f
 
     return float(f.sf(max(statistic, 0.0) / parameters, parameters, runs + PRIOR_RUNS))
@@ -107,8 +108,11 @@ def missed(fitted: Fit) -> float:
 
 
 @lru_cache(maxsize=256)
-def leave_out(fitted: Fit, prior: Noise) -> dict[str, float]:
-    """Log-likelihood of each condition under the fit of all others; of each run if there is one condition."""
+def leave_out(fitted: Fit, prior: Noise, moved: Callable[[Fit], Fit] | None = None) -> dict[str, float]:
+    """Log-likelihood of each condition under the fit of all others; of each run if there is one condition.
+
+    ``moved`` puts the fit of all others where something else than these runs wants it.
+    """
     cut = [block for block in fitted.blocks if block.role != "calibrate"]
     by_condition = len({block.condition for block in cut}) > 1
     groups: dict[str, list[Block]] = {}
@@ -116,10 +120,12 @@ def leave_out(fitted: Fit, prior: Noise) -> dict[str, float]:
         groups.setdefault(block.condition if by_condition else block.run, []).append(block)
     if len(groups) == 1:
         return dict.fromkeys(groups, -math.inf)
-    return {name: _unseen(fitted, held, prior) for name, held in groups.items()}
+    return {name: _unseen(fitted, held, prior, moved) for name, held in groups.items()}
 
 
-def _unseen(fitted: Fit, held: Sequence[Block], prior: Noise) -> float:
+def _unseen(
+    fitted: Fit, held: Sequence[Block], prior: Noise, moved: Callable[[Fit], Fit] | None = None
+) -> float:
     """Log-likelihood of runs under the fit of all others.
 
     Of runs that alone tell a base parameter (the only hole among slots) nothing can be predicted without
@@ -128,8 +134,8 @@ def _unseen(fitted: Fit, held: Sequence[Block], prior: Noise) -> float:
     left_out = {block.run for block in held}
     others = refit(fitted, [block for block in fitted.blocks if block.run not in left_out], prior)
     if len(held) > 1 and _told(others) < _told(fitted):
-        return sum(_unseen(fitted, [block], prior) for block in held)
-    return score(others, held).total
+        return sum(_unseen(fitted, [block], prior, moved) for block in held)
+    return score(moved(others) if moved else others, held).total
 
 
 def _told(fitted: Fit) -> int:

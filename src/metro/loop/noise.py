@@ -82,13 +82,16 @@ def _axes(block: Block) -> tuple[tuple[str, ...], np.ndarray, Array]:
 def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION) -> Array:
     """Variance of each element that nothing else shares, (n,).
 
-    The misfit counts ``correlation`` times, so that that many elements weigh as one.
+    What all repeats share counts as many times as there are repeats. The misfit counts ``correlation``
+    times, so that that many elements weigh as one.
     """
     names, number, rms = _axes(block)
     scale = rms if block.scale is None else block.scale
     missed = np.array([noise.misfit.get(name, 0.0) for name in names])[number] * rms
     repeats = noise.repeats.get(block.condition, 1) * block.repeats
-    return np.asarray(block.sigma**2 + repeats * ((noise.budget * scale) ** 2 + correlation * missed**2))
+    alike = 0.0 if block.alike is None else block.alike
+    common = alike**2 + (noise.budget * scale) ** 2 + correlation * missed**2
+    return np.asarray(block.sigma**2 + repeats * common)
 
 
 def all_alike(noise: Noise) -> Noise:

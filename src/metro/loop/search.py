@@ -45,7 +45,8 @@ class Outcome:
     rivals and against nothing; ``rivals`` effects that explain the rest as well as a chosen one; ``lines``
     the signature of the rest, ``step`` that along the session, ``between`` that from condition to condition,
     ``restless`` that from run to run (of the base: ``base_between``, ``base_restless``); ``not_visible`` why
-    effects cannot be seen; ``likeness`` the fit with what the rest resembles and is no effect of the library
+    effects cannot be seen; ``seen`` those that can, fitted to the batch; ``prior`` the noise before anything
+    was known; ``likeness`` the fit with what the rest resembles and is no effect of the library
     (``final`` is without).
     """
 
@@ -57,6 +58,8 @@ class Outcome:
     rivals: tuple[Rival, ...]
     base_lines: tuple[rest.Line, ...]
     lines: tuple[rest.Line, ...]
+    seen: tuple[Effect, ...]
+    prior: Noise
     step: Step | None = None
     base_between: Between | None = None
     between: Between | None = None
@@ -144,6 +147,8 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
         rivals=compared.rivals,
         base_lines=tuple(rest.signature(base, floor)),
         lines=tuple(rest.signature(final, floor)),
+        seen=tuple(seen),
+        prior=prior,
         step=step if step and step.p_value < SESSION and abs(step.relative) > SESSION_SIZE else None,
         base_between=_differing(base, floor),
         between=_differing(likeness, floor),
@@ -153,17 +158,18 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
         not_visible=unable | absorbed,
         likeness=likeness if likeness is not final else None,
     )
-    return outcome if outcome.rivals or outcome.explained > EVEN else _withdrawn(outcome)
+    return outcome if outcome.rivals or outcome.explained > EVEN else withdrawn(outcome, UNBELIEVED)
 
 
-def _withdrawn(outcome: Outcome) -> Outcome:
+def withdrawn(outcome: Outcome, why: str) -> Outcome:
     """Return an outcome without effects: a correction that is less likely than not is not applied."""
     return replace(
         outcome,
         final=outcome.base,
         steps=(),
+        rivals=(),
         trials=tuple(
-            replace(trial, why_not=UNBELIEVED) if trial.effect.name in outcome.names else trial
+            replace(trial, why_not=why) if trial.effect.name in outcome.names else trial
             for trial in outcome.trials
         ),
         weight={},

@@ -15,6 +15,10 @@ from metro.units import Array
 
 FALSE_DISCOVERY = 0.01
 LEAST_RATIO = 1.5
+# Of the least rest that counts: what the inputs of a model share scales its prediction, and few patterns are
+# of that shape.
+SHAPED = 0.35
+FREE = 0.3  # share of a pattern that the zeros must leave
 
 
 @dataclass(frozen=True)
@@ -47,10 +51,12 @@ def signature(fitted: Fit, least: float) -> list[Line]:
     """Test the rest of a fit, place by place (axis × label × how it changes), against the plain noise.
 
     The plain noise is that without the misfit. A place counts when it is significant by Benjamini–Hochberg at
-    1 % over all places and its excess over the noise is at least ``least`` of the axis's signal.
+    1 % over all places and its excess over the noise is at least ``least`` of the axis's signal, a share
+    of that where it is of a shape of its own (a block's ``patterns``).
     """
     places: dict[tuple[str, str], list[Array]] = {}
     signal: dict[str, float] = {}
+    shaped: set[str] = set()
     cut = [block for block in fitted.blocks if block.role != "calibrate"]
     for block in cut:
         labels = np.full(len(block.axis), "all") if block.labels is None else block.labels
@@ -63,11 +69,18 @@ def signature(fitted: Fit, least: float) -> list[Line]:
                 chosen = ((block.axis == axis) & (labels == label))[:once]
                 name = f"{label}, {change}" if change else str(label)
                 places.setdefault((str(axis), name), []).append(seen[:, chosen].reshape(3, -1))
+        for name, seen in _by_pattern(fitted, block).items():
+            places.setdefault((str(block.axis[0]), name), []).append(seen)
+            shaped.add(name)
+
+    def floor(line: Line) -> float:
+        return least * SHAPED if line.label in shaped else least
+
     freedom = len(cut) + noise_room.PRIOR_RUNS
     lines = [_line(axis, label, parts, signal[axis], freedom) for (axis, label), parts in places.items()]
     accepted = q_values([line.p_value for line in lines]) <= FALSE_DISCOVERY
     return [
-        replace(line, significant=bool(found) and line.ratio > LEAST_RATIO and line.relative > least)
+        replace(line, significant=bool(found) and line.ratio > LEAST_RATIO and line.relative > floor(line))
         for line, found in zip(lines, accepted, strict=True)
     ]
 
@@ -97,6 +110,28 @@ def _by_change(fitted: Fit, block: Block) -> dict[str, Array]:
         own = within + (budget if not name else budget / repeats)
         alone = np.einsum("kf,kn->nf", unit**2, own)
         result[name] = np.array([seen, alone + common, common]) / repeats
+    return result
+
+
+def _by_pattern(fitted: Fit, block: Block) -> dict[str, Array]:
+    """Return what :func:`_by_change` does, of each pattern of a block, (3, k)."""
+    if not block.patterns:
+        return {}
+    strict = replace(fitted.noise, misfit={})
+    model = fitted.candidate.model(fitted.theta)
+    matrix, offset = model.design(block, fitted.nuisance[block.run], fitted.beta)
+    rest = block.measured - offset - matrix @ fitted.beta
+    directions = noise_room.shared(block, strict, matrix, fitted.beta)
+    variance = noise_room.diagonal(block, strict)
+    result = {}
+    for name, shape in block.patterns.items():
+        # What the zeros leave of a shape says more: they are not known well. If they leave next to nothing,
+        # it is tested against them.
+        free = shape - block.zeros @ np.linalg.lstsq(block.zeros, shape, rcond=None)[0]
+        beyond = np.linalg.norm(free) > FREE * np.linalg.norm(shape)
+        unit = _orthonormal(free if beyond else shape, against=None)
+        common = ((unit.T @ directions) ** 2).sum(axis=1)
+        result[name] = np.array([(unit.T @ rest) ** 2, (unit**2).T @ variance + common, common])
     return result
 
 

@@ -7,7 +7,16 @@ import numpy as np
 from metro.loop import signature as rest
 from metro.loop.advice import ranked
 from metro.loop.search import Gates, Outcome, Trial
-from metro.loop.verdict import comparison, error, finite, held_out, held_out_rms, parameters, why_not
+from metro.loop.verdict import (
+    comparison,
+    error,
+    estimates,
+    finite,
+    held_out,
+    held_out_rms,
+    parameters,
+    why_not,
+)
 from metro.observables.problem import Block, Problem
 from metro.units import JSON, Array
 
@@ -69,6 +78,8 @@ def _tried(problem: Problem, trial: Trial, outcome: Outcome) -> JSON:
     verdict = "added" if trial.effect.name in outcome.names else "rejected"
     verdict = "rival" if trial.effect.name in rivals else verdict
     verdict = "not visible" if trial.effect.name in outcome.not_visible else verdict
+    fitted = outcome.final if verdict == "added" else trial.fit
+    forms = sum(effect.name == trial.effect.name for effect in outcome.offered)
     return {
         "effect": trial.effect.name,
         "statistic": trial.evidence.statistic,
@@ -81,6 +92,9 @@ def _tried(problem: Problem, trial: Trial, outcome: Outcome) -> JSON:
         "verdict": verdict,
         "why_not": "" if verdict == "added" else why_not(outcome, trial),
         "parameters": parameters(trial.fit, trial.effect.name),
+        "estimates": estimates(fitted, trial.effect.name),
+        "where": dict(trial.effect.where),
+        "chosen_among": max(forms, trial.effect.sought),
     }
 
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from metro.effects.effect import EffectParameter, by_name
+from metro.effects.effect import Effect, EffectParameter, by_name
 from metro.loop.advice import enough_runs, left_over, more_runs, next_experiment
 from metro.loop.fit import Fit, score
 from metro.loop.noise import block_sigma
-from metro.loop.search import Gates, Outcome, Trial
+from metro.loop.search import Gates, Outcome, Trial, withdrawn
 from metro.loop.signature import Line, in_words, share_left, signature
 from metro.observables.problem import BaseFit, Problem
 from metro.observables.quantity import quantity
@@ -24,9 +24,11 @@ COMPARISON = (
     *("measured", "before", "after", "sigma", "unit"),
 )
 DRAWS = 2000
+AGAINST = 1.0  # log-likelihood by which held-out runs must be worse off with effects to speak against them
 WORSE = 2.0  # times the least rest that counts: on unseen runs, what the parameters are off adds to it
 RESEMBLED = "no effect of the library: it is only said what the rest is like"
 BEATEN = "passed every gate, but what was added explains the runs better"
+REFUTED = "the held-out runs speak against it: they are predicted worse with it"
 UNTESTED = "not tested: there is no run to judge it by that the fit has not seen"
 
 
@@ -94,6 +96,21 @@ def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
     low, high = np.quantile(np.sqrt(by_run[drawn].mean(axis=1)), [0.025, 0.975])
     rms = float(np.sqrt(square.mean()))
     return {"rms": rms, "nrmse": rms / signal if signal > 0 else 0.0, "ci95": [float(low), float(high)]}
+
+
+def stands(problem: Problem, outcome: Outcome) -> Outcome:
+    """Return an outcome whose effects the held-out runs do not speak against: else it has none.
+
+    They do where these runs are predicted worse, and are less likely, with the effects than without. Nothing
+    is fitted or chosen by them.
+    """
+    held = problem.role("validate")
+    if not held or not outcome.names:
+        return outcome
+    before, after = held_out_rms(problem, outcome.base), held_out_rms(problem, outcome.final)
+    worse = before is not None and after is not None and after > before
+    unlikelier = score(outcome.final, held).total < score(outcome.base, held).total - AGAINST
+    return withdrawn(outcome, REFUTED) if worse and unlikelier else outcome
 
 
 def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) -> JSON:
@@ -165,7 +182,44 @@ def _effect(outcome: Outcome, name: str) -> JSON:
 
 def parameters(fitted: Fit, name: str) -> JSON:
     """Parameters of one effect of a fit with their intervals, in the contract's units; lists as lists."""
-    p, dof = len(fitted.beta), run_dof(fitted)
+    effect, values, deviation = _estimated(fitted, name)
+    entries = [
+        bounded(parameter, float(value), float(sd), run_dof(fitted))
+        for parameter, value, sd in zip(effect.reported, values, deviation, strict=True)
+    ]
+    return {**effect.where, **by_name(effect.reported, entries)}
+
+
+def estimates(fitted: Fit, name: str) -> list[JSON]:
+    """Parameters of one effect of a fit as they are estimated, with their standard deviations, one by one.
+
+    ``signed``: around the value at which it changes nothing there is room on both sides, for all parameters
+    of the effect, so that estimates of what is not there scatter about it (``less_neutral`` is what they
+    differ by); no interval is cut off.
+    """
+    effect, values, deviation = _estimated(fitted, name)
+    signed = all(p.period is None and p.lower < p.neutral < p.upper for p in effect.reported)
+    entries: list[JSON] = []
+    for parameter, value, sd in zip(effect.reported, values.tolist(), deviation.tolist(), strict=True):
+        entries.append(
+            {
+                "parameter": parameter.name,
+                "index": sum(entry["parameter"] == parameter.name for entry in entries),
+                "value": value,
+                "sd": finite(sd),
+                "unit": parameter.unit,
+                "less_neutral": value - parameter.neutral,
+                "signed": signed,
+                "inside": bool(parameter.lower < value < parameter.upper),
+                "angle": parameter.period is not None,
+            }
+        )
+    return entries
+
+
+def _estimated(fitted: Fit, name: str) -> tuple[Effect, Array, Array]:
+    """Return an effect of a fit, with the values of the contract (v,) and their standard deviations."""
+    p = len(fitted.beta)
     for effect, place in fitted.candidate.parts(fitted.theta):
         if effect.name != name:
             continue
@@ -176,16 +230,11 @@ def parameters(fitted: Fit, name: str) -> JSON:
             float(row[row != 0] @ covariance[np.ix_(row != 0, row != 0)] @ row[row != 0])
             for row in effect.matrix
         ]
-        deviation = np.sqrt(np.maximum(variance, 0.0) * fitted.dispersion)
-        entries = [
-            _bounded(parameter, float(value), float(sd), dof)
-            for parameter, value, sd in zip(effect.reported, values, deviation, strict=True)
-        ]
-        return {**effect.where, **by_name(effect.reported, entries)}
+        return effect, values, np.sqrt(np.maximum(variance, 0.0) * fitted.dispersion)
     raise KeyError(name)
 
 
-def _bounded(parameter: EffectParameter, value: float, deviation: float, dof: float) -> JSON:
+def bounded(parameter: EffectParameter, value: float, deviation: float, dof: float) -> JSON:
     """Write an effect's parameter: its interval within the bounds, that of an angle within its period."""
     entry = quantity(value, deviation, parameter.unit, dof)
     low, high = entry["ci95"]
