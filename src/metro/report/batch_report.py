@@ -5,25 +5,31 @@ from __future__ import annotations
 from metro import __version__
 from metro.report.document import Cover, compile_pdf
 from metro.report.results import Results
+from metro.report.sections.causes import upstream, with_causes
 from metro.report.sections.comparison import comparison
 from metro.report.sections.identification import identification
 from metro.report.sections.loop import loop
 from metro.report.sections.provenance import provenance
 from metro.report.sections.published import published
-from metro.report.sections.quality import quality
+from metro.report.sections.quality import quality, with_flags
 from metro.report.sections.robot import robot
+from metro.report.sections.study import study
+from metro.report.sections.surface import flatness
 from metro.report.sections.verdict import summary
 
 
 def batch_report(results: Results) -> bytes:
     """Return the report as a PDF; the same bytes for the same results."""
     sections = [
-        summary(results),
+        with_flags(with_causes(summary(results), results), results),
         quality(results),
         published(results),
         identification(results),
+        flatness(results),
         robot(results),
+        study(results),
         comparison(results),
+        upstream(results),
         loop(results),
         provenance(results),
     ]

@@ -1,24 +1,67 @@
-"""Campaign: the verdicts of all batches become one PDF and one table."""
+"""Campaign: the verdicts of all batches become one PDF, one table, and a memory over the batches."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from metro.batch.processed import write_atomically, write_table
+import pandas as pd
+
+from metro.batch.processed import read_batch, write_atomically, write_json, write_table
+from metro.memory.history import Record
+from metro.memory.remember import remember
 from metro.report.campaign import campaign_report, campaign_table
 from metro.units import JSON
 
 
-def campaign(reports: Sequence[Path], out: Path, settings: JSON, code: str) -> None:
-    """Write ``summary.parquet`` and ``summary.pdf`` over the result folders ``reports`` of all batches."""
+def campaign(
+    reports: Sequence[Path],
+    processed: Path,
+    out: Path,
+    settings: JSON,
+    code: str,
+    *,
+    unfinished: Mapping[str, str] | None = None,
+) -> None:
+    """Write ``summary.parquet``, ``memory.json`` and ``summary.pdf`` over all batches.
+
+    Parameters
+    ----------
+    reports : the batches' result folders. processed : the folder that holds each batch's processed folder.
+    unfinished : batches that failed, each with the log that says why.
+    """
     verdicts = {folder.name: _json(folder / "verdict.json") for folder in reports}
     identified = {folder.name: _json(folder / "identified.json") for folder in reports}
+    memory = remember([_record(processed / name, verdicts[name], identified[name]) for name in verdicts])
+    failed = {batch: _told(Path(log)) for batch, log in (unfinished or {}).items()}
     provenance = {"code": code, "settings": json.dumps(settings), "batches": json.dumps(sorted(verdicts))}
-    pdf = campaign_report(verdicts, identified)
-    write_table(out / "summary.parquet", campaign_table(verdicts), provenance)
+    pdf = campaign_report(verdicts, identified, memory, failed)
+    write_table(out / "summary.parquet", campaign_table(verdicts, failed), provenance)
+    write_json(out / "memory.json", memory)
     write_atomically(out / "summary.pdf", lambda stream: stream.write(pdf))
+
+
+def _told(log: Path) -> str:
+    """Return what a stage said before it stopped: all of a message, the last line of anything else."""
+    text = log.read_text(encoding="utf-8", errors="replace").strip() if log.is_file() else ""
+    if not text:
+        return f"was not run to its end; {log} does not say why"
+    return f"{text.splitlines()[-1]} (all of it: {log})" if "Traceback" in text else text
+
+
+def _record(processed: Path, verdict: JSON, identified: JSON) -> Record:
+    batch = read_batch(processed)
+    told = _json(processed / "loop.json")
+    return Record(batch.name, batch.manifest, first_start(batch.runs), verdict, told, identified)
+
+
+def first_start(runs: pd.DataFrame) -> float | None:
+    """Return when the first run began, s since 1970; None where no run tells. Without a zone it is UTC."""
+    if "started_at" not in runs:
+        return None
+    at = pd.to_datetime(runs["started_at"], format="ISO8601", utc=True, errors="coerce").min()
+    return None if pd.isna(at) else float(at.timestamp())
 
 
 def _json(path: Path) -> JSON:

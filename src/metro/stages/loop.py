@@ -7,7 +7,8 @@ includes what was found upstream.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import json
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -17,13 +18,18 @@ from metro import __version__
 from metro.batch.batch import Batch
 from metro.batch.processed import read_batch, read_table, write_json, write_table
 from metro.effects import library
+from metro.loop.batch_story import brief
+from metro.loop.fit import Fit
 from metro.loop.labels import judge_labels
 from metro.loop.search import Gates, Outcome, search
 from metro.loop.story import told
-from metro.loop.verdict import COMPARISON, comparison, held_out, identified_fit, judge, typed
-from metro.observables import lobes, published
+from metro.loop.verdict import COMPARISON, comparison, held_out, identified_fit, judge, stands, typed
+from metro.loop.witnesses import Closed
+from metro.observables import flatness, lobes, published
+from metro.observables.face_advice import after_loop
 from metro.observables.lobes import LabelProblem
 from metro.observables.problem import Problem, Refusal
+from metro.stages.across import across
 from metro.stages.observed import (
     MODULES,
     OBSERVED_WITH_COEFFICIENTS,
@@ -49,6 +55,7 @@ class _Closing:
     tables: list[pd.DataFrame] = field(default_factory=list)
     verdicts: JSON = field(default_factory=dict)
     stories: JSON = field(default_factory=dict)
+    closed: dict[str, Closed] = field(default_factory=dict)
 
     @property
     def found(self) -> list[JSON]:
@@ -81,12 +88,25 @@ def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
                 state.observed |= {} if isinstance(again, Refusal) else again
             task = task_of(module, state.batch, state.observed, state.identified)
             outcome = _close(state, task)
+            if outcome and isinstance(task, Problem):
+                state.closed[task.observable] = Closed(task, outcome)
             fitted = identified_fit(task, outcome.final) if outcome and isinstance(task, Problem) else None
             mended = state.found or (module is lobes and state.verdicts.get("lobes", {}).get("effects"))
             if mended and (fitted or (module is lobes and "modes" in state.observed)):
                 blocks = module.report(state.batch, state.observed, state.identified, task, fitted)
                 state.identified = merged(state.identified, blocks)
-    _write(state, reports, code)
+            if module is flatness and isinstance(task, Problem) and outcome:
+                _rank_again(state, task, outcome.final)
+    _write(state, reports, {"code": code, "settings": json.dumps(settings, sort_keys=True)})
+
+
+def _rank_again(state: _Closing, task: Problem, final: Fit) -> None:
+    """Rank the configurations of faces as predicted with the effects found, where there are any."""
+    if final.candidate.effects:
+        with_effects = replace(task, base=final.candidate.model(final.theta))
+        fitted = identified_fit(task, final)
+        told = flatness.report(state.batch, state.observed, state.identified, with_effects, fitted)
+        state.identified = merged(state.identified, after_loop(told))
 
 
 def _read(processed: Path, name: str, run: str | None = None) -> pd.DataFrame:
@@ -105,7 +125,7 @@ def _close(state: _Closing, task: Task) -> Outcome | None:
             state.observed["lobes"] = lobes.redrawn(task, state.observed["lobes"], change)
     elif isinstance(task, Problem) and task.role("identify"):
         before = state.prediction[state.prediction["observable"] == task.observable].reset_index(drop=True)
-        outcome = search(task, library(task.observable), state.gates)
+        outcome = stands(task, search(task, library(task.observable), state.gates))
         rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
         rows["before"] = before["before"]
         verdict = judge(task, outcome, rows, state.gates)
@@ -118,14 +138,16 @@ def _close(state: _Closing, task: Task) -> Outcome | None:
     return None if isinstance(task, LabelProblem) else outcome
 
 
-def _write(state: _Closing, reports: Path, code: str) -> None:
+def _write(state: _Closing, reports: Path, provenance: dict[str, str]) -> None:
     filled = [table for table in state.tables if len(table)]
     joined = pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(COMPARISON))
     name, processed = state.batch.name, state.processed
-    write_table(processed / "comparison.parquet", typed(joined), {"code": code})
+    write_table(processed / "comparison.parquet", typed(joined), provenance)
     diagram = state.observed.get("lobes", pd.DataFrame())
-    write_table(processed / "lobes_final.parquet", diagram, {"code": code})
-    write_json(processed / "loop.json", {"format": 1, "batch": name, "observables": state.stories})
+    write_table(processed / "lobes_final.parquet", diagram, provenance)
+    said = across(state.closed, state.verdicts, joined, state.observed, state.gates)
+    write_json(processed / "loop.json", {"format": 1, "batch": name, "observables": state.stories, **said})
     write_json(reports / "identified.json", state.identified)
     verdict = {"format": 1, "batch": name, "metro": __version__, "observables": state.verdicts}
+    verdict["causes"] = [brief(cause) for cause in said["causes"]]
     write_json(reports / "verdict.json", verdict)

@@ -6,8 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
-from metro.report.figures import surface as figures
+from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
 from metro.report.numbers import number, quantity, unit, words
 from metro.report.results import Results
 from metro.report.sections.lobes import boundaries
@@ -48,7 +47,6 @@ def identification(results: Results) -> Section:
         *boundaries(results),
         *_arm(found.get("arm") or {}),
         *_tip(found.get("tip") or {}),
-        *_faces(found.get("faces") or {}, results.tables.get("face_map")),
     ]
     if not items:
         items.append(Paragraph("Nothing could be identified from this batch."))
@@ -151,26 +149,6 @@ def _tip(tip: JSON) -> list[Item]:
         if rows
         else []
     )
-
-
-def _faces(faces: JSON, face_map: pd.DataFrame | None) -> list[Item]:
-    if not faces:
-        return []
-    shown = {
-        run: {key: face[key] for key in FACES if face.get(key) is not None} for run, face in faces.items()
-    }
-    items: list[Item] = [
-        Heading("Faces"),
-        _by_run(shown, "face", "Flatness, with 95 % intervals where known."),
-    ]
-    told = {f"{words(k)}: {v}" for face in faces.values() for k, v in face.items() if isinstance(v, str)}
-    if told:
-        items.append(Paragraph("; ".join(sorted(told)) + ".", "note"))
-    if face_map is not None:
-        caption = "Deviation of the faces from their least-squares planes."
-        alt = f"Maps of the deviation of {face_map['run'].nunique()} faces."
-        items.append(Picture(figures.face_maps(face_map), caption, alt))
-    return items
 
 
 def _by_run(blocks: JSON, name: str, caption: str) -> Table:

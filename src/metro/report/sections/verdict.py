@@ -10,7 +10,7 @@ from metro.report.content import Facts, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import verdicts as figures
 from metro.report.figures.comparison import coordinate, overlay
 from metro.report.figures.verdicts import Change
-from metro.report.numbers import listing, number, percent, quantity, unit, with_interval, words
+from metro.report.numbers import listing, number, percent, probability, quantity, unit, with_interval, words
 from metro.report.phrases import plain, rest_words
 from metro.report.results import Results, title
 from metro.units import JSON
@@ -181,7 +181,8 @@ def summary(results: Results) -> Section:
     if not verdicts:
         nothing = "No held-out measurement could be compared with a prediction in this batch: no verdict."
         items.append(Paragraph(f"{nothing} {_identified_words(results.identified)}".strip(), "verdict"))
-    items += _print_check(results) + _key_numbers(verdicts)
+    items += advice(results.identified)
+    items += print_check(results) + _key_numbers(verdicts)
     told = [c for c in (change(title(name), entry) for name, entry in verdicts.items()) if c is not None]
     if told:
         items.append(
@@ -192,6 +193,21 @@ def summary(results: Results) -> Section:
             )
         )
     return Section("Summary", [*items, *(_one_run(results) if len(verdicts) <= MOST_DRAWN else [])])
+
+
+def advice(found: JSON) -> list[Item]:
+    """Name the planned configuration that is predicted to be the flattest."""
+    study = found.get("study") or {}
+    told = (study.get("after_loop") or {}).get("advice") or study.get("advice")
+    if not told:
+        return []
+    best, count = told["configurations"][0], len(told["configurations"])
+    text = (
+        f"Of {count} planned configurations of faces, none of them cut, {best['configuration']} is predicted "
+        f"to be the flattest: X_m {quantity(best['xm_predicted'])}, the best with probability "
+        f"{probability(best['probability_best'])}. Nothing was measured of these."
+    )
+    return [Paragraph(text)]
 
 
 def _one_run(results: Results) -> list[Item]:
@@ -220,7 +236,7 @@ def _identified_words(found: JSON) -> str:
     return f"Identified: {told}." if told else ""
 
 
-def _print_check(results: Results) -> list[Item]:
+def print_check(results: Results) -> list[Item]:
     """Say on the first page of a published batch what became of its printed errors."""
     table = results.tables.get("published_errors")
     if table is None:
@@ -300,8 +316,23 @@ def measured_words(results: Results) -> str:
         parts.append(f"tool ⌀{tool['diameter_mm']} mm{teeth}")
     if work.get("material"):
         parts.append(f"work {work['material']}")
-    text = "; ".join(parts) + "." + _run_words(runs)
+    planned = planned_runs(results)
+    text = "; ".join(parts) + "." + _run_words(runs[~runs.index.isin(planned)]) + _planned_words(planned)
     return f"{text} Source: {manifest['citation']}" if manifest.get("citation") else text
+
+
+def planned_runs(results: Results) -> list[str]:
+    """Return the runs that were not cut, on which the study gives advice."""
+    told = (results.identified.get("study") or {}).get("advice") or {}
+    return [str(run) for row in told.get("configurations") or [] for run in row["runs"]]
+
+
+def _planned_words(planned: list[str]) -> str:
+    return (
+        f" {_count(len(planned), 'run')} {'is' if len(planned) == 1 else 'are'} planned, not cut."
+        if planned
+        else ""
+    )
 
 
 def _run_words(runs: pd.DataFrame) -> str:

@@ -1,0 +1,90 @@
+"""The chain of prediction: what an observable's error owes to the predicted force, and what is its own.
+
+With p(F) the prediction from a force F, measured less p(F predicted) is the sum of what is the observable's
+own, measured less p(F measured), and of what came from upstream, p(F measured) less p(F predicted).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from metro.loop.fit import Fit, score
+from metro.observables.problem import Block, Problem
+from metro.units import JSON, Array
+
+WHENS = ("before", "after")
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Error of one run in the rows of the comparison, SI, (m,) each: all of it, from upstream, its own."""
+
+    total: Array
+    upstream: Array
+    own: Array
+
+
+def parts(fitted: Fit, measured: Block, predicted: Block) -> Parts:
+    """Split the error of a held-out run; the blocks are fed with the measured and with the predicted force.
+
+    Of the run itself only its own unknowns are taken, with the measured force.
+    """
+    scored = score(fitted, [measured])
+    model, nuisance = scored.candidate.model(scored.theta), scored.nuisance[measured.run]
+
+    def prediction(block: Block) -> Array:
+        matrix, offset = model.design(block, nuisance, scored.beta)
+        return block.to_rows(offset + matrix @ scored.beta)
+
+    own = measured.to_rows(measured.measured) - prediction(measured)
+    upstream = prediction(measured) - prediction(predicted)
+    return Parts(own + upstream, upstream, own)
+
+
+def split(problem: Problem, fits: Mapping[str, Fit], fed: Mapping[str, Mapping[str, Block]]) -> JSON:
+    """Return the split of an observable's error for loop.json.
+
+    Parameters
+    ----------
+    fits : base and final fit, by ``before`` and ``after``. fed : by held-out run, its block fed with the
+        force as ``measured``, and as predicted ``before`` and ``after``.
+
+    Returns
+    -------
+    JSON
+        ``unit``; for before and after the rms ``total``, ``upstream``, ``own``, and ``share``, of the mean
+        square error that goes when the measured force is put in (negative: the two had made up for each
+        other); the same by run.
+    """
+    told: JSON = {"unit": problem.unit, "runs": []}
+    for when in WHENS:
+        by_run = {run: parts(fits[when], blocks["measured"], blocks[when]) for run, blocks in fed.items()}
+        told[when] = _figures(list(by_run.values()), problem.si)
+        told["runs"] += [
+            {"run": run, "when": when, **_figures([one], problem.si)} for run, one in by_run.items()
+        ]
+    return told | {"words": in_words(told)}
+
+
+def _figures(found: Sequence[Parts], si: float) -> JSON:
+    total, upstream, own = (
+        float(np.sqrt(np.mean(np.concatenate([getattr(one, name) for one in found]) ** 2))) / si
+        for name in ("total", "upstream", "own")
+    )
+    share = 1.0 - (own / total) ** 2 if total > 0.0 else 0.0
+    return {"total": total, "upstream": upstream, "own": own, "share": share}
+
+
+def in_words(told: JSON) -> str:
+    """Say how much of the error came with the force."""
+    unit = told["unit"]
+    sentences = [
+        f"{when.capitalize()}, the error with the predicted force is {told[when]['total']:.3g} {unit} rms "
+        f"and with the measured force {told[when]['own']:.3g} {unit}: the force accounts for "
+        f"{told[when]['upstream']:.3g} {unit}."
+        for when in WHENS
+    ]
+    return " ".join(sentences)

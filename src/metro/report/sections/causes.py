@@ -1,0 +1,97 @@
+"""The batch as one story: its causes, where each was seen, and what of an error came with the force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from metro.report.content import Item, Paragraph, Section, Table
+from metro.report.numbers import listing, number, percent, probability, quantity, unit, words
+from metro.report.results import Results, title
+from metro.report.sections.verdict import parameter_name
+from metro.units import JSON
+
+STATUS = {
+    "together": "seen by several together",
+    "contradiction": "contradiction",
+    "confirmed": "confirmed",
+    "alone": "the others cannot tell",
+    "one_observable": "no other can show it",
+}
+SAID = ("together", "contradiction")  # what the verdicts of single observables do not say
+
+
+def with_causes(summary: Section, results: Results) -> Section:
+    """Return the first page with the causes of the batch behind the verdicts, where there are several."""
+    told = results.loop.get("causes") or []
+    if not told or len(results.verdicts()) < 2:
+        return summary
+    items = list(summary.items)
+    behind = [i for i, item in enumerate(items) if isinstance(item, Paragraph) and item.look == "verdict"]
+    place = max(behind, default=len(items) - 1) + 1
+    return replace(summary, items=[*items[:place], *_story(told), *items[place:]])
+
+
+def _story(told: list[JSON]) -> list[Item]:
+    rows = [
+        [
+            cause_name(cause),
+            listing([title(name) for name in cause["seen_in"]]),
+            _values(cause),
+            probability(cause["probability"]),
+            STATUS.get(cause["status"], words(cause["status"])),
+        ]
+        for cause in told
+    ]
+    header = ["cause", "seen in", "all together", "probability", "others"]
+    caption = (
+        "The causes in this batch over all observables; parameters that they share, with 95 % intervals."
+    )
+    table = Table(header, rows, caption, [1.5, 1.9, 2.0, 0.9, 1.4], numeric=[3])
+    notes = [str(cause["words"]) for cause in told if cause["status"] in SAID]
+    return [table, *(Paragraph(_capital(note), "warning") for note in notes)]
+
+
+def cause_name(cause: JSON) -> str:
+    """Name of a cause, and of the joint that it is of."""
+    joint = (cause.get("where") or {}).get("joint", "all")
+    return words(str(cause["cause"])) + (f", joint {joint}" if joint != "all" else "")
+
+
+def _values(cause: JSON) -> str:
+    if cause["status"] == "contradiction":
+        return "not one value"
+    told = [f"{parameter_name(name, value)} {quantity(value)}" for name, value in cause["parameters"].items()]
+    return ", ".join(told) or "–"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def upstream(results: Results) -> Section | None:
+    """Write what of each observable's error came with the predicted force, where that was measured, too."""
+    chain = results.loop.get("chain") or {}
+    rows = [
+        [
+            title(name),
+            when,
+            *(f"{number(told[when][part])} {unit(told['unit'])}" for part in ("total", "upstream", "own")),
+            percent(told[when]["share"]),
+        ]
+        for name, told in chain.items()
+        for when in ("before", "after")
+    ]
+    if not rows:
+        return None
+    text = (
+        "In held-out runs with a dynamometer the force is both predicted and measured. The error of what "
+        "follows from the force is split: what the predicted force adds, and what is left with the measured "
+        "one. Where the verdict starts from the measured force, its error is the latter."
+    )
+    header = ["observable", "loop", "with predicted force", "from the force", "with measured force", "share"]
+    caption = (
+        "Rms error by where it comes from. Share: of the mean square error that goes when the measured force "
+        "is put in; below zero where the two errors make up for each other."
+    )
+    table = Table(header, rows, caption, [1.6, 0.8, 1.4, 1.2, 1.4, 0.8], numeric=[2, 3, 4, 5])
+    return Section("From force to shape", [Paragraph(text), table])
