@@ -3,7 +3,7 @@
 from snakemake.utils import min_version
 
 from metro.batch.layout import OBSERVED
-from metro.workflow import Plan, only_one_at_work, remove_leftovers
+from metro.workflow import COMPLETE, Plan, only_one_at_work, remove_leftovers
 
 min_version("9.0")
 
@@ -18,6 +18,12 @@ wildcard_constraints:
 onstart:
     only_one_at_work(Path.cwd())
     remove_leftovers(Path("data/processed"), Path("reports"))
+
+
+onerror:
+    COMPLETE.unlink(missing_ok=True)
+    if plan.partial_summary():
+        shell("mkdir -p reports && {command}", command=plan.partial_summary())
 
 
 rule all:

@@ -25,6 +25,17 @@ from metro.batch.findings import BatchError, Finding
 from metro.codehash import code_hash
 from metro.units import JSON
 
+# Stage → the file that it writes last.
+LAST = {
+    "ingest": "data/processed/{batch}/batch.json",
+    "identify": "data/processed/{batch}/identified.json",
+    "predict": "data/processed/{batch}/prediction.parquet",
+    "loop": "reports/{batch}/verdict.json",
+    "report": "reports/{batch}/report.pdf",
+}
+# What says that the summary is of all batches: without it the next call writes the summary again.
+COMPLETE = Path("logs/campaign.complete")
+
 # What a stage reads of config.yaml besides the section of its own name: the setting's name → where it stands.
 SHARED: dict[str, dict[str, tuple[str, ...]]] = {
     "ingest": {"holdout": ("holdout",)},
@@ -100,6 +111,25 @@ class Plan:
         """Return the settings that a stage uses, as JSON, so that changing any of them re-runs it."""
         shared = {name: reduce(getitem, path, self.config) for name, path in SHARED.get(stage, {}).items()}
         return json.dumps({**self.config.get(stage, {}), **shared}, sort_keys=True)
+
+    def unfinished(self) -> dict[str, str]:
+        """Return the batches that lack a result, each with the log of the stage that it stopped at."""
+        stopped: dict[str, str] = {}
+        for batch in self.found:
+            written = {stage: Path(last.format(batch=batch)) for stage, last in LAST.items()}
+            stage = next((stage for stage, path in written.items() if not path.exists()), None)
+            stopped |= {batch: f"logs/{stage}/{batch}.log"} if stage else {}
+        return stopped
+
+    def partial_summary(self) -> str:
+        """Return the command that summarises what there is, and lists the batches that failed; or ""."""
+        logs = self.unfinished()
+        if not logs:
+            return ""
+        finished = [f"reports/{batch}" for batch in self.found if batch not in logs]
+        failed = [word for batch, log in logs.items() for word in ("--unfinished", f"{batch}={log}")]
+        fixed = ["--processed", "data/processed", "--out", "reports", "--settings", self.settings("campaign")]
+        return shlex.join(["metro", "campaign", *finished, *failed, *fixed, "--code", self.code("campaign")])
 
     def code(self, stage: str) -> str:
         """Return the hash of the code that a stage runs."""

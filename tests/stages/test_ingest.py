@@ -34,7 +34,7 @@ MANIFEST = {
         "hammer": {"rate_hz": 1000},
     },
 }
-CLOUD = np.random.default_rng(0).uniform(0.0, 60.0, size=(50, 3))
+CLOUD = np.random.default_rng(0).uniform(0.0, [60.0, 100.0, 30.0], size=(50, 3))
 
 
 def batch(root):
@@ -44,7 +44,8 @@ def batch(root):
     wave = np.sin(0.3 * np.arange(100))
     force = pd.DataFrame({"t_s": 8.0 + TIME, "fx_n": 10 + wave, "fy_n": 20 + wave, "fz_n": 30 + wave})
     force.assign(spindle_deg=np.arange(100.0)).to_csv(folder / "force.csv", index=False)
-    robot = pd.DataFrame(dict.fromkeys(KINDS["robot"].required, wave))
+    columns = enumerate(KINDS["robot"].required, 1)
+    robot = pd.DataFrame({name: 40.0 + wave * i for i, name in columns})
     robot.assign(t_s=8.05 + TIME).to_csv(folder / "cut.csv", index=False)
     robot.assign(t_s=3.0 + TIME).to_csv(folder / "idle.csv", index=False)
     pd.DataFrame({"point": [1, 2], "pass": [1, 1], "x_mm": [0, 9], "y_mm": 0, "z_mm": 0}).to_csv(
@@ -54,7 +55,7 @@ def batch(root):
     np.savetxt(folder / "scan.xyz", CLOUD)
     pd.DataFrame({"t_s": TIME, "force_n": wave, "response": wave}).to_csv(folder / "hit.csv", index=False)
     frequency = np.arange(20.0)
-    mobility = np.full(20, 2.0 + 0.0j)
+    mobility = np.full(20, 2e-4 + 0.0j)
     np.savez(folder / "h.npz", freq_hz=frequency, frf=mobility)
     (folder / "runs.csv").write_text(
         "run,dynamometer,robot_log,idle_log,path,scan,profile\na,force.csv,cut.csv,idle.csv,path.csv,scan.xyz,profile.csv\n"
@@ -142,12 +143,12 @@ def test_hammer_records_are_in_si(folder, tmp_path):
 def test_a_mobility_becomes_a_receptance_without_its_0_hz_line(folder, tmp_path):
     frf = ingested(folder, tmp_path)["frf"]
     assert frf["frequency_hz"].tolist() == list(range(1, 20))
-    np.testing.assert_allclose(frf["imag_m_n"], -2.0 / (2.0 * np.pi * np.arange(1, 20)))
+    np.testing.assert_allclose(frf["imag_m_n"], -2e-4 / (2.0 * np.pi * np.arange(1, 20)))
     np.testing.assert_allclose(frf["real_m_n"], 0.0, atol=1e-15)
 
 
 def test_a_conjugated_driving_point_is_reported(folder, tmp_path):
-    np.savez(folder / "h.npz", freq_hz=np.arange(20.0), frf=np.full(20, -2.0 + 0.0j))
+    np.savez(folder / "h.npz", freq_hz=np.arange(20.0), frf=np.full(20, -2e-4 + 0.0j))
     qc = ingested(folder, tmp_path)["qc"]
     row = qc[qc["check"] == "FRF convention"].iloc[0]
     assert not row["ok"]

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import time
 
+import pandas as pd
 import pytest
 
 pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
@@ -22,6 +23,15 @@ def test_an_invalid_batch_says_why_and_the_others_finish(checkout):
     assert "Traceback" not in printed
     assert (checkout / "reports/omega/report.pdf").exists()
     assert not (checkout / "data/processed/gamma/batch.json").exists()
+    table = pd.read_parquet(checkout / "reports/summary.parquet").set_index("batch")
+    assert table.loc["gamma", "status"] == "failed"
+    assert "published.csv: row 2" in table.loc["gamma", "error"]
+    assert (checkout / "reports/summary.pdf").read_bytes().startswith(b"%PDF")
+    assert checkout.planned()["campaign"] == {"all"}
+    checkout.edit("data/raw/gamma/published.csv", "a lot", "101.5")
+    checkout.call()
+    assert "failed" not in set(pd.read_parquet(checkout / "reports/summary.parquet")["status"])
+    assert checkout.planned() == {}
 
 
 def test_a_misspelt_config_key_is_an_error_that_names_the_right_one(checkout):

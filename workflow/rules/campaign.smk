@@ -2,9 +2,14 @@ rule campaign:
     input:
         expand("reports/{batch}/identified.json", batch=plan.batches),
         expand("reports/{batch}/verdict.json", batch=plan.batches),
+        expand("data/processed/{batch}/batch.json", batch=plan.batches),
+        expand("data/processed/{batch}/runs.parquet", batch=plan.batches),
+        expand("data/processed/{batch}/loop.json", batch=plan.batches),
     output:
         "reports/summary.parquet",
+        "reports/memory.json",
         "reports/summary.pdf",
+        touch("logs/campaign.complete"),
     log:
         "logs/campaign.log",
     conda:
@@ -14,10 +19,11 @@ rule campaign:
         mem_mb=2000,
     params:
         batches=expand("reports/{batch}", batch=plan.batches),
+        processed=subpath(input[-1], ancestor=2),
         out=subpath(output[0], parent=True),
         settings=plan.settings("campaign"),
         code=plan.code("campaign"),
     message:
         "writing the summary of all batches"
     shell:
-        "metro campaign {params.batches} --out {params.out} --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        "metro campaign {params.batches} --processed {params.processed} --out {params.out} --settings {params.settings:q} --code {params.code} > {log} 2>&1"

@@ -119,6 +119,10 @@ def _lobes(manifest: JSON, runs: pd.DataFrame, impacts: pd.DataFrame, coefficien
 
 def _flatness(runs: pd.DataFrame, loads: pd.DataFrame, coefficients: list[str]) -> Capability:
     scanned = runs[runs["scan"] != ""]
+    planned = runs[(runs["operation"] == "face") & (runs["path"] != "")]
+    if scanned.empty and len(planned) and len(loads) and not coefficients:
+        source = f"{_plural(len(planned), 'planned face')}: a prediction alone"
+        return Capability("flatness", source, ("scan files in runs.csv, to compare with",))
     wishes = list(coefficients)
     if not loads[["x_mm", "y_mm", "z_mm"]].notna().all(axis=1).any():
         wishes.append("loads.csv with x_mm, y_mm, z_mm: the stiffness along the path")
@@ -179,4 +183,8 @@ def _roles(runs: pd.DataFrame) -> list[str]:
 
 def _count(runs: pd.DataFrame, what: str) -> str:
     held = int((runs["role"] == "validate").sum())
-    return f"{len(runs)} run{'' if len(runs) == 1 else 's'} with {what}, {held} held out"
+    return f"{_plural(len(runs), 'run')} with {what}, {held} held out"
+
+
+def _plural(count: int, name: str) -> str:
+    return f"{count} {name}{'' if count == 1 else 's'}"

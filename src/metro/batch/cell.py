@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from metro.batch.documents import read_yaml, schema_findings
@@ -9,6 +10,7 @@ from metro.batch.findings import Finding, Severity
 from metro.units import JSON
 
 FILE = "cell.yaml"
+SHORTEST_ARM_MM = 10.0
 
 
 def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, list[Finding]]:
@@ -27,7 +29,7 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
     findings : what is wrong, missing or assumed.
     """
     own, shared = folder / FILE, cells / f"{name}.yaml"
-    source = own if own.is_file() else shared if shared.is_file() else None
+    source = own if own.exists() else shared if shared.is_file() else None
     if source is None:
         note = f"nothing is known of cell {name} (rigid): neither {FILE} nor {shared} is there"
         return {"cell": name}, None, [Finding("note", "batch.yaml", note, column="cell")]
@@ -39,10 +41,31 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
     if content.get("cell", name) != name:
         message = f'found "{content["cell"]}", expected the cell that batch.yaml names, "{name}"'
         findings.append(Finding("error", file, message, column="cell"))
+    if not findings and content.get("arm"):
+        findings += _arm(content["arm"]["dh"], file)
+    stations = content.get("stations")
+    if isinstance(stations, str) and (Path(stations).is_absolute() or ".." in Path(stations).parts):
+        message = f'found "{stations}", expected a table beside {source.name}'
+        findings.append(Finding("error", file, message, column="stations"))
+        content = {key: value for key, value in content.items() if key != "stations"}
     if content.get("joint_stiffness_nm_rad") and not content.get("arm"):
         message = "is of no use without arm.dh, which says where the joints are"
         findings.append(Finding("warning", file, message, column="joint_stiffness_nm_rad"))
     return content, source, findings
+
+
+def _arm(rows: list[list[float]], file: str) -> list[Finding]:
+    """Check the units of an arm's rows: theta_deg, alpha_deg, d_mm, a_mm."""
+    twist = max(abs(value) for row in rows for value in row[:2])
+    length = max(abs(value) for row in rows for value in row[2:])
+    found = []
+    if 0 < twist <= 2 * math.pi:
+        message = f"found no angle beyond {twist:g}, expected degrees: theta and alpha seem to be in radians"
+        found.append(Finding("error", file, message, column="arm.dh"))
+    if length < SHORTEST_ARM_MM:
+        message = f"found no length beyond {length:g}, expected mm: d and a seem to be in metres"
+        found.append(Finding("error", file, message, column="arm.dh"))
+    return found
 
 
 def stations_path(cell: JSON, source: Path | None) -> Path | None:

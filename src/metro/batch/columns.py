@@ -91,6 +91,7 @@ RUNS = (
     Column("stable", choices=("yes", "no")),
     Column("started_at", "time"),
     Column("return_s", "number", at_least=0),
+    Column("plate"),
 )
 
 IMPACTS = (

@@ -113,7 +113,7 @@ def _entry(path: Path, key: str) -> str | None:
     """Return a text entry of a YAML file; None where it has none or cannot be read (`check` says why)."""
     try:
         content = yaml.safe_load(path.read_bytes())
-    except yaml.YAMLError:
+    except (yaml.YAMLError, RecursionError, OSError):
         return None
     value = content.get(key) if isinstance(content, dict) else None
     return value if isinstance(value, str) else None

@@ -24,7 +24,21 @@ UnknownKey = Callable[[tuple[str, ...], bool], Severity]
 
 
 class _Loader(yaml.SafeLoader):
-    """PyYAML's safe loader, with numbers as everybody writes them (1e6), dates as text, and no key twice."""
+    """PyYAML's safe loader, with numbers as everybody writes them (1e6), dates as text, and no key twice.
+
+    Aliases are refused: a few lines of them unfold to any size.
+    """
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Compose a node, unless it is an alias of another."""
+        if self.check_event(yaml.AliasEvent):
+            parser: Any = self  # its stubs leave this method without types
+            mark = parser.peek_event().start_mark
+            raise yaml.composer.ComposerError(
+                None, None, "found an alias (*…), expected the value itself", mark
+            )
+        node: yaml.Node | None = super().compose_node(parent, index)
+        return node
 
 
 def _mapping(loader: _Loader, node: yaml.MappingNode) -> JSON:
@@ -41,9 +55,17 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> JSON:
     return content
 
 
+def _whole(_loader: _Loader, node: yaml.ScalarNode) -> int:
+    """Construct a whole number as people write it: YAML 1.1 takes 010 for 8, and 1:30 for 90."""
+    if not re.fullmatch(r"[-+]?(0|[1-9][0-9]*)", node.value):
+        message = f'found "{node.value}", expected a decimal number without leading noughts (text: in quotes)'
+        raise yaml.constructor.ConstructorError(None, None, message, node.start_mark)
+    return int(node.value)
+
+
 def _finite(loader: _Loader, node: yaml.ScalarNode) -> float:
     """Construct a number, and refuse the infinite and the undefined."""
-    value = loader.construct_yaml_float(node)
+    value = math.nan if re.search("[:_]", node.value) else loader.construct_yaml_float(node)
     if not math.isfinite(value):
         message = f'found "{node.value}", expected a finite number'
         raise yaml.constructor.ConstructorError(None, None, message, node.start_mark)
@@ -56,6 +78,7 @@ def _text(loader: _Loader, node: yaml.ScalarNode) -> str:
 
 
 _Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
+_Loader.add_constructor("tag:yaml.org,2002:int", _whole)
 _Loader.add_constructor("tag:yaml.org,2002:float", _finite)
 _Loader.add_constructor("tag:yaml.org,2002:timestamp", _text)
 _Loader.add_implicit_resolver(
@@ -74,7 +97,8 @@ def read_yaml(path: Path, file: str) -> tuple[JSON, list[Finding]]:
     try:
         content = yaml.load(path.read_bytes().decode("utf-8-sig"), _Loader)
     except OSError:
-        return {}, [Finding("error", file, "is not there, or cannot be read")]
+        what = "is a folder, expected a file" if path.is_dir() else "is not there, or cannot be read"
+        return {}, [Finding("error", file, what)]
     except UnicodeDecodeError as fault:
         return {}, [Finding("error", file, f"is not UTF-8 text (byte {fault.start + 1}): save it as UTF-8")]
     except yaml.MarkedYAMLError as fault:
@@ -82,8 +106,10 @@ def read_yaml(path: Path, file: str) -> tuple[JSON, list[Finding]]:
         return {}, [
             Finding("error", file, fault.problem or "is not YAML", row=mark.line + 1 if mark else None)
         ]
-    except yaml.YAMLError as fault:
-        return {}, [Finding("error", file, f"is not YAML: {fault}")]
+    except (yaml.YAMLError, RecursionError) as fault:
+        deep = "is nested too deeply, expected a few levels of keys"
+        message = deep if isinstance(fault, RecursionError) else f"is not YAML: {fault}"
+        return {}, [Finding("error", file, message)]
     if not isinstance(content, dict):
         return {}, [Finding("error", file, f"found {shown(content)}, expected keys with values")]
     return content, []

@@ -17,6 +17,7 @@ RUN_FILES = {
     "scan": "cloud",
     "profile": "profile",
 }
+LONGEST_NAME = 255  # bytes, of every file system
 OWN_TO_A_RUN = ("dynamometer", "robot_log", "scan", "profile")
 
 
@@ -46,8 +47,10 @@ def _named(runs: Table, impacts: Table) -> Iterator[tuple[Table, int, str, str, 
 def _path_fault(folder: Path, name: str) -> str | None:
     """Say what is wrong with a path that a table names; None where it is a file of the batch, not empty."""
     inside = "expected a path relative to the batch folder, inside it"
-    if "\\" in name:
-        return f"is written with backslashes, {inside}, with /"
+    too_long = max(len(part.encode()) for part in Path(name).parts) > LONGEST_NAME
+    if "\\" in name or "\0" in name or too_long:
+        why = "is written with backslashes" if "\\" in name else "is no name of a file"
+        return f"{why}, {inside}, with /"
     if Path(name).is_absolute() or ".." in Path(name).parts:
         return f"leads outside the batch, {inside}"
     path = folder / name
@@ -74,6 +77,10 @@ def _content_fault(path: Path, kind: str) -> str | None:
 
 def _shared(runs: Table) -> Iterator[Finding]:
     """Warn of a recording that two runs name: it belongs to one of them."""
+    for position, (cut, idle) in enumerate(zip(runs.frame["robot_log"], runs.frame["idle_log"], strict=True)):
+        if cut and cut == idle:
+            message = f"{shown(idle)} is the log of the cut, too, expected that of a run without contact"
+            yield runs.finding(position, "idle_log", message)
     for column in OWN_TO_A_RUN:
         first: dict[str, str] = {}
         for position, (run, name) in enumerate(zip(runs.frame["run"], runs.frame[column], strict=True)):

@@ -2,11 +2,23 @@
 
 OBSERVED: tuple[str, ...] = (
     *("orders", "spindle", "force_refused", "yielding"),
-    *("joint_torque", "tool_force", "joint_force_refused"),
+    *("joint_torque", "tool_force", "joint_force_refused", "joint_friction", "joint_friction_curve"),
     *("waviness_points", "waviness_runs", "waviness_refused"),
     *("tip_force", "profile_points", "observability", "arm_loads", "deformation_refused"),
-    *("face_indices", "face_map", "face_points", "face_loads", "face_mass", "face_refused"),
+    *(
+        "face_indices",
+        "face_map",
+        "face_contacts",
+        "face_placed",
+        "face_points",
+        "face_beside",
+        "face_loads",
+        "face_mass",
+        "face_refused",
+    ),
+    "face_planned",
     *("modes", "lobes", "frf_used", "stabilisation", "lobe_runs", "lobes_refused"),
     *("lobe_methods", "lobe_islands", "lobe_stations", "chatter_runs", "chatter_records"),
-    *("published_errors", "published_modes", "published_loads", "published_forces"),
+    *("published_errors", "published_modes", "published_loads", "published_matrices"),
+    "published_forces",
 )

@@ -15,6 +15,7 @@ from metro.units import JSON, Array
 FILE = "batch.yaml"
 AXES = ("x", "y", "z")
 CLOSED_DEG = 0.1  # printed pitch angles are rounded
+HARDEST = 1e5  # N/mm2, a hundred times aluminium
 ORTHONORMAL = 1e-3  # printed direction cosines are rounded
 
 
@@ -90,7 +91,7 @@ INSTRUMENT_DEFAULTS: dict[str, JSON] = {
 
 def _unknown_key(path: tuple[str, ...], resembles: bool) -> Severity:
     """Say how bad an unknown key is: the contract lets fields be added, but a misspelt one must not pass."""
-    may_be_added = not path or path[0] == "instruments"
+    may_be_added = not path or (path[0] == "instruments" and path[-1] != "axes")
     return "error" if resembles and not may_be_added else "warning"
 
 
@@ -161,9 +162,36 @@ def _motion(rows: list[list[float]]) -> str | None:
     return f"expected a rigid motion (rotation and translation in mm): {fault}" if fault else None
 
 
+def _coefficients(given: JSON) -> str | None:
+    """Check that cutting coefficients are in N/mm2 and N/mm."""
+    for name, value in given.items():
+        if isinstance(value, int | float) and value > HARDEST:
+            return f"found {name}: {value:g}, expected at most {HARDEST:g}: is it in N/m2 (Pa) or N/m?"
+    return None
+
+
+def _not_metres(least: float) -> Callable[[Any], str | None]:
+    """Return the check that a length, or the longest of several, is so many mm, or nought."""
+
+    def rule(value: Any) -> str | None:
+        longest = float(np.abs(np.array(value, dtype=float)).max())
+        if not 0 < longest < least:
+            return None
+        return f"found {shown(value)}, expected {least:g} mm or more: it seems to be in metres"
+
+    return rule
+
+
 # Semantic checks of what a schema cannot say: path of keys → rule(value) → message or None.
 RULES: dict[str, Callable[[Any], str | None]] = {
     "tool": _tool,
+    "tool.diameter_mm": _not_metres(0.1),
+    "tool.overhang_mm": _not_metres(1.0),
+    "tool_in_flange_mm": _not_metres(1.5),
+    "work.size_mm": _not_metres(1.5),
+    "work_in_base.xyz_mm": _not_metres(5.0),
+    "hole_diameter_mm": _not_metres(0.1),
+    "coefficients": _coefficients,
     "tool_axes_in_flange": _directions,
     "instruments.dynamometer.axes": _axes,
     "instruments.scanner.to_work": _motion,

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from metro.batch.findings import Finding
 from metro.batch.tables import Table
 
+STIFFNESS_N_MM = (10.0, 2e5)  # softer than any arm … stiffer than any machine tool
+CLOSEST_MM = 1.0
+MASSES_KG = (1.0, 2e4)
+STIFFEST_N_UM = 1e5
 SELF_DESCRIBING = (".uff", ".unv", ".uf")  # universal files carry points, axes, kind and unit themselves
 
 
@@ -43,6 +48,49 @@ def load_findings(table: Table) -> Iterator[Finding]:
             yield table.finding(position, "fx_n", "the load is zero, expected a force")
         if not any(math.isfinite(row[name]) for name in ("dx_mm", "dy_mm", "dz_mm")):
             yield table.finding(position, "dx_mm", "dx_mm, dy_mm, dz_mm are all blank, expected at least one")
+        elif sum(row[f"f{a}_n"] * row[f"d{a}_mm"] for a in "xyz" if math.isfinite(row[f"d{a}_mm"])) < 0:
+            message = (
+                "the tip moves against its load, expected with it: a sign is wrong, or two axes are exchanged"
+            )
+            yield table.finding(position, "dx_mm", message)
+    yield from _load_units(table)
+
+
+def _load_units(table: Table) -> Iterator[Finding]:
+    """Check the units of load tests by the stiffness that they make, and by the extent of the places."""
+    rows = [row for _, row in table.sound()]
+    angles = np.array([[row[f"q{i}_deg"] for i in range(1, 7)] for row in rows]).reshape(-1, 6)
+    known = angles[np.isfinite(angles).all(axis=1)]
+    if known.size and 0 < np.abs(known).max() <= 2 * math.pi:
+        found = f"no angle is beyond {np.abs(known).max():g}: they seem to be in radians, expected degrees"
+        yield Finding("error", table.file, found, column="q1_deg")
+    stiffness = [
+        abs(row[f"f{axis}_n"] / row[f"d{axis}_mm"])
+        for row in rows
+        for axis in "xyz"
+        if row[f"f{axis}_n"] and math.isfinite(row[f"d{axis}_mm"]) and row[f"d{axis}_mm"]
+    ]
+    typical = float(np.median(stiffness)) if stiffness else STIFFNESS_N_MM[0]
+    if typical < STIFFNESS_N_MM[0]:
+        hint = "fx_n … seem to be in kN, or dx_mm … in micrometres"
+        yield _odd(table, "fx_n, dx_mm", typical, hint)
+    if typical > STIFFNESS_N_MM[1]:
+        hint = "dx_mm … seem to be in metres"
+        yield _odd(table, "dx_mm", typical, hint)
+    places = np.array([[row[f"{axis}_mm"] for axis in "xyz"] for row in rows]).reshape(-1, 3)
+    known = places[np.isfinite(places).all(axis=1)]
+    span = float(np.ptp(known, axis=0).max()) if len(known) else 0.0
+    if 0 < span < CLOSEST_MM:
+        found = (
+            f"all places lie within {span:g}, expected {CLOSEST_MM:g} mm or more: they seem to be in metres"
+        )
+        yield Finding("error", table.file, found, column="x_mm")
+
+
+def _odd(table: Table, column: str, typical: float, hint: str) -> Finding:
+    low, high = STIFFNESS_N_MM
+    found = f"load over displacement is {typical:.3g} N/mm (median), expected {low:g} to {high:g}: {hint}"
+    return Finding("error", table.file, found, column=column)
 
 
 def mass_findings(table: Table) -> Iterator[Finding]:
@@ -50,7 +98,15 @@ def mass_findings(table: Table) -> Iterator[Finding]:
     for position, row in table.sound():
         xx, xy, xz, yy, yz, zz = (row[name] for name in ("mxx", "mxy", "mxz", "myy", "myz", "mzz"))
         if np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])[0] <= 0:
-            yield table.finding(position, "mxx", "the mass matrix of this row is not positive definite")
+            expected = "expected the eigenvalues of a mass"
+            yield table.finding(position, "mxx", f"the matrix is not positive definite, {expected}")
+            continue
+        mean = (xx + yy + zz) / 3
+        if not MASSES_KG[0] <= mean <= MASSES_KG[1]:
+            unit = "tonnes" if mean < MASSES_KG[0] else "grams"
+            found = f"found {mean:g} (mean of the diagonal), expected {MASSES_KG[0]:g} to {MASSES_KG[1]:g} kg"
+            yield table.finding(position, "mxx", f"{found}: it seems to be in {unit}")
+    yield from _twice(table, ("pose", "point"))
 
 
 def published_findings(table: Table) -> Iterator[Finding]:
@@ -63,10 +119,28 @@ def published_findings(table: Table) -> Iterator[Finding]:
 
 
 def station_findings(table: Table) -> Iterator[Finding]:
-    """Check that no station is tabulated twice."""
+    """Check that no station is tabulated twice, and that its stiffness is in N/µm."""
+    for position, row in table.sound():
+        if row["kx_n_um"] > STIFFEST_N_UM:
+            found = (
+                f"found {row['kx_n_um']:g}, expected at most {STIFFEST_N_UM:g} N/µm: it seems to be in N/m"
+            )
+            yield table.finding(position, "kx_n_um", found)
     for position, name in enumerate(table.frame["position"]):
         if name in list(table.frame["position"][:position]):
             yield table.finding(position, "position", f'position "{name}" stands twice')
+
+
+def _twice(table: Table, columns: tuple[str, ...]) -> Iterator[Finding]:
+    """Report a row that is of the same thing as an earlier one."""
+    first: dict[tuple[Any, ...], int] = {}
+    for position, row in table.sound():
+        key = tuple(row[column] for column in columns)
+        other = first.setdefault(key, position)
+        if any(key) and other != position:
+            names = ", ".join(f'{column} "{value}"' for column, value in zip(columns, key, strict=True))
+            message = f"{names} stands in row {table.rows[other]} too, expected each once"
+            yield table.finding(position, columns[0], message)
 
 
 def _named_twice(table: Table) -> Iterator[Finding]:

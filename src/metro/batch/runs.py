@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -37,6 +38,7 @@ def run_findings(table: Table, manifest: JSON) -> Iterator[Finding]:
     yield from _twice(table, "order", table.frame["order"].fillna(_places(table.frame)))
     for position, row in table.sound():
         faults = [
+            *_sizes(row, diameter),
             *_immersion(row, diameter),
             *(_helical(row, diameter, hole) if row["operation"] == "helical" else []),
         ]
@@ -83,8 +85,8 @@ def settings_name(row: Mapping[Any, Any]) -> str:
 
 
 def recorded(runs: pd.DataFrame) -> pd.Series:
-    """Tell which rows were recorded: those with a role, a file, or a judgement of stability."""
-    return (runs[["role", "stable", *RUN_FILES]] != "").any(axis=1)
+    """Tell which rows were recorded: those with a role, a file other than the path, or a judgement."""
+    return (runs[["role", "stable", *(name for name in RUN_FILES if name != "path")]] != "").any(axis=1)
 
 
 def design_findings(runs: pd.DataFrame, file: str) -> Iterator[Finding]:
@@ -141,6 +143,22 @@ def _twice(table: Table, column: str, values: pd.Series) -> Iterator[Finding]:
             yield table.finding(
                 position, column, f"{shown} stands in row {table.rows[other]} too, expected each once"
             )
+
+
+def _sizes(row: Mapping[str, Any], diameter: float | None) -> Iterator[tuple[str, str]]:
+    """Check lengths by what a mill can do: a wrong unit is a factor of a thousand."""
+    limits = {
+        "feed_per_tooth_mm": (1e-4, 5.0 if diameter is None else diameter / 2),
+        "axial_depth_mm": (5e-3, 500.0 if diameter is None else 20 * diameter),
+        "radial_depth_mm": (1e-2 if diameter is None else 1e-3 * diameter, math.inf),
+        "cut_length_mm": (0.1, 1e7),
+    }
+    for column, (low, high) in limits.items():
+        value = row[column]
+        if 0 < value <= low:
+            yield column, f"found {value:g}, expected more than {low:g} mm: it seems to be in metres"
+        if value > high:
+            yield column, f"found {value:g}, expected at most {high:g} mm: it seems to be in another unit"
 
 
 def _immersion(row: Mapping[str, Any], diameter: float | None) -> Iterator[tuple[str, str]]:

@@ -17,7 +17,7 @@ import pandas as pd
 from metro.batch.columns import TABLES, Column
 from metro.batch.findings import Finding, Severity, shown, suggestion
 
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 BLANK_NUMBERS = {"nan", "na", "null", "none"}  # what other programs write for "does not apply"
 DECIMAL = "a decimal takes a point, not a comma"
 Row = tuple[int, dict[str, str]]
@@ -67,10 +67,12 @@ def read_table(folder: Path, name: str, stem: str | None = None) -> tuple[Table,
     """
     columns = TABLES[name]
     there = [folder / f"{stem or name}{suffix}" for suffix in (".csv", ".parquet")]
-    there = [path for path in there if path.is_file()]
+    there = [path for path in there if path.exists()]
     if not there:
         return Table("", _frame([], columns)), []
     file = there[0].name
+    if not there[0].is_file():
+        return Table(file, _frame([], columns)), [Finding("error", file, "is a folder, expected a table")]
     if len(there) > 1:
         return Table(file, _frame([], columns)), [
             Finding("error", file, f"there is {there[1].name} too: keep one")
@@ -93,6 +95,10 @@ def _read_csv(path: Path) -> tuple[list[str], list[Row], list[Finding]]:
             [],
             [Finding("error", file, f"is not UTF-8 text (byte {fault.start + 1}): save it as UTF-8")],
         )
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        message = "found a NUL character, expected text: the file is damaged, copy or export it again"
+        return [], [], [Finding("error", file, message, line)]
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     header: list[str] = []
     try:

@@ -115,6 +115,27 @@ def dead(name: str, values: Array) -> Finding:
     return Finding("dead channel", span, 0.0, ok, message)
 
 
+def alike(names: tuple[str, ...], values: Array) -> Finding:
+    """Check that no two channels (n, k) that move are the same, but for the sign."""
+    pairs = [(i, j) for i in range(len(names)) for j in range(i) if np.ptp(values[:, i]) > 0.0]
+    same = [
+        f"{names[j]} and {names[i]}"
+        for i, j in pairs
+        if np.array_equal(values[:, i], values[:, j]) or np.array_equal(values[:, i], -values[:, j])
+    ]
+    message = f"{same[0]} are one signal: is one cable in two inputs?" if same else "channels differ"
+    return Finding("channels alike", float(len(same)), 0.0, not same, message)
+
+
+def motion(set_deg: Array) -> Finding:
+    """Check that an arm (n, 6) is told to move."""
+    travel = float(np.ptp(set_deg, axis=0).max())
+    message = (
+        f"the joints move by up to {travel:.3g}°" if travel else "no joint moves: is it the log of a cut?"
+    )
+    return Finding("motion", travel, 0.0, travel > 0.0, message)
+
+
 def air_offset(names: tuple[str, ...], values: Array) -> list[Finding]:
     """Check the zero of force channels (n, k) where the tool cuts air at the record's start or end.
 

@@ -10,15 +10,19 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 
+from metro.batch.batch import Batch
 from metro.batch.canonical import Part, write_parts
 from metro.batch.check import HOLDOUT, Loaded, load
-from metro.batch.findings import BatchError
+from metro.batch.files import OWN_TO_A_RUN
+from metro.batch.findings import BatchError, Finding
 from metro.batch.processed import COLUMNS, write_batch
 from metro.stages import recordings as parts
+from metro.stages import scans
 from metro.stages.recordings import Recordings
 from metro.units import JSON
 
@@ -61,9 +65,11 @@ def ingest(folder: Path, cells: Path, out: Path, settings: JSON, code: str) -> N
             files = named.get(table, [described[table]] if table in described else [])
             own = {file: sources[file] for file in files}
             write_parts(staging / f"{table}.parquet", table, content, _provenance(code, own))
+        recordings.problems += _copies(named, loaded, sources)
         if recordings.problems:
             raise BatchError(recordings.problems)
-        write_batch(staging, loaded.batch, _provenance(code, sources))
+        made = {**_provenance(code, sources), "settings": json.dumps(settings, sort_keys=True)}
+        write_batch(staging, _without(loaded.batch, recordings.left_out), made)
 
 
 def _provenance(code: str, sources: Mapping[str, str]) -> dict[str, str]:
@@ -92,7 +98,7 @@ def _tables(loaded: Loaded, recordings: Recordings) -> Iterator[tuple[str, Itera
     yield "force", parts.force(batch, recordings)
     yield "robot", parts.robot(batch, recordings)
     yield "path", parts.path(batch, recordings)
-    yield "scan", parts.scan(batch, recordings)
+    yield "scan", scans.scan(batch, recordings)
     yield "profile", parts.profile(batch, recordings)
     yield "hit", parts.hit(batch, loaded.impacts, recordings)
     yield "frf", parts.frf(loaded.impacts, recordings)
@@ -109,6 +115,28 @@ def _named_files(loaded: Loaded) -> dict[str, list[str]]:
     for table, columns in RUN_FILES.items():
         named[table] = [str(file) for column in columns for file in runs[column] if file]
     return named
+
+
+def _copies(named: Mapping[str, list[str]], loaded: Loaded, sources: Mapping[str, str]) -> list[Finding]:
+    """Find recordings of a run that are, byte for byte, those of another file."""
+    own = [file for column in OWN_TO_A_RUN for file in loaded.batch.runs[column] if file]
+    first: dict[str, str] = {}
+    found = []
+    for file in dict.fromkeys([*own, *named["hit"]]):
+        other = first.setdefault(sources[file], file)
+        if other != file:
+            message = f"has the same content as {other}, expected a recording of its own: which was copied?"
+            found.append(Finding("error", file, message))
+    return found
+
+
+def _without(batch: Batch, left_out: list[tuple[str, str]]) -> Batch:
+    """Return the batch as though recordings that are not fit for use had not been made."""
+    runs = batch.runs.copy()
+    for run, column in left_out:
+        if run:
+            runs.loc[run, column] = ""
+    return replace(batch, runs=runs)
 
 
 def _description(folder: Path) -> dict[str, str]:

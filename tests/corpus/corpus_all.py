@@ -1,0 +1,24 @@
+"""All cases, and the table of them."""
+
+from collections import Counter
+
+import corpus_bytes
+import corpus_runs
+import corpus_tests
+import corpus_text
+import corpus_values
+import corpus_yaml
+
+
+def cases():
+    """Return every case of the corpus; no two of one kind and format have one name."""
+    modules = (corpus_bytes, corpus_text, corpus_yaml, corpus_runs, corpus_values, corpus_tests)
+    found = [case for module in modules for case in module.cases()]
+    twice = [name for name, count in Counter(case.name for case in found).items() if count > 1]
+    assert not twice, twice
+    return found
+
+
+def kinds():
+    """Return the kinds of input, in the order of their first case."""
+    return list(dict.fromkeys(case.kind for case in cases()))
