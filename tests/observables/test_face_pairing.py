@@ -90,7 +90,7 @@ def comparison() -> pd.DataFrame:
         columns = {"measured": measured, "before": before * SHAPE, "after": SHAPE}
         parts.append(
             pd.DataFrame({name: z / MM for name, z in columns.items()}).assign(
-                run=run, x_mm=X, y_mm=Y, sigma=3e-3, unit="mm"
+                run=run, x_mm=X, y_mm=Y, sigma=3e-2, unit="mm"
             )
         )
     return pd.concat(parts, ignore_index=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 
@@ -66,7 +68,7 @@ def _row(run: str, part: pd.DataFrame) -> dict[str, str | float]:
     place = part[["x_mm", "y_mm"]].to_numpy(float)
     heights = _about_plane(place, part[[*KINDS]].to_numpy(float))
     xm = dict(zip(KINDS, np.ptp(heights, axis=0).tolist(), strict=True))
-    xm["measured"] -= _of_noise(place, heights[:, 2], part["sigma"].to_numpy(float))
+    xm["measured"] -= _of_noise(place, heights[:, 2], _scatter(heights[:, 0] - heights[:, 2]))
     row: dict[str, str | float] = {"run": run, **xm}
     own = heights[:, 0]
     for column, kind in enumerate(KINDS[1:], start=1):
@@ -79,10 +81,19 @@ def _row(run: str, part: pd.DataFrame) -> dict[str, str | float]:
     return row
 
 
-def _of_noise(place: Array, surface: Array, sigma: Array) -> float:
-    """Return what noise of ``sigma`` (n,) adds to a surface's range about its plane: the mean of draws."""
+def _scatter(rest: Array) -> float:
+    """Return how measured heights scatter from point to point, by second differences of the rest.
+
+    The table's ``sigma`` also holds what a whole face shares (its place, the arm's stiffness): that adds
+    nothing to a range about a plane.
+    """
+    return 1.4826 * float(np.median(np.abs(np.diff(rest, 2)))) / math.sqrt(6.0)
+
+
+def _of_noise(place: Array, surface: Array, sigma: float) -> float:
+    """Return what noise of ``sigma`` adds to a surface's range about its plane: the mean of draws."""
     rng = np.random.default_rng(0)
-    noisy = surface[:, None] + np.nan_to_num(sigma)[:, None] * rng.standard_normal((len(surface), DRAWS))
+    noisy = surface[:, None] + sigma * rng.standard_normal((len(surface), DRAWS))
     return float(np.ptp(_about_plane(place, noisy), axis=0).mean() - np.ptp(surface))
 
 
