@@ -159,3 +159,10 @@ def test_clean_pairs_have_no_cause():
         pair = [noisy(bent(300 + seed + offset, 0.0, repeats=1), 0.2, seed + offset) for offset in (0, 1000)]
         false += bool(judged({n: unsearched(n, task) for n, task in zip("ab", pair, strict=True)}, GATES))
     assert false == 0
+
+
+def test_an_effect_that_is_handed_on_with_the_coefficients_is_one_cause():
+    effect = {"effect": "tool_runout", "probability": 1.0, "parameters": {"radius_um": {"value": 8.2}}}
+    entries = {name: {"status": "explained", "effects": [effect]} for name in ("force", "lobes")}
+    (found,) = causes({}, entries, GATES)
+    assert found["seen_in"] == ["force", "lobes"]

@@ -38,13 +38,15 @@ def causes(closed: Mapping[str, Closed], verdicts: JSON, gates: Gates) -> list[J
     }
     several = [_entry(one) for one in judged(usable, gates)]
     told = {(entry["cause"], str(entry["where"].get("joint", "all"))) for entry in several}
-    single = [
-        _single(name, effect)
-        for name, verdict in verdicts.items()
-        for effect in verdict.get("effects") or []
-        if (effect["effect"], str(effect["parameters"].get("joint", "all"))) not in told
-    ]
-    return sorted(several + single, key=lambda entry: -entry["probability"])
+    single: dict[tuple[str, str], JSON] = {}
+    for name, verdict in verdicts.items():
+        for effect in verdict.get("effects") or []:
+            key = (effect["effect"], str(effect["parameters"].get("joint", "all")))
+            if key in single:  # found upstream, and handed on with the coefficients
+                single[key]["seen_in"].append(name)
+            elif key not in told:
+                single[key] = _single(name, effect)
+    return sorted([*several, *single.values()], key=lambda entry: -entry["probability"])
 
 
 def brief(entry: JSON) -> JSON:
