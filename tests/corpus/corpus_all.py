@@ -3,6 +3,7 @@
 from collections import Counter
 
 import corpus_bytes
+import corpus_channels
 import corpus_runs
 import corpus_tests
 import corpus_text
@@ -12,7 +13,15 @@ import corpus_yaml
 
 def cases():
     """Return every case of the corpus; no two of one kind and format have one name."""
-    modules = (corpus_bytes, corpus_text, corpus_yaml, corpus_runs, corpus_values, corpus_tests)
+    modules = (
+        corpus_bytes,
+        corpus_text,
+        corpus_yaml,
+        corpus_runs,
+        corpus_values,
+        corpus_tests,
+        corpus_channels,
+    )
     found = [case for module in modules for case in module.cases()]
     twice = [name for name, count in Counter(case.name for case in found).items() if count > 1]
     assert not twice, twice

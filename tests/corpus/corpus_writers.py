@@ -5,6 +5,8 @@ import struct
 import zipfile
 
 import numpy as np
+from corpus_matlab import matlab73
+from corpus_tdms import segment
 
 AXES = range(1, 7)
 X3P_NAMESPACE = "http://www.opengps.eu/2008/ISO5436_2"
@@ -22,6 +24,35 @@ def dynoware(path, table):
     rows = "\n".join(f"{t:.6f}\t{x:.4f}\t{y:.4f}\t{z:.4f}" for t, x, y, z in table.to_numpy())
     head = "DynoWare\tVersion 2.5.1.2\nPath:\tC:\\Data\\\nSampling rate [Hz]:\t1000\nCycle No:\t1\n"
     path.write_text(f"{head}Time\tFx\tFy\tFz\ns\tN\tN\tN\n{rows}\n")
+
+
+def named(table):
+    """Channels as a recorder names them, with units of their own: name → unit and values."""
+    units = {"s": "s", "n": "N", "deg": "deg", "nm": "Nm"}
+    for column in table:
+        name, _, unit = column.rpartition("_")
+        yield (name, units[unit], table[column]) if unit in units else (column, "m/s^2", table[column])
+
+
+def tdms(path, table):
+    """Write two segments, as a recorder that writes while it records."""
+    half = len(table) // 2
+    parts = [
+        {name: (values.to_numpy(), {"unit_string": unit}) for name, unit, values in named(part)}
+        for part in (table.iloc[:half], table.iloc[half:])
+    ]
+    path.write_bytes(b"".join(segment(part) for part in parts))
+
+
+def mat(path, table):
+    from scipy.io import savemat
+
+    savemat(path, {name: table[name].to_numpy() for name in table}, do_compression=True)
+
+
+def mat_hdf5(path, table):
+    units = {name: unit for name, unit, _ in named(table)}
+    matlab73(path, {"record": {name: each.to_numpy() for name, _, each in named(table)}, "units": units})
 
 
 def _axes(tag, values):
@@ -175,15 +206,22 @@ def x3p(path, table):
         archive.writestr("md5checksum.hex", f"{hashlib.md5(text).hexdigest()} *main.xml\n")
 
 
+CHANNELS = {"TDMS": (".tdms", tdms), "MAT v7": (".mat", mat), "MAT v7.3": (".mat", mat_hdf5)}
 # Kind of recording → format → suffix and writer; the first is the one that batches have unless asked.
 FORMATS = {
-    "dynamometer": {"CSV": (".csv", csv), "Parquet": (".parquet", parquet), "DynoWare": (".txt", dynoware)},
+    "dynamometer": {
+        "CSV": (".csv", csv),
+        "Parquet": (".parquet", parquet),
+        "DynoWare": (".txt", dynoware),
+        **CHANNELS,
+    },
     "robot_log": {
         "CSV": (".csv", csv),
         "Parquet": (".parquet", parquet),
         "RSI": (".rsi", rsi),
         "MCAP": (".mcap", rosbag),
         "ROS db3": (".db3", rosbag),
+        **CHANNELS,
     },
     "idle_log": {"CSV": (".csv", csv), "RSI": (".rsi", rsi)},
     "path": {"CSV": (".csv", csv), "Parquet": (".parquet", parquet)},
@@ -201,7 +239,7 @@ FORMATS = {
         "STL": (".stl", stl_text),
         "STL binary": (".stl", stl),
     },
-    "hammer record": {"CSV": (".csv", csv), "Parquet": (".parquet", parquet)},
+    "hammer record": {"CSV": (".csv", csv), "Parquet": (".parquet", parquet), **CHANNELS},
     "FRF": {
         "CSV": (".csv", csv),
         "Parquet": (".parquet", parquet),

@@ -4,32 +4,12 @@ import struct
 
 import numpy as np
 import pytest
+from cloud_files import POINTS, array, failure, written
 
-from metro.formats import FormatError
-from metro.formats.registry import read, sniff
+from metro.formats.errors import FormatError
+from metro.formats.registry import read
 
-POINTS = np.array([[0.1, 0.2, 0.3], [-1.5, 2.0, 1e-3], [100.25, 60.5, 30.0], [7.0, -8.0, 9.0]])
 ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
-
-
-def array(path):
-    sniff(path, "cloud")
-    table = read(path, "cloud")
-    assert list(table) == ["x_mm", "y_mm", "z_mm"]
-    assert (table.dtypes == np.float64).all()
-    return table.to_numpy()
-
-
-def failure(path):
-    with pytest.raises(FormatError) as caught:
-        read(path, "cloud")
-    return caught.value.message
-
-
-def written(tmp_path, content, name):
-    path = tmp_path / name
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return path
 
 
 def ply_header(encoding, properties, count=4, end="\n"):
@@ -116,6 +96,15 @@ def test_compressed_pcd(tmp_path):
     body = struct.pack("<II", len(packed), len(columns)) + packed
     path = written(tmp_path, pcd_header("binary_compressed") + body, "scan.pcd")
     np.testing.assert_allclose(array(path), POINTS, rtol=1e-7)
+
+
+def test_a_compressed_cloud_whose_columns_open3d_does_not_know_is_refused(tmp_path):
+    columns = POINTS.T.astype("<f4").tobytes()
+    packed = lzf_of_literals(columns)
+    body = struct.pack("<II", len(packed), len(columns)) + packed
+    path = written(tmp_path, pcd_header("binary_compressed", fields="x_mm y_mm z_mm") + body, "scan.pcd")
+    with pytest.raises(FormatError, match="found the columns x_mm, y_mm, z_mm, expected x, y and z"):
+        array(path)
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,10 @@ import struct
 
 import numpy as np
 import pytest
+from cloud_files import POINTS, failure, written
 
-from metro.formats import FormatError
 from metro.formats.registry import read, read_cloud, sniff
 
-POINTS = np.array([[0.1, 0.2, 0.3], [-1.5, 2.0, 1e-3], [100.25, 60.5, 30.0], [7.0, -8.0, 9.0]])  # mm
 PAGE, HELD = 1024, 1020
 HEADER = struct.Struct("<8sIIQQQQ")
 QUARTER = (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5))  # a quarter of a turn about z: x → y
@@ -88,20 +87,12 @@ def doubles(points, placed=""):
     return prototype, streams, len(points), placed
 
 
-def written(tmp_path, content):
-    path = tmp_path / "scan.e57"
-    path.write_bytes(content)
-    return path
-
-
-def failure(path):
-    with pytest.raises(FormatError) as caught:
-        read(path, "cloud")
-    return caught.value.message
+def scan(tmp_path, content):
+    return written(tmp_path, content, "scan.e57")
 
 
 def test_a_scan_in_double_precision_is_read_in_millimetres(tmp_path):
-    path = written(tmp_path, e57([doubles(POINTS)]))
+    path = scan(tmp_path, e57([doubles(POINTS)]))
     sniff(path, "cloud")
     table = read(path, "cloud")
     np.testing.assert_allclose(table.to_numpy(), POINTS, rtol=1e-14)
@@ -119,7 +110,7 @@ def test_scaled_integers_intensity_and_points_marked_invalid(tmp_path):
     prototype += '<cartesianInvalidState type="Integer" minimum="0" maximum="2"/>'
     streams = [bits(column, 12) for column in steps.T]
     streams += [np.ones(4, "<f4").tobytes(), bits([0, 2, 0, 0], 2)]
-    table = read(written(tmp_path, e57([(prototype, streams, 4, "")])), "cloud")
+    table = read(scan(tmp_path, e57([(prototype, streams, 4, "")])), "cloud")
     np.testing.assert_allclose(table.to_numpy(), steps[[0, 2, 3]] * 0.01 - 20.0, atol=1e-12)
     assert table.attrs["dropped"] == 1
 
@@ -127,7 +118,7 @@ def test_scaled_integers_intensity_and_points_marked_invalid(tmp_path):
 @pytest.mark.parametrize("rows", [None, 3, 100])
 def test_scans_are_joined_by_their_poses(tmp_path, rows):
     placed = pose(QUARTER, (1.0, 2.0, 3.0))
-    path = written(tmp_path, e57([doubles(POINTS), doubles(POINTS[:3], placed)]))
+    path = scan(tmp_path, e57([doubles(POINTS), doubles(POINTS[:3], placed)]))
     pieces = list(read_cloud(path, rows)) if rows else [read(path, "cloud")]
     shift = np.array([1000.0, 2000.0, 3000.0])
     turned = np.column_stack([-POINTS[:3, 1], POINTS[:3, 0], POINTS[:3, 2]]) + shift
@@ -146,7 +137,7 @@ def test_spherical_coordinates(tmp_path):
     names = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
     prototype = "".join(f'<{name} type="Float"/>' for name in names)
     streams = [np.asarray(column, "<f8").tobytes() for column in (distance, azimuth, elevation)]
-    table = read(written(tmp_path, e57([(prototype, streams, 3, "")])), "cloud")
+    table = read(scan(tmp_path, e57([(prototype, streams, 3, "")])), "cloud")
     expected = [[1000, 0, 0], [0, 2000, 0], [2000 * np.cos(np.pi / 6), 0, 1000]]
     np.testing.assert_allclose(table.to_numpy(), expected, atol=1e-9)
 
@@ -155,14 +146,14 @@ def test_faults_of_an_e57_file_are_named(tmp_path):
     good = e57([doubles(POINTS)])
     flipped = bytearray(good)
     flipped[90] ^= 1
-    assert "ends early: found 1000 bytes, expected" in failure(written(tmp_path, good[:1000]))
-    assert "ends early: found 20 bytes, expected a header" in failure(written(tmp_path, good[:20]))
-    assert "not a readable E57 file" in failure(written(tmp_path, bytes(flipped)))
+    assert "ends early: found 1000 bytes, expected" in failure(scan(tmp_path, good[:1000]))
+    assert "ends early: found 20 bytes, expected a header" in failure(scan(tmp_path, good[:20]))
+    assert "not a readable E57 file" in failure(scan(tmp_path, bytes(flipped)))
     colours = "".join(f'<color{name} type="Float"/>' for name in ("Red", "Green", "Blue"))
-    assert "found a scan with colorRed" in failure(written(tmp_path, e57([(colours, *doubles(POINTS)[1:])])))
-    assert "found 0 rows" in failure(written(tmp_path, e57([])))
+    assert "found a scan with colorRed" in failure(scan(tmp_path, e57([(colours, *doubles(POINTS)[1:])])))
+    assert "found 0 rows" in failure(scan(tmp_path, e57([])))
 
 
 def test_entities_are_not_unfolded(tmp_path):
     bomb = '<!DOCTYPE e57Root [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]>'
-    assert "its XML declares a document type" in failure(written(tmp_path, e57([doubles(POINTS)], bomb)))
+    assert "its XML declares a document type" in failure(scan(tmp_path, e57([doubles(POINTS)], bomb)))

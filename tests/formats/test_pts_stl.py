@@ -4,32 +4,13 @@ import struct
 
 import numpy as np
 import pytest
+from cloud_files import POINTS, array, failure, written
 
 from metro.formats import FormatError
-from metro.formats.registry import read, read_cloud, sniff
+from metro.formats.registry import read_cloud
 
-POINTS = np.array([[0.1, 0.2, 0.3], [-1.5, 2.0, 1e-3], [100.25, 60.5, 30.0], [7.0, -8.0, 9.0]])
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
 TETRAHEDRON = CORNERS[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]
-
-
-def written(tmp_path, content, name):
-    path = tmp_path / name
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return path
-
-
-def failure(path):
-    with pytest.raises(FormatError) as caught:
-        read(path, "cloud")
-    return caught.value.message
-
-
-def array(path):
-    sniff(path, "cloud")
-    table = read(path, "cloud")
-    assert (table.dtypes == np.float64).all()
-    return table.to_numpy()
 
 
 def block(points, after=""):

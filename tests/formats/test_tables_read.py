@@ -118,10 +118,10 @@ def test_a_file_that_is_not_there_is_said_to_be_so(tmp_path):
     assert "cannot be opened" in failure(tmp_path / "none.csv")
 
 
-@pytest.mark.parametrize("suffix", [".tdms", ".MAT"])
-def test_formats_without_a_reader_say_what_to_export(tmp_path, suffix):
+@pytest.mark.parametrize(("suffix", "title"), [(".tdms", "TDMS"), (".MAT", "MATLAB")])
+def test_a_binary_format_that_does_not_start_as_one_is_refused(tmp_path, suffix, title):
     message = failure(written(tmp_path, "x", f"file{suffix}"))
-    assert "files are not read yet; export it as" in message
+    assert f"does not start as a {title} file, expected a force record" in message
 
 
 def test_an_unknown_suffix_is_refused_with_those_that_are_known(tmp_path):

@@ -219,3 +219,12 @@ def test_what_an_independent_writer_writes_is_read(tmp_path):
         assert (found.reference, found.response, found.unit) == ("1x", "7z", "m/s")
         np.testing.assert_allclose(found.values, given.values, rtol=1e-11)
         np.testing.assert_array_equal(found.frequency, given.frequency)
+
+
+@pytest.mark.parametrize("count", [0, -1])
+def test_a_function_of_no_values_is_refused(tmp_path, count):
+    path = single_precision(tmp_path)
+    text = path.read_text()
+    path.write_text(text.replace(line("{:10d}{:10d}", 5, 4).rstrip("\n"), f"{5:10d}{count:10d}", 1))
+    with pytest.raises(FormatError, match=rf"dataset 2 \(58\).*found a count of {count} values"):
+        read_functions(path)

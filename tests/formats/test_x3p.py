@@ -71,5 +71,5 @@ def test_faults_of_an_x3p_file_are_named(tmp_path):
 
 
 def test_an_archive_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("metro.formats.x3p.LARGEST", 100)
+    monkeypatch.setattr("metro.formats.limits.LARGEST_ARCHIVE", 100)
     assert "expected at most 100" in failure(x3p(tmp_path / "bomb.x3p"))

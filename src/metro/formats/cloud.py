@@ -13,6 +13,7 @@ import pandas as pd
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw, columns_to_read
 
+_DIGITS = 12  # of the number of points: more than any disk holds
 _COORDINATE = re.compile(r"([xyz])(?:[\s_(\[]*(\w+)[)\]]?)?", re.IGNORECASE)
 
 
@@ -45,6 +46,13 @@ def piece(
 def number_of(start: int, row: int) -> str:
     """Name a point of a piece that begins after the first ``start`` points of its file."""
     return f"point {start + row + 1}"
+
+
+def point_count(text: str) -> int:
+    """Return a number of points as a header states it; raises ValueError where it is none that can be."""
+    if not (text.isascii() and text.isdigit() and len(text) <= _DIGITS):
+        raise ValueError(f"found {text[:40]!r}, expected a number of points")
+    return int(text)
 
 
 def slices(count: int, rows: int | None) -> Iterator[slice]:

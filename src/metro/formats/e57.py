@@ -16,21 +16,22 @@ import numpy as np
 from metro.formats.cloud import number_of, piece
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
+from metro.formats.limits import LARGEST_XML, check_unpacked
 from metro.formats.packets import Note
 from metro.units import MM, Array
 
 SIGNATURE = b"ASTM-E57"
 
 _HEADER = struct.Struct("<8s2L4Q")  # signature, version, file length, offset and length of the XML, page size
-_CHECKSUM = 4
-_LARGEST_XML = 1 << 26
+_CHECKSUM, _POINT = 4, 24
+_PAGE, _DEEPEST = 1024, 64
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
 _STATE = {_CARTESIAN: "cartesianInvalidState", _SPHERICAL: "sphericalInvalidState"}
 _OWN = {"x_mm": "x", "y_mm": "y", "z_mm": "z"}
 
 
-def e57_pieces(path: Path, _kind: Kind, rows: int | None) -> Iterator[Raw]:
+def e57_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     """Read the points of all scans, moved by their poses into the frame of the file, in millimetres.
 
     Points that a scan marks as invalid have no coordinates. A note of the first piece says what was joined.
@@ -46,8 +47,8 @@ def e57_pieces(path: Path, _kind: Kind, rows: int | None) -> Iterator[Raw]:
     _check_header(path)
     try:
         with pye57.E57(str(path)) as file:
-            yield from _scans(path, file, rows)
-    except (pye57.libe57.E57Exception, RuntimeError) as error:
+            yield from _scans(path, file, rows, kind)
+    except (pye57.libe57.E57Exception, RuntimeError, MemoryError) as error:
         raise FormatError(path, f"is not a readable E57 file: {' '.join(str(error).split())}") from error
 
 
@@ -63,19 +64,52 @@ def _check_header(path: Path) -> None:
         there = path.stat().st_size
         if there < length:
             raise FormatError(path, f"ends early: found {there} bytes, expected {length}")
-        if page <= _CHECKSUM or size > _LARGEST_XML:
-            message = f"found an XML section of {size} bytes on pages of {page}"
-            raise FormatError(path, f"{message}, expected at most {_LARGEST_XML} on pages of 1024")
+        if page != _PAGE or size > LARGEST_XML or start > there:
+            message = f"found an XML section of {size} bytes at {start} on pages of {page}"
+            raise FormatError(path, f"{message}, expected at most {LARGEST_XML} on pages of {_PAGE}")
         stream.seek(start - start % page)
         pages = (start % page + size) // (page - _CHECKSUM) + 1
         held = b"".join(stream.read(page)[:-_CHECKSUM] for _ in range(pages))
         xml = held[start % page : start % page + size]
-    if b"<!DOCTYPE" in xml or b"<!ENTITY" in xml or b"\0" in xml:
-        raise FormatError(path, "its XML declares a document type or is not UTF-8, expected neither")
+    _check_xml(path, xml)
 
 
-def _scans(path: Path, file: Any, rows: int | None) -> Iterator[Raw]:
+def _check_xml(path: Path, xml: bytes) -> None:
+    """Check that an XML section declares no entities and is not nested: the library would go down with it."""
+    from xml.parsers import expat
+
+    depth = 0
+    parser = expat.ParserCreate()
+
+    def declared(*_: object) -> None:
+        raise FormatError(path, "its XML declares a document type, expected none")
+
+    def begun(*_: object) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > _DEEPEST:
+            raise FormatError(path, f"its XML is nested more than {_DEEPEST} deep, expected about ten")
+
+    def ended(_: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser.StartDoctypeDeclHandler, parser.StartElementHandler, parser.EndElementHandler = (
+        declared,
+        begun,
+        ended,
+    )
+    try:
+        parser.Parse(xml, True)
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        raise FormatError(path, f"its XML section cannot be read: {error}") from error
+
+
+def _scans(path: Path, file: Any, rows: int | None, kind: Kind) -> Iterator[Raw]:
     count = int(file.scan_count)
+    if rows is None:
+        said = sum(int(file.get_header(index).point_count) for index in range(count))
+        check_unpacked(path, _POINT * said, kind.title)
     headers = [file.get_header(index) for index in range(count)]
     posed = sum(bool(header.has_pose()) for header in headers)
     note = Note(
@@ -105,15 +139,23 @@ def _points(path: Path, file: Any, header: Any, rows: int | None) -> Iterator[Ar
     state = _STATE[names]
     turn, shift = _pose(header)
     wanted = [*names, *([state] if state in fields else [])]
-    capacity = max(1, header.point_count if rows is None else min(rows, header.point_count))
+    capacity = max(1, min(header.point_count, 8 * path.stat().st_size if rows is None else rows))
     data, buffers = file.make_buffers(wanted, capacity)
     reader = header.points.reader(buffers)
+    stored = path.stat().st_size
+    seen, most = (
+        0,
+        8 * stored,
+    )  # a point of no bits, the same as all others, can be stated any number of times
     while size := reader.read():
         points = np.column_stack([data[name][:size] for name in names])
         if names is _SPHERICAL:
             points = _from_spherical(points)
         if state in data:
             points[data[state][:size] != 0] = np.nan
+        seen += size
+        if seen > most:
+            raise FormatError(path, f"found more points than the {most} that its {stored} bytes can hold")
         yield (points @ turn.T + shift) / MM
     reader.close()
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from metro.formats.cloud import counted, own_names, piece, record_pieces
+from metro.formats.cloud import counted, own_names, piece, point_count, record_pieces
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
 from metro.formats.text import SPACES, Layout, number_pieces
@@ -65,8 +65,8 @@ def read_header(path: Path) -> Header:
             match words:
                 case ["format", name, "1.0"]:
                     encoding = name
-                case ["element", name, count] if count.isdigit():
-                    elements.append((name, int(count)))
+                case ["element", name, count] if _is_count(count):
+                    elements.append((name, point_count(count)))
                 case ["property", *rest] if len(elements) == 1:
                     properties.append(_property(path, number, rest))
                 case ["end_header"]:
@@ -87,6 +87,13 @@ def read_header(path: Path) -> Header:
     if not names or len(set(names)) < len(names):
         raise FormatError(path, f"found the vertex properties {names}, expected each once")
     return Header(encoding, elements[0][1], tuple(properties), number, size)
+
+
+def _is_count(text: str) -> bool:
+    try:
+        return point_count(text) >= 0
+    except ValueError:
+        return False
 
 
 def _property(path: Path, number: int, words: list[str]) -> tuple[str, str]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from metro.formats import rosbag, rsi
+from metro.formats import matlab, rosbag, rsi, tdms
 from metro.formats.dynoware import read_dynoware
 from metro.formats.e57 import SIGNATURE, e57_pieces
 from metro.formats.errors import FormatError
@@ -30,6 +30,7 @@ Pieces = Callable[[Path, Kind, int | None], Iterator[Raw]]
 _HEAD = 512
 _FIRST_ROWS = 32
 _TABLES = tuple(KINDS)
+_CHANNELS = tuple(kind for kind in _TABLES if kind != "cloud")
 _ANY: tuple[bytes, ...] = (b"",)
 _UNIVERSAL = (b"-1\n", b"-1\r", b"-1".ljust(76))  # a mark on a line of its own
 
@@ -72,18 +73,14 @@ FORMATS = (
     Format("KUKA RSI recording", (".rsi", ".xml"), rsi.STARTS, ("robot",), rsi.read_rsi),
     Format("ROS 2 bag", (".mcap", ".db3"), rosbag.STARTS, ("robot",), rosbag.read_rosbag),
     Format("DynoWare text export", (".txt", ".csv"), (b"DynoWare",), ("force",), read_dynoware),
+    Format("TDMS", (".tdms",), (tdms.START,), _CHANNELS, tdms.read_tdms),
+    Format("MATLAB", (".mat",), matlab.STARTS, _CHANNELS, matlab.read_mat),
     Format("X3P", (".x3p",), (b"PK\x03\x04",), ("profile",), read_x3p),
     _cloud("PTS", (".pts",), _ANY, pts_pieces),
     _cloud("STL", (".stl",), _ANY, stl_pieces),
     _cloud("point list", (".xyz", ".txt", ".asc", ".csv"), _ANY, xyz_pieces),
-    Format("CSV", (".csv", ".txt"), _ANY, tuple(kind for kind in _TABLES if kind != "cloud"), read_csv),
+    Format("CSV", (".csv", ".txt"), _ANY, _CHANNELS, read_csv),
 )
-
-# Formats of the contract that have no reader, with what to export instead.
-UNREAD = {
-    ".tdms": "CSV or Parquet",
-    ".mat": "CSV, Parquet or (for an FRF) npz",
-}
 
 
 def read(path: Path, kind: str) -> pd.DataFrame:
@@ -174,8 +171,6 @@ def _table(frf: Function, coherence: Function | None) -> pd.DataFrame:
 def _format_of(path: Path, kind: str) -> Format:
     """Find the format by content, then by suffix; a file named as one and holding another is an error."""
     suffix = path.suffix.lower()
-    if suffix in UNREAD:
-        raise FormatError(path, f"{suffix} files are not read yet; export it as {UNREAD[suffix]}")
     try:
         with path.open("rb") as stream:
             head = stream.read(_HEAD).removeprefix(b"\xef\xbb\xbf").lstrip()

@@ -15,14 +15,16 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from metro.formats.bag_limits import check_tables, limited_chunks, plain_types
 from metro.formats.errors import FormatError
 from metro.formats.kinds import JOINTS, Kind, Raw
 from metro.formats.packets import Note, in_order
 from metro.units import DEG, Array
 
 if TYPE_CHECKING:
-    from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
+    from rosbags.rosbag2 import Reader
+    from rosbags.typesys.store import Typestore
 
 STARTS = (b"\x89MCAP", b"SQLite format 3\x00")
 
@@ -30,6 +32,7 @@ _STATE = "sensor_msgs/msg/JointState"
 _CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 _SET = re.compile(r"set|command|cmd|reference|desired|target", re.IGNORECASE)
 _NS = 1e-9
+_IDL_RULE = "=" * 80 + "\nIDL: "
 _GAP = 1.5  # set-points further apart than so many of their steps do not say what was commanded between
 
 
@@ -55,19 +58,41 @@ def read_rosbag(path: Path, kind: Kind, rows: int | None) -> Raw:
     FormatError
         Where the file is no whole bag, or the topics, joints 1 … 6 or efforts are not there.
     """
-    from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_typestore
+    from rosbags.rosbag2 import Reader
 
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+        if path.suffix == ".db3":
+            check_tables(path)
+        with limited_chunks(path), Reader(path) as bag:
             state, target = _topics(path, kind, bag.connections)
-            measured = _series(path, bag, state, _measured, rows)
-            commanded = _series(path, bag, target, _commanded, rows)
+            store = _store(path, [*state, *target])
+            measured = _series(path, (bag, store), state, _measured, rows)
+            commanded = _series(path, (bag, store), target, _commanded, rows)
     except FormatError:
         raise
     except Exception as error:  # whatever a damaged bag makes its reader stumble over
         raise FormatError(path, f"is not a readable ROS 2 bag: {error or type(error).__name__}") from error
     return _joined(measured, commanded, kind, whole=rows is None)
+
+
+def _store(path: Path, connections: Sequence[Connection]) -> Typestore:
+    """Return the types of ROS 2 Humble, and of the file's own those that these lack."""
+    from rosbags.interfaces import MessageDefinitionFormat
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for each in connections:
+        if each.msgtype in store.fielddefs:
+            continue
+        text, form = each.msgdef.data, each.msgdef.format
+        if form == MessageDefinitionFormat.MSG:
+            types = get_types_from_msg(text, each.msgtype)
+        else:
+            parts = [part.partition("\n")[2] for part in text.split(_IDL_RULE)[1:]] or [text]
+            types = {name: found for part in parts for name, found in get_types_from_idl(part).items()}
+        new = {name: found for name, found in types.items() if name not in store.fielddefs}
+        store.register(plain_types(path, new))
+    return store
 
 
 def _topics(
@@ -98,18 +123,18 @@ def _topics(
 
 def _series(
     path: Path,
-    bag: AnyReader,
+    source: tuple[Reader, Typestore],
     connections: Sequence[Connection],
     values_of: Callable[[Any, list[int]], list[float]],
     rows: int | None,
 ) -> _Series:
     """Read a topic's messages that name joints 1 … 6; others (a gripper's) are passed over."""
-    topic = connections[0].topic
+    topic, (bag, store) = connections[0].topic, source
     stamps: list[int] = []
     values: list[list[float]] = []
     seen: tuple[str, ...] = ()
     for connection, _, data in bag.messages(connections):
-        message: Any = bag.deserialize(data, connection.msgtype)
+        message: Any = store.deserialize_cdr(data, connection.msgtype)
         seen = tuple(message.name if connection.msgtype == _STATE else message.joint_names)
         joints = _joints(seen)
         if joints is not None:

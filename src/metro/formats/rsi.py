@@ -28,6 +28,7 @@ _TELEGRAM = re.compile(rb"<Rob[\s>].*?(?=<Rob[\s>]|\Z)", re.DOTALL)
 _END = b"</Rob>"
 _ANGLES = {"ASPos": "q{}_set_deg", "AIPos": "q{}_deg"}
 _TORQUES = ("GearTorque", "Torque", "MACur")  # the first that is there is taken
+_DIGITS = 18  # of IPOC: more do not fit 64 bits
 _TORQUE = "tau{}_nm"
 
 
@@ -67,8 +68,8 @@ class _Recording:
 
     def cycle(self, index: int) -> int:
         text = (self.telegrams[index].rob.findtext("IPOC") or "").strip()
-        if not text.isdecimal():
-            found = f"found {text!r}" if text else "found none"
+        if not (text.isascii() and text.isdecimal() and len(text) <= _DIGITS):
+            found = f"found {text[:40]!r}" if text else "found none"
             raise FormatError(self.path, f"{self.place(index)}, IPOC: {found}, expected whole milliseconds")
         return int(text)
 

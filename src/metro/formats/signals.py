@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import zipfile
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw, columns_to_read
+from metro.formats.limits import check_archive, check_unpacked
 from metro.formats.text import Layout, fields, is_number, lines, numbers, separator
+
+_ARRAYS = ("freq_hz", "frf", "coherence")
 
 
 def read_csv(path: Path, kind: Kind, rows: int | None) -> Raw:
@@ -43,15 +47,25 @@ def read_parquet(path: Path, kind: Kind, rows: int | None) -> Raw:
         use = columns_to_read(path, kind, names)
         wanted = {stored[names.index(name)]: name for name in use}
         _check_numeric(path, {name: file.schema_arrow.field(key).type for key, name in wanted.items()})
+        check_unpacked(path, _unpacked(file.metadata, wanted), kind.title)
         if rows is None:
             table = file.read(columns=list(wanted))
         else:
             batches = file.iter_batches(batch_size=rows, columns=list(wanted))
-            table = pa.Table.from_batches([batch for batch, _ in zip(batches, range(1), strict=False)])
-    except pa.ArrowException as error:
+            none = file.schema_arrow.empty_table().select(list(wanted))
+            first = [batch for batch, _ in zip(batches, range(1), strict=False)]
+            table = pa.Table.from_batches(first) if first else none
+    except (pa.ArrowException, OSError, ValueError) as error:  # of a damaged file, Arrow raises any of them
         raise FormatError(path, f"is not a readable Parquet file: {error}") from error
     columns = {name: table[key].to_numpy().astype(np.float64) for key, name in wanted.items()}
     return Raw(pd.DataFrame(columns), lambda row: f"row {row + 1}")
+
+
+def _unpacked(metadata: Any, columns: Iterable[str]) -> int:
+    """Return the bytes of so many columns as float64, or as the file states their pages unpacked, if more."""
+    groups = (metadata.row_group(i) for i in range(metadata.num_row_groups))
+    pages = sum(group.column(i).total_uncompressed_size for group in groups for i in range(group.num_columns))
+    return int(max(8 * metadata.num_rows * len(list(columns)), pages))
 
 
 def _check_numeric(path: Path, types: dict[str, object]) -> None:
@@ -65,19 +79,26 @@ def _check_numeric(path: Path, types: dict[str, object]) -> None:
 def read_npz(path: Path, kind: Kind, rows: int | None) -> Raw:
     """Read an FRF from a NumPy archive: ``freq_hz``, ``frf`` (complex e^{+iωt}), ``coherence``, each (n,)."""
     try:
+        check_archive(path, kind.title)
         with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: np.squeeze(archive[name])[:rows] for name in archive.files}
-    except (ValueError, OSError, zipfile.BadZipFile) as error:
-        raise FormatError(path, f"is not a readable NumPy archive: {error}") from error
+            present = archive.files
+            arrays = {
+                name: np.atleast_1d(np.squeeze(archive[name]))[:rows] for name in _ARRAYS if name in present
+            }
+    except FormatError:
+        raise
+    except Exception as error:  # whatever a damaged archive makes its reader stumble over
+        message = f"is not a readable NumPy archive: {error or type(error).__name__}"
+        raise FormatError(path, message) from error
     missing = [name for name in ("freq_hz", "frf") if name not in arrays]
     if missing:
-        found = ", ".join(arrays) or "none"
+        found = ", ".join(present) or "none"
         raise FormatError(path, f"lacks the array {', '.join(missing)} of {kind.title}: found {found}")
     for name, array in arrays.items():
-        if name in ("freq_hz", "frf", "coherence") and array.shape != arrays["freq_hz"].shape:
-            shape = f"found shape {array.shape}, expected {arrays['freq_hz'].shape} as freq_hz has"
-            raise FormatError(path, f"array {name}: {shape}")
-        if name in ("freq_hz", "frf", "coherence") and not np.issubdtype(array.dtype, np.number):
+        if array.ndim != 1 or array.shape != arrays["freq_hz"].shape:
+            expected = f"({arrays['freq_hz'].size},), one value per line of freq_hz"
+            raise FormatError(path, f"array {name}: found shape {array.shape}, expected {expected}")
+        if array.dtype.kind not in ("iufc" if name == "frf" else "iuf"):
             raise FormatError(path, f"array {name}: found values of type {array.dtype}, expected numbers")
     frf = arrays["frf"]
     columns = {"frequency_hz": arrays["freq_hz"], "real": frf.real, "imag": frf.imag}

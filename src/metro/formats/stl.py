@@ -64,7 +64,7 @@ def _ascii(path: Path) -> Array:
     last, number = "", 0
     for number, text in lines(path):
         words = text.split()
-        last = words[0].lower()
+        last = words[0].lower() if words else last  # a line of control characters holds nothing
         if last == "vertex":
             if len(words) != 4 or not all(map(is_number, words[1:])):
                 raise FormatError(path, f"line {number}: found {text!r}, expected vertex x y z")

@@ -18,6 +18,7 @@ from metro.formats.kinds import Raw
 
 SPACES = r"\s+"
 DECIMAL_COMMA = "numbers need a decimal point: export again with '.' as decimal sign"
+MIXED = "the first line of numbers has decimal commas: export again with '.' as decimal sign in all"
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -49,7 +50,11 @@ def fields(text: str, parted_by: str) -> list[str]:
     """Split a line into its fields, stripped, quotes taken off."""
     if parted_by == SPACES:
         return text.split()
-    return [field.strip() for field in next(csv.reader([text], delimiter=parted_by, skipinitialspace=True))]
+    try:
+        found = next(csv.reader([text], delimiter=parted_by, skipinitialspace=True))
+    except csv.Error:  # a field longer than any name or number
+        found = text.split(parted_by)
+    return [field.strip() for field in found]
 
 
 def is_number(text: str) -> bool:
@@ -70,11 +75,13 @@ class Layout:
     names : the file's columns in order.
     parted_by : what stands between columns: a character, or ``SPACES``.
     skip : how many lines of the file, comments included, come before the first row.
+    decimal : the decimal sign, "." or ",".
     """
 
     names: tuple[str, ...]
     parted_by: str
     skip: int
+    decimal: str = "."
 
 
 def numbers(path: Path, layout: Layout, use: Sequence[str], rows: int | None) -> Raw:
@@ -102,8 +109,10 @@ def number_pieces(
     except pd.errors.ParserError as error:
         raise FormatError(path, _ragged(str(error))) from error
     except ValueError as error:
-        row, column, found = _first_fault(_parse(path, layout, use, rows, limit=limit, dtype=str))
+        texts = _parse(path, layout, use, rows, limit=limit, dtype=str)
+        row, column, found = _first_fault(texts, layout.decimal)
         hint = f"; {DECIMAL_COMMA}" if re.match(r"[-+]?\d+,\d", found) else ""
+        hint = f"; {MIXED}" if layout.decimal == "," and "." in found else hint
         message = f"{_place(path, layout, 0, row)}, column {column}: found {found!r}, expected a number{hint}"
         raise FormatError(path, message) from error
 
@@ -119,6 +128,7 @@ def _parse(
     with pd.read_csv(
         path,
         sep=layout.parted_by,
+        decimal=layout.decimal,
         header=None,
         names=_labels(path, layout, use),
         index_col=False,
@@ -170,11 +180,12 @@ def _ragged(message: str) -> str:
     return f"line {line}: found {saw} fields, expected {expected} as in the header; {DECIMAL_COMMA}"
 
 
-def _first_fault(pieces: Iterator[pd.DataFrame]) -> tuple[int, str, str]:
+def _first_fault(pieces: Iterator[pd.DataFrame], decimal: str) -> tuple[int, str, str]:
     """Find row, column and content of the first field that is not a number."""
-    start = 0
+    start, swapped = 0, str.maketrans(",.", ".,") if decimal == "," else {}
     for text in pieces:
-        wrong = text.apply(pd.to_numeric, errors="coerce").isna().to_numpy() & text.notna().to_numpy()
+        pointed = text.apply(lambda column: column.str.translate(swapped))
+        wrong = pointed.apply(pd.to_numeric, errors="coerce").isna().to_numpy() & text.notna().to_numpy()
         if wrong.any():
             row, column = divmod(int(np.argmax(wrong)), wrong.shape[1])
             return start + row, str(text.columns[column]), str(text.iloc[row, column])

@@ -67,7 +67,7 @@ def read_functions(path: Path) -> list[Function]:
                 length, force = _unit_factors(data[start:end])
             elif name in ("58", "58b"):
                 found += _function(data[start:end], name == "58b")
-        except (ValueError, IndexError, KeyError) as error:
+        except (ValueError, IndexError, KeyError, ArithmeticError, RecursionError) as error:
             raise FormatError(path, f"{where}: is not what universal file datasets hold: {error}") from error
     to_si = {FRF: force / length}
     return [replace(each, values=each.values * to_si.get(each.kind, 1.0)) for each in found]
@@ -97,7 +97,10 @@ def _datasets(path: Path, data: bytes) -> Iterator[tuple[str, int, int]]:
         if name == "-1":  # an end mark too many
             at = start - 1
             continue
-        close = _binary_close(data, start) if name == "58b" else _MARK.search(data, start)
+        try:
+            close = _binary_close(data, start) if name == "58b" else _MARK.search(data, start)
+        except (ValueError, IndexError, KeyError) as error:
+            raise FormatError(path, f"dataset {name}: has no header of such a dataset: {error}") from error
         if close is None:
             raise FormatError(path, f"dataset {name}: found no end mark -1 where its data end")
         yield name, start, close.start()
@@ -138,6 +141,8 @@ def _unit_factors(block: bytes) -> tuple[float, float]:
     """Length and force of a universal file's units in metres and newtons: SI value = value / factor."""
     lines, _ = _lines(block, 3)
     values = [float(lines[2][i : i + 25].replace("D", "E")) for i in (0, 25)]
+    if not all(0 < value < np.inf for value in values):
+        raise ValueError(f"found the unit factors {values}, expected positive numbers")
     return values[0], values[1]
 
 
@@ -149,6 +154,8 @@ def _function(block: bytes, binary: bool) -> list[Function]:
     if abscissa not in (0, 18):
         return []
     kind, count, even = _form(form)
+    if count < 1:
+        raise ValueError(f"found a count of {count} values, expected 1 or more")
     width = 1 + _COMPLEX[kind] + (not even)
     body = block[at:]
     table = _binary(lines[0], body, (count, width), kind) if binary else _text(body, kind, (count, width))

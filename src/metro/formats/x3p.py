@@ -10,9 +10,8 @@ import pandas as pd
 
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
+from metro.formats.limits import check_archive
 from metro.units import MM
-
-LARGEST = 1 << 30  # bytes unpacked: a profile has thousands of points, not so many
 
 
 def read_x3p(path: Path, kind: Kind, rows: int | None) -> Raw:
@@ -24,17 +23,14 @@ def read_x3p(path: Path, kind: Kind, rows: int | None) -> Raw:
     Raises
     ------
     FormatError
-        Where the archive is damaged or unpacks to more than 1 GiB, or holds no single profile.
+        Where the archive is damaged or unpacks to more than a profile can be, or holds no single profile.
     """
     import x3pio
 
     try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > LARGEST:
-            raise FormatError(path, f"unpacks to {size} bytes, expected at most {LARGEST} in {kind.title}")
+        check_archive(path, kind.title)
         content = x3pio.read(path)
-    except (x3pio.X3pError, zipfile.BadZipFile, OSError) as error:
+    except (x3pio.X3pError, zipfile.BadZipFile, OSError, LookupError, ValueError) as error:
         raise FormatError(path, f"is not a readable X3P file: {error}") from error
     if not isinstance(content, x3pio.Profile):
         found = type(content).__name__.lower()
