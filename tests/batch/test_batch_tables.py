@@ -1,6 +1,9 @@
 import math
 
+import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from metro.batch.columns import TABLES
@@ -166,3 +169,11 @@ def test_a_table_that_is_there_twice_is_an_error(tmp_path):
 def test_a_file_that_is_no_parquet_is_an_error(tmp_path):
     (tmp_path / "runs.parquet").write_text("run\nr1\n")
     assert "runs.parquet: cannot be read as Parquet" in str(read_table(tmp_path, "runs")[1][0])
+
+
+def test_a_parquet_table_whose_text_is_no_unicode_is_refused_by_name(tmp_path):
+    broken = pa.StringArray.from_buffers(1, pa.py_buffer(np.array([0, 2], "<i4")), pa.py_buffer(b"\xe1\xff"))
+    pq.write_table(pa.table({"run": broken}), tmp_path / "runs.parquet")
+    found = [str(finding) for finding in read_table(tmp_path, "runs")[1]]
+    assert len(found) == 1
+    assert found[0].startswith("runs.parquet: cannot be read as Parquet")

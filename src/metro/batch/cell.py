@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from metro.batch.documents import read_yaml, schema_findings
-from metro.batch.findings import Finding, Severity
+from metro.batch.findings import Finding, Severity, linked_outside
 from metro.units import JSON
 
 FILE = "cell.yaml"
@@ -29,12 +29,14 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
     findings : what is wrong, missing or assumed.
     """
     own, shared = folder / FILE, cells / f"{name}.yaml"
-    source = own if own.exists() else shared if shared.is_file() else None
+    plain = Path(name).name == name and "\0" not in name  # else it would lead out of the folder of cells
+    source = own if own.exists() else shared if plain and shared.is_file() else None
     if source is None:
         note = f"nothing is known of cell {name} (rigid): neither {FILE} nor {shared} is there"
         return {"cell": name}, None, [Finding("note", "batch.yaml", note, column="cell")]
     file = FILE if source is own else str(shared)
-    content, findings = read_yaml(source, file)
+    outside = linked_outside(folder, own, FILE) if source is own else []
+    content, findings = ({}, outside) if outside else read_yaml(source, file)
     if findings:
         return {"cell": name}, source, findings
     findings = schema_findings(content, "cell", file, _unknown_key)

@@ -15,7 +15,7 @@ from metro.batch.capabilities import Capability, capabilities
 from metro.batch.cell import read_cell, stations_path
 from metro.batch.discover import NAME, NAME_IN_WORDS
 from metro.batch.files import file_findings
-from metro.batch.findings import BatchError, Finding, errors
+from metro.batch.findings import BatchError, Finding, errors, linked_outside
 from metro.batch.holdout import plan
 from metro.batch.manifest import FILE, read_manifest, with_defaults
 from metro.batch.runs import design_findings, filled, recorded, run_findings
@@ -154,6 +154,9 @@ def _stations(cell: JSON, source: Path | None) -> tuple[Table, list[Finding]]:
     path = stations_path(cell, source)
     if path is None or source is None:
         return read_table(Path(), "stations", "")
+    outside = linked_outside(source.parent, path.parent, f"{source.name}: stations")
+    if outside:
+        return read_table(Path(), "stations", "")[0], outside
     table, findings = read_table(path.parent, "stations", path.stem)
     if not table.file:
         message = f'"{cell["stations"]}" is not there, expected a table beside {source.name}'

@@ -11,8 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
+from metro.batch.documents import read_yaml
 from metro.batch.findings import BatchError, Finding
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
@@ -104,16 +103,14 @@ def _found(folder: Path, cells: Path) -> FoundBatch:
 
 
 def _existing(folder: Path, name: str) -> Path | None:
-    """Return the file ``name`` of a folder if it is there."""
+    """Return the file ``name`` of a folder if it is there, and in it."""
+    if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
+        return None  # `check` says why; the name comes from a file of somebody else
     path = folder / name
     return path if path.is_file() else None
 
 
 def _entry(path: Path, key: str) -> str | None:
     """Return a text entry of a YAML file; None where it has none or cannot be read (`check` says why)."""
-    try:
-        content = yaml.safe_load(path.read_bytes())
-    except (yaml.YAMLError, RecursionError, OSError):
-        return None
-    value = content.get(key) if isinstance(content, dict) else None
+    value = read_yaml(path, path.name)[0].get(key)
     return value if isinstance(value, str) else None

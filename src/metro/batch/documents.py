@@ -9,25 +9,39 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import yaml
 
 from metro.batch.findings import Finding, Severity, resembling, shown, suggestion
-from metro.units import JSON
 
 if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
+
+    from metro.units import (
+        JSON,
+    )  # which imports NumPy, and this module is imported at every call of snakemake
 
 # How bad an unknown key is: called with the keys that lead to it, and whether it resembles a known one.
 UnknownKey = Callable[[tuple[str, ...], bool], Severity]
 
 
+LARGEST = 1 << 20  # bytes: a description that people write has some thousands
+_TRUTH = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
+
+
 class _Loader(yaml.SafeLoader):
     """PyYAML's safe loader, with numbers as everybody writes them (1e6), dates as text, and no key twice.
 
-    Aliases are refused: a few lines of them unfold to any size.
+    Aliases are refused: a few lines of them unfold to any size. So is every tag but those of text, numbers,
+    truth, lists and mappings.
     """
+
+    yaml_constructors: ClassVar[dict[Any, Any]] = {
+        tag: make
+        for tag, make in yaml.SafeLoader.yaml_constructors.items()
+        if tag is None or str(tag).rpartition(":")[2] in {"null", "seq", "str"}
+    }
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """Compose a node, unless it is an alias of another."""
@@ -57,19 +71,32 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> JSON:
 
 def _whole(_loader: _Loader, node: yaml.ScalarNode) -> int:
     """Construct a whole number as people write it: YAML 1.1 takes 010 for 8, and 1:30 for 90."""
-    if not re.fullmatch(r"[-+]?(0|[1-9][0-9]*)", node.value):
-        message = f'found "{node.value}", expected a decimal number without leading noughts (text: in quotes)'
+    if not re.fullmatch(r"[-+]?(0|[1-9][0-9]{0,17})", node.value):
+        message = (
+            f"found {shown(node.value)}, expected a decimal number without leading noughts (text: in quotes)"
+        )
         raise yaml.constructor.ConstructorError(None, None, message, node.start_mark)
     return int(node.value)
 
 
 def _finite(loader: _Loader, node: yaml.ScalarNode) -> float:
     """Construct a number, and refuse the infinite and the undefined."""
-    value = math.nan if re.search("[:_]", node.value) else loader.construct_yaml_float(node)
+    try:
+        value = math.nan if re.search("[:_]", node.value) else loader.construct_yaml_float(node)
+    except ValueError:
+        value = math.nan
     if not math.isfinite(value):
-        message = f'found "{node.value}", expected a finite number'
+        message = f"found {shown(node.value)}, expected a finite number"
         raise yaml.constructor.ConstructorError(None, None, message, node.start_mark)
     return value
+
+
+def _truth(_loader: _Loader, node: yaml.ScalarNode) -> bool:
+    """Construct a truth value, under a tag, too."""
+    if node.value.lower() not in _TRUTH:
+        message = f"found {shown(node.value)}, expected true or false"
+        raise yaml.constructor.ConstructorError(None, None, message, node.start_mark)
+    return _TRUTH[node.value.lower()]
 
 
 def _text(loader: _Loader, node: yaml.ScalarNode) -> str:
@@ -80,6 +107,7 @@ def _text(loader: _Loader, node: yaml.ScalarNode) -> str:
 _Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
 _Loader.add_constructor("tag:yaml.org,2002:int", _whole)
 _Loader.add_constructor("tag:yaml.org,2002:float", _finite)
+_Loader.add_constructor("tag:yaml.org,2002:bool", _truth)
 _Loader.add_constructor("tag:yaml.org,2002:timestamp", _text)
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+"), list("-+.0123456789")
@@ -95,7 +123,11 @@ def read_yaml(path: Path, file: str) -> tuple[JSON, list[Finding]]:
     file : its name in messages.
     """
     try:
-        content = yaml.load(path.read_bytes().decode("utf-8-sig"), _Loader)
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST + 1)
+        if len(data) > LARGEST:
+            raise yaml.YAMLError(f"has more than {LARGEST} bytes, expected at most so many")
+        content = yaml.load(data.decode("utf-8-sig"), _Loader)
     except OSError:
         what = "is a folder, expected a file" if path.is_dir() else "is not there, or cannot be read"
         return {}, [Finding("error", file, what)]

@@ -6,6 +6,7 @@ import difflib
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 Severity = Literal["error", "warning", "note"]
@@ -59,6 +60,13 @@ class BatchError(ContractError):
 
 class ConfigError(ContractError):
     """The configuration breaks its schema."""
+
+
+def linked_outside(folder: Path, path: Path, file: str) -> list[Finding]:
+    """Report a file that is a link to a place outside its folder: it is not read, a message would show it."""
+    if path.resolve().is_relative_to(folder.resolve()):
+        return []
+    return [Finding("error", file, "is a link that leads outside the folder, expected the file itself")]
 
 
 def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -1,4 +1,4 @@
-"""Names of the tables that identify writes for the later stages: what was observed, compact."""
+"""Names of tables that several stages share: what identify observed, and what the campaign's page draws."""
 
 OBSERVED: tuple[str, ...] = (
     *("orders", "spindle", "force_refused", "yielding"),
@@ -22,3 +22,6 @@ OBSERVED: tuple[str, ...] = (
     *("published_errors", "published_modes", "published_loads", "published_matrices"),
     "published_forces",
 )
+
+# What the plots of the campaign's page are drawn from
+PAGE: tuple[str, ...] = ("comparison", "lobes", "lobes_final", "lobe_islands", "face_map")

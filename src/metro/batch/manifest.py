@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from metro.batch.documents import read_yaml, schema_findings
-from metro.batch.findings import Finding, Severity, shown
+from metro.batch.findings import Finding, Severity, linked_outside, shown
 from metro.units import JSON, Array
 
 FILE = "batch.yaml"
@@ -26,7 +26,8 @@ def read_manifest(folder: Path) -> tuple[JSON, list[Finding]]:
     ----------
     folder : the batch.
     """
-    content, findings = read_yaml(folder / FILE, FILE)
+    outside = linked_outside(folder, folder / FILE, FILE)
+    content, findings = ({}, outside) if outside else read_yaml(folder / FILE, FILE)
     if findings:
         return content, findings
     findings = schema_findings(content, "batch", FILE, _unknown_key)

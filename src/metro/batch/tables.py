@@ -15,11 +15,13 @@ from typing import Any
 import pandas as pd
 
 from metro.batch.columns import TABLES, Column
-from metro.batch.findings import Finding, Severity, shown, suggestion
+from metro.batch.findings import Finding, Severity, linked_outside, shown, suggestion
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 BLANK_NUMBERS = {"nan", "na", "null", "none"}  # what other programs write for "does not apply"
 DECIMAL = "a decimal takes a point, not a comma"
+LARGEST = 1 << 26  # bytes of a table file: runs, loads and printed values are rows that people write
+MOST_CELLS = 10_000_000
 Row = tuple[int, dict[str, str]]
 
 
@@ -71,17 +73,27 @@ def read_table(folder: Path, name: str, stem: str | None = None) -> tuple[Table,
     if not there:
         return Table("", _frame([], columns)), []
     file = there[0].name
-    if not there[0].is_file():
-        return Table(file, _frame([], columns)), [Finding("error", file, "is a folder, expected a table")]
-    if len(there) > 1:
-        return Table(file, _frame([], columns)), [
-            Finding("error", file, f"there is {there[1].name} too: keep one")
-        ]
+    faults = _file_faults(folder, there)
+    if faults:
+        return Table(file, _frame([], columns)), faults
     header, rows, findings = _read_csv(there[0]) if there[0].suffix == ".csv" else _read_parquet(there[0])
     findings += _header_findings(file, header, columns) if header else []
     if any(finding.severity == "error" for finding in findings):
         return Table(file, _frame([], columns)), findings
     return _typed(file, rows, columns, findings)
+
+
+def _file_faults(folder: Path, there: list[Path]) -> list[Finding]:
+    """Say what keeps a table's file from being read at all."""
+    file = there[0].name
+    if not there[0].is_file():
+        return [Finding("error", file, "is a folder, expected a table")]
+    if len(there) > 1:
+        return [Finding("error", file, f"there is {there[1].name} too: keep one")]
+    size = there[0].stat().st_size
+    if size > LARGEST:
+        return [Finding("error", file, f"has {size} bytes, expected at most {LARGEST}")]
+    return linked_outside(folder, there[0], file)
 
 
 def _read_csv(path: Path) -> tuple[list[str], list[Row], list[Finding]]:
@@ -126,12 +138,22 @@ def _read_csv(path: Path) -> tuple[list[str], list[Row], list[Finding]]:
 
 def _read_parquet(path: Path) -> tuple[list[str], list[Row], list[Finding]]:
     """Read header and rows of a Parquet file as text; the first row is row 1."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     try:
-        frame = pd.read_parquet(path)
-    except (OSError, ValueError) as fault:
+        stored = pq.ParquetFile(path)
+        count = stored.metadata.num_rows * stored.metadata.num_columns
+        if count > MOST_CELLS:
+            message = f"has {count} cells, expected at most {MOST_CELLS}"
+            return [], [], [Finding("error", path.name, message)]
+        # what pandas notes of its own in the file is left unread: names and types are those of the columns
+        frame = stored.read().to_pandas(ignore_metadata=True)
+        header = [str(name) for name in frame.columns]
+        columns = [[_as_text(value) for value in frame.iloc[:, place]] for place in range(len(header))]
+    except (OSError, ValueError, pa.ArrowException) as fault:
         return [], [], [Finding("error", path.name, f"cannot be read as Parquet: {fault}")]
-    header = [str(name) for name in frame.columns]
-    cells = zip(*([_as_text(value) for value in frame[name]] for name in frame.columns), strict=True)
+    cells = zip(*columns, strict=True)
     return header, [(row, dict(zip(header, values, strict=True))) for row, values in enumerate(cells, 1)], []
 
 
