@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from metro.surface.areal import (
     CellSums,
@@ -11,7 +12,7 @@ from metro.surface.areal import (
     local_outliers,
     make_grid,
     point_spacing,
-    point_weights,
+    residual_share,
 )
 from metro.surface.plane import moments
 
@@ -62,11 +63,24 @@ def test_noise_is_averaged_as_the_weights_say() -> None:
     points = lattice(seed=3)
     noise = np.random.default_rng(4).normal(size=len(points))
     sums, cells = summed(points, noise)
-    own, squares = point_weights(sums, NESTING)
-    smooth = gaussian_s_filter(sums, NESTING)
-    assert smooth.std() == pytest.approx(np.sqrt(squares), rel=0.06)
-    rest = noise - smooth.ravel()[cells]
-    assert rest.std() == pytest.approx(np.sqrt(1 - 2 * own + squares), rel=0.02)
+    rest = noise - gaussian_s_filter(sums, NESTING).ravel()[cells]
+    assert rest.var() == pytest.approx(residual_share(sums, NESTING, 0.0), rel=0.02)
+
+
+def test_of_blurred_noise_the_residuals_hold_what_the_filter_stops() -> None:
+    points, blur = lattice(), 1.0
+    rng = np.random.default_rng(8)
+    shape = len(np.unique(points[:, 0])), len(np.unique(points[:, 1]))
+    noise = gaussian_filter(rng.normal(size=shape), blur / 0.375, mode="wrap").ravel()
+    sums, cells = summed(points, noise)
+    fine = summed(points, noise, 0.375)[0]
+    for nesting in (NESTING, 2 * NESTING):
+        share = np.var(noise - gaussian_s_filter(sums, nesting).ravel()[cells]) / noise.var()
+        assert residual_share(sums, nesting, blur) == pytest.approx(share, abs=0.025)
+        # ∫ S (1 − H)² / ∫ S with S = exp(−a k²), H = exp(−b k²)
+        a, b = (2 * np.pi * blur) ** 2, 2 * (np.pi * 0.18739 * nesting) ** 2
+        continuous = 1 - 2 * a / (a + b) + a / (a + 2 * b)
+        assert residual_share(fine, nesting, blur) == pytest.approx(continuous, abs=0.005)
 
 
 def test_the_interior_keeps_the_margin_from_every_edge_and_closes_single_holes() -> None:

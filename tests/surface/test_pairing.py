@@ -50,3 +50,4 @@ def test_indices_of_known_deviations() -> None:
     found = indices_of(np.array([[1.0, -2.0, 4.0], [1.0, 1.0, 1.0]]))
     np.testing.assert_allclose(found, [[6.0, 7 / 3, 2.0], [0.0, 1.0, 1.0]])
     assert indices_of(np.array([0.0, 1.0]), step=0.1)[2] == pytest.approx(np.sqrt(0.05 / np.e))
+    assert indices_of(np.array([0.06, 1.0]), step=0.1)[2] == pytest.approx(np.sqrt(0.06))

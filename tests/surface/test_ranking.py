@@ -64,6 +64,15 @@ def test_the_interval_of_bonett_and_wright_covers_the_correlation_of_the_populat
     assert stats.binomtest(inside, 300, 0.95).pvalue > 0.005
 
 
+def test_without_draws_the_interval_is_that_of_bonett_and_wright():
+    found = agreement(np.arange(5.0), np.array([0.0, 2.0, 1.0, 3.0, 4.0]))
+    assert found.spearman == pytest.approx(0.9)
+    half = 1.96 * math.sqrt((1 + 0.9**2 / 2) / (5 - 3))  # equation 2 of the paper
+    assert found.interval == pytest.approx(
+        tuple(math.tanh(math.atanh(0.9) + side * half) for side in (-1, 1)), abs=1e-4
+    )
+
+
 def test_an_order_that_the_runs_leave_open_widens_the_interval():
     predicted = measured = np.array([1.0, 1.1, 2.0, 3.0])
     close, wide = (
@@ -73,6 +82,8 @@ def test_an_order_that_the_runs_leave_open_widens_the_interval():
     assert (close.sure_pairs, close.sure_alike) == (6, 1.0)
     assert wide.interval[0] < 0.5
     assert wide.sure_pairs < 4
+    falling = agreement(-predicted, -measured, posterior_draws(-measured, 1e-8 * np.eye(4), 50))
+    assert (falling.sure_pairs, falling.sure_alike) == (6, 1.0)
 
 
 def test_a_wrong_order_of_a_sure_pair_is_counted():

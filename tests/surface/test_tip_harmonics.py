@@ -40,6 +40,7 @@ def test_near_the_highest_mode_they_move_it_by_more_than_the_mean_force() -> Non
     modes = tip_modes(MASS, STIFFNESS[None])
     heights = tooth_heights(modes, 0.02, force(), modes.frequency[0, 2] / 4)
     assert np.ptp(heights) > abs((np.linalg.inv(STIFFNESS) @ force().mean(axis=0))[2])
+    assert abs(heights.mean()) < 1e-9 * np.ptp(heights)  # the mean force is the static deflection's
 
 
 def test_the_motion_is_that_which_the_propagated_response_settles_to() -> None:

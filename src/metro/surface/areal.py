@@ -96,20 +96,32 @@ def gaussian_s_filter(sums: CellSums, nesting_index: float) -> Array:
         return np.where(weight > 1e-6, total / weight, np.nan)
 
 
-def point_weights(sums: CellSums, nesting_index: float) -> tuple[float, float]:
-    """Return the weight of a point in the filtered value of its cell, and the sum of squares of all weights.
+def residual_share(sums: CellSums, nesting_index: float, correlation: float) -> float:
+    """Return the share of the variance of noise that the residuals of points from the filtered surface hold.
 
-    With independent noise of variance v, a filtered value has the variance ``v × squares``, and the rest of a
-    point from it ``v × (1 − 2 own + squares)``.
+    1 − 2 Σ wᵢ rᵢ₀ + Σ wᵢ wⱼ rᵢⱼ with the weights w of the filter for the points of a lattice, and noise
+    correlated as r = exp(−d²/4c²), which white noise becomes when it is blurred; both are products of one
+    factor along either axis.
+
+    Parameters
+    ----------
+    correlation : standard deviation c of the blur, in the unit of the coordinates; 0 for white noise.
     """
     from scipy.ndimage import gaussian_filter1d
 
-    impulse = np.zeros(2 * int(5 * nesting_index / sums.grid.cell) + 1)
-    impulse[len(impulse) // 2] = 1.0
-    width = filter_width(sums.grid.cell, nesting_index)
-    response = gaussian_filter1d(impulse, width, mode="constant", truncate=TRUNCATE)
-    per_cell = float(sums.count.sum() / np.count_nonzero(sums.count))
-    return float(response.max() ** 2 / per_cell), float((response @ response) ** 2 / per_cell)
+    side = max(1, round(float(np.sqrt(sums.count.sum() / np.count_nonzero(sums.count)))))
+    reach = int(5 * nesting_index / sums.grid.cell)
+    response = gaussian_filter1d(
+        np.eye(1, 2 * reach + 1, reach)[0],
+        filter_width(sums.grid.cell, nesting_index),
+        mode="constant",
+        truncate=TRUNCATE,
+    )
+    weight = np.repeat(response / side, side)
+    apart = np.abs(np.subtract.outer(np.arange(len(weight)), np.arange(len(weight)))) * sums.grid.cell / side
+    alike = np.exp(-((apart / correlation) ** 2) / 4) if correlation else np.eye(len(weight))
+    pulled = (weight @ alike)[reach * side : (reach + 1) * side]  # of the points in the middle cell
+    return float(1 - 2 * pulled.mean() ** 2 + (weight @ alike @ weight) ** 2)
 
 
 def filter_width(cell: float, nesting_index: float) -> float:

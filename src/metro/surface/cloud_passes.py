@@ -197,9 +197,13 @@ def raw_readings(
     turn = np.vstack([frame.axes, frame.normal])
     # deviation from the second plane as a linear function of the coordinates in the frame of the first
     slope, offset = turn @ plane.normal, float((frame.point - plane.point) @ plane.normal)
-    used = sample.deviations[depth.take(sample.cells) > 0]
+    kept = depth.take(sample.cells) > 0
+    places = grid.corner + (np.column_stack(np.divmod(sample.cells[kept], grid.shape[1])) + 0.5) * grid.cell
+    used = places @ slope[:2] + slope[2] * sample.deviations[kept] + offset
     bounds = np.percentile(used, [TAIL, 100 - TAIL]) if len(used) else np.zeros(2)
-    ends = _Ends((float(bounds[0]), float(bounds[1])), [], [])
+    # a point lies up to half a cell off its centre; of equal ones rounding must leave out none
+    slack = grid.cell * float(np.abs(slope[:2]).sum()) / 2 + 1e-9 * float(np.ptp(used) if len(used) else 0.0)
+    ends = _Ends((float(bounds[0]) + slack, float(bounds[1]) - slack), [], [])
     count, total, logs = 0, 0.0, 0.0
     extremes: list[Array] = []
     inner: list[Array] = []

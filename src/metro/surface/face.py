@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.surface.areal import (
-    CellSums,
     Grid,
     cell_size,
     crop_margin,
@@ -16,7 +15,7 @@ from metro.surface.areal import (
     local_outliers,
     make_grid,
     point_spacing,
-    point_weights,
+    residual_share,
 )
 from metro.surface.cloud_passes import (
     Points,
@@ -28,32 +27,18 @@ from metro.surface.cloud_passes import (
     residuals,
     survey,
 )
+from metro.surface.denoise import modes_of_scan
 from metro.surface.face_noise import PITCHES, Noise, dense_noise, filterable, sparse_noise
-from metro.surface.indices import iso_indices, raw_indices
+from metro.surface.indices import Index, iso_indices, raw_indices, symmetric
 from metro.surface.minimum_zone import MinimumZone, minimum_zone
 from metro.surface.noise import noise_bias, shrink
-from metro.surface.noise_spectrum import Modes, field, modes_of_scan
+from metro.surface.noise_spectrum import CORRELATION
 from metro.surface.plane import Plane, fit_plane, moments_of_columns, plane_of_moments
+from metro.surface.under_noise import corrected
 from metro.units import MM, Array
 
 NESTING_INDEX = 2.5 * MM
 CROP_TOLERANCE = 0.05
-# where noise adds in quadrature a second helping adds √2 − 1 of the first, and √2 times that is left
-LEFT = 1.4142
-
-
-@dataclass(frozen=True)
-class Index:
-    """A flatness index as read, its bias by noise (read minus true) and its standard deviation by noise."""
-
-    value: float
-    bias: float
-    sd: float
-
-    @property
-    def corrected(self) -> float:
-        """The reading less its bias; an index is not negative."""
-        return max(0.0, self.value - self.bias)
 
 
 @dataclass(frozen=True)
@@ -187,20 +172,19 @@ def _dense_face(
     raw, xm_inner, points = raw_readings(
         cloud, (plane, exact), sums.grid, depth.ravel(), rejected=gone, sample=rest.sample, step=step
     )
-    own, squares = point_weights(sums, nesting_index)
-    local_sigma /= np.sqrt(1 - 2 * own + squares)  # the filtered surface follows each point a little
-    told, spectrum = dense_noise(noise, float(local_sigma), spacing)
+    # the filtered surface follows each point a little, and noise that is correlated more
+    white, blurred = (residual_share(sums, nesting_index, length) for length in (0.0, CORRELATION))
+    told, spectrum = dense_noise(noise, local_sigma, (white, blurred), spacing, points)
     smooth = gaussian_s_filter(sums, nesting_index)
     map_points = _in_space(sums.grid, plane, smooth, inside)
     smooth_plane = fit_plane(map_points)
     deviations, zone = smooth_plane.deviations(map_points), minimum_zone(map_points)
     readings = raw | iso_indices(deviations) | {"minimum_zone": zone.width}
-    indices = {name: Index(value, float("nan"), float("nan")) for name, value in readings.items()}
     if uncertainty:
         modes = modes_of_scan(sums, smooth, spectrum)
-        indices = _with_bias(
-            readings, modes, sums=sums, plane=plane, inside=inside, nesting_index=nesting_index
-        )
+        indices = corrected(readings, modes, sums=sums, inside=inside, nesting_index=nesting_index)
+    else:
+        indices = {name: Index(value, *[float("nan")] * 3) for name, value in readings.items()}
     return Face(
         plane=smooth_plane,
         indices=indices,
@@ -209,7 +193,7 @@ def _dense_face(
         zone=zone,
         nesting_index=nesting_index,
         noise=told,
-        local_sigma=float(local_sigma),
+        local_sigma=local_sigma / float(np.sqrt(white)),
         scanned=seen.moments.count,
         outliers=gone,
         points=points,
@@ -230,44 +214,6 @@ def _plane_of_crop(frame: Plane, rest: Residuals, rejected: np.ndarray, inside: 
     return Plane(frame.point + local.point @ turn, local.normal @ turn, local.axes @ turn)
 
 
-def _with_bias(
-    readings: dict[str, float],
-    modes: Modes,
-    *,
-    sums: CellSums,
-    plane: Plane,
-    inside: np.ndarray,
-    nesting_index: float,
-) -> dict[str, Index]:
-    """Correct each reading by what is estimated of the surface under the noise, and the bias of that.
-
-    The indices of the estimated surface are corrected by how far those of estimates from new noise on it are
-    from them, and as uncertain as these scatter (parametric bootstrap, Efron & Tibshirani 1993).
-    """
-    flat = np.linalg.qr(np.stack([np.ones(inside.shape), *np.indices(inside.shape)], axis=-1)[inside])[0]
-    flat, passes = flat.astype(np.float32), modes.through(nesting_index)
-
-    def read(estimate: Array) -> dict[str, float]:
-        raw, filtered = (field(each)[inside] for each in (estimate, estimate * passes))
-        raw, filtered = (each - flat @ (flat.T @ each) for each in (raw, filtered))
-        return raw_indices(raw, 0.0) | iso_indices(filtered)
-
-    middle = modes.estimate()
-    estimated = read(middle)
-    zone = minimum_zone(_in_space(sums.grid, plane, field(middle * passes), inside)).width
-    drawn = [read(estimate) for estimate in modes.again()]
-    found = {}
-    for name, value in estimated.items():
-        draws = np.array([draw[name] for draw in drawn])
-        bias = float(draws.mean()) - value
-        sd = float(np.hypot(draws.std(), LEFT * bias))
-        found[name] = Index(readings[name], readings[name] - (value - bias), sd)
-    # the zone of every estimate would take too long: taken to be off as the range is
-    bias = estimated["fltt"] - (found["fltt"].value - found["fltt"].bias)
-    read_zone = readings["minimum_zone"]
-    return found | {"minimum_zone": Index(read_zone, read_zone - (zone - bias), found["fltt"].sd)}
-
-
 def _in_space(grid: Grid, plane: Plane, field: Array, inside: np.ndarray) -> Array:
     """Points (c, 3) of a surface over the grid's cells, within the mask."""
     points = plane.point + grid.centres()[inside.ravel()] @ plane.axes
@@ -284,13 +230,14 @@ def _sparse_face(cloud: Array, plane: Plane, spacing: float, told: Noise | None,
         return noise_bias(shrink(deviations, sigma), sigma, len(cloud), len(cloud))
 
     at, off = bias(noise.sigma), bias(noise.sigma * (1 + noise.relative))
-    indices = {"percentile_range": Index(readings.pop("percentile_range"), 0.0, float("nan"))}
+    indices = {"percentile_range": symmetric(readings.pop("percentile_range"), 0.0, float("nan"))}
     for name, value in readings.items():  # what is not known of the noise is not known of the bias
-        indices[name] = Index(value, at[name][0], float(np.hypot(at[name][1], off[name][0] - at[name][0])))
+        u = float(np.hypot(at[name][1], off[name][0] - at[name][0]))
+        indices[name] = symmetric(value, at[name][0], u)
     xm = indices["xm"]
     return Face(
         plane=plane,
-        indices=indices | {"minimum_zone": Index(zone.width, xm.bias, xm.sd)},
+        indices=indices | {"minimum_zone": symmetric(zone.width, xm.bias, xm.sd)},
         map_points=cloud,
         map_deviations=deviations,
         zone=zone,

@@ -16,13 +16,14 @@ import numpy as np
 from metro.surface.areal import cell_size, crop_margin, interior, make_grid, point_spacing
 from metro.surface.cloud_passes import Points, box_in_plane, cell_sums, survey
 from metro.surface.noise import repeat_sigma
-from metro.surface.noise_spectrum import BANDS, Spectrum, assumed, difference_spectrum
+from metro.surface.noise_spectrum import BAND, Spectrum, assumed, difference_spectrum
 from metro.surface.plane import plane_of_moments
 from metro.units import MM, UM, Array
 
 PITCHES = 6  # least nesting index of the filter
 COARSEST = 4.0  # times the nesting index asked for: a cloud that needs a longer one is not filtered
 NEIGHBOURS = 4
+ROBUST = 2.33  # relative error of the square of a robust deviation, times √n
 ORDER = 0.05  # chance of as much spatial order in noise below which a face is taken to have a shape
 
 
@@ -44,21 +45,36 @@ class Noise:
     spectrum: Spectrum | None = None
 
 
-def dense_noise(noise: Noise | None, local_sigma: float, spacing: float) -> tuple[Noise, Spectrum]:
+def dense_noise(
+    noise: Noise | None,
+    residual: float,
+    left: tuple[float, float],
+    spacing: float,
+    points: int,
+) -> tuple[Noise, Spectrum]:
     """Return the noise of a dense scan, and its spectrum.
 
     Parameters
     ----------
-    noise : as told. local_sigma : noise that differs from point to point. spacing : pitch of the points.
+    noise : as told. residual : robust deviation of the points from the filtered surface.
+    left : share that this holds of the variance of white noise, and of noise blurred by a millimetre.
+    spacing : pitch of the points. points : number of them.
     """
     density = spacing**-2
+    off = ROBUST / np.sqrt(points)  # of the variance of the residual, relative
     if noise is None:
-        return Noise(local_sigma, "local residual, a lower bound"), assumed(local_sigma, 0.0, density)
+        alone = residual / float(np.sqrt(left[0]))
+        return Noise(alone, "local residual, a lower bound"), assumed(alone, 0.0, density)
     if noise.spectrum is not None:
         return noise, noise.spectrum
-    # what the declared noise has beyond the local residual is correlated: how far is not told
-    white = min(local_sigma, noise.sigma)
-    return noise, assumed(white, float(np.sqrt(noise.sigma**2 - white**2)), density)
+    # what the declared noise has beyond the residual is correlated: how far is not told
+    beyond, error = left[0] * noise.sigma**2 - residual**2, off * residual**2
+    if beyond < 2 * error:
+        return noise, assumed(noise.sigma, 0.0, density)
+    told = noise.sigma**2
+    correlated = min(told, beyond / (left[0] - min(left[1], 0.9 * left[0])))
+    white = float(np.sqrt(told - correlated))
+    return noise, assumed(white, float(np.sqrt(correlated)), density, float(error / beyond))
 
 
 def repeat_noise(scans: Sequence[Points], nesting_index: float) -> Noise:
@@ -85,10 +101,14 @@ def repeat_noise(scans: Sequence[Points], nesting_index: float) -> Noise:
     grid = make_grid(low, high, cell_size(spacing, max(nesting_index, PITCHES * spacing)))
     sums = [cell_sums(scan, frame, grid) for scan in scans]
     inside = np.all([interior(each, crop_margin(spacing, nesting_index, MM)) for each in sums], axis=0)
-    if np.count_nonzero(inside) < 10 * BANDS:
+    if np.count_nonzero(inside) < 4 * BAND:
         raise ValueError("the scans do not show the same part of the face")
     spectra = [difference_spectrum(*pair, inside) for pair in pairwise(sums)]
-    spectrum = Spectrum(spectra[0].wavenumber, np.mean([each.density for each in spectra], axis=0))
+    spectrum = Spectrum(
+        spectra[0].wavenumber,
+        np.mean([each.density for each in spectra], axis=0),
+        spectra[0].doubt / np.sqrt(len(spectra)),
+    )
     white = spectrum.density[-1] / spacing**2  # at the cells' own wavelength noise is white
     correlated = spectrum.density - spectrum.density[-1]
     k = spectrum.wavenumber

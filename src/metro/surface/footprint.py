@@ -1,4 +1,4 @@
-"""A cloud sampled at points of the path: mean height in a disc, which keeps waves longer than 12 mm."""
+"""A cloud sampled at points of the path: mean height in a disc, which keeps most of waves beyond 5 mm."""
 
 from __future__ import annotations
 

@@ -7,11 +7,43 @@ maximum minus minimum is not FLTt, and the two sets are computed by two function
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from metro.units import Array
 
 PERCENTILES = (0.1, 99.9)
+NORMAL = 1.96
+
+
+@dataclass(frozen=True)
+class Index:
+    """A flatness index as read, less what noise adds to it, and the 95 % interval of the true one.
+
+    The interval is of what noise does alone, and need not be symmetric: an index is not negative.
+    """
+
+    value: float
+    corrected: float
+    low: float
+    high: float
+
+    @property
+    def bias(self) -> float:
+        """What noise is taken to have added."""
+        return self.value - self.corrected
+
+    @property
+    def sd(self) -> float:
+        """Standard uncertainty by the longer side of the interval."""
+        return max(self.high - self.corrected, self.corrected - self.low) / NORMAL
+
+
+def symmetric(value: float, bias: float, sd: float) -> Index:
+    """Return an index by its bias and standard deviation."""
+    corrected = max(0.0, value - bias)
+    return Index(value, corrected, max(0.0, corrected - NORMAL * sd), corrected + NORMAL * sd)
 
 
 def log_mean_floor(step: float) -> float:

@@ -56,6 +56,15 @@ def minimum_zone(points: Array) -> MinimumZone:
     return min((_descend(centred, start @ frame) for start in _directions()), key=lambda zone: zone.width)
 
 
+def vertical_zone(points: Array, start: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return the zone's width along z, and the points that were tried, of ``points`` (n, 3) of order 1.
+
+    ``start``: indices of points that are likely to touch.
+    """
+    _, gap, _, working, _ = _vertical_zone(points, start)
+    return gap, working
+
+
 def _directions() -> Array:
     """Return unit vectors to faces, edges and corners of a cube, one of each opposite pair, (13, 3)."""
     steps = np.array(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1])).reshape(3, -1).T[14:].astype(float)

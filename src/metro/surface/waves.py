@@ -53,28 +53,47 @@ def white_noise(series: Array) -> float:
     return float(np.mean(np.diff(series, n=3) ** 2) / 20.0)
 
 
-def signal_share(waves: Array, noise: float, most: Array) -> Array:
-    """Share w (n,) of each wave that may be signal: Wiener's S/(S + N).
+def signal_share(
+    readings: Array, noise: Array, whole: Array, whole_noise: float = 0.0
+) -> tuple[Array, Array]:
+    """Share w (n, k) of each wave of several readings that is signal, Wiener's S/(S + N), and what is left.
 
-    S is the mean power of the neighbouring waves less that of the noise, and one standard error of that mean
-    more: a signal that is not seen in the noise may still be there. It is no more than the power of ``most``
-    either, whose waves have the signal in them. ``w × waves`` is then off the signal by a variance of w N at
-    most, and a regression on it is hardly biased by the noise (regression calibration).
+    S is the mean power of the neighbouring waves less that of the noise, where it is more than chance gives
+    to one of as many waves, and none elsewhere: noise that passed would be off the signal by all of itself,
+    and a regression on it would be pulled to zero. What passes is off by a variance of w² N, what does not
+    by (1 − w)² S with as much S as is seen and one standard error more. All readings together leave no more
+    than ``whole`` has, whose waves are the sum of the signals: its power less what passed, and its noise.
 
     Parameters
     ----------
-    waves : (n,) a reading, wave by wave. noise : N, the variance of the noise on each. most : (n,) another
-        reading of the signal, with next to no noise but with more than the signal in it.
+    readings : (n, k) wave by wave. noise : N (k,), the variance of the noise on each. whole : (n,) a reading
+        of the sum of the k signals, which may have more in it. whole_noise : variance of its noise.
+
+    Returns
+    -------
+    tuple
+        w (n, k), and the variance (n,) of the sum of the signals less the sum of w times the readings.
     """
-    if noise <= 0.0:
-        return np.ones_like(waves)
-    window = np.ones(min(NEIGHBOURS, len(waves)))
-    count = _moving_sum(np.ones(len(waves)), window)
+    from scipy.stats import chi2
+
+    size = len(whole)
+    window = np.ones(min(NEIGHBOURS, size))
+    count = _moving_sum(np.ones(size), window)
     error = np.sqrt(2.0 / count)
-    seen = np.maximum(_moving_sum(waves**2, window) / count - noise, 0.0) + noise * error
-    bound = _moving_sum(most**2, window) / count * (1.0 + error)
-    signal = np.minimum(seen, bound)
-    return np.asarray(signal / (signal + noise))
+
+    def most(waves: Array) -> Array:
+        power = _moving_sum(waves**2, window) / count
+        return np.asarray(np.maximum(power * (1.0 + error) - whole_noise, 0.0))
+
+    share, missed = np.ones(readings.shape), np.zeros(size)
+    for i in np.flatnonzero(noise > 0.0):
+        power = _moving_sum(readings[:, i] ** 2, window) / count
+        beyond = power * count > noise[i] * chi2.isf(1.0 / size, count)
+        signal = np.where(beyond, np.minimum(power - noise[i], most(whole)), 0.0)
+        share[:, i] = signal / (signal + noise[i])
+        missed += (1.0 - share[:, i]) ** 2 * (np.maximum(power - noise[i], 0.0) + noise[i] * error)
+    missed = np.minimum(missed, most(whole - (share * readings).sum(axis=1)))
+    return share, missed + share**2 @ noise
 
 
 def _moving_sum(values: Array, window: Array) -> Array:
