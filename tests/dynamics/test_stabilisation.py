@@ -5,7 +5,7 @@ import pytest
 
 from metro.dynamics.plscf import normal_equations, poles
 from metro.dynamics.refine import Data
-from metro.dynamics.stabilisation import clustered, stabilisation
+from metro.dynamics.stabilisation import Cluster, Diagram, clustered, stabilisation
 
 FREQUENCY = np.arange(20.0, 120.0, 0.25)
 OMEGA = 2 * np.pi * np.array([40.0, 70.0, 100.0])
@@ -126,3 +126,20 @@ def test_a_cluster_takes_one_pole_of_each_order():
     counts = np.bincount(found.member)
     assert counts.tolist() == [cluster.count for cluster in found.clusters]
     np.testing.assert_array_equal(found.recurs, counts >= 0.25 * 9)
+
+
+@pytest.mark.parametrize(("share", "joins"), [(0.85, True), (0.75, False), (0.3, False)])
+def test_shapes_join_from_an_assurance_of_four_fifths_on(share, joins):
+    """The modal assurance criterion of unit vectors is the square of their product."""
+    one, across = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    turned = np.sqrt(share) * one + np.sqrt(1 - share) * across
+    pole = np.array([100.0 * (-0.02 + 1j)])
+    found = clustered([(2, pole, one[None].astype(complex)), (4, pole, turned[None].astype(complex))])
+    assert (len(found) == 1) == joins
+
+
+def test_a_pole_of_a_quarter_of_the_orders_recurs_and_one_of_fewer_does_not():
+    clusters = tuple(Cluster(100j, count) for count in (1, 4, 5, 20))
+    found = Diagram(np.zeros(0), np.zeros(0), np.zeros(0), clusters, 20)
+    assert found.recurs.tolist() == [False, False, True, True]
+    assert len(found.recurring()) == 2

@@ -10,7 +10,7 @@ pi the matrix is real: its real eigenvalues are the flips.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,6 +35,11 @@ class Candidates:
     def take(self, which: np.ndarray) -> Candidates:
         """Those at the indices, or under the mask, ``which``."""
         return Candidates(self.speed[which], self.theta[which], self.inverse[which])
+
+    def among(self, speeds: np.ndarray) -> Candidates:
+        """Those at ``speeds`` (rising indices), which are numbered anew from 0."""
+        chosen = self.take(np.isin(self.speed, speeds))
+        return replace(chosen, speed=np.searchsorted(speeds, chosen.speed))
 
     def near_lowest(self, factor: float) -> Candidates:
         """Those up to ``factor`` times the lowest depth of their speed."""
@@ -114,7 +119,8 @@ def scan(structure: Structure, equation: Kernel, count: int, followed: float | N
     """
     followed = followed or (_FOLLOWED if equation.delayed.all() else _FOLLOWED_DAMPED)
     theta = angles(structure, equation.period, count)
-    values: ComplexArray = np.linalg.eigvals(matrix(equation, theta)).astype(complex)
+    inner = np.linalg.eigvals(matrix(equation, theta[:, :-1])).astype(complex)
+    values: ComplexArray = np.concatenate([inner, _at_flip(equation)], axis=1)
     keep = int(min(followed, values.shape[2]))
     order = np.argpartition(-np.abs(values) - values.real, keep - 1, axis=2)[:, :, :keep]
     values = np.take_along_axis(values, order, axis=2)
@@ -131,6 +137,12 @@ def scan(structure: Structure, equation: Kernel, count: int, followed: float | N
         np.concatenate([at[hopf], np.full(len(row), np.pi)]),
         np.concatenate([inverse[hopf], end.real[row, column]]),
     )
+
+
+def _at_flip(equation: Kernel) -> ComplexArray:
+    """Eigenvalues (k, 1, n) of S(pi), which is real, since poles come in conjugate pairs."""
+    flip = matrix(equation, np.full((len(equation.period), 1), np.pi)).real
+    return np.linalg.eigvals(flip).astype(complex)
 
 
 def _links(values: ComplexArray) -> tuple[np.ndarray, ...]:

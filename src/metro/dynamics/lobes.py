@@ -18,13 +18,16 @@ from metro.dynamics.crossings import Candidates, Refined
 from metro.dynamics.system import Cut, Structure
 from metro.units import Array, ComplexArray
 
-# Points per radian of the fastest vibration, further points per panel, and multiplier angles of the scan.
+# Points per radian of the fastest vibration, further points per panel, multiplier angles of the scan, and
+# functions of its reduced equation per point.
 # Gauss points resolve an oscillation from 1/2 per radian on and converge exponentially beyond.
-# The later efforts are for speeds at which the first one missed a crossing: peaks of the lobes, mostly.
-_EFFORTS = ((0.65, 4, 7), (0.75, 9, 40), (0.9, 12, 120))
+# The later efforts are for speeds at which those before missed a crossing: peaks of the lobes, mostly. The
+# second does not scan: it follows the multipliers that were found outside the unit circle.
+_EFFORTS = ((0.65, 4, 5, 0.5), (0.65, 4, 0, 0.6), (0.75, 9, 30, 0.6), (0.9, 12, 120, 0.6))
+_Effort = tuple[float, int, int, float]
 _EXTRA_POINTS = 5  # from one resolution to the next; the difference is the error
-_RESOLUTIONS, _TOLERANCE = 3, 5e-4  # at most, and the relative error that is good enough
-_BELOW = (0.995, 0.88, 0.5)  # shares of a boundary at which the cut must be stable
+_RESOLUTIONS, _TOLERANCE = 3, 1e-4  # at most, and the relative error that is good enough
+_BELOW = (0.999, 0.88, 0.5)  # shares of a boundary at which the cut must be stable
 _ASIDE = 0.1  # rad beside a multiplier's angle
 _KEEP = 1.5  # crossings deeper than this many times the lowest cannot become it
 
@@ -65,14 +68,12 @@ def stability_boundary(structure: Structure, cut: Cut, rpm: Array) -> Boundary:
     for members in groups(structure, cut, rpm):
         group, hints = members, result.crossings
         for effort in _EFFORTS:
-            part = _solve(structure, cut, rpm[group], effort, hints)
-            again, hints = _missed(structure, cut, rpm[group], part.depth, effort)
-            for name in ("depth", "chatter_hz", "kind", "error"):
-                getattr(result, name)[group] = getattr(part, name)
+            part, missed, hints = _solve(structure, cut, rpm[group], effort, hints)
+            _enter(result, group, part)
             last = effort is _EFFORTS[-1]
-            done = part.crossings.take(~again[part.crossings.speed] | last)
-            parts.append(Candidates(group[done.speed], done.theta, done.inverse))
-            group = group[again]
+            done = part.crossings.take(~missed[part.crossings.speed] | last)
+            parts.append(replace(done, speed=group[done.speed]))
+            group = group[missed]
             if not len(group):
                 break
     return replace(result, crossings=Candidates.join(parts))
@@ -85,11 +86,11 @@ def spectral_radius(structure: Structure, cut: Cut, rpm: Array, depth: Array) ->
 
 
 def groups(structure: Structure, cut: Cut, rpm: Array) -> Iterator[np.ndarray]:
-    """Yield indices of speeds that are solved as one stack: about as many points, at most 32 speeds."""
+    """Yield indices of speeds that are solved as one stack: about as many points, at most 64 speeds."""
     need = np.ceil(_cycles(structure, cut, rpm) / 3.0)
     for value in np.unique(need):
         members = np.flatnonzero(need == value)
-        yield from np.array_split(members, math.ceil(len(members) / 32))
+        yield from np.array_split(members, math.ceil(len(members) / 64))
 
 
 def _cycles(structure: Structure, cut: Cut, rpm: Array) -> Array:
@@ -113,42 +114,78 @@ def discretised(
 
 def fine_kernel(structure: Structure, cut: Cut, rpm: Array) -> Kernel:
     """Discretise at the second resolution of the boundary's first effort, for speeds of one group."""
-    share, extra, _ = _EFFORTS[0]
+    share, extra, *_ = _EFFORTS[0]
     return discretised(structure, cut, rpm, share, extra + _EXTRA_POINTS)[1]
 
 
 def _solve(
-    structure: Structure, cut: Cut, rpm: Array, effort: tuple[float, int, int], hints: Candidates
-) -> Boundary:
-    """Scan at a low resolution, refine at rising ones until two agree, take the lowest crossings.
+    structure: Structure, cut: Cut, rpm: Array, effort: _Effort, hints: Candidates
+) -> tuple[Boundary, np.ndarray, Candidates]:
+    """Scan at a low resolution, refine each speed at rising ones until two agree, take the lowest crossings.
 
-    ``hints``: crossings that may be near, to be refined with those of the scan.
+    ``hints``: crossings that may be near, to be refined with those of the scan. What is returned beside the
+    boundary is that of :func:`_missed`.
     """
-    share, extra, count = effort
-    _, equation = discretised(structure, cut, rpm, share, extra)
-    start = crossings.scan(structure, collocation.reduced(equation), count).near_lowest(_KEEP)
-    start = Candidates.join([start.take(start.distinct()), hints])
-    found = crossings.refine(equation, start, 5)
-    for _ in range(_RESOLUTIONS):
-        before = found.at.take(found.at.inverse > 0.0)
+    extra = effort[1]
+    result, missed = _nothing(rpm), np.zeros(len(rpm), dtype=bool)
+    near, outside = [result.crossings], [result.crossings]
+    before = _roughly(structure, cut, rpm, effort, hints)
+    speeds = np.arange(len(rpm))
+    for resolution in range(_RESOLUTIONS):
+        before = before.take(before.inverse > 0.0)
         before = before.take(before.distinct())
         extra += _EXTRA_POINTS
-        arc, equation = discretised(structure, cut, rpm, share, extra)
+        arc, equation = discretised(structure, cut, rpm[speeds], effort[0], extra)
         found = crossings.refine(equation, before, 2)
-        rising = _rising(found)
-        winner = np.full(len(rpm), -1)
-        winner[found.at.speed[rising]] = rising  # the largest 1/depth of each speed is written last
-        hit, best = winner >= 0, winner[winner >= 0]
-        change = np.abs(found.at.inverse[best] / before.inverse[best] - 1.0)
-        if np.all(change < _TOLERANCE):
+        part = _lowest(structure, (arc, equation), rpm[speeds], found, before)
+        settled = (part.error <= _TOLERANCE * part.depth) | (resolution == _RESOLUTIONS - 1)
+        missed[speeds], hints = _missed(equation, part, settled)
+        _enter(result, speeds, part)
+        done = part.crossings.take(settled[part.crossings.speed])
+        near.append(replace(done, speed=speeds[done.speed]))
+        outside.append(replace(hints, speed=speeds[hints.speed]))
+        before, speeds = found.at.among(np.flatnonzero(~settled)), speeds[~settled]
+        if not len(speeds):
             break
+    result = replace(result, crossings=Candidates.join(near))
+    hints = Candidates.join([*near, *outside]).among(np.flatnonzero(missed))
+    return result, missed, hints
+
+
+def _roughly(structure: Structure, cut: Cut, rpm: Array, effort: _Effort, hints: Candidates) -> Candidates:
+    """Crossings at the lowest resolution: those that the scan finds and those that ``hints`` lead to."""
+    share, extra, count, functions = effort
+    _, equation = discretised(structure, cut, rpm, share, extra)
+    start = hints
+    if count:
+        cheap = collocation.reduced(equation, functions)
+        scanned = crossings.scan(structure, cheap, count).near_lowest(_KEEP)
+        start = Candidates.join([scanned.take(scanned.distinct()), hints])
+    return crossings.refine(equation, start, 5).at
+
+
+def _lowest(
+    structure: Structure, discrete: tuple[Arc, Kernel], rpm: Array, found: Refined, before: Candidates
+) -> Boundary:
+    """Boundary of the lowest crossing of each speed; its error is the change from ``before``."""
+    arc, equation = discrete
+    rising = _rising(found)
+    winner = np.full(len(rpm), -1)
+    winner[found.at.speed[rising]] = rising  # the largest 1/depth of each speed is written last
+    hit, best = winner >= 0, winner[winner >= 0]
     result = replace(_nothing(rpm), crossings=found.at.take(rising))
     theta = found.at.theta[best]
     result.depth[hit] = 1.0 / found.at.inverse[best]
-    result.error[hit] = change * result.depth[hit]
+    result.error[hit] = np.abs(found.at.inverse[best] / before.inverse[best] - 1.0) * result.depth[hit]
     result.kind[hit] = kind(theta)
     result.chatter_hz[hit] = chatter_hz(structure, arc, equation.period[hit], theta, found.shape[best])
     return result
+
+
+def _enter(whole: Boundary, speeds: np.ndarray, part: Boundary) -> None:
+    """Write what is known of some speeds, but for the crossings, into the boundary of all."""
+    for name in ("depth", "chatter_hz", "kind", "error"):
+        getattr(whole, name)[speeds] = getattr(part, name)
 
 
 def _rising(found: Refined) -> np.ndarray:
@@ -185,28 +222,30 @@ def chatter_hz(structure: Structure, arc: Arc, period: Array, theta: Array, shap
     return np.abs(strongest) / (2.0 * np.pi)
 
 
-def _missed(
-    structure: Structure, cut: Cut, rpm: Array, depth: Array, effort: tuple[float, int, int]
-) -> tuple[np.ndarray, Candidates]:
+def _missed(equation: Kernel, found: Boundary, asked: np.ndarray) -> tuple[np.ndarray, Candidates]:
     """Tell where a crossing was missed: where there is none, or the cut is unstable below it.
+
+    Only speeds under the mask ``asked`` are looked at.
 
     Returns
     -------
-    (k,) whether; and for these speeds, numbered anew, the multipliers that are outside the unit circle: the
-    crossing is not far from them.
+    (k,) whether, and the multipliers that are outside the unit circle: the crossing is not far from them.
     """
-    missed = ~np.isfinite(depth)
-    below = np.where(missed, 0.0, depth)
-    equation = discretised(structure, cut, rpm, effort[0], effort[1] + _EXTRA_POINTS)[1]
-    cheap = collocation.reduced(equation)
-    outside = []
+    known = np.isfinite(found.depth)
+    missed = asked & ~known
+    # where nothing was found, the cut may be unstable at the depths of other speeds
+    tried = np.where(known, found.depth, found.depth[known].max(initial=0.0))
+    speeds = np.flatnonzero(asked)
+    outside = [found.crossings.take(np.zeros(0, dtype=int))]
     for share in _BELOW:
-        multipliers = collocation.multipliers(cheap, share * below)
-        largest = multipliers[np.arange(len(rpm)), np.abs(multipliers).argmax(axis=1)]
-        speed = np.flatnonzero(np.abs(largest) > 1.0 + 1e-6)
-        theta, inverse = np.abs(np.angle(largest[speed])), 1.0 / (share * below[speed])
+        depth = share * tried[speeds]
+        doubt = ~collocation.surely_stable(equation.take(speeds), depth)
+        multipliers = collocation.multipliers(equation.take(speeds[doubt]), depth[doubt])
+        largest = multipliers[np.arange(len(multipliers)), np.abs(multipliers).argmax(axis=1)]
+        beyond = np.abs(largest) > 1.0 + 1e-6
+        speed = speeds[doubt][beyond]
+        theta, inverse = np.abs(np.angle(largest[beyond])), 1.0 / depth[doubt][beyond]
         # to either side too: an island starts with one crossing and ends with another
         outside += [Candidates(speed, theta + aside, inverse) for aside in (-_ASIDE, 0.0, _ASIDE)]
         missed[speed] = True
-    hints = Candidates.join(outside)
-    return missed, replace(hints, speed=np.searchsorted(np.flatnonzero(missed), hints.speed))
+    return missed, Candidates.join(outside)

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
+from metro.dynamics.linear_fit import Alike, LinearFit, alike, linear_fit, stacked
 from metro.dynamics.polefit import PoleFit, Scatter
 from metro.units import Array, ComplexArray
 
@@ -35,25 +36,15 @@ class Data:
     inputs: int = 1
     scatter: Scatter | None = None
 
+    @cached_property
+    def alike(self) -> tuple[Alike, ...]:
+        """Which responses share the course of their weights."""
+        return alike(self.weight)
+
     def thinned(self, lines: int) -> Data:
         """Every so many-th line, so that at most ``lines`` are left; without the scatter."""
         every = -(-len(self.omega) // lines)
         return Data(self.omega[::every], self.frf[::every], self.weight[::every], self.inputs)
-
-
-class _Response(NamedTuple):
-    """One response's linear fit: weighted residual (2 n,) and Jacobian (2 n, 2m), both clear of the unknowns.
-
-    ``unknowns`` (u,) are ``solve`` (u, 2 n) times the weighted data, and move with the poles by ``slope``
-    (u, 2m); ``own`` (u, u) is their covariance for unit noise and given poles.
-    """
-
-    residual: Array
-    jacobian: Array
-    unknowns: Array
-    solve: Array
-    slope: Array
-    own: Array
 
 
 def refine(data: Data, omega: Array, zeta: Array, *, real: bool, iterations: int = 30) -> PoleFit:
@@ -103,33 +94,20 @@ def _basis(omega: Array, theta: Array, *, real: bool) -> tuple[ComplexArray, Com
     return np.concatenate([*columns, outside], axis=1), np.array(changes).transpose(2, 0, 1, 3)
 
 
-def _responses(data: Data, theta: Array, real: bool) -> Iterator[_Response]:
-    """Fit the unknowns of each response for given poles."""
+def _fits(data: Data, theta: Array, real: bool) -> Iterator[LinearFit]:
+    """Fit the unknowns of all responses for given poles."""
     basis, slopes = _basis(data.omega, theta, real=real)
-    scale = np.linalg.norm(basis, axis=0)
-    lines, _, units, m = slopes.shape
-    for c in range(data.frf.shape[1]):
-        weight = data.weight[:, c, None]
-        q, r = np.linalg.qr(_stack(basis / scale * weight))
-        target = _stack(data.frf[:, c, None] * weight)[:, 0]
-        projected = q.T @ target
-        inverse = np.linalg.pinv(r) / scale[:, None]
-        x = inverse @ projected
-        change = np.einsum("nsum,um->nsm", slopes, x[: units * m].reshape(units, m)).reshape(lines, 2 * m)
-        moved = _stack(change * weight)
-        along = q.T @ moved
-        yield _Response(
-            q @ projected - target, moved - q @ along, x, inverse @ q.T, -inverse @ along, inverse @ inverse.T
-        )
+    for of in data.alike:
+        yield linear_fit(basis, slopes, data.frf, of)
 
 
 def _quadratic(data: Data, theta: Array, real: bool) -> tuple[float, Array, Array]:
     """Weighted sum of squares, half its gradient (2m,), and the normal matrix (2m, 2m)."""
     chi2, gradient, normal = 0.0, np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
-    for each in _responses(data, theta, real):
-        chi2 += float(each.residual @ each.residual)
-        gradient += each.jacobian.T @ each.residual
-        normal += each.jacobian.T @ each.jacobian
+    for each in _fits(data, theta, real):
+        chi2 += each.chi2
+        gradient += each.gradient()
+        normal += each.normal()
     return chi2, gradient, normal
 
 
@@ -138,15 +116,11 @@ def losses(data: Data, fit: PoleFit) -> Array:
     m, units = len(fit.omega), 1 if fit.real else 2
     total = np.zeros(m)
     own = np.arange(units) * m + np.arange(m)[:, None]
-    for each in _responses(data, np.log(np.concatenate([fit.omega, fit.zeta])), fit.real):
-        x = each.unknowns[own]
-        blocks = each.own[own[:, :, None], own[:, None, :]]
-        total += np.einsum("mu,mu->m", x, np.linalg.solve(blocks, x[:, :, None])[:, :, 0])
+    for each in _fits(data, np.log(np.concatenate([fit.omega, fit.zeta])), fit.real):
+        x = each.unknowns[own]  # (m, units, c)
+        blocks = each.spread[own[:, :, None], own[:, None, :]]
+        total += np.sum(each.of.scale**2 * np.sum(x * np.linalg.solve(blocks, x), axis=1), axis=1)
     return total
-
-
-def _stack(values: ComplexArray) -> Array:
-    return np.concatenate([values.real, values.imag])
 
 
 def _finish(data: Data, theta: Array, real: bool) -> PoleFit:
@@ -155,21 +129,22 @@ def _finish(data: Data, theta: Array, real: bool) -> PoleFit:
     count = 2 * len(data.omega) * responses, 2 * m + responses * ((1 if real else 2) * m + 2)
     noise = chi2 / max(count[0] - count[1], 1)
     inverse = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
-    unknowns, joint = [], []
-    for each in _responses(data, theta, real):
-        # (log omega, log zeta, Im A) = move (log omega, log zeta), plus the residues' own scatter
-        move = np.concatenate([np.eye(2 * m), each.slope[:m]])
-        covariance = move @ inverse @ move.T
-        covariance[2 * m :, 2 * m :] += each.own[:m, :m]
-        joint.append(noise * covariance)
-        unknowns.append(each.unknowns)
-    x = np.stack(unknowns, axis=1)
+    x = np.empty(((1 if real else 2) * m + 2, responses))
+    joint = np.empty((responses, 3 * m, 3 * m))
+    for each in _fits(data, theta, real):
+        x[:, each.of.columns] = each.unknowns
+        for i, column in enumerate(each.of.columns):
+            # (log omega, log zeta, Im A) = move (log omega, log zeta), plus the residues' own scatter
+            move = np.concatenate([np.eye(2 * m), each.slope(i)[:m]])
+            covariance = move @ inverse @ move.T
+            covariance[2 * m :, 2 * m :] += each.own(i)[:m, :m]
+            joint[column] = noise * covariance
     return PoleFit(
         omega=np.exp(theta[:m]),
         zeta=np.exp(theta[m:]),
         residues=np.asarray(1j * x[:m] + (0.0 if real else x[m : 2 * m]), dtype=np.complex128),
         residual_terms=x[-2:] * np.array([[1.0], [data.omega[0] ** 2]]),
-        joint=np.stack(joint),
+        joint=joint,
         shifts=_shifts(data, theta, inverse, real=real),
         mean=np.zeros(0, dtype=int) if data.scatter is None else data.scatter.mean,
         chi2=chi2,
@@ -183,10 +158,14 @@ def _shifts(data: Data, theta: Array, inverse: Array, *, real: bool) -> Array:
     m = len(theta) // 2
     if data.scatter is None:
         return np.zeros((data.frf.shape[1], 0, 3 * m))
-    parts, pull = [], np.zeros((2 * m, len(data.scatter.deviation)))
-    for c, each in enumerate(_responses(data, theta, real)):
-        deviation = _stack((data.scatter.deviation[:, :, c] * data.weight[:, c]).T)
-        pull += each.jacobian.T @ deviation
-        parts.append((each.solve[:m] @ deviation, each.slope[:m]))
+    repeats, responses = len(data.scatter.deviation), data.frf.shape[1]
+    pull = np.zeros((2 * m, repeats))
+    own, slope = np.empty((responses, m, repeats)), np.empty((responses, m, 2 * m))
+    for each in _fits(data, theta, real):
+        for i, column in enumerate(each.of.columns):
+            deviation = stacked((data.scatter.deviation[:, :, column] * each.of.weight).T)
+            pull += each.pull(i, deviation)
+            own[column], slope[column] = each.solve[:m] @ deviation, each.slope(i)[:m]
     poles = inverse @ pull
-    return np.stack([np.concatenate([poles, own + slope @ poles]).T for own, slope in parts])
+    every = np.broadcast_to(poles, (responses, *poles.shape))
+    return np.concatenate([every, own + slope @ poles], axis=1).transpose(0, 2, 1)
