@@ -64,6 +64,17 @@ def test_the_parts_are_those_that_the_batch_was_made_of(shape, share):
     assert [entry["run"] for entry in told["runs"]] == ["v", "v"]
 
 
+def test_parts_that_had_made_up_for_each_other_have_a_negative_share_and_figures_are_in_the_unit_told():
+    """The wall stands 8 µm proud by itself, and the force that was predicted too large hides it."""
+    problem, fitted = held_out(0.008)
+    problem = replace(problem, unit="um", si=1e-3)
+    (run,) = problem.role("validate")
+    fed = {"measured": run, "before": replace(run, setting=TRUE * (1 + OFF)), "after": run}
+    told = split(problem, {"before": fitted, "after": fitted}, {"v": fed})["before"]
+    assert (told["total"], told["upstream"], told["own"]) == pytest.approx((2.0, 10.0, 8.0), rel=1e-3)
+    assert told["share"] == pytest.approx(1 - 16, rel=1e-2)
+
+
 def test_the_two_parts_add_up_place_by_place():
     problem, fitted = held_out(SHAPE)
     (run,) = problem.role("validate")

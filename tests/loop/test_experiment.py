@@ -1,10 +1,11 @@
 """What to measure next: where two explanations part, and how likely a run there decides between them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy import ANGLE, BEND, GATES, Wave, block, effect, problem
+from toy import BEND, GATES, block, problem
+from toy_knee import STOP, Knee
 
 from metro.loop.candidate import Candidate
 from metro.loop.descent import State, descend, linearised
@@ -15,24 +16,6 @@ from metro.loop.search import search
 from metro.loop.story import told
 from metro.loop.verdict import comparison, held_out, judge
 from metro.observables.problem import Proposal
-
-KNEE = 4.0
-
-
-@dataclass(frozen=True)
-class Knee(Wave):
-    """A wave whose ``stop`` bends it like ``bend`` up to a feed of four, and no further."""
-
-    stop: float = 0.0
-
-    def design(self, block, nuisance, beta=None):
-        matrix, offset = super().design(block, nuisance, beta)
-        tau = ANGLE - (nuisance[0] if len(nuisance) else 0.0)
-        matrix[:, 0] += self.stop * min(block.setting.feed, KNEE) * np.cos(3 * tau)
-        return matrix, offset
-
-
-STOP = effect("stop", "stop")
 
 
 def proposal(feed, runs=1):

@@ -60,3 +60,23 @@ def test_nothing_has_one_prediction():
     nothing = hypothesis((), EVIDENCE)
     assert nothing.theta.shape == (1, 0)
     np.testing.assert_allclose(nothing.depth[0], Line().boundary(TASK.point_rpm))
+
+
+@pytest.mark.parametrize("step", [-0.3, 0.1, 0.4])
+def test_where_the_boundary_jumps_it_is_solved_until_the_interval_is_that_of_a_fine_grid(step):
+    """Beyond ``step`` of the slope another lobe is the lowest; what is quickly estimated does not know it."""
+
+    def solved(change):
+        model = change(Line())
+        jump = 0.8 * np.tanh((model.slope - step) / 0.02)
+        return model.boundary(TASK.point_rpm) + jump, np.full(len(TASK.point_rpm), 300.0)
+
+    evidence = Evidence(solved, TASK.estimates, TESTS, np.zeros((1, len(TASK.point_rpm))), GATES.seed)
+    found = hypothesis((SLOPE,), evidence)
+    theta = quantile(SLOPE.parameters[0], (np.arange(2000) + 0.5) / 2000)
+    depth = np.stack([solved(lambda _, v=v: Line(slope=v))[0] for v in theta])
+    log = log_likelihood(TESTS, depth, np.full_like(depth, 300.0), evidence.deviations).sum(axis=2)[:, 0]
+    below = np.cumsum(np.exp(log - logsumexp(log)))
+    told = found.parameters("slope")["size"]["ci95"]
+    assert told == pytest.approx(np.interp([0.025, 0.975], below, theta), abs=0.12)
+    assert found.log_evidence == pytest.approx(logsumexp(log) - np.log(len(log)), abs=0.35)

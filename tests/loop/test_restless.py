@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 from toy import BEND, GATES, SCATTER, problem
 
 from metro.loop.candidate import Candidate
@@ -55,3 +56,11 @@ def test_a_session_that_drifts_while_repeats_are_mixed_is_not_called_clean():
     assert verdict["status"] == "unexplained"
     assert "times what is usual" in verdict["unexplained"]["signature"]
     assert not verdict["effects"]
+
+
+@pytest.mark.parametrize("factor", [0.0, 2.0, 5.0])
+def test_the_p_value_is_that_of_the_runs_own_scatter_without_what_the_prior_pulled(factor):
+    """Twelve runs over what four are worth: the estimate that the p-value stands for is the true ratio."""
+    found = [seen(problem(seed, phased=False, scatter=factor * SCATTER)) for seed in range(20)]
+    ratio = stats.f.isf([one.p_value for one in found], 12, 4)
+    assert np.mean(ratio) == pytest.approx(factor**2, rel=0.15, abs=0.1)

@@ -10,6 +10,7 @@ import pytest
 from scipy import stats
 from toy import ANGLE, BEND, BETA, GATES, POINTS, RIPPLE, SIGMA, TWIN, Wave, problem
 
+from metro.loop import verdict as verdicts
 from metro.loop.search import search
 from metro.loop.signature import Line, share_left
 from metro.loop.story import SENTENCES, in_words, told
@@ -258,3 +259,12 @@ def test_an_effect_that_held_out_runs_speak_against_is_withdrawn():
     verdict = judge(mixed, refuted, rows, GATES)
     assert verdict["status"] == "unexplained"
     assert verdict["candidates"][0]["why_not"] == REFUTED
+
+
+def test_what_is_unlikelier_but_no_worse_predicted_is_not_withdrawn(monkeypatch):
+    """A likelihood alone may fall because the fit's noise is smaller: it takes a worse prediction, too."""
+    bent, straight = problem(9, truth=Wave(bend=0.1)), problem(9)
+    mixed = replace(bent, blocks=(*bent.role("identify"), *straight.role("validate")))
+    found = search(mixed, (BEND,), GATES)
+    monkeypatch.setattr(verdicts, "held_out_rms", lambda _problem, fit: 1.0 if fit is found.final else 2.0)
+    assert stands(mixed, found).names == ("bend",)

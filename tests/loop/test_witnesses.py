@@ -12,9 +12,11 @@ from metro.loop.batch_story import brief, causes
 from metro.loop.candidate import Candidate
 from metro.loop.causes import judged
 from metro.loop.descent import State, descend
+from metro.loop.evidence import change, leave_out
+from metro.loop.fit import fit
 from metro.loop.search import search
 from metro.loop.verdict import comparison, held_out, judge
-from metro.loop.witnesses import Closed, agreement, ask, weighed
+from metro.loop.witnesses import Closed, Witness, agreement, ask, weighed
 
 
 def noisy(task, sd, seed):
@@ -166,3 +168,37 @@ def test_an_effect_that_is_handed_on_with_the_coefficients_is_one_cause():
     entries = {name: {"status": "explained", "effects": [effect]} for name in ("force", "lobes")}
     (found,) = causes({}, entries, GATES)
     assert found["seen_in"] == ["force", "lobes"]
+
+
+@pytest.fixture(scope="module")
+def pair():
+    tasks = (noisy(bent(seed, 0.03), 0.2, seed) for seed in (3, 4))
+    return [ask(unsearched(name, task), ("bend", "all")) for name, task in zip("ab", tasks, strict=True)]
+
+
+def test_who_shares_a_parameter_that_others_know_is_tested_with_it_as_a_constant_of_the_model(pair):
+    one, other = pair
+    prior = one.closed.outcome.prior
+    given = fit(Candidate(Wave(bend=0.1)), one.smaller.blocks, prior)
+    before, after = leave_out(one.smaller, prior), leave_out(given, prior)
+    sure = replace(other, value=np.array([0.1]), covariance=np.array([[1e-12]]))
+    found = one.sharing([sure]).evidence
+    expected = {name: after[name] - before[name] for name in before}
+    assert found.held_out == pytest.approx(expected, abs=0.1)
+    alone = one.held_out().evidence.held_out
+    assert max(abs(alone[name] - expected[name]) for name in before) > 1.0
+    assert found.size == pytest.approx(change(one.smaller, given), rel=1e-2)
+
+
+def test_a_condition_that_is_left_out_has_no_part_in_what_predicts_it(pair, monkeypatch):
+    one, other = pair
+    own = []
+
+    def at(_witness, fitted, value):
+        own.append((fitted.theta[0], value[0]))
+        return fitted
+
+    monkeypatch.setattr(Witness, "at", at)
+    one.sharing([replace(other, covariance=np.array([[np.inf]]))])
+    assert len({round(theta, 6) for theta, _ in own}) == 5  # four conditions, and all
+    assert [value for _, value in own] == pytest.approx([theta for theta, _ in own])

@@ -2,6 +2,8 @@
 
 import pytest
 
+from metro.loop.label_search import NOTHING
+from metro.loop.label_unknown import UNKNOWN
 from proof.figures import over_floor, over_stated
 from proof.score import FAILED, score
 
@@ -241,3 +243,28 @@ def test_a_rival_that_is_declared_is_among_what_is_possible():
     one = lobes(COUPLED, found, oracle(mode_coupling=3.0))
     assert one.among
     assert not one.exact
+
+
+def test_another_cause_is_no_name_that_could_be_wrong():
+    """Of labels that no effect explains: it is left open whether something acts, and nothing is named."""
+    entry = {
+        "status": "undetermined",
+        "effects": [],
+        "candidates": [
+            {"effect": UNKNOWN, "probability": 0.95},
+            {"effect": "missing_mode", "probability": 0.01},
+        ],
+        "indistinguishable": [[UNKNOWN, NOTHING]],
+        "before": {"rms": 0.5},
+        "after": {"rms": 0.5},
+        "noise_floor": 0.3,
+        "unexplained": {"rms": 0.5},
+    }
+    truth = {"batch": "b", "kind": "outside", "effects": {"tool_runout": {"radius_um": 9.0}}}
+    found = score(
+        truth, None, {"observables": {"lobes": entry}}, None, teeth=2, seconds=None, observable="lobes"
+    )
+    assert found.named == {}
+    assert found.admitted
+    assert not found.surely_wrong
+    assert found.rejected == ((0.01, False),)

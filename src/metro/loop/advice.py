@@ -9,7 +9,7 @@ from metro.loop.experiment import Prospect, best_view, prospects
 from metro.loop.fit import Fit
 from metro.loop.rivals import Rival
 from metro.loop.search import Outcome
-from metro.observables.problem import Problem, Proposal
+from metro.observables.problem import Block, Problem, Proposal
 
 LEAST_RUNS = 2  # to identify on
 WORTH = 0.5  # probability of deciding below which a run is not worth naming
@@ -94,7 +94,7 @@ def _to_decide(problem: Problem, outcome: Outcome) -> str:
             break
         repeats = max(prospect.repeats for prospect in decided.values())
         pairs = " and ".join(
-            f"{_pair(rival)} with a probability of {_chance(prospect.probability)}"
+            f"{pair_in_words(rival)} with a probability of {chance_in_words(prospect.probability)}"
             for rival, prospect in decided.items()
         )
         parts.append(f"{_cut(chosen[0][1].proposal, repeats)}: this tells {pairs}")
@@ -128,19 +128,26 @@ def _undecided(problem: Problem, outcome: Outcome, rivals: Sequence[Rival]) -> s
     first = rivals[0]
     best = next(iter(ranked(problem, outcome, first)), None)
     if best and best.probability >= WORTH:
+        pair = pair_in_words(first)
         return (
-            f"{_cut(best.proposal, best.repeats)}: the best of the runs tried to tell {_pair(first)}, "
-            f"but it decides with a probability of {_chance(best.probability)} only"
+            f"{_cut(best.proposal, best.repeats)}: the best of the runs tried to tell {pair}, "
+            f"but it decides with a probability of {chance_in_words(best.probability)} only"
         )
     plain = {name.partition(" (")[0] for name in first.pair}
     texts = {effect.name: effect.experiment for effect in outcome.offered if effect.name in plain}
-    names = " or ".join(_pair(rival) for rival in rivals)
+    names = " or ".join(pair_in_words(rival) for rival in rivals)
     tried = f"no run of the kinds tried tells {names}; " if problem.feasible else ""
     return tried + "; or ".join(f"for {_words(name)}: {text}" for name, text in texts.items())
 
 
 def _to_describe(fitted: Fit, left: str) -> str:
     """Name the condition whose rest is largest against the noise."""
+    worst = most_left(fitted).condition
+    return f"condition {worst} again, its repeats spread over the session, to describe what is left: {left}"
+
+
+def most_left(fitted: Fit) -> Block:
+    """Return a run of the condition whose rest is largest against the noise."""
     chi2: dict[str, float] = {}
     elements: dict[str, int] = {}
     for block in fitted.blocks:
@@ -148,7 +155,7 @@ def _to_describe(fitted: Fit, left: str) -> str:
             chi2[block.condition] = chi2.get(block.condition, 0.0) + fitted.chi2[block.run]
             elements[block.condition] = elements.get(block.condition, 0) + fitted.elements[block.run]
     worst = max(chi2, key=lambda name: chi2[name] / elements[name])
-    return f"condition {worst} again, its repeats spread over the session, to describe what is left: {left}"
+    return next(block for block in fitted.blocks if block.condition == worst)
 
 
 def _to_show(problem: Problem, outcome: Outcome) -> str:
@@ -163,11 +170,11 @@ def _to_show(problem: Problem, outcome: Outcome) -> str:
             by_words.setdefault(view.proposal.words, []).append(name)
         else:
             hidden.append(name)
-    parts = [f"to see {_listed(names)}: {words}" for words, names in by_words.items()]
+    parts = [f"to see {listed(names)}: {words}" for words, names in by_words.items()]
     if hidden:
         parts.append(f"to see {_words(hidden[0])}: {experiments[hidden[0]]}")
     if len(hidden) > 1:
-        parts.append(f"no run of the kinds tried shows {_listed(hidden[1:])}")
+        parts.append(f"no run of the kinds tried shows {listed(hidden[1:])}")
     return "; ".join(parts)
 
 
@@ -175,11 +182,13 @@ def _cut(proposal: Proposal, repeats: int) -> str:
     return proposal.words if repeats == 1 else f"{proposal.words}, {repeats} times"
 
 
-def _pair(rival: Rival) -> str:
+def pair_in_words(rival: Rival) -> str:
+    """Name what was found and its rival."""
     return f"{_words(rival.found)} from {_words(rival.other)}"
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
+    """Name effects in a row."""
     *first, last = map(_words, names)
     return f"{', '.join(first)} and {last}" if first else last
 
@@ -188,5 +197,6 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _chance(probability: float) -> str:
+def chance_in_words(probability: float) -> str:
+    """Write a probability so that none is one."""
     return "more than 0.99" if probability > 0.99 else f"{probability:.2f}"

@@ -169,12 +169,14 @@ def descend(
     steps: int = ITERATIONS,
     *,
     own: bool = False,
+    enough: float = ENOUGH,
 ) -> tuple[State, float]:
     """Follow Gauss–Newton steps, shortened until the cost falls, to where they gain next to nothing.
 
     Parameters
     ----------
     own : move the blocks' own unknowns alone; base and effect parameters stay.
+    enough : gain in twice the log-likelihood below which the descent ends.
 
     Returns
     -------
@@ -183,7 +185,9 @@ def descend(
     free: Literal["all", "own"] = "own" if own else "all"
     system = linearised(candidate, blocks, noise, state, derivatives=free)
     for step in range(steps):
-        common = np.zeros(len(state.beta) + len(state.theta)) if own else solution(*normal_equations(system))
+        common = np.zeros(len(state.beta) + len(state.theta)) if own else _common_step(system)
+        if not np.isfinite(common).all():  # the model overflows here: there is no way down to be seen
+            break
         alone = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
         for share in SHARES:
             trial = _moved(candidate, state, share * common, {run: share * alone[run] for run in alone})
@@ -193,11 +197,40 @@ def descend(
         else:
             break
         gain, system, state = system.cost - reached.cost, reached, trial
-        if gain < share * ENOUGH:
+        if gain < share * enough:
             break
         if step + 1 < steps:
             system = linearised(candidate, blocks, noise, state, derivatives=free)
     return state, system.cost
+
+
+def polish(
+    candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, steps: int = ITERATIONS
+) -> State:
+    """Follow whole steps from the end of a descent, as long as each leaves less ahead than the one before.
+
+    There the cost no longer tells: it is flat to rounding where the parameters have half of their digits.
+    """
+    nearest, best = np.inf, state
+    for _ in range(steps):
+        system = linearised(candidate, blocks, noise, state)
+        normal, right = normal_equations(system)
+        if not np.isfinite(normal).all():
+            break
+        left = ahead(normal, right)
+        if not left < nearest:
+            break
+        nearest, best = left, state
+        common = solution(normal, right)
+        alone = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
+        state = _moved(candidate, state, common, alone)
+    return best
+
+
+def _common_step(system: System) -> Array:
+    """Step of base and effect parameters; not finite where the model is not."""
+    normal, right = normal_equations(system)
+    return solution(normal, right) if np.isfinite(normal).all() else np.full(len(right), np.nan)
 
 
 def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, Array]) -> State:
@@ -211,6 +244,20 @@ def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, 
             theta[i] = min(max(theta[i], parameter.lower), parameter.upper)
     nuisance = {run: state.nuisance[run] + step for run, step in own.items()}
     return State(theta, state.beta + common[:p], nuisance)
+
+
+def ahead(normal: Array, right: Array) -> float:
+    """Return what another step would gain in twice the log-likelihood, to second order."""
+    return float(solution(normal, right) @ right)
+
+
+def condition(normal: Array) -> float:
+    """Return the condition number of the whitened columns, brought to one length, that a normal matrix is of.
+
+    Infinite where a column tells nothing, or nothing beside the others.
+    """
+    size = np.linalg.eigvalsh(_scaled(normal)[0])
+    return float(np.sqrt(size[-1] / size[0])) if size.size and size[0] > UNSEEN * size[-1] else float(np.inf)
 
 
 def solution(normal: Array, right: Array) -> Array:

@@ -63,7 +63,7 @@ def compare(smaller: Fit, larger: Fit) -> Evidence:
     """Compare two fits of the same blocks; nothing is left out yet (:func:`hold_out` does that)."""
     runs = sum(block.role != "calibrate" for block in larger.blocks)
     statistic = 2.0 * (larger.total - smaller.total)
-    parameters = len(larger.theta) - len(smaller.theta)
+    parameters = len(larger.theta) - len(smaller.theta) + runs * (_own(larger) - _own(smaller))
     sought = _sought(larger) / _sought(smaller)
     p_value = -math.expm1(sought * math.log1p(-min(tail(statistic, parameters, runs), 1.0 - 1e-16)))
     return Evidence(statistic, p_value, {}, change(smaller, larger), missed(larger), sought)
@@ -77,6 +77,11 @@ def hold_out(evidence: Evidence, smaller_out: Mapping[str, float], larger: Fit, 
 
 def _sought(fitted: Fit) -> float:
     return math.prod(effect.sought for effect in fitted.candidate.effects)
+
+
+def _own(fitted: Fit) -> int:
+    """Count the unknowns that the effects of a fit give each run."""
+    return sum(effect.own for effect in fitted.candidate.effects)
 
 
 def tail(statistic: float, parameters: int, runs: int) -> float:
@@ -126,16 +131,17 @@ def leave_out(fitted: Fit, prior: Noise, moved: Callable[[Fit], Fit] | None = No
 def _unseen(
     fitted: Fit, held: Sequence[Block], prior: Noise, moved: Callable[[Fit], Fit] | None = None
 ) -> float:
-    """Log-likelihood of runs under the fit of all others.
+    """Log-likelihood of runs under the fit of all others, less one for each unknown that is their own.
 
-    Of runs that alone tell a base parameter (the only hole among slots) nothing can be predicted without
-    them: they are left out one by one.
+    Such an unknown is fitted to the run that is predicted, which gains that much by chance. Of runs that
+    alone tell a base parameter (the only hole among slots) nothing can be predicted without them: they are
+    left out one by one.
     """
     left_out = {block.run for block in held}
     others = refit(fitted, [block for block in fitted.blocks if block.run not in left_out], prior)
     if len(held) > 1 and _told(others) < _told(fitted):
         return sum(_unseen(fitted, [block], prior, moved) for block in held)
-    return score(moved(others) if moved else others, held).total
+    return score(moved(others) if moved else others, held).total - len(held) * _own(fitted)
 
 
 def _told(fitted: Fit) -> int:
@@ -173,6 +179,29 @@ def surviving_share(candidate: Candidate, base: Fit) -> float:
     start. Near zero, the data cannot speak of the effect: the base absorbs it.
     """
     return share_left(signature(candidate, base), len(base.beta) + len(base.theta))
+
+
+@dataclass(frozen=True)
+class Dimmed:
+    """What the base parameters and the zeros of the runs leave of an effect.
+
+    ``share`` of its signature; ``least``: three standard errors of its first parameter, its size.
+    """
+
+    share: float
+    least: float
+
+
+def dimmed(candidate: Candidate, base: Fit) -> Dimmed:
+    """Return what the base parameters and the zeros of the runs, known to some error, leave of an effect.
+
+    Unlike what base parameters imitate, an effect that is much larger than the zeros is seen all the same.
+    """
+    place = len(base.beta) + len(base.theta)
+    whole = signature(candidate, replace(base, noise=replace(base.noise, zero_factor=0.0))).total
+    seen = signature(candidate, base)
+    left = share_left(seen, place) * seen.total
+    return Dimmed(left / whole if whole > 0 else 0.0, 3.0 / math.sqrt(left) if left > 0 else math.inf)
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from metro.units import Array
 DECIDED = 3.0  # log Bayes factor
 ENOUGH = 0.95  # probability of deciding with which an experiment is worth its while
 MOST_REPEATS = 6
+TWICE = 2  # times that runs to show a hidden effect are made
 
 
 @dataclass(frozen=True)
@@ -91,13 +92,25 @@ def _merit(prospect: Prospect) -> tuple[float, ...]:
 
 
 def _prospect(one: Fit, other: Fit, proposal: Proposal) -> Prospect:
-    forecasts = [(a, b, _forecasts(a, b, proposal.blocks)) for a, b in ((one, other), (other, one))]
     chance = [
-        sum(0.5 * deciding(*log_bayes_factor(*each, repeats)) for each in forecasts)
-        for repeats in range(1, MOST_REPEATS + 1)
+        sum(0.5 * deciding(*forecast) for forecast in either)
+        for either in zip(*expected(one, other, proposal), strict=True)
     ]
     enough = next((i for i, value in enumerate(chance) if value >= ENOUGH), MOST_REPEATS - 1)
     return Prospect(proposal, enough + 1, chance[enough], chance[0])
+
+
+@lru_cache(maxsize=1024)
+def expected(one: Fit, other: Fit, proposal: Proposal) -> tuple[list[tuple[float, float]], ...]:
+    """Mean and deviation of the log Bayes factor for the truth, be it ``one`` or ``other``: two lists.
+
+    Each by the repeats of the proposal's runs, from one to ``MOST_REPEATS``.
+    """
+    return tuple(
+        [log_bayes_factor(a, b, forecasts, repeats) for repeats in range(1, MOST_REPEATS + 1)]
+        for a, b in ((one, other), (other, one))
+        for forecasts in [_forecasts(a, b, proposal.blocks)]
+    )
 
 
 def probability(truth: Fit, other: Fit, blocks: Sequence[Block], repeats: int = 1) -> float:
@@ -122,17 +135,13 @@ def log_bayes_factor(
     beyond the space of r and of the derivatives is noise to both and is left out. The mean is the
     Kullback–Leibler divergence, the variance that of a quadratic form.
     """
-    made = Counter(forecast.block.condition for forecast in forecasts for _ in range(repeats))
-    known = truth.noise.repeats
-    cut = {name: known.get(name, 0) + count for name, count in made.items()}
-    noise = replace(truth.noise, repeats={**known, **cut})
-    rows = np.vstack([_whitened(forecast, noise) for forecast in forecasts]) * math.sqrt(repeats)
+    rows = _rows(truth, forecasts, repeats)
     square = np.asarray(np.linalg.qr(rows, mode="r"), dtype=float)
     p = truth.covariance.shape[0]
     difference, mine, others = square[:, 0], square[:, 1 : 1 + p], square[:, 1 + p :]
     unit = np.eye(len(square))
-    under_truth = unit + mine @ _covariance(truth) @ mine.T
-    under_other = unit + others @ _covariance(other) @ others.T
+    under_truth = unit + mine @ covariance(truth) @ mine.T
+    under_other = unit + others @ covariance(other) @ others.T
     precision = np.linalg.inv(under_other)
     ratio = precision @ under_truth
     pull = precision @ difference
@@ -141,15 +150,31 @@ def log_bayes_factor(
     return float(mean), math.sqrt(max(0.0, float(variance)))
 
 
-def _covariance(fitted: Fit) -> Array:
+def _rows(truth: Fit, forecasts: Sequence[_Forecast], repeats: int) -> Array:
+    """Forecasts of runs, each made ``repeats`` times, in units of the noise: (n, 1 + k + l)."""
+    made = Counter(forecast.block.condition for forecast in forecasts for _ in range(repeats))
+    known = truth.noise.repeats
+    cut = {name: known.get(name, 0) + count for name, count in made.items()}
+    noise = replace(truth.noise, repeats={**known, **cut})
+    return np.vstack([_whitened(forecast, noise) for forecast in forecasts]) * math.sqrt(repeats)
+
+
+def information(fitted: Fit, proposal: Proposal, repeats: int) -> Array:
+    """Information (k, k) that a proposal's runs would add on the base and effect parameters of a fit."""
+    rows = _rows(fitted, _forecasts(fitted, fitted, proposal.blocks), repeats)
+    mine = rows[:, 1 : 1 + len(fitted.covariance)]
+    return np.asarray(mine.T @ mine)
+
+
+def covariance(fitted: Fit) -> Array:
     """Covariance of a fit's parameters; one of which nothing is known may be anywhere within its bounds."""
     reach = np.array([(p.upper - p.lower) / math.sqrt(12.0) for p in fitted.candidate.parameters])
     widest = np.concatenate([fitted.beta, reach]) ** 2
-    covariance = fitted.covariance * fitted.dispersion
-    unknown = ~np.isfinite(np.diag(covariance))
-    covariance[unknown, :] = covariance[:, unknown] = 0.0
-    covariance[unknown, unknown] = widest[unknown]
-    return np.asarray(covariance)
+    found = fitted.covariance * fitted.dispersion
+    unknown = ~np.isfinite(np.diag(found))
+    found[unknown, :] = found[:, unknown] = 0.0
+    found[unknown, unknown] = widest[unknown]
+    return np.asarray(found)
 
 
 def _whitened(forecast: _Forecast, noise: noise_room.Noise) -> Array:
@@ -210,11 +235,16 @@ def _growth(block: Block, predicted: Array) -> Array:
 
 @dataclass(frozen=True)
 class View:
-    """A proposal that would show a hidden effect, with the share of the signature that would be left."""
+    """A proposal that would show a hidden effect, with the share of the signature that would be left.
+
+    ``chance``: the probability that the effect is seen if it has its typical size, the proposal's runs made
+    twice.
+    """
 
     effect: str
     proposal: Proposal
     share: float
+    chance: float
 
 
 def best_view(problem: Problem, base: Fit, effects: Sequence[Effect]) -> View | None:
@@ -225,22 +255,28 @@ def best_view(problem: Problem, base: Fit, effects: Sequence[Effect]) -> View | 
     effects : the forms of one effect, as they are in the library.
     """
     views = [
-        View(effects[0].name, proposal, _share(problem, base, effects, proposal))
+        View(effects[0].name, proposal, *_share(problem, base, effects, proposal))
         for proposal in problem.feasible
     ]
     best = max(views, key=lambda view: view.share, default=None)
     return best if best and best.share >= NOT_VISIBLE else None
 
 
-def _share(problem: Problem, base: Fit, effects: Sequence[Effect], proposal: Proposal) -> float:
-    """Largest share of the signature, over the forms of an effect, if a proposal is made as well."""
+def _share(problem: Problem, base: Fit, effects: Sequence[Effect], proposal: Proposal) -> tuple[float, float]:
+    """Largest share of the signature, over the forms of an effect, if a proposal is made as well.
+
+    Also the probability that it is seen then.
+    """
     wider = replace(problem, blocks=problem.blocks + proposal.blocks)
     able, _ = fitted_to(tuple(effects), wider)
     made, starts = as_cut(base, proposal.blocks)
     new = replace(base, blocks=tuple(made), nuisance=starts)
-    shares = [0.0]
+    found = [(0.0, 0.0)]
     for effect in able:
         candidate = Candidate(problem.base, (effect,))
-        seen = signature(candidate, base) + signature(candidate, new) * MOST_REPEATS
-        shares.append(share_left(seen, len(base.beta)))
-    return max(shares)
+        now, more = signature(candidate, base), signature(candidate, new)
+        share = share_left(now + more * MOST_REPEATS, len(base.beta))
+        made_twice = now + more * TWICE
+        size = made_twice.total * share_left(made_twice, len(base.beta)) * effect.parameters[0].scale ** 2
+        found.append((share, deciding(0.5 * size, math.sqrt(size))))
+    return max(found)

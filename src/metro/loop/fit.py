@@ -9,13 +9,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from metro.loop import noise as noise_room
 from metro.loop.candidate import Candidate, started
 from metro.loop.covariance import between_runs
-from metro.loop.descent import ENOUGH, ITERATIONS, State, descend, inverse, linearised, normal_equations
+from metro.loop.descent import (
+    ENOUGH,
+    ITERATIONS,
+    State,
+    ahead,
+    condition,
+    descend,
+    inverse,
+    linearised,
+    normal_equations,
+    polish,
+)
+from metro.loop.least_squares import least_squares
 from metro.loop.noise import Noise
 from metro.observables.problem import Block, Model
 from metro.units import Array
@@ -38,6 +51,8 @@ class Fit:
     theta, beta : effect parameters (units of the contract), base parameters (SI).
     nuisance : each block's nonlinear unknowns, by run.
     covariance : of ``[beta, theta]``, for a dispersion of one.
+    ahead : what another step of the descent would gain in twice the log-likelihood; next to 0: converged.
+    condition : of the whitened, scaled columns of base and effects; infinite: a parameter is not determined.
     log_likelihood : marginal, by run; ``chi2`` and ``elements``: whitened sum of squares and count, by run.
     """
 
@@ -47,10 +62,22 @@ class Fit:
     nuisance: Mapping[str, Array]
     noise: Noise
     covariance: Array
+    ahead: float
+    condition: float
     log_likelihood: Mapping[str, float]
     chi2: Mapping[str, float]
     elements: Mapping[str, int]
     blocks: tuple[Block, ...] = field(repr=False)
+
+    @property
+    def rank(self) -> int:
+        """How many of the base and effect parameters the blocks determine."""
+        return int(np.count_nonzero(np.isfinite(np.diag(self.covariance))))
+
+    @property
+    def converged(self) -> bool:
+        """Whether the descent ended where the likelihood is highest, to a fraction of its standard error."""
+        return self.ahead < UNDECIDED
 
     @property
     def total(self) -> float:
@@ -67,6 +94,14 @@ class Fit:
         """Prediction of a block of this fit in the fit's basis, (n,) SI."""
         matrix, offset = self.candidate.model(self.theta).design(block, self.nuisance[block.run], self.beta)
         return offset + matrix @ self.beta
+
+
+class _Told(NamedTuple):
+    """What a linearisation at the end of a descent says of it; see :class:`Fit`."""
+
+    covariance: Array
+    ahead: float
+    condition: float
 
 
 @lru_cache(maxsize=256)
@@ -129,6 +164,14 @@ def refit(start: Fit, blocks: Sequence[Block], prior: Noise) -> Fit:
     return _refined(start.candidate, blocks, prior, start.noise, state, rounds=1)
 
 
+def polished(fitted: Fit) -> Fit:
+    """Follow a fit from where its likelihood tells no more to where its parameters have all their digits."""
+    state = State(fitted.theta, fitted.beta, dict(fitted.nuisance))
+    state = polish(fitted.candidate, fitted.blocks, fitted.noise, state)
+    told = _told(fitted.candidate, fitted.blocks, fitted.noise, state)
+    return _finished(fitted.candidate, fitted.blocks, fitted.noise, state, told)
+
+
 def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
     """Evaluate a fit on blocks it has not seen: only their nuisances are estimated, nothing else moves."""
     candidate, noise = fitted.candidate, fitted.noise
@@ -141,7 +184,9 @@ def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
         near = _distinct(sorted(zip(costs, states, strict=True), key=lambda one: one[0]), ALIKE * min(costs))
         reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
         state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
-    return _finished(candidate, blocks, noise, state, fitted.covariance)
+    return _finished(
+        candidate, blocks, noise, state, _Told(fitted.covariance, fitted.ahead, fitted.condition)
+    )
 
 
 def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> Array:
@@ -162,7 +207,7 @@ def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> 
         if kept is not None:
             rows.append(kept[0])
             right.append(kept[1])
-    return np.asarray(np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)[0])
+    return least_squares(np.vstack(rows), np.concatenate(right))
 
 
 def _search_nuisance(
@@ -212,11 +257,11 @@ def _refined(
         if before - cost < SETTLED:
             break
         before = cost
-    return _finished(candidate, blocks, noise, state, _covariance(candidate, blocks, noise, state))
+    return _finished(candidate, blocks, noise, state, _told(candidate, blocks, noise, state))
 
 
-def _covariance(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> Array:
-    """Covariance of base and effect parameters, (p + q, p + q).
+def _told(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> _Told:
+    """Covariance of base and effect parameters, (p + q, p + q), and how well the end was reached.
 
     The base parameters scatter from run to run, and the runs tell how far that leaves them off. What the
     model gets wrong where an effect shows may be the same in all runs: the variances of the effect parameters
@@ -225,13 +270,14 @@ def _covariance(candidate: Candidate, blocks: Sequence[Block], noise: Noise, sta
     system, wide = (
         linearised(candidate, blocks, kind, state) for kind in (noise, noise_room.all_alike(noise))
     )
-    covariance, alike = (inverse(normal_equations(each)[0]) for each in (system, wide))
+    normal, right = normal_equations(system)
+    covariance, alike = inverse(normal), inverse(normal_equations(wide)[0])
     p = len(state.beta)
     factor = between_runs(system)
     factor[p:] = 1.0
     covariance *= np.outer(factor, factor)
     covariance[p:, p:] = alike[p:, p:]
-    return covariance
+    return _Told(covariance, ahead(normal, right), condition(normal))
 
 
 def _reestimated(
@@ -248,12 +294,10 @@ def _reestimated(
     return noise
 
 
-def _finished(
-    candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, covariance: Array
-) -> Fit:
+def _finished(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, told: _Told) -> Fit:
     system = linearised(candidate, blocks, noise, state, derivatives="none")
     elements = {block.run: len(block.measured) for block in blocks}
     return Fit(
-        candidate, state.theta, state.beta, dict(state.nuisance), noise, covariance,
+        candidate, state.theta, state.beta, dict(state.nuisance), noise, *told,
         system.log_likelihood, system.chi2, elements, tuple(blocks),
     )  # fmt: skip

@@ -25,7 +25,7 @@ from metro.loop.label_evidence import Labels, log_evidence, log_likelihood, post
 from metro.units import JSON, Array
 
 _MOST, _MOST_EACH = 256, 64  # points of a set, and of each parameter
-_ROUNDS = 8  # sets after the first, at most
+_ROUNDS = 12  # sets after the first, at most
 _ENOUGH, _ENOUGH_JOINED = 100.0, 50.0  # effective points at which no more are drawn
 _SURE = 0.04  # mean deviation of the log depth that is learnt, at which no more are solved
 _SPREAD, _SPREAD_EACH = 8, 4  # points of the first set where the boundary is solved, and of each parameter
@@ -98,6 +98,12 @@ class Hypothesis:
         return posterior(self.likelihood, self.prior)
 
     @property
+    def in_doubt(self) -> Array:
+        """(t,) shares of what the boundary, where it is learnt, leaves open of the weights."""
+        doubt = self.weights * self.unsure.mean(axis=1)
+        return np.asarray(doubt / doubt.sum())
+
+    @property
     def likeliest(self) -> Callable[[Any], Any]:
         """Return what the effects do to a model with the parameters of the highest posterior density."""
         return changed(self, int(np.argmax(self.weights / self.prior)))
@@ -137,7 +143,7 @@ def hypothesis(
     drawn = drawn.solved_at(np.linspace(0, len(drawn.cube) - 1, spread).astype(int))
     found = drawn.weighed()
     for _ in range(_ROUNDS):
-        drawn = drawn.solved_at(_thinned(found.weights, spread // 2, rng)).about(found, rng)
+        drawn = drawn.solved_at(_thinned(found.in_doubt, spread // 2, rng)).about(found, rng)
         found = drawn.weighed()
         told = 1.0 / np.sum(found.weights**2) >= enough
         if told and float((found.weights @ found.unsure).mean()) < _SURE:

@@ -10,6 +10,7 @@ import pandas as pd
 
 from metro.loop.hypotheses import Hypothesis, changed
 from metro.loop.label_search import NOTHING, LabelOutcome, Weighed
+from metro.loop.label_unknown import UNKNOWN, curves
 from metro.loop.labelled import Labelled
 from metro.units import MM, Array
 
@@ -71,7 +72,10 @@ def _chance(problem: Labelled, one: Weighed, rpm: Array, depth: Array, outcome: 
 
     tests, mine = outcome.evidence.tests, one.hypothesis
     heavy = _drawn(mine, outcome.evidence.seed)
-    found = np.stack([problem.boundary_at(changed(mine, which), rpm) for which in heavy])
+    if one.names == (UNKNOWN,):
+        found = problem.boundary_at(lambda model: model, rpm) + curves(mine, tests.rpm, rpm)[heavy]
+    else:
+        found = np.stack([problem.boundary_at(changed(mine, which), rpm) for which in heavy])
     chance: Array = ndtr((np.log(depth) - found[:, :, None]) / tests.model_sd).mean(axis=0)
     return tests.label_error + (1.0 - 2.0 * tests.label_error) * chance
 

@@ -1,8 +1,9 @@
 """The search where the measurement is a label: which effects the boundary lacks, if any.
 
-The hypotheses are nothing, each effect of the library, and, where an effect is likely and the tests can bear
-it, that effect with each other, and the best of these others with the rest. The identification tests weigh
-them; the validation tests are not read here.
+The hypotheses are nothing, each effect of the library, a cause that it lacks
+(:mod:`metro.loop.label_unknown`), and, where an effect is likely and the tests can bear it, that effect with
+each other, and the best of these others with the rest. The identification tests weigh them; the validation
+tests are not read here.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from metro.effects.effect import Effect, fitted_to
 from metro.loop.hypotheses import Evidence, Hypothesis, hypothesis
 from metro.loop.label_evidence import SHARED, Labels, left_out, own_sd, unstable_probability
+from metro.loop.label_unknown import UNKNOWN, unknown
 from metro.loop.labelled import Labelled, tests_of
 from metro.loop.rivals import RIVAL_WEIGHT
 from metro.loop.trial import Gates
@@ -23,7 +25,7 @@ from metro.units import JSON, Array
 
 LEAST_TESTS, LEAST_SPEEDS = 6, 3
 PAIR_TESTS, PAIR_SPEEDS = 16, 5
-PRIOR_NOTHING, PRIOR_PAIRS = 0.5, 0.1
+PRIOR_NOTHING, PRIOR_PAIRS, PRIOR_UNKNOWN = 0.5, 0.1, 0.1
 SURE = 1.0 - RIVAL_WEIGHT
 WORTH = 0.25  # of the likeliest hypothesis: below it, effects that are sure are not enough by themselves
 MATERIAL = 0.05  # least change of a predicted probability, rms over the tests
@@ -82,6 +84,22 @@ class LabelOutcome:
         open_names = [name for name in (*others, NOTHING) if self._without_lead(name) > RIVAL_WEIGHT]
         return tuple(sorted(open_names, key=lambda name: -self._without_lead(name)))
 
+    @property
+    def elsewhere(self) -> bool:
+        """Whether something is missing, as it seems, and it is none of the library's effects."""
+        nothing = self.weighed[0].probability
+        return nothing < PRIOR_NOTHING and self.probability(UNKNOWN) > SURE * (1.0 - nothing)
+
+    @property
+    def unsettled(self) -> bool:
+        """Whether nothing is missing, or something that is none of the library's effects."""
+        return self.elsewhere and self.weighed[0].probability > RIVAL_WEIGHT
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether a cause that the library lacks may be in the place of the lead."""
+        return self.unsettled or UNKNOWN in self.rivals
+
     def _without_lead(self, name: str) -> float:
         lead = set(self.lead.names) if self.lead else set()
         mine = [one for one in self.weighed if not lead <= set(one.names)]
@@ -108,9 +126,10 @@ def search_labels(problem: Labelled, library: Sequence[Effect], gates: Gates) ->
         if _largest(one, nothing, evidence) < MATERIAL
     }
     seen = [one for one in singles if one.names[0] not in hidden]
-    weighed = _probabilities([nothing, *seen], [])
+    other = unknown(nothing, evidence)
+    weighed = _probabilities([nothing, *seen], [], other)
     if _worth_pairs(weighed, tests):
-        first = max(weighed[1:], key=lambda one: one.probability).hypothesis
+        first = max(weighed[1:-1], key=lambda one: one.probability).hypothesis
         others = [one for one in seen if one is not first]
         joined = [hypothesis(first.effects + two.effects, evidence, first) for two in others]
         best = max(joined, key=lambda one: one.log_evidence)
@@ -119,7 +138,7 @@ def search_labels(problem: Labelled, library: Sequence[Effect], gates: Gates) ->
             rest = [one for one in others if one is not second]
             beside = replace(best, effects=second.effects, cube=best.cube[:, first.cube.shape[1] :])
             joined += [hypothesis(second.effects + two.effects, evidence, beside) for two in rest]
-        weighed = _probabilities([nothing, *seen], joined)
+        weighed = _probabilities([nothing, *seen], joined, other)
     judged = tuple(_judged(one, nothing, evidence, gates) for one in weighed)
     outcome = LabelOutcome(judged, evidence, None, unable | hidden)
     return replace(outcome, lead=_lead(outcome))
@@ -127,15 +146,17 @@ def search_labels(problem: Labelled, library: Sequence[Effect], gates: Gates) ->
 
 def _worth_pairs(weighed: list[Weighed], tests: Labels) -> bool:
     many = len(tests.depth) >= PAIR_TESTS and len(tests.speeds) >= PAIR_SPEEDS
-    return many and len(weighed) > 2 and weighed[0].probability < PRIOR_NOTHING
+    return many and len(weighed) > 3 and weighed[0].probability < PRIOR_NOTHING
 
 
-def _probabilities(singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis]) -> list[Weighed]:
-    """Posterior probabilities; ``singles`` has nothing first."""
-    left = 1.0 - PRIOR_NOTHING - (PRIOR_PAIRS if pairs else 0.0)
+def _probabilities(
+    singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], other: Hypothesis
+) -> list[Weighed]:
+    """Posterior probabilities; ``singles`` has nothing first, the ``other`` cause comes last."""
+    left = 1.0 - PRIOR_NOTHING - PRIOR_UNKNOWN - (PRIOR_PAIRS if pairs else 0.0)
     prior = [PRIOR_NOTHING, *[left / max(1, len(singles) - 1)] * (len(singles) - 1)]
-    prior += [PRIOR_PAIRS / max(1, len(pairs))] * len(pairs)
-    every = [*singles, *pairs]
+    prior += [*[PRIOR_PAIRS / max(1, len(pairs))] * len(pairs), PRIOR_UNKNOWN]
+    every = [*singles, *pairs, other]
     log = np.log(prior) + [one.log_evidence for one in every]
     weight = np.exp(log - log.max())
     return [Weighed(one, float(w)) for one, w in zip(every, weight / weight.sum(), strict=True)]
@@ -181,14 +202,14 @@ def _judged(one: Weighed, nothing: Hypothesis, evidence: Evidence, gates: Gates)
 
 def _lead(outcome: LabelOutcome) -> Weighed | None:
     """Return the effects that are sure, or the likeliest where the tests speak against nothing."""
-    names = {name for one in outcome.weighed for name in one.names}
+    nothing, *others, _ = outcome.weighed
+    names = {name for one in others for name in one.names}
     sure = {name for name in names if outcome.probability(name) > SURE}
-    nothing, *others = outcome.weighed
     heaviest = max((one.probability for one in others), default=0.0)
     exactly = [one for one in others if set(one.names) == sure and one.probability > WORTH * heaviest]
     if exactly:
         return exactly[0]
-    if nothing.probability >= PRIOR_NOTHING:  # the tests do not speak against it
+    if nothing.probability >= PRIOR_NOTHING or outcome.elsewhere:
         return None
     return max(others, key=lambda one: one.probability, default=None)
 
@@ -196,6 +217,8 @@ def _lead(outcome: LabelOutcome) -> Weighed | None:
 def pairs(outcome: LabelOutcome) -> list[list[str]]:
     """Return what the tests cannot tell apart: the lead's effects, each with each rival."""
     lead = outcome.lead.names if outcome.lead else ()
+    if outcome.unsettled:
+        return [[UNKNOWN, NOTHING]]
     return [list(pair) for pair in itertools.product(lead[-1:], outcome.rivals)]
 
 

@@ -25,15 +25,16 @@ from metro.loop.label_search import (
     search_labels,
     tried,
 )
+from metro.loop.label_unknown import UNKNOWN, curves
 from metro.loop.labelled import Change, Labelled, tests_of
 from metro.loop.story import MOST_PROPOSALS, in_words
 from metro.loop.trial import Gates
 from metro.loop.verdict import DRAWS, error
-from metro.units import JSON, Array
+from metro.units import JSON, MM, Array
 
 SIGNIFICANT = 0.01
 REFUTED = -1.0  # log-likelihood of the held-out tests that a correction may cost: more is no chance
-FEW = "effects of the boundary need {} tests with a label that no fit holds out, at {} speeds or more"
+FEW = "Effects of the boundary need {} tests with a label that no fit holds out, at {} speeds or more"
 
 
 def log_likelihood(label: Array, probability: Array) -> Array:
@@ -76,16 +77,34 @@ class _Judged:
     @property
     def status(self) -> str:
         """The verdict."""
-        contradicted = min(self.surprises[1:]) < SIGNIFICANT
+        contradicted, outcome = min(self.surprises[1:]) < SIGNIFICANT, self.outcome
         if len(self.rows) < LEAST_TESTS:
             return "insufficient"
-        if self.outcome and self.outcome.lead and not contradicted:
-            return "explained" if self.found and not self.outcome.rivals else "undetermined"
+        if outcome and outcome.lead and not contradicted:
+            return "explained" if self.found and not outcome.rivals else "undetermined"
         if self.found:
             return "partly_explained"
-        if contradicted:
+        if contradicted or (outcome and outcome.elsewhere and not outcome.unsettled):
             return "unexplained"
+        if outcome and outcome.unsettled:
+            return "undetermined"
         return "explained" if self.upstream else "clean"
+
+    @property
+    def left(self) -> list[str]:
+        """What no effect accounts for, or may not, in words."""
+        words = []
+        if self.status in ("unexplained", "partly_explained"):
+            label, after = (self.rows[name].to_numpy(float) for name in ("measured", "after"))
+            wrong = self.rows["run"][np.abs(label - after) > 0.5].tolist()
+            named = f": {', '.join(wrong)}" if wrong else ""
+            words.append(
+                f"labels against the predicted boundary in {len(wrong)} of {len(label)} tests{named}"
+            )
+        lacking = self.outcome and (self.outcome.elsewhere or self.outcome.doubtful)
+        if self.outcome and lacking and self.status in ("unexplained", "undetermined"):
+            words.append(elsewhere_words(self.outcome))
+        return words
 
 
 def judge_labels(
@@ -104,13 +123,11 @@ def judge_labels(
     library : effects that change the boundary.
     """
     judged = _judged(task, rows, library, gates)
-    rows, label = judged.rows, judged.rows["measured"].to_numpy(float)
-    after = rows["after"].to_numpy(float)
+    rows, after = judged.rows, judged.rows["after"].to_numpy(float)
     floor = float(np.sqrt(np.mean(after * (1.0 - after)))) if len(rows) else None
     figures = {
         column: error(rows, column, gates.seed) if len(rows) else None for column in ("before", "after")
     }
-    wrong = rows["run"][np.abs(label - after) > 0.5].tolist()
     verdict: JSON = {
         "status": judged.status,
         "unit": "1",
@@ -123,11 +140,12 @@ def judge_labels(
         "next_experiment": _next(judged),
         "unexplained": None,
     }
-    if judged.status in ("unexplained", "partly_explained") and figures["after"]:
-        left = (
-            f"labels against the predicted boundary in {len(wrong)} of {len(rows)} tests: {', '.join(wrong)}"
-        )
-        verdict["unexplained"] = {"rms": figures["after"]["rms"], "unit": "1", "signature": left}
+    if judged.left and figures["after"]:
+        verdict["unexplained"] = {
+            "rms": figures["after"]["rms"],
+            "unit": "1",
+            "signature": "; ".join(judged.left),
+        }
     lead = judged.outcome.lead if judged.outcome else None
     change = lead.hypothesis.likeliest if lead and judged.found else None
     return rows, verdict, _story(task, judged, verdict, gates), change
@@ -148,7 +166,8 @@ def _judged(task: Labelled, rows: pd.DataFrame, library: Sequence[Effect], gates
     if outcome and lead and not lead.rejected and within >= SIGNIFICANT:
         corrected = _with_effects(task, rows, outcome)
         old, new = (log_likelihood(label, each["after"].to_numpy(float)) for each in (rows, corrected))
-        refuted = bool(new - old < REFUTED)
+        still = surprise(label, corrected["after"].to_numpy(float), gates.seed) < SIGNIFICANT
+        refuted = bool(new - old < REFUTED) or (still and outcome.doubtful)
         rows = rows if refuted else corrected
     suggested = next_tests(task, outcome) if outcome and (lead or len(rows) < LEAST_TESTS) else []
     upstream = before < SIGNIFICANT <= refitted
@@ -162,6 +181,17 @@ def _with_effects(task: Labelled, rows: pd.DataFrame, outcome: LabelOutcome) -> 
     told = predicted(outcome.lead.hypothesis, tests, outcome.evidence.deviations)
     changed = pd.Series(told, index=list(runs), dtype=float).reindex(rows["run"]).to_numpy()
     return rows.assign(after=np.where(np.isfinite(changed), changed, rows["after"]))
+
+
+def elsewhere_words(outcome: LabelOutcome) -> str:
+    """Say how a cause that the library lacks would have to move the boundary."""
+    (curve,) = (one.hypothesis for one in outcome.weighed if one.names == (UNKNOWN,))
+    speeds = outcome.evidence.tests.speeds
+    at = np.unique(speeds[[0, len(speeds) // 2, -1]])
+    factor = np.exp(curve.weights @ curves(curve, outcome.evidence.tests.rpm, at))
+    told = ", ".join(f"{f:.2g} at {rpm:.0f} rev/min" for f, rpm in zip(factor, at, strict=True))
+    may = "" if outcome.elsewhere and not outcome.unsettled else "it may be "
+    return f"{may}a cause that the library lacks: the depth of the boundary times {told}"
 
 
 def _within(outcome: LabelOutcome, gates: Gates) -> float:
@@ -250,6 +280,8 @@ def _experiments(judged: _Judged) -> list[JSON]:
             "runs": 1,
             "probability": test.leading,
             "probability_once": test.leading,
+            "spindle_rpm": test.rpm,
+            "axial_depth_mm": test.depth / MM,
         }
         for test in judged.tests[:MOST_PROPOSALS]
     ]

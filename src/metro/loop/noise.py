@@ -124,7 +124,7 @@ def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
 def whitener(variance: Array, directions: Array) -> Whitener:
     """Factor the covariance ``diag(variance) + directions @ directionsᵀ``."""
     inverse_sd = 1.0 / np.sqrt(variance)
-    scaled = inverse_sd[:, None] * directions
+    scaled = inverse_sd[:, None] * directions[:, directions.any(axis=0)]
     power, turn = np.linalg.eigh(scaled.T @ scaled)
     power = np.maximum(power, 0.0)
     root = np.sqrt(1.0 + power)
@@ -169,7 +169,7 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         # The misfit as it is, not as it weighs: else it takes what the shared directions explain.
         found, uncertain = amplitude(directions, residual, diagonal(block, noise, correlation=1.0))
         left = residual - directions @ found
-        spread = left**2 + np.einsum("ij,jk,ik->i", directions, uncertain, directions)
+        spread = left**2 + ((directions @ uncertain) * directions).sum(axis=1)
         excess = spread - diagonal(block, replace(noise, misfit={}))
         names, number, rms = _axes(block)
         pulled = np.bincount(number, rms**2 * excess / variance**2)

@@ -14,7 +14,7 @@ from metro.effects.effect import Effect, fitted_to
 from metro.loop import signature as rest
 from metro.loop.between import Between, between_conditions
 from metro.loop.candidate import Candidate
-from metro.loop.evidence import compare, hold_out, leave_out, surviving_share
+from metro.loop.evidence import compare, dimmed, hold_out, leave_out, surviving_share
 from metro.loop.fit import Fit, fit
 from metro.loop.noise import Noise, first_noise
 from metro.loop.restless import Restless, restless
@@ -28,6 +28,10 @@ __all__ = ["Gates", "Outcome", "Trial", "search"]
 MOST_EFFECTS = 4
 NOT_VISIBLE = 0.02
 ABSORBED = "the base parameters imitate all but {:.1f} % of its signature"
+DIM = 0.1
+HIDDEN = (
+    "the zeros of each run (its offset, its place) take all but {:.1f} % of it: it shows from {:.2g} {} on"
+)
 UNBELIEVED = "more stays unexplained with it than it explains"
 EVEN = 0.5  # least share explained by effects that are claimed
 SESSION = 0.005  # p-value of a step along the session that counts
@@ -45,9 +49,9 @@ class Outcome:
     rivals and against nothing; ``rivals`` effects that explain the rest as well as a chosen one; ``lines``
     the signature of the rest, ``step`` that along the session, ``between`` that from condition to condition,
     ``restless`` that from run to run (of the base: ``base_between``, ``base_restless``); ``not_visible`` why
-    effects cannot be seen; ``seen`` those that can, fitted to the batch; ``prior`` the noise before anything
-    was known; ``likeness`` the fit with what the rest resembles and is no effect of the library
-    (``final`` is without).
+    effects cannot be seen, ``dim`` why others can only where they are large; ``seen`` those that can, fitted
+    to the batch; ``prior`` the noise before anything was known; ``likeness`` the fit with what the rest
+    resembles and is no effect of the library (``final`` is without).
     """
 
     base: Fit
@@ -67,6 +71,7 @@ class Outcome:
     restless: Restless | None = None
     offered: tuple[Effect, ...] = ()
     not_visible: dict[str, str] = field(default_factory=dict)
+    dim: dict[str, str] = field(default_factory=dict)
     likeness: Fit | None = None
 
     @property
@@ -156,9 +161,25 @@ def search(problem: Problem, library: Sequence[Effect], gates: Gates) -> Outcome
         restless=_unsteady(likeness, prior, floor),
         offered=tuple(library),
         not_visible=unable | absorbed,
+        dim=_dim(base, seen),
         likeness=likeness if likeness is not final else None,
     )
     return outcome if outcome.rivals or outcome.explained > EVEN else withdrawn(outcome, UNBELIEVED)
+
+
+def _dim(base: Fit, effects: Iterable[Effect]) -> dict[str, str]:
+    """Say of which effects the zeros of the runs leave little, and from which size they show.
+
+    Those sought among many places are left out: their first parameter is a place, no size.
+    """
+    words: dict[str, str] = {}
+    for effect in effects:
+        if effect.resembled or effect.sought > 1.0:
+            continue
+        left = dimmed(Candidate(base.candidate.base, (effect,)), base)
+        if left.share < DIM:
+            words[effect.name] = HIDDEN.format(100.0 * left.share, left.least, effect.parameters[0].unit)
+    return words
 
 
 def withdrawn(outcome: Outcome, why: str) -> Outcome:

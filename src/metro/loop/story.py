@@ -44,7 +44,11 @@ def told(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> JSO
         "path": _path(problem, outcome),
         "signature_unit": problem.basis_unit or problem.unit,
         "signature": [_line(line, problem.si) for line in outcome.lines],
-        "cannot_be_seen": [{"effect": name, "why": why} for name, why in outcome.not_visible.items()],
+        "cannot_be_seen": [
+            {"effect": name, "why": why}
+            for name, why in (outcome.not_visible | outcome.dim).items()
+            if name not in outcome.names
+        ],
         "experiments": _experiments(problem, outcome),
         "blocks": _blocks(problem, outcome),
         "words": in_words(verdict),

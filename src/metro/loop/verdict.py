@@ -11,7 +11,7 @@ import pandas as pd
 
 from metro.effects.effect import Effect, EffectParameter, by_name
 from metro.loop.advice import enough_runs, left_over, more_runs, next_experiment
-from metro.loop.fit import Fit, score
+from metro.loop.fit import Fit, polished, score
 from metro.loop.noise import block_sigma
 from metro.loop.search import Gates, Outcome, Trial, withdrawn
 from metro.loop.signature import Line, in_words, share_left, signature
@@ -116,12 +116,8 @@ def stands(problem: Problem, outcome: Outcome) -> Outcome:
 def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) -> JSON:
     """Return the observable's entry of verdict.json."""
     floor = float(np.sqrt((rows["sigma"] ** 2).mean())) if len(rows) else math.nan
-    remaining, told_by, lines = left_over(outcome), outcome.final, outcome.lines
     enough = enough_runs(problem)
-    if enough and not remaining:
-        told_by = score(outcome.final, problem.role("validate"))
-        lines = _unseen_rest(problem, told_by, gates)
-        remaining = f"only on runs that no fit has seen: {in_words(lines)}" if lines else ""
+    remaining, told_by, lines = rest_of(problem, outcome, gates)
     found = outcome.names if enough else ()  # what no held-out run has tested is not claimed
     before = error(rows, "before", gates.seed) if len(rows) else None
     after = error(rows, "after", gates.seed) if len(rows) else None
@@ -144,6 +140,16 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         ),
         "unexplained": _unexplained(problem, outcome, rows, remaining, lines) if remaining else None,
     }
+
+
+def rest_of(problem: Problem, outcome: Outcome, gates: Gates) -> tuple[str, Fit, tuple[Line, ...]]:
+    """Describe what is left, if only on held-out runs, with the fit and the lines that tell it."""
+    remaining, told_by, lines = left_over(outcome), outcome.final, outcome.lines
+    if enough_runs(problem) and not remaining:
+        told_by = score(outcome.final, problem.role("validate"))
+        lines = _unseen_rest(problem, told_by, gates)
+        remaining = f"only on runs that no fit has seen: {in_words(lines)}" if lines else ""
+    return remaining, told_by, lines
 
 
 def _unseen_rest(problem: Problem, scored: Fit, gates: Gates) -> tuple[Line, ...]:
@@ -250,7 +256,7 @@ def bounded(parameter: EffectParameter, value: float, deviation: float, dof: flo
 
 def identified_fit(problem: Problem, fitted: Fit) -> BaseFit:
     """Return the base parameters of a fit, with the unknowns of the held-out runs beside those of its own."""
-    held = problem.role("validate")
+    held, fitted = problem.role("validate"), polished(fitted)
     nuisance = {**fitted.nuisance, **(score(fitted, held).nuisance if held else {})}
     p = len(fitted.beta)
     covariance = fitted.covariance[:p, :p] * fitted.dispersion

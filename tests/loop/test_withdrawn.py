@@ -1,0 +1,56 @@
+"""What an outcome says once its effects are taken back, and how much of the rest they had explained."""
+
+from dataclasses import replace
+
+import pytest
+from toy import BEND, GATES, RIPPLE, SCATTER, Wave, problem
+
+from metro.loop.between import Between
+from metro.loop.restless import Restless
+from metro.loop.search import _unsteady, search, withdrawn
+from metro.loop.signature import Line
+
+
+@pytest.fixture(scope="module")
+def bent():
+    return search(problem(9, truth=Wave(bend=0.2), phased=False), (BEND, RIPPLE), GATES)
+
+
+def line(relative):
+    return Line("x", "all", relative, relative, 1.0, relative, 0.0, True)
+
+
+def test_without_its_effects_an_outcome_is_the_base_model_with_the_rest_of_that(bent):
+    unrest = Restless(0.05, 4.0, 1e-6)
+    apart = Between(0.1, "c", 0.0)
+    full = replace(bent, base_restless=unrest, base_between=apart, restless=None, between=None)
+    none = withdrawn(full, "because")
+    assert bent.names == ("bend",)
+    assert (none.names, none.steps, none.weight, none.final) == ((), (), {}, bent.base)
+    assert {trial.effect.name: trial.why_not == "because" for trial in none.trials} == {
+        "bend": True,
+        "ripple": False,
+    }
+    assert none.lines == bent.base_lines != ()
+    assert none.restless is unrest
+    assert none.between is apart
+
+
+def test_what_only_an_effect_laid_bare_is_there_all_the_same(bent):
+    later = replace(bent, base_lines=(), lines=(line(0.1),), restless=Restless(0.02, 3.0, 1e-6))
+    none = withdrawn(later, "because")
+    assert none.lines == later.lines
+    assert none.restless is later.restless
+
+
+def test_the_share_explained_is_of_the_power_within_and_between_runs(bent):
+    base = {"base_lines": (line(0.3),), "base_restless": Restless(0.4, 9.0, 0.0), "base_between": None}
+    left = {"lines": (line(0.1),), "restless": Restless(0.2, 5.0, 0.0), "between": Between(0.1, "c", 0.0)}
+    assert replace(bent, **base, **left).explained == pytest.approx(1 - 0.06 / 0.25)
+    assert replace(bent, **base, lines=(), restless=None, between=None).explained == 1.0
+
+
+def test_a_scatter_that_changes_the_prediction_too_little_is_no_finding():
+    found = search(problem(3, phased=False, scatter=10 * SCATTER), (), GATES)
+    assert found.base_restless.relative == pytest.approx(0.1, rel=0.5)
+    assert _unsteady(found.base, found.prior, 0.5) is None
