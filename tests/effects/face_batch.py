@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from face_manifest import SIZE, manifest
 
 from metro.batch.batch import Batch
 from metro.batch.processed import COLUMNS
@@ -15,27 +16,13 @@ from metro.observables import cutting_force, flatness
 from metro.observables.problem import Problem
 
 GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
-SIZE, RADIUS, PITCH, SPEED = (120.0, 60.0), 8.0, 10.0, 40.0  # mm, mm/s
+RADIUS, PITCH, SPEED = 8.0, 10.0, 40.0  # mm, mm/s
 LEAD = 12.0
 CASES = [(along, depth, role) for along, depth, role in (
     ("L", 1.0, "identify"), ("T", 1.0, "identify"), ("L", 2.0, "identify"), ("T", 2.0, "identify"),
     ("L", 1.5, "validate"), ("T", 1.5, "validate"),
 )]  # fmt: skip
-COEFFICIENTS = {
-    "ktc_n_mm2": 900.0,
-    "krc_n_mm2": 400.0,
-    "kac_n_mm2": 460.0,
-    "kte_n_mm": 16.0,
-    "kre_n_mm": 20.0,
-    "kae_n_mm": 22.0,
-}
-MANIFEST = {
-    "format": 1,
-    "tool": {"diameter_mm": 16, "teeth": 4, "helix_deg": 30},
-    "work": {"size_mm": [*SIZE, 10.0]},
-    "coefficients": COEFFICIENTS,
-    "instruments": {"scanner": {"spacing_mm": 0.8, "sigma_mm": 0.006, "to_work": np.eye(4).tolist()}},
-}
+MANIFEST = manifest(spacing_mm=0.8, sigma_mm=0.006)
 
 
 def compliance(x, y):

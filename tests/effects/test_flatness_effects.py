@@ -1,12 +1,17 @@
 """Effects of flatness in faces made by formulas: found where they are, unseen where zeros hide them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from face_batch import GATES, problem
+from scipy.stats import f
 
 from metro.effects import library
 from metro.effects.effect import fitted_to
+from metro.loop import noise
 from metro.loop.candidate import Candidate
+from metro.loop.evidence import compare, dimmed, leave_out
 from metro.loop.fit import fit, score
 from metro.loop.noise import first_noise
 from metro.loop.search import search
@@ -30,6 +35,10 @@ def swung(time, phase, **_cut):
     return 8e-3 * np.sin(2 * np.pi * 1.7 * time + phase)
 
 
+def swung_in_short_waves(time, phase, **_cut):
+    return 15e-3 * np.sin(2 * np.pi * 4.9 * time + phase)  # 8 mm at 40 mm/s: two points of the path
+
+
 def bowed(x, y):
     u, v = x / 60.0 - 1.0, y / 30.0 - 1.0
     return 12e-3 * u**2 - 5e-3 * u * v + 8e-3 * v**2
@@ -48,6 +57,8 @@ HIDDEN = [
     ("stiffness_scale", {"factor": 0.75}, {"factor": 0.75}),
 ]
 
+SHORT = ("path_vibration", {"hidden": swung_in_short_waves}, {"frequency_hz": 4.9, "amplitude_um": 15.0})
+
 
 def base_fit(task):
     blocks = task.role("identify", "calibrate")
@@ -65,7 +76,9 @@ def clean():
     return task, *base_fit(task)
 
 
-@pytest.mark.parametrize(("name", "made", "truth"), HIDDEN, ids=[case[0] for case in HIDDEN])
+@pytest.mark.parametrize(
+    ("name", "made", "truth"), [*HIDDEN, SHORT], ids=[*(case[0] for case in HIDDEN), "short waves"]
+)
 def test_an_effect_comes_back_with_its_size_inside_its_interval(name, made, truth):
     task = problem(**made)
     base, prior = base_fit(task)
@@ -102,6 +115,38 @@ def test_the_noise_is_that_of_faces_which_no_fit_has_seen(clean):
 def test_a_clean_batch_has_no_pattern(clean):
     _, base, _ = clean
     assert not any(line.significant for line in signature(base, 0.04))
+
+
+def test_the_size_from_which_a_growth_shows_is_three_errors_of_generalised_least_squares(clean):
+    task, base, _ = clean
+    growth = effect_of(task, "thermal_growth")
+    found = dimmed(Candidate(task.base, (growth,)), base)
+    normal = np.zeros((len(base.beta) + 1,) * 2)
+    for block in base.blocks:
+        nuisance = base.nuisance[block.run]
+        matrix, offset = task.base.design(block, nuisance)
+        moved = growth.apply(task.base, {"um_per_min": 1e-3}).design(block, nuisance)[1]
+        shared = noise.shared(block, base.noise, matrix, base.beta)
+        covariance = np.diag(noise.diagonal(block, base.noise)) + shared @ shared.T
+        columns = np.column_stack([matrix, (moved - offset) / 1e-3])
+        normal += columns.T @ np.linalg.solve(covariance, columns)
+    scale = 1.0 / np.sqrt(np.diag(normal))
+    sd = scale[-1] * np.sqrt(np.linalg.inv(normal * np.outer(scale, scale))[-1, -1])
+    assert found.least == pytest.approx(3.0 * sd, rel=0.05)
+    assert found.share < 0.05  # the plane of a scan takes nearly all of a face that falls evenly
+
+
+def test_a_phase_that_every_face_has_for_itself_is_paid_for(clean):
+    task, base, prior = clean
+    effect = replace(effect_of(task, "path_vibration"), sought=1.0)
+    free, paid = (
+        fit(Candidate(task.base, (replace(effect, own=own),)), base.blocks, prior, base) for own in (0, 1)
+    )
+    evidence = compare(base, paid)
+    assert evidence.p_value == pytest.approx(f.sf(evidence.statistic / (2 + 8), 2 + 8, 8 + 4), rel=1e-6)
+    assert evidence.p_value > compare(base, free).p_value
+    gains = [sum(leave_out(each, prior).values()) for each in (free, paid)]
+    assert gains[0] - gains[1] == pytest.approx(8.0)  # one for each of eight faces
 
 
 @pytest.mark.parametrize("name", ["thermal_growth", "fixture_bow", "spindle_tilt"])

@@ -43,7 +43,7 @@ def cut(path, feed):
     t = 0.1 + X / feed
     return (
         WavyCut(
-            by_joint=blank, idle=None, share=np.ones(len(waves)), q=q, rate=np.gradient(q, t, axis=0), t=t,
+            by_joint=blank, idle=None, share=np.ones(blank.shape), q=q, rate=np.gradient(q, t, axis=0), t=t,
             moves=np.tile(MOVES[path], (len(X), 1)), load=load, compliance=COMPLIANCE, filtered=filtered,
             longer=np.zeros((2, len(X[KEPT]))),
         ),

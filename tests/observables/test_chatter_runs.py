@@ -5,10 +5,13 @@ import pandas as pd
 import pytest
 
 from metro.batch.batch import Batch
+from metro.batch.processed import COLUMNS
 from metro.cutting.cutter import Cutter
 from metro.dynamics.system import Structure
+from metro.observables import lobes
 from metro.observables.chatter_runs import measured, observe_chatter, observe_records
 from metro.observables.lobe_positions import Tip
+from metro.observables.problem import Refusal
 from metro.observables.stability import Cutting, run_probabilities, solve
 
 RATE, TEETH, RPM = 2000.0, 4, 1200.0
@@ -176,3 +179,19 @@ def test_a_speed_that_wanders_without_a_tacho_alarms_nobody_and_hides_no_chatter
     found = observe(made, [stable, chatter])
     assert list(found["probability"] > 0.5) == [False, True]
     assert found["probability"]["c0"] <= 0.5
+
+
+@pytest.mark.parametrize("order", [2.63, 0])
+def test_without_a_modal_test_the_records_still_tell_chatter_and_the_lobes_are_refused(order):
+    made, records = batch(stable=[""]), [record(order)]
+    source = {"force": dict(zip(made.runs.index, records, strict=True))}
+
+    def read(name, run=None):
+        return source[name][run] if name in source else pd.DataFrame(columns=list(COLUMNS[name]))
+
+    found = lobes.observe(made, read, {})
+    assert (found["chatter_runs"]["probability"].iloc[0] > 0.5) == bool(order)
+    refused = lobes.problem(made, found, {})
+    assert isinstance(refused, Refusal)
+    assert "impacts.csv" in refused.reason
+    assert lobes.report(made, found, {}, refused, None) == {}

@@ -9,7 +9,7 @@ from metro.batch.processed import read_table
 from metro.dynamics.hits import Hit, gate
 from metro.formats.uff import FRF, Function
 from metro.formats.uff_writer import write_functions
-from metro.observables.modal_test import clear_of_drift, observe_modes
+from metro.observables.modal_test import clear_of_drift, clear_of_noise, observe_modes
 from metro.observables.receptance import arranged, from_files
 from metro.stages.ingest import ingest
 
@@ -258,3 +258,18 @@ def test_a_drift_is_not_sought_beyond_a_quarter_of_the_band():
     clear = clear_of_drift(frequency, level)
     assert frequency[clear][0] == 251.0
     assert clear[frequency >= 251.0].all()
+
+
+def test_one_line_that_stands_out_of_the_noise_by_chance_does_not_open_the_band():
+    rng = np.random.default_rng(3)
+    frequency = np.arange(0.5, 200.0, 0.5)
+    omega = 2 * np.pi * frequency
+    mode = 1 / (1 - (frequency / 60) ** 2 + 0.1j * frequency / 60)
+    noise = 0.02 + 30 / omega  # of an integrated acceleration
+    hits = [mode + noise * (rng.normal(size=len(omega)) + 1j * rng.normal(size=len(omega))) for _ in range(5)]
+    hits = np.stack(hits)
+    hits[:, 0] = 100.0 + rng.normal(size=5)
+    variance = np.var(hits, axis=0, ddof=1)[:, None] / 5
+    clear = np.flatnonzero(clear_of_noise(hits.mean(axis=0)[:, None], variance))
+    assert 5.0 < frequency[clear[0]] < 60.0
+    assert frequency[clear[-1]] > 75.0

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 
 from metro.batch.batch import Batch
-from metro.observables.robot_tables import robot_tables
+from metro.observables.robot_tables import SPACING, _waves, robot_tables
+from metro.observables.waviness_points import IDLE, STRAYED
 from metro.robot.kinematics import arm_of_cell
 from metro.robot.workspace import reach
 from metro.units import DEG, MM
@@ -112,3 +113,21 @@ def test_the_map_holds_the_softest_direction_of_the_joints_as_identified(tables)
 def test_a_machine_that_is_no_arm_has_no_tables():
     batch = Batch("b", {}, {"cell": "mill"}, pd.DataFrame(index=pd.Index([], name="run")), {})
     assert robot_tables(batch, lambda _name, _run=None: pd.DataFrame(), {}, None) == {}
+
+
+@pytest.mark.parametrize("idle", [0.5, np.nan])
+def test_the_waves_of_tip_and_idle_run_are_those_of_their_joints_together(idle):
+    """Six joints that stray by a sixth each: the tip by the whole; without an idle run nothing is drawn."""
+    x = np.arange(0.0, 60.0, SPACING / MM)
+    wave = 4.0 * np.sin(2 * np.pi * x / 3.0)  # the profile's filter keeps nine tenths of it
+    points = pd.DataFrame({"run": "a", "x_mm": x, "waviness_um": wave, "kept": (x > 15.0) & (x < 45.0)})
+    points[STRAYED] = np.outer(wave, np.ones(6)) / 6.0
+    points[IDLE] = idle * np.outer(wave, np.ones(6)) / 6.0
+    made = Batch("b", {"instruments": {"profiler": {"cutoff_mm": 8.0}}}, {}, pd.DataFrame(), {})
+    found = _waves(made, points)
+    inner = found["x_mm"].between(20.0, 40.0)
+    tip, told = (found.loc[inner, name].to_numpy() for name in ("tip_um", "idle_um"))
+    assert tip == pytest.approx(
+        0.9 * 4.0 * np.sin(2 * np.pi * found["x_mm"][inner].to_numpy() / 3.0), abs=0.4
+    )
+    assert np.isnan(told).all() if np.isnan(idle) else told == pytest.approx(0.5 * tip)

@@ -7,8 +7,11 @@ from test_deformation import Cell, moves
 from metro.observables import waviness
 from metro.observables.problem import BaseFit, Problem
 from metro.observables.wall import wall
+from metro.observables.waviness_points import ENCODER
 from metro.observables.waviness_report import joint_share
 from metro.units import DEG, MM
+
+JOINTS = range(1, 7)
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +52,22 @@ def test_a_run_without_a_direction_is_refused_with_the_reason(made):
     observed = waviness.observe(batch, cell.read, {})
     assert observed["waviness_refused"]["reason"].str.contains("neither up nor down").all()
     assert "waviness_points" not in observed
+
+
+def test_the_noise_of_each_encoder_is_told_at_the_tip_by_its_lever():
+    """White noise of 2e-6 rad on every joint: at the wall it is that times the joint's lever."""
+    cell, rng = Cell(tracking=0.0), np.random.default_rng(1)
+    for run, table in cell.logs.items():
+        noisy = {
+            f"q{i}_deg": table[f"q{i}_set_deg"] + 2e-6 * rng.normal(size=len(table)) / DEG for i in JOINTS
+        }
+        cell.logs[run] = table.assign(**noisy)
+    facts = waviness.observe(cell.batch, cell.read, {})["waviness_runs"].set_index("run")
+    for run, row in facts.iterrows():
+        q = cell.logs[run][[f"q{i}_set_deg" for i in JOINTS]].to_numpy() * DEG
+        levers = np.abs(wall(cell.batch, run).normal @ moves(cell.arm, q[len(q) // 4]))
+        at_tip = row[ENCODER].to_numpy(dtype=float) * 1e-6
+        np.testing.assert_allclose(at_tip, 2e-6 * levers, rtol=0.35, atol=2e-8)
 
 
 def test_shares_of_joints_are_those_of_independent_waves():

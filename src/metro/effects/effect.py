@@ -78,6 +78,8 @@ class Effect:
         table is predicted without an arm).
     prior : its weight before anything is known, against that of an effect with one form: that of a cause is
         shared by its forms.
+    own : number of unknowns that it gives every run for itself (a phase): each is fitted to the run, and
+        gains by chance.
     sought : number of independent places (lines of a spectrum) among which ``adapt`` looked for it. The best
         of many is good by chance: the evidence is discounted by so many tries.
     """
@@ -96,6 +98,7 @@ class Effect:
     where: Mapping[str, int | str] = field(default_factory=dict, hash=False)
     part: str = ""
     prior: float = 1.0
+    own: int = 0
     sought: float = 1.0
 
     @property

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, Values
-from metro.effects.periodogram import middle_start, own_peaks, peaks
+from metro.effects.periodogram import TimeShares, middle_start, own_peaks, peaks
 from metro.observables.problem import Block, Problem, Refusal
 from metro.observables.waviness_model import Vibration
 from metro.units import DEG, MM, UM, Array
@@ -19,8 +18,9 @@ LEAST_CYCLES, LEAST_POINTS = (
     2.0,
     4.0,
 )  # that the shortest run must show; that a cycle of the fastest must hold
-LEAST_WAVES, LEAST_BINS = 1.0, 2.0  # that a pass must show; that a wave must hold
-SHORTEST = 12 * MM  # wave of which the discs of path points keep all but some per cent
+LEAST_WAVES = 1.0  # that the longest pass must show
+SHORTEST = 5 * MM  # wave of which the discs of path points keep more than half
+OF_THE_STRONGEST = 0.4  # least power of a line that is followed, too
 STEPS = 3.0  # per width of a line: the longest run's reciprocal
 MOST = 4  # lines that are followed
 
@@ -79,12 +79,12 @@ def on_faces(model: Any, values: Values) -> Any:
 
 def adapt_to_faces(effect: Effect, problem: Problem) -> Effect | Refusal:
     """Start from the strongest lines in time of what the base model leaves, each face with its own phase."""
-    base: Any = problem.base
     blocks = problem.role("identify")
     frequencies = _seen_on_faces([block.setting for block in blocks])
     if len(frequencies) < 2:
-        return Refusal("its passes are too short, or its points too far apart, for a wave of 12 mm or more")
-    found, size = own_peaks(problem, [_times(base, block) for block in blocks], frequencies, MOST)
+        return Refusal("its passes are too short, or its points too far apart, to show a wave")
+    ways = [_time_shares(problem.base, block) for block in blocks]
+    found, size = own_peaks(problem, ways, frequencies, MOST, least=OF_THE_STRONGEST)
     frequency, amplitude = effect.parameters
     step = float(frequencies[1] - frequencies[0])
     return replace(
@@ -100,11 +100,12 @@ def adapt_to_faces(effect: Effect, problem: Problem) -> Effect | Refusal:
             replace(amplitude, starts=(max(float(np.median(size)) / UM, amplitude.scale),)),
         ),
         sought=max(1.0, len(frequencies) / STEPS),
+        own=1,
     )
 
 
 def _seen_on_faces(settings: list[Any]) -> Array:
-    """Frequencies, Hz, whose waves along a pass are no longer than it and are resolved by the points.
+    """Frequencies, Hz, whose waves along a pass are no longer than it, and longer than a disc and a bin.
 
     From pass to pass a wave is seen once per period, so that its frequency is told modulo the rate of the
     passes; which of these it is, the waves along the passes tell, and faces with passes of another length.
@@ -116,15 +117,22 @@ def _seen_on_faces(settings: list[Any]) -> Array:
         spans.append(float(np.ptp(times)))
         low.append(LEAST_WAVES * pace.speed / float(np.ptp(passages.along[passages.valid])))
         apart = np.hypot(np.diff(setting.mean(setting.x)), np.diff(setting.mean(setting.y)))
-        high.append(pace.speed / max(SHORTEST, LEAST_BINS * float(np.median(apart))))
-    return np.asarray(np.arange(max(low), min(high), 1.0 / (STEPS * max(spans))))
+        high.append(pace.speed / max(SHORTEST, float(np.median(apart))))
+    return np.asarray(np.arange(min(low), min(high), 1.0 / (STEPS * max(spans))))
 
 
-def _times(base: Any, block: Block) -> tuple[Array, Callable[[Array], Array]]:
-    """When the rim finished the points of a face by the base model, and how these make its elements."""
+def _time_shares(base: Any, block: Block) -> TimeShares:
+    """When the rim may have finished the points of a face, and how these make its elements.
+
+    A vibration decides which of the passages that are nearly the lowest by the base model is: what is left is
+    lower than their mean, and goes up and down with it. They share each point evenly.
+    """
     setting = block.setting
-    chosen, _ = base.finished(setting, middle_start(base, block))
-    return setting.pace.time(setting.passages)[chosen], setting.mean
+    height = base.heights(setting, middle_start(base, block))
+    free = block.measured - block.zeros @ np.linalg.lstsq(block.zeros, block.measured, rcond=None)[0]
+    near = height <= height.min(axis=1)[:, None] + float(np.std(free))
+    share = near / near.sum(axis=1)[:, None]
+    return TimeShares(setting.pace.time(setting.passages), share, setting.mean)
 
 
 ON_WALLS = Effect(
@@ -158,8 +166,8 @@ ON_FACES = replace(
     adapt=adapt_to_faces,
     signature=(
         "Waves along every pass of one frequency in time, that go on from pass to pass and from where they "
-        "were in no other face. Waves shorter than 12 mm are lost between the points of the path: at 40 mm/s "
-        "up to 3 Hz are seen. The ringing of the arm's modes dies out behind the entry."
+        "were in no other face. Waves shorter than 5 mm are lost in the means over discs: at 40 mm/s "
+        "up to 8 Hz are seen. The ringing of the arm's modes dies out behind the entry."
     ),
     form="faces",
 )

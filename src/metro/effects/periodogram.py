@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -46,11 +47,21 @@ def peaks(
     return _strongest(frequencies, power, amplitude, most)
 
 
+@dataclass(frozen=True, eq=False)
+class TimeShares:
+    """When what makes the elements of a block was cut.
+
+    ``time``, ``share`` (m, k): the m places were each cut at k times, each with its share; ``mean`` makes the
+    block's elements of values at the places.
+    """
+
+    time: Array
+    share: Array
+    mean: Callable[[Array], Array]
+
+
 def own_peaks(
-    problem: Problem,
-    times: Sequence[tuple[Array, Callable[[Array], Array]]],
-    frequencies: Array,
-    most: int,
+    problem: Problem, ways: Sequence[TimeShares], frequencies: Array, most: int, least: float
 ) -> tuple[Array, Array]:
     """Return what :func:`peaks` does of waves in time whose phase is each run's own.
 
@@ -58,27 +69,35 @@ def own_peaks(
 
     Parameters
     ----------
-    times : for each block of the identification (m,) times, s, and what makes its elements of values there.
+    ways : for each block of the identification. frequencies : (f,) evenly apart.
+    least : power of a peak, over that of the strongest, below which it is left out.
     """
     blocks = problem.role("identify")
     power, square = np.zeros(len(frequencies)), np.zeros(len(frequencies))
-    for block, left, (time, mean) in zip(blocks, _rests(problem.base, blocks)[0], times, strict=True):
+    for block, left, way in zip(blocks, _rests(problem.base, blocks)[0], ways, strict=True):
         zeros = np.linalg.qr(block.zeros / block.sigma[:, None])[0]
         rest = left - zeros @ (zeros.T @ left)
-        for i, frequency in enumerate(frequencies):
-            angle = 2.0 * np.pi * frequency * time
-            waves = mean(np.stack([np.sin(angle), np.cos(angle)], axis=1)) / block.sigma[:, None]
+        wave = way.share * np.exp(2j * np.pi * frequencies[0] * way.time)
+        on = np.exp(2j * np.pi * (frequencies[1] - frequencies[0]) * way.time)
+        for i in range(len(frequencies)):
+            seen = way.mean(wave.sum(axis=1)) / block.sigma
+            waves = np.stack([seen.imag, seen.real], axis=1)
             waves -= zeros @ (zeros.T @ waves)
-            found = np.linalg.lstsq(waves, rest, rcond=1e-9)[0]
-            power[i] += found @ (waves.T @ rest)
+            right = waves.T @ rest
+            found = np.linalg.lstsq(waves.T @ waves, right, rcond=1e-9)[0]
+            power[i] += found @ right
             square[i] += found @ found
-    return _strongest(frequencies, power, np.sqrt(square / len(blocks)), most)
+            wave *= on
+    return _strongest(frequencies, power, np.sqrt(square / len(blocks)), most, least)
 
 
-def _strongest(frequencies: Array, power: Array, amplitude: Array, most: int) -> tuple[Array, Array]:
+def _strongest(
+    frequencies: Array, power: Array, amplitude: Array, most: int, least: float = 0.0
+) -> tuple[Array, Array]:
     rises = np.diff(power, prepend=-np.inf, append=-np.inf)
     tops = np.flatnonzero((rises[:-1] > 0.0) & (rises[1:] <= 0.0))
     chosen = tops[np.argsort(power[tops])[::-1][:most]]
+    chosen = chosen[power[chosen] >= least * power[chosen].max(initial=0.0)]
     return frequencies[chosen], amplitude[chosen]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from metro.dynamics.stability_model import StabilityModel
 from metro.effects.effect import Effect, EffectParameter, Values
 
-MOST = 0.5  # relative change at the fastest speed
+MOST, USUAL = 0.8, 0.25  # relative change at the fastest speed: the largest, and its standard deviation
 
 
 def apply(model: StabilityModel, values: Values) -> StabilityModel:
@@ -17,11 +17,11 @@ def apply(model: StabilityModel, values: Values) -> StabilityModel:
 
 
 def adapt(effect: Effect, problem: Any) -> Effect:
-    """Keep the stiffness between half and one and a half times that at rest."""
+    """Keep the stiffness between a fifth and nine fifths of that at rest."""
     fastest = max(float(case.rpm.max()) for case in problem.cases) / 1000.0
     (parameter,) = effect.parameters
     bound = MOST / fastest
-    fitted = replace(parameter, lower=-bound, upper=bound, plausible=bound / 2.0)
+    fitted = replace(parameter, lower=-bound, upper=bound, plausible=USUAL / fastest)
     return replace(effect, parameters=(fitted,))
 
 

@@ -71,12 +71,14 @@ class DeformationModel:
     structure : stiffness in the cut relative to the load tests.
     flange_rotation : how much of what the flange turns moves the tip: all of it, in truth.
     torsion : what the joints do beyond linear springs.
+    drift : how far the tip has moved from one run to the next, work frame x and y, m.
     """
 
     arm: Arm
     structure: Structure = field(default_factory=Structure)
     flange_rotation: float = 1.0
     torsion: Torsion = field(default_factory=Torsion)
+    drift: tuple[float, float] = (0.0, 0.0)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -92,7 +94,8 @@ class DeformationModel:
         setting: Any = block.setting
         about = np.zeros(len(self.arm.dh)) if beta is None else beta
         if isinstance(setting, CutWall):
-            return self._cut(setting, about)
+            matrix, offset = self._cut(setting, about)
+            return matrix, offset + block.order * float(setting.normal[:2] @ np.array(self.drift))
         if isinstance(setting, LoadTest):
             return self._loaded(setting, about)
         rows = np.eye(len(self.arm.dh))[setting.joints]

@@ -11,13 +11,14 @@ import numpy as np
 from metro.observables.cutting_force import turn_about_z
 from metro.observables.deformation_blocks import ZERO, PerNewton, force_error
 from metro.observables.deformation_model import CutWall, LoadTest
-from metro.observables.problem import Block, Proposal
+from metro.observables.problem import Block, Made, Proposal
 from metro.robot.kinematics import Arm
 from metro.units import DEG, Array
 
 MEASURED = 0.01  # relative error of a force that a dynamometer reads
 SHALLOW, DEEP = 0.5, 2.0  # depths of walls, of that of the run they are like
 HEAVIER = 2.0  # load tests, of the largest force so far
+LOADED = "load tests "  # what the name of such a block begins with; then comes the pose
 TURNS = (0.0, 90.0 * DEG)  # of the feed; half a turn loads the joints the other way and shows the same
 
 
@@ -47,9 +48,12 @@ def _walls(
         setting: CutWall = like.setting
         middle = setting.commanded[len(setting.commanded) // 2]
         towards = _heading(setting, arm)
-        poses = [("the pose of the cuts", middle)]
-        poses += [(f"the pose of {block.run}", block.setting.joints[0]) for block in loaded]
-        for place, joints in poses:
+        poses = [("the pose of the cuts", middle, "")]
+        poses += [
+            (f"the pose of {block.run}", block.setting.joints[0], block.run.removeprefix(LOADED))
+            for block in loaded
+        ]
+        for place, joints, pose in poses:
             for turn in TURNS:
                 here = _turned(setting, joints, turn)
                 feed = round((towards + turn) / DEG) % 360
@@ -58,7 +62,10 @@ def _walls(
                     f"feed at {feed}°, with a dynamometer"
                 )
                 blocks = (_block(like, here, depth, words, per_newton) for depth in (SHALLOW, DEEP))
-                yield Proposal(words, tuple(blocks))
+                given: dict[str, float | str] = {"feed_direction_deg": feed}
+                given |= {"pose": pose} if pose else {}
+                rows = (Made(like.run, {"axial_depth_mm": depth}, given) for depth in (SHALLOW, DEEP))
+                yield Proposal(words, tuple(blocks), tuple(rows))
 
 
 def _each_side(made: Sequence[Block], arm: Arm) -> list[Block]:

@@ -17,7 +17,7 @@ from metro.observables.face_noise import bin_sigma
 from metro.observables.face_path import Path, make_pace, make_path, passages, turn_from_declared, work_size
 from metro.observables.face_patterns import patterns
 from metro.observables.face_ringing import Ringing, make_ringing
-from metro.observables.flatness_model import ACROSS, PHASES, FaceSetting, LoadSetting, PoseField
+from metro.observables.flatness_model import ACROSS, AHEAD, PHASES, FaceSetting, LoadSetting, PoseField
 from metro.observables.problem import Block, Refusal
 from metro.surface.footprint import RADIUS
 from metro.surface.tip_stiffness import (
@@ -156,10 +156,10 @@ def face_block(
 
 
 def _places(table: pd.DataFrame, path: Path) -> tuple[Array, Array]:
-    """Return the places (3 n,) that stand for the discs of the points of a table, m."""
-    across = RADIUS * np.array(ACROSS)
-    x = table["x_mm"].to_numpy()[:, None] * MM - across * path.direction.imag
-    y = table["y_mm"].to_numpy()[:, None] * MM + across * path.direction.real
+    """Return the places (4 n,) that stand for the discs of the points of a table, m."""
+    about = RADIUS * (AHEAD + 1j * ACROSS) * path.direction
+    x = table["x_mm"].to_numpy()[:, None] * MM + about.real
+    y = table["y_mm"].to_numpy()[:, None] * MM + about.imag
     return x.ravel(), y.ravel()
 
 

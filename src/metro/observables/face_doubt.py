@@ -20,11 +20,11 @@ def damping_doubt(field: PoseField, setting: FaceSetting) -> Array | None:
         return None
     model, own = FlatnessModel((field,)), ringing.starts[0]
     chosen, _ = model.finished(setting, np.zeros(1))
-    known = ringing.rest(model.structure, own, setting.passages)
+    known = ringing.rest(model.structure, own, setting.middle)
     size, directions = np.linalg.eigh(ringing.damping.covariance)
     columns = []
     for sd in (directions * np.sqrt(np.maximum(size, 0.0))).T:
         moved = replace(ringing, damping=ringing.damping.shifted(sd))
-        apart = moved.rest(model.structure, own, setting.passages) - known
+        apart = moved.rest(model.structure, own, setting.middle) - known
         columns.append(setting.mean(apart[chosen]))
     return np.column_stack(columns)

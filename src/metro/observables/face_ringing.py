@@ -6,6 +6,7 @@ import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -85,23 +86,48 @@ class Ringing:
         ----------
         nuisance : as :attr:`starts` has it.
         """
+        return self.at(self.moved(structure, nuisance), passages) + self.of_teeth(
+            structure, nuisance, passages
+        )
+
+    def moved(self, structure: Structure, nuisance: Array) -> Array:
+        """Height of the tip over the static one under the full force, (passes, n) m, as :meth:`rest`."""
         softer = structure.in_cut(np.ones(1))
         modes, ratio = self._in_cut(self.modes, softer, nuisance)
         moved = respond(modes, ratio, self.force, self.step) - (softer * self.static)[:, None]
-        mean = np.convolve(moved.ravel(), self.weights, mode="same").reshape(self.passes, -1)
-        rest = self._at(mean, passages)
+        return np.convolve(moved.ravel(), self.weights, mode="same").reshape(self.passes, -1)
+
+    def of_teeth(self, structure: Structure, nuisance: Array, passages: Passages) -> Array | float:
+        """Height of the tip about its mean over a turn as the rim goes over, (points, k) m; zero if slow."""
         if self.teeth is None:
-            return rest
-        modes, ratio = self._in_cut(self.teeth.modes, softer, nuisance)
+            return 0.0
+        modes, ratio = self._in_cut(self.teeth.modes, structure.in_cut(np.ones(1)), nuisance)
         heights = tooth_heights(modes, ratio, self.teeth.force, self.teeth.rate)
-        return rest + at_rim(heights, passages.number, passages.rim, self.teeth.angles)
+        return at_rim(heights, passages.number, passages.rim, self.teeth.angles)
+
+    @cached_property
+    def _said(self) -> bytes:
+        parts = (self.modes.frequency, self.modes.shape, self.static, self.force, self.weights)
+        damping = () if self.damping is None else tuple(self.damping.values)
+        return b"".join(part.tobytes() for part in (*parts, np.array([self.step, self.speed, *damping])))
+
+    def __eq__(self, other: object) -> bool:
+        """Repeats of a cut ring alike: what is known of one (its teeth aside) serves all."""
+        return isinstance(other, Ringing) and (self is other or self._said == other._said)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self._said)
 
     def _in_cut(self, modes: TipModes, softer: Array, nuisance: Array) -> tuple[TipModes, Array]:
         """Return the modes of load tests with the stiffness of the cut, and their damping ratios."""
         modes = replace(modes, frequency=modes.frequency / np.sqrt(softer))
         return modes, np.exp(nuisance[:1]) if self.damping is None else self.damping.ratio(modes.frequency)
 
-    def _at(self, heights: Array, passages: Passages) -> Array:
+    def at(self, heights: Array, passages: Passages) -> Array:
         """Interpolate ``heights`` (passes, n) at passages, (points, k)."""
         place = passages.along / self.speed / self.step
         before = np.clip(np.floor(place).astype(np.intp), 0, heights.shape[1] - 2)

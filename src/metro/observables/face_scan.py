@@ -21,8 +21,10 @@ POINT_COLUMNS: tuple[str, ...] = (
 )
 FACE_TABLES: dict[str, tuple[str, ...]] = {
     "face_indices": (
-        *("run", "index_name", "value_um", "bias_um", "corrected_um", "u_um", "sigma_um", "sigma_source"),
+        *("run", "index_name", "value_um", "bias_um", "corrected_um", "u_um", "low_um", "high_um"),
         *(
+            "sigma_um",
+            "sigma_source",
             "local_sigma_um",
             "nesting_index_mm",
             "points",
@@ -100,6 +102,7 @@ def _indices(run: str, face: Face) -> pd.DataFrame:
     rows = [
         {"run": run, "index_name": name, "value_um": index.value / UM, "bias_um": index.bias / UM}
         | {"corrected_um": index.corrected / UM, "u_um": index.sd / UM}
+        | {"low_um": index.low / UM, "high_um": index.high / UM}
         | shared
         for name, index in face.indices.items()
     ]

@@ -12,7 +12,6 @@ import numpy as np
 
 from metro.observables.face_path import Pace, Passages
 from metro.observables.waviness_model import Vibration
-from metro.surface.footprint import RADIUS
 from metro.units import Array
 
 
@@ -37,7 +36,9 @@ class Setup:
     def cuts(self, x: Array, y: Array, passages: Passages, pace: Pace) -> Array:
         """How much higher the rim cuts the points ``x``, ``y`` (n,) at each passage, (n, k) m."""
         about_x, about_y = self.tilt
-        higher = (y[:, None] - passages.y) * about_x - (x[:, None] - passages.x) * about_y
+        higher = np.zeros(passages.along.shape)
+        if about_x or about_y:
+            higher = (y[:, None] - passages.y) * about_x - (x[:, None] - passages.x) * about_y
         if self.growth:
             higher = higher - self.growth * pace.time(passages)
         amplitude, length = self.entry
@@ -56,19 +57,8 @@ class Setup:
 
 
 def swung(vibration: Vibration, phase: float, passages: Passages, pace: Pace) -> Array:
-    """Height of a tip that swings, at passages (n, k), m, as the mean over a footprint keeps it.
-
-    ``phase`` is the face's own, rad.
-    """
+    """Height of a tip that swings, at passages (n, k), m; ``phase`` is the face's own, rad."""
     if not vibration.amplitude:
         return np.zeros(passages.along.shape)
-    kept = _kept(2 * math.pi * vibration.frequency * RADIUS / pace.speed)
     turn = 2 * math.pi * vibration.frequency * pace.time(passages) + phase
-    return np.asarray(kept * vibration.amplitude * np.sin(turn))
-
-
-def _kept(wave: float) -> float:
-    """Share of a wave that its mean over a disc keeps; ``wave`` = 2π radius over wavelength."""
-    from scipy.special import j1
-
-    return 2.0 * float(j1(wave)) / wave
+    return np.asarray(vibration.amplitude * np.sin(turn))

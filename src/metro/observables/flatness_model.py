@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,13 +16,19 @@ from metro.observables.face_setup import Setup, swung
 from metro.observables.problem import Block, Parameter
 from metro.observables.waviness_model import Vibration
 from metro.structure import Structure
+from metro.surface.footprint import RADIUS
 from metro.surface.tip_stiffness import POWERS, Basis, Rows, heights_design
 from metro.units import UM, Array
 
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
 ENTRIES = ("zx", "zy", "zz")
-# Places across the feed, in radii of a disc, and their weights: Gauss's rule for the mean over a disc.
-ACROSS, WEIGHTS = (-math.sqrt(0.5), 0.0, math.sqrt(0.5)), (0.25, 0.5, 0.25)
-NODES = 0.1  # apart, of the logarithm of the damping ratio between which the ringing is interpolated
+# Places across and along the feed, in radii of a disc, whose mean is that over the disc: exact for a cubic,
+# and to 0.2 % of a wave of three radii or more.
+ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
+# Apart, of the logarithms of the damping ratio and of the stiffness; the ringing is interpolated between.
+NODES, STIFF_NODES = 0.1, 0.02
 PHASES = tuple(2 * math.pi * third / 3 for third in range(3))
 
 
@@ -44,8 +52,8 @@ class FaceSetting:
 
     Attributes
     ----------
-    pose : of the arm. x, y : (3 n,) places of n points, m: each one's middle between two to its sides, which
-        stand for its disc. first : index of the first point of each bin that is compared.
+    pose : of the arm. x, y : (4 n,) places of n points, m: four about each one, which stand for its disc.
+    first : index of the first point of each bin that is compared.
     passages : of the rim over the points; ``pace``: when. size : of the work along x and y, m; NaN where
         it is not known.
     force : (3,) mean force on the tool in full engagement, N, work frame.
@@ -65,15 +73,33 @@ class FaceSetting:
     loaded: Array
     ringing: Ringing | None
 
+    @cached_property
+    def middle(self) -> Passages:
+        """The passages with the way of the axis where it is over the middle of the disc."""
+        ahead = np.tile(RADIUS * AHEAD, len(self.x) // len(AHEAD))
+        return replace(self.passages, along=self.passages.along - ahead[:, None])
+
     def mean(self, values: Array) -> Array:
-        """Average the values of places, (3 n,) or (3 n, p), over the discs, and these over the bins."""
-        discs = values.reshape(-1, len(ACROSS), *values.shape[1:])
-        return self.binned(np.tensordot(WEIGHTS, discs, axes=(0, 1)))
+        """Average the values of places, (4 n,) or (4 n, p), over the discs, and these over the bins."""
+        return np.asarray(self._weights @ values)
 
     def binned(self, values: Array) -> Array:
         """Average the values of points, (n,) or (n, p), over the bins."""
-        count = np.diff(np.append(self.first, len(self.x) // len(ACROSS)))
-        return np.asarray((np.add.reduceat(values, self.first, axis=0).T / count).T)
+        return np.asarray((np.add.reduceat(values, self.first, axis=0).T / self._count).T)
+
+    @property
+    def _count(self) -> np.ndarray:
+        """Points in each bin."""
+        return np.diff(np.append(self.first, len(self.x) // len(ACROSS)))
+
+    @cached_property
+    def _weights(self) -> csr_array:
+        """Weight of each place in the mean of each bin: whatever is fitted averages many times."""
+        from scipy.sparse import csr_array
+
+        weight = np.repeat(1.0 / self._count, self._count * len(ACROSS)) / len(ACROSS)
+        begins = np.append(len(ACROSS) * self.first, len(weight))
+        return csr_array((weight, np.arange(len(weight)), begins))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,42 +155,83 @@ class FlatnessModel:
         """Matrix (n, p) in m per (m/N), and what rings, swings or is set up otherwise (n,) m."""
         setting = block.setting
         if isinstance(setting, LoadSetting):
-            parts = [self._own(part, setting.pose, setting.rows.design(part.basis)) for part in self.fields]
-            return np.hstack(parts), np.zeros(len(block.measured))
-        chosen, rest = self.finished(setting, nuisance)
-        x, y = setting.passages.x[chosen], setting.passages.y[chosen]
-        parts = [
-            self._own(
-                part,
-                setting.pose,
-                setting.mean(self.structure.in_cut(heights_design(part.basis, x, y, setting.force))),
-            )
-            for part in self.fields
-        ]
-        bowed = self.setup.bowed(setting.x, setting.y, setting.size)
-        return np.hstack(parts), setting.mean(rest[chosen] + bowed)
-
-    def _own(self, part: PoseField, pose: str, columns: Array) -> Array:
-        return columns[:, part.used] * float(part.pose == pose)
+            return _loaded(self.fields, setting), np.zeros(len(block.measured))
+        own = tuple(float(value) for value in nuisance[:-1])
+        # The phase of no vibration changes nothing.
+        terms, offset = _shaped(self, setting, own, float(nuisance[-1]) if self.vibration.amplitude else 0.0)
+        columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
+        parts = [_own(part, setting.pose, columns) for part in self.fields]
+        return np.hstack(parts), offset.copy()
 
     def finished(self, setting: FaceSetting, nuisance: Array) -> tuple[tuple[np.ndarray, np.ndarray], Array]:
         """Index of the passage that finished each point, and what each cuts over the static height, (n, k) m.
 
         The passages whose cut is lowest; ``nuisance`` as :meth:`nuisance_starts` has it.
         """
+        height, rest = self._heights(setting, nuisance)
+        lowest = height.argmin(axis=1)
+        return (np.arange(len(lowest)), lowest), rest
+
+    def heights(self, setting: FaceSetting, nuisance: Array) -> Array:
+        """Height of the cut at each passage by the load tests, (n, k) m; infinite where there is none."""
+        return self._heights(setting, nuisance)[0]
+
+    def _heights(self, setting: FaceSetting, nuisance: Array) -> tuple[Array, Array]:
         passages = setting.passages
         rest = self.setup.cuts(setting.x, setting.y, passages, setting.pace)
         rest = rest + swung(self.vibration, float(nuisance[-1]), passages, setting.pace)
         if setting.ringing is not None:
             own = tuple(float(value) for value in nuisance[:-1])
-            rest = rest + _rung(setting.ringing, self.structure, own, passages)
+            # What rings is a mean along the feed already: its waves may be shorter than a disc.
+            rest = rest + setting.ringing.at(_rung(setting.ringing, self.structure, own), setting.middle)
+            rest = rest + setting.ringing.of_teeth(self.structure, nuisance[:-1], passages)
         static = self.structure.in_cut(self._static(setting))
-        lowest = np.where(passages.valid, static + rest, np.inf).argmin(axis=1)
-        return (np.arange(len(lowest)), lowest), rest
+        return np.where(passages.valid, static + rest, np.inf), rest
 
     def _static(self, setting: FaceSetting) -> Array:
-        basis = next(part.basis for part in self.fields if part.pose == setting.pose)
-        return _static(basis, setting)
+        return _static(self._basis(setting), setting)
+
+    def _basis(self, setting: FaceSetting) -> Basis:
+        return next(part.basis for part in self.fields if part.pose == setting.pose)
+
+
+def _own(part: PoseField, pose: str, columns: Array) -> Array:
+    """Return those ``columns``, (n, 3 · terms) of a face at ``pose``, that are parameters; else zeros."""
+    count = int(part.used.sum())
+    return columns[:, part.used] if part.pose == pose else np.zeros((len(columns), count))
+
+
+@lru_cache(maxsize=16)
+def _loaded(fields: tuple[PoseField, ...], setting: LoadSetting) -> Array:
+    """Return the matrix of load tests, which no effect of a cut changes."""
+    rows = {part.pose: setting.rows.design(part.basis) for part in fields if part.pose == setting.pose}
+    none = np.zeros((len(setting.rows.displacement), 0))
+    return np.hstack([_own(part, setting.pose, rows.get(part.pose, none)) for part in fields])
+
+
+@lru_cache(maxsize=512)
+def _shaped(
+    model: FlatnessModel, setting: FaceSetting, own: tuple[float, ...], phase: float
+) -> tuple[Array, Array]:
+    """Return the mean of the basis' terms over each bin, (bins, terms), and of all else, (bins,) m.
+
+    Noise and parameters are estimated in turn, so that the same is asked for many times.
+    """
+    chosen, rest = model.finished(setting, np.array([*own, phase]))
+    bowed = model.setup.bowed(setting.x, setting.y, setting.size)
+    finished_by = chosen[1].astype(np.int8).tobytes()
+    return _terms(model._basis(setting), setting, finished_by), setting.mean(rest[chosen] + bowed)
+
+
+@lru_cache(maxsize=512)
+def _terms(basis: Basis, setting: FaceSetting, finished_by: bytes) -> Array:
+    """Mean of the basis' terms where the tool was, (bins, terms); ``finished_by``: index of each passage.
+
+    A little change of an effect leaves nearly always the same passage the lowest.
+    """
+    lowest = np.frombuffer(finished_by, dtype=np.int8).astype(np.intp)
+    rows = np.arange(len(lowest))
+    return setting.mean(basis(setting.passages.x[rows, lowest], setting.passages.y[rows, lowest]))
 
 
 @lru_cache(maxsize=64)
@@ -175,23 +242,31 @@ def _static(basis: Basis, setting: FaceSetting) -> Array:
     return np.asarray((rows @ setting.loaded).reshape(at.x.shape))
 
 
-def _rung(ringing: Ringing, structure: Structure, own: tuple[float, ...], passages: Passages) -> Array:
-    """Return the height over the static one at passages.
+@lru_cache(maxsize=64)
+def _rung(ringing: Ringing, structure: Structure, own: tuple[float, ...]) -> Array:
+    """Return the height over the static one along the passes, (passes, n) m.
 
-    With the stiffness of the load tests, which most fits keep, by cubic interpolation over the logarithm of
-    the damping: to 1e-5 of the ringing.
+    By cubic interpolation over the logarithms of damping and stiffness, where they are not given: to 1e-5 of
+    the ringing for the damping, to 1e-3 for the stiffness.
     """
-    if not own or structure != Structure():
-        return _rung_at(ringing, structure, own, passages)
-    place = own[0] / NODES
+    softer = structure.stiffness_factor != 1.0
+    damping = _cubic(own[0] / NODES) if own else [((), 1.0)]
+    stiffness = _cubic(math.log(structure.stiffness_factor) / STIFF_NODES) if softer else [((), 1.0)]
+    parts = []
+    for (at, weight), (stiff, share) in itertools.product(damping, stiffness):
+        there = Structure(*(math.exp(node * STIFF_NODES) for node in stiff))
+        parts.append(weight * share * _rung_at(ringing, there, tuple(node * NODES for node in at)))
+    return np.asarray(sum(parts))
+
+
+def _cubic(place: float) -> list[tuple[tuple[int, ...], float]]:
+    """Return the four integers about a place, each with its weight in Lagrange's cubic interpolation."""
     first = math.floor(place) - 1
     share = place - first
-    weights = [math.prod((share - j) / (i - j) for j in range(4) if j != i) for i in range(4)]
-    nodes = [_rung_at(ringing, structure, ((first + i) * NODES,), passages) for i in range(4)]
-    return np.asarray(sum(weight * node for weight, node in zip(weights, nodes, strict=True)))
+    return [((first + i,), math.prod((share - j) / (i - j) for j in range(4) if j != i)) for i in range(4)]
 
 
 @lru_cache(maxsize=512)
-def _rung_at(ringing: Ringing, structure: Structure, own: tuple[float, ...], passages: Passages) -> Array:
+def _rung_at(ringing: Ringing, structure: Structure, own: tuple[float, ...]) -> Array:
     """Whatever else shapes the face, this is the same, and slow to have."""
-    return ringing.rest(structure, np.array(own), passages)
+    return ringing.moved(structure, np.array(own))

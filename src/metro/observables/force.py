@@ -64,7 +64,7 @@ def problem(batch: Batch, observed: dict[str, pd.DataFrame], _identified: JSON) 
         *(f"Left out: {reason}." for reason in observed["force_refused"]["reason"]),
     ]
     scatter = np.full(len(model.parameters), SCATTER)
-    next_runs = feasible(blocks, tool)
+    next_runs = feasible(blocks, tool, batch.manifest.get("limits"))
     return Problem(OBSERVABLE, "N", 1.0, model, blocks, scatter, notes=tuple(notes), feasible=next_runs)
 
 

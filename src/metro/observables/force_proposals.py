@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,17 +12,20 @@ from metro.cutting.cutter import Cutter
 from metro.cutting.engagement import Engagement, engagement
 from metro.observables.force_blocks import UNZEROED_SHARE, ZERO_SHARE, zeros
 from metro.observables.force_model import ForceSetting
-from metro.observables.problem import Block, Proposal
-from metro.units import MM
+from metro.observables.problem import Block, Made, Proposal
+from metro.units import DEG, MM
 
 LARGEST_FEED = 0.02  # per tooth, in tool diameters
 SIDE_WIDTH = 0.25  # of a side cut that is proposed, in tool diameters
 SLOT = Engagement(0.0, math.pi)
 LONGER = 3.0
+ROUNDING = 1e-9  # by which what is computed may be above a limit
 HOLE, FACE = "a hole", "a face cut"
 
 
-def feasible(blocks: Sequence[Block], cutter: Cutter) -> tuple[Proposal, ...]:
+def feasible(
+    blocks: Sequence[Block], cutter: Cutter, limits: Mapping[str, Sequence[float]] | None = None
+) -> tuple[Proposal, ...]:
     """Return the runs that could be made after those of a batch, with the same tool.
 
     The first condition again, a longer cut and a record in the air; and of each kind of cut that the batch
@@ -30,26 +33,32 @@ def feasible(blocks: Sequence[Block], cutter: Cutter) -> tuple[Proposal, ...]:
 
     Parameters
     ----------
-    blocks : all runs of the batch; those of the identification are varied.
+    blocks : all runs of the batch; those of the identification are varied. limits : by column of the run
+        table, least and largest value that may be set; None: as deep as the batch went, and feeds that teeth
+        usually bear.
     """
+    most = {column: ends[1] * MM for column, ends in (limits or {}).items()}
     last = max(_setting(block).cut_length for block in blocks)
     made = [
         replace(block, setting=replace(_setting(block), cut_length=last))
         for block in blocks
         if block.role == "identify"
     ]
-    return tuple(_proposals(made, blocks, cutter)) if made else ()
+    return tuple(_proposals(made, blocks, cutter, most)) if made else ()
 
 
-def _proposals(made: Sequence[Block], blocks: Sequence[Block], cutter: Cutter) -> Iterator[Proposal]:
+def _proposals(
+    made: Sequence[Block], blocks: Sequence[Block], cutter: Cutter, most: Mapping[str, float]
+) -> Iterator[Proposal]:
     yield from _first_again(made[0])
     kinds = dict.fromkeys(kind(block) for block in made)
     for name in kinds:
         runs = [block for block in made if kind(block) == name]
         seen = [_setting(block) for block in blocks if kind(block) == name]
-        deepest = max(_setting(block).cut.axial_depth for block in blocks)
+        deepest = most.get("axial_depth_mm", max(_setting(block).cut.axial_depth for block in blocks))
         like = max(runs, key=_feed)
-        yield from _feeds(name, runs, seen, LARGEST_FEED * 2.0 * cutter.radius)
+        largest = most.get("feed_per_tooth_mm", LARGEST_FEED * 2.0 * cutter.radius)
+        yield from _feeds(name, runs, seen, largest)
         yield from _depths(name, runs, seen, deepest)
         yield from _speeds(name, like, seen)
         if name != HOLE:
@@ -80,13 +89,13 @@ def _feed(block: Block) -> float:
     return _setting(block).cut.feed_per_tooth
 
 
-def _proposal(words: str, like: Block, setting: ForceSetting) -> Proposal:
-    """Propose a run with the noise and the zeros of one that it is like."""
+def _proposal(words: str, like: Block, setting: ForceSetting, made: Made | None) -> Proposal:
+    """Propose a run with the noise and the zeros of one that it is like; ``made``: its row, if it has one."""
     recording = setting.recording
     time = np.repeat(recording.middles, len(like.axis) // like.repeats)
     directions = zeros(like.axis, np.asarray(like.labels) == "mean", time, recording)
     block = replace(like, run=f"proposed: {words}", condition=words, setting=setting, zeros=directions)
-    return Proposal(words, (block,))
+    return Proposal(words, (block,), (made,) if made else ())
 
 
 def _first_again(first: Block) -> Iterator[Proposal]:
@@ -94,14 +103,17 @@ def _first_again(first: Block) -> Iterator[Proposal]:
     setting = _setting(first)
     words = f"the first condition ({kind(first)} at {_feed(first) / MM:.3g} mm per tooth) again"
     yield Proposal(
-        f"{words} at the end of the session", (replace(first, run="proposed: first condition again"),)
+        f"{words} at the end of the session",
+        (replace(first, run="proposed: first condition again"),),
+        (Made(first.run),),
     )
     rms = math.sqrt(float(np.sum(first.measured**2)) / first.repeats)
     if first.zero_sd.max() > 2.0 * ZERO_SHARE * rms:
         zeroed = replace(first, zero_sd=first.zero_sd * (ZERO_SHARE / UNZEROED_SHARE))
-        yield _proposal(f"{words} with a record of the air before the cut", zeroed, setting)
+        yield _proposal(f"{words} with a record of the air before the cut", zeroed, setting, Made(first.run))
     if setting.helix is None:
-        yield _proposal(f"{words}, three times as long", first, _longer(setting))
+        made = Made(first.run, {"cut_length_mm": LONGER})
+        yield _proposal(f"{words}, three times as long", first, _longer(setting), made)
     recording = setting.recording
     silent = replace(
         setting,
@@ -110,7 +122,7 @@ def _first_again(first: Block) -> Iterator[Proposal]:
         recording=replace(recording, orbit=0.0, speed=_spindle(setting)),
     )
     words = "a record in the air, spindle turning, as long as that of a run"
-    yield _proposal(words, replace(first, symmetries=None), silent)
+    yield _proposal(words, replace(first, symmetries=None), silent, None)
 
 
 def _longer(setting: ForceSetting) -> ForceSetting:
@@ -130,20 +142,22 @@ def _feeds(
         (fast, 2.0 * most, "twice the largest"),
         (fast, 3.0 * most, "three times the largest"),
     ):
-        if feed <= max(limit, least):
+        if feed <= (1.0 + ROUNDING) * max(limit, least):
             words = f"{name} at {feed / MM:.3g} mm per tooth ({how} feed so far)"
-            yield _proposal(words, like, _fed(_setting(like), feed / _feed(like)))
+            yield _fed(words, like, feed / _feed(like))
 
 
-def _fed(setting: ForceSetting, factor: float) -> ForceSetting:
+def _fed(words: str, like: Block, factor: float) -> Proposal:
     """Feed faster; in a hole the orbit is as much faster, and the bottom edges cut as much more."""
+    setting = _setting(like)
     cut = replace(setting.cut, feed_per_tooth=factor * setting.cut.feed_per_tooth)
     recording, helix = setting.recording, setting.helix
     if helix is not None:
         helix = replace(helix, axial_feed=factor * helix.axial_feed)
         orbit = factor * recording.orbit
         recording = replace(recording, orbit=orbit, speed=_spindle(setting) + orbit / (2.0 * math.pi))
-    return replace(setting, cut=cut, helix=helix, recording=recording)
+    setting = replace(setting, cut=cut, helix=helix, recording=recording)
+    return _proposal(words, like, setting, Made(like.run, {"feed_per_tooth_mm": factor, "orbit_rpm": factor}))
 
 
 def _spindle(setting: ForceSetting) -> float:
@@ -159,17 +173,20 @@ def _depths(
     depths = [setting.cut.axial_depth for setting in seen]
     for factor, how in ((0.5, "half"), (2.0, "twice")):
         depth = factor * min(depths)
-        if depth <= deepest and not any(math.isclose(depth, other, rel_tol=0.2) for other in depths):
+        there = any(math.isclose(depth, other, rel_tol=0.2) for other in depths)
+        if depth <= (1.0 + ROUNDING) * deepest and not there:
             words = f"{name} {depth / MM:.3g} mm deep ({how} the least depth so far)"
-            yield _proposal(words, like, _deep(_setting(like), depth / _setting(like).cut.axial_depth))
+            yield _deep(words, like, depth / _setting(like).cut.axial_depth)
 
 
-def _deep(setting: ForceSetting, factor: float) -> ForceSetting:
+def _deep(words: str, like: Block, factor: float) -> Proposal:
     """Cut deeper; in a hole that is a steeper helix."""
+    setting = _setting(like)
     cut, helix = replace(setting.cut, axial_depth=factor * setting.cut.axial_depth), setting.helix
     if helix is not None:
         helix = replace(helix, pitch=factor * helix.pitch, axial_feed=factor * helix.axial_feed)
-    return replace(setting, cut=cut, helix=helix)
+    setting = replace(setting, cut=cut, helix=helix)
+    return _proposal(words, like, setting, Made(like.run, {"axial_depth_mm": factor}))
 
 
 def _speeds(name: str, like: Block, seen: Sequence[ForceSetting]) -> Iterator[Proposal]:
@@ -180,7 +197,8 @@ def _speeds(name: str, like: Block, seen: Sequence[ForceSetting]) -> Iterator[Pr
         recording = _setting(like).recording
         recording = replace(recording, speed=factor * recording.speed, orbit=factor * recording.orbit)
         words = f"{name} at {round(60.0 * speed, -1):.0f} rpm ({how} speed so far)"
-        yield _proposal(words, like, replace(_setting(like), recording=recording))
+        made = Made(like.run, {"orbit_rpm": factor}, {"spindle_rpm": round(60.0 * speed, -1)})
+        yield _proposal(words, like, replace(_setting(like), recording=recording), made)
 
 
 def _sides(like: Block, kinds: Collection[str], cutter: Cutter) -> Iterator[Proposal]:
@@ -192,12 +210,16 @@ def _sides(like: Block, kinds: Collection[str], cutter: Cutter) -> Iterator[Prop
         if name not in kinds:
             arc = engagement("side", direction, width, cutter.radius)
             words = f"{name}, {width / MM:.3g} mm wide at {_feed(like) / MM:.3g} mm per tooth"
-            yield _proposal(words, like, replace(setting, cut=replace(setting.cut, engagement=arc)))
+            side = replace(setting, cut=replace(setting.cut, engagement=arc))
+            given = {"operation": "side", "direction": direction, "radial_depth_mm": width / MM}
+            yield _proposal(words, like, side, Made(like.run, given=given))
     if "a slot" not in kinds:
         depth = 0.5 * setting.cut.axial_depth
         words = f"a slot {depth / MM:.3g} mm deep at {_feed(like) / MM:.3g} mm per tooth"
         cut = replace(setting.cut, axial_depth=depth, engagement=SLOT)
-        yield _proposal(words, like, replace(setting, cut=cut))
+        given = {"operation": "slot", "direction": "slot", "radial_depth_mm": 2.0 * cutter.radius / MM}
+        made = Made(like.run, {"axial_depth_mm": 0.5}, given)
+        yield _proposal(words, like, replace(setting, cut=cut), made)
 
 
 def _across(name: str, like: Block, seen: Sequence[ForceSetting]) -> Iterator[Proposal]:
@@ -206,4 +228,5 @@ def _across(name: str, like: Block, seen: Sequence[ForceSetting]) -> Iterator[Pr
     turned = setting.feed_direction + 0.5 * math.pi
     if all(abs(math.cos(other.feed_direction - turned)) < math.sqrt(0.5) for other in seen):
         words = f"{name} at {_feed(like) / MM:.3g} mm per tooth with the feed turned by 90°"
-        yield _proposal(words, like, replace(setting, feed_direction=turned))
+        made = Made(like.run, given={"feed_direction_deg": turned / DEG})
+        yield _proposal(words, like, replace(setting, feed_direction=turned), made)

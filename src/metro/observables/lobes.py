@@ -108,7 +108,7 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
     Tables ``modes``, ``frf_used``, ``stabilisation``, ``lobes`` (diagram per position), ``lobe_runs``
     (probability per run with a depth), ``chatter_runs`` (what the runs' own records say), ``chatter_records``
     (a record of each kind), those of :mod:`metro.observables.lobe_methods`, ``lobes_refused`` (reasons and
-    notes).
+    notes). Without modes: what the records say of chatter, and why there are no lobes.
     """
     test = observe_modes(read, batch.instrument("hammer"))
     modes, notes = test.modes, test.notes
@@ -118,7 +118,7 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
         identified = {**printed_modes.printed_coefficients(published), **identified}
         notes = [] if modes.empty else [_PRINTED]
     if modes.empty:
-        return Refusal("; ".join(notes) or "no impacts.csv: no hammer record and no FRF")
+        return _heard(batch, read, "; ".join(notes) or "no impacts.csv: no hammer record and no FRF")
     found = stability.cutting(batch, identified)
     tips = lobe_positions.tips(modes, notes)
     where = lobe_positions.places(read("stations"))
@@ -142,6 +142,19 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
         "chatter_runs": chatter,
         "chatter_records": records,
         "lobes_refused": refused,
+    }
+
+
+def _heard(batch: Batch, read: Read, reason: str) -> dict[str, pd.DataFrame] | Refusal:
+    """Where there are no modes: what the records of the cuts say of chatter, if any says something."""
+    unknown = pd.DataFrame(columns=["used", "frequency_hz", "damping"], dtype=float)
+    chatter = chatter_runs.observe_chatter(batch, read, unknown)
+    if not chatter["probability"].notna().any():
+        return Refusal(reason)
+    return {
+        "chatter_runs": chatter,
+        "chatter_records": chatter_runs.observe_records(batch, read, chatter),
+        "lobes_refused": pd.DataFrame([("refusal", reason)], columns=["kind", "reason"], dtype=str),
     }
 
 
@@ -183,7 +196,7 @@ def _solved(
 
 def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON) -> LabelProblem | Refusal:
     """Return the labelled runs with their predicted probabilities."""
-    if "lobe_runs" not in observed:
+    if "lobes_refused" not in observed:
         return Refusal((identified.get("not_identified") or {}).get(OBSERVABLE, "no impacts.csv: no modes"))
     said = observed["lobes_refused"]
     refusals = said["reason"][said["kind"] == "refusal"]
@@ -265,7 +278,9 @@ def report(
     _problem: LabelProblem | Refusal,
     _fit: object,
 ) -> JSON:
-    """Blocks ``modes`` and ``lobes`` of identified.json."""
+    """Blocks ``modes`` and ``lobes`` of identified.json; none where no modes are known."""
+    if "modes" not in observed:
+        return {}
     modes = [
         {
             "position": _number(row["position"]),

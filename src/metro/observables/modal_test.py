@@ -21,7 +21,7 @@ MODE_COLUMNS = (
 _MORE_COLUMNS = ("mass_sd", "viscous_n_s_m", "viscous_sd", "collinearity", "resolved")
 Read = Callable[..., pd.DataFrame]
 _LEAST_LINES = 40
-_QUIET_LINES = 5  # in a row, below which a drift has ended
+_QUIET_LINES = 5  # in a row, where a drift has ended or a response stands out of the noise
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def _identified(group: list[Receptance], inputs: int, decay: float) -> tuple[Mod
     known = [item.variance for item in group if item.variance is not None]
     variance = np.stack(known, axis=1) if len(known) == len(group) else None
     driving = next((i for i, item in enumerate(group) if item.driving), None)
-    clear = clear_of_drift(group[0].frequency, frf) if variance is None else _clear_of_noise(frf, variance)
+    clear = clear_of_drift(group[0].frequency, frf) if variance is None else clear_of_noise(frf, variance)
     usable = np.logical_and.reduce([item.usable for item in group])
     keep = np.flatnonzero(clear & usable)[:: max(item.redundancy for item in group)]
     model = identify_modes(
@@ -148,18 +148,23 @@ def clear_of_drift(frequency: Array, frf: ComplexArray) -> np.ndarray:
     """
     level = np.sqrt(np.mean(np.abs(frf) ** 2, axis=1))
     low = (level < 30.0 * np.median(level)) | (frequency > 0.25 * frequency[-1])
-    quiet = np.flatnonzero(np.convolve(low, np.ones(_QUIET_LINES), mode="valid") == _QUIET_LINES)
+    quiet = _in_a_row(low)
     return np.arange(len(frequency)) >= (quiet[0] if len(quiet) else 0)
 
 
-def _clear_of_noise(frf: ComplexArray, variance: Array) -> np.ndarray:
-    """Lines from the first to the last that stand out of the scatter of the hits."""
+def _in_a_row(lines: np.ndarray) -> np.ndarray:
+    """Return indices from which on a few lines in a row are true: a single one may be so by chance."""
+    return np.flatnonzero(np.convolve(lines, np.ones(_QUIET_LINES), mode="valid") == _QUIET_LINES)
+
+
+def clear_of_noise(frf: ComplexArray, variance: Array) -> np.ndarray:
+    """Lines from the first to the last few that stand out of the scatter of the hits."""
     level, noise = np.mean(np.abs(frf) ** 2, axis=1), np.mean(variance, axis=1)
-    clear = np.flatnonzero(level > 9.0 * noise)
+    clear = _in_a_row(level > 9.0 * noise)
     lines = np.arange(len(frf))
     if len(clear) < _LEAST_LINES:
         return lines >= 0
-    inside: np.ndarray = (lines >= clear[0]) & (lines <= clear[-1])
+    inside: np.ndarray = (lines >= clear[0]) & (lines < clear[-1] + _QUIET_LINES)
     return inside
 
 

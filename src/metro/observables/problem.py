@@ -122,16 +122,30 @@ class Model(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Made:
+    """A row of the run table as it would be made: like that of run ``like``, but for some settings.
+
+    ``times``: columns whose number is so many times as large; ``given``: columns with another value.
+    """
+
+    like: str
+    times: Mapping[str, float] = field(default_factory=dict)
+    given: Mapping[str, float | str] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, eq=False)
 class Proposal:
     """Runs that could be made next.
 
     ``words``: what they are, for the report. ``blocks`` hold the setting of each run as it would be made;
-    their ``measured`` is that of a run like it, for the size of the signal alone.
+    their ``measured`` is that of a run like it, for the size of the signal alone. ``made``: the row of the
+    run table of each block; empty where they are no runs of the run table (a load test, a record in the air).
     """
 
     words: str
     blocks: tuple[Block, ...]
+    made: tuple[Made, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -173,7 +173,7 @@ def _waves(batch: Batch, points: pd.DataFrame) -> pd.DataFrame:
     cutoff = float(batch.instrument("profiler").get("cutoff_mm", 8.0)) * MM
     parts = []
     for run, rows in points.groupby("run", sort=False):
-        strayed = np.column_stack([rows[STRAYED].sum(axis=1), rows[IDLE]])
+        strayed = np.column_stack([rows[STRAYED].sum(axis=1), rows[IDLE].sum(axis=1, skipna=False)])
         tip, idle = part(strayed, SPACING, cutoff).waviness.T
         columns = {"x_mm": rows["x_mm"], "wall_um": rows["waviness_um"], "tip_um": tip, "idle_um": idle}
         parts.append(pd.DataFrame({"run": run, **columns})[rows["kept"].to_numpy(dtype=bool)])

@@ -15,7 +15,7 @@ from metro.observables.problem import Block
 from metro.observables.tip_force import FORCE, SET
 from metro.observables.wall import wall
 from metro.observables.waviness_model import WavyCut
-from metro.observables.waviness_points import GRID, IDLE, STRAYED
+from metro.observables.waviness_points import ENCODER, GRID, IDLE, STRAYED
 from metro.robot.kinematics import Arm
 from metro.robot.statics import joint_torque, tip_jacobian
 from metro.surface.profile import part, transmission
@@ -45,7 +45,9 @@ def wave_block(
     ----------
     points, facts : the run's rows of ``waviness_points`` and ``waviness_runs``. force : on the tip along the
         path (table ``tip_force``); None where it is not known. compliance : (6,) of the joints, rad/(N m).
-    What of the tracking error drowns in the noise of the encoders is the same in all repeats.
+    What of the tracking error drowns in the noise of the encoders is the same in all repeats. Each joint
+    counts by what stands out of the noise of its own encoder: at the tip that of the first joints is larger,
+    by the distance to them, than what the joints of the wrist stray.
     """
     row: Any = batch.runs.loc[run]
     kept = points["kept"].to_numpy(dtype=bool)
@@ -57,12 +59,12 @@ def wave_block(
     band = part(np.eye(len(points)), GRID, cutoff, shortest).waviness[kept]
     passes = transmission(length, shortest) - transmission(length, cutoff)
     by_joint = waves @ band @ (points[STRAYED].to_numpy() * UM)
-    coded = (facts["encoder_um"] * UM) ** 2 * step / GRID
+    coded = (np.array([facts[name] for name in ENCODER], dtype=float) * UM) ** 2 * step / GRID
     profile = points.loc[kept, "waviness_um"].to_numpy() * UM
-    share = signal_share(by_joint.sum(axis=1) / passes, float(coded), waves @ profile / passes)
     profiler = float(batch.instrument("profiler").get("sigma_mm", 0.0005)) * MM
     traced = profiler**2 * facts["profile_step_mm"] * MM / GRID
-    strayed = points[STRAYED].to_numpy().sum(axis=1) * UM
+    share, missed = signal_share(by_joint / passes[:, None], coded, waves @ profile / passes, traced)
+    strayed = points[STRAYED].to_numpy() * UM
     longer, _ = wave_basis(int(kept.sum()), GRID, cutoff, np.inf)
     place, axis = points.loc[kept, "x_mm"].to_numpy(), np.full(int(kept.sum()), "z")
     return Block(
@@ -72,18 +74,18 @@ def wave_block(
         order=int(row["order"]),
         measured=waves @ profile,
         sigma=np.broadcast_to(passes * math.sqrt(traced), length.shape),
-        alike=passes * np.sqrt(coded * share),
+        alike=passes * np.sqrt(missed),
         setting=WavyCut(
             by_joint=by_joint,
             idle=_known(waves @ band @ (points[IDLE].to_numpy() * UM)),
             share=share,
-            longer=np.stack([longer @ profile, longer @ (band @ strayed)]) @ longer,
+            longer=np.stack([longer @ profile, longer @ (band @ strayed.sum(axis=1))]) @ longer,
             filtered=waves @ band,
             compliance=compliance,
             **_joints(points, force, arm, wall(batch, run).normal),
         ),
         axis=np.full(len(length), "z"),
-        zeros=(share * (waves @ band @ np.gradient(strayed, GRID)))[:, None],
+        zeros=(share * (waves @ band @ np.gradient(strayed, GRID, axis=0))).sum(axis=1)[:, None],
         zero_sd=np.array([min(facts["shift_sd_mm"] * MM, LOOSEST)]),
         coordinates={"axis": axis, "s_mm": place, "x_mm": place, "t_s": points.loc[kept, "t_s"].to_numpy()},
         synthesis=waves.T,

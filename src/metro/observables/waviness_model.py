@@ -27,8 +27,8 @@ class WavyCut:
     Attributes
     ----------
     by_joint : (n, 6) tracking error of the tip along the wall's normal by the encoders, joint by joint,
-        filtered as the profile is, m. idle : (n,) that of the idle run, all joints; None where there is none.
-    share : (n,) of each wave that may be more than the noise of the encoders.
+        filtered as the profile is, m. idle : (n, 6) that of the idle run; None where there is none.
+    share : (n, 6) of each joint's waves that may be more than the noise of its encoder.
     q, rate : (m, 6) joint angles, rad, and speeds, rad/s. t : (m,) from the start of the log of the cut, s.
     moves : (m, 6) how far a turn of each joint takes the tip along the wall's normal, m/rad.
     load : (m, 6) torque of the steady cut on the link of each joint, N m; zero where no force is known.
@@ -53,7 +53,7 @@ class WavyCut:
     @property
     def tracking(self) -> Array:
         """Tracking error (n,) as far as it stands out of the noise, m."""
-        return np.asarray(self.share * self.by_joint.sum(axis=1))
+        return np.asarray((self.share * self.by_joint).sum(axis=1))
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,8 @@ ALIGNED = (
 LEAST_LENGTH = 3  # cut-offs: one is left out at either end, one at least is compared
 LEAST_SAMPLES = 16
 STRAYED = [f"strayed{i}_um" for i in JOINTS]
-IDLE = "strayed_idle_um"
+IDLE = [f"strayed_idle{i}_um" for i in JOINTS]
+ENCODER = [f"encoder{i}_um" for i in JOINTS]
 
 Points = tuple[pd.DataFrame, dict[str, object]]
 
@@ -49,8 +50,9 @@ def wave_points(
     -------
     tuple
         Per point ``x_mm, t_s, waviness_um, kept``, joint angles, the tip's tracking error along the wall's
-        normal by joint and (NaN where there is none) of the idle run; and ``shift_mm, shift_sd_mm, shifted,
-        alike, shortest_mm, profile_step_mm, log_step_mm, encoder_um, idle_speed``.
+        normal by joint, and (NaN where there is none) that of the idle run; and ``shift_mm, shift_sd_mm,
+        shifted, alike, shortest_mm, profile_step_mm, log_step_mm, idle_speed``, and the noise of each joint's
+        encoder at the tip, ``encoder1_um …``.
     """
     try:
         x, z = even(profile["x_mm"].to_numpy(dtype=float) * MM, profile["z_mm"].to_numpy(dtype=float) * MM)
@@ -72,7 +74,7 @@ def wave_points(
             return found
     back = _way(idle, arm, wall) if len(idle.tip) else None
     place = found["x_mm"].to_numpy() * MM - shift.value * shift.told
-    found[IDLE] = np.full(len(found), np.nan) if back is None else back.strayed_at(place).sum(axis=1) / UM
+    found[IDLE] = np.full((len(found), len(IDLE)), np.nan) if back is None else back.strayed_at(place) / UM
     facts: dict[str, object] = {
         "shift_mm": shift.value / MM,
         "shift_sd_mm": shift.sd / MM,
@@ -81,8 +83,8 @@ def wave_points(
         "shortest_mm": shortest / MM,
         "profile_step_mm": (x[1] - x[0]) / MM,
         "log_step_mm": step / MM,
-        "encoder_um": math.sqrt(white_noise(way.strayed.sum(axis=1))) / UM,
         "idle_speed": math.nan if back is None else back.speed / way.speed,
+        **{name: math.sqrt(white_noise(one)) / UM for name, one in zip(ENCODER, way.strayed.T, strict=True)},
     }
     return found, facts
 

@@ -37,7 +37,7 @@ def waviness_of(block: Block, predicted: Array) -> JSON:
         "predicted": block.to_rows(predicted) + run.longer[1],
     }
     if run.idle is not None:
-        profiles["idle"] = block.to_rows(run.share * run.idle) + run.longer[1]
+        profiles["idle"] = block.to_rows((run.share * run.idle).sum(axis=1)) + run.longer[1]
     drawn = _drawn(len(profiles["measured"]), block.order)
     found: JSON = {}
     for name, profile in profiles.items():
@@ -50,7 +50,7 @@ def waviness_of(block: Block, predicted: Array) -> JSON:
         found[key] = _quantity(_alike, (measured, profile), drawn, "1", 1.0)
     return found | {
         "coherence": coherence(block),
-        "joint_share": joint_share(run.share[:, None] * run.by_joint).tolist(),
+        "joint_share": joint_share(run.share * run.by_joint).tolist(),
     }
 
 
@@ -89,7 +89,7 @@ def transfer(blocks: Sequence[Block], other: Sequence[Array]) -> JSON:
     """
     sums = np.array(
         [
-            (block.setting.share * block.setting.idle)
+            (block.setting.share * block.setting.idle).sum(axis=1)
             @ np.stack([block.measured - rest, block.setting.by_joint.sum(axis=1)], axis=1)
             for block, rest in zip(blocks, other, strict=True)
             if block.setting.idle is not None
