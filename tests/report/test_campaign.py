@@ -17,7 +17,8 @@ EMPTY = {"format": 1, "batch": "modes-only", "metro": "0", "observables": {}}
 
 def processed(folder, started=""):
     folder.mkdir(parents=True)
-    runs = pd.DataFrame({"run": ["r1"], "started_at": [started]}).set_index("run")
+    runs = pd.DataFrame({"run": ["r1"], "operation": ["slot"], "role": ["validate"], "started_at": [started]})
+    runs = runs.set_index("run")
     manifest = {"cell": "cell-a", "source": "measured"}
     write_batch(folder, Batch(folder.name, manifest, {"cell": "cell-a"}, runs, {}), {})
     (folder / "loop.json").write_text(json.dumps({"observables": {}}))
@@ -43,7 +44,7 @@ def test_a_campaign_without_verdicts_has_an_empty_table_of_the_same_columns(verd
     assert list(empty.columns) == list(campaign_table(verdicts).columns)
 
 
-def test_the_stage_writes_both_files_and_the_pdf_names_what_could_not_be_told(tmp_path, verdicts):
+def test_the_stage_writes_its_files_and_the_pdf_names_what_could_not_be_told(tmp_path, verdicts):
     folders = []
     for name, verdict in verdicts.items():
         folder = tmp_path / "reports" / name
@@ -54,6 +55,8 @@ def test_the_stage_writes_both_files_and_the_pdf_names_what_could_not_be_told(tm
         processed(tmp_path / "processed" / name)
     campaign(folders, tmp_path / "processed", tmp_path / "out", {}, "c0de")
     assert len(pd.read_parquet(tmp_path / "out" / "summary.parquet")) == 4
+    page = (tmp_path / "out" / "summary.html").read_text(encoding="utf-8")
+    assert 'href="../reports/modes-only/report.pdf"' in page
     document = pypdfium2.PdfDocument(tmp_path / "out" / "summary.pdf")
     text = " ".join(
         " ".join(document[i].get_textpage().get_text_range() for i in range(len(document))).split()

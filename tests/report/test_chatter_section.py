@@ -6,9 +6,10 @@ import pandas as pd
 import pytest
 import synthetic_results as synthetic
 
-from metro.report.content import Bullets, Picture, Table
+from metro.report.content import Bullets, Paragraph, Picture, Section, Table
 from metro.report.figures import chatter as figures
-from metro.report.sections.chatter import chatter_items
+from metro.report.sections.chatter import chatter_flags, chatter_items
+from metro.report.sections.quality import with_flags
 from metro.report.style import to_svg
 
 RUNS = pd.DataFrame(
@@ -127,3 +128,38 @@ def test_the_same_tests_give_the_same_bytes():
     tests = RUNS.assign(position="1", wrong_label=False)
     first, second = (to_svg(figures.tests_chart(synthetic.boundary(), tests)) for _ in range(2))
     assert first == second
+
+
+@pytest.fixture
+def forces():
+    """Return what gives the results of a batch of forces with the records of its cuts, and no lobes."""
+    made = synthetic.results()
+    batch = replace(made.batch, manifest={**made.batch.manifest, "tool": {"teeth": 4}})
+    tables = {name: table for name, table in synthetic.tables().items() if not name.startswith("lobe")}
+
+    def results(runs):
+        return replace(made, batch=batch, tables={**tables, "chatter_runs": runs})
+
+    return results
+
+
+def test_a_cut_that_chatters_among_measurements_of_the_force_is_flagged_on_the_first_page(forces):
+    results = forces(RUNS.assign(labelled=-1))
+    flags = chatter_flags(results)
+    assert [flag.split(":")[0] for flag in flags] == ["b", "c"]
+    assert "68" in flags[0]
+    first = with_flags(Section("Summary", [Paragraph("all is well")]), results)
+    assert any("b: chatters at 68" in getattr(item, "text", "") for item in first.items)
+
+
+def test_tests_of_the_lobes_that_chatter_are_no_flaw():
+    tables = {**synthetic.tables(), "chatter_runs": RUNS, "lobe_runs": LOBES}
+    assert "lobes_final" in tables
+    assert chatter_flags(replace(synthetic.results(), tables=tables)) == []
+
+
+def test_where_nothing_chatters_and_nothing_is_predicted_a_sentence_is_enough(forces):
+    quiet = RUNS.assign(probability=0.02, labelled=-1, separable=True)
+    items = chatter_items(forces(quiet))
+    assert not tables_of(items)
+    assert "None of 5" in items[-1].items[0]

@@ -1,6 +1,8 @@
 """What is left over, in words."""
 
-from metro.report.phrases import plain, rest_words
+import pytest
+
+from metro.report.phrases import plain, rest_words, sentence
 
 
 def place(axis, label, relative, excess=None, significant=True):
@@ -43,3 +45,16 @@ def test_sentences_of_the_verdict_lose_their_jargon():
         "repeats spread over the session, to describe what is left"
     )
     assert plain("a test beside run c08") == "a test beside run c08"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("effects need tests.", "Effects need tests."),
+        ("position 1: turned", "Position 1: turned."),
+        ("x is the feed", "x is the feed."),
+        ("k_x is not known", "k_x is not known."),
+    ],
+)
+def test_a_note_becomes_a_sentence_and_symbols_stay(text, told):
+    assert sentence(text) == told

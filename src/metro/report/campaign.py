@@ -18,6 +18,7 @@ from metro.report.sections.memory import memory_section
 from metro.report.sections.verdict import STATUS, change, effect_words, error_cell, known_interval
 from metro.units import JSON
 
+TITLE = "Campaign summary"
 PER_FIGURE = 24
 MOST_LINES = 6
 TEXT = (
@@ -65,22 +66,30 @@ def campaign_report(
 
     ``memory``: content of ``memory.json``; ``failed``: batches without a result, and why.
     """
+    cover = Cover(TITLE, f"{len(verdicts)} batches", f"metro {__version__}")
+    return compile_pdf(cover, campaign_sections(verdicts, identified, memory, failed))
+
+
+def campaign_sections(
+    verdicts: Mapping[str, JSON],
+    identified: Mapping[str, JSON],
+    memory: JSON | None = None,
+    failed: Mapping[str, str] | None = None,
+) -> list[Section]:
+    """Return what the summary says, for whatever it is set in."""
     entries = _entries(verdicts)
     nexts = [
         f"{b}, {title(n)}: {plain(e['next_experiment'])}" for b, n, e in entries if e.get("next_experiment")
     ]
-    sections = [
+    return [
         *_failed(failed or {}),
-        *([Section("What to measure next", [Bullets(nexts)])] if nexts else []),
         Section(
             "Verdicts", [Paragraph(_overview(verdicts), "verdict"), *_verdicts(entries), *_pictures(entries)]
         ),
+        *([Section("What to measure next", [Bullets(nexts)])] if nexts else []),
         *memory_section(memory or {}),
         Section("What could not be told", _untold(entries, identified)),
     ]
-    return compile_pdf(
-        Cover("Campaign summary", f"{len(verdicts)} batches", f"metro {__version__}"), sections
-    )
 
 
 def _failed(failed: Mapping[str, str]) -> list[Section]:

@@ -27,6 +27,13 @@ def rest_words(entries: Sequence[JSON], teeth: int) -> str:
     return "; ".join(_kind_words(kind, found) for kind, found in ranked)
 
 
+def sentence(text: str) -> str:
+    """Return a text with a capital at its start and a full stop at its end; a symbol stays as it is."""
+    first = text.split(maxsplit=1)[0]
+    start = text[0].upper() if first.rstrip(":,").isalpha() and len(first) > 1 else text[0]
+    return start + text[1:].rstrip(".") + "."
+
+
 def plain(text: str) -> str:
     """Return a sentence of ``verdict.json`` with the places of a signature in words.
 

@@ -41,6 +41,8 @@ RC = {
     "xtick.direction": "out",
     "ytick.direction": "out",
     "axes.unicode_minus": True,
+    # names of runs are not formulas, whatever dollars they hold; a label that is one says so (parse_math)
+    "text.parse_math": False,
     "svg.hashsalt": "metro",
     "svg.fonttype": "path",
 }

@@ -132,7 +132,7 @@ def orbit(forces: pd.DataFrame, spindle_rpm: float) -> Figure:
             left.plot(at, middle, color=style.AFTER, label="mean over a revolution")
             near = time <= time[0] + REVOLUTIONS * revolution
             right.plot(1e3 * (time[near] - time[0]), force[near], color=style.AFTER)
-            left.set_ylabel(f"$F_{name}$ (N)")
+            left.set_ylabel(f"$F_{name}$ (N)", parse_math=True)
         grid[0][0].set_title("one orbit", loc="left")
         grid[0][1].set_title("its first two revolutions of the tool", loc="left")
         grid[-1][0].set_xlabel("time (s)")

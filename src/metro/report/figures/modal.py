@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from metro.report import style
+from metro.report.numbers import number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +40,7 @@ def responses(frf: pd.DataFrame) -> Figure:
             axes.semilogy(
                 thin["frequency_hz"], thin["modal_m_n"], color=style.BEFORE, ls="--", label="modal model"
             )
-            error = f" ({100.0 * part['error'].iloc[0]:.2g} %)" if "error" in part else ""
+            error = f" ({number(100.0 * part['error'].iloc[0], 2)} %)" if "error" in part else ""
             axes.set_title(f"position {position}: {reference} → {response}{error}", loc="left")
             axes.yaxis.set_minor_formatter(NullFormatter())
         for row in grid:

@@ -36,7 +36,7 @@ def interactions(ranking: Sequence[JSON]) -> Figure:
         figure, grid = style.new_figure(2.7, 1, len(pairs), sharey=True)
         for axes, (across, beside) in zip(grid[0], pairs, strict=True):
             _pair(axes, ranking, across, beside)
-        grid[0][0].set_ylabel("$X_m$ (µm)")
+        grid[0][0].set_ylabel("$X_m$ (µm)", parse_math=True)
         grid[0][0].set_yscale("log")
         ticks(grid[0][0], [float(row["xm"]["value"]) for row in ranking])
     return figure
@@ -147,7 +147,7 @@ def _list(axes: Axes, rows: Sequence[JSON], key: str, label: str) -> None:
     axes.set_yticks(height, [row["configuration"] for row in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlim(left=0)
-    axes.set_xlabel("$X_m$ (µm)")
+    axes.set_xlabel("$X_m$ (µm)", parse_math=True)
     for y, row in zip(height, rows, strict=True):
         if row.get("probability_best") is not None:
             axes.annotate(
@@ -173,5 +173,5 @@ def advice(rows: Sequence[JSON]) -> Figure:
     with style.style():
         figure, grid = style.new_figure(0.7 + 0.27 * max(len(shown), 3))
         _list(grid[0][0], shown, "xm_predicted", "predicted")
-        grid[0][0].set_xlabel("$X_m$ predicted (µm); beside: probability of being the least")
+        grid[0][0].set_xlabel("$X_m$ predicted (µm); beside: probability of being the least", parse_math=True)
     return figure

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from metro.report.content import Item, Paragraph, Section, Table
 from metro.report.numbers import listing, number, percent, probability, quantity, unit, words
+from metro.report.phrases import sentence
 from metro.report.results import Results, title
 from metro.report.sections.verdict import parameter_name
 from metro.units import JSON
@@ -48,7 +49,7 @@ def _story(told: list[JSON]) -> list[Item]:
     )
     table = Table(header, rows, caption, [1.5, 1.9, 2.0, 0.9, 1.4], numeric=[3])
     notes = [str(cause["words"]) for cause in told if cause["status"] in SAID]
-    return [table, *(Paragraph(_capital(note), "warning") for note in notes)]
+    return [table, *(Paragraph(sentence(note), "warning") for note in notes)]
 
 
 def cause_name(cause: JSON) -> str:
@@ -62,10 +63,6 @@ def _values(cause: JSON) -> str:
         return "not one value"
     told = [f"{parameter_name(name, value)} {quantity(value)}" for name, value in cause["parameters"].items()]
     return ", ".join(told) or "–"
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def upstream(results: Results) -> Section | None:

@@ -29,12 +29,27 @@ def chatter_items(results: Results) -> list[Item]:
         return []
     items: list[Item] = [Heading("Chatter in the records")]
     boundary = results.tables.get("lobes_final")
+    if boundary is None and (tests["unstable"] == 0).all() and not tests["wrong_label"].any():
+        return [*items, Bullets([f"None of {len(tests)} records that could be judged holds chatter."])]
     if boundary is not None and tests["position"].notna().any():
         caption = "Test cuts on the stability boundary, by what their own records say"
         caption += ", with the probability of chatter." if len(tests) <= figures.NUMBERED else "."
         items.append(Picture(figures.tests_chart(boundary, tests), caption, caption))
     items += [_table(tests, results.batch.manifest), *_confusion(tests), Bullets(_words(tests))]
     return [*items, *_records(results, tests), *_roughness(tests)]
+
+
+def chatter_flags(results: Results) -> list[str]:
+    """Name the cuts that chattered in a batch that is no test of stability: its models assume none did."""
+    tests = _tests(results) if results.tables.get("lobes_final") is None else None
+    if tests is None:
+        return []
+    loud = tests[tests["unstable"] > 0].sort_values("probability", ascending=False)
+    return [
+        f"{row['run']}: chatters at {number(row['chatter_hz'])} Hz (probability "
+        f"{probability(row['probability'])}), and no model of the force holds there"
+        for _, row in loud.iterrows()
+    ]
 
 
 def _tests(results: Results) -> pd.DataFrame | None:
@@ -141,9 +156,14 @@ def _records(results: Results, tests: pd.DataFrame) -> list[Item]:
     records = results.tables.get("chatter_records")
     if records is None:
         return []
+    kinds = {
+        "a cut that chattered": (tests["unstable"] > 0).any(),
+        "a stable one": (tests["unstable"] == 0).any(),
+    }
+    cuts = " and in ".join(kind for kind, there in kinds.items() if there)
     caption = (
-        "Force in a cut that chattered and in a stable one: spectrum of the whole steady cut, and its last "
-        "turns. What chatters stands between the orders of the spindle."
+        f"Force in {cuts}: spectrum of the whole steady cut, and its last turns. What chatters stands "
+        "between the orders of the spindle."
     )
     chart = figures.records_chart(records, tests, int(results.batch.manifest["tool"]["teeth"]))
     return [Picture(chart, caption, caption)]

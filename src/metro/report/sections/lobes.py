@@ -119,7 +119,7 @@ def _stations(stations: pd.DataFrame) -> Table:
 
 def cut_items(results: Results, frame: pd.DataFrame) -> list[Item]:
     """Draw the held-out test cuts on the boundary and tabulate the probability of each."""
-    tests = _placed(results, frame)
+    tests = placed(results, frame)
     items: list[Item] = []
     boundary = results.tables.get("lobes_final")
     if boundary is not None:
@@ -156,7 +156,7 @@ def cut_items(results: Results, frame: pd.DataFrame) -> list[Item]:
     return items
 
 
-def _placed(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
+def placed(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
     """Join the held-out labels to where they were cut."""
     runs = results.batch.runs
     at = runs.reindex(frame["run"])

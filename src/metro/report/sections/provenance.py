@@ -7,6 +7,7 @@ import json
 from metro import __version__
 from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
 from metro.report.numbers import listing
+from metro.report.phrases import sentence
 from metro.report.results import Results, title
 
 LONGEST = 400
@@ -58,9 +59,8 @@ def _limits(results: Results) -> list[Item]:
     for observable in results.verdicts():
         own = [str(note) for note in results.told(observable).get("notes") or []]
         limit = [] if results.batch.manifest.get("source") == "published" else [LIMITS.get(observable, "")]
-        text = " ".join(note.rstrip(".") + "." for note in [*limit, *own] if note)
-        name = title(observable)
-        notes.append(f"{name[0].upper()}{name[1:]}: {text}")
+        text = " ".join(sentence(note) for note in [*limit, *own] if note)
+        notes.append(f"{sentence(title(observable)).rstrip('.')}: {text}")
     return [Heading("Limits of the models"), Bullets(notes)] if notes else []
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 from metro.report.content import Item, Paragraph, Section, Table
 from metro.report.numbers import listing, number, words
 from metro.report.results import Results
+from metro.report.sections.chatter import chatter_flags
 
 LONGEST, MOST_NAMES, MOST_FLAGS = 40, 24, 5
 
@@ -47,10 +48,11 @@ def with_flags(first: Section, results: Results) -> Section:
     """Return the first page with what is wrong in the raw data, and what was left out for it."""
     table = results.tables.get("qc")
     failed = [] if table is None else table[~table["ok"].astype(bool)].to_dict("records")
-    if not failed:
-        return first
     failed.sort(key=lambda row: "left out" not in str(row["message"]))
     told = [": ".join(str(row[part]) for part in ("file", "message") if row[part]) for row in failed]
+    told = [*chatter_flags(results), *told]
+    if not told:
+        return first
     more = f" And {len(told) - MOST_FLAGS} more, see Data quality." if len(told) > MOST_FLAGS else ""
     text = f"Flagged in the raw data: {'; '.join(told[:MOST_FLAGS])}.{more}"
     return replace(first, items=[*first.items[:1], Paragraph(text, "warning"), *first.items[1:]])

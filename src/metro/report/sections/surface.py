@@ -14,7 +14,6 @@ from metro.report.results import Results
 LONGEST = 24
 RAW = {"xm": "X_m", "xa": "X_a", "xg": "X_g", "percentile_range": "P0.1 … P99.9"}
 ISO = {"fltt": "FLTt", "fltp": "FLTp", "fltv": "FLTv", "fltq": "FLTq", "minimum_zone": "minimum zone"}
-NORMAL = 1.96
 
 
 def flatness(results: Results) -> Section | None:
@@ -63,10 +62,9 @@ def _indices(
 def _read_and_corrected(part: pd.DataFrame, name: str) -> tuple[str, str]:
     if name not in part.index:
         return "–", "–"
-    value, corrected, u = _numbers(part, name, "value_um", "corrected_um", "u_um")
-    if not math.isfinite(u):
+    value, corrected, low, high = _numbers(part, name, "value_um", "corrected_um", "low_um", "high_um")
+    if not math.isfinite(high):
         return number(value), "–"
-    low, high = max(0.0, corrected - NORMAL * u), corrected + NORMAL * u
     return number(value), with_interval(corrected, [low, high])
 
 
@@ -101,14 +99,14 @@ def _by_noise_alone(faces: dict[str, pd.DataFrame]) -> list[Item]:
     """Say of which faces X_m is noise: all of it, or, where no filter took some of it out, most of it."""
     said = []
     for run, part in faces.items():
-        value, bias, corrected, u, sigma = _numbers(
-            part, "xm", "value_um", "bias_um", "corrected_um", "u_um", "sigma_um"
+        value, bias, corrected, low, high, sigma = _numbers(
+            part, "xm", "value_um", "bias_um", "corrected_um", "low_um", "high_um", "sigma_um"
         )
         unfiltered = not math.isfinite(float(part["nesting_index_mm"].iloc[0]))
-        alone = corrected <= NORMAL * u
-        if not u > 0 or not (alone or (unfiltered and bias > value / 2)):
+        alone = low <= 0.0
+        if not high > 0 or not (alone or (unfiltered and bias > value / 2)):
             continue
-        face = with_interval(corrected, [max(0.0, corrected - NORMAL * u), corrected + NORMAL * u])
+        face = with_interval(corrected, [low, high])
         told = "is not told from flat" if alone else "is the rest"
         said.append(
             f"{run}: X_m reads {number(value)} µm, but {number(bias)} µm of that is what noise of "

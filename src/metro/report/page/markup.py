@@ -1,0 +1,114 @@
+"""HTML that escapes whatever it is given, and the report's items written in it."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from metro.report.content import Bullets, Facts, Heading, Item, Paragraph, Picture, Table
+from metro.report.style import to_svg
+
+SHORT = 26  # characters of a cell that is not broken into lines
+VOID = {"meta", "img", "hr"}
+# By a sign as well as by a word and a colour: told apart in grey print, too
+SIGNS = {
+    "clean": "✓",
+    "explained": "✓",
+    "partly explained": "◐",
+    "undetermined": "?",
+    "unexplained": "!",
+    "insufficient data": "–",
+}
+
+
+class Html(str):
+    """Text that is markup already; any other text is escaped where it is put into markup."""
+
+    __slots__ = ()
+
+
+def tag(name: str, /, *children: str, **attributes: str) -> Html:
+    """Return an element; ``class_`` stands for the attribute ``class``, ``_`` in a name for a hyphen."""
+    said = "".join(
+        f' {key.rstrip("_").replace("_", "-")}="{html.escape(value)}"' for key, value in attributes.items()
+    )
+    inside = joined(children)
+    return Html(f"<{name}{said}>" if name in VOID else f"<{name}{said}>{inside}</{name}>")
+
+
+def joined(children: Sequence[str]) -> Html:
+    """Put texts one after the other, each escaped unless it is markup."""
+    return Html("".join(each if isinstance(each, Html) else html.escape(each) for each in children))
+
+
+def embedded(content: Any) -> Html:
+    """Return JSON for a ``script`` element: nothing in it can close the element or open a comment."""
+    text = json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return Html(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+
+
+def badge(status: str) -> Html:
+    """Return a verdict's word with its sign."""
+    sign = tag("span", SIGNS.get(status, "–"), aria_hidden="true")
+    return tag("span", sign, f" {status}", class_=f"badge {status.replace(' ', '-')}")
+
+
+def items_of(items: Sequence[Item], links: Mapping[str, str], level: int = 3) -> Html:
+    """Write paragraphs, lists, tables and figures of a report.
+
+    Parameters
+    ----------
+    links : name of a batch → where a table's cell with that name leads to. level : of headings among them.
+    """
+    return joined([_item(item, links, level) for item in items])
+
+
+def _item(item: Item, links: Mapping[str, str], level: int) -> Html:
+    match item:
+        case Paragraph():
+            return tag("p", item.text, class_=item.look)
+        case Bullets():
+            return tag("ul", *(tag("li", text) for text in item.items))
+        case Heading():
+            return tag(f"h{level}", item.text)
+        case Facts():
+            pairs = [tag("div", tag("dt", a), tag("dd", b, " ", tag("small", c))) for a, b, c in item.items]
+            return tag("dl", *pairs)
+        case Picture():
+            source = "data:image/svg+xml;base64," + base64.b64encode(to_svg(item.figure)).decode()
+            return tag(
+                "figure",
+                tag("img", src=source, alt=item.alt),
+                tag("figcaption", item.caption),
+                class_="still",
+            )
+        case Table():
+            return _table(item, links)
+
+
+def _table(table: Table, links: Mapping[str, str]) -> Html:
+    head = tag("tr", *(tag("th", name, scope="col") for name in table.header))
+    rows = [
+        tag("tr", *(_cell(n, c, links) for n, c in zip(table.header, row, strict=True))) for row in table.rows
+    ]
+    caption = tag("caption", table.caption)
+    # wide tables scroll by themselves, and with the keyboard
+    return tag(
+        "div",
+        tag("table", caption, tag("thead", head), tag("tbody", *rows)),
+        class_="scroll",
+        tabindex="0",
+        role="group",
+        aria_label=table.caption,
+    )
+
+
+def _cell(column: str, text: str, links: Mapping[str, str]) -> Html:
+    if column == "batch" and text in links:
+        return tag("td", tag("a", text, href=links[text]), class_="short")
+    if column == "verdict":
+        return tag("td", badge(text))
+    return tag("td", text, class_="short") if len(text) <= SHORT else tag("td", text)

@@ -1,0 +1,98 @@
+"""A page of two batches with a curve, a boundary, faces, and a title that would be a script."""
+
+import json
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.batch.processed import write_batch, write_json, write_table
+from metro.stages.campaign import campaign
+
+EVIL = "<script>document.title = 'taken'</script>"
+RUNS = pd.DataFrame(
+    {
+        "run": ["r1", "r2", "c1", "c2"],
+        "condition": ["a", "b", "c", "d"],
+        "operation": "slot",
+        "role": "validate",
+        "spindle_rpm": [1000.0, 1000.0, 1000.0, 1200.0],
+        "axial_depth_mm": [1.0, 1.0, 1.0, 3.0],
+        "pose": ["1"] * 4,
+    }
+)
+BLANK = dict.fromkeys(("t_s", "angle_deg", "s_mm", "x_mm", "y_mm"), np.nan)
+
+
+def _comparison():
+    angle = np.arange(0, 360, 3.0)
+    wave = 100 * np.sin(np.deg2rad(angle))
+    force = [
+        {**BLANK, "observable": "force", "run": run, "axis": axis, "t_s": 0.5, "unit": "N", "sigma": 1.0,
+         "angle_deg": a, "measured": w, "before": w + 12.0, "after": w + 1.0}
+        for run in ("r1", "r2") for axis in "xy" for a, w in zip(angle, wave, strict=True)
+    ]  # fmt: skip
+    cuts = [
+        {**BLANK, "observable": "lobes", "run": run, "axis": None, "unit": "1", "sigma": np.nan,
+         "measured": m, "before": 0.5, "after": m}
+        for run, m in (("c1", 0.0), ("c2", 1.0))
+    ]  # fmt: skip
+    face = [
+        {**BLANK, "observable": "flatness", "run": "r1", "axis": "z", "unit": "mm", "sigma": 0.01,
+         "s_mm": 50.0 * j + x, "x_mm": x, "y_mm": 5.0 * j, "measured": 0.001 * x,
+         "before": 0.0, "after": 0.0009 * x}
+        for j in range(4) for x in np.arange(0.0, 50.0, 5.0)
+    ]  # fmt: skip
+    return pd.DataFrame([*force, *cuts, *face])
+
+
+def _lobes(depth):
+    rpm = np.arange(1000.0, 2001.0, 50.0)
+    table = pd.DataFrame({"position": 1, "rpm": rpm, "depth_mm": depth, "kind": "hopf", "chatter_hz": 88.0})
+    return table.assign(depth_lo_mm=0.9 * depth, depth_hi_mm=1.1 * depth, interpolated=False)
+
+
+def _face():
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(20.0), np.arange(12.0)))
+    return pd.DataFrame({"run": "r1", "x_mm": x, "y_mm": y, "deviation_um": 10 * np.sin(x / 3) - y})
+
+
+def _error(rms):
+    return {"rms": rms, "nrmse": rms / 100, "ci95": [0.9 * rms, 1.1 * rms]}
+
+
+def _entry(unit):
+    runout = {"value": 9.8, "ci95": [9.3, 10.3], "unit": "um"}
+    effect = {"effect": "tool_runout", "probability": 0.99, "parameters": {"radius_um": runout}}
+    return {
+        "status": "explained", "unit": unit, "noise_floor": 1.9, "held_out_runs": ["r1", "r2"],
+        "before": _error(11.8), "after": _error(2.1), "effects": [effect], "candidates": [],
+        "indistinguishable": [], "next_experiment": "a slot at twice the feed", "unexplained": None,
+    }  # fmt: skip
+
+
+def written_page(root):
+    """Write the summary of two batches under ``root``; return the page."""
+    tables = {
+        "comparison": _comparison(),
+        "lobes": _lobes(1.5),
+        "lobes_final": _lobes(2.0),
+        "face_map": _face(),
+    }
+    units = {"force": "N", "flatness": "mm", "lobes": "1"}
+    titles = {"early": (EVIL, {}, {"force": "N"}), "late": ("Slots & <b>faces</b>", tables, units)}
+    for name, (title, frames, observables) in titles.items():
+        processed, reports = root / "processed" / name, root / "reports" / name
+        batch = Batch(name, {"title": title, "cell": "c", "source": "measured"}, {"cell": "c"},
+                      RUNS.set_index("run"), {})  # fmt: skip
+        write_batch(processed, batch, {})
+        (processed / "loop.json").write_text(json.dumps({"observables": {}}))
+        for table, frame in frames.items():
+            write_table(processed / f"{table}.parquet", frame, {})
+        verdicts = {observable: _entry(unit) for observable, unit in observables.items()}
+        write_json(reports / "verdict.json", {"format": 1, "batch": name, "observables": verdicts})
+        write_json(reports / "identified.json", {"format": 1, "batch": name})
+        (reports / "report.pdf").write_bytes(b"%PDF-1.7")
+    folders = [root / "reports" / name for name in titles]
+    campaign(folders, root / "processed", root / "reports", {}, "c0de")
+    return root / "reports" / "summary.html"
