@@ -2,7 +2,7 @@
 
 from snakemake.utils import min_version
 
-from metro.batch.layout import OBSERVED
+from metro.batch.layout import OBSERVED, PAGE
 from metro.workflow import COMPLETE, Plan, only_one_at_work, remove_leftovers
 
 min_version("9.0")

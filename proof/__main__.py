@@ -1,7 +1,8 @@
 """``python -m proof``: make batches that hide sealed effects, run the pipeline on them, open the truth.
 
 ``coverage`` needs no seal: its batches hide nothing, and what is counted is how often intervals hold. Nor
-does ``faces``: what is compared is the faces that are predicted with those that are scanned.
+does ``faces``: what is compared is the faces that are predicted with those that are scanned. ``next`` asks
+for runs where a verdict is undetermined, cuts them, and counts how often they decide.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ def main(arguments: list[str] | None = None) -> None:
     if options.command == "coverage":
         _coverage(options)
     else:
-        {"make": _make, "run": _run, "open": _open, "faces": _faces}[options.command](
+        {"make": _make, "run": _run, "open": _open, "faces": _faces, "next": _next}[options.command](
             Layout(options.out), options
         )
 
@@ -44,9 +45,12 @@ def _parser() -> argparse.ArgumentParser:
     faces = commands.add_parser("faces", help="how predicted faces of eight cases resemble the scanned ones")
     faces.add_argument("--seed", type=int, default=1)
     faces.add_argument("--replicates", type=int, default=3)
-    for command in (make, run, opening, faces):
+    planned = commands.add_parser("next", help="how often runs that `metro next` plans decide")
+    planned.add_argument("--batches", type=int, default=60)
+    planned.add_argument("--seed", type=int, default=1)
+    for command in (make, run, opening, faces, planned):
         command.add_argument("out", type=Path, help="folder of this proof")
-    for command in (make, coverage, run, opening):
+    for command in (make, coverage, run, opening, planned):
         command.add_argument("--jobs", type=int, default=2, help="worker processes")
     return parser
 
@@ -82,6 +86,15 @@ def _faces(out: Layout, options: argparse.Namespace) -> None:
     from proof.show import printed
 
     printed(tables(*eight_cases(out, options.seed, options.replicates)), Console())
+
+
+def _next(out: Layout, options: argparse.Namespace) -> None:
+    from rich.console import Console
+
+    from proof.planned import asked_and_cut, tables
+    from proof.show import printed
+
+    printed(tables(*asked_and_cut(out, options.batches, options.seed, options.jobs)), Console())
 
 
 def _coverage(options: argparse.Namespace) -> None:

@@ -46,6 +46,7 @@ def further(scores: Sequence[Score]) -> list[Figure]:
     outside = kind(scores, "outside")
     absorbed = [s for s in kind(scores, "one") if s.hidden[0] in ABSORBED]
     oracle = [s.oracle / s.floor for s in inside if s.oracle is not None and s.floor]
+    at_truth = [s.at_truth / s.floor for s in inside if s.at_truth is not None and s.floor]
     return [
         share("batches that the pipeline ran through", [s.status != "failed" for s in scores]),
         share("one effect: something is detected", [s.detected for s in one]),
@@ -65,6 +66,7 @@ def further(scores: Sequence[Score]) -> list[Figure]:
         share("outside, below the noise: clean", [s.status == "clean" for s in outside if not s.seen]),
         share("outside, whatever its size: wrong attribution", [s.misattributed for s in outside]),
         median("error of the oracle on held-out runs, over the noise", oracle),
+        median("the same with the true parameters, of labels", at_truth),
         median("held-out error after, over the floor that the verdict states", over_stated(inside)),
         median("nothing hidden: held-out error over that before", unchanged(kind(scores, "none"))),
         _brier("Brier score of the effects named", [pair for s in scores for pair in s.stated]),

@@ -1,8 +1,8 @@
 """The oracle where the measurement is a label: what a reader could tell who knows the true effects.
 
-Nothing is fitted to labels, so none is refitted here: boundaries are predicted with the batch's own modes and
-coefficients and the true parameters, and labels are drawn from them with the errors that the loop itself
-allows for.
+As everywhere the oracle is told which effects act, and learns their parameters from the identification tests.
+How large the effects are is judged with their true parameters: boundaries are predicted with the batch's own
+modes and coefficients, and labels are drawn from them with the errors that the loop itself allows for.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from metro.dynamics.stability_model import StabilityModel
 from metro.effects.effect import Effect, fitted_to
+from metro.loop.hypotheses import Evidence, hypothesis
 from metro.loop.label_evidence import (
     FREQUENCY_SD,
     OF_SPEED,
@@ -27,7 +28,7 @@ from metro.loop.label_evidence import (
     own_sd,
     unstable_probability,
 )
-from metro.loop.label_search import LEAST_SPEEDS, LEAST_TESTS
+from metro.loop.label_search import LEAST_SPEEDS, LEAST_TESTS, predicted
 from metro.loop.labelled import tests_of
 from metro.observables.lobes import LabelProblem
 from metro.units import JSON, Array
@@ -57,12 +58,13 @@ def label_oracle(
 
     Returns
     -------
-    ``before`` and ``after`` (rms error of the probability of the held-out labels without and with the
-    effects), ``floor`` (that of labels drawn from the latter), ``enough`` (whether there are tests enough for
-    any verdict), and ``sizes``: the log-likelihood ratio, with the effect at its true parameters over
-    without, that 95 % of identification labels drawn from the truth exceed, over ``gain``. Where the library
-    lacks one of the effects: ``after`` is None, and the size is by how much less likely all labels are than
-    those that the base model would draw, over ``gain``.
+    ``before`` and ``after`` (rms error of the probability of the held-out labels without the effects, and
+    with them as the identification tests tell their parameters), ``exact`` (with the true parameters),
+    ``floor`` (that of labels drawn from these), ``enough`` (whether there are tests enough for any verdict),
+    and ``sizes``: the log-likelihood ratio, with the effect at its true parameters over without, that 95 % of
+    identification labels drawn from the truth exceed, over ``gain``. Where the library lacks one of the
+    effects: ``after`` is None, and the size is by how much less likely all labels are than those that the
+    base model would draw, over ``gain``.
     """
     able, _ = fitted_to(tuple(effects), task)
     known = {effect.name: effect for effect in able}
@@ -90,8 +92,18 @@ def label_oracle(
         ratio = full - [_evidence(one, without, deviations) for one in drawn_labels]
         sizes[name] = max(0.0, float(np.quantile(ratio, ASSURED))) / gain
     before, _ = _errors(held, base, deviations)
-    after, floor = _errors(held, truth, deviations)
-    return found | {"before": before, "after": after, "floor": floor, "sizes": sizes}
+    exact, floor = _errors(held, truth, deviations)
+    after = _rms(held, _learnt(task, [known[name] for name in hidden], held, deviations))
+    return found | {"before": before, "after": after, "exact": exact, "floor": floor, "sizes": sizes}
+
+
+def _learnt(task: LabelProblem, effects: Sequence[Effect], held: Labels, deviations: Array) -> Array:
+    """Probability that held-out tests are unstable, parameters as the identification tests tell them."""
+    evidence = Evidence(task.boundaries, task.estimates, tests_of(task, "identify")[0], deviations, SEED)
+    found = hypothesis((effects[0],), evidence)
+    for count in range(2, len(effects) + 1):
+        found = hypothesis(tuple(effects[:count]), evidence, found)
+    return predicted(found, held, deviations)
 
 
 def _deviations(task: LabelProblem, seed: int) -> Array:
@@ -159,5 +171,8 @@ def _errors(held: Labels, boundary: _Boundary, deviations: Array) -> tuple[float
         return None, None
     depth = boundary.depth[held.point] + deviations[:, held.point]
     chance = unstable_probability(held, depth, own_sd(held)).mean(axis=0)
-    error = float(np.sqrt(np.mean((held.unstable - chance) ** 2)))
-    return error, float(np.sqrt(np.mean(chance * (1.0 - chance))))
+    return _rms(held, chance), float(np.sqrt(np.mean(chance * (1.0 - chance))))
+
+
+def _rms(held: Labels, chance: Array) -> float | None:
+    return float(np.sqrt(np.mean((held.unstable - chance) ** 2))) if len(held.depth) else None

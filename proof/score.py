@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from metro.loop.label_search import NOTHING
+from metro.loop.label_unknown import UNKNOWN
 from metro.units import JSON
 from proof.estimates import Estimate, estimates
 
@@ -35,7 +36,8 @@ class Score:
         rivals. groups : sets that it cannot tell apart. rest : whether it says that something is unexplained.
         advised : whether it says what to measure next.
     enough : whether the batch has tests enough for any verdict.
-    before, after : rms error on held-out runs. oracle, floor : that of the fit told the truth, and the noise.
+    before, after : rms error on held-out runs. oracle, floor : that of the fit told which effects act, and
+        the noise. at_truth : that with their true parameters, where the measurement is a label.
     expected : that the verdict states as its floor, with what no run tells of the base model.
     stated, rejected : probability of every effect named, or tried and not named, and whether it was there;
         those of effects too small to be seen left out.
@@ -57,6 +59,7 @@ class Score:
     before: float | None = None
     after: float | None = None
     oracle: float | None = None
+    at_truth: float | None = None
     floor: float | None = None
     expected: float | None = None
     estimates: tuple[Estimate, ...] = ()
@@ -178,7 +181,8 @@ def score(
     named = {found["effect"]: found["probability"] for found in effects}
     if not named and entry["status"] == "undetermined":
         candidates = {c["effect"]: c["probability"] for c in entry["candidates"]}
-        named = {group[0]: candidates.get(group[0].split(",")[0], 0.0) for group in pairs}
+        firsts = [group[0] for group in pairs if group[0] != UNKNOWN]
+        named = {first: candidates.get(first.split(",")[0], 0.0) for first in firsts}
     unseen = (told or {"observables": {}})["observables"].get(observable, {}).get("cannot_be_seen", [])
     return Score(
         batch=truth["batch"],
@@ -195,6 +199,7 @@ def score(
         before=_rms(entry["before"]),
         after=_rms(entry["after"]),
         oracle=oracle["after"],
+        at_truth=oracle.get("exact"),
         floor=oracle["floor"],
         expected=entry["noise_floor"],
         estimates=tuple(
@@ -245,7 +250,8 @@ def _rejected(
         return _stated(said, hidden, sizes)
     if any(sizes.get(name, SEEN) < SEEN for name in hidden):
         return ()
-    return tuple((one["probability"], set(one["effect"].split(" + ")) == set(hidden)) for one in said)
+    tried = [(one["probability"], set(one["effect"].split(" + "))) for one in said]
+    return tuple((p, names == set(hidden)) for p, names in tried if names != {UNKNOWN})
 
 
 def _rms(error: JSON | None) -> float | None:

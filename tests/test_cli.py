@@ -10,7 +10,7 @@ from metro.batch.findings import BatchError, Finding
 from metro.codehash import code_hash
 from metro.formats import FormatError
 
-COMMANDS = ("check", "new-batch", "simulate", "status", "explain", "query", "verify", "frf-export")
+COMMANDS = ("check", "new-batch", "simulate", "status", "explain", "next", "query", "verify", "frf-export")
 STAGES = ("ingest", "identify", "predict", "loop", "report", "campaign")
 
 
@@ -121,7 +121,7 @@ def test_a_stage_does_nothing_when_the_code_is_not_the_planned_one(tmp_path, mon
 
 
 @pytest.mark.parametrize(
-    "command", ["check", "new-batch", "simulate", "status", "explain", "query", "verify"]
+    "command", ["check", "new-batch", "simulate", "status", "explain", "next", "query", "verify"]
 )
 def test_a_command_that_people_call_shows_an_example_and_can_print_json(command):
     output = call(command, "--help").output

@@ -4,7 +4,6 @@ import ast
 import os
 import re
 import subprocess
-import time
 from pathlib import Path
 
 import pytest
@@ -233,7 +232,6 @@ def test_the_bundled_batches_are_small():
 @pytest.mark.skipif(not (ROOT / ".venv/made-from").exists(), reason="the environment is not that of set-up")
 def test_set_up_finds_everything_in_place_with_its_environment_active():
     path = f"{ROOT / '.venv/bin'}:{os.environ['PATH']}"
-    start = time.perf_counter()
     done = subprocess.run(
         [ROOT / "scripts/setup.sh"],
         env={**os.environ, "PATH": path},
@@ -242,4 +240,3 @@ def test_set_up_finds_everything_in_place_with_its_environment_active():
         check=True,
     )
     assert done.stderr == ""
-    assert time.perf_counter() - start < 1.0

@@ -110,11 +110,26 @@ def spread(plans: Sequence[Condition], rng: np.random.Generator) -> list[tuple[C
 
 def cut_all(session: Session, plans: tuple[Plan, ...], folder: Path, rng: np.random.Generator) -> list[Row]:
     """Cut and record every run of a session into ``folder``; return the rows of the run table."""
-    order = spread(plans, rng)
-    rows, metres = [], 0.0
-    for place, (plan, replicate) in enumerate(order, start=1):
+    return cut_in_order(session, spread(plans, rng), folder, rng)
+
+
+def cut_in_order(
+    session: Session,
+    order: Sequence[tuple[Plan, int]],
+    folder: Path,
+    rng: np.random.Generator,
+    *,
+    after: int = 0,
+    metres: float = 0.0,
+) -> list[Row]:
+    """Cut and record runs (plan, replicate) one after another; return their rows.
+
+    ``after`` so many runs that cut so many ``metres``; they are the session, the runs come after its end.
+    """
+    rows = []
+    for place, (plan, replicate) in enumerate(order, start=after + 1):
         name = f"r{place:02d}"
-        true, deeper = _later(session, plan, (place - 1) / len(order))
+        true, deeper = _later(session, plan, (place - 1) / (after or len(order)))
         file = record_run(true, deeper, folder, name, metres=metres, rng=rng)
         rows.append(row_of(session, plan, name, place, replicate) | {"dynamometer": file})
         metres += plan.cut_length_mm * MM

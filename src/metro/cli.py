@@ -197,6 +197,33 @@ def explain(
         tell(batch, observable, processed, reports, as_json)
 
 
+@app.command("next")
+def next_runs(
+    batch: Annotated[str, typer.Argument(help="Name of the batch.", autocompletion=batches)],
+    *,
+    observable: Annotated[str, typer.Option(help="Only this observable.", autocompletion=observables)] = "",
+    runs: Annotated[int, typer.Option(min=1, help="Most runs, per observable.")] = 12,
+    limit: Annotated[list[str] | None, typer.Option(help="What may be set: COLUMN=LOW:HIGH.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the runs here, as rows of a runs.csv.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the order in which the runs are cut.")] = 0,
+    processed: Root = Path("data/processed"),
+    reports: Results = Path("reports"),
+    as_json: AsJson = False,
+) -> None:
+    """Plan the few runs that would decide what a batch leaves open, in an order drawn at random.
+
+    They tell apart what is undetermined, describe what is left, show what cannot be seen, or tighten what
+    makes predictions unsure. Repeats the search of the loop stage, and takes as long.
+
+    Example: `metro next side-milling-17 --limit axial_depth_mm=0.5:4 --out next.csv`
+    """
+    from metro.stages.next_runs import next_runs as plan
+
+    folders = {"processed": processed, "reports": reports}
+    with readable_errors():
+        plan(batch, observable, most=runs, limits=limit or [], out=out, seed=seed, as_json=as_json, **folders)
+
+
 @app.command()
 def query(
     sql: Annotated[

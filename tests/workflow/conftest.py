@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from program_copy import copy_program
 
 ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
@@ -84,9 +85,7 @@ class Checkout:
 def finished(tmp_path_factory):
     """Return a checkout with two batches whose reports are up to date."""
     folder = tmp_path_factory.mktemp("finished")
-    shutil.copy(ROOT / "Snakefile", folder)
-    for name in ("workflow", "profiles", "config", "src"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    copy_program(folder)
     checkout = Checkout(folder)
     checkout.add_batch("alpha")
     checkout.add_batch("beta")

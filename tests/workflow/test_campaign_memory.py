@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pypdfium2
 import pytest
+from program_copy import copy_program
 
 from virtual_cell.chips import Tool
 from virtual_cell.dynamometer import Dynamometer
@@ -54,9 +54,7 @@ def slots(folder, place):
 def campaign(tmp_path_factory):
     """Return the folder of a campaign whose summary is there."""
     folder = tmp_path_factory.mktemp("campaign")
-    shutil.copy(ROOT / "Snakefile", folder)
-    for name in ("workflow", "profiles", "config", "src"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    copy_program(folder)
     for place in range(BATCHES):
         slots(folder / f"data/raw/slots-{place + 1}", place)
     search = os.pathsep.join([str(folder / "src"), str(ROOT)])

@@ -2,14 +2,15 @@
 
 What is cut does not depend on what is hidden: slots at several feeds, side cuts both ways, a slot across,
 helical holes. The styles differ in how it is measured, so that what was made to work on one can be tried on
-another.
+another. Runs can be cut after those of a batch, by the same tool in the same metal: :func:`cut_more`.
 """
 
 from __future__ import annotations
 
+import csv
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from virtual_cell.chips import Tool
 from virtual_cell.dynamometer import Dynamometer
 from virtual_cell.hidden import EFFECTS, Parameters
 from virtual_cell.milling import Coefficients, in_millimetres
-from virtual_cell.session import Plan, Session, cut_all
+from virtual_cell.session import Plan, Session, cut_all, cut_in_order, orbit_rpm
 from virtual_cell.units import DEG, MM, N_MM, N_MM2, RPM
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_yaml
 
@@ -30,6 +31,8 @@ _AXES = (
     {"x": "-x", "y": "y", "z": "-z"},
 )
 STYLES = ("a", "b")
+FEW = "few"  # a style beside these: too few runs to tell small effects from one another
+FULL_S, CUT_MM = 0.4, 120.0  # length of a straight cut as recorded, and as made
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,8 @@ class Style:
     ``rate`` Hz; ``noise`` N, from–to; ``air_s`` s in the air before each straight cut (None: none);
     ``tacho``; ``scatter`` relative, of the coefficients from run to run; ``feeds`` of the slots of the
     identification, in parts of the largest; ``speeds`` of the spindle, in parts of the nominal one, taken in
-    turn by the conditions.
+    turn by the conditions; ``replicates`` of those of the identification; ``narrow``: nothing is cut but
+    strips of a tenth of the diameter, along which most effects look alike.
     """
 
     rate: float = 8192.0
@@ -49,13 +53,18 @@ class Style:
     scatter: float = 0.01
     feeds: tuple[float, ...] = (0.25, 0.45, 0.7, 1.0)
     speeds: tuple[float, ...] = (1.0,)
+    replicates: int = 3
+    narrow: bool = False
 
 
 def _drawn_style(name: str, seed: int) -> Style:
-    """Style ``a`` is always the same; in ``b`` every batch is measured in its own way."""
+    """Style ``a`` is always the same; ``b`` differs from batch to batch; ``few`` has the fewest runs."""
     if name == "a":
         return Style()
     rng = np.random.default_rng([seed, 11])
+    if name == FEW:
+        close = ((0.85, 0.9, 1.0), (0.8, 0.95, 1.0), (0.9, 0.95, 1.0))
+        return Style(feeds=close[rng.integers(len(close))], replicates=1, narrow=True)
     feeds = ((0.3, 0.55, 1.0), (0.25, 0.4, 0.65, 1.0), (0.2, 0.35, 0.5, 0.75, 1.0))
     return Style(
         rate=float(rng.choice([6000.0, 10000.0, 12800.0])),
@@ -68,6 +77,18 @@ def _drawn_style(name: str, seed: int) -> Style:
     )
 
 
+@dataclass(frozen=True)
+class _Drawn:
+    """What a seed draws: the truth, the plan, the metal without any effect, and what the manifest says."""
+
+    session: Session
+    plans: tuple[Plan, ...]
+    effects: Mapping[str, Parameters]
+    coefficients: Row
+    manifest: Row
+    rng: np.random.Generator
+
+
 def make(folder: Path, effects: Mapping[str, Parameters | None], seed: int, style: str = "a") -> Row:
     """Write a batch that hides ``effects`` (name → parameters, or None: drawn by the seed); return the truth.
 
@@ -76,6 +97,54 @@ def make(folder: Path, effects: Mapping[str, Parameters | None], seed: int, styl
     KeyError
         For an effect that is not known.
     """
+    drawn = _drawn(effects, seed, style)
+    fresh_folder(folder)
+    rows = cut_all(drawn.session, drawn.plans, folder, drawn.rng)
+    write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
+    write_yaml(folder / "cell.yaml", {"cell": "bench-mill"})
+    write_yaml(folder / "batch.yaml", {"format": 1, "batch": folder.name, **drawn.manifest})
+    return {
+        "batch": folder.name,
+        "seed": seed,
+        "style": style,
+        "effects": dict(drawn.effects),
+        "coefficients": drawn.coefficients,
+    }
+
+
+def cut_more(
+    folder: Path, planned: Sequence[Row], effects: Mapping[str, Parameters], seed: int, style: str
+) -> None:
+    """Cut planned runs after those of a batch, in their order, as the same truth has it; add their rows.
+
+    Parameters
+    ----------
+    planned : rows of a run table without files, numbers as numbers. effects, seed, style : of the batch.
+    """
+    drawn = _drawn(effects, seed, style)
+    with (folder / "runs.csv").open(newline="", encoding="utf-8") as stream:
+        cut: list[Row] = list(csv.DictReader(stream))
+    air = drawn.plans[0].air_s
+    order = [(_planned(row, drawn.session, air), int(row["replicate"])) for row in planned]
+    rng = np.random.default_rng([seed, 17])
+    metres = sum(float(row["cut_length_mm"]) * MM for row in cut)
+    more = cut_in_order(drawn.session, order, folder, rng, after=len(cut), metres=metres)
+    named = [made | {"run": row["run"]} for made, row in zip(more, planned, strict=True)]
+    write_csv(folder / "runs.csv", [*cut, *named], RUN_COLUMNS)
+
+
+def _planned(row: Row, session: Session, air_s: float | None) -> Plan:
+    """Return how a row of a run table is cut: a record as long as that of others of its length."""
+    plan = Plan(
+        **{name: row[name] for name in Plan.__dataclass_fields__ if name in row and row[name] is not None}
+    )
+    if plan.operation == "helical":
+        orbit_s = 60.0 / orbit_rpm(session, plan)
+        return replace(plan, full_s=round(1.03 * orbit_s, 3), replicates=1)
+    return replace(plan, air_s=air_s, full_s=FULL_S * plan.cut_length_mm / CUT_MM, replicates=1)
+
+
+def _drawn(effects: Mapping[str, Parameters | None], seed: int, style: str) -> _Drawn:
     rng = np.random.default_rng([seed, 7])
     diameter, axes = float(rng.choice([10.0, 12.0, 16.0])), _AXES[rng.integers(len(_AXES))]
     measured = _drawn_style(style, seed)
@@ -92,18 +161,7 @@ def make(folder: Path, effects: Mapping[str, Parameters | None], seed: int, styl
     truth = {name: given or EFFECTS[name].draw(rng, session) for name, given in effects.items()}
     for name, parameters in truth.items():
         session = EFFECTS[name].apply(session, parameters)
-    fresh_folder(folder)
-    rows = cut_all(session, plans, folder, rng)
-    write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
-    write_yaml(folder / "cell.yaml", {"cell": "bench-mill"})
-    write_yaml(folder / "batch.yaml", _manifest(folder.name, session, diameter, axes, noise))
-    return {
-        "batch": folder.name,
-        "seed": seed,
-        "style": style,
-        "effects": truth,
-        "coefficients": coefficients,
-    }
+    return _Drawn(session, plans, truth, coefficients, _manifest(session, diameter, axes, noise), rng)
 
 
 def _in_words(metal: Coefficients) -> Row:
@@ -141,8 +199,8 @@ def _plans(session: Session, diameter: float, style: Style, rng: np.random.Gener
     top, arc = round(float(rng.uniform(0.1, 0.14)), 3), 2.0 * math.pi * 0.3 * diameter
     slot = Plan(
         *("slot", "identify", "slot", rpm, top, depth, diameter),
-        cut_length_mm=120.0,
-        full_s=0.4,
+        cut_length_mm=CUT_MM,
+        full_s=FULL_S,
         air_s=style.air_s,
     )
     across = replace(slot, condition="across", feed_direction_deg=90.0)
@@ -159,24 +217,24 @@ def _plans(session: Session, diameter: float, style: Style, rng: np.random.Gener
         orbit_s = arc / (feed * session.tool.teeth * speed / 60.0)
         full_s = round(1.03 * orbit_s, 3) if plan.operation == "helical" else plan.full_s
         named = replace(plan, condition=f"{plan.condition}-{feed:g}", role=role, feed_per_tooth_mm=feed)
-        return replace(named, spindle_rpm=speed, full_s=full_s, replicates=3 if role == "identify" else 2)
+        replicates = style.replicates if role == "identify" else min(2, style.replicates)
+        return replace(named, spindle_rpm=speed, full_s=full_s, replicates=replicates)
 
+    others = () if style.narrow else ((down, 0.7), (hole, 1.0))
+    held_out = () if style.narrow else ((up, 0.7), (across, 0.45), (hole, 0.7))
+    if style.narrow:
+        slot = replace(down, radial_depth_mm=0.1 * diameter)
     return (
         *(at(slot, share) for share in style.feeds),
-        at(down, 0.7),
-        at(hole, 1.0),
-        at(slot, 0.85, "validate"),
-        at(up, 0.7, "validate"),
-        at(across, 0.45, "validate"),
-        at(hole, 0.7, "validate"),
+        *(at(plan, share) for plan, share in others),
+        at(slot, 0.925 if style.narrow else 0.85, "validate"),
+        *(at(plan, share, "validate") for plan, share in held_out),
     )
 
 
-def _manifest(name: str, session: Session, diameter: float, axes: Mapping[str, str], noise: float) -> Row:
+def _manifest(session: Session, diameter: float, axes: Mapping[str, str], noise: float) -> Row:
     teeth, sensor = session.tool.teeth, session.dynamometer
     return {
-        "format": 1,
-        "batch": name,
         "title": f"Milling tests, {teeth}-tooth {diameter:g} mm end mill",
         "source": "simulated",
         "cell": "bench-mill",

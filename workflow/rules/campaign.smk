@@ -4,11 +4,13 @@ rule campaign:
         expand("reports/{batch}/verdict.json", batch=plan.batches),
         expand("data/processed/{batch}/batch.json", batch=plan.batches),
         expand("data/processed/{batch}/runs.parquet", batch=plan.batches),
+        expand("data/processed/{batch}/{table}.parquet", batch=plan.batches, table=PAGE),
         expand("data/processed/{batch}/loop.json", batch=plan.batches),
     output:
         "reports/summary.parquet",
         "reports/memory.json",
         "reports/summary.pdf",
+        "reports/summary.html",
         touch("logs/campaign.complete"),
     log:
         "logs/campaign.log",
@@ -26,4 +28,4 @@ rule campaign:
     message:
         "writing the summary of all batches"
     shell:
-        "metro campaign {params.batches} --processed {params.processed} --out {params.out} --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        "metro campaign {params.batches:q} --processed {params.processed:q} --out {params.out:q} --settings {params.settings:q} --code {params.code:q} > {log:q} 2>&1"

@@ -18,4 +18,4 @@ rule identify:
     message:
         "{wildcards.batch}: identifying the models"
     shell:
-        "metro identify --processed {params.processed} --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        "metro identify --processed {params.processed:q} --settings {params.settings:q} --code {params.code:q} > {log:q} 2>&1"

@@ -37,4 +37,4 @@ rule ingest:
     message:
         "{wildcards.batch}: checking and reading the raw files"
     shell:
-        "metro ingest {params.folder:q} --cells {params.cells:q} --out {params.out} --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        "metro ingest {params.folder:q} --cells {params.cells:q} --out {params.out:q} --settings {params.settings:q} --code {params.code:q} > {log:q} 2>&1"

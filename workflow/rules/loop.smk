@@ -24,4 +24,4 @@ rule loop:
     message:
         "{wildcards.batch}: tracing what the prediction leaves over"
     shell:
-        "metro loop --processed {params.processed} --reports {params.reports} --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        "metro loop --processed {params.processed:q} --reports {params.reports:q} --settings {params.settings:q} --code {params.code:q} > {log:q} 2>&1"

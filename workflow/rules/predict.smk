@@ -18,4 +18,4 @@ rule predict:
     message:
         "{wildcards.batch}: predicting the held-out runs"
     shell:
-        "metro predict --processed {params.processed} --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        "metro predict --processed {params.processed:q} --settings {params.settings:q} --code {params.code:q} > {log:q} 2>&1"

@@ -22,4 +22,4 @@ rule report:
     message:
         "{wildcards.batch}: writing the report"
     shell:
-        "metro report --processed {params.processed} --reports {params.reports} --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        "metro report --processed {params.processed:q} --reports {params.reports:q} --settings {params.settings:q} --code {params.code:q} > {log:q} 2>&1"

@@ -48,7 +48,7 @@ def joint_compliances(
     Raises
     ------
     ValueError
-        If the measured components are too few to tell any joint from the others.
+        If the measured components are too few to tell any joint from the others, or none were found.
     """
     from scipy.optimize import nnls
 
@@ -62,7 +62,12 @@ def joint_compliances(
         raise ValueError(f"{len(target)} measured displacements cannot tell the joints apart")
     size = np.linalg.norm(design[:, seen], axis=0)
     scaled = design[:, seen] / size
-    solution, residual = nnls(scaled, target)
+    if not (np.isfinite(scaled).all() and np.isfinite(target).all()):
+        raise ValueError("found loads or displacements that are not finite")
+    try:
+        solution, residual = nnls(scaled, target)
+    except RuntimeError as error:
+        raise ValueError(f"the joint compliances were not found: {error}") from error
     scatter = float(residual / np.sqrt(dof))
     value, covariance = np.zeros(joints), np.diag(np.full(joints, np.inf))
     value[seen] = solution / size

@@ -1,17 +1,22 @@
-"""Campaign: the verdicts of all batches become one PDF, one table, and a memory over the batches."""
+"""Campaign: the verdicts of all batches become a PDF, a web page, a table, and a memory over the batches."""
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from urllib.parse import quote
 
 import pandas as pd
 
-from metro.batch.processed import read_batch, write_atomically, write_json, write_table
+from metro.batch.layout import PAGE
+from metro.batch.processed import read_batch, read_table, write_atomically, write_json, write_table
 from metro.memory.history import Record
 from metro.memory.remember import remember
-from metro.report.campaign import campaign_report, campaign_table
+from metro.report.campaign import campaign_report, campaign_sections, campaign_table
+from metro.report.page.build import campaign_page
+from metro.report.results import Results
 from metro.units import JSON
 
 
@@ -24,7 +29,7 @@ def campaign(
     *,
     unfinished: Mapping[str, str] | None = None,
 ) -> None:
-    """Write ``summary.parquet``, ``memory.json`` and ``summary.pdf`` over all batches.
+    """Write ``summary.parquet``, ``memory.json``, ``summary.pdf`` and ``summary.html`` over all batches.
 
     Parameters
     ----------
@@ -40,6 +45,27 @@ def campaign(
     write_table(out / "summary.parquet", campaign_table(verdicts, failed), provenance)
     write_json(out / "memory.json", memory)
     write_atomically(out / "summary.pdf", lambda stream: stream.write(pdf))
+    page = campaign_page(
+        campaign_sections(verdicts, identified, memory, failed),
+        (
+            _results(processed / f.name, verdicts[f.name], identified[f.name])
+            for f in sorted(reports, key=_name)
+        ),
+        {f.name: quote(os.path.relpath(f / "report.pdf", out)) for f in reports},
+    ).encode(errors="replace")
+    write_atomically(out / "summary.html", lambda stream: stream.write(page))
+
+
+def _name(folder: Path) -> str:
+    return folder.name
+
+
+def _results(processed: Path, verdict: JSON, identified: JSON) -> Results:
+    """Read what the page tells of a batch; tables that are absent or empty are left out."""
+    read = {n: read_table(p) for n in PAGE if (p := processed / f"{n}.parquet").exists()}
+    tables = {name: table for name, table in read.items() if len(table)}
+    told = _json(processed / "loop.json")
+    return Results(read_batch(processed), tables, identified, verdict, told)
 
 
 def _told(log: Path) -> str:

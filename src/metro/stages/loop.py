@@ -8,6 +8,7 @@ includes what was found upstream.
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -43,7 +44,7 @@ from metro.units import JSON
 
 
 @dataclass
-class _Closing:
+class Closing:
     """The loop of one batch while its observables are closed one after another."""
 
     batch: Batch
@@ -69,10 +70,22 @@ def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
 
     ``settings``: ``model_form_budget``, ``materiality``, ``false_additions``, ``held_out_gain``, ``seed``.
     """
-    state = _Closing(
-        batch=read_batch(processed),
+    state = closed(processed, Gates(**settings))
+    _write(state, reports, {"code": code, "settings": json.dumps(settings, sort_keys=True)})
+
+
+def closed(
+    processed: Path, gates: Gates, only: Collection[str] | None = None, limits: JSON | None = None
+) -> Closing:
+    """Close the loop of a batch's observables (or ``only`` some), one after another, and write nothing.
+
+    ``limits`` of settings, [least, largest] by column of the run table, within which runs may be proposed.
+    """
+    batch = read_batch(processed)
+    state = Closing(
+        batch=replace(batch, manifest={**batch.manifest, "limits": limits}) if limits else batch,
         processed=processed,
-        gates=Gates(**settings),
+        gates=gates,
         prediction=read_table(processed / "prediction.parquet"),
         identified=read_json(processed / "identified.json"),
         observed=read_observed(processed),
@@ -82,6 +95,8 @@ def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
             _close(state, printed)
     else:
         for module in MODULES:
+            if only is not None and module.OBSERVABLE not in only:
+                continue
             if state.found and module in OBSERVED_WITH_COEFFICIENTS:
                 read = partial(_read, processed)
                 again = module.observe(state.batch, read, state.identified)
@@ -97,10 +112,10 @@ def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
                 state.identified = merged(state.identified, blocks)
             if module is flatness and isinstance(task, Problem) and outcome:
                 _rank_again(state, task, outcome.final)
-    _write(state, reports, {"code": code, "settings": json.dumps(settings, sort_keys=True)})
+    return state
 
 
-def _rank_again(state: _Closing, task: Problem, final: Fit) -> None:
+def _rank_again(state: Closing, task: Problem, final: Fit) -> None:
     """Rank the configurations of faces as predicted with the effects found, where there are any."""
     if final.candidate.effects:
         with_effects = replace(task, base=final.candidate.model(final.theta))
@@ -113,7 +128,7 @@ def _read(processed: Path, name: str, run: str | None = None) -> pd.DataFrame:
     return read_table(processed / f"{name}.parquet", run)
 
 
-def _close(state: _Closing, task: Task) -> Outcome | None:
+def _close(state: Closing, task: Task) -> Outcome | None:
     """Close the loop of one observable; the held-out runs are read once, for the figures."""
     if isinstance(task, LabelProblem):
         before = state.prediction[state.prediction["observable"] == task.observable].reset_index(drop=True)
@@ -138,7 +153,7 @@ def _close(state: _Closing, task: Task) -> Outcome | None:
     return None if isinstance(task, LabelProblem) else outcome
 
 
-def _write(state: _Closing, reports: Path, provenance: dict[str, str]) -> None:
+def _write(state: Closing, reports: Path, provenance: dict[str, str]) -> None:
     filled = [table for table in state.tables if len(table)]
     joined = pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(COMPARISON))
     name, processed = state.batch.name, state.processed

@@ -200,7 +200,7 @@ def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator
     for row in impacts[impacts["kind"] == "record"].to_dict("records"):
         file, unit = str(row["file"]), str(row["response_unit"])
         table = recordings.table(file, "record")
-        if table is None:
+        if table is None or recordings.doubt(file, _unit_at_odds(table, unit)):
             continue
         time, zero = _from_zero(table)
         recordings.note(file, "", [_starts_at(zero), *quality.sampling(time, rate)])
@@ -214,6 +214,13 @@ def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator
         si_unit = "m/s2" if unit == "g" else unit
         columns: Part = {"t_s": time, "force_n": table["force_n"], "response_si": response}
         yield {**_place(row), "response_unit": si_unit, **columns}
+
+
+def _unit_at_odds(table: pd.DataFrame, unit: str) -> str:
+    """Say that a record's own unit of the response is not that of impacts.csv; "" where they agree."""
+    own = table.attrs.get("response_unit") or unit
+    found = f"column response: found the unit {own!r} in the file, expected {unit!r} as impacts.csv says"
+    return "" if own == unit else f"{found}: correct the one that is wrong"
 
 
 def frf(impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:
