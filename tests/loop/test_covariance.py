@@ -15,7 +15,9 @@ def system(designs, rests, weight=()):
     for design, rest in zip(designs, rests, strict=True):
         base, effect = np.split(design, [design.shape[1] - len(weight)], axis=1)
         rows.append((rest, base, effect, np.zeros((len(rest), 0))))
-    return System(rows, {}, {}, np.zeros(len(weight)), weight)
+    bases = designs[0].shape[1] - len(weight)
+    precision = np.diag([*np.zeros(bases), *weight])
+    return System(rows, {}, {}, np.zeros(len(precision)), precision)
 
 
 def fitted(designs, values):
@@ -75,7 +77,7 @@ def test_what_a_run_says_of_its_own_unknown_is_no_evidence():
         free.append((away @ rest, away @ design))
     with_own = System(
         [(r, d, np.zeros((6, 0)), o) for r, d, o in zip(rests, designs, own, strict=True)],
-        {}, {}, np.zeros(0), np.zeros(0),
+        {}, {}, np.zeros(2), np.zeros((2, 2)),
     )  # fmt: skip
     expected = between_runs(system([d for _, d in free], [r for r, _ in free]))
     assert between_runs(with_own) == pytest.approx(expected)

@@ -38,6 +38,20 @@ class State:
 
 
 @dataclass(frozen=True)
+class Known:
+    """What is known of base and effect parameters: ``mean`` (p + q,) and ``precision`` (p + q, p + q)."""
+
+    mean: Array
+    precision: Array
+
+
+def weakly_known(candidate: Candidate, bases: int) -> Known:
+    """Return what a machinist believes: effects are rather small; nothing of ``bases`` base parameters."""
+    weight = [0.0 if p.plausible is None else p.plausible**-2 for p in candidate.parameters]
+    return Known(np.zeros(bases + len(weight)), np.diag([0.0] * bases + weight))
+
+
+@dataclass(frozen=True)
 class System:
     """What the blocks say at given values of everything.
 
@@ -45,8 +59,8 @@ class System:
     ----------
     rows : of each block the whitened rest, base columns, effect columns and own (nuisance) columns.
     log_likelihood, chi2 : by run.
-    pull : distance of the effect parameters from the mean of their weak prior, zero.
-    weight : precision of that prior.
+    pull : distance of base and effect parameters from what is known of them beforehand, (p + q,).
+    weight : precision of that, (p + q, p + q).
     """
 
     rows: list[Rows]
@@ -58,7 +72,7 @@ class System:
     @property
     def cost(self) -> float:
         """Twice the negative logarithm of likelihood times prior."""
-        return float(self.pull @ (self.weight * self.pull)) - 2.0 * sum(self.log_likelihood.values())
+        return float(self.pull @ self.weight @ self.pull) - 2.0 * sum(self.log_likelihood.values())
 
 
 def linearised(
@@ -68,8 +82,12 @@ def linearised(
     state: State,
     *,
     derivatives: Literal["all", "own", "none"] = "all",
+    known: Known | None = None,
 ) -> System:
-    """Whitened rest of every block, its likelihood, and its derivatives: all, or by its own unknowns only."""
+    """Whitened rest of every block, its likelihood, and its derivatives: all, or by its own unknowns only.
+
+    ``known`` of the parameters beforehand; None: :func:`weakly_known`.
+    """
     model = candidate.model(state.theta)
     moved = moved_models(candidate, state.theta) if derivatives == "all" else []
     rows: list[Rows] = []
@@ -90,8 +108,9 @@ def linearised(
             whitened = whiten(np.hstack([matrix, effect, own]))
             p, q = matrix.shape[1], matrix.shape[1] + effect.shape[1]
             rows.append((rest, whitened[:, :p], whitened[:, p:q], whitened[:, q:]))
-    weight = np.array([0.0 if p.plausible is None else p.plausible**-2 for p in candidate.parameters])
-    return System(rows, log_likelihood, chi2, state.theta, weight)
+    known = known or weakly_known(candidate, len(state.beta))
+    pull = np.concatenate([state.beta, state.theta]) - known.mean
+    return System(rows, log_likelihood, chi2, pull, known.precision)
 
 
 def sensitivities(
@@ -147,9 +166,7 @@ def normal_equations(system: System) -> tuple[Array, Array]:
             columns = columns - basis @ (basis.T @ columns)
         normal += columns.T @ columns
         right += columns.T @ rest
-    normal[np.arange(p, p + q), np.arange(p, p + q)] += system.weight
-    right[p:] -= system.weight * system.pull
-    return normal, right
+    return normal + system.weight, right - system.weight @ system.pull
 
 
 def own_step(row: Rows, common: Array) -> Array:
@@ -170,6 +187,7 @@ def descend(
     *,
     own: bool = False,
     enough: float = ENOUGH,
+    known: Known | None = None,
 ) -> tuple[State, float]:
     """Follow Gauss–Newton steps, shortened until the cost falls, to where they gain next to nothing.
 
@@ -177,13 +195,14 @@ def descend(
     ----------
     own : move the blocks' own unknowns alone; base and effect parameters stay.
     enough : gain in twice the log-likelihood below which the descent ends.
+    known : of the parameters beforehand; None: :func:`weakly_known`.
 
     Returns
     -------
     state, cost : where at most so many ``steps`` lead.
     """
     free: Literal["all", "own"] = "own" if own else "all"
-    system = linearised(candidate, blocks, noise, state, derivatives=free)
+    system = linearised(candidate, blocks, noise, state, derivatives=free, known=known)
     for step in range(steps):
         common = np.zeros(len(state.beta) + len(state.theta)) if own else _common_step(system)
         if not np.isfinite(common).all():  # the model overflows here: there is no way down to be seen
@@ -191,7 +210,7 @@ def descend(
         alone = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
         for share in SHARES:
             trial = _moved(candidate, state, share * common, {run: share * alone[run] for run in alone})
-            reached = linearised(candidate, blocks, noise, trial, derivatives="none")
+            reached = linearised(candidate, blocks, noise, trial, derivatives="none", known=known)
             if reached.cost < system.cost:
                 break
         else:
@@ -200,7 +219,7 @@ def descend(
         if gain < share * enough:
             break
         if step + 1 < steps:
-            system = linearised(candidate, blocks, noise, state, derivatives=free)
+            system = linearised(candidate, blocks, noise, state, derivatives=free, known=known)
     return state, system.cost
 
 

@@ -72,6 +72,7 @@ class DeformationModel:
     flange_rotation : how much of what the flange turns moves the tip: all of it, in truth.
     torsion : what the joints do beyond linear springs.
     drift : how far the tip has moved from one run to the next, work frame x and y, m.
+    give : of what lies between flange and edge, in the cut: m of the wall per newton along its normal.
     """
 
     arm: Arm
@@ -79,6 +80,7 @@ class DeformationModel:
     flange_rotation: float = 1.0
     torsion: Torsion = field(default_factory=Torsion)
     drift: tuple[float, float] = (0.0, 0.0)
+    give: float = 0.0
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -155,6 +157,7 @@ class DeformationModel:
         # what the profile was filtered by, the prediction is filtered by: at the entry that matters
         smooth = _filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
         rest = (out * (twist - slope * compliance)).sum(axis=1) + _strayed(self.arm, setting)
+        rest = rest + self.give * (setting.force @ setting.normal)
         return smooth @ (out * slope), smooth @ rest
 
     def _loaded(self, setting: LoadTest, compliance: Array) -> tuple[Array, Array]:
