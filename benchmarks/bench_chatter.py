@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from chatter_trials import TEETH, settings, tests
+from chatter_trials import TEETH, settings, trials
 
 from metro.signals.chatter import UNDECIDED, detect
 
@@ -23,7 +23,7 @@ CLASSES = ("forced", "hopf", "flip", "unknown")
 @pytest.fixture(scope="module")
 def told():
     """Tests off the boundary, and what their records say."""
-    made = [test for teeth in TEETH for test in tests(settings(COUNT, teeth, SEED), SEED)]
+    made = [test for teeth in TEETH for test in trials(settings(COUNT, teeth, SEED), SEED)]
     off = [test for test in made if test.unstable >= 0]
     return off, [detected(test) for test in off]
 

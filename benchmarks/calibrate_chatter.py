@@ -6,7 +6,7 @@ logistic regression, drawn weakly towards nothing, weighs evidence, line and sid
 """
 
 import numpy as np
-from chatter_trials import TEETH, settings, tests
+from chatter_trials import TEETH, settings, trials
 
 from metro.signals import chatter, chatter_signs
 from metro.signals.asynchronous import windows
@@ -37,7 +37,7 @@ def fitted(told, unstable):
 
 
 def main():
-    made = [test for teeth in TEETH for test in tests(settings(COUNT, teeth, SEED), SEED)]
+    made = [test for teeth in TEETH for test in trials(settings(COUNT, teeth, SEED), SEED)]
     used = [test for test in made if test.unstable >= 0 and not test.locked]
     weights = fitted(np.array([features(test) for test in used]), np.array([test.unstable for test in used]))
     print(f"{len(used)} of {len(made)} tests, {sum(test.unstable for test in used)} of them chatter")

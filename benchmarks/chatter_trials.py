@@ -141,7 +141,7 @@ def _cut(teeth, immersion, law):
     return Cut(teeth, *immersion, law.ktc, law.krc)
 
 
-def tests(drawn, seed):
+def trials(drawn, seed):
     """March settings of one number of teeth together; yield a test for each that has a boundary."""
     drawn = [s for s in drawn if np.isfinite(s.depth)]
     factors = np.repeat([1.0, 1.0 - BESIDE, 1.0 + BESIDE], len(drawn))

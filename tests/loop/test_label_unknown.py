@@ -78,7 +78,34 @@ def test_the_curve_that_is_found_is_the_one_that_acts():
     evidence = Evidence(task.boundaries, task.estimates, tests, flat, GATES.seed)
     found = unknown(hypothesis((), evidence), evidence)
     at = np.array([2400.0, 3800.0, 5200.0])
-    told = found.weights @ curves(found, task.point_rpm, at)
+    tested = (tests.rpm, Line().boundary(tests.rpm))
+    told = found.weights @ curves(found, tested, (at, Line().boundary(at)))
     true = Arch(rise=0.5).boundary(at) - Line().boundary(at)
     assert told == pytest.approx(true, abs=0.25)
     assert found.names == (UNKNOWN,)
+
+
+def test_what_moves_deep_boundaries_most_is_found_as_such():
+    """Lobes that lose the more the higher they are: no curve over the speeds alone does that."""
+    task = problem(Line(), 4)
+
+    def lobes(rpm):
+        return np.log(1e-3) + 0.6 * np.sin(rpm / 320.0)
+
+    point = np.repeat(np.arange(len(RPM)), 6)
+    height = lobes(RPM) - lobes(RPM).mean()
+    log_depth = (lobes(RPM) - 0.6 * height)[point] + np.tile([-0.5, -0.2, -0.1, 0.1, 0.2, 0.5], len(RPM))
+    task = replace(task, unstable=np.tile([False] * 3 + [True] * 3, len(RPM)), depth=np.exp(log_depth))
+    tests, _ = told_by(task, "identify")
+    boundary = lobes(tests.rpm)
+    evidence = Evidence(
+        lambda _: (boundary, np.full(len(boundary), 300.0)),
+        lambda changes: (np.tile(boundary, (len(changes), 1)), np.full((len(changes), len(boundary)), 300.0)),
+        tests,
+        np.zeros((1, len(boundary))),
+        GATES.seed,
+    )
+    found = unknown(hypothesis((), evidence), evidence)
+    told = found.weights @ curves(found, (tests.rpm, boundary), (RPM, lobes(RPM)))
+    assert np.corrcoef(told, -0.6 * height)[0, 1] > 0.9
+    assert told.std() == pytest.approx((0.6 * height).std(), rel=0.4)

@@ -73,7 +73,8 @@ def _chance(problem: Labelled, one: Weighed, rpm: Array, depth: Array, outcome: 
     tests, mine = outcome.evidence.tests, one.hypothesis
     heavy = _drawn(mine, outcome.evidence.seed)
     if one.names == (UNKNOWN,):
-        found = problem.boundary_at(lambda model: model, rpm) + curves(mine, tests.rpm, rpm)[heavy]
+        base = problem.boundary_at(lambda model: model, rpm)
+        found = base + curves(mine, outcome.base_boundary, (rpm, outcome.evidence.told(base)))[heavy]
     else:
         found = np.stack([problem.boundary_at(changed(mine, which), rpm) for which in heavy])
     chance: Array = ndtr((np.log(depth) - found[:, :, None]) / tests.model_sd).mean(axis=0)

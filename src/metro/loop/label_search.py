@@ -69,6 +69,11 @@ class LabelOutcome:
     lead: Weighed | None = None
     not_visible: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def base_boundary(self) -> tuple[Array, Array]:
+        """Speeds of all points, and the base model's log depth there, (p,) each."""
+        return self.evidence.tests.rpm, self.evidence.told(self.weighed[0].hypothesis.depth[0])
+
     def probability(self, name: str) -> float:
         """Probability that an effect acts, or that nothing does."""
         if name == NOTHING:

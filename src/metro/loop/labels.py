@@ -186,10 +186,10 @@ def _with_effects(task: Labelled, rows: pd.DataFrame, outcome: LabelOutcome) -> 
 def elsewhere_words(outcome: LabelOutcome) -> str:
     """Say how a cause that the library lacks would have to move the boundary."""
     (curve,) = (one.hypothesis for one in outcome.weighed if one.names == (UNKNOWN,))
-    speeds = outcome.evidence.tests.speeds
-    at = np.unique(speeds[[0, len(speeds) // 2, -1]])
-    factor = np.exp(curve.weights @ curves(curve, outcome.evidence.tests.rpm, at))
-    told = ", ".join(f"{f:.2g} at {rpm:.0f} rev/min" for f, rpm in zip(factor, at, strict=True))
+    rpm, depth = outcome.base_boundary
+    at = np.argsort(rpm, kind="stable")[[0, len(rpm) // 2, -1]]
+    factor = np.exp(curve.weights @ curves(curve, (rpm, depth), (rpm[at], depth[at])))
+    told = ", ".join(f"{f:.2g} at {rpm[i]:.0f} rev/min" for f, i in zip(factor, at, strict=True))
     may = "" if outcome.elsewhere and not outcome.unsettled else "it may be "
     return f"{may}a cause that the library lacks: the depth of the boundary times {told}"
 
