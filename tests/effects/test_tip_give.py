@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from metro.effects import joint_backlash, stiffness_scale, tip_give
+from metro.loop.advice import left_over
 from metro.loop.search import Gates, search
 from metro.observables.deformation_model import CutWall
 
@@ -15,9 +16,9 @@ EFFECTS = (*joint_backlash.EFFECT, *stiffness_scale.EFFECT[1:], tip_give.EFFECT)
 GIVE = 80e-9  # m/N: a tool of 12.5 N/µm
 
 
-def bent(give, truth=None):
+def bent(give, truth=None, **plan):
     """The batch with a tool that bends under what pushes it along the wall's normal."""
-    task = elastic_arm.problem(truth or {}, 1)
+    task = elastic_arm.problem(truth or {}, 1, **plan)
     moved = [
         replace(block, measured=block.measured + give * float(block.setting.force[0] @ block.setting.normal))
         if isinstance(block.setting, CutWall)
@@ -53,3 +54,10 @@ def test_a_softer_arm_is_no_bent_tool(factor):
     outcome = search(bent(0.0, {"factor": dict.fromkeys(range(1, 7), factor)}), EFFECTS, GATES)
     assert outcome.names == ("stiffness_scale",)
     assert outcome.likeness is None
+
+
+def test_where_the_poses_do_not_tell_a_bent_tool_is_said_to_be_possible():
+    task = bent(GIVE, ways=elastic_arm.ONE_WAY, repeats=3)
+    outcome = search(task, EFFECTS, GATES)
+    assert outcome.names == ("stiffness_scale",)
+    assert "may be no stiffness scale but a tip give" in left_over(outcome)

@@ -49,7 +49,12 @@ def enough_runs(problem: Problem) -> bool:
 
 def left_over(outcome: Outcome) -> str:
     """Describe the significant rest, and what it resembles; empty where there is none."""
-    parts = [_resembled(outcome.likeness)] if outcome.likeness else []
+    parts = [f"like a {_resembled(outcome.likeness)}"] if outcome.likeness else []
+    parts += [
+        f"it may be no {_words(rival.found)} but a {_resembled(rival.fit)}"
+        for rival in outcome.rivals
+        if rival.fit.candidate.effects[-1].resembled
+    ]
     parts.append(rest.in_words(outcome.lines))
     if outcome.step:
         step = outcome.step
@@ -80,7 +85,7 @@ def _resembled(likeness: Fit) -> str:
         for effect, place in likeness.candidate.parts(likeness.theta)
         if effect.resembled
     ]
-    return f"like a {' and a '.join(found)}, which is no effect of the library"
+    return f"{' and a '.join(found)}, which is no effect of the library"
 
 
 def _to_decide(problem: Problem, outcome: Outcome) -> str:

@@ -297,7 +297,7 @@ def _unexplained(
     """Describe the rest; its size is the share left on the runs that tell of it, of the held-out signal."""
     whole = [abs(found.relative) for found in (outcome.step, outcome.between, outcome.restless) if found]
     share = max(share_left(lines), *whole) if whole else share_left(lines)
-    over = share * float(np.sqrt((rows["measured"] ** 2).mean())) if len(rows) else None
+    over = share * float(np.sqrt((rows["measured"] ** 2).mean())) if len(rows) and share else None
     if outcome.likeness and len(rows):
         words += (
             f"; with that the error would be {held_out_rms(problem, outcome.likeness):.3g} {problem.unit} rms"

@@ -9,7 +9,7 @@ from metro.report.figures import verdicts as figures
 from metro.report.numbers import number, percent, probability, quantity, unit, words
 from metro.report.phrases import plain
 from metro.report.results import Results, title
-from metro.report.sections.verdict import STATUS, error_cell, left_words, parameter_name, sentence
+from metro.report.sections.verdict import STATUS, error_text, left_words, parameter_name, sentence
 from metro.units import JSON
 
 LONGEST = 16
@@ -122,7 +122,7 @@ def _path(path: list[JSON], entry: JSON, shown: str | None) -> list[Item]:
         for step in path
     ]
     header = ["model", *(name for _, name in known), "of the signal"]
-    caption = f"How the model grew. Final held-out error {error_cell(entry.get('after'), shown)}."
+    caption = f"How the model grew. Final held-out error {error_text(entry.get('after'), shown)}."
     numeric = list(range(1, len(header)))
     return [Table(header, rows, caption, [2.4, *([1.4] * len(known)), 1], numeric=numeric)]
 
@@ -139,13 +139,13 @@ def _rest(entry: JSON, told: JSON, shown: str | None, left: str) -> list[Item]:
         )
     rest = entry.get("unexplained") or {}
     if rest.get("signature"):
-        size = f"{number(rest.get('rms'))} {unit(shown)} rms"
-        items.append(Paragraph(f"Unexplained: {size}, {left or plain(rest['signature'])}.", "warning"))
+        size = "" if rest.get("rms") is None else f"{number(rest['rms'])} {unit(shown)} rms, "
+        items.append(Paragraph(f"Unexplained: {size}{left or plain(rest['signature'])}.", "warning"))
     groups = [" and ".join(words(str(n)) for n in group) for group in entry.get("indistinguishable") or []]
     if groups:
         items.append(Paragraph("Cannot be told apart with these data: " + "; ".join(groups) + "."))
     hidden = [
-        f"{words(str(c['effect']))}: {c.get('why', '')}".rstrip(": ")
+        plain(f"{words(str(c['effect']))}: {c.get('why', '')}".rstrip(": "))
         for c in told.get("cannot_be_seen") or []
     ]
     if hidden:
