@@ -157,6 +157,37 @@ def test_a_slope_that_the_place_of_an_unplaced_scan_takes_is_not_found(name):
     assert found.total < base.total + 6.0
 
 
+def settled(time, **_cut):
+    return -60e-3 * (1.0 - np.exp(-time / 8.0))
+
+
+def distorted(x, y):
+    u, v = x / 60.0 - 1.0, y / 30.0 - 1.0
+    return 25e-3 * u**3 - 15e-3 * u * v**2
+
+
+@pytest.mark.parametrize(
+    ("made", "name"),
+    [
+        ({"hidden": settled}, "pass_levels"),
+        ({"hidden": lambda number, **_cut: -20e-3 * (number == 2)}, "pass_levels"),
+        ({"work": distorted}, "cubic_form"),
+    ],
+    ids=["settling", "one pass deeper", "distortion"],
+)
+def test_what_is_outside_the_library_is_most_like_a_cause_of_its_kind(made, name):
+    task = problem(**made)
+    base, prior = base_fit(task)
+    others = ("thermal_growth", "fixture_bow", "spindle_tilt", "pass_levels", "cubic_form")
+    total = {
+        other: fit(Candidate(task.base, (effect_of(task, other),)), base.blocks, prior, base).total
+        for other in others
+    }
+    likeness = total.pop(name)
+    assert effect_of(task, name).resembled
+    assert likeness > max(total.values()) + 10.0
+
+
 @pytest.mark.parametrize(
     ("made", "words"),
     [

@@ -66,7 +66,7 @@ def test_impacts_at_the_pose_or_at_a_point_of_it_tell_a0_and_a1() -> None:
         assert not any("contradict" in note for note in notes)
 
 
-def test_impacts_elsewhere_one_mode_or_none_leave_the_damping_to_each_face() -> None:
+def test_impacts_elsewhere_one_mode_or_none_leave_the_damping_in_doubt() -> None:
     for table in (modes("B"), modes("AB"), modes(count=1), pd.DataFrame()):
         found, _ = told(mass(1.0), table)
         assert isinstance(found, TipDynamics)

@@ -8,11 +8,13 @@ import pytest
 
 from metro.batch.batch import Batch
 from metro.observables import cutting_force
+from metro.observables.face_doubt import damping_doubt
 from metro.observables.face_dynamics import TipDynamics
-from metro.observables.face_path import force_over_period, make_path, passages
+from metro.observables.face_path import Pace, force_over_period, make_path, passages
 from metro.observables.face_ringing import Ringing, make_ringing
+from metro.observables.flatness_model import FaceSetting, FlatnessModel, PoseField
 from metro.structure import Structure
-from metro.surface.tip_damping import Rayleigh
+from metro.surface.tip_damping import Rayleigh, SharedRatio
 from metro.surface.tip_field import field_in
 from metro.surface.tip_stiffness import basis_over
 from metro.units import MM, UM
@@ -123,7 +125,7 @@ def test_the_face_is_that_of_a_cutter_swept_over_it_step_by_step_under_the_disc(
     )
     seen = passages(make_path(path()), at_x, at_y, RADIUS)
     soft = known.compliance(seen.x.ravel(), seen.y.ravel()) @ full
-    cuts = soft[:, 2].reshape(seen.x.shape) + rung.rest(Structure(), np.zeros(0), seen)
+    cuts = soft[:, 2].reshape(seen.x.shape) + rung.rest(Structure(), seen)
     found = np.where(seen.valid, cuts, np.inf).min(axis=1)
     grid_x, grid_y = np.meshgrid(x, y, indexing="ij")
     truth = np.array(
@@ -141,7 +143,7 @@ def test_the_face_is_that_of_a_cutter_swept_over_it_step_by_step_under_the_disc(
 def test_a_softer_arm_in_the_cut_rings_slower_and_farther() -> None:
     rung, _ = ringing(make_batch(), dynamics())
     seen = passages(make_path(path()), np.arange(0.02, 0.06, 1e-3), np.full(40, 0.022), RADIUS)
-    stiff, soft = (rung.rest(Structure(f), np.zeros(0), seen)[:, 0] for f in (1.0, 0.5))
+    stiff, soft = (rung.rest(Structure(f), seen)[:, 0] for f in (1.0, 0.5))
     assert np.ptp(soft) > 1.3 * np.ptp(stiff)
 
 
@@ -150,9 +152,7 @@ def test_teeth_count_only_where_they_are_slower_than_ten_times_the_highest_mode(
     fast, slow = (ringing(make_batch(rpm), dynamics())[0] for rpm in (12000.0, 1500.0))
     assert fast.teeth is None
     assert slow.teeth is not None
-    apart = slow.rest(Structure(), np.zeros(0), seen) - replace(slow, teeth=None).rest(
-        Structure(), np.zeros(0), seen
-    )
+    apart = slow.rest(Structure(), seen) - replace(slow, teeth=None).rest(Structure(), seen)
     assert 0.1 * UM < np.abs(apart).max() < 20 * UM
 
 
@@ -161,3 +161,40 @@ def test_without_a_size_of_the_work_or_a_mass_nothing_is_said_to_ring() -> None:
     assert make_ringing(batch, "r1", make_path(path()), None, COEFFICIENTS, full=np.zeros(3)) is None
     batch.manifest.pop("work")
     assert make_ringing(batch, "r1", make_path(path()), dynamics(), COEFFICIENTS, full=np.zeros(3)) is None
+
+
+def test_a_damping_that_nothing_tells_is_in_doubt_by_as_much_as_faces_of_arms_differ() -> None:
+    rung, full = ringing(make_batch(), replace(dynamics(), damping=None))
+    at_x, at_y = (
+        c.ravel() for c in np.meshgrid(np.arange(12.0, 69.0, 4.0) * MM, np.array([12.0, 22.0]) * MM)
+    )
+    x, y = (np.repeat(c, 4) for c in (at_x, at_y))  # four places in each disc, here all in its middle
+    basis = basis_over(np.array([0.0, 0.08, 0.0, 0.08]), np.array([0.0, 0.0, 0.03, 0.03]), 3)
+    soft = np.linalg.inv(STIFFNESS)[2] @ full
+    setting = FaceSetting(
+        pose="A",
+        x=x,
+        y=y,
+        first=np.arange(len(at_x)),
+        passages=passages(make_path(path()), x, y, RADIUS),
+        pace=Pace(0.04, 10.0, np.zeros(3)),
+        size=(0.08, 0.03),
+        force=np.array([0.0, 0.0, 1.0]),
+        loaded=np.concatenate([np.zeros(6), soft * np.array([1.16, 0.16, 0.0])]),
+        ringing=rung,
+    )
+    field = PoseField("A", basis, (True, True, True))
+    columns = damping_doubt(field, setting)
+    assert columns is not None
+    lowest, _ = FlatnessModel((field,)).finished(setting, np.zeros(1))
+    rng = np.random.default_rng(3)
+
+    def height(ratio: float) -> np.ndarray:
+        moved = replace(rung, damping=SharedRatio(ratio)).rest(Structure(), setting.middle)
+        return setting.mean(moved[lowest])
+
+    drawn = [height(0.05 * 2.0 ** rng.standard_normal()) - height(0.05) for _ in range(300)]
+    expected = np.sqrt(np.mean(np.square(drawn), axis=0))
+    found = np.sqrt((columns**2).sum(axis=1))
+    assert expected.max() > 0.5 * UM
+    assert np.linalg.norm(found - expected) < 0.15 * np.linalg.norm(expected)

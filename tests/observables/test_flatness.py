@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ from metro.observables.face_path import force_over_period, make_path, passages
 from metro.observables.flatness_model import FaceSetting
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.structure import Structure
+from metro.surface.tip_damping import Rayleigh, SharedRatio
 
 ROOT = Path(__file__).resolve().parents[2]
 SIMULATED = ROOT / "data/raw/irb6640-face"
@@ -145,6 +147,23 @@ def test_the_known_compliance_comes_back(plate: tuple) -> None:
     assert values["c_zy_u0v0_A"] == pytest.approx(-0.3e-6, rel=0.02)
     assert values["c_zz_u0v0_A"] == pytest.approx(1.2e-6, rel=0.02)
     assert rest < 5e-3  # the rim finishes a point 8 mm away, where the tip is up to 3 µm higher or lower
+
+
+def test_the_damping_is_reported_where_impacts_told_it_and_nowhere_else(plate: tuple) -> None:
+    batch, observed, task = plate
+
+    def reported(damping: Rayleigh | SharedRatio) -> dict:
+        blocks = [
+            replace(block, setting=replace(block.setting, ringing=SimpleNamespace(damping=damping)))
+            if isinstance(block.setting, FaceSetting)
+            else block
+            for block in task.blocks
+        ]
+        return flatness.report(batch, observed, {}, replace(task, blocks=tuple(blocks)), None)
+
+    assert "tip" not in reported(SharedRatio())
+    told = reported(Rayleigh(np.array([0.9, 0.002]), np.diag([1e-4, 1e-9]), 1.0))["tip"]
+    assert told["a0"]["value"] == pytest.approx(0.9)
 
 
 def test_a_softer_arm_in_the_cut_is_predicted_by_its_factor_and_by_no_other() -> None:

@@ -37,6 +37,16 @@ def test_two_scans_tell_noise_that_one_takes_for_the_surface() -> None:
     assert measure_face(scans[0]).sigma < 0.9 * found.sigma
 
 
+def test_the_doubt_of_a_spectrum_is_the_scatter_of_spectra_however_many_scans_they_are_of() -> None:
+    rng, found = np.random.default_rng(8), []
+    for _ in range(150):
+        scans = [cloud(DOME + WHITE * rng.normal(size=X.shape))[X.ravel() < 0.03] for _ in range(4)]
+        found.append(repeat_noise(scans, 2.5 * MM).spectrum)
+    density = np.array([each.density for each in found])[:, 1:]
+    scatter = density.std(axis=0) / density.mean(axis=0)
+    assert np.mean(scatter / found[0].doubt[1:]) == pytest.approx(1.0, abs=0.07)
+
+
 def test_a_declared_blur_passes_the_filter_as_a_simulated_one_does() -> None:
     rng, passed = np.random.default_rng(4), []
     for _ in range(12):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from metro.surface.tip_damping import fit_rayleigh, rayleigh_of_matrices
+from metro.surface.tip_damping import Rayleigh, SharedRatio, fit_rayleigh, rayleigh_of_matrices
 
 # Iglesias et al. 2025, section 3.1, point 25, wrists A and B
 PRINTED_A0, PRINTED_A1 = 0.9196, 0.0024
@@ -63,3 +63,18 @@ def test_modes_that_share_no_a0_and_a1_widen_the_error() -> None:
 def test_one_mode_tells_no_two_coefficients() -> None:
     with pytest.raises(ValueError, match="two modes"):
         fit_rayleigh(np.array([20.0, 20.0]), np.array([0.03, 0.04]), np.full(2, 1e-3))
+
+
+def test_the_doubts_of_a_shared_ratio_are_the_moments_of_a_normal_logarithm() -> None:
+    known = SharedRatio(0.05, 0.7)
+    assert known.ratio(np.ones((2, 3))) == pytest.approx(np.full((2, 3), 0.05))
+    moved = np.array([weight * np.log(other.value / 0.05) for weight, other in known.doubts()])
+    assert np.sum(moved**2) == pytest.approx(0.7**2)
+    fourth = [(weight * np.log(other.value / 0.05) ** 2) ** 2 for weight, other in known.doubts()]
+    assert np.sum(fourth) == pytest.approx(3 * 0.7**4)
+
+
+def test_the_doubts_of_measured_coefficients_make_up_their_covariance() -> None:
+    known = Rayleigh(np.array([0.9, 0.002]), np.array([[0.04, -3e-5], [-3e-5, 1e-7]]), 1.0)
+    moved = np.array([weight * (other.values - known.values) for weight, other in known.doubts()])
+    assert moved.T @ moved == pytest.approx(known.covariance)

@@ -47,12 +47,14 @@ class Choice:
 class Unknown:
     """Draws of what all choices share.
 
-    ``beta`` (draws, p); ``coefficients`` (draws, c) in standard errors; ``place`` (draws,) in 0…1 among what
-    the cut ``faces`` told of themselves; ``scale`` of the force, where coefficients have no known errors.
+    ``beta`` (draws, p); ``coefficients`` (draws, c) and ``damping`` (draws, d) in standard errors;
+    ``place`` (draws,) in 0…1 among what the cut ``faces`` told of themselves; ``scale`` of the force, where
+    coefficients have no known errors.
     """
 
     beta: Array
     coefficients: Array
+    damping: Array
     place: Array
     faces: tuple[Array, ...]
     scale: float
@@ -187,13 +189,15 @@ def predicted_heights(
     """Draw the faces of each choice, (draws, n) m.
 
     What is not known is the same in all of them: the compliance, the coefficients (or with them declared a
-    common ``scale`` of the force), and what a face has to tell of itself, taken from the faces that were cut,
-    else from the whole range of the model.
+    common ``scale`` of the force), the damping, and what a face has to tell of itself, taken from the faces
+    that were cut, else from the whole range of the model.
     """
     rng = np.random.default_rng(SEED)
+    doubts = max(0 if choice.block.untold is None else choice.block.untold.shape[1] for choice in chosen)
     unknown = Unknown(
         beta=posterior_draws(fit.beta, fit.covariance, _dof(task, fit), DRAWS, SEED),
         coefficients=rng.standard_normal((DRAWS, max(1, len(chosen[0].forces)))),
+        damping=rng.standard_normal((DRAWS, doubts)),
         place=rng.random(DRAWS),
         faces=tuple(fit.nuisance[b.run] for b in task.role("identify", "validate") if b.run in fit.nuisance),
         scale=scale,
@@ -223,7 +227,8 @@ def _drawn(task: Problem, fit: BaseFit, choice: Choice, unknown: Unknown) -> Arr
         off = off or [unknown.scale * base]
         result[rows] = base + (unknown.beta[rows] - fit.beta) @ design.T
         result[rows] += unknown.coefficients[rows] @ np.array(off)
-    return result
+    untold = choice.block.untold
+    return result if untold is None else result + unknown.damping[:, : untold.shape[1]] @ untold.T
 
 
 def _at(task: Problem, fit: BaseFit, block: Block, nuisance: Array) -> Array:
@@ -271,10 +276,9 @@ def _statement(cut: bool, scale: float, off: Sequence[object]) -> str:
     )
     return (
         f"Nothing was measured of these runs: X_m is predicted from {rests}. In the intervals: the error of "
-        f"the compliance; {forces}; the range of the damping where no face or impact tells it. Not in them: "
-        "scatter from run to run, the scanner's noise, and whatever shapes the face beside the force. X_m is "
-        "that of the points of the path a radius or more from entry and exit: a scan of the whole face "
-        "reads more."
+        f"the compliance; {forces}; what is not known of the damping. Not in them: scatter from run to "
+        "run, the scanner's noise, and whatever shapes the face beside the force. X_m is that of the points "
+        "of the path a radius or more from entry and exit: a scan of the whole face reads more."
     )
 
 

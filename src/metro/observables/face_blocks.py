@@ -169,7 +169,6 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, setting: FaceSetting, pa
     x, y = setting.mean(setting.x), setting.mean(setting.y)
     measured = setting.binned(deviation)
     placed = "to_work" in batch.instrument("scanner")
-    own = 0 if setting.ringing is None else setting.ringing.starts.shape[1]
     return Block(
         run=run,
         condition=str(row["condition"]),
@@ -188,7 +187,7 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, setting: FaceSetting, pa
             "y_mm": y / MM,
         },
         patterns=patterns(x, y, table["pass"].to_numpy()[setting.first], path.along(x, y)),
-        symmetries=np.array([[*np.zeros(own), phase] for phase in PHASES]),
+        symmetries=np.array(PHASES)[:, None],
     )
 
 

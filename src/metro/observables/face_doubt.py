@@ -1,4 +1,4 @@
-"""How far a predicted face may be off because the damping from impacts is known to some error only."""
+"""How far a predicted face may be off because the damping is known to some error only, if at all."""
 
 from __future__ import annotations
 
@@ -11,20 +11,19 @@ from metro.units import Array
 
 
 def damping_doubt(field: PoseField, setting: FaceSetting) -> Array | None:
-    """Heights (n, 2), m, of one standard error of a0 and a1 in each of two independent directions.
+    """Heights (n, k), m, of what the damping may be instead, each of one standard deviation.
 
-    None where each face tells its damping itself, or nothing rings.
+    None where nothing rings. The damping is not fitted to a face: one that misses much for another cause
+    would take any damping for it.
     """
     ringing = setting.ringing
-    if ringing is None or ringing.damping is None:
+    if ringing is None:
         return None
-    model, own = FlatnessModel((field,)), ringing.starts[0]
+    model = FlatnessModel((field,))
     chosen, _ = model.finished(setting, np.zeros(1))
-    known = ringing.rest(model.structure, own, setting.middle)
-    size, directions = np.linalg.eigh(ringing.damping.covariance)
+    known = ringing.rest(model.structure, setting.middle)[chosen]
     columns = []
-    for sd in (directions * np.sqrt(np.maximum(size, 0.0))).T:
-        moved = replace(ringing, damping=ringing.damping.shifted(sd))
-        apart = moved.rest(model.structure, own, setting.middle) - known
-        columns.append(setting.mean(apart[chosen]))
+    for weight, damping in ringing.damping.doubts():
+        other = replace(ringing, damping=damping).rest(model.structure, setting.middle)[chosen]
+        columns.append(weight * setting.mean(other - known))
     return np.column_stack(columns)

@@ -134,7 +134,7 @@ def _damping(
 
 
 def _free(pose: str, why: str) -> str:
-    return f"Pose {pose}: {why}: the modes share one damping ratio, fitted to each face."
+    return f"Pose {pose}: {why}: the modes share one damping ratio of 5 %, known to a factor of two."
 
 
 def _of_the_pose(pose: str, modes: pd.DataFrame) -> pd.DataFrame:

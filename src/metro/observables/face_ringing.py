@@ -20,12 +20,11 @@ from metro.observables.face_path import STEP, Passages, Path, force_over_period
 from metro.observables.problem import Refusal
 from metro.structure import Structure
 from metro.surface.footprint import RADIUS
-from metro.surface.tip_damping import Rayleigh
+from metro.surface.tip_damping import Damping, SharedRatio
 from metro.surface.tip_harmonics import SLOW, at_rim, tooth_heights
 from metro.surface.tip_response import TipModes, disc_weights, respond, tip_modes
 from metro.units import MM, Array
 
-DAMPING_RATIOS = (0.02, 0.05, 0.12)
 SEGMENT = 4 * MM  # M, C, K are constant over it
 PER_CYCLE = 4  # samples in a period of the fastest mode, and in the time that the footprint's radius takes
 
@@ -60,8 +59,7 @@ class Ringing:
     force : (s, m + 1, 3) N on the tip. step : s, between its samples.
     speed : feed, m/s. passes : in which the segments are, as many in each.
     weights : of the samples in the mean over the footprint.
-    damping : None where it is not known; the modes then share a ratio that each face tells.
-    teeth : None where they come too fast to move the tip.
+    damping : of the modes. teeth : None where they come too fast to move the tip.
     """
 
     modes: TipModes
@@ -71,45 +69,33 @@ class Ringing:
     speed: float
     passes: int
     weights: Array
-    damping: Rayleigh | None
+    damping: Damping
     teeth: Teeth | None
 
-    @property
-    def starts(self) -> Array:
-        """Starts of what a face tells: the logarithm of the damping ratio, (3, 1), or nothing, (1, 0)."""
-        return np.log(DAMPING_RATIOS)[:, None] if self.damping is None else np.zeros((1, 0))
+    def rest(self, structure: Structure, passages: Passages) -> Array:
+        """Height of the tip over the static one under the full force, (points, k) m, mean over discs."""
+        return self.at(self.moved(structure), passages) + self.of_teeth(structure, passages)
 
-    def rest(self, structure: Structure, nuisance: Array, passages: Passages) -> Array:
-        """Height of the tip over the static one under the full force, (points, k) m, mean over the footprint.
-
-        Parameters
-        ----------
-        nuisance : as :attr:`starts` has it.
-        """
-        return self.at(self.moved(structure, nuisance), passages) + self.of_teeth(
-            structure, nuisance, passages
-        )
-
-    def moved(self, structure: Structure, nuisance: Array) -> Array:
+    def moved(self, structure: Structure) -> Array:
         """Height of the tip over the static one under the full force, (passes, n) m, as :meth:`rest`."""
         softer = structure.in_cut(np.ones(1))
-        modes, ratio = self._in_cut(self.modes, softer, nuisance)
+        modes, ratio = self._in_cut(self.modes, softer)
         moved = respond(modes, ratio, self.force, self.step) - (softer * self.static)[:, None]
         return np.convolve(moved.ravel(), self.weights, mode="same").reshape(self.passes, -1)
 
-    def of_teeth(self, structure: Structure, nuisance: Array, passages: Passages) -> Array | float:
+    def of_teeth(self, structure: Structure, passages: Passages) -> Array | float:
         """Height of the tip about its mean over a turn as the rim goes over, (points, k) m; zero if slow."""
         if self.teeth is None:
             return 0.0
-        modes, ratio = self._in_cut(self.teeth.modes, structure.in_cut(np.ones(1)), nuisance)
+        modes, ratio = self._in_cut(self.teeth.modes, structure.in_cut(np.ones(1)))
         heights = tooth_heights(modes, ratio, self.teeth.force, self.teeth.rate)
         return at_rim(heights, passages.number, passages.rim, self.teeth.angles)
 
     @cached_property
     def _said(self) -> bytes:
         parts = (self.modes.frequency, self.modes.shape, self.static, self.force, self.weights)
-        damping = () if self.damping is None else tuple(self.damping.values)
-        return b"".join(part.tobytes() for part in (*parts, np.array([self.step, self.speed, *damping])))
+        damping = self.damping.ratio(self.modes.frequency)
+        return b"".join(part.tobytes() for part in (*parts, damping, np.array([self.step, self.speed])))
 
     def __eq__(self, other: object) -> bool:
         """Repeats of a cut ring alike: what is known of one (its teeth aside) serves all."""
@@ -122,10 +108,10 @@ class Ringing:
     def _hash(self) -> int:
         return hash(self._said)
 
-    def _in_cut(self, modes: TipModes, softer: Array, nuisance: Array) -> tuple[TipModes, Array]:
+    def _in_cut(self, modes: TipModes, softer: Array) -> tuple[TipModes, Array]:
         """Return the modes of load tests with the stiffness of the cut, and their damping ratios."""
         modes = replace(modes, frequency=modes.frequency / np.sqrt(softer))
-        return modes, np.exp(nuisance[:1]) if self.damping is None else self.damping.ratio(modes.frequency)
+        return modes, self.damping.ratio(modes.frequency)
 
     def at(self, heights: Array, passages: Passages) -> Array:
         """Interpolate ``heights`` (passes, n) at passages, (points, k)."""
@@ -170,7 +156,7 @@ def make_ringing(
         speed,
         len(path.start),
         disc_weights(RADIUS / speed, step),
-        dynamics.damping,
+        dynamics.damping or SharedRatio(),
         _teeth(batch, run, path, tool, dynamics=dynamics, values=values),
     )
 

@@ -23,14 +23,19 @@ class Setup:
     ----------
     tilt : of the spindle about work x and y through the tool's tip, rad.
     growth : of tool and spindle from the start of the first pass, m/s.
+    levels : how high passes are set, from the first to the last of a face: m by the Legendre polynomials of
+        degree 1, 2, … over that order.
     bow : (xx, xy, yy) of the work, m: height xx u² + xy u v + yy v², with u, v from −1 to 1 over the work.
+    cubic : (uuu, uuv, uvv, vvv) of work or scanner, m: height uuu u³ + uuv u² v + uvv u v² + vvv v³.
     entry : how much higher the tip is when the axis has come to the block's edge, m, and the way over which
         that fades to 1/e, m.
     """
 
     tilt: tuple[float, float] = (0.0, 0.0)
     growth: float = 0.0
+    levels: tuple[float, ...] = ()
     bow: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    cubic: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     entry: tuple[float, float] = (0.0, 1.0)
 
     def cuts(self, x: Array, y: Array, passages: Passages, pace: Pace) -> Array:
@@ -41,6 +46,9 @@ class Setup:
             higher = (y[:, None] - passages.y) * about_x - (x[:, None] - passages.x) * about_y
         if self.growth:
             higher = higher - self.growth * pace.time(passages)
+        if any(self.levels):
+            place = np.linspace(-1.0, 1.0, len(pace.edge)) if len(pace.edge) > 1 else np.zeros(1)
+            higher = higher + np.polynomial.legendre.legval(place, [0.0, *self.levels])[passages.number]
         amplitude, length = self.entry
         if amplitude:
             inside = pace.inside(passages)
@@ -49,11 +57,12 @@ class Setup:
 
     def bowed(self, x: Array, y: Array, size: tuple[float, float]) -> Array:
         """How much higher the work lies at points, (n,) m; ``size`` (m) of the work, whose corner is zero."""
-        if not any(self.bow):
+        if not any(self.bow) and not any(self.cubic):
             return np.zeros(len(x))
         u, v = 2.0 * x / size[0] - 1.0, 2.0 * y / size[1] - 1.0
-        xx, xy, yy = self.bow
-        return np.asarray(xx * u**2 + xy * u * v + yy * v**2)
+        (xx, xy, yy), (uuu, uuv, uvv, vvv) = self.bow, self.cubic
+        bent = xx * u**2 + xy * u * v + yy * v**2
+        return np.asarray(bent + uuu * u**3 + uuv * u**2 * v + uvv * u * v**2 + vvv * v**3)
 
 
 def swung(vibration: Vibration, phase: float, passages: Passages, pace: Pace) -> Array:

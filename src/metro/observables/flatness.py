@@ -156,7 +156,7 @@ def _limits(batch: Batch) -> list[str]:
     return [
         "The face is compared where the cutter is fully engaged (one radius from entry and exit); the "
         "spindle stands square to it. Where no impacts at the pose tell the damping of the arm, its modes "
-        "share one ratio, fitted to each face.",
+        "share one ratio of 5 %, known to a factor of two.",
         "Scans are placed by the declared scanner-to-work transform (offset and tilts known to 10 µm)."
         if placed
         else "No scanner-to-work transform is declared: offset and tilt are free, only the shape counts.",
@@ -211,7 +211,7 @@ def _damping(task: Problem) -> dict[str, Rayleigh]:
     """Return a0 and a1 by pose, where impacts told them."""
     settings = [block.setting for block in task.role("identify", "validate")]
     rung = [(each.pose, each.ringing.damping) for each in settings if each.ringing is not None]
-    return {pose: damping for pose, damping in rung if damping is not None}
+    return {pose: damping for pose, damping in rung if isinstance(damping, Rayleigh)}
 
 
 def _compliance_json(loads: pd.DataFrame) -> JSON:

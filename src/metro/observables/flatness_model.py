@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
@@ -27,8 +26,7 @@ ENTRIES = ("zx", "zy", "zz")
 # Places across and along the feed, in radii of a disc, whose mean is that over the disc: exact for a cubic,
 # and to 0.2 % of a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
-# Apart, of the logarithms of the damping ratio and of the stiffness; the ringing is interpolated between.
-NODES, STIFF_NODES = 0.1, 0.02
+STIFF_NODES = 0.02  # apart, of the logarithm of the stiffness; the ringing is interpolated between
 PHASES = tuple(2 * math.pi * third / 3 for third in range(3))
 
 
@@ -143,22 +141,18 @@ class FlatnessModel:
         )
 
     def nuisance_starts(self, block: Block) -> Array:
-        """Return starts of what a face has to tell, (k, m): for its transients, and a vibration's phase."""
+        """Return starts of what a face has to tell, (k, 1): a vibration's phase."""
         if not isinstance(block.setting, FaceSetting):
             return np.zeros((1, 0))
-        ringing = block.setting.ringing
-        starts = np.zeros((1, 0)) if ringing is None else ringing.starts
-        phases = PHASES if self.vibration.amplitude else PHASES[:1]
-        return np.array([[*start, phase] for phase in phases for start in starts])
+        return np.array(PHASES if self.vibration.amplitude else PHASES[:1])[:, None]
 
     def design(self, block: Block, nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
         """Matrix (n, p) in m per (m/N), and what rings, swings or is set up otherwise (n,) m."""
         setting = block.setting
         if isinstance(setting, LoadSetting):
             return _loaded(self.fields, setting), np.zeros(len(block.measured))
-        own = tuple(float(value) for value in nuisance[:-1])
         # The phase of no vibration changes nothing.
-        terms, offset = _shaped(self, setting, own, float(nuisance[-1]) if self.vibration.amplitude else 0.0)
+        terms, offset = _shaped(self, setting, float(nuisance[0]) if self.vibration.amplitude else 0.0)
         columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
         parts = [_own(part, setting.pose, columns) for part in self.fields]
         return np.hstack(parts), offset.copy()
@@ -179,12 +173,11 @@ class FlatnessModel:
     def _heights(self, setting: FaceSetting, nuisance: Array) -> tuple[Array, Array]:
         passages = setting.passages
         rest = self.setup.cuts(setting.x, setting.y, passages, setting.pace)
-        rest = rest + swung(self.vibration, float(nuisance[-1]), passages, setting.pace)
+        rest = rest + swung(self.vibration, float(nuisance[0]), passages, setting.pace)
         if setting.ringing is not None:
-            own = tuple(float(value) for value in nuisance[:-1])
             # What rings is a mean along the feed already: its waves may be shorter than a disc.
-            rest = rest + setting.ringing.at(_rung(setting.ringing, self.structure, own), setting.middle)
-            rest = rest + setting.ringing.of_teeth(self.structure, nuisance[:-1], passages)
+            rest = rest + setting.ringing.at(_rung(setting.ringing, self.structure), setting.middle)
+            rest = rest + setting.ringing.of_teeth(self.structure, passages)
         static = self.structure.in_cut(self._static(setting))
         return np.where(passages.valid, static + rest, np.inf), rest
 
@@ -210,14 +203,12 @@ def _loaded(fields: tuple[PoseField, ...], setting: LoadSetting) -> Array:
 
 
 @lru_cache(maxsize=512)
-def _shaped(
-    model: FlatnessModel, setting: FaceSetting, own: tuple[float, ...], phase: float
-) -> tuple[Array, Array]:
+def _shaped(model: FlatnessModel, setting: FaceSetting, phase: float) -> tuple[Array, Array]:
     """Return the mean of the basis' terms over each bin, (bins, terms), and of all else, (bins,) m.
 
     Noise and parameters are estimated in turn, so that the same is asked for many times.
     """
-    chosen, rest = model.finished(setting, np.array([*own, phase]))
+    chosen, rest = model.finished(setting, np.array([phase]))
     bowed = model.setup.bowed(setting.x, setting.y, setting.size)
     finished_by = chosen[1].astype(np.int8).tobytes()
     return _terms(model._basis(setting), setting, finished_by), setting.mean(rest[chosen] + bowed)
@@ -243,30 +234,28 @@ def _static(basis: Basis, setting: FaceSetting) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _rung(ringing: Ringing, structure: Structure, own: tuple[float, ...]) -> Array:
+def _rung(ringing: Ringing, structure: Structure) -> Array:
     """Return the height over the static one along the passes, (passes, n) m.
 
-    By cubic interpolation over the logarithms of damping and stiffness, where they are not given: to 1e-5 of
-    the ringing for the damping, to 1e-3 for the stiffness.
+    By cubic interpolation over the logarithm of the stiffness: to 1e-3 of the ringing.
     """
-    softer = structure.stiffness_factor != 1.0
-    damping = _cubic(own[0] / NODES) if own else [((), 1.0)]
-    stiffness = _cubic(math.log(structure.stiffness_factor) / STIFF_NODES) if softer else [((), 1.0)]
-    parts = []
-    for (at, weight), (stiff, share) in itertools.product(damping, stiffness):
-        there = Structure(*(math.exp(node * STIFF_NODES) for node in stiff))
-        parts.append(weight * share * _rung_at(ringing, there, tuple(node * NODES for node in at)))
+    if structure.stiffness_factor == 1.0:
+        return _rung_at(ringing, structure)
+    place = math.log(structure.stiffness_factor) / STIFF_NODES
+    parts = [
+        weight * _rung_at(ringing, Structure(math.exp(node * STIFF_NODES))) for node, weight in _cubic(place)
+    ]
     return np.asarray(sum(parts))
 
 
-def _cubic(place: float) -> list[tuple[tuple[int, ...], float]]:
+def _cubic(place: float) -> list[tuple[int, float]]:
     """Return the four integers about a place, each with its weight in Lagrange's cubic interpolation."""
     first = math.floor(place) - 1
     share = place - first
-    return [((first + i,), math.prod((share - j) / (i - j) for j in range(4) if j != i)) for i in range(4)]
+    return [(first + i, math.prod((share - j) / (i - j) for j in range(4) if j != i)) for i in range(4)]
 
 
 @lru_cache(maxsize=512)
-def _rung_at(ringing: Ringing, structure: Structure, own: tuple[float, ...]) -> Array:
+def _rung_at(ringing: Ringing, structure: Structure) -> Array:
     """Whatever else shapes the face, this is the same, and slow to have."""
-    return ringing.moved(structure, np.array(own))
+    return ringing.moved(structure)

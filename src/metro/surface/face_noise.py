@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -92,9 +91,8 @@ def repeat_noise(scans: Sequence[Points], nesting_index: float) -> Noise:
     source = f"{'two' if len(scans) == 2 else len(scans)} scans of the face"
     if not filterable(spacing, nesting_index):
         clouds = [np.asarray(scan[:], dtype=np.float64) for scan in scans]
-        sigmas = [repeat_sigma(*pair) for pair in pairwise(clouds)]
-        sigma, dof = float(np.sqrt(np.mean(np.square(sigmas)))), len(sigmas) * (len(clouds[0]) - 3)
-        return Noise(sigma, source, float(1 / np.sqrt(2 * dof)), repeated=True)
+        dof = (len(clouds) - 1) * (len(clouds[0]) - 3)
+        return Noise(repeat_sigma(*clouds), source, float(1 / np.sqrt(2 * dof)), repeated=True)
     frame = plane_of_moments(seen.moments)
     boxes = [box_in_plane(frame, survey(scan)) for scan in scans]
     low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
@@ -103,12 +101,7 @@ def repeat_noise(scans: Sequence[Points], nesting_index: float) -> Noise:
     inside = np.all([interior(each, crop_margin(spacing, nesting_index, MM)) for each in sums], axis=0)
     if np.count_nonzero(inside) < 4 * BAND:
         raise ValueError("the scans do not show the same part of the face")
-    spectra = [difference_spectrum(*pair, inside) for pair in pairwise(sums)]
-    spectrum = Spectrum(
-        spectra[0].wavenumber,
-        np.mean([each.density for each in spectra], axis=0),
-        spectra[0].doubt / np.sqrt(len(spectra)),
-    )
+    spectrum = difference_spectrum(sums, inside)
     white = spectrum.density[-1] / spacing**2  # at the cells' own wavelength noise is white
     correlated = spectrum.density - spectrum.density[-1]
     k = spectrum.wavenumber

@@ -17,23 +17,34 @@ NODES = 200  # even, so that none is at zero, where ln |d| is not defined
 LEVELS = 160
 
 
-def repeat_sigma(first: Array, second: Array) -> float:
-    """Return the noise of a scan from two of the same points, (n, 3): rms difference / √2 about its plane.
+def contrasts(scans: int) -> Array:
+    """Return weights (scans − 1, scans) of what differs between scans: orthonormal, free of what all share.
+
+    Each contrast has the noise of one scan, independent of that of the others; the differences of one scan
+    from the next are not independent (they overlap).
+    """
+    from scipy.linalg import helmert
+
+    return np.asarray(helmert(scans))
+
+
+def repeat_sigma(*scans: Array) -> float:
+    """Return the noise of a scan from two or more of the same points, (n, 3), planes apart from each other.
 
     Raises
     ------
     ValueError
-        Where the two do not hold the same number of points, more than three.
+        Where they do not all hold the same number of points, more than three.
     """
-    if first.shape != second.shape or len(first) <= 3:
-        raise ValueError(
-            f"repeat scans need the same points, more than three: found {len(first)} and {len(second)}"
-        )
+    first, sizes = scans[0], [len(scan) for scan in scans]
+    if len(set(sizes)) > 1 or len(first) <= 3:
+        found = " and ".join(map(str, sizes))
+        raise ValueError(f"repeat scans need the same points, more than three: found {found}")
     plane = fit_plane(first)
     basis = np.column_stack([np.ones(len(first)), plane.coordinates(first)])
-    difference = (first - second) @ plane.normal
-    rest = difference - basis @ np.linalg.lstsq(basis, difference, rcond=None)[0]
-    return float(np.sqrt(rest @ rest / (len(rest) - 3) / 2))
+    differ = contrasts(len(scans)) @ np.array([(scan - first) @ plane.normal for scan in scans])
+    rest = differ.T - basis @ np.linalg.lstsq(basis, differ.T, rcond=None)[0]
+    return float(np.sqrt(np.sum(rest**2) / (len(rest) - 3) / rest.shape[1]))
 
 
 def shrink(deviations: Array, sigma: float) -> Array:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from metro.surface.areal import GAUSSIAN, CellSums
+from metro.surface.noise import contrasts
 from metro.units import MM, Array
 
 CORRELATION = 1 * MM  # deviation of the blur that makes noise of unknown correlation out of white noise
@@ -61,24 +63,24 @@ def wavenumbers(shape: tuple[int, int], cell: float) -> Array:
     return np.asarray(np.hypot(rows[:, None], columns))
 
 
-def difference_spectrum(first: CellSums, second: CellSums, inside: np.ndarray) -> Spectrum:
-    """Return the noise of one scan by the cell means of two, where both cover ``inside``.
+def difference_spectrum(scans: Sequence[CellSums], inside: np.ndarray) -> Spectrum:
+    """Return the noise of one scan by the cell means of two or more, where all cover ``inside``.
 
-    The pair may lie a plane apart. Cells outside are taken as the mean: the noise of the others fills less of
+    The scans may lie planes apart. Cells outside are taken as the mean: the noise of the others fills less of
     the rectangle about them, and the density is raised accordingly.
     """
     from scipy.fft import dctn
 
     with np.errstate(invalid="ignore", divide="ignore"):
-        means = [each.total / each.count for each in (first, second)]
-    seen = inside & np.isfinite(means[0]) & np.isfinite(means[1])
+        means = np.array([each.total / each.count for each in scans])
+    seen = inside & np.isfinite(means).all(axis=0)
     # of a rectangle without a rim of zeros, which would spread the power
     rows, columns = (slice(int(at.min()), int(at.max()) + 1) for at in np.nonzero(seen))
-    seen, gap = seen[rows, columns], (means[1] - means[0])[rows, columns]
-    field = np.where(seen, without_plane(gap, seen), 0.0) / np.sqrt(2)
-    cell = first.grid.cell
-    power = dctn(field, norm="ortho") ** 2 * cell**2 / seen.mean()
-    k = wavenumbers(field.shape, cell).ravel()
+    seen, cell = seen[rows, columns], scans[0].grid.cell
+    differ = np.tensordot(contrasts(len(scans)), means[:, rows, columns], axes=1)
+    fields = [np.where(seen, without_plane(each, seen), 0.0) for each in differ]
+    power = np.mean([dctn(field, norm="ortho") ** 2 for field in fields], axis=0) * cell**2 / seen.mean()
+    k = wavenumbers(seen.shape, cell).ravel()
     # bands that double in size: the first few modes hold most of what the filter passes
     order = np.argsort(k)
     starts = np.array([0, *(BAND * 2 ** np.arange(int(np.log2(k.size / BAND))))])
@@ -86,7 +88,7 @@ def difference_spectrum(first: CellSums, second: CellSums, inside: np.ndarray) -
     centre = np.add.reduceat(k[order], starts) / number
     number[0] -= 3  # the plane's
     density = np.add.reduceat(power.ravel()[order], starts) / number
-    return Spectrum(centre, density, np.sqrt(2 / (number * seen.mean())))
+    return Spectrum(centre, density, np.sqrt(2 / (number * seen.mean() * len(differ))))
 
 
 def without_plane(field: Array, inside: np.ndarray) -> Array:

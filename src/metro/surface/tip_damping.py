@@ -1,12 +1,18 @@
-"""Proportional damping C = a0 M + a1 K: from the damping ratios of modes, or from printed matrices."""
+"""Proportional damping of the tip: C = a0 M + a1 K from damping ratios of modes, or from printed matrices.
+
+Where no mode was measured, all share one ratio, of which it is only known what arms have.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from metro.units import Array
+
+NODES = 5  # of Gauss's rule
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +33,45 @@ class Rayleigh:
     def shifted(self, sd: Array) -> Rayleigh:
         """Return these coefficients moved by ``sd`` (2,)."""
         return Rayleigh(self.values + sd, self.covariance, self.misfit)
+
+    def doubts(self) -> list[tuple[float, Rayleigh]]:
+        """Return what it may be instead, each with the weight of the difference that this makes.
+
+        The second moment of whatever follows from the damping, about that of the damping as it is, is the sum
+        of the squares of the weighted differences.
+        """
+        size, directions = np.linalg.eigh(self.covariance)
+        moves = (directions * np.sqrt(np.maximum(size, 0.0))).T
+        return [(1.0, self.shifted(move)) for move in moves]
+
+
+@dataclass(frozen=True)
+class SharedRatio:
+    """One damping ratio ``value`` of all modes; its logarithm is known to ``sd``.
+
+    The matrices that are printed for a milling arm give its two lowest modes 5 % (Iglesias et al. 2025,
+    section 3.1); another arm is taken to have as much, within a factor of two in two of three cases.
+    """
+
+    value: float = 0.05
+    sd: float = math.log(2.0)
+
+    def ratio(self, frequency: Array) -> Array:
+        """Damping ratio at undamped ``frequency`` (rad/s), whatever it is."""
+        return np.full(frequency.shape, self.value)
+
+    def doubts(self) -> list[tuple[float, SharedRatio]]:
+        """Return what it may be instead, as :meth:`Rayleigh.doubts` does: by Gauss's rule for a normal."""
+        place, weight = np.polynomial.hermite_e.hermegauss(NODES)
+        share = np.sqrt(weight / weight.sum())
+        return [
+            (float(part), SharedRatio(self.value * math.exp(at * self.sd), self.sd))
+            for at, part in zip(place, share, strict=True)
+            if abs(at) > 1e-9
+        ]
+
+
+Damping = Rayleigh | SharedRatio
 
 
 def damping_rows(frequency: Array) -> Array:
