@@ -1,16 +1,14 @@
-"""What the Snakefile is told: batches, settings, and that it is alone at work."""
+"""What the Snakefile is told: batches and settings."""
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from metro.batch.findings import BatchError, ConfigError
-from metro.workflow import Plan, only_one_at_work, remove_leftovers
+from metro.workflow import Plan
 
 ROOT = Path(__file__).parents[1]
 
@@ -64,45 +62,3 @@ def test_a_section_from_the_command_line_replaces_the_whole_section(lab):
 def test_a_folder_without_batches_is_an_error_that_names_it(lab):
     with pytest.raises(BatchError, match="data: holds no batch"):
         Plan.read(ROOT, {"raw_roots": ["data"]})
-
-
-def test_a_second_process_cannot_work_in_the_same_folder(tmp_path):
-    (tmp_path / ".snakemake").mkdir()
-    script = "\n".join(
-        [
-            "import pathlib, sys, metro.workflow",
-            "metro.workflow.only_one_at_work(pathlib.Path(sys.argv[1]))",
-            "print('in', flush=True)",
-            "input()",
-        ]
-    )
-    first = subprocess.Popen(
-        [sys.executable, "-c", script, str(tmp_path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    )
-    assert first.stdout.readline() == b"in\n"
-    with pytest.raises(RuntimeError, match="another snakemake is at work"):
-        only_one_at_work(tmp_path)
-    first.kill()
-    first.communicate()
-    only_one_at_work(tmp_path)
-
-
-def test_leftovers_of_killed_jobs_go_and_everything_else_stays(tmp_path):
-    from metro.batch.processed import write_atomically
-
-    def killed(stream):
-        stream.write(b"half")
-        raise KeyboardInterrupt
-
-    (tmp_path / "a/.scan.k2x_8dq0").mkdir(parents=True)
-    (tmp_path / "a/.force.parquet.abcd1234").write_text("")
-    for name in (".gitkeep", "a/force.parquet", "a/.hidden.txt", "a/x.abcdefgh"):
-        (tmp_path / name).write_text("")
-    with pytest.raises(KeyboardInterrupt):
-        write_atomically(tmp_path / "a/new.json", killed)
-    remove_leftovers(tmp_path, tmp_path / "not-there")
-    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
-    assert left == [".gitkeep", "a/.hidden.txt", "a/force.parquet", "a/x.abcdefgh"]
-    assert not (tmp_path / "a/.scan.k2x_8dq0").exists()

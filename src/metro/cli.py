@@ -70,9 +70,10 @@ def readable_errors() -> Iterator[None]:
 
 def _run(stage: str, settings: str, code: str, **folders: Any) -> None:
     """Run a stage with the code that the workflow was planned with, or not at all."""
+    from metro.batch.at_work import job_at_work
     from metro.codehash import require_code
 
-    with readable_errors():
+    with job_at_work(Path.cwd()), readable_errors():
         require_code(stage, code)
         function = getattr(import_module(f"metro.stages.{stage}"), stage)
         function(**folders, settings=json.loads(settings), code=code)

@@ -5,12 +5,9 @@ It is read at every call of snakemake, so nothing heavy is imported here.
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 import re
 import shlex
-import shutil
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -134,35 +131,6 @@ class Plan:
     def code(self, stage: str) -> str:
         """Return the hash of the code that a stage runs."""
         return code_hash(stage)
-
-
-def only_one_at_work(folder: Path) -> None:
-    """Take a working folder for this process until it ends.
-
-    In place of snakemake's own lock, which a killed run leaves behind for a person to remove: this one ends
-    with the process, in whatever way.
-
-    Raises
-    ------
-    RuntimeError
-        Another process has taken the folder.
-    """
-    descriptor = os.open(folder / ".snakemake" / "metro.lock", os.O_CREAT | os.O_RDWR)  # never closed
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise RuntimeError(
-            f"another snakemake is at work in {folder.resolve()}: wait until it ends"
-        ) from None
-
-
-def remove_leftovers(*roots: Path) -> None:
-    """Remove what jobs of a killed run were writing: files and folders named ``.<name>.<8 letters>``."""
-    for path in [path for root in roots for path in root.rglob(".*.????????")]:
-        if path.is_dir():
-            shutil.rmtree(path)
-        else:
-            path.unlink(missing_ok=True)
 
 
 def _unnameable(found: Iterable[FoundBatch]) -> Iterator[Finding]:

@@ -137,6 +137,15 @@ def test_a_report_without_provenance_says_what_to_do(own_campaign):
     assert "call snakemake" in result.stderr
 
 
+@pytest.mark.parametrize("content", ["", '{"raw": {', "[]", "7", '{"raw": {}}', "\x00\ud83d"])
+def test_a_damaged_provenance_says_what_to_do(own_campaign, content):
+    file = own_campaign / "reports/late/provenance.json"
+    file.write_bytes(content.encode(errors="surrogatepass"))
+    result = verify()
+    assert result.exit_code == 1
+    assert "provenance.json: is damaged" in result.output
+
+
 def test_the_record_names_code_and_settings_of_every_stage(own_campaign):
     made = json.loads((own_campaign / "reports/late/provenance.json").read_text())
     assert list(made["stages"]) == ["ingest", "identify", "predict", "loop", "report"]

@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from metro import __version__
-from metro.batch.processed import COLUMNS, write_atomically
+from metro.batch.processed import COLUMNS
+from metro.batch.writing import write_atomically
 
 # Rows that belong together (a run's record): arrays of one length, and values that stand for all of its rows.
 Part = Mapping[str, np.ndarray | pd.Series | str | int]

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import IO
 
 import pandas as pd
 
 from metro import __version__
 from metro.batch.batch import Batch
+from metro.batch.writing import write_atomically
 from metro.units import JSON
 
 # Every table that ingest writes, always, with these columns (no rows where the batch has no such data).
@@ -66,22 +64,6 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     ),
     "qc": ("file", "run", "check", "value", "limit", "ok", "message"),
 }
-
-
-def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write ``path`` through a unique temporary file beside it, so that it is there whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            write(stream)
-            stream.flush()
-            os.fsync(stream.fileno())
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
 
 
 def write_json(path: Path, content: JSON) -> None:

@@ -17,6 +17,7 @@ from metro.commands.output import print_json
 from metro.units import JSON
 from metro.workflow import Plan
 
+RECORDED = {"raw", "processed", "results", "stages", "metro", "python", "packages"}
 # Files that are part of a batch by their name alone: nothing has to name them.
 BY_NAME = {
     f"{stem}{suffix}"
@@ -72,7 +73,7 @@ def verify(reports: Path, raw: Path, processed: Path, config: Path) -> tuple[JSO
     Raises
     ------
     ContractError
-        There is no ``provenance.json``, or the raw folder is not there.
+        There is no ``provenance.json``, it is damaged, or the raw folder is not there.
     """
     file = reports / provenance.FILE
     if not file.is_file():
@@ -81,8 +82,7 @@ def verify(reports: Path, raw: Path, processed: Path, config: Path) -> tuple[JSO
     if not raw.is_dir():
         message = "is not there: name the folder of the raw files with --raw"
         raise ContractError([Finding("error", str(raw), message)])
-    made: JSON = json.loads(file.read_text(encoding="utf-8"))
-    plan = _plan(config)
+    made, plan = _recorded(file), _plan(config)
     return made, [
         *_raw(made["raw"], raw),
         *_cell(raw, processed, Path(plan.cells)),
@@ -93,6 +93,18 @@ def verify(reports: Path, raw: Path, processed: Path, config: Path) -> tuple[JSO
         *_stages(made["stages"], plan),
         *compare("package", _versions(made), _versions(_here())),
     ]
+
+
+def _recorded(file: Path) -> JSON:
+    """Return the content of ``provenance.json``; one that was damaged is an error in words."""
+    try:
+        made: JSON = json.loads(file.read_text(encoding="utf-8"))
+        if set(made) >= RECORDED:
+            return made
+    except (ValueError, TypeError):
+        pass
+    message = "is damaged, nothing can be compared with it: remove it and call snakemake"
+    raise ContractError([Finding("error", str(file), message)])
 
 
 def _raw(was: dict[str, str], folder: Path) -> list[Difference]:

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
 
+from metro.batch.writing import writing
 from metro.report.content import Item, Picture, Section
 from metro.report.style import to_svg
 from metro.units import JSON
@@ -33,7 +34,7 @@ def compile_pdf(cover: Cover, sections: Sequence[Section]) -> bytes:
     """
     import typst
 
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, writing(Path(name) / TEMPLATE):
         folder = Path(name)
         template = folder / TEMPLATE
         template.write_bytes((files("metro.report") / "templates" / TEMPLATE).read_bytes())

@@ -11,7 +11,8 @@ from urllib.parse import quote
 import pandas as pd
 
 from metro.batch.layout import PAGE
-from metro.batch.processed import read_batch, read_table, write_atomically, write_json, write_table
+from metro.batch.processed import read_batch, read_table, write_json, write_table
+from metro.batch.writing import write_atomically
 from metro.memory.history import Record
 from metro.memory.remember import remember
 from metro.report.campaign import campaign_report, campaign_sections, campaign_table

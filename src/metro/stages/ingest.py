@@ -21,6 +21,7 @@ from metro.batch.check import HOLDOUT, Loaded, load
 from metro.batch.files import OWN_TO_A_RUN
 from metro.batch.findings import BatchError, Finding
 from metro.batch.processed import COLUMNS, write_batch
+from metro.batch.writing import writing
 from metro.stages import recordings as parts
 from metro.stages import scans
 from metro.stages.recordings import Recordings
@@ -159,15 +160,18 @@ def _sha256(path: Path) -> str:
 @contextmanager
 def _staging(out: Path) -> Iterator[Path]:
     """Give a folder beside ``out`` to write into; if all went well its files move there, batch.json last."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    staging = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
-    try:
-        yield staging
-        out.mkdir(exist_ok=True)
-        for file in sorted(staging.iterdir(), key=lambda file: file.name == "batch.json"):
-            file.replace(out / file.name)
-    finally:
-        shutil.rmtree(staging)
+    with writing(out):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
+        try:
+            yield staging
+            out.mkdir(exist_ok=True)
+            # That of an earlier call does not describe these tables.
+            (out / "batch.json").unlink(missing_ok=True)
+            for file in sorted(staging.iterdir(), key=lambda file: file.name == "batch.json"):
+                file.replace(out / file.name)
+        finally:
+            shutil.rmtree(staging)
 
 
 @contextmanager

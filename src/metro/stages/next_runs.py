@@ -17,7 +17,7 @@ import pandas as pd
 
 from metro.batch.findings import ContractError, Finding
 from metro.batch.planned import Limits, Row, in_random_order, limits_of, rounded, row_like, within
-from metro.batch.processed import write_atomically
+from metro.batch.writing import write_atomically
 from metro.loop.planner import Aim, aims
 from metro.loop.search import Gates
 from metro.observables.problem import Made, Problem

@@ -10,7 +10,8 @@ import pandas as pd
 
 from metro.batch import provenance
 from metro.batch.batch import Batch
-from metro.batch.processed import read_batch, read_table, write_atomically, write_json
+from metro.batch.processed import read_batch, read_table, write_json
+from metro.batch.writing import write_atomically
 from metro.observables import force_metrics
 from metro.observables.end_stiffness import end_stiffness
 from metro.observables.robot_tables import robot_tables
