@@ -8,11 +8,11 @@ import pytest
 import synthetic_results as synthetic
 
 from metro.observables.force_metrics import metrics, order_spectrum
-from metro.report.content import Picture, Table
+from metro.report.content import Facts, Picture, Table
 from metro.report.figures import force as figures
 from metro.report.sections.force import force_items
 from metro.report.sections.quality import quality
-from metro.report.sections.verdict import error_cell
+from metro.report.sections.verdict import error_text, summary
 
 TEETH = 4
 
@@ -85,10 +85,14 @@ def test_failures_of_one_kind_share_a_row_with_the_list_of_their_runs():
     ]  # fmt: skip
 
 
-def test_the_error_of_one_held_out_condition_has_a_dash_for_an_interval():
+def test_the_error_of_one_held_out_condition_stands_alone_and_the_first_page_says_why():
     point = {"rms": 21.4, "nrmse": 0.1, "ci95": [21.4, 21.4]}
-    assert error_cell(point, "N") == "21.4 ± – N"
+    assert error_text(point, "N") == "21.4 N"
     runs = synthetic.batch().runs.assign(condition="the same")
     results = replace(synthetic.results(), batch=replace(synthetic.batch(), runs=runs))
     assert results.verdicts()["force"]["before"]["ci95"] is None
     assert synthetic.results().verdicts()["force"]["before"]["ci95"] is not None
+    only = {"observables": {"force": synthetic.results().verdict["observables"]["force"]}}
+    for told, said in ((results, True), (synthetic.results(), False)):
+        facts = [i for i in summary(replace(told, verdict=only)).items if isinstance(i, Facts)]
+        assert ("one condition: no interval" in facts[0].items[1][2]) is said

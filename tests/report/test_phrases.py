@@ -58,3 +58,9 @@ def test_sentences_of_the_verdict_lose_their_jargon():
 )
 def test_a_note_becomes_a_sentence_and_symbols_stay(text, told):
     assert sentence(text) == told
+
+
+def test_units_are_set_as_in_print():
+    assert plain("it shows from 0.93 1 on") == "it shows from 0.93 on"
+    assert plain("it shows from 12 um/min on") == "it shows from 12 µm/min on"
+    assert plain("a column thrust_um") == "a column thrust_um"

@@ -1,9 +1,10 @@
 """Figures show what is in the frame, name their units, and are the same for the same data."""
 
 import numpy as np
+import pandas as pd
 import synthetic_results as synthetic
 
-from metro.report.figures import comparison, surface, verdicts
+from metro.report.figures import comparison, face_pairing, surface, verdicts
 from metro.report.style import to_svg
 
 
@@ -65,3 +66,10 @@ def test_maps_have_a_colour_scale_symmetric_about_zero():
     figure = surface.face_maps(synthetic.tables()["face_map"])
     low, high = figure.axes[0].collections[0].get_clim()
     assert low == -high
+
+
+def test_the_parity_of_faces_bears_the_unit_of_the_comparison():
+    columns = ("measured", "before", "after", "similar_before", "similar_after")
+    faces = pd.DataFrame({"run": ["r1", "r2"], **dict.fromkeys(columns, (0.1, 0.2))})
+    left = face_pairing.parity(faces, "mm").axes[0]
+    assert (left.get_xlabel(), left.get_ylabel()) == ("X_m measured (mm)", "predicted (mm)")

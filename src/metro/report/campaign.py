@@ -15,7 +15,7 @@ from metro.report.numbers import listing, number, unit, words
 from metro.report.phrases import plain
 from metro.report.results import OBSERVABLES, title
 from metro.report.sections.memory import memory_section
-from metro.report.sections.verdict import STATUS, change, effect_words, error_cell, known_interval
+from metro.report.sections.verdict import STATUS, change, effect_words, error_text, known_interval
 from metro.units import JSON
 
 TITLE = "Campaign summary"
@@ -164,8 +164,8 @@ def _verdicts(entries: list[tuple[str, str, JSON]]) -> list[Item]:
             batch,
             title(name),
             STATUS.get(str(entry.get("status")), "–"),
-            error_cell(entry.get("before"), None),
-            error_cell(entry.get("after"), None),
+            error_text(entry.get("before"), None),
+            error_text(entry.get("after"), None),
             unit(entry.get("unit")) or "1",
             number(entry.get("noise_floor")),
             "; ".join(effect_words(e) for e in entry.get("effects") or []) or "none",

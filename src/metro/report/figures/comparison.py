@@ -140,6 +140,7 @@ def _equal(axes: Axes, part: pd.DataFrame, drawn: tuple[Prediction, ...]) -> Non
             lw=0.5,
             alpha=0.6,
             label=kind.label,
+            clip_on=False,
         )
     span = part[["measured", "before", "after"]].to_numpy(float)
     ends = [float(span.min()), float(span.max())]

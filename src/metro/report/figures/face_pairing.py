@@ -13,13 +13,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def parity(faces: pd.DataFrame) -> Figure:
+def parity(faces: pd.DataFrame, unit: str) -> Figure:
     """Draw predicted over measured X_m of held-out faces, beside the similarity of each.
 
     Parameters
     ----------
-    faces : a row per run: ``run``, and by ``measured``, ``before``, ``after`` X_m in µm; ``similar_before``,
+    faces : a row per run: ``run``, and by ``measured``, ``before``, ``after`` X_m; ``similar_before``,
         ``similar_after`` in per cent.
+    unit : of X_m.
     """
     ends = [0.0, 1.08 * float(faces[["measured", "before", "after"]].to_numpy().max())]
     with style.style():
@@ -32,14 +33,17 @@ def parity(faces: pd.DataFrame) -> Figure:
                 marker=kind.mark,
                 ls="",
                 label=kind.label,
+                clip_on=False,
             )
             right.plot(
                 *(range(len(faces)), faces[f"similar_{kind.column}"]),
                 color=kind.colour,
                 marker=kind.mark,
                 ls="",
+                clip_on=False,
             )
-        left.set(xlim=ends, ylim=ends, aspect="equal", xlabel="X_m measured (µm)", ylabel="predicted (µm)")
+        left.set(xlim=ends, ylim=ends, aspect="equal", xlabel=f"X_m measured ({unit})")
+        left.set_ylabel(f"predicted ({unit})")
         left.set_title("Parity", loc="left")
         right.axhline(100, color=style.GREY, lw=0.8)
         right.set_xticks(range(len(faces)), faces["run"].astype(str), rotation=90 if len(faces) > 8 else 0)

@@ -102,7 +102,9 @@ def _mark(axes: Axes, contacts: pd.DataFrame | None, run: str) -> None:
         return
     for side, marker in (("upper", "^"), ("lower", "v")):
         part = contacts[(contacts["run"] == run) & (contacts["side"] == side)]
-        axes.plot(part["x_mm"], part["y_mm"], marker, ms=5, mfc="white", mec=style.MEASURED, mew=0.8)
+        axes.plot(
+            part["x_mm"], part["y_mm"], marker, ms=5, mfc="white", mec=style.MEASURED, mew=0.8, clip_on=False
+        )
 
 
 def _raster(part: pd.DataFrame) -> tuple[Array, Array, Array]:

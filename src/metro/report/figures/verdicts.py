@@ -91,7 +91,8 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
             for key, colour, mark, name in series[: 1 + changed] if at else []:
                 value = [float(v) if (v := rows[i].get(key)) is not None else np.nan for i in at]
                 face, label = (colour if filled else "white"), f"{name}, {words}"
-                axes.scatter(x[at], value, marker=mark, s=22, facecolors=face, edgecolors=colour, label=label)
+                drawn = axes.scatter(x[at], value, marker=mark, s=22, fc=face, ec=colour, label=label)
+                drawn.set_clip_on(False)  # a run without residual stands on the axis
         if floor is not None:
             axes.axhline(floor, color=style.MEASURED, lw=0.8, ls=":", label="noise floor")
         axes.margins(y=0.12)

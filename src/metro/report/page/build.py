@@ -21,7 +21,7 @@ from metro.report.sections.causes import with_causes
 from metro.report.sections.verdict import (
     STATUS,
     advice,
-    error_cell,
+    error_text,
     left_words,
     measured_words,
     parameter_name,
@@ -152,7 +152,7 @@ def _errors(verdicts: Mapping[str, JSON]) -> list[Item]:
 def _error(entry: JSON, when: str) -> tuple[str, str]:
     error = entry.get(when) or {}
     share = "–" if entry.get("unit") == "1" else percent(error.get("nrmse"))
-    return error_cell(error, entry.get("unit")), share
+    return error_text(error, entry.get("unit")), share
 
 
 def _effects(verdicts: Mapping[str, JSON]) -> list[Item]:

@@ -158,7 +158,7 @@ def _records(results: Results, tests: pd.DataFrame) -> list[Item]:
         return []
     kinds = {
         "a cut that chattered": (tests["unstable"] > 0).any(),
-        "a stable one": (tests["unstable"] == 0).any(),
+        "a stable cut": (tests["unstable"] == 0).any(),
     }
     cuts = " and in ".join(kind for kind, there in kinds.items() if there)
     caption = (

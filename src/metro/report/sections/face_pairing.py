@@ -53,7 +53,7 @@ def pairing_items(frame: pd.DataFrame) -> list[Item]:
     return [
         Paragraph(text),
         Table(header, rows, caption, [0] * len(header), numeric=list(range(1, len(header))), small=True),
-        Picture(figures.parity(faces), about, about),
+        Picture(figures.parity(faces, shown), about, about),
     ]
 
 

@@ -77,13 +77,6 @@ def error_text(error: JSON | None, unit_name: str | None) -> str:
     return f"{text} {shown}" if shown else text
 
 
-def error_cell(error: JSON | None, unit_name: str | None) -> str:
-    """Write an error for a table, where an interval that is not known reads –."""
-    if not error or error.get("rms") is None or known_interval(error):
-        return error_text(error, unit_name)
-    return f"{number(error['rms'])} ± – {unit(unit_name)}".strip()
-
-
 def known_interval(error: JSON) -> list[float | None] | None:
     """Return the interval of an error; None where one condition, which has no scatter, makes it a point."""
     low, high = error.get("ci95") or (None, None)
@@ -118,6 +111,12 @@ def _scaled(error: JSON) -> tuple[float, float] | None:
 def _dimensionless(entry: JSON) -> bool:
     """Tell whether the value is a probability, whose error has no signal to be relative to."""
     return entry.get("unit") == "1"
+
+
+def _share(error: JSON) -> str:
+    """Write an error as a share of the signal, and why it has no interval where it has none."""
+    point = error.get("rms") is not None and known_interval(error) is None
+    return f"{percent(error.get('nrmse'))} of the signal{'; one condition: no interval' if point else ''}"
 
 
 def _unit(entry: JSON) -> str:
@@ -265,13 +264,13 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
                     ),
                     (
                         "error before",
-                        error_cell(before, entry.get("unit")),
-                        f"{percent(before.get('nrmse'))} of the signal",
+                        error_text(before, entry.get("unit")),
+                        _share(before),
                     ),
                     (
                         "error after",
-                        error_cell(after, entry.get("unit")),
-                        f"{percent(after.get('nrmse'))} of the signal",
+                        error_text(after, entry.get("unit")),
+                        _share(after),
                     ),
                     (
                         "noise floor",
@@ -285,8 +284,8 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
         [
             title(name),
             STATUS.get(str(entry.get("status")), "–"),
-            error_cell(entry.get("before"), entry.get("unit")),
-            error_cell(entry.get("after"), entry.get("unit")),
+            error_text(entry.get("before"), entry.get("unit")),
+            error_text(entry.get("after"), entry.get("unit")),
             f"{number(entry.get('noise_floor'))}{_unit(entry)}",
             listing([words(str(e["effect"])) for e in entry.get("effects") or []]) or "none",
         ]
