@@ -61,8 +61,8 @@ class Setup:
             return np.zeros(len(x))
         u, v = 2.0 * x / size[0] - 1.0, 2.0 * y / size[1] - 1.0
         (xx, xy, yy), (uuu, uuv, uvv, vvv) = self.bow, self.cubic
-        bent = xx * u**2 + xy * u * v + yy * v**2
-        return np.asarray(bent + uuu * u**3 + uuv * u**2 * v + uvv * u * v**2 + vvv * v**3)
+        uu, vv = u * u, v * v
+        return np.asarray(uu * (xx + uuu * u + uuv * v) + xy * u * v + vv * (yy + uvv * u + vvv * v))
 
 
 def swung(vibration: Vibration, phase: float, passages: Passages, pace: Pace) -> Array:

@@ -175,9 +175,7 @@ class FlatnessModel:
         rest = self.setup.cuts(setting.x, setting.y, passages, setting.pace)
         rest = rest + swung(self.vibration, float(nuisance[0]), passages, setting.pace)
         if setting.ringing is not None:
-            # What rings is a mean along the feed already: its waves may be shorter than a disc.
-            rest = rest + setting.ringing.at(_rung(setting.ringing, self.structure), setting.middle)
-            rest = rest + setting.ringing.of_teeth(self.structure, passages)
+            rest = rest + _ringing(setting, setting.ringing, self.structure)
         static = self.structure.in_cut(self._static(setting))
         return np.where(passages.valid, static + rest, np.inf), rest
 
@@ -231,6 +229,16 @@ def _static(basis: Basis, setting: FaceSetting) -> Array:
     at = setting.passages
     rows = heights_design(basis, at.x.ravel(), at.y.ravel(), setting.force)
     return np.asarray((rows @ setting.loaded).reshape(at.x.shape))
+
+
+@lru_cache(maxsize=128)
+def _ringing(setting: FaceSetting, ringing: Ringing, structure: Structure) -> Array:
+    """Return what rings at each passage, (n, k) m: whatever else shapes the face, it is the same.
+
+    It is a mean along the feed already: its waves may be shorter than a disc.
+    """
+    rung = ringing.at(_rung(ringing, structure), setting.middle)
+    return rung + ringing.of_teeth(structure, setting.passages)
 
 
 @lru_cache(maxsize=64)
