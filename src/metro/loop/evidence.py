@@ -126,25 +126,26 @@ def leave_out(fitted: Fit, prior: Noise, moved: Callable[[Fit], Fit] | None = No
         groups.setdefault(block.condition if by_condition else block.run, []).append(block)
     if len(groups) == 1:
         return dict.fromkeys(groups, -math.inf)
-    return {name: _unseen(fitted, held, prior, moved) for name, held in groups.items()}
+    whole = moved(fitted) if moved else fitted
+    return {name: _unseen(fitted, held, prior, moved, whole.noise) for name, held in groups.items()}
 
 
 def _unseen(
-    fitted: Fit, held: Sequence[Block], prior: Noise, moved: Callable[[Fit], Fit] | None = None
+    fitted: Fit, held: Sequence[Block], prior: Noise, moved: Callable[[Fit], Fit] | None, known: Noise
 ) -> float:
     """Log-likelihood of runs under the fit of all others, less one for each unknown that is their own.
 
     Such an unknown is fitted to the run that is predicted, which gains that much by chance. Of runs that
     alone tell a base parameter (the only hole among slots) nothing can be predicted without them: they are
-    left out one by one.
+    left out one by one. ``known``: the noise by all runs.
     """
     left_out = {block.run for block in held}
     others = refit(fitted, [block for block in fitted.blocks if block.run not in left_out], prior)
     if len(held) > 1 and _told(others) < _told(fitted):
-        return sum(_unseen(fitted, [block], prior, moved) for block in held)
+        return sum(_unseen(fitted, [block], prior, moved, known) for block in held)
     others = moved(others) if moved else others
     # What a model misses may show in the condition that is left out only (where a gap closes): it is known.
-    others = replace(others, noise=replace(others.noise, misfit=_most_missed(others.noise, fitted.noise)))
+    others = replace(others, noise=replace(others.noise, misfit=_most_missed(others.noise, known)))
     return predictive(others, held) - len(held) * _own(fitted)
 
 
