@@ -54,11 +54,11 @@ CLEAN.set_forkserver_preload([__name__])
 class Undisturbed:
     """A small batch brought to its report once: the folder before each stage, and its files after it."""
 
-    def __init__(self, folder, value=100.0):
+    def __init__(self, folder, **batch):
         self.before, self.after = {}, {}
         work = folder / "work"
         work.mkdir(parents=True)
-        checkout.Checkout(work).add_batch("alpha", value=value)
+        checkout.Checkout(work).add_batch("alpha", **batch)
         for stage in STAGES:
             self.before[stage] = folder / f"before-{stage}"
             shutil.copytree(work, self.before[stage])

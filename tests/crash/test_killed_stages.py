@@ -67,10 +67,11 @@ def test_a_stage_killed_in_the_middle_of_a_file(undisturbed, stage, size, tmp_pa
 
 
 def test_what_describes_a_batch_is_never_beside_tables_of_another_ingest(undisturbed, tmp_path):
-    was = Undisturbed(tmp_path / "was", value=90.0)
+    was = Undisturbed(tmp_path / "was", value=90.0, title="As it was")
     old, new = was.after["ingest"], undisturbed.after["ingest"]
     changed = {name for name in new if old[name] != new[name]}
-    assert len(changed) >= 2
+    assert len(changed) >= 3
+    assert str(PROCESSED / "batch.json") in changed
     for number in range(1, 80, 3):
         folder = tmp_path / str(number)
         shutil.copytree(was.before["identify"], folder)

@@ -37,7 +37,7 @@ def test_a_damaged_file_is_read_or_refused(target, tmp_path):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             fuzz_targets.outcome(target, folder, data)
-        assert time.process_time() - begun < 60.0  # nothing hangs
+        assert time.process_time() - begun < 5.0
 
     fuzzed()
 

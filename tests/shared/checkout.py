@@ -11,7 +11,7 @@ BIN = Path(sys.executable).parent
 BATCH = """\
 format: 1
 batch: {name}
-title: Two printed pairs
+title: {title}
 source: published
 citation: nobody, nowhere
 cell: kr160
@@ -63,10 +63,10 @@ class Checkout:
         assert jobs or "Nothing to be done" in printed, printed
         return {stage: {batch or "all" for name, batch in jobs if name == stage} for stage, _ in jobs}
 
-    def add_batch(self, name, root="data/raw", value=100.0):
+    def add_batch(self, name, root="data/raw", value=100.0, title="Two printed pairs"):
         folder = self.folder / root / name
         folder.mkdir(parents=True)
-        (folder / "batch.yaml").write_text(BATCH.format(name=name))
+        (folder / "batch.yaml").write_text(BATCH.format(name=name, title=title))
         (folder / "published.csv").write_text(PUBLISHED.format(value=value))
         return folder
 
