@@ -17,6 +17,7 @@ from metro.loop.noise import first_noise
 from metro.loop.search import search
 from metro.loop.signature import in_words, signature
 from metro.loop.verdict import parameters
+from metro.observables.face_setup import Setup
 
 
 def tilted(dx, dy, **_cut):
@@ -186,6 +187,15 @@ def test_what_is_outside_the_library_is_most_like_a_cause_of_its_kind(made, name
     likeness = total.pop(name)
     assert effect_of(task, name).resembled
     assert likeness > max(total.values()) + 10.0
+
+
+def test_a_form_of_third_degree_is_what_its_parameters_say():
+    x, y = np.random.default_rng(2).uniform(0.0, 1.0, (2, 50)) * [[0.12], [0.06]]
+    u, v = 2.0 * x / 0.12 - 1.0, 2.0 * y / 0.06 - 1.0
+    height = Setup(cubic=(1e-5, 2e-5, 3e-5, 4e-5)).bowed(x, y, (0.12, 0.06))
+    np.testing.assert_allclose(
+        height, 1e-5 * u**3 + 2e-5 * u**2 * v + 3e-5 * u * v**2 + 4e-5 * v**3, atol=1e-15
+    )
 
 
 @pytest.mark.parametrize(

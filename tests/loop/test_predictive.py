@@ -10,6 +10,7 @@ from toy import BEND, GATES, RIPPLE, Wave, block, problem
 
 from metro.loop import noise as noise_room
 from metro.loop.candidate import Candidate
+from metro.loop.evidence import leave_out, refit
 from metro.loop.fit import fit, score
 from metro.loop.noise import first_noise
 from metro.loop.predictive import estimated, predictive
@@ -72,3 +73,22 @@ def test_an_effect_that_the_fit_has_not_seen_may_be_anywhere_in_its_bounds():
     # A normal of the variance of the bounds stands for them: at its middle it is denser by (6/π)^½.
     assert predictive(found, held) == pytest.approx(averaged, abs=np.log(2.0))
     assert predictive(found, held) > score(found, held).total + 100.0
+
+
+def test_what_a_model_misses_in_the_condition_left_out_alone_is_known_there_too():
+    """A gap closes in one pose: that the model lacks it is no news about an effect of another kind."""
+    task, rng = problem(3, phased=False, feeds=(1.0, 2.0, 3.0), repeats=2), np.random.default_rng(3)
+    missed = [
+        block(f"s{i}", 4.0, "identify", rng, truth=Wave(spike=0.3), phased=False, order=20 + i)
+        for i in range(2)
+    ]
+    task = replace(task, blocks=(*task.blocks, *missed))
+    blocks = task.role("identify")
+    noise = first_noise(GATES.model_form_budget, task.scatter, blocks)
+    found = fit(Candidate(task.base), blocks, noise)
+    others = refit(found, [one for one in blocks if one not in missed], noise)
+    assert found.noise.misfit["x"] > 2.0 * others.noise.misfit["x"]
+    known = replace(others, noise=replace(others.noise, misfit=found.noise.misfit))
+    (name,) = {one.condition for one in missed}
+    assert leave_out(found, noise)[name] == pytest.approx(predictive(known, missed))
+    assert leave_out(found, noise)[name] > predictive(others, missed) + 10.0

@@ -268,3 +268,11 @@ def test_what_is_unlikelier_but_no_worse_predicted_is_not_withdrawn(monkeypatch)
     found = search(mixed, (BEND,), GATES)
     monkeypatch.setattr(verdicts, "held_out_rms", lambda _problem, fit: 1.0 if fit is found.final else 2.0)
     assert stands(mixed, found).names == ("bend",)
+
+
+def test_a_rival_that_is_no_effect_of_the_library_leaves_words_and_no_error():
+    _, rows, verdict = closed(problem(9, truth=Wave(bend=0.1)), (BEND, replace(TWIN, resembled=True)))
+    assert len(rows)
+    assert [found["effect"] for found in verdict["effects"]] == ["bend"]
+    assert "it may be no bend but a twin" in verdict["unexplained"]["signature"]
+    assert verdict["unexplained"]["rms"] is None  # nothing is left over
