@@ -121,3 +121,18 @@ def test_a_tip_that_is_not_where_it_was_declared_is_found(cell):
     ((name, _, values),) = found(cell, manifest=declared)
     assert name == "tool_offset_error"
     assert values["dy_mm"] == pytest.approx(120.0, abs=20.0)
+
+
+def speeds(table, joint):
+    """Speed of a joint, rad/s."""
+    return np.radians(table[RATE[joint - 1]].to_numpy())
+
+
+def test_a_joint_with_stiffer_grease_is_taken_for_no_effect_of_the_library(cell):
+    batch, observed = cell
+    observed = observed | {"joint_torque": torques(cell, 3, lambda t: 2000.0 * speeds(t, 3))}
+    outcome = search(joint_force.problem(batch, observed, {}), library("joint_force"), GATES)
+    assert outcome.names == ()
+    (likeness,) = outcome.likeness.candidate.effects
+    assert (likeness.name, likeness.where) == ("friction_by_speed", {"joint": 3})
+    assert outcome.likeness.theta == pytest.approx([2000.0], rel=0.15)

@@ -123,11 +123,14 @@ def _not_held_out(evidence: Evidence, gates: Gates) -> str:
 
 
 def unlike(effect: Effect, fitted: Fit) -> bool:
-    """Whether an effect that is not of the library leaves more than the declared budget: no likeness then.
+    """Whether an effect that is not of the library leaves a rest that stands out: no likeness then.
 
     Where much stays unexplained, what has more freedom comes nearer to it, whatever the cause.
     """
-    return effect.resembled and missed(fitted) > fitted.noise.budget
+    budget = fitted.noise.budget
+    return (
+        effect.resembled and missed(fitted) > budget and bool(rest.share_left(rest.signature(fitted, budget)))
+    )
 
 
 def without(current: Fit, kept: tuple[Effect, ...], prior: Noise) -> Fit:

@@ -34,19 +34,24 @@ class DriveTorques:
     ----------
     reversal : (6,) Coulomb level of the cut less that of the idle run, N m.
     warmup : (6,) slope of the Coulomb level from the start of the cut's log, N m/s.
+    viscous : (6,) friction in proportion to the joint's speed, the cut's less the idle run's, N m s/rad.
     ripple : of the gears, in the cut alone (what both runs have at the same place cancels).
     """
 
     reversal: tuple[float, ...] = NONE
     warmup: tuple[float, ...] = NONE
+    viscous: tuple[float, ...] = NONE
     ripple: tuple[Ripple, ...] = ()
 
-    def with_friction(self, joint: int, *, reversal: float = 0.0, warmup: float = 0.0) -> DriveTorques:
+    def with_friction(
+        self, joint: int, *, reversal: float = 0.0, warmup: float = 0.0, viscous: float = 0.0
+    ) -> DriveTorques:
         """Return these with more friction in one joint (0 … 5)."""
         return replace(
             self,
             reversal=_raised(self.reversal, joint, reversal),
             warmup=_raised(self.warmup, joint, warmup),
+            viscous=_raised(self.viscous, joint, viscous),
         )
 
     def at(self, q: Array, rate: Array, t: Array, width: Array | float = 0.0) -> Array:
@@ -57,7 +62,9 @@ class DriveTorques:
         q, rate : (m, 6) angles, rad, and speeds, rad/s, of the joints. t : (m,) s from the log's start.
         """
         turning = np.tanh(rate / TURNING)
-        torque: Array = turning * (np.array(self.reversal) + np.outer(t, self.warmup))
+        torque: Array = turning * (np.array(self.reversal) + np.outer(t, self.warmup)) + rate * np.array(
+            self.viscous
+        )
         for one in self.ripple:
             angle = one.order * q[:, one.joint]
             cycles = one.order * rate[:, one.joint] * width / (2.0 * np.pi)
