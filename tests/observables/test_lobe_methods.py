@@ -182,3 +182,14 @@ def test_boundaries_are_sought_no_deeper_than_four_times_the_lowest(lobes):
     lowest = lobes.boundary.depth.min()
     assert stability.deepest(lobes, pd.DataFrame({"axial_depth_mm": [1e3]})) == pytest.approx(4 * lowest)
     assert stability.deepest(lobes, pd.DataFrame({"axial_depth_mm": [1e-3]})) >= 2.5 * lowest
+
+
+def test_where_semidiscretisation_finds_no_boundary_at_any_speed_the_rest_is_there():
+    """An arm of 8 Hz at 9000 rev/min is stable to depths at which the helix wraps the tool many times."""
+    arm = replace(STRUCTURE, omega=2 * np.pi * np.array([8.0, 8.4, 10.4, 11.0]), stiffness=np.full(4, 1e6))
+    cut = stability.solve(
+        replace(TIP, structure=arm), FOUND, first(radial_depth_mm=6.0), np.array([9e3]), check=False
+    )
+    (row,) = lobe_methods.methods(cut, replace(TOOL, helix=np.radians(30.0)), FEED).to_dict("records")
+    assert row["semidiscretisation_mm"] == pytest.approx(row["depth_mm"], rel=1e-3)
+    assert np.isnan(row["tool_mm"])

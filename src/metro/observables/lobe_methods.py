@@ -127,6 +127,8 @@ def _extrapolated(structure: Structure, engagement: Engagement, rpm: Array, arou
     search = semidiscretisation.lowest_boundary if uneven else semidiscretisation.boundary_near
     coarse = search(structure, engagement, rpm, around, steps)
     known = np.isfinite(coarse)
+    if not known.any():
+        return coarse
     fine = semidiscretisation.boundary_near(structure, engagement, rpm[known], coarse[known], 2 * steps)
     coarse[known] += (fine - coarse[known]) * 4.0 / 3.0
     return coarse
