@@ -17,8 +17,7 @@ from metro.effects.effect import Effect, fitted_to
 from metro.loop.hypotheses import Evidence, hypothesis
 from metro.loop.label_evidence import (
     FREQUENCY_SD,
-    OF_SPEED,
-    OF_TEST,
+    LINES,
     SHARED,
     STRAY,
     STRAY_WIDTH,
@@ -29,11 +28,13 @@ from metro.loop.label_evidence import (
     unstable_probability,
 )
 from metro.loop.label_search import LEAST_SPEEDS, LEAST_TESTS, predicted
-from metro.loop.labelled import tests_of
+from metro.loop.label_surprise import drawn as labels_drawn
+from metro.loop.labelled import every_test, tests_of
 from metro.observables.lobes import LabelProblem
 from metro.units import JSON, Array
 
 DEVIATIONS, DRAWS, ASSURED = 128, 100, 0.05
+LONG, ALARM = 400, 0.01  # draws for, and the share of, what is unlikely by chance
 SEED = 11
 
 
@@ -64,7 +65,7 @@ def label_oracle(
     and ``sizes``: the log-likelihood ratio, with the effect at its true parameters over without, that 95 % of
     identification labels drawn from the truth exceed, over ``gain``. Where the library lacks one of the
     effects: ``after`` is None, and the size is by how much less likely all labels are than those that the
-    base model would draw, over ``gain``.
+    base model would draw, over the amount by which one set in a hundred is less likely by chance.
     """
     able, _ = fitted_to(tuple(effects), task)
     known = {effect.name: effect for effect in able}
@@ -77,14 +78,15 @@ def label_oracle(
     if not counts[0]:
         return found | dict.fromkeys(("before", "after", "floor")) | {"sizes": dict.fromkeys(hidden, 0.0)}
     if set(hidden) - set(known):
-        every = _every(task)
-        drawn = [_evidence(one, base, deviations) for one in _drawn(task, every, base)]
-        size = (float(np.mean(drawn)) - _evidence(every, base, deviations)) / gain
+        every = every_test(task)
+        drawn = [_evidence(one, base, deviations) for one in _drawn(task, every, base, LONG)]
+        usual, chance = float(np.mean(drawn)), float(np.quantile(drawn, ALARM))
+        size = (usual - _evidence(every, base, deviations)) / (usual - chance)
         before, floor = _errors(held, base, deviations)
         sizes = dict.fromkeys(hidden, max(0.0, size))
         return found | {"before": before, "after": None, "floor": floor, "sizes": sizes}
     truth = _told(task, known, hidden)
-    drawn_labels = _drawn(task, mine, truth)
+    drawn_labels = _drawn(task, mine, truth, DRAWS)
     full = np.array([_evidence(one, truth, deviations) for one in drawn_labels])
     sizes = {}
     for name in hidden:
@@ -112,12 +114,6 @@ def _deviations(task: LabelProblem, seed: int) -> Array:
     return np.asarray(task.deviations(DEVIATIONS, seed) + shared)
 
 
-def _every(task: LabelProblem) -> Labels:
-    """All tests at places whose modes are known, of either role."""
-    same = replace(task, roles=("identify",) * len(task.roles))
-    return tests_of(same, "identify")[0]
-
-
 def _told(task: LabelProblem, known: Mapping[str, Effect], hidden: Mapping[str, JSON]) -> _Boundary:
     """Boundary of the batch's model with effects at their true parameters."""
     changes = [_change(known[name], values) for name, values in hidden.items()]
@@ -141,26 +137,24 @@ def _evidence(tests: Labels, boundary: _Boundary, deviations: Array) -> float:
     return log_evidence(found, np.ones(1))
 
 
-def _drawn(task: LabelProblem, tests: Labels, truth: _Boundary) -> list[Labels]:
+def _drawn(task: LabelProblem, tests: Labels, truth: _Boundary, draws: int) -> list[Labels]:
     """Return the tests with labels drawn from the truth; with frequencies where records told any."""
     rng = np.random.default_rng([SEED, 2])
     heard = bool(np.isfinite(task.chatter_hz).any())
-    speeds = np.searchsorted(tests.speeds, tests.rpm[tests.point])
+    size = len(tests.depth)
     deviations = _deviations(task, SEED + 1)
     drawn = []
-    for _ in range(DRAWS):
-        wrong = deviations[rng.integers(DEVIATIONS)][tests.point]
-        wrong = wrong + tests.model_sd * OF_SPEED**0.5 * rng.standard_normal(len(tests.speeds))[speeds]
-        wrong = wrong + tests.model_sd * OF_TEST**0.5 * rng.standard_normal(len(speeds))
-        unstable = tests.depth > truth.depth[tests.point] + wrong
-        unstable ^= rng.random(len(speeds)) < tests.label_error
-        stray = rng.random(len(speeds)) < STRAY
+    for _ in range(draws):
+        unstable = labels_drawn(tests, truth.depth + deviations[rng.integers(DEVIATIONS)], rng) > 0.5
+        stray = rng.random(size) < STRAY
         spread = np.where(
             stray,
-            STRAY_WIDTH * rng.uniform(-0.5, 0.5, len(speeds)),
-            FREQUENCY_SD * rng.standard_normal(len(speeds)),
+            STRAY_WIDTH * rng.uniform(-0.5, 0.5, size),
+            FREQUENCY_SD * rng.standard_normal(size),
         )
-        chatter = np.where(unstable & heard, truth.chatter[tests.point] * np.exp(spread), np.nan)
+        line = rng.choice(list(LINES), size=size, p=list(LINES.values()))
+        heard_at = np.abs(truth.chatter[tests.point] + np.where(stray, 0, line) * tests.tooth_hz[tests.point])
+        chatter = np.where(unstable & heard, heard_at * np.exp(spread), np.nan)
         drawn.append(replace(tests, unstable=unstable.astype(float), chatter_hz=chatter))
     return drawn
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
+from metro.effects import library
 from metro.loop.label_search import NOTHING
 from metro.loop.label_unknown import UNKNOWN
 from metro.units import JSON
@@ -181,7 +182,8 @@ def score(
     named = {found["effect"]: found["probability"] for found in effects}
     if not named and entry["status"] == "undetermined":
         candidates = {c["effect"]: c["probability"] for c in entry["candidates"]}
-        firsts = [group[0] for group in pairs if group[0] != UNKNOWN]
+        lacking = _lacking(observable)
+        firsts = [group[0] for group in pairs if group[0] not in lacking]
         named = {first: candidates.get(first.split(",")[0], 0.0) for first in firsts}
     unseen = (told or {"observables": {}})["observables"].get(observable, {}).get("cannot_be_seen", [])
     return Score(
@@ -234,6 +236,12 @@ def _without_form(name: str, hidden: JSON) -> str:
     return attributed(found["name"], {"joint": int(found["joint"])} if found["joint"] else {}, hidden)
 
 
+@cache
+def _lacking(observable: str) -> frozenset[str]:
+    """Names of hypotheses that are no effect of the library."""
+    return frozenset({UNKNOWN, *(effect.name for effect in library(observable) if effect.resembled)})
+
+
 def _stated(said: Iterable[JSON], hidden: JSON, sizes: Mapping[str, float]) -> tuple[Stated, ...]:
     return tuple(
         (one["probability"], one["effect"] in hidden)
@@ -251,7 +259,7 @@ def _rejected(
     if any(sizes.get(name, SEEN) < SEEN for name in hidden):
         return ()
     tried = [(one["probability"], set(one["effect"].split(" + "))) for one in said]
-    return tuple((p, names == set(hidden)) for p, names in tried if names != {UNKNOWN})
+    return tuple((p, names == set(hidden)) for p, names in tried if not names & _lacking(observable))
 
 
 def _rms(error: JSON | None) -> float | None:

@@ -7,7 +7,7 @@ import pytest
 from machines import TWO
 
 from metro.dynamics.lobes import spectral_radius, stability_boundary
-from metro.dynamics.stability_model import StabilityModel
+from metro.dynamics.stability_model import StabilityModel, estimated
 from metro.dynamics.system import Cut, Structure
 
 SIDE = Cut(3, 0.0, 0.4 * np.pi, 1e9, 4e8)
@@ -119,3 +119,29 @@ def test_a_mode_far_stiffer_than_the_rest_changes_nothing():
     assert stability_boundary(more, SIDE, RPM).depth == pytest.approx(
         stability_boundary(TWO, SIDE, RPM).depth, rel=1e-3
     )
+
+
+@pytest.mark.parametrize("growth", [30.0, 200.0])
+def test_what_yields_with_depth_is_stable_up_to_where_depth_and_compliance_agree(growth):
+    model, rpm = StabilityModel(TWO, (SIDE,), 0.01, yielding=growth), np.linspace(800.0, 2600.0, 25)
+    depth, hz = model.boundary(rpm)
+    stiff, _ = replace(model, yielding=0.0).boundary(rpm)
+    assert np.abs(np.log(depth / stiff)).max() > 0.1
+    agreed, heard = [], []
+    for speed, found in zip(rpm, depth, strict=True):
+        factor = 1.0 / (1.0 + growth * found)
+        softer = replace(TWO, omega=TWO.omega * np.sqrt(factor), stiffness=TWO.stiffness * factor)
+        alone = stability_boundary(softer, SIDE, np.array([speed]))
+        agreed.append(float(alone.depth[0]))
+        heard.append(float(alone.chatter_hz[0]))
+    off = np.abs(np.log(depth / agreed))
+    # Interpolated between compliances, it is off where lobes meet.
+    assert np.quantile(off, [0.5, 0.8]) == pytest.approx([0.0, 0.0], abs=0.025)
+    assert np.quantile(np.abs(np.log(hz / heard)), [0.5, 0.9]) == pytest.approx([0.0, 0.0], abs=0.01)
+
+
+def test_a_yield_of_next_to_nothing_changes_nothing():
+    model, rpm = StabilityModel(TWO, (SIDE, DAMPED), 0.01, softening=-1e-4), np.linspace(800.0, 2600.0, 9)
+    for one in (lambda m: m.boundary(rpm), lambda m: tuple(p[0] for p in estimated([m], rpm))):
+        for plain, yielded in zip(one(model), one(replace(model, yielding=1e-9)), strict=True):
+            np.testing.assert_allclose(yielded, plain, rtol=2e-2)

@@ -21,12 +21,14 @@ VALUES = {
     "mode_coupling": {"angle_deg": 30.0},
     "process_damping": {"coefficient_n_mm": 120.0},
     "spindle_speed_softening": {"change_per_krpm": -0.02},
+    "depth_yielding": {"growth_per_mm": 0.1},
 }
 
 
 def test_the_library_has_the_effects_of_the_contract():
     effects = {effect.name: effect for effect in library("lobes")}
     assert set(effects) == set(VALUES)
+    assert {name for name, effect in effects.items() if effect.resembled} == {"depth_yielding"}
     assert all(set(effects[name].names) == set(values) for name, values in VALUES.items())
 
 
@@ -47,6 +49,7 @@ def test_the_effects_stack_in_any_order():
             backward = effect.apply(backward, VALUES[effect.name])
     assert forward.cuts == backward.cuts
     assert forward.softening == backward.softening
+    assert forward.yielding == backward.yielding
     np.testing.assert_array_equal(forward.structure.omega, backward.structure.omega)
 
 
@@ -79,11 +82,12 @@ def test_softening_is_relative_per_thousand_turns():
 
 
 def test_bounds_follow_the_batch():
-    problem = SimpleNamespace(cases=(SimpleNamespace(model=MODEL, rpm=RPM),))
+    problem = SimpleNamespace(cases=(SimpleNamespace(model=MODEL, rpm=RPM),), depth=np.array([1e-3, 4e-3]))
     effects, unable = fitted_to(library("lobes"), problem)
     bounds = {p.name: (p.lower, p.upper) for effect in effects for p in effect.parameters}
     assert not unable
     assert bounds["frequency_hz"] == pytest.approx((0.4 * 310.0, 2.5 * 390.0))
     assert bounds["stiffness_n_um"] == pytest.approx((0.2 * 7.0, 20.0 * 7.0))
     low, _ = bounds["change_per_krpm"]
+    assert bounds["growth_per_mm"] == pytest.approx((0.0, 2.0 / 2.0))  # twice as soft at the mean log depth
     assert 1.0 + low * 4.8 == pytest.approx(0.2)  # a fifth of the stiffness at the fastest speed, no less

@@ -54,6 +54,10 @@ class Made:
     model_sd: float = 0.15
     label_error: float = 0.005
 
+    @property
+    def point_tooth_hz(self):
+        return 3 * self.point_rpm / 60.0
+
     def boundaries(self, change):
         model = change(Line())
         return model.boundary(self.point_rpm), np.full(len(self.point_rpm), model.hz)

@@ -52,7 +52,7 @@ def judged(hidden, seed):
     [
         pytest.param("process_damping", {"coefficient_n_mm": 300.0}, marks=pytest.mark.slow),
         pytest.param("mode_coupling", {"angle_deg": -40.0}, marks=pytest.mark.slow),
-        ("spindle_speed_softening", {"change_per_krpm": -0.06}),
+        ("spindle_speed_softening", {"change_per_krpm": 0.06}),
         pytest.param("missing_mode", MISSING, marks=pytest.mark.slow),
     ],
 )
@@ -67,6 +67,15 @@ def test_an_effect_of_the_march_is_found(name, values):
         assert low <= values[key] <= high
     if name == "missing_mode":
         assert found["axis"]["value"] == "x"
+
+
+def test_what_softens_with_speed_or_yields_with_depth_is_told_by_the_next_test():
+    """High lobes are those of fast speeds: by these tests alone either may be the cause."""
+    verdict = judged({"spindle_speed_softening": {"change_per_krpm": -0.06}}, 16)
+    assert verdict["status"] == "undetermined"
+    assert verdict["indistinguishable"] == [["spindle_speed_softening", "depth_yielding"]]
+    assert "it may be a depth yielding" in verdict["unexplained"]["signature"]
+    assert "its label tells most about whether it is" in verdict["next_experiment"]
 
 
 def test_no_effect_is_found_where_there_is_none():

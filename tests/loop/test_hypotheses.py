@@ -5,6 +5,7 @@ import pytest
 from label_toy import GATES, SHIFT, SLOPE, Line, problem
 from scipy.special import logsumexp
 
+from metro.loop import hypotheses
 from metro.loop.hypotheses import Evidence, changed, hypothesis, quantile
 from metro.loop.label_evidence import log_likelihood
 from metro.loop.labelled import tests_of as told_by
@@ -80,3 +81,13 @@ def test_where_the_boundary_jumps_it_is_solved_until_the_interval_is_that_of_a_f
     told = found.parameters("slope")["size"]["ci95"]
     assert told == pytest.approx(np.interp([0.025, 0.975], below, theta), abs=0.12)
     assert found.log_evidence == pytest.approx(logsumexp(log) - np.log(len(log)), abs=0.35)
+
+
+@pytest.mark.parametrize("width", [0.02, 0.5])
+def test_points_drawn_about_others_are_folded_back_into_the_cube(width):
+    cloud = hypotheses._Nearby(np.array([[0.01, 1.0], [0.5, 0.0]]), np.full(2, width))
+    points = np.concatenate([cloud.drawn(np.random.default_rng(seed), 3) for seed in range(40)])
+    assert points.min() >= 0.0
+    assert points.max() <= 1.0
+    near = np.abs(points[:, None, :2] - cloud.centres).max(axis=2).min(axis=1)
+    assert np.quantile(near, 0.9) < 3.0 * width

@@ -10,13 +10,14 @@ from metro.loop import label_evidence as room
 from metro.loop.label_evidence import Labels, left_out, log_evidence, log_likelihood, posterior
 
 RPM = np.array([2000.0, 3000.0])
+TOOTH_HZ = np.array([80.0, 110.0])
 NONE = np.full(3, np.nan)
 
 
 def labelled(point, depth, unstable, chatter_hz=None, error=1e-9):
     depth = np.asarray(depth)
     chatter = np.full(len(depth), np.nan) if chatter_hz is None else np.asarray(chatter_hz)
-    return Labels(np.asarray(point), depth, np.asarray(unstable, float), chatter, RPM, 0.15, error)
+    return Labels(np.asarray(point), depth, np.asarray(unstable, float), chatter, RPM, TOOTH_HZ, 0.15, error)
 
 
 def at(tests, boundary, chatter=300.0):
@@ -53,11 +54,23 @@ def test_a_wrong_label_costs_no_more_than_its_probability():
 
 def test_a_chatter_frequency_speaks_for_the_boundary_that_predicts_it():
     heard = labelled([1], [0.5], [1.0], [300.0])
-    right, near, wrong, none = (at(heard, 0.0, hz)[0] for hz in (300.0, 315.0, 600.0, np.nan))
+    right, near, wrong, none = (at(heard, 0.0, hz)[0] for hz in (300.0, 315.0, 900.0, np.nan))
     assert right > near > wrong == none
     stray = room.STRAY / room.STRAY_WIDTH
-    peak = (1 - room.STRAY) / (np.sqrt(2 * np.pi) * room.FREQUENCY_SD) + stray
-    assert right - wrong == pytest.approx(np.log(peak / stray), abs=1e-9)
+    peak = (1 - room.STRAY) * room.LINES[0] / (np.sqrt(2 * np.pi) * room.FREQUENCY_SD) + stray
+    assert right - wrong == pytest.approx(np.log(peak / stray), abs=1e-3)
+
+
+@pytest.mark.parametrize("line", [-2, -1, 1, 2])
+def test_chatter_may_be_heard_so_many_teeth_from_its_own_frequency(line):
+    heard = labelled([1], [0.5], [1.0], [2000.0])
+    aside, own, none = (at(heard, 0.0, hz)[0] for hz in (2000.0 - line * 110.0, 2000.0, np.nan))
+    away = at(replace(heard, tooth_hz=np.full(2, 500.0)), 0.0, 2000.0 - line * 110.0)[0]
+    assert none < away < aside < own
+
+
+def test_lines_take_no_more_than_what_follows_the_model():
+    assert sum(room.LINES.values()) == pytest.approx(1.0)
 
 
 def test_evidence_is_the_mean_likelihood_under_the_prior():

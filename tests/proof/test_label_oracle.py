@@ -31,6 +31,10 @@ class Case:
 class Problem(LabelProblem):
     """Boundaries that move by a number, in the logarithm, which is all that effects change."""
 
+    @property
+    def point_tooth_hz(self):
+        return np.full(len(RPM), 100.0)
+
     def boundaries(self, change):
         return np.log(1e-3) + np.full(len(RPM), change(0.0)), np.full(len(RPM), 300.0)
 

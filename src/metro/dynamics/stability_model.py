@@ -3,7 +3,8 @@
 Softening needs no equation of its own: with mass and damping ratio constant, modes whose stiffness is ``f``
 times as large are ``sqrt(f)`` times as fast. Depth over stiffness and speed over frequency are all that the
 boundary depends on, so that at ``n`` it is ``f`` times what it is without softening at ``n / sqrt(f)``. With
-``f`` of each speed, every speed has its own structure, and still all are solved as one stack.
+``f`` of each speed, every speed has its own structure, and still all are solved as one stack. What yields
+the more the deeper it cuts is solved for several ``f``: its boundary is where a depth and its ``f`` agree.
 """
 
 from __future__ import annotations
@@ -18,6 +19,10 @@ from metro.dynamics.system import Cut, Structure
 from metro.dynamics.zero_order import zero_order_boundary
 from metro.units import Array
 
+COMPLIANCES = np.geomspace(1.0, 4.0, 17)  # relative, at which a structure that yields with depth is solved
+_DEPTHS = 300  # at which depth and compliance are compared
+_FAR = 1e3  # stable at any depth: times the deepest boundary
+
 
 @dataclass(frozen=True)
 class StabilityModel:
@@ -29,12 +34,14 @@ class StabilityModel:
     cuts : the cut in each direction in which it is fed; the least stable counts.
     radius : of the tool, m.
     softening : relative change of every stiffness per rev/min; mass and damping ratio are constant.
+    yielding : relative growth of every compliance per m of depth, likewise.
     """
 
     structure: Structure
     cuts: tuple[Cut, ...]
     radius: float
     softening: float = 0.0
+    yielding: float = 0.0
 
     def boundary(self, rpm: Array) -> tuple[Array, Array]:
         """Lowest depths (k,), m, and chatter frequencies there (k,), Hz, at speeds (k,), rev/min.
@@ -45,6 +52,15 @@ class StabilityModel:
             When nothing is left of the stiffness at one of the speeds.
         """
         factor = self._factor(rpm)
+        if self.yielding:
+            softer = (factor / COMPLIANCES[:, None]).ravel()
+            depth, hz = self._at(np.tile(rpm, len(COMPLIANCES)), softer)
+            shape = (len(COMPLIANCES), len(rpm))
+            return _agreed(depth.reshape(shape), hz.reshape(shape), self.yielding)
+        return self._at(rpm, factor)
+
+    def _at(self, rpm: Array, factor: Array) -> tuple[Array, Array]:
+        """Return the boundary (k,) at speeds (k,) with ``factor`` (k,) times the stiffness."""
         found = [stability_boundary(self.structure, cut, rpm / np.sqrt(factor)) for cut in self.cuts]
         depth = np.stack([one.depth for one in found])
         least = (depth.argmin(axis=0), np.arange(depth.shape[1]))
@@ -64,6 +80,20 @@ def estimated(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Arra
     The models have equally many modes, and cuts that differ in process damping alone.
     """
     factor = np.stack([model._factor(rpm) for model in models])
+    if not any(model.yielding for model in models):
+        return _estimated(models, rpm, factor)
+    softer = (factor[:, None] / COMPLIANCES[:, None]).reshape(len(models), -1)
+    depth, hz = _estimated(models, np.tile(rpm, len(COMPLIANCES)), softer)
+    shape = (len(models), len(COMPLIANCES), len(rpm))
+    found = [
+        _agreed(d, c, model.yielding)
+        for d, c, model in zip(depth.reshape(shape), hz.reshape(shape), models, strict=True)
+    ]
+    return np.stack([d for d, _ in found]), np.stack([c for _, c in found])
+
+
+def _estimated(models: Sequence[StabilityModel], rpm: Array, factor: Array) -> tuple[Array, Array]:
+    """Estimate the boundaries (t, k) at speeds (k,) with ``factor`` (t, k) times the stiffness."""
     structures = [model.structure for model in models]
     slowed = rpm / np.sqrt(factor)
     found = [
@@ -71,6 +101,27 @@ def estimated(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Arra
     ]
     depth, chatter = (np.stack(part) for part in zip(*found, strict=True))
     least = depth.argmin(axis=0)[None]
-    chosen = (np.take_along_axis(part, least, axis=0)[0] for part in (depth, chatter))
-    lowest, hz = chosen
+    lowest, hz = (np.take_along_axis(part, least, axis=0)[0] for part in (depth, chatter))
     return factor * lowest, np.sqrt(factor) * hz
+
+
+def _agreed(depth: Array, hz: Array, yielding: float) -> tuple[Array, Array]:
+    """Lowest depths (k,) that are the boundary with the compliance that they make, and frequencies there.
+
+    ``depth``, ``hz`` (c, k) of the boundary at :data:`COMPLIANCES`; ``yielding`` per m of depth.
+    """
+    known = np.isfinite(depth)
+    if not known.any():
+        return depth[0], hz[0]
+    tried = np.geomspace(depth[known].min(), depth[known].max(), _DEPTHS)
+    bounded = np.where(known, depth, _FAR * tried[-1])
+    compliance, at = np.log(COMPLIANCES), np.log1p(yielding * tried)
+    limit = np.stack([np.interp(at, compliance, column) for column in np.log(bounded).T], axis=1)
+    beyond = np.log(tried)[:, None] - limit  # rises through zero at the boundary
+    first = np.maximum(1, np.argmax(beyond >= 0.0, axis=0))
+    below, above = (np.take_along_axis(beyond, (first - back)[None], axis=0)[0] for back in (1, 0))
+    share = np.clip(below / np.minimum(below - above, -1e-12), 0.0, 1.0)
+    found = tried[first - 1] * (tried[first] / tried[first - 1]) ** share
+    found = np.where((beyond >= 0.0).any(axis=0), found, np.inf)
+    soft = np.log1p(yielding * np.minimum(found, tried[-1]))
+    return found, np.array([np.interp(c, compliance, column) for c, column in zip(soft, hz.T, strict=True)])

@@ -260,8 +260,8 @@ class _Nearby:
         """Points (n, size)."""
         points = rng.random((_count(size), size))
         near = self.centres[rng.integers(len(self.centres), size=len(points))]
-        near = np.abs(near + self.width * rng.standard_normal(near.shape))
-        points[:, : near.shape[1]] = np.where(near > 1.0, 2.0 - near, near)
+        near = near + self.width * rng.standard_normal(near.shape)
+        points[:, : near.shape[1]] = 1.0 - np.abs(1.0 - near % 2.0)
         return points
 
     def density(self, cube: Array) -> Array:

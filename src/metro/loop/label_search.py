@@ -1,7 +1,7 @@
 """The search where the measurement is a label: which effects the boundary lacks, if any.
 
-The hypotheses are nothing, each effect of the library, a cause that it lacks
-(:mod:`metro.loop.label_unknown`), and, where an effect is likely and the tests can bear it, that effect with
+The hypotheses are nothing, each effect of the library, causes that it lacks (likenesses, and whatever else,
+:mod:`metro.loop.label_unknown`), and, where an effect is likely and the tests can bear it, that effect with
 each other, and the best of these others with the rest. The identification tests weigh them; the validation
 tests are not read here.
 """
@@ -17,7 +17,7 @@ import numpy as np
 from metro.effects.effect import Effect, fitted_to
 from metro.loop.hypotheses import Evidence, Hypothesis, hypothesis
 from metro.loop.label_evidence import SHARED, Labels, left_out, own_sd, unstable_probability
-from metro.loop.label_unknown import UNKNOWN, unknown
+from metro.loop.label_unknown import unknown
 from metro.loop.labelled import Labelled, tests_of
 from metro.loop.rivals import RIVAL_WEIGHT
 from metro.loop.trial import Gates
@@ -25,7 +25,8 @@ from metro.units import JSON, Array
 
 LEAST_TESTS, LEAST_SPEEDS = 6, 3
 PAIR_TESTS, PAIR_SPEEDS = 16, 5
-PRIOR_NOTHING, PRIOR_PAIRS, PRIOR_UNKNOWN = 0.5, 0.1, 0.1
+PRIOR_NOTHING, PRIOR_PAIRS = 0.5, 0.1
+PRIOR_LACKING = 0.08  # of each cause that the library lacks, times its own prior
 SURE = 1.0 - RIVAL_WEIGHT
 WORTH = 0.25  # of the likeliest hypothesis: below it, effects that are sure are not enough by themselves
 MATERIAL = 0.05  # least change of a predicted probability, rms over the tests
@@ -51,6 +52,11 @@ class Weighed:
     def names(self) -> tuple[str, ...]:
         """Names of its effects."""
         return self.hypothesis.names
+
+    @property
+    def lacking(self) -> bool:
+        """Whether it is a cause that the library lacks."""
+        return any(effect.resembled for effect in self.hypothesis.effects)
 
 
 @dataclass(frozen=True)
@@ -90,10 +96,17 @@ class LabelOutcome:
         return tuple(sorted(open_names, key=lambda name: -self._without_lead(name)))
 
     @property
+    def lacking(self) -> tuple[Weighed, ...]:
+        """Causes that the library lacks, the likeliest first."""
+        found = [one for one in self.weighed if one.lacking]
+        return tuple(sorted(found, key=lambda one: -one.probability))
+
+    @property
     def elsewhere(self) -> bool:
         """Whether something is missing, as it seems, and it is none of the library's effects."""
         nothing = self.weighed[0].probability
-        return nothing < PRIOR_NOTHING and self.probability(UNKNOWN) > SURE * (1.0 - nothing)
+        lacking = sum(one.probability for one in self.lacking)
+        return nothing < PRIOR_NOTHING and lacking > SURE * (1.0 - nothing)
 
     @property
     def unsettled(self) -> bool:
@@ -103,7 +116,8 @@ class LabelOutcome:
     @property
     def doubtful(self) -> bool:
         """Whether a cause that the library lacks may be in the place of the lead."""
-        return self.unsettled or UNKNOWN in self.rivals
+        lacking = {name for one in self.lacking for name in one.names}
+        return self.unsettled or bool(lacking & set(self.rivals))
 
     def _without_lead(self, name: str) -> float:
         lead = set(self.lead.names) if self.lead else set()
@@ -124,17 +138,18 @@ def search_labels(problem: Labelled, library: Sequence[Effect], gates: Gates) ->
     shared = np.random.default_rng(gates.seed).normal(size=(DEVIATIONS, 1)) * tests.model_sd * SHARED**0.5
     evidence = Evidence(problem.boundaries, problem.estimates, tests, base + shared, gates.seed)
     nothing = hypothesis((), evidence)
-    singles = [hypothesis((effect,), evidence) for effect in effects]
+    singles = [hypothesis((effect,), evidence) for effect in effects if not effect.resembled]
+    lacking = [hypothesis((effect,), evidence) for effect in effects if effect.resembled]
+    lacking.append(unknown(nothing, evidence))
     hidden = {
         one.names[0]: HIDDEN.format(MATERIAL)
         for one in singles
         if _largest(one, nothing, evidence) < MATERIAL
     }
     seen = [one for one in singles if one.names[0] not in hidden]
-    other = unknown(nothing, evidence)
-    weighed = _probabilities([nothing, *seen], [], other)
+    weighed = _probabilities([nothing, *seen], [], lacking)
     if _worth_pairs(weighed, tests):
-        first = max(weighed[1:-1], key=lambda one: one.probability).hypothesis
+        first = max(weighed[1 : 1 + len(seen)], key=lambda one: one.probability).hypothesis
         others = [one for one in seen if one is not first]
         joined = [hypothesis(first.effects + two.effects, evidence, first) for two in others]
         best = max(joined, key=lambda one: one.log_evidence)
@@ -143,7 +158,7 @@ def search_labels(problem: Labelled, library: Sequence[Effect], gates: Gates) ->
             rest = [one for one in others if one is not second]
             beside = replace(best, effects=second.effects, cube=best.cube[:, first.cube.shape[1] :])
             joined += [hypothesis(second.effects + two.effects, evidence, beside) for two in rest]
-        weighed = _probabilities([nothing, *seen], joined, other)
+        weighed = _probabilities([nothing, *seen], joined, lacking)
     judged = tuple(_judged(one, nothing, evidence, gates) for one in weighed)
     outcome = LabelOutcome(judged, evidence, None, unable | hidden)
     return replace(outcome, lead=_lead(outcome))
@@ -151,17 +166,19 @@ def search_labels(problem: Labelled, library: Sequence[Effect], gates: Gates) ->
 
 def _worth_pairs(weighed: list[Weighed], tests: Labels) -> bool:
     many = len(tests.depth) >= PAIR_TESTS and len(tests.speeds) >= PAIR_SPEEDS
-    return many and len(weighed) > 3 and weighed[0].probability < PRIOR_NOTHING
+    effects = sum(not one.lacking for one in weighed[1:])
+    return many and effects > 1 and weighed[0].probability < PRIOR_NOTHING
 
 
 def _probabilities(
-    singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], other: Hypothesis
+    singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], lacking: Sequence[Hypothesis]
 ) -> list[Weighed]:
-    """Posterior probabilities; ``singles`` has nothing first, the ``other`` cause comes last."""
-    left = 1.0 - PRIOR_NOTHING - PRIOR_UNKNOWN - (PRIOR_PAIRS if pairs else 0.0)
+    """Posterior probabilities; ``singles`` has nothing first, what the library is ``lacking`` comes last."""
+    others = [PRIOR_LACKING * effect.prior for one in lacking for effect in one.effects]
+    left = 1.0 - PRIOR_NOTHING - sum(others) - (PRIOR_PAIRS if pairs else 0.0)
     prior = [PRIOR_NOTHING, *[left / max(1, len(singles) - 1)] * (len(singles) - 1)]
-    prior += [*[PRIOR_PAIRS / max(1, len(pairs))] * len(pairs), PRIOR_UNKNOWN]
-    every = [*singles, *pairs, other]
+    prior += [*[PRIOR_PAIRS / max(1, len(pairs))] * len(pairs), *others]
+    every = [*singles, *pairs, *lacking]
     log = np.log(prior) + [one.log_evidence for one in every]
     weight = np.exp(log - log.max())
     return [Weighed(one, float(w)) for one, w in zip(every, weight / weight.sum(), strict=True)]
@@ -207,7 +224,8 @@ def _judged(one: Weighed, nothing: Hypothesis, evidence: Evidence, gates: Gates)
 
 def _lead(outcome: LabelOutcome) -> Weighed | None:
     """Return the effects that are sure, or the likeliest where the tests speak against nothing."""
-    nothing, *others, _ = outcome.weighed
+    nothing = outcome.weighed[0]
+    others = [one for one in outcome.weighed[1:] if not one.lacking]
     names = {name for one in others for name in one.names}
     sure = {name for name in names if outcome.probability(name) > SURE}
     heaviest = max((one.probability for one in others), default=0.0)
@@ -223,7 +241,7 @@ def pairs(outcome: LabelOutcome) -> list[list[str]]:
     """Return what the tests cannot tell apart: the lead's effects, each with each rival."""
     lead = outcome.lead.names if outcome.lead else ()
     if outcome.unsettled:
-        return [[UNKNOWN, NOTHING]]
+        return [[outcome.lacking[0].names[0], NOTHING]]
     return [list(pair) for pair in itertools.product(lead[-1:], outcome.rivals)]
 
 

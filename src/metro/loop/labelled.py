@@ -57,6 +57,11 @@ class Labelled(Protocol):
         ...
 
     @property
+    def point_tooth_hz(self) -> Array:
+        """(p,) frequency at which the teeth come at each point, Hz."""
+        ...
+
+    @property
     def model_sd(self) -> float:
         """Standard deviation of the log of the depth for what the models leave out."""
         ...
@@ -86,13 +91,22 @@ class Labelled(Protocol):
 def tests_of(problem: Labelled, role: str) -> tuple[Labels, tuple[str, ...]]:
     """Return the tests of a role at places whose modes are known, and their runs."""
     which = (np.array(problem.roles) == role) & (problem.point >= 0)
-    every = Labels(
+    return _labels(problem).take(which), tuple(np.array(problem.runs, dtype=object)[which])
+
+
+def every_test(problem: Labelled) -> Labels:
+    """Return all tests at places whose modes are known, of any role."""
+    return _labels(problem).take(problem.point >= 0)
+
+
+def _labels(problem: Labelled) -> Labels:
+    return Labels(
         problem.point,
         np.log(problem.depth),
         problem.unstable.astype(float),
         problem.chatter_hz,
         problem.point_rpm,
+        problem.point_tooth_hz,
         problem.model_sd,
         problem.label_error,
     )
-    return every.take(which), tuple(np.array(problem.runs, dtype=object)[which])

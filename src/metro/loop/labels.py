@@ -19,14 +19,16 @@ from metro.loop.label_search import (
     LEAST_SPEEDS,
     LEAST_TESTS,
     LabelOutcome,
+    Weighed,
     enough,
     pairs,
     predicted,
     search_labels,
     tried,
 )
+from metro.loop.label_surprise import surprise
 from metro.loop.label_unknown import UNKNOWN, curves
-from metro.loop.labelled import Change, Labelled, tests_of
+from metro.loop.labelled import Change, Labelled, every_test, tests_of
 from metro.loop.story import MOST_PROPOSALS, in_words
 from metro.loop.trial import Gates
 from metro.loop.verdict import DRAWS, error
@@ -43,8 +45,8 @@ def log_likelihood(label: Array, probability: Array) -> Array:
     return np.asarray(np.sum(np.where(label > 0.5, np.log(p), np.log1p(-p)), axis=-1))
 
 
-def surprise(label: Array, probability: Array, seed: int) -> float:
-    """Probability that labels drawn from the prediction are at least as unlikely as those measured."""
+def surprise_alone(label: Array, probability: Array, seed: int) -> float:
+    """Probability that labels drawn one by one are at least as unlikely as those measured."""
     drawn = np.random.default_rng(seed).random((DRAWS, len(label))) < probability
     found = log_likelihood(drawn.astype(float), probability) <= log_likelihood(label, probability) + 1e-12
     return float((1 + np.count_nonzero(found)) / (1 + DRAWS))
@@ -157,21 +159,32 @@ def _judged(task: Labelled, rows: pd.DataFrame, library: Sequence[Effect], gates
     label = rows["measured"].to_numpy(float)
 
     def surprised(column: str) -> float:
-        return surprise(label, rows[column].to_numpy(float), gates.seed) if len(rows) else 1.0
+        return surprise_alone(label, rows[column].to_numpy(float), gates.seed) if len(rows) else 1.0
 
     before, refitted = surprised("before"), surprised("after")
-    lead = outcome.lead if outcome else None
-    within = _within(outcome, gates) if outcome else 1.0
-    refuted = False
-    if outcome and lead and not lead.rejected and within >= SIGNIFICANT:
+    upstream = before < SIGNIFICANT <= refitted
+    if outcome is None:
+        return _Judged(rows, None, (before, refitted, 1.0), upstream, False, [])
+    lead, refuted = outcome.lead, False
+    within = _within(task, outcome, gates)
+    nothing = leading = outcome.weighed[0]
+    if lead and not lead.rejected and within >= SIGNIFICANT:
         corrected = _with_effects(task, rows, outcome)
         old, new = (log_likelihood(label, each["after"].to_numpy(float)) for each in (rows, corrected))
-        still = surprise(label, corrected["after"].to_numpy(float), gates.seed) < SIGNIFICANT
+        still = _held_out(task, outcome, lead, gates) < SIGNIFICANT
         refuted = bool(new - old < REFUTED) or (still and outcome.doubtful)
-        rows = rows if refuted else corrected
-    suggested = next_tests(task, outcome) if outcome and (lead or len(rows) < LEAST_TESTS) else []
-    upstream = before < SIGNIFICANT <= refitted
-    return _Judged(rows, outcome, (before, surprised("after"), within), upstream, refuted, suggested)
+        rows, leading = (rows, nothing) if refuted else (corrected, lead)
+    after = refitted
+    if rows["after"].equals(rows["before"]) or leading is lead:  # else the force's effects predict them
+        before, after = (_held_out(task, outcome, one, gates) for one in (nothing, leading))
+    suggested = next_tests(task, outcome) if lead or len(rows) < LEAST_TESTS else []
+    return _Judged(rows, outcome, (before, after, within), upstream, refuted, suggested)
+
+
+def _held_out(task: Labelled, outcome: LabelOutcome, one: Weighed, gates: Gates) -> float:
+    """Return the surprise of the held-out tests under a hypothesis."""
+    tests, _ = tests_of(task, "validate")
+    return surprise(tests, one.hypothesis, outcome.evidence.deviations, gates.seed)
 
 
 def _with_effects(task: Labelled, rows: pd.DataFrame, outcome: LabelOutcome) -> pd.DataFrame:
@@ -185,20 +198,24 @@ def _with_effects(task: Labelled, rows: pd.DataFrame, outcome: LabelOutcome) -> 
 
 def elsewhere_words(outcome: LabelOutcome) -> str:
     """Say how a cause that the library lacks would have to move the boundary."""
-    (curve,) = (one.hypothesis for one in outcome.weighed if one.names == (UNKNOWN,))
+    may = "" if outcome.elsewhere and not outcome.unsettled else "it may be "
+    likeliest = outcome.lacking[0]
+    if likeliest.names != (UNKNOWN,):
+        return f"{may}a {likeliest.names[0].replace('_', ' ')}, which is no effect of the library"
+    curve = likeliest.hypothesis
     rpm, depth = outcome.base_boundary
     at = np.argsort(rpm, kind="stable")[[0, len(rpm) // 2, -1]]
     factor = np.exp(curve.weights @ curves(curve, (rpm, depth), (rpm[at], depth[at])))
     told = ", ".join(f"{f:.2g} at {rpm[i]:.0f} rev/min" for f, i in zip(factor, at, strict=True))
-    may = "" if outcome.elsewhere and not outcome.unsettled else "it may be "
     return f"{may}a cause that the library lacks: the depth of the boundary times {told}"
 
 
-def _within(outcome: LabelOutcome, gates: Gates) -> float:
-    """Return the surprise of the identification tests under the hypothesis that leads."""
-    leading = outcome.lead or outcome.weighed[0]
-    tests, deviations = outcome.evidence.tests, outcome.evidence.deviations
-    return surprise(tests.unstable, predicted(leading.hypothesis, tests, deviations), gates.seed)
+def _within(task: Labelled, outcome: LabelOutcome, gates: Gates) -> float:
+    """Return the surprise of the tests that weighed the hypothesis that leads; of all where it is nothing."""
+    leading, tests = outcome.lead, outcome.evidence.tests
+    if leading is None:
+        leading, tests = outcome.weighed[0], every_test(task)
+    return surprise(tests, leading.hypothesis, outcome.evidence.deviations, gates.seed)
 
 
 def _effects(judged: _Judged) -> list[JSON]:

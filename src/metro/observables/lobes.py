@@ -75,6 +75,13 @@ class LabelProblem:
         speeds: Array = np.concatenate([np.zeros(0), *(case.rpm for case in self.cases)])
         return speeds
 
+    @property
+    def point_tooth_hz(self) -> Array:
+        """(p,) frequency at which the teeth come at each point, Hz."""
+        found = [case.model.cuts[0].teeth * case.rpm / 60.0 for case in self.cases]
+        frequencies: Array = np.concatenate([np.zeros(0), *found])
+        return frequencies
+
     def boundaries(self, change: Change) -> tuple[Array, Array]:
         """Log depth (p,) and chatter frequency (p,), Hz, of the boundary once the models are changed."""
         return boundaries(self.cases, change)

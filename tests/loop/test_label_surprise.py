@@ -1,0 +1,52 @@
+"""Surprise: as often as it says where the model is right, small where labels are wrong together."""
+
+from dataclasses import replace
+
+import numpy as np
+from label_toy import GATES, Line, problem
+from scipy import stats
+
+from metro.loop.hypotheses import Evidence, hypothesis
+from metro.loop.label_evidence import SHARED
+from metro.loop.label_surprise import drawn, surprise
+from metro.loop.labelled import every_test
+
+SD = 0.15
+
+
+def surprised(task, seed=1):
+    tests = every_test(task)
+    shared = np.random.default_rng(seed).normal(size=(128, 1)) * SD * SHARED**0.5
+    evidence = Evidence(task.boundaries, task.estimates, tests, np.tile(shared, len(tests.rpm)), GATES.seed)
+    return surprise(tests, hypothesis((), evidence), evidence.deviations, seed)
+
+
+def labelled(true, seed):
+    """Tests of the toy with labels in error as the model says: all alike, each speed, and each test."""
+    task, rng = problem(Line(), 1), np.random.default_rng(seed)
+    boundary = true.boundary(task.point_rpm) + SD * SHARED**0.5 * rng.standard_normal()
+    return replace(task, unstable=drawn(every_test(task), boundary, rng) > 0.5)
+
+
+def test_where_the_model_is_right_it_is_small_as_often_as_it_says():
+    found = np.array([surprised(labelled(Line(), seed), seed) for seed in range(50)])
+    assert stats.kstest(found, "uniform").pvalue > 0.01
+    assert np.mean(found < 0.01) < 0.1
+
+
+def test_what_all_tests_get_wrong_alike_is_within_the_error_that_they_share():
+    found = [
+        [surprised(labelled(Line(shift=shift), seed), seed) for seed in range(8)] for shift in (0.1, 0.9)
+    ]
+    assert np.median(found[0]) > 0.1
+    assert np.median(found[1]) < 0.01
+
+
+def test_labels_that_follow_a_curve_the_model_lacks_are_a_surprise():
+    found = [surprised(labelled(Line(slope=0.5), seed), seed) for seed in range(10)]
+    assert np.median(found) < 0.01
+
+
+def test_there_is_no_surprise_without_tests():
+    task = problem(Line(), 1)
+    assert surprised(replace(task, point=np.full(len(task.point), -1))) == 1.0
