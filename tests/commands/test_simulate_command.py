@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import subprocess
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -21,20 +22,42 @@ def simulate(*arguments):
     return CliRunner().invoke(app, ["simulate", *arguments])
 
 
-def test_the_truth_stands_outside_the_batch_and_the_raw_root(folder, monkeypatch):
-    asked = []
+class Simulator:
+    """Stands for the simulator: notes what it is asked, and fills the folder."""
 
-    def run(command, **_):
-        asked.append(command[1:])
+    def __init__(self, folder):
+        self.folder, self.asked, self.there = folder, [], None
+
+    def __call__(self, command, **_):
+        self.asked.append(command[1:])
+        self.there = [path.name for path in (self.folder / "data/raw").glob("[!.]*")]
+        (self.folder / command[4] / "batch.yaml").write_text("format: 1\n")
+        Path(command[command.index("--truth") + 1]).write_text("{}")
         return SimpleNamespace(returncode=0, stderr="")
 
-    monkeypatch.setattr(subprocess, "run", run)
+
+def test_the_truth_stands_outside_the_batch_and_the_raw_root(folder, monkeypatch):
+    simulator = Simulator(folder)
+    monkeypatch.setattr(subprocess, "run", simulator)
     effects = ("--effect", "tool_runout:radius_um=12,angle_deg=40", "--effect", "tool_wear")
     result = simulate("try-1", *effects, "--seed", "3", "--json")
     assert json.loads(result.stdout)["truth"] == "truth/try-1.truth.json"
+    assert [path.name for path in (folder / "truth").iterdir()] == ["try-1.truth.json"]
+    assert [str(path.relative_to(folder)) for path in (folder / "data").rglob("*") if path.is_file()] == [
+        "data/raw/try-1/batch.yaml"
+    ]
+    (asked,) = simulator.asked
+    assert asked[:3] == ["-m", "virtual_cell", "force"]
     hidden = ["--effect", "tool_runout", "radius_um=12", "angle_deg=40", "--effect", "tool_wear"]
-    start = ["-m", "virtual_cell", "force", "data/raw/try-1", "--seed", "3", "--style", "a"]
-    assert asked == [[*start, *hidden, "--truth", "truth/try-1.truth.json"]]
+    assert asked[4:8] + asked[10:] == ["--seed", "3", "--style", "a", *hidden]
+
+
+def test_a_batch_has_its_name_when_it_is_whole(folder, monkeypatch):
+    simulator = Simulator(folder)
+    monkeypatch.setattr(subprocess, "run", simulator)
+    simulate("try-1")
+    assert simulator.there == []
+    assert (folder / "data/raw/try-1/batch.yaml").exists()
 
 
 @pytest.mark.parametrize(
@@ -49,7 +72,7 @@ def test_a_mistake_is_told_in_one_line(folder, arguments, told):
     result = simulate(*arguments)
     assert result.exit_code == 1
     assert told in result.stderr
-    assert not (folder / "data").exists()
+    assert [path for root in ("data/raw", "truth") for path in (folder / root).rglob("*")] == []
 
 
 def test_a_batch_that_is_there_is_not_overwritten(folder):

@@ -28,7 +28,7 @@ WAYS = ("all", "head", "stage")
 
 @dataclass
 class Killed:
-    """What became of one kill: where it hit, what was torn by it, and what the next call did not mend."""
+    """What became of one kill: where it hit ("": too late), what it tore, what the next call did not mend."""
 
     way: str
     moment: float
@@ -64,11 +64,13 @@ def kill_once(checkout, way, moment, reference):
         start_new_session=True,
     )
     time.sleep(moment)
-    hit = kill_stage(head) if way == "stage" else stage_at_work(checkout)
-    if way == "all":
-        os.killpg(head.pid, signal.SIGKILL)
-    if way == "head":
-        head.kill()
+    hit = ""
+    if head.poll() is None:
+        hit = kill_stage(head) if way == "stage" else stage_at_work(checkout)
+        if way == "all":
+            os.killpg(head.pid, signal.SIGKILL)
+        if way == "head":
+            head.kill()
     head.wait()
     found = torn(checkout.folder, reference)
     checkout.call("--cores", "1")
@@ -107,19 +109,24 @@ def stage_at_work(checkout):
 
 
 def kills(folder, batches, number, seed):
-    """Yield what became of each of a number of kills, at moments drawn over the time of a run."""
+    """Yield what became of each of a number of kills, at moments drawn over the time of a run.
+
+    A run may be through before its moment comes: it is not one of the number.
+    """
     undisturbed = campaign(folder / "undisturbed", batches)
     start = time.monotonic()
     undisturbed.call("--cores", "1")
     spent = time.monotonic() - start
     reference = outputs(undisturbed.folder)
-    draw = random.Random(seed)
-    for index in range(number):
-        checkout = campaign(folder / f"kill-{index}", batches)
-        one = kill_once(checkout, WAYS[index % len(WAYS)], draw.uniform(0.0, spent), reference)
+    draw, done = random.Random(seed), 0
+    while done < number:
+        checkout = campaign(folder / f"kill-{done}", batches)
+        one = kill_once(checkout, WAYS[done % len(WAYS)], draw.uniform(0.0, spent), reference)
         if one.survived:
             shutil.rmtree(checkout.folder)
-        yield one
+        if one.hit or not one.survived:
+            done += 1
+            yield one
 
 
 def main():

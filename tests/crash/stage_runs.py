@@ -13,6 +13,7 @@ import checkout
 from outputs import outputs
 
 from metro.batch.findings import ContractError
+from metro.batch.template import new_batch
 from metro.stages.campaign import campaign
 from metro.stages.identify import identify
 from metro.stages.ingest import ingest
@@ -41,6 +42,8 @@ STAGES = {
     "report": lambda at: report(at / PROCESSED, at / REPORTS, {}, CODE),
     "campaign": lambda at: campaign([at / REPORTS], at / "data/processed", at / "reports", {}, CODE),
 }
+# What is called by hand, and writes a folder.
+BY_HAND = {"new-batch": lambda at: new_batch(at / "data/raw", "my-cut")}
 # What happens to files; what is written into one that is there already is not told of.
 EVENTS = {"open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.chmod"}
 WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT
@@ -105,7 +108,7 @@ def _heard(said, work, *arguments):
 
 
 def _run(stage, folder):
-    STAGES[stage](folder)
+    (STAGES | BY_HAND)[stage](folder)
 
 
 def _killed_at_event(stage, folder, number):
@@ -120,7 +123,7 @@ def _killed_at_event(stage, folder, number):
             os.kill(os.getpid(), signal.SIGKILL)
 
     sys.addaudithook(watch)
-    STAGES[stage](folder)
+    (STAGES | BY_HAND)[stage](folder)
 
 
 def _killed_within_write(stage, folder, size):
@@ -131,4 +134,4 @@ def _killed_within_write(stage, folder, size):
 
 def _refused_beyond(stage, folder, size):
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-    STAGES[stage](folder)
+    (STAGES | BY_HAND)[stage](folder)

@@ -32,12 +32,12 @@ def bits(values, width):
     return number.to_bytes((len(values) * width + 7) // 8, "little")
 
 
-def section(streams, at):
+def section(streams, at, packet_type=1):
     """A compressed vector: section header and one data packet, its bytestreams one after the other."""
     lengths = b"".join(struct.pack("<H", len(stream)) for stream in streams)
     body = lengths + b"".join(streams)
     body += b"\0" * (-(6 + len(body)) % 4)
-    packet = struct.pack("<BBHH", 1, 0, 6 + len(body) - 1, len(streams)) + body
+    packet = struct.pack("<BBHH", packet_type, 0, 6 + len(body) - 1, len(streams)) + body
     return struct.pack("<B7xQQQ", 1, 32 + len(packet), physical(at + 32), 0) + packet
 
 
@@ -50,7 +50,7 @@ def pose(rotation, shift):
     )
 
 
-def e57(scans, doctype=""):
+def e57(scans, doctype="", packet_type=1):
     """``scans``: (prototype, streams, number of points, pose) each."""
     logical, children = bytes(HEADER.size), []
     for prototype, streams, count, placed in scans:
@@ -61,7 +61,7 @@ def e57(scans, doctype=""):
             f'<prototype type="Structure">{prototype}</prototype>'
             '<codecs type="Vector" allowHeterogeneousChildren="1"/></points></vectorChild>'
         )
-        logical += section(streams, len(logical))
+        logical += section(streams, len(logical), packet_type)
     xml = (
         f'<?xml version="1.0" encoding="UTF-8"?>{doctype}'
         '<e57Root type="Structure" xmlns="http://www.astm.org/COMMIT/E57/2010-e57-v1.0">'
@@ -152,6 +152,12 @@ def test_faults_of_an_e57_file_are_named(tmp_path):
     colours = "".join(f'<color{name} type="Float"/>' for name in ("Red", "Green", "Blue"))
     assert "found a scan with colorRed" in failure(scan(tmp_path, e57([(colours, *doubles(POINTS)[1:])])))
     assert "found 0 rows" in failure(scan(tmp_path, e57([])))
+
+
+def test_a_byte_that_is_no_text_in_what_the_library_says_is_no_crash(tmp_path):
+    message = failure(scan(tmp_path, e57([doubles(POINTS)], packet_type=255)))
+    assert "not a readable E57 file" in message
+    assert "packetType" in message
 
 
 def test_entities_are_not_unfolded(tmp_path):

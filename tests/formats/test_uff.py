@@ -8,7 +8,7 @@ import pytest
 from metro.formats import FormatError
 from metro.formats.registry import read, read_frfs, sniff
 from metro.formats.uff import FRF, Function, read_functions
-from metro.formats.uff_writer import write_functions
+from metro.formats.uff_writer import universal_file
 
 DF = 0.01953125
 
@@ -25,7 +25,7 @@ def functions(count=2001, first=1, df=DF):
 @pytest.mark.parametrize("count", [2000, 2001, 9])
 def test_what_is_written_comes_back(tmp_path, binary, count):
     given = functions(count)
-    write_functions(tmp_path / "a.uff", given, binary=binary)
+    (tmp_path / "a.uff").write_bytes(universal_file(given, binary=binary))
     found = read_functions(tmp_path / "a.uff")
     assert [(f.kind, f.reference, f.response, f.unit) for f in found] == [
         (f.kind, f.reference, f.response, f.unit) for f in given
@@ -39,7 +39,7 @@ def test_what_is_written_comes_back(tmp_path, binary, count):
 @pytest.mark.parametrize("first", [0, 1, 1023])
 def test_a_step_of_six_digits_becomes_the_rate_over_the_samples_again(tmp_path, df, first):
     given = functions(4001, first, df)
-    write_functions(tmp_path / "a.uff", given)
+    (tmp_path / "a.uff").write_bytes(universal_file(given))
     found = read_functions(tmp_path / "a.uff")[0]
     np.testing.assert_allclose(found.frequency, given[0].frequency, rtol=1e-12)
 
@@ -47,15 +47,17 @@ def test_a_step_of_six_digits_becomes_the_rate_over_the_samples_again(tmp_path, 
 def test_uneven_lines_are_written_out_in_full(tmp_path):
     frequency = np.sort(np.random.default_rng(1).uniform(10, 20, 33))
     given = Function(FRF, "1x", "2x", "m", frequency, np.exp(1j * frequency))
-    write_functions(tmp_path / "a.uff", [given])
+    (tmp_path / "a.uff").write_bytes(universal_file([given]))
     np.testing.assert_array_equal(read_functions(tmp_path / "a.uff")[0].frequency, frequency)
-    write_functions(tmp_path / "b.uff", [given], binary=False)
+    (tmp_path / "b.uff").write_bytes(universal_file([given], binary=False))
     np.testing.assert_allclose(read_functions(tmp_path / "b.uff")[0].frequency, frequency, atol=1e-4)
 
 
 def test_single_precision_abscissae_before_double_values_are_told_by_the_size(tmp_path):
     frequency = np.array([1.0, 2.5, 2.75, 4.0, 8.0, 9.5])
-    write_functions(tmp_path / "a.uff", [Function(FRF, "1x", "2x", "m", frequency, np.exp(1j * frequency))])
+    (tmp_path / "a.uff").write_bytes(
+        universal_file([Function(FRF, "1x", "2x", "m", frequency, np.exp(1j * frequency))])
+    )
     text = (tmp_path / "a.uff").read_bytes()
     table = np.stack([frequency, np.cos(frequency), np.sin(frequency)], axis=1)
     rows = [row[:1].astype("<f4").tobytes() + row[1:].astype("<f8").tobytes() for row in table]
@@ -69,7 +71,7 @@ def test_single_precision_abscissae_before_double_values_are_told_by_the_size(tm
 @pytest.mark.parametrize("binary", [True, False])
 def test_carriage_returns_before_the_end_marks_change_nothing(tmp_path, binary):
     given = functions(17)
-    write_functions(tmp_path / "a.uff", given, binary=binary)
+    (tmp_path / "a.uff").write_bytes(universal_file(given, binary=binary))
     text = (tmp_path / "a.uff").read_bytes()
     text = text.replace(b"\n    -1\n", b"\r\n    -1\r\n") if binary else text.replace(b"\n", b"\r\n")
     (tmp_path / "a.uff").write_bytes(text)
@@ -80,7 +82,7 @@ def test_carriage_returns_before_the_end_marks_change_nothing(tmp_path, binary):
 
 def test_an_end_mark_right_after_binary_data_and_one_too_many_are_taken(tmp_path):
     given = functions(17)
-    write_functions(tmp_path / "a.uff", given)
+    (tmp_path / "a.uff").write_bytes(universal_file(given))
     text = (tmp_path / "a.uff").read_bytes()
     (tmp_path / "a.uff").write_bytes(
         b"    -1\n" + text[:164] + text[164:].replace(b"\n    -1\n", b"    -1\n")
@@ -92,7 +94,7 @@ def test_binary_data_that_look_like_an_end_mark_are_data(tmp_path):
     hidden = np.frombuffer(b"\n    -1\n    -1\n ", dtype="<f8")
     values = np.full(8, hidden[0] + 1j * hidden[1])
     given = Function(FRF, "1x", "1x", "m", np.arange(8.0), values)
-    write_functions(tmp_path / "a.uff", [given, given])
+    (tmp_path / "a.uff").write_bytes(universal_file([given, given]))
     assert [len(f.values) for f in read_functions(tmp_path / "a.uff")] == [8, 8]
 
 
@@ -142,7 +144,7 @@ def test_a_rotation_and_data_that_end_early_are_named(tmp_path):
 
 
 def test_binary_data_that_end_early_are_named(tmp_path):
-    write_functions(tmp_path / "a.uff", functions(100)[:1])
+    (tmp_path / "a.uff").write_bytes(universal_file(functions(100)[:1]))
     (tmp_path / "a.uff").write_bytes((tmp_path / "a.uff").read_bytes()[:-900])
     with pytest.raises(FormatError, match="no end mark"):
         read_functions(tmp_path / "a.uff")
@@ -150,7 +152,7 @@ def test_binary_data_that_end_early_are_named(tmp_path):
 
 def test_the_registry_reads_a_universal_file_by_its_content(tmp_path):
     given = functions(64)
-    write_functions(tmp_path / "a.unv", given)
+    (tmp_path / "a.unv").write_bytes(universal_file(given))
     sniff(tmp_path / "a.unv", "frf")
     table = read(tmp_path / "a.unv", "frf")
     np.testing.assert_array_equal(table["real"], given[0].values.real)
@@ -165,7 +167,7 @@ def test_the_registry_reads_a_universal_file_by_its_content(tmp_path):
 def test_coherence_stands_beside_its_response(tmp_path):
     given = functions(32)
     coherence = Function(6, "1x", "7z", "", given[1].frequency, np.linspace(0.5, 1, 32) + 0j)
-    write_functions(tmp_path / "a.uff", [*given, coherence])
+    (tmp_path / "a.uff").write_bytes(universal_file([*given, coherence]))
     tables = [f.table for f in read_frfs(tmp_path / "a.uff")]
     assert ["coherence" in table for table in tables] == [False, True, False]
     np.testing.assert_array_equal(tables[1]["coherence"], coherence.values.real)
@@ -181,7 +183,7 @@ def test_an_independent_reader_reads_what_is_written(tmp_path):
     pyuff = pytest.importorskip("pyuff", reason="pyuff is not installed (development only)")
     given = functions(101)
     for binary in (True, False):
-        write_functions(tmp_path / "a.uff", given, binary=binary)
+        (tmp_path / "a.uff").write_bytes(universal_file(given, binary=binary))
         sets = [each for each in pyuff.UFF(str(tmp_path / "a.uff")).read_sets() if each["type"] == 58]
         assert [(s["rsp_node"], s["rsp_dir"], s["ref_node"], s["ref_dir"]) for s in sets] == [
             (1, 1, 1, 1),

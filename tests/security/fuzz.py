@@ -2,7 +2,8 @@
 
 ``python tests/security/fuzz.py --inputs 100000`` works in a process of its own, so that a reader that
 takes the process down, hangs or takes all memory is found, too. It prints a table, and the inputs that
-failed by target and number. ``--only NAME --number N`` does one again, here.
+failed by target and number. ``--only NAME --number N`` does one again, here. Stopped by Ctrl-C it prints what
+it has done so far; ``--first N`` begins at a later input, so that a count may be made in parts.
 """
 
 import argparse
@@ -127,6 +128,7 @@ def main():
     """Run, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--inputs", type=int, default=100_000)
+    parser.add_argument("--first", type=int, default=0, help="number of the first input")
     parser.add_argument("--seed", default="1")
     parser.add_argument("--only", default="", help="targets whose names hold this")
     parser.add_argument("--number", type=int, help="one input, in this process")
@@ -142,19 +144,31 @@ def main():
             )
             print(fuzz_targets.outcome(targets[0], folder, data))
             return
-    state, first = mmap.mmap(-1, 16 + 24 * len(targets)), 0
+    state = mmap.mmap(-1, 16 + 24 * len(targets))
     Path(options.log).write_text("")
-    while first < options.inputs:
+    with contextlib.suppress(KeyboardInterrupt):
+        run(state, targets, options)
+    table(targets, state)
+
+
+def run(state, targets, options):
+    """Let workers go through all inputs, a new one from where one was taken down."""
+    first, last = options.first, options.first + options.inputs
+    while first < last:
         SLOT.pack_into(state, 0, -1)
         pid = os.fork()
         if not pid:
-            null = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(null, 1)
-            work(state, first, options.inputs, options)
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            work(state, first, last, options)
             os._exit(0)
-        why = watched(state, pid)
+        try:
+            why = watched(state, pid)
+        except KeyboardInterrupt:
+            os.kill(pid, signal.SIGKILL)
+            raise
         if not why:
-            break
+            return
         at = SLOT.unpack_from(state, 0)[0]
         if at < 0:
             raise SystemExit(f"the worker did not start: {why}")
@@ -164,7 +178,6 @@ def main():
         with Path(options.log).open("a", encoding="utf-8") as log:
             log.write(f"{targets[k].name}\t{at}\t{why}\n")
         first = at + 1
-    table(targets, state)
 
 
 def table(targets, state):

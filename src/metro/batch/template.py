@@ -11,6 +11,7 @@ from string import Template
 from metro.batch.columns import RUNS
 from metro.batch.discover import NAME, NAME_IN_WORDS
 from metro.batch.findings import BatchError, Finding
+from metro.batch.whole_folder import whole_folder
 
 FEEDS_MM = (0.04, 0.06, 0.08, 0.10)
 REPEATS = 2
@@ -37,18 +38,20 @@ def new_batch(root: Path, name: str) -> Path:
     ------
     BatchError
         The name is not allowed, or the folder is there already.
+    ContractError
+        The folder cannot be written.
     """
     folder = root / name
     if not NAME.fullmatch(name):
         raise BatchError([Finding("error", name, f"is no name for a batch, expected {NAME_IN_WORDS}")])
     if folder.exists():
         raise BatchError([Finding("error", str(folder), "is there already: nothing was written")])
-    folder.mkdir(parents=True)
     texts = importlib.resources.files("metro.batch").joinpath("template")
-    for file in ("batch.yaml", "README.md"):
-        text = Template(texts.joinpath(file).read_text(encoding="utf-8"))
-        (folder / file).write_text(text.substitute(name=name), encoding="utf-8")
-    (folder / "runs.csv").write_text("\n".join(_rows(name)) + "\n", encoding="utf-8")
+    with whole_folder(folder) as filled:
+        for file in ("batch.yaml", "README.md"):
+            text = Template(texts.joinpath(file).read_text(encoding="utf-8"))
+            (filled / file).write_text(text.substitute(name=name), encoding="utf-8")
+        (filled / "runs.csv").write_text("\n".join(_rows(name)) + "\n", encoding="utf-8")
     return folder
 
 

@@ -14,6 +14,8 @@ from pathlib import Path
 
 from metro.batch.discover import NAME, NAME_IN_WORDS
 from metro.batch.findings import BatchError, ContractError, Finding
+from metro.batch.whole_folder import whole_folder
+from metro.batch.writing import write_atomically
 from metro.commands.output import print_json
 
 PROGRAM = "virtual_cell"
@@ -50,18 +52,25 @@ def simulate(
     if importlib.util.find_spec(PROGRAM) is None:
         message = "the simulator is not installed: it comes with metro-machining; install that package again"
         raise ContractError([Finding("error", PROGRAM, message)])
-    truth.mkdir(parents=True, exist_ok=True)
     secret = truth / f"{name}.truth.json"
-    command = [sys.executable, "-m", PROGRAM, kind, str(folder), "--seed", str(seed), "--style", style]
-    for effect in effects:
-        hidden, _, settings = effect.partition(":")
-        command += ["--effect", hidden, *filter(None, settings.split(","))]
-    done = subprocess.run([*command, "--truth", str(secret)], capture_output=True, text=True, check=False)
-    if done.returncode:
-        said = (done.stderr.strip() or "it failed without a word").splitlines()[-1]
-        wrong = " (the parameters of an effect are given all, or none)" if said.startswith("KeyError") else ""
-        raise ContractError([Finding("error", PROGRAM, said + wrong)])
+    with whole_folder(folder) as filled:
+        told = filled.with_suffix(".truth.json")
+        _call(kind, filled, effects, ("--seed", str(seed), "--style", style, "--truth", str(told)))
+        write_atomically(secret, lambda stream: stream.write(told.read_bytes()))
     if as_json:
         print_json({"batch": name, "folder": str(folder), "truth": str(secret)})
         return
     sys.stdout.write(f"{folder} is there. What it hides stands in {secret}. Call: snakemake\n")
+
+
+def _call(kind: str, folder: Path, effects: Sequence[str], options: Sequence[str]) -> None:
+    """Let the simulator fill a folder."""
+    command = [sys.executable, "-m", PROGRAM, kind, str(folder), *options]
+    for effect in effects:
+        hidden, _, settings = effect.partition(":")
+        command += ["--effect", hidden, *filter(None, settings.split(","))]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        said = (done.stderr.strip() or "it failed without a word").splitlines()[-1]
+        wrong = " (the parameters of an effect are given all, or none)" if said.startswith("KeyError") else ""
+        raise ContractError([Finding("error", PROGRAM, said + wrong)])

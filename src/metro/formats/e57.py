@@ -48,8 +48,14 @@ def e57_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     try:
         with pye57.E57(str(path)) as file:
             yield from _scans(path, file, rows, kind)
+    except UnicodeDecodeError as error:  # the library's own message quotes a byte of the file
+        raise _unreadable(path, error.object.decode(errors="replace")) from error
     except (pye57.libe57.E57Exception, RuntimeError, MemoryError) as error:
-        raise FormatError(path, f"is not a readable E57 file: {' '.join(str(error).split())}") from error
+        raise _unreadable(path, str(error)) from error
+
+
+def _unreadable(path: Path, said: str) -> FormatError:
+    return FormatError(path, f"is not a readable E57 file: {' '.join(said.split())}")
 
 
 def _check_header(path: Path) -> None:

@@ -2,8 +2,9 @@
 
 A file is a row of segments: a lead-in, what is new of the objects (properties, and how many values of which
 type follow), and the raw values. Read are numbers in any byte order, contiguous or interleaved; refused are
-raw values of DAQmx and values that still await NI's scaling. The common library for TDMS is not used: its
-licence (LGPL) is stricter than this package's.
+raw values of DAQmx and values that still await NI's scaling. The common library, npTDMS, is the tests' other
+program and not the reader: it would read those two, but also what there is of a file that is cut off, without
+a word, and it trusts the sizes that a damaged file states.
 """
 
 from __future__ import annotations

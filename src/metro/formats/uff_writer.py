@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -14,8 +13,8 @@ _MARK = b"    -1\n"
 _FORCE, _FREQUENCY = 13, 18
 
 
-def write_functions(path: Path, functions: Sequence[Function], *, binary: bool = True) -> None:
-    """Write functions of frequency in SI.
+def universal_file(functions: Sequence[Function], *, binary: bool = True) -> bytes:
+    """Return a universal file of functions of frequency in SI.
 
     Evenly spaced lines are written as first line and step, which hold six digits: exact again for the reader
     of this package, since the step of a measurement is a simple fraction. Other lines are written out: in
@@ -24,7 +23,7 @@ def write_functions(path: Path, functions: Sequence[Function], *, binary: bool =
     units = b"   164\n         1SI                          2\n" + _doubles(1.0, 1.0, 1.0) + _doubles(0.0)
     blocks = [_MARK + units + _MARK]
     blocks += [_MARK + _dataset(each, binary) + b"\n" + _MARK for each in functions]
-    path.write_bytes(b"".join(blocks))
+    return b"".join(blocks)
 
 
 def _doubles(*values: float) -> bytes:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from metro.batch.processed import read_batch, read_table
+from metro.batch.writing import write_atomically
 from metro.formats import FormatError
 from metro.formats.uff import FRF, Function
-from metro.formats.uff_writer import write_functions
+from metro.formats.uff_writer import universal_file
 from metro.observables.modal_test import receptances
 
 
@@ -35,7 +36,8 @@ def frf_export(processed: Path, out: Path, position: str) -> list[str]:
             processed, f"found FRFs at position {', '.join(there)}, expected one of them: --position"
         )
     chosen = [item for item in found if item.position == (position or there[0])]
-    write_functions(
-        out, [Function(FRF, one.reference, one.response, "m", one.frequency, one.frf) for one in chosen]
+    content = universal_file(
+        [Function(FRF, one.reference, one.response, "m", one.frequency, one.frf) for one in chosen]
     )
+    write_atomically(out, lambda stream: stream.write(content))
     return [*notes, f"{out}: {len(chosen)} FRFs of position {position or there[0]}, m/N"]
