@@ -23,6 +23,8 @@ _ORDERS = range(8, 49, 2)
 _MOST_MODES = 24
 _LARGEST_DAMPING = 0.35
 _CHANCE, _TRACE = 1e-3, 0.25
+# A fit has converged where a few steps more gain less than a tenth of what one parameter gains by chance.
+_FEW_STEPS, _ROUNDS, _SETTLED = 3, 20, 0.1
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,8 @@ def identify_modes(
     ------
     ValueError
         When there are fewer than 16 lines, or values that are not finite, or none of the FRFs has a driving
-        point's sign although one is declared (conjugated or negated data), or the window hides a mode.
+        point's sign although one is declared (conjugated or negated data), or the window hides a mode, or the
+        fit does not converge.
     """
     if len(frequency) < 16:
         raise ValueError(f"{len(frequency)} lines in the band: expected 16 or more")
@@ -88,7 +91,7 @@ def identify_modes(
     weight = np.sqrt(2.0 / (noise + (model_error * rms) ** 2))  # of the real and the imaginary part
     data = Data(2 * np.pi * frequency, frf, weight, inputs, scatter)
     found, diagram = _search(data.thinned(_SEARCH_LINES))
-    fit = refine(data, found.omega, found.zeta, real=found.real)
+    fit = _converged(data, refine(data, found.omega, found.zeta, real=found.real))
     change = np.linalg.norm(fit.evaluate(data.omega) - frf, axis=0) / np.linalg.norm(frf, axis=0)
     inside = (fit.omega > data.omega[0]) & (fit.omega < data.omega[-1]) & (fit.zeta < _LARGEST_DAMPING)
     free = residues(data.omega, frf, np.sqrt(np.mean(data.weight**2, axis=1)), fit.poles)
@@ -123,6 +126,26 @@ def _search(data: Data) -> tuple[PoleFit, Diagram]:
 def _fit(data: Data, poles: ComplexArray, *, real: bool) -> PoleFit:
     omega = np.abs(poles)
     return refine(data, omega, np.clip(-poles.real / omega, 1e-3, _LARGEST_DAMPING), real=real)
+
+
+def _converged(data: Data, fit: PoleFit) -> PoleFit:
+    """Refine a fit until a few steps more gain nothing that counts.
+
+    Raises
+    ------
+    ValueError
+        When they still do after many rounds.
+    """
+    gain = np.inf
+    for _ in range(_ROUNDS):
+        further = refine(data, fit.omega, fit.zeta, real=fit.real, iterations=_FEW_STEPS)
+        gain, fit = (fit.chi2 - further.chi2) / max(further.chi2_per_datum, 1.0), further
+        if gain < _SETTLED:
+            return fit
+    raise ValueError(
+        f"modes: the fit does not converge, its last {_FEW_STEPS} steps still lower chi² by {gain:.2g}: "
+        "modes too close for these lines? Record longer, or choose a narrower band"
+    )
 
 
 def _pruned(data: Data, fit: PoleFit) -> PoleFit:

@@ -6,9 +6,9 @@ solved has only base and effect parameters, however many runs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -21,9 +21,11 @@ from metro.units import Array
 ITERATIONS = 40
 ENOUGH = 0.01  # gain in twice the log-likelihood below which a descent ends
 SHARES = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step, tried in turn until the cost falls
+DAMPINGS = (0.1, 10.0, 1e3, 1e5)  # of the normal matrix's diagonal, where no share of the step makes it fall
 THETA_STEP = 1e-3  # in units of the parameter's scale
 NUISANCE_STEP = 1e-4
-UNSEEN = 1e-9  # smallest eigenvalue of the scaled normal matrix that still tells something
+UNSEEN = 1e-12  # smallest eigenvalue of the scaled normal matrix that is more than its rounding
+TRACE = 1e-9  # square of a parameter's part in a direction that is no more than rounding
 
 Rows = tuple[Array, Array, Array, Array]
 
@@ -191,6 +193,8 @@ def descend(
 ) -> tuple[State, float]:
     """Follow Gauss–Newton steps, shortened until the cost falls, to where they gain next to nothing.
 
+    Where no share of a step lowers the cost although there is something to gain, Levenberg's steps are tried.
+
     Parameters
     ----------
     own : move the blocks' own unknowns alone; base and effect parameters stay.
@@ -204,23 +208,54 @@ def descend(
     free: Literal["all", "own"] = "own" if own else "all"
     system = linearised(candidate, blocks, noise, state, derivatives=free, known=known)
     for step in range(steps):
-        common = np.zeros(len(state.beta) + len(state.theta)) if own else _common_step(system)
-        if not np.isfinite(common).all():  # the model overflows here: there is no way down to be seen
-            break
-        alone = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
-        for share in SHARES:
-            trial = _moved(candidate, state, share * common, {run: share * alone[run] for run in alone})
+        for way in _ways_down(blocks, system, own=own, enough=enough):
+            trial = _moved(candidate, state, way.common, way.alone)
             reached = linearised(candidate, blocks, noise, trial, derivatives="none", known=known)
             if reached.cost < system.cost:
                 break
         else:
             break
         gain, system, state = system.cost - reached.cost, reached, trial
-        if gain < share * enough:
+        if gain < way.share * enough:
             break
         if step + 1 < steps:
             system = linearised(candidate, blocks, noise, state, derivatives=free, known=known)
     return state, system.cost
+
+
+class _Way(NamedTuple):
+    """A step to try: how much of a whole one it is, its part of base and effects, and that of each run."""
+
+    share: float
+    common: Array
+    alone: dict[str, Array]
+
+
+def _ways_down(blocks: Sequence[Block], system: System, *, own: bool, enough: float) -> Iterator[_Way]:
+    """Yield steps to try in turn; none where the model overflows.
+
+    First Gauss–Newton's, shortened; then, where that promises to gain ``enough``, Levenberg's, ever more
+    damped, which turn to the steepest way down.
+    """
+    still = np.zeros_like(system.pull)
+    normal, right = (np.diag(still), still) if own else normal_equations(system)
+    if not np.isfinite(normal).all():
+        return
+    whole = still if own else solution(normal, right)
+    alone = [own_step(row, whole) for row in system.rows]
+    for share in SHARES:
+        yield _Way(share, share * whole, _by_run(blocks, alone, share))
+    if own or whole @ right < enough:
+        return
+    for damping in DAMPINGS:
+        share = 1.0 / (1.0 + damping)
+        common = solution(normal + damping * np.diag(np.diag(normal)), right)
+        yield _Way(share, common, _by_run(blocks, [own_step(row, common) for row in system.rows], share))
+
+
+def _by_run(blocks: Sequence[Block], steps: Sequence[Array], share: float) -> dict[str, Array]:
+    """Give each run its share of its own step."""
+    return {block.run: share * step for block, step in zip(blocks, steps, strict=True)}
 
 
 def polish(
@@ -241,15 +276,9 @@ def polish(
             break
         nearest, best = left, state
         common = solution(normal, right)
-        alone = {block.run: own_step(row, common) for block, row in zip(blocks, system.rows, strict=True)}
-        state = _moved(candidate, state, common, alone)
+        alone = [own_step(row, common) for row in system.rows]
+        state = _moved(candidate, state, common, _by_run(blocks, alone, 1.0))
     return best
-
-
-def _common_step(system: System) -> Array:
-    """Step of base and effect parameters; not finite where the model is not."""
-    normal, right = normal_equations(system)
-    return solution(normal, right) if np.isfinite(normal).all() else np.full(len(right), np.nan)
 
 
 def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, Array]) -> State:
@@ -292,7 +321,7 @@ def inverse(normal: Array) -> Array:
     seen = size > UNSEEN * size.max(initial=0.0)
     known = direction[:, seen] * scale[:, None]
     covariance = (known / size[seen]) @ known.T
-    unknown = (direction[:, ~seen] ** 2).sum(axis=1) > UNSEEN
+    unknown = (direction[:, ~seen] ** 2).sum(axis=1) > TRACE
     covariance[unknown, unknown] = np.inf
     return np.asarray(covariance)
 
