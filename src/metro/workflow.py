@@ -6,15 +6,16 @@ It is read at every call of snakemake, so nothing heavy is imported here.
 from __future__ import annotations
 
 import json
+import math
 import re
 import shlex
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import reduce
 from operator import getitem
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from metro.batch.config import load_config
 from metro.batch.discover import FoundBatch, discover
@@ -38,6 +39,29 @@ SHARED: dict[str, dict[str, tuple[str, ...]]] = {
     "ingest": {"holdout": ("holdout",)},
     "identify": {"model_form_budget": ("loop", "model_form_budget")},
     "predict": {"model_form_budget": ("loop", "model_form_budget")},
+}
+
+
+class Need(NamedTuple):
+    """What a stage's job asks of a scheduler: a base, and more for each megabyte of the batch's raw files.
+
+    For the summary of all batches: more for each batch. Memory of ingest and identify is twice what
+    docs/performance.md has for a record; the others are guesses on the safe side.
+    """
+
+    memory_mb: float
+    memory_mb_each: float
+    minutes: float
+    minutes_each: float
+
+
+NEEDS = {
+    "ingest": Need(800, 10, 10, 0.1),
+    "identify": Need(1500, 50, 60, 1.0),
+    "predict": Need(1000, 0, 20, 0.1),
+    "loop": Need(1500, 0, 120, 1.0),
+    "report": Need(1000, 2, 20, 0.1),
+    "campaign": Need(1000, 1, 20, 0.02),
 }
 
 
@@ -108,6 +132,27 @@ class Plan:
         """Return the settings that a stage uses, as JSON, so that changing any of them re-runs it."""
         shared = {name: reduce(getitem, path, self.config) for name, path in SHARED.get(stage, {}).items()}
         return json.dumps({**self.config.get(stage, {}), **shared}, sort_keys=True)
+
+    def memory(self, stage: str) -> Callable[[Wildcards, int], int]:
+        """Return the function that gives the memory, MB, for the first and each further attempt of a job."""
+        need = NEEDS[stage]
+        return lambda wildcards, attempt: math.ceil(
+            attempt * (need.memory_mb + need.memory_mb_each * self._amount(wildcards))
+        )
+
+    def minutes(self, stage: str) -> Callable[[Wildcards, int], int]:
+        """Return the function that gives the longest time, min, of the first and each further attempt."""
+        need = NEEDS[stage]
+        return lambda wildcards, attempt: math.ceil(
+            attempt * (need.minutes + need.minutes_each * self._amount(wildcards))
+        )
+
+    def _amount(self, wildcards: Wildcards) -> float:
+        """Megabytes of the raw files of a job's batch; of the job that has none, the number of batches."""
+        name = getattr(wildcards, "batch", None)
+        if name is None:
+            return float(len(self.found))
+        return sum(path.stat().st_size for path in self.found[name].inputs) / 1e6
 
     def unfinished(self) -> dict[str, str]:
         """Return the batches that lack a result, each with the log of the stage that it stopped at."""

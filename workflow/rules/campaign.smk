@@ -1,11 +1,13 @@
 rule campaign:
     input:
-        expand("reports/{batch}/identified.json", batch=plan.batches),
-        expand("reports/{batch}/verdict.json", batch=plan.batches),
-        expand("data/processed/{batch}/batch.json", batch=plan.batches),
-        expand("data/processed/{batch}/runs.parquet", batch=plan.batches),
-        expand("data/processed/{batch}/{table}.parquet", batch=plan.batches, table=PAGE),
-        expand("data/processed/{batch}/loop.json", batch=plan.batches),
+        identified=expand("reports/{batch}/identified.json", batch=plan.batches),
+        verdicts=expand("reports/{batch}/verdict.json", batch=plan.batches),
+        manifests=expand("data/processed/{batch}/batch.json", batch=plan.batches),
+        runs=expand("data/processed/{batch}/runs.parquet", batch=plan.batches),
+        tables=expand(
+            "data/processed/{batch}/{table}.parquet", batch=plan.batches, table=PAGE
+        ),
+        loops=expand("data/processed/{batch}/loop.json", batch=plan.batches),
     output:
         "reports/summary.parquet",
         "reports/memory.json",
@@ -18,9 +20,12 @@ rule campaign:
         "../envs/metro.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=plan.memory("campaign"),
+        runtime=plan.minutes("campaign"),
     params:
-        batches=expand("reports/{batch}", batch=plan.batches),
+        batches=lambda wildcards, input: [
+            str(Path(file).parent) for file in input.identified
+        ],
         processed=subpath(input[-1], ancestor=2),
         out=subpath(output[0], parent=True),
         settings=plan.settings("campaign"),

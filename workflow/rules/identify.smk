@@ -10,7 +10,8 @@ rule identify:
         "../envs/metro.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=plan.memory("identify"),
+        runtime=plan.minutes("identify"),
     params:
         processed=subpath(input[0], parent=True),
         settings=plan.settings("identify"),

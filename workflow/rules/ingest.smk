@@ -1,6 +1,6 @@
 rule ingest:
     input:
-        plan.raw_files,
+        local(plan.raw_files),
     output:
         expand(
             "data/processed/{{batch}}/{table}.parquet",
@@ -27,7 +27,8 @@ rule ingest:
         "../envs/metro.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=plan.memory("ingest"),
+        runtime=plan.minutes("ingest"),
     params:
         folder=plan.folder,
         cells=plan.cells,

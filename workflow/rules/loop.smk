@@ -15,7 +15,8 @@ rule loop:
         "../envs/metro.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=plan.memory("loop"),
+        runtime=plan.minutes("loop"),
     params:
         processed=subpath(input[0], parent=True),
         reports=subpath(output[-1], parent=True),

@@ -10,7 +10,8 @@ rule predict:
         "../envs/metro.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=plan.memory("predict"),
+        runtime=plan.minutes("predict"),
     params:
         processed=subpath(input[0], parent=True),
         settings=plan.settings("predict"),

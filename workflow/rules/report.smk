@@ -13,7 +13,8 @@ rule report:
         "../envs/metro.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=plan.memory("report"),
+        runtime=plan.minutes("report"),
     params:
         processed=subpath(input[0], parent=True),
         reports=subpath(output[0], parent=True),

@@ -193,8 +193,8 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
         pieces = _segments(
             time[start:end], per_s, max(REVOLUTIONS_PER_SEGMENT, (2 * highest + 20) / len(time) * revolutions)
         )
-        matrix = order_matrix(angle[start:end], highest)
-        values = np.stack([_fit(matrix[p], signal[start:end][p]) for p in pieces])
+        within, record = angle[start:end], signal[start:end]
+        values = np.stack([_fit(order_matrix(within[p], highest), record[p]) for p in pieces])
         means.append(values.mean(axis=0))
         counts.append(len(pieces))
         middles.append(float(time[start:end].mean()))
