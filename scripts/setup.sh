@@ -14,7 +14,7 @@ fail() { say "$*"; exit 1; }
 python=${PYTHON:-$(command -v python3.11 || command -v python3 || true)}
 [ -n "$python" ] || fail "Python 3.11 or newer is needed and not found (Debian: apt-get install python3 python3-venv)"
 interpreter=$("$python" -c 'import sys; print(sys.version, sys.base_prefix); sys.exit(sys.version_info < (3, 11))') ||
-    fail "Python 3.11 or newer is needed; $python is $interpreter. Name another one with PYTHON=…"
+    fail "Python 3.11 or newer is needed; $python is ${interpreter:-not Python}. Name another one with PYTHON=…"
 
 # --- System libraries -----------------------------------------------------------------------------------------------
 missing=()

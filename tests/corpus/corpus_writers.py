@@ -102,11 +102,11 @@ def npz(path, table):
 
 def uff(path, table, *, binary=True):
     from metro.formats.uff import FRF, Function
-    from metro.formats.uff_writer import write_functions
+    from metro.formats.uff_writer import universal_file
 
     values = (table["real"] + 1j * table["imag"]).to_numpy()
     one = Function(FRF, "1x", "1x", "m", table["frequency_hz"].to_numpy(), values)
-    write_functions(path, [one], binary=binary)
+    path.write_bytes(universal_file([one], binary=binary))
 
 
 def uff_text(path, table):

@@ -8,7 +8,7 @@ import yaml
 from metro.batch.processed import read_table
 from metro.dynamics.hits import Hit, gate
 from metro.formats.uff import FRF, Function
-from metro.formats.uff_writer import write_functions
+from metro.formats.uff_writer import universal_file
 from metro.observables.modal_test import clear_of_drift, clear_of_noise, observe_modes
 from metro.observables.receptance import arranged, from_files
 from metro.stages.ingest import ingest
@@ -202,7 +202,7 @@ def test_a_universal_file_of_many_pairs_goes_from_the_batch_to_the_modes(tmp_pat
         )
         for point in range(3)
     ]
-    write_functions(folder / "test.uff", functions)
+    (folder / "test.uff").write_bytes(universal_file(functions))
     manifest = {"format": 1, "batch": "modal", "source": "measured", "cell": "none"}
     (folder / "batch.yaml").write_text(yaml.safe_dump(manifest))
     (folder / "impacts.csv").write_text(
@@ -223,7 +223,7 @@ def test_a_row_that_names_a_pair_takes_that_pair_out_of_the_file(tmp_path):
     functions = [
         Function(FRF, "1x", f"{point + 1}x", "m", FREQUENCY, receptance(point)) for point in range(3)
     ]
-    write_functions(folder / "test.uff", functions, binary=False)
+    (folder / "test.uff").write_bytes(universal_file(functions, binary=False))
     manifest = {"format": 1, "batch": "modal", "source": "measured", "cell": "none"}
     (folder / "batch.yaml").write_text(yaml.safe_dump(manifest))
     (folder / "impacts.csv").write_text(

@@ -1,8 +1,10 @@
 """The campaign's summary."""
 
+import io
 import json
 
 import pandas as pd
+import pikepdf
 import pypdfium2
 import pytest
 import synthetic_results as synthetic
@@ -10,6 +12,7 @@ import synthetic_results as synthetic
 from metro.batch.batch import Batch
 from metro.batch.processed import write_batch
 from metro.report.campaign import campaign_report, campaign_table
+from metro.report.sections.standings import largest_rests, rankings
 from metro.stages.campaign import campaign, first_start
 
 EMPTY = {"format": 1, "batch": "modes-only", "metro": "0", "observables": {}}
@@ -73,6 +76,47 @@ def test_the_stage_writes_its_files_and_the_pdf_names_what_could_not_be_told(tmp
 def test_the_summary_is_the_same_whatever_the_order_of_the_batches(verdicts):
     backwards = dict(reversed(list(verdicts.items())))
     assert campaign_report(verdicts, {}) == campaign_report(backwards, {})
+
+
+RANKED = [
+    {"configuration": f"wrist {name}", "xm": synthetic.q(xm, 0.1 * xm, "um"), "probability_best": p}
+    for name, xm, p in (
+        ("A", 60.0, 0.9),
+        ("B", 75.0, 0.1),
+        ("C", 80.0, 0.0),
+        ("D", 90.0, 0.0),
+        ("E", 200.0, 0.0),
+    )
+]
+
+
+def test_the_flattest_configurations_and_the_least_flat_are_ranked():
+    (section,) = rankings({"faces": {"study": {"ranking": RANKED}}, "force-only": {}})
+    rows = section.items[0].rows
+    assert [row[1:3] for row in rows] == [
+        ["1 of 5", "wrist A"], ["2 of 5", "wrist B"], ["3 of 5", "wrist C"], ["5 of 5", "wrist E"],
+    ]  # fmt: skip
+    assert rows[0][3:] == ["60.0 ± 6.0 µm", "0.900"]
+    assert rankings({"force-only": {}}) == []
+
+
+def test_the_largest_rests_come_first_in_units_of_the_noise():
+    small, large = synthetic.observable(after=2.0), synthetic.observable(after=8.0, noise_floor=2.0)
+    (section,) = largest_rests([("b1", "force", small), ("b2", "force", large), ("b3", "lobes", {})])
+    told, table = section.items
+    assert "2 of 2" in told.text
+    assert [(row[0], row[2], row[4]) for row in table.rows] == [
+        ("b2", "8.00 N", "4.0"),
+        ("b1", "2.00 N", "1.1"),
+    ]
+    assert largest_rests([("b3", "lobes", {})]) == []
+
+
+def test_the_name_of_a_batch_leads_to_its_report(verdicts):
+    pdf = campaign_report(verdicts, {}, links={"synthetic": "synthetic/report.pdf"})
+    with pikepdf.open(io.BytesIO(pdf)) as document:
+        notes = [note for page in document.pages for note in page.get("/Annots", [])]
+        assert {str(note.A.URI) for note in notes} == {"synthetic/report.pdf"}
 
 
 def test_a_batch_starts_with_the_first_of_its_runs_that_tells_when():

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from metro.observables import modal_test
 from metro.report.numbers import listing, number, percent, probability, quantity, with_interval
 from metro.report.sections.verdict import parameter_name
 
@@ -72,3 +73,11 @@ def test_shares_probabilities_and_lists_read_as_one_says_them():
         "a and b",
         "a, b and c",
     ]
+
+
+@pytest.mark.parametrize(
+    ("value", "sd"), [(379.4, 90.0), (31.4738, 0.21), (5.5123, 0.6), (0.0123, 0.00043), (60.0, 5.08)]
+)
+def test_notes_of_the_modal_test_write_an_interval_as_the_report_does(value, sd):
+    half = 1.96 * sd
+    assert modal_test._with_interval(value, sd) == with_interval(value, [value - half, value + half])

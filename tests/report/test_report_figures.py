@@ -35,6 +35,36 @@ def test_overlay_of_force_has_a_panel_per_run_and_axis_and_one_revolution_in_eac
     assert all(lines(axes)["measured"].size == 120 for axes in figure.axes)
 
 
+def test_a_line_is_broken_where_nothing_was_measured():
+    frame = rows("deformation")
+    gap = frame[(frame["s_mm"] < 20) | (frame["s_mm"] > 30)]
+    axes = comparison.overlay(gap, "deformation").axes[0]
+    for name, column in (("measured", "measured"), ("base model", "before")):
+        drawn = lines(axes)[name]
+        assert np.flatnonzero(np.isnan(drawn)).tolist() == [20]
+        assert np.allclose(np.delete(drawn, 20), gap[column])
+
+
+def test_what_is_left_is_drawn_as_a_share_of_the_signal_and_full_where_it_counts():
+    left = [
+        {"axis": "z", "label": "all", "amplitude": 0.43, "relative": 0.0, "significant": False},
+        {"axis": "z", "label": "pass 2", "amplitude": 0.01, "relative": 0.05, "significant": True},
+    ]
+    axes = verdicts.signature(left).axes[0]
+    bars = [(bar.get_width(), bar.get_facecolor()[:3] == (1, 1, 1)) for bar in axes.patches[1:]]
+    assert bars == [(0.0, True), (5.0, False)]
+    assert [t.get_text() for t in axes.get_yticklabels()] == ["throughout", "pass 2"]
+    assert axes.get_xlim()[1] > 5.0
+
+
+def test_residual_and_parity_of_one_axis_stand_in_one_figure():
+    frame = rows("deformation")
+    left, middle, right = comparison.judged(frame, "deformation").axes
+    assert np.allclose(lines(left)["base model"], frame["measured"] - frame["before"])
+    assert np.allclose(sorted(middle.collections[0].get_offsets()[:, 1]), sorted(frame["before"]))
+    assert right.get_xlabel() == "measured − predicted (mm)"
+
+
 def test_rows_without_coordinates_are_drawn_by_their_place_in_the_table():
     frame = rows("deformation").assign(s_mm=np.nan)
     assert comparison.coordinate(frame) == ""

@@ -88,17 +88,35 @@ def test_a_batch_without_an_arm_has_no_such_section():
 
 def test_the_steady_means_stand_beside_the_dynamometers_with_their_error():
     items = content(robot_means=means(), robot_force=force(), robot_joints=joints())
-    table = table_with(items, "against the dynamometer")
-    assert table.rows[1] == ["r1", "y", "−160", "−170.0 ± 3.9", "−10", "6.2"]
+    table = table_with(items, "beside the dynamometer")
+    assert table.rows[0][:1] + table.rows[0][4:7] == ["r1", "−160", "−170.0 ± 3.9", "6.2"]
     assert "Mean of the absolute errors: 4.3 N" in table.caption
-    alone = table_with(items, "without a dynamometer")
-    assert alone.rows == [["r2 *", "50.0 ± 3.9", "−170.0 ± 3.9", "−30.0 ± 3.9"]]
+    assert table.rows[1] == [
+        "r2 *",
+        "–",
+        "50.0 ± 3.9",
+        "–",
+        "–",
+        "−170.0 ± 3.9",
+        "–",
+        "–",
+        "−30.0 ± 3.9",
+        "–",
+    ]
+    assert "Too few joints" in table.caption
+
+
+def test_without_a_dynamometer_there_is_a_column_per_axis():
+    table = table_with(content(robot_means=means().query("run == 'r2'")), "Mean force of the steady cut")
+    assert table.rows == [["r2 *", "50.0 ± 3.9", "−170.0 ± 3.9", "−30.0 ± 3.9"]]
+    assert list(table.header) == ["run", "x (N)", "y (N)", "z (N)"]
 
 
 def test_unused_joints_coloured_innovations_and_remarks_are_told():
     items = content(robot_means=means(), robot_joints=joints())
     table = table_with(items, "Observability")
-    assert table.rows == [["r1", "9.0 †", "0.10 –", "4.0", "0.30 –", "5.0", "2.1"]]
+    assert table.rows[0] == ["r1", "9.0 †", "0.10 –", "4.0", "0.30 –", "5.0", "2.1"]
+    assert [row[1] for row in table.rows[1:]] == ["1.5", "0.40"]
     assert "1 of 6" in table.caption
     said = [text for item in items if isinstance(item, Bullets) for text in item.items]
     assert said == ["r1: the idle run was +10.0 % faster than the cut."]

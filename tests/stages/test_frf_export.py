@@ -10,7 +10,7 @@ from metro.batch.processed import read_table
 from metro.dynamics.frf import estimate_frf
 from metro.dynamics.hits import Hit
 from metro.formats.uff import FRF, Function, read_functions
-from metro.formats.uff_writer import write_functions
+from metro.formats.uff_writer import universal_file
 from metro.stages.ingest import ingest
 
 FREQUENCY = np.arange(1, 802) * 0.125
@@ -47,8 +47,8 @@ def files(tmp_path):
         to_acceleration = -((2 * np.pi * FREQUENCY) ** 2)
         values = [to_acceleration * receptance(FREQUENCY, share) for share in (1.0, 0.5, -0.2)]
         given = [Function(FRF, "1x", f"{i + 1}x", "m/s2", FREQUENCY, v) for i, v in enumerate(values)]
-        write_functions(folder / "a.uff", given)
-        write_functions(folder / "b.uff", given[:1])
+        (folder / "a.uff").write_bytes(universal_file(given))
+        (folder / "b.uff").write_bytes(universal_file(given[:1]))
 
     return processed(tmp_path, "t,1,,,,,a.uff,\nt,2,,,,,b.uff,\n", write)
 
@@ -114,3 +114,11 @@ def test_a_batch_without_impacts_says_so(tmp_path):
     result = export(tmp_path / "processed", tmp_path / "out.uff")
     assert result.exit_code == 1
     assert "found no FRF and no usable hammer record" in result.stderr
+
+
+def test_a_file_that_cannot_be_written_is_told_and_nothing_is_left(files, tmp_path):
+    (tmp_path / "out.uff").mkdir()
+    result = export(files, tmp_path / "out.uff", "--position", "1")
+    assert result.exit_code == 1
+    assert "something else has its name" in result.output.replace("\n", " ")
+    assert list(tmp_path.glob(".out.uff.*")) == []

@@ -14,13 +14,13 @@ from metro.report.content import Paragraph
 from metro.report.numbers import number, percent, probability, unit, words
 from metro.report.phrases import plain
 from metro.report.results import Results, title
+from metro.report.sections.measured import measured_words
 from metro.report.sections.verdict import (
     STATUS,
     advice,
     change,
     error_text,
     left_words,
-    measured_words,
     print_check,
     sentence,
 )

@@ -196,11 +196,19 @@ def _doubts(model: ModalModel) -> Iterator[str]:
 
 
 def _in_words(mode: Mode) -> str:
-    known = [f"{mode.frequency:.5g} ± {mode.frequency_sd:.1g} Hz"]
-    known.append(f"damping {100 * mode.damping:.3g} ± {100 * mode.damping_sd:.1g} %")
+    known = [f"{_with_interval(mode.frequency, mode.frequency_sd)} Hz"]
+    known.append(f"damping {_with_interval(100 * mode.damping, 100 * mode.damping_sd)} %")
     if math.isfinite(mode.stiffness):
-        known.append(f"stiffness {mode.stiffness / N_UM:.3g} ± {mode.stiffness_sd / N_UM:.1g} N/µm")
+        stiffness = _with_interval(mode.stiffness / N_UM, mode.stiffness_sd / N_UM)
+        known.append(f"stiffness {stiffness} N/µm")
     return ", ".join(known)
+
+
+def _with_interval(value: float, sd: float) -> str:
+    """Write a value and half its 95 % interval, both to two digits of the latter, as the report does."""
+    half = 1.96 * sd
+    place = 1 - math.floor(math.log10(float(f"{half:.1e}"))) if 0 < half < math.inf else 3
+    return " ± ".join(f"{round(number, place):.{max(0, place)}f}" for number in (value, half))
 
 
 def _diagram_rows(position: str, direction: str, model: ModalModel) -> pd.DataFrame:

@@ -15,6 +15,7 @@ from metro.report.numbers import listing, number, unit, words
 from metro.report.phrases import plain
 from metro.report.results import OBSERVABLES, title
 from metro.report.sections.memory import memory_section
+from metro.report.sections.standings import largest_rests, rankings
 from metro.report.sections.verdict import STATUS, change, effect_words, error_text, known_interval
 from metro.units import JSON
 
@@ -61,13 +62,15 @@ def campaign_report(
     identified: Mapping[str, JSON],
     memory: JSON | None = None,
     failed: Mapping[str, str] | None = None,
+    links: Mapping[str, str] | None = None,
 ) -> bytes:
     """Return the campaign's summary as a PDF; the same bytes for the same results.
 
-    ``memory``: content of ``memory.json``; ``failed``: batches without a result, and why.
+    ``memory``: content of ``memory.json``; ``failed``: batches without a result, and why; ``links``: where
+    the report of each batch is, as seen from the summary.
     """
     cover = Cover(TITLE, f"{len(verdicts)} batches", f"metro {__version__}")
-    return compile_pdf(cover, campaign_sections(verdicts, identified, memory, failed))
+    return compile_pdf(cover, campaign_sections(verdicts, identified, memory, failed), links or {})
 
 
 def campaign_sections(
@@ -87,6 +90,8 @@ def campaign_sections(
             "Verdicts", [Paragraph(_overview(verdicts), "verdict"), *_verdicts(entries), *_pictures(entries)]
         ),
         *([Section("What to measure next", [Bullets(nexts)])] if nexts else []),
+        *largest_rests(entries),
+        *rankings(identified),
         *memory_section(memory or {}),
         Section("What could not be told", _untold(entries, identified)),
     ]

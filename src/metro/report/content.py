@@ -20,9 +20,10 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Bullets:
-    """A list of sentences."""
+    """A list of sentences; ``small``: in the type of a note."""
 
     items: Sequence[str]
+    small: bool = False
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,20 @@ class Heading:
     text: str
 
 
-Item = Paragraph | Bullets | Table | Picture | Facts | Heading
+@dataclass(frozen=True)
+class Abreast:
+    """One or two items, each half as wide as the page: narrow tables, figures drawn for half the width."""
+
+    items: Sequence[Table | Picture]
+
+
+Simple = Paragraph | Bullets | Table | Picture | Facts | Heading
+Item = Simple | Abreast
+
+
+def abreast(items: Sequence[Table | Picture]) -> list[Item]:
+    """Put items in pairs side by side."""
+    return [Abreast(items[i : i + 2]) for i in range(0, len(items), 2)]
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 
 from metro.batch.writing import writing
-from metro.report.content import Item, Picture, Section
+from metro.report.content import Abreast, Item, Picture, Section
 from metro.report.style import to_svg
 from metro.units import JSON
 
 TEMPLATE = "report.typ"
+NO_LINKS: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -26,8 +28,8 @@ class Cover:
     footer: str
 
 
-def compile_pdf(cover: Cover, sections: Sequence[Section]) -> bytes:
-    """Set the sections in the report's template.
+def compile_pdf(cover: Cover, sections: Sequence[Section], links: Mapping[str, str] = NO_LINKS) -> bytes:
+    """Set the sections in the report's template; ``links``: where a name in a column ``batch`` leads to.
 
     The bytes depend on nothing but the arguments and the installed versions: fonts are those of the Typst
     package, and the time stamp is fixed.
@@ -40,6 +42,7 @@ def compile_pdf(cover: Cover, sections: Sequence[Section]) -> bytes:
         template.write_bytes((files("metro.report") / "templates" / TEMPLATE).read_bytes())
         content = {
             "cover": asdict(cover),
+            "links": dict(links),
             "sections": [_section(s, i, folder) for i, s in enumerate(sections)],
         }
         (folder / "content.json").write_text(json.dumps(content), encoding="utf-8")
@@ -60,6 +63,9 @@ def _section(section: Section, place: int, folder: Path) -> JSON:
 
 def _item(item: Item, name: str, folder: Path) -> JSON:
     kind = type(item).__name__.lower()
+    if isinstance(item, Abreast):
+        parts = [_item(part, f"{k}-{name}", folder) for k, part in enumerate(item.items)]
+        return {"kind": kind, "items": parts}
     if isinstance(item, Picture):
         (folder / name).write_bytes(to_svg(item.figure))
         return {"kind": kind, "file": name, "caption": item.caption, "alt": item.alt}

@@ -18,7 +18,7 @@ MEASURED, BEFORE, AFTER = "#000000", "#D55E00", "#0072B2"
 GREY, GREEN, PURPLE, SKY, YELLOW = "#8C8C8C", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"
 SERIES = (AFTER, BEFORE, GREEN, PURPLE, YELLOW, SKY, MEASURED)
 DIVERGING, SEQUENTIAL = "RdBu_r", "cividis"
-WIDTH = 6.7
+WIDTH, HALF = 6.7, 3.25  # of the text, and of one of two figures abreast, inches
 
 RC = {
     "font.family": "STIXGeneral",
@@ -58,12 +58,18 @@ def style() -> Iterator[None]:
 
 
 def new_figure(
-    height: float, rows: int = 1, columns: int = 1, sharex: Share = False, sharey: Share = False
+    height: float,
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    sharex: Share = False,
+    sharey: Share = False,
+    width: float = WIDTH,
 ) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure as wide as the text, ``height`` inches high, and its axes as a list of rows."""
+    """Return a figure as wide as the text, or ``width`` inches, ``height`` high; its axes as rows."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
     return figure, [list(row) for row in axes]
 

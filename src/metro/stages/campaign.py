@@ -42,7 +42,8 @@ def campaign(
     memory = remember([_record(processed / name, verdicts[name], identified[name]) for name in verdicts])
     failed = {batch: _told(Path(log)) for batch, log in (unfinished or {}).items()}
     provenance = {"code": code, "settings": json.dumps(settings), "batches": json.dumps(sorted(verdicts))}
-    pdf = campaign_report(verdicts, identified, memory, failed)
+    links = {f.name: quote(os.path.relpath(f / "report.pdf", out)) for f in reports}
+    pdf = campaign_report(verdicts, identified, memory, failed, links)
     write_table(out / "summary.parquet", campaign_table(verdicts, failed), provenance)
     write_json(out / "memory.json", memory)
     write_atomically(out / "summary.pdf", lambda stream: stream.write(pdf))
@@ -52,7 +53,7 @@ def campaign(
             _results(processed / f.name, verdicts[f.name], identified[f.name])
             for f in sorted(reports, key=_name)
         ),
-        {f.name: quote(os.path.relpath(f / "report.pdf", out)) for f in reports},
+        links,
     ).encode(errors="replace")
     write_atomically(out / "summary.html", lambda stream: stream.write(page))
 

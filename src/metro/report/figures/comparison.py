@@ -24,6 +24,7 @@ COORDINATES = {
     "t_s": "time (s)",
 }
 RUNS, BINS, POINTS = 4, 60, 1200
+GAP = 5  # steps without a value at which a line is broken
 RUNS_OF_AXES = 3
 
 
@@ -60,7 +61,7 @@ def overlay(frame: pd.DataFrame, title: str) -> Figure:
     column, drawn = coordinate(frame), predictions(frame)
     with style.style():
         figure, grid = style.new_figure(
-            0.75 + 1.15 * rows, rows, columns, sharey=False if len(axes_of(frame)) > 1 else "all"
+            0.7 + 0.9 * rows, rows, columns, sharey=False if len(axes_of(frame)) > 1 else "all"
         )
         flat = [axes for row in grid for axes in row]
         for axes, (run, axis) in zip(flat, panels, strict=False):
@@ -78,43 +79,72 @@ def overlay(frame: pd.DataFrame, title: str) -> Figure:
 
 def _draw(axes: Axes, part: pd.DataFrame, column: str, drawn: tuple[Prediction, ...]) -> None:
     part = part.sort_values(column, kind="stable") if column else part
-    x = _places(part, column)
-    measured, sigma = part["measured"].to_numpy(float), part["sigma"].to_numpy(float)
+    few, (x, measured, sigma, *predicted) = len(part) <= 60, _broken(part, column, drawn)
     if np.isfinite(sigma).any():
         band = (measured - 1.96 * sigma, measured + 1.96 * sigma)
         axes.fill_between(x, *band, color=style.GREY, alpha=0.35, lw=0, label="measured, 95 % band")
-    axes.plot(
-        x, measured, color=style.MEASURED, lw=0.9, marker="." if len(part) <= 60 else "", label="measured"
-    )
-    for kind in drawn:
-        axes.plot(x, part[kind.column], color=kind.colour, ls=kind.line, label=kind.label)
+    axes.plot(x, measured, color=style.MEASURED, lw=0.9, marker="." if few else "", label="measured")
+    for kind, values in zip(drawn, predicted, strict=True):
+        axes.plot(x, values, color=kind.colour, ls=kind.line, label=kind.label)
+
+
+def _broken(part: pd.DataFrame, column: str, drawn: tuple[Prediction, ...]) -> list[Array]:
+    """Return places, measured values, sigma and predictions, with NaN where nothing was measured between."""
+    x = _places(part, column)
+    step = np.diff(x)
+    at = 1 + np.flatnonzero(step > GAP * np.median(step) if len(step) else step)
+    names = ["measured", "sigma", *(kind.column for kind in drawn)]
+    return [np.insert(values, at, np.nan) for values in (x, *(part[n].to_numpy(float) for n in names))]
 
 
 def residuals(frame: pd.DataFrame, title: str) -> Figure:
     """Draw the residuals over the coordinate: median and 10–90 % band of all held-out runs."""
-    column, axes_names = coordinate(frame), axes_of(frame)
+    axes_names = axes_of(frame)
     with style.style():
-        figure, (row,) = style.new_figure(1.95, 1, len(axes_names), sharey=True)
+        figure, (row,) = style.new_figure(1.55, 1, len(axes_names), sharey=True)
         for axes, axis in zip(row, axes_names, strict=True):
-            part = frame[axis_labels(frame) == axis]
-            x = _places(part, column)
-            for kind in predictions(frame):
-                at, low, middle, high = _bands(x, (part["measured"] - part[kind.column]).to_numpy(float))
-                axes.fill_between(at, low, high, color=kind.colour, alpha=0.22, lw=0)
-                axes.plot(at, middle, color=kind.colour, ls=kind.line, label=kind.label)
-            axes.axhline(0, color=style.MEASURED, lw=0.6)
+            _residual(axes, frame[axis_labels(frame) == axis], predictions(frame))
             axes.set_title(axis or title, loc="left")
-            _abscissa(axes, column)
         row[0].set_ylabel(_label("measured − predicted", frame))
         style.legend_above(figure, row[0])
     return figure
+
+
+def judged(frame: pd.DataFrame, title: str) -> Figure:
+    """Draw side by side what :func:`residuals` and :func:`parity` do, of an observable of one axis."""
+    drawn = predictions(frame)
+    with style.style():
+        figure, ((left, middle, right),) = style.new_figure(1.8, 1, 3)
+        _residual(left, frame, drawn)
+        left.set_title("Residual of all runs", loc="left")
+        left.set_ylabel(_label("measured − predicted", frame))
+        _equal(middle, frame, drawn)
+        middle.set_title("Parity", loc="left")
+        middle.set(xlabel=_label(f"{title}, measured", frame), ylabel=_label("predicted", frame))
+        _histogram(right, frame)
+        right.set_title("Residual, distribution", loc="left")
+        right.set(xlabel=_label("measured − predicted", frame), ylabel="share per bin")
+        _legend(figure, middle, right)
+    return figure
+
+
+def _residual(axes: Axes, part: pd.DataFrame, drawn: tuple[Prediction, ...]) -> None:
+    """Median and 10–90 % band of the residuals over the coordinate."""
+    column = coordinate(part)
+    x = _places(part, column)
+    for kind in drawn:
+        at, low, middle, high = _bands(x, (part["measured"] - part[kind.column]).to_numpy(float))
+        axes.fill_between(at, low, high, color=kind.colour, alpha=0.22, lw=0)
+        axes.plot(at, middle, color=kind.colour, ls=kind.line, label=kind.label)
+    axes.axhline(0, color=style.MEASURED, lw=0.6)
+    _abscissa(axes, column)
 
 
 def parity(frame: pd.DataFrame, title: str) -> Figure:
     """Draw predicted over measured, axis by axis, and the distribution of the residuals."""
     names, drawn = axes_of(frame), predictions(frame)
     with style.style():
-        figure, (row,) = style.new_figure(2.2, 1, len(names) + 1)
+        figure, (row,) = style.new_figure(1.75, 1, len(names) + 1)
         for axes, name in zip(row, names, strict=False):
             _equal(axes, frame[axis_labels(frame) == name], drawn)
             axes.set_title(f"Parity, {name}" if len(names) > 1 else "Parity", loc="left")

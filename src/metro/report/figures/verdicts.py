@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PATTERNS = 12
-LABEL_ROOM = 90  # characters that fit side by side under a figure
+PATTERNS, LONGEST = 8, 26  # most bars, and characters of what stands beside one
+SMALLEST = 0.1  # end of the axis where nothing is left, % of the signal
+ABREAST = 2.0  # height of the two figures that stand side by side, inches
+LABEL_ROOM = 36  # characters that fit side by side under a figure of half the width
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
     rows = sorted(rows, key=lambda b: b.get("order") or 0)
     x = np.arange(1, len(rows) + 1)
     with style.style():
-        figure, ((axes,),) = style.new_figure(2.5)
+        figure, ((axes,),) = style.new_figure(ABREAST, width=style.HALF)
         changed = any(b.get("rms_after") not in {None, b["rms_before"]} for b in rows)
         series = [
             ("rms_before", style.BEFORE, "D", "base model"),
@@ -105,53 +107,58 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
         rotation = 90 if sum(len(str(b["run"])) + 2 for b in rows[::step]) > LABEL_ROOM else 0
         axes.set_xticks(x[::step], [str(b["run"]) for b in rows][::step], rotation=rotation)
         handles, labels = axes.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=3)
+        figure.legend(handles, labels, loc="outside upper center", ncols=2)
     return figure
 
 
 def _largest(entries: Sequence[JSON]) -> list[str]:
     """Labels of the largest entries, in their natural order (order 2 before order 10)."""
-    size: dict[str, float] = {}
+    size: dict[str, tuple[float, float]] = {}
     for entry in entries:
-        label = str(entry["label"])
-        size[label] = max(size.get(label, 0.0), float(entry.get("amplitude") or 0.0))
-    chosen = sorted(size, key=lambda label: -size[label])[:PATTERNS]
+        label, own = str(entry["label"]), (_share(entry), float(entry.get("amplitude") or 0.0))
+        size[label] = max(size.get(label, own), own)
+    chosen = sorted(size, key=lambda label: size[label], reverse=True)[:PATTERNS]
     return sorted(
         chosen, key=lambda label: [int(x) if x.isdigit() else -1 for x in re.split(r"(\d+)", label)]
     )
 
 
-def signature(entries: Sequence[JSON], unit: str) -> Figure:
-    """Draw what is left after the effects, by axis and pattern; full bars are significant.
+def _share(entry: JSON) -> float:
+    return 100.0 * float(entry.get("relative") or 0.0)
+
+
+def signature(entries: Sequence[JSON]) -> Figure:
+    """Draw what is left beyond the noise after the effects, by pattern and axis; full bars are significant.
+
+    As a share of the axis's signal: amplitudes of patterns that sum over different numbers of values are not
+    to be compared.
 
     Parameters
     ----------
-    entries : ``{"axis", "label", "amplitude", "significant", "p_value"}`` of ``loop.json``.
+    entries : ``{"axis", "label", "amplitude", "relative", "significant"}`` of ``loop.json``.
     """
-    axes_names = list(dict.fromkeys(str(e.get("axis") or "") for e in entries))
+    names = list(dict.fromkeys(str(e.get("axis") or "") for e in entries))
     labels = _largest(entries)
     with style.style():
-        figure, (row,) = style.new_figure(
-            0.75 + 0.15 * len(labels), 1, len(axes_names), sharey=True, sharex=True
-        )
-        for axes, axis in zip(row, axes_names, strict=True):
-            mine = {str(e["label"]): e for e in entries if str(e.get("axis") or "") == axis}
-            for i, label in enumerate(labels):
-                entry = mine.get(label)
-                if entry is None or entry.get("amplitude") is None:
-                    continue
-                full = bool(entry.get("significant"))
-                axes.barh(
-                    -i,
-                    entry["amplitude"],
-                    height=0.7,
-                    color=style.AFTER if full else "white",
-                    edgecolor=style.AFTER,
-                    lw=0.7,
-                )
-            axes.set_title(axis or "all axes", loc="left")
-            axes.set_xlabel(f"amplitude ({shown_unit(unit)})" if shown_unit(unit) else "amplitude")
-            axes.grid(visible=False, axis="y")
-        row[0].set_ylim(-len(labels) + 0.3, 0.7)
-        row[0].set_yticks([-i for i in range(len(labels))], labels)
+        figure, ((axes,),) = style.new_figure(ABREAST, width=style.HALF)
+        thick = 0.8 / len(names)
+        for k, name in enumerate(names):
+            colour = style.SERIES[k % len(style.SERIES)]
+            axes.barh(0, 0, color="white", edgecolor=colour, label=name)
+            for entry in entries:
+                if str(entry.get("axis") or "") == name and str(entry["label"]) in labels:
+                    at = thick * ((len(names) - 1) / 2 - k) - labels.index(str(entry["label"]))
+                    face = colour if entry.get("significant") else "white"
+                    axes.barh(at, _share(entry), 0.9 * thick, color=face, edgecolor=colour, lw=0.7)
+        axes.set_yticks([-i for i in range(len(labels))], [_shown(label) for label in labels], fontsize=7)
+        axes.set(ylim=(0.4 - len(labels), 0.6), xlabel="beyond the noise (% of the signal)")
+        axes.set_xlim(0, 1.05 * max(SMALLEST, *map(_share, entries)))
+        axes.grid(visible=False, axis="y")
+        if len(names) > 1:
+            figure.legend(loc="outside upper center", ncols=3)
     return figure
+
+
+def _shown(label: str) -> str:
+    name = {"all": "throughout", "mean": "constant"}.get(label, label)
+    return name if len(name) <= LONGEST else name[: LONGEST - 1] + "…"

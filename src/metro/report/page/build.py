@@ -18,12 +18,12 @@ from metro.report.page.markup import Html, badge, embedded, items_of, joined, ta
 from metro.report.phrases import plain
 from metro.report.results import Results, title
 from metro.report.sections.causes import with_causes
+from metro.report.sections.measured import measured_words
 from metro.report.sections.verdict import (
     STATUS,
     advice,
     error_text,
     left_words,
-    measured_words,
     parameter_name,
     sentence,
 )

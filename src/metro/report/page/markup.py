@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from metro.report.content import Bullets, Facts, Heading, Item, Paragraph, Picture, Table
+from metro.report.content import Abreast, Bullets, Facts, Heading, Item, Paragraph, Picture, Simple, Table
 from metro.report.style import to_svg
 
 SHORT = 26  # characters of a cell that is not broken into lines
@@ -63,10 +63,11 @@ def items_of(items: Sequence[Item], links: Mapping[str, str], level: int = 3) ->
     ----------
     links : name of a batch → where a table's cell with that name leads to. level : of headings among them.
     """
-    return joined([_item(item, links, level) for item in items])
+    flat = [part for item in items for part in (item.items if isinstance(item, Abreast) else [item])]
+    return joined([_item(item, links, level) for item in flat])
 
 
-def _item(item: Item, links: Mapping[str, str], level: int) -> Html:
+def _item(item: Simple, links: Mapping[str, str], level: int) -> Html:
     match item:
         case Paragraph():
             return tag("p", item.text, class_=item.look)

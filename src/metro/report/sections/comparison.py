@@ -14,7 +14,7 @@ from metro.report.sections.face_pairing import pairing_items
 from metro.report.sections.force import force_items
 from metro.report.sections.lobes import cut_items
 
-LONGEST = 30
+LONGEST, SHORT = 30, 6
 FEWEST = 3  # values of a run along an axis that make a curve
 
 
@@ -43,23 +43,28 @@ def _values(frame: pd.DataFrame, name: str, merit: list[Item]) -> list[Item]:
     rms = {k: float(np.sqrt(np.mean((frame["measured"] - frame[k]) ** 2))) for k in ("before", "after")}
     shown = unit(str(frame["unit"].iloc[0]))
     words = f"rms residual {number(rms['before'])} {shown} before and {number(rms['after'])} {shown} after"
-    parity = Picture(
-        figures.parity(frame, name),
-        "Parity on held-out runs, axis by axis, and distribution of the residual beside the noise alone."
-        if len(figures.axes_of(frame)) > 1
-        else "Parity on held-out runs, and distribution of the residual beside the noise alone.",
-        f"Scatter of predicted over measured {name} and histogram of both residuals; {words}.",
-    )
+    whole = name[0].upper() + name[1:]
+
+    def parity() -> Picture:
+        by_axis = ", axis by axis," if len(figures.axes_of(frame)) > 1 else ","
+        return Picture(
+            figures.parity(frame, name),
+            f"{whole}: parity on held-out runs{by_axis} and distribution of the residual beside the noise.",
+            f"Scatter of predicted over measured {name} and histogram of both residuals; {words}.",
+        )
+
     if frame.groupby(["run", figures.axis_labels(frame)]).size().max() < FEWEST:
-        return [errors(frame), parity]
+        return [errors(frame), parity()]
     if merit:
-        return [*merit, *_curves(frame, name, words), parity]
-    residual = Picture(
-        figures.residuals(frame, name),
-        "Residual of all held-out runs: median and the band that holds 80 % of the values.",
-        f"Residual of the base model and of the model with effects; {words}.",
-    )
-    return [errors(frame), *_curves(frame, name, words), residual, parity]
+        return [*merit, *_curves(frame, name, words), parity()]
+    about = f"{whole}, residual of all held-out runs: median and the band that holds 80 % of the values"
+    alt = f"Residual of the base model and of the model with effects; {words}."
+    if len(figures.axes_of(frame)) == 1:
+        caption = f"{about}; parity; and distribution of the residual beside the noise alone."
+        judged = [Picture(figures.judged(frame, name), caption, alt)]
+    else:
+        judged = [Picture(figures.residuals(frame, name), f"{about}.", alt), parity()]
+    return [errors(frame), *_curves(frame, name, words), *judged]
 
 
 def _curves(frame: pd.DataFrame, name: str, words: str) -> list[Item]:
@@ -104,4 +109,5 @@ def errors(frame: pd.DataFrame) -> Table:
     if len(rows) > LONGEST:
         caption += f" The first {LONGEST} of {len(rows)} rows; comparison.parquet has all."
     header = ["run", "axis", "measured", "base model", "with effects", "gain", "values"]
-    return Table(header, rows[:LONGEST], caption, [2, 0.6, 1, 1, 1, 0.8, 0.8], numeric=[2, 3, 4, 5, 6])
+    widths = [2, 0.6, 1, 1, 1, 0.8, 0.8]
+    return Table(header, rows[:LONGEST], caption, widths, numeric=[2, 3, 4, 5, 6], small=len(rows) > SHORT)

@@ -37,7 +37,7 @@ def force_items(results: Results) -> list[Item]:
         metrics_table(metrics),
         Picture(
             figures.spectrum(orders, teeth),
-            "Order spectrum of the measured force and of what the predictions leave, rms over the held-out "
+            "Cutting force: order spectrum, measured and what the predictions leave, rms over the held-out "
             f"runs. Ticks stand at the tooth passing, every {teeth} orders.",
             _spectrum_words(orders),
         ),

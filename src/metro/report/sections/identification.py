@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
+from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table, abreast
 from metro.report.numbers import number, quantity, unit, words
 from metro.report.results import Results
 from metro.report.sections.lobes import boundaries
@@ -113,7 +113,7 @@ def _yielding(table: pd.DataFrame | None) -> list[Item]:
             "Force of the yielding tool against that of a rigid one: iterations to convergence, those of the "
             "plain fixed-point scheme, largest difference in the first and the last of six revolutions."
         )
-        items.append(Table(head, rows, caption, [1, 1, 1, 1, 1, 1, 1, 1]))
+        items.append(Table(head, rows, caption, [1] * len(head), small=True))
     refused = table[table["refused"] != ""].groupby("refused")["run"].agg(", ".join)
     items += [Bullets([f"{runs}: {reason}." for reason, runs in refused.items()])] if len(refused) else []
     return items
@@ -126,17 +126,16 @@ def _feedback(row: pd.Series) -> list[str]:
 
 
 def _arm(arm: JSON) -> list[Item]:
-    items: list[Item] = []
+    tables = []
     joints = arm.get("joint_stiffness") or []
     if joints:
         rows = [[str(i), quantity(q, with_unit=False) if q else "–"] for i, q in enumerate(joints, start=1)]
-        items.append(
-            Table(["joint", "stiffness (N m/rad)"], rows, "Joint stiffness with 95 % intervals.", [1, 3])
-        )
+        told = "Joint stiffness with 95 % intervals."
+        tables.append(Table(["joint", "stiffness (N m/rad)"], rows, told, [1, 3], small=True))
     for key, name in RUN_BLOCKS.items():
         if arm.get(key) and key not in OF_ROBOT:
-            items.append(_by_run(arm[key], name, f"{name.capitalize()}, run by run."))
-    return [Heading("Robot"), *items] if items else []
+            tables.append(_by_run(arm[key], name, f"{name.capitalize()}, run by run.", half=True))
+    return [Heading("Robot"), *abreast(tables)] if tables else []
 
 
 def _tip(tip: JSON) -> list[Item]:
@@ -151,21 +150,24 @@ def _tip(tip: JSON) -> list[Item]:
     )
 
 
-def _by_run(blocks: JSON, name: str, caption: str) -> Table:
-    """Tabulate ``{run: quantity}``, ``{run: {name: quantity}}`` or ``{run: [quantities]}``, a row per run."""
+def _by_run(blocks: JSON, name: str, caption: str, *, half: bool = False) -> Table:
+    """Tabulate ``{run: quantity}``, ``{run: {name: quantity}}`` or ``{run: [quantities]}``, a row per run.
+
+    ``half``: for a place half as wide as the page.
+    """
     rows = {run: _flat(value, name) for run, value in blocks.items()}
     columns = list(dict.fromkeys(key for row in rows.values() for key in row))
     body = [
         [str(run), *(row.get(column, "–") for column in columns)] for run, row in list(rows.items())[:LONGEST]
     ]
-    if len(columns) == 1 and len(body) > ABREAST:
-        return _abreast(["run", *columns], body, caption + _more(len(rows)))
-    small = len(columns) > 5
+    if len(columns) == 1 and len(body) > ABREAST and not half:
+        return _wrapped(["run", *columns], body, caption + _more(len(rows)))
+    small = half or len(columns) > 5
     widths = [0] * (1 + len(columns)) if small else [1, *([1.2] * len(columns))]
     return Table(["run", *columns], body, caption + _more(len(rows)), widths, small=small)
 
 
-def _abreast(header: list[str], body: list[list[str]], caption: str) -> Table:
+def _wrapped(header: list[str], body: list[list[str]], caption: str) -> Table:
     """Set a long table of two columns in several pairs of columns side by side."""
     height = -(-len(body) // ABREAST)
     filled = [*body, *([["", ""]] * (ABREAST * height - len(body)))]

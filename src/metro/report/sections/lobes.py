@@ -12,7 +12,7 @@ from metro.report.results import Results
 from metro.report.sections.chatter import chatter_items
 from metro.units import JSON, Array
 
-LONGEST = 30
+LONGEST, SHORT = 30, 10
 _NOTHING_PERCENT = 0.001
 _NO_TESTS = pd.DataFrame(columns=["position", "rpm", "depth_mm", "measured"], dtype=float)
 
@@ -150,10 +150,8 @@ def cut_items(results: Results, frame: pd.DataFrame) -> list[Item]:
         "P(chatter), with effects",
     ]
     more = f" The first {LONGEST} of {len(tests)}." if len(tests) > LONGEST else ""
-    items.append(
-        Table(header, rows, f"Held-out test cuts.{more}", [1.4, 1, 1, 1, 1.4, 1.4], numeric=[1, 2, 4, 5])
-    )
-    return items
+    caption, widths = f"Held-out test cuts.{more}", [1.4, 1, 1, 1, 1.4, 1.4]
+    return [*items, Table(header, rows, caption, widths, numeric=[1, 2, 4, 5], small=len(rows) > SHORT)]
 
 
 def placed(results: Results, frame: pd.DataFrame) -> pd.DataFrame:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
+from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table, abreast
 from metro.report.figures import verdicts as figures
 from metro.report.numbers import number, percent, probability, quantity, unit, words
 from metro.report.phrases import plain
@@ -18,14 +18,18 @@ LONGEST = 16
 def loop(results: Results) -> Section:
     """Write the loop of each observable that has a verdict."""
     items: list[Item] = []
+    pictures: list[Picture] = []
     for observable, entry in results.verdicts().items():
-        name = title(observable)
-        items.append(Heading(f"{name[0].upper()}{name[1:]}: {STATUS.get(str(entry.get('status')), '–')}"))
-        items += _observable(observable, entry, results.told(observable), left_words(results, observable))
+        name, told = title(observable), results.told(observable)
+        name = f"{name[0].upper()}{name[1:]}"
+        items.append(Heading(f"{name}: {STATUS.get(str(entry.get('status')), '–')}"))
+        items += _observable(observable, entry, told, left_words(results, observable))
+        pictures += [*_runs(name, told, entry.get("unit")), *_signature(name, told)]
     if not items:
         nothing = "There was no residual to trace: no held-out run has both a measurement and a prediction."
         return Section("The closed loop", [Paragraph(nothing)])
-    return Section("The closed loop", items)
+    drawn = [Heading("What is left, run by run and by pattern"), *abreast(pictures)] if pictures else []
+    return Section("The closed loop", [*items, *drawn])
 
 
 def _observable(observable: str, entry: JSON, told: JSON, left: str) -> list[Item]:
@@ -38,17 +42,29 @@ def _observable(observable: str, entry: JSON, told: JSON, left: str) -> list[Ite
     items += _added(entry)
     items += _candidates(told.get("candidates") or entry.get("candidates") or [], shown)
     items += _path(told.get("path") or [], entry, shown)
-    blocks = [b for b in told.get("blocks") or [] if b.get("rms_before") is not None]
-    if blocks:
-        alt = f"rms residual of {len(blocks)} runs before and after, in the order of cutting."
-        items.append(
-            Picture(
-                figures.runs(blocks, shown or "", noise.get("floor")),
-                "Residual of every run, in the order of cutting.",
-                alt,
-            )
-        )
     return [*items, *_rest(entry, told, shown, left)]
+
+
+def _runs(name: str, told: JSON, shown: str | None) -> list[Picture]:
+    blocks = [b for b in told.get("blocks") or [] if b.get("rms_before") is not None]
+    if not blocks:
+        return []
+    alt = f"rms residual of {len(blocks)} runs before and after, in the order of cutting."
+    chart = figures.runs(blocks, shown or told.get("unit") or "", (told.get("noise") or {}).get("floor"))
+    return [Picture(chart, f"{name}: residual of every run, in the order of cutting.", alt)]
+
+
+def _signature(name: str, told: JSON) -> list[Picture]:
+    """Draw what is left by pattern where any is beyond the noise, and say whether it stands out."""
+    entries = told.get("signature") or []
+    if len({e["label"] for e in entries}) < 2 or not any(e.get("relative") for e in entries):
+        return []
+    full = [f"{e.get('axis') or ''} {e['label']}".strip() for e in entries if e.get("significant")]
+    found = f"{len(full)} of {len(entries)} places stand" if full else f"None of {len(entries)} places stands"
+    bars = " (full bars)" if full else ""
+    caption = f"{name}: what is left, by pattern and axis. {found} out of the noise{bars}."
+    alt = "Significant: " + (", ".join(full[:6]) if full else "nothing") + "."
+    return [Picture(figures.signature(entries), caption, alt)]
 
 
 def _noise_words(noise: JSON, shown: str | None) -> str:
@@ -95,11 +111,12 @@ def _candidates(candidates: list[JSON], shown: str | None) -> list[Item]:
     strong = [i for i, c in enumerate(candidates[:LONGEST]) if c.get("verdict") == "added"]
     header = ["effect tried", *(name for name, _ in columns), "outcome"]
     caption = (
-        "Every candidate, refitted jointly with the base model. Gain: log-likelihood on conditions left out; "
-        "size: share of the signal that it changes."
+        "Every candidate, fitted with the base model. Gain: log-likelihood on conditions left out; "
+        "size: share of the signal."
     )
     numeric = list(range(1, len(columns) + 1))
-    return [Table(header, rows, caption, [1.6, *([0.8] * len(columns)), 2.6], numeric=numeric, strong=strong)]
+    widths = [1.6, *([0.8] * len(columns)), 3.6]
+    return [Table(header, rows, caption, widths, numeric=numeric, strong=strong, small=True)]
 
 
 def _why(candidate: JSON) -> str:
@@ -129,14 +146,6 @@ def _path(path: list[JSON], entry: JSON, shown: str | None) -> list[Item]:
 
 def _rest(entry: JSON, told: JSON, shown: str | None, left: str) -> list[Item]:
     items: list[Item] = []
-    entries = [e for e in told.get("signature") or [] if e.get("amplitude") is not None]
-    if len({e["label"] for e in entries}) > 1:
-        full = [f"{e.get('axis') or ''} {e['label']}".strip() for e in entries if e.get("significant")]
-        alt = "Significant: " + (", ".join(full[:6]) if full else "nothing") + "."
-        caption = "Signature of what is left, by axis and pattern; full bars are significant."
-        items.append(
-            Picture(figures.signature(entries, told.get("signature_unit") or shown or ""), caption, alt)
-        )
     rest = entry.get("unexplained") or {}
     if rest.get("signature"):
         size = "" if rest.get("rms") is None else f"{number(rest['rms'])} {unit(shown)} rms, "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 
 from metro import __version__
@@ -10,7 +11,7 @@ from metro.report.numbers import listing
 from metro.report.phrases import sentence
 from metro.report.results import Results, title
 
-LONGEST = 400
+LONGEST, ABREAST, DIGITS = 240, 3, 12
 LIMITS = {
     "force": "The force model is mechanistic and linear in its coefficients: one edge force, one pressure, "
     "no dependence on temperature or speed; the tool is rigid unless an effect says otherwise.",
@@ -61,7 +62,7 @@ def _limits(results: Results) -> list[Item]:
         limit = [] if results.batch.manifest.get("source") == "published" else [LIMITS.get(observable, "")]
         text = " ".join(sentence(note) for note in [*limit, *own] if note)
         notes.append(f"{sentence(title(observable)).rstrip('.')}: {text}")
-    return [Heading("Limits of the models"), Bullets(notes)] if notes else []
+    return [Heading("Limits of the models"), Bullets(notes, small=True)] if notes else []
 
 
 def _code(results: Results) -> list[Item]:
@@ -69,19 +70,31 @@ def _code(results: Results) -> list[Item]:
         ["metro", __version__],
         ["code of this stage", results.code or "–"],
         ["batch", results.batch.name],
+        ["list of source files", _of_all(results)],
     ]
     rows += [[key, json.dumps(value, ensure_ascii=False)] for key, value in sorted(results.settings.items())]
-    return [
-        Heading("Code and settings"),
-        Table(["what", "value"], rows, "Versions and settings.", [1, 4], small=True),
-    ]
+    caption = "Versions, settings, and the SHA-256 of the list of source files as sha256sum would write it."
+    return [Heading("Code and settings"), Table(["what", "value"], rows, caption, [1, 4], small=True)]
+
+
+def _of_all(results: Results) -> str:
+    """SHA-256 over the lines of all source files, in the order of their names."""
+    lines = [f"{digest}  {name}\n" for name, digest in sorted(results.sources.items())]
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 def _sources(results: Results) -> list[Item]:
     if not results.sources:
         return [Heading("Source files"), Paragraph("The processed tables name no source files.")]
-    rows = [[name, digest] for name, digest in sorted(results.sources.items())[:LONGEST]]
-    caption = f"The {len(results.sources)} source files and their SHA-256."
-    if len(results.sources) > LONGEST:
-        caption += f" The first {LONGEST}; the Parquet tables' metadata hold all."
-    return [Heading("Source files"), Table(["file", "SHA-256"], rows, caption, [1, 1.35], small=True)]
+    shown = [[name, digest[:DIGITS]] for name, digest in sorted(results.sources.items())[:LONGEST]]
+    height = -(-len(shown) // ABREAST)
+    shown += [["", ""]] * (ABREAST * height - len(shown))
+    rows = [[cell for part in range(ABREAST) for cell in shown[part * height + i]] for i in range(height)]
+    caption = (
+        f"The {len(results.sources)} source files and the first {DIGITS} digits of the SHA-256 of each; "
+        "provenance.json has all of them."
+    )
+    caption += f" The first {LONGEST} files." if len(results.sources) > LONGEST else ""
+    header = ["file", "SHA-256"] * ABREAST
+    table = Table(header, rows, caption, [1.2, 1] * ABREAST, small=True)
+    return [Heading("Source files"), table]

@@ -40,7 +40,7 @@ def _force(results: Results) -> list[Item]:
     means, refused = results.tables.get("robot_means"), results.tables.get("robot_refused")
     items: list[Item] = [Heading("Force from the joints' torques")]
     if means is not None:
-        items += _means(means)
+        items.append(_means(means))
     if (joints := results.tables.get("robot_joints")) is not None:
         items += _joints(joints)
     if means is not None:
@@ -51,61 +51,47 @@ def _force(results: Results) -> list[Item]:
     return items if len(items) > 1 else []
 
 
-def _means(means: pd.DataFrame) -> list[Item]:
-    """Tabulate the steady means as [K] table 7, and those of runs without a dynamometer."""
-    items: list[Item] = []
-    caption = (
-        "Mean force of the steady cut by the torques of the joints, with its 95 % interval (noise of the "
+def _means(means: pd.DataFrame) -> Table:
+    """Tabulate the steady means as [K] table 7 run by run, beside the dynamometer's where there is one."""
+    beside = means[means["dynamometer_n"].notna()]
+    rows = [
+        [
+            _starred(part.iloc[0]),
+            *(cell for _, r in part.sort_values("axis").iterrows() for cell in _mean(r, bool(len(beside)))),
+        ]
+        for _, part in means.groupby("run", sort=False)
+    ]
+    told = (
+        "Mean force of the steady cut by the torques of the joints (N), with its 95 % interval (noise of the "
         "torques, slow noise as in the idle runs, and friction repeatable to a tenth of the noise)"
     )
-    star = (
-        ""
-        if means["by_index"].all()
-        else " * The joints that pass the index of 2 do not tell all three axes: of all joints."
-    )
-    beside = means[means["dynamometer_n"].notna()]
     if len(beside):
-        rows = [
-            [
-                _starred(r),
-                str(r["axis"]),
-                number(r["dynamometer_n"]),
-                band(r["sensorless_n"], r["sensorless_sd_n"]),
-                *_error(r["dynamometer_n"], r["sensorless_n"]),
-            ]
-            for _, r in beside.head(LONGEST).iterrows()
-        ]
-        error = (beside["sensorless_n"] - beside["dynamometer_n"]).abs()
-        told = (
-            f"{caption}, against the dynamometer's. Mean of the absolute errors: "
-            f"{number(float(error.mean()), 2)} N.{star}{more(len(beside))}"
+        error = float((beside["sensorless_n"] - beside["dynamometer_n"]).abs().mean())
+        told += (
+            ", beside the dynamometer's, and the error in percent of that. Mean of the absolute errors: "
+            f"{number(error, 2)} N"
         )
-        header = ["run", "axis", "dynamometer (N)", "sensorless (N)", "error (N)", "error (%)"]
-        items.append(Table(header, rows, told, [1, 0.6, 1.3, 1.6, 1, 1], numeric=[2, 3, 4, 5]))
-    alone = means[means["dynamometer_n"].isna()]
-    if len(alone):
-        rows = [
-            [
-                _starred(part.iloc[0]),
-                *(band(r["sensorless_n"], r["sensorless_sd_n"]) for _, r in part.iterrows()),
-            ]
-            for _, part in alone.groupby("run", sort=False)
-        ]
-        where = " of the runs without a dynamometer" if len(beside) else ""
-        told = f"{caption},{where or ' run by run'}.{star}{more(len(rows))}"
-        header = ["run", "x (N)", "y (N)", "z (N)"]
-        items.append(Table(header, rows[:LONGEST], told, [1, 1.5, 1.5, 1.5], numeric=[1, 2, 3]))
-    return items
+    star = "" if means["by_index"].all() else " * Too few joints pass the index of 2: of all joints."
+    header = ["run"]
+    for axis in sorted(means["axis"].unique()):
+        header += [f"{axis}, measured", "by torques", "%"] if len(beside) else [f"{axis} (N)"]
+    widths = [0.7, *([1.0, 1.4, 0.6] if len(beside) else [1.0]) * means["axis"].nunique()]
+    numeric = list(range(1, len(header)))
+    caption = f"{told}.{star}{more(len(rows))}"
+    return Table(header, rows[:LONGEST], caption, widths, numeric=numeric, small=bool(len(beside)))
+
+
+def _mean(row: pd.Series, beside: bool) -> list[str]:
+    told = band(row["sensorless_n"], row["sensorless_sd_n"])
+    measured = float(row["dynamometer_n"])
+    if not beside:
+        return [told]
+    error = number(100 * (row["sensorless_n"] / measured - 1), 2) if measured else "–"
+    return [number(measured), told, error if math.isfinite(measured) else "–"]
 
 
 def _starred(row: pd.Series) -> str:
     return str(row["run"]) + ("" if row["by_index"] else " *")
-
-
-def _error(measured: float, predicted: float) -> tuple[str, str]:
-    if not math.isfinite(measured) or measured == 0:
-        return "–", "–"
-    return number(predicted - measured, 2), number(100 * (predicted / measured - 1), 2)
 
 
 def _course(results: Results, means: pd.DataFrame) -> list[Item]:
@@ -139,23 +125,18 @@ def _joints(joints: pd.DataFrame) -> list[Item]:
         f"walk does "
         "(it steps where the tool enters and leaves), and the band is no more than its estimate."
     )
+    caption += (
+        " Below: the random walk behind the filter, medians over the runs; noise from the idle run, drift by "
+        "maximum likelihood."
+    )
+    walk = joints.groupby("joint")[["noise_nm", "drift_nm"]].median()
+    foot = [
+        [name, *(number(value, 2) for value in walk[column])]
+        for name, column in (("noise of a bin (N m)", "noise_nm"), ("drift, bin to bin (N m)", "drift_nm"))
+    ]
     header = ["run", *(f"joint {i}" for i in range(1, 7))]
-    noise = joints.groupby("joint")[["noise_nm", "drift_nm"]].median()
-    drawn = [
-        [str(joint), number(r["noise_nm"], 2), number(r["drift_nm"], 2)] for joint, r in noise.iterrows()
-    ]
-    items: list[Item] = [
-        Table(header, rows[:LONGEST], caption + more(len(rows)), [0.7, *([1.0] * 6)]),
-        Table(
-            ["joint", "noise of a bin (N m)", "drift from bin to bin (N m)"],
-            drawn,
-            "The random walk behind the filter, medians over the runs: noise from the idle run, drift by "
-            "maximum "
-            "likelihood.",
-            [0.6, 1.4, 1.6],
-            numeric=[1, 2],
-        ),
-    ]
+    body = rows[:LONGEST] + foot
+    items: list[Item] = [Table(header, body, caption + more(len(rows)), [1.6, *([1.0] * 6)], small=True)]
     said = joints[joints["remark"] != ""].drop_duplicates(["run", "remark"])
     groups = said.groupby("remark", sort=False)["run"]
     if len(said):
@@ -237,7 +218,7 @@ def _waves(blocks: JSON) -> Table:
     names = [f"{wave.capitalize()} {kind}" for wave in shown for kind in ("wall", "told")]
     caption = "Waviness (µm) of the wall and as told by the model, with 95 % intervals where known."
     header = ["run", *names, "correlation"]
-    return Table(header, rows, caption + more(len(blocks)), [0] * len(header), small=len(names) > 2)
+    return Table(header, rows, caption + more(len(blocks)), [0] * len(header), small=True)
 
 
 def _shares(blocks: JSON) -> list[Item]:
@@ -249,7 +230,8 @@ def _shares(blocks: JSON) -> list[Item]:
         "Share of each joint in the variance of the tip's waves; below zero: it works against the others."
     )
     header = ["run", *(f"joint {i}" for i in range(1, 7))]
-    return [Table(header, rows, caption + more(len(known)), [0.7, *([1.0] * 6)], numeric=[1, 2, 3, 4, 5, 6])]
+    widths, numeric = [0.7, *([1.0] * 6)], [1, 2, 3, 4, 5, 6]
+    return [Table(header, rows, caption + more(len(known)), widths, numeric=numeric, small=True)]
 
 
 def _spectra(results: Results) -> list[Item]:

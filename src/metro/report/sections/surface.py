@@ -144,7 +144,8 @@ def _noise(faces: dict[str, pd.DataFrame]) -> list[Item]:
     if not all(part["crop_holds"].iloc[0] for part in faces.values()):
         caption += " * With one more millimetre cropped X_m changes by more than 5 %: the edge rules it."
     header = ["run", "noise", "from", "local", "points", "rejected", "pitch", "crop"]
-    return [Table(header, rows, caption, [0.6, 0.7, 3, 0.7, 0.9, 0.9, 0.7, 0.7], numeric=[1, 3, 4, 5, 6, 7])]
+    widths, numeric = [0.6, 0.7, 3, 0.7, 0.9, 0.9, 0.7, 0.7], [1, 3, 4, 5, 6, 7]
+    return [Table(header, rows, caption, widths, numeric=numeric, small=True)]
 
 
 def _zones(faces: dict[str, pd.DataFrame], contacts: pd.DataFrame | None) -> list[Item]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import pandas as pd
-
 from metro.report.content import Facts, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import verdicts as figures
 from metro.report.figures.comparison import coordinate, overlay
@@ -13,6 +11,7 @@ from metro.report.figures.verdicts import Change
 from metro.report.numbers import listing, number, percent, probability, quantity, unit, with_interval, words
 from metro.report.phrases import plain, rest_words
 from metro.report.results import Results, title
+from metro.report.sections.measured import count_of, measured_words
 from metro.units import JSON
 
 MOST_DRAWN = 2  # verdicts beside which a first page has room for a run
@@ -260,7 +259,7 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
                     (
                         "verdict",
                         STATUS.get(str(entry.get("status")), "–"),
-                        _count(len(entry.get("held_out_runs") or []), "held-out run"),
+                        count_of(len(entry.get("held_out_runs") or []), "held-out run"),
                     ),
                     (
                         "error before",
@@ -284,66 +283,24 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
         [
             title(name),
             STATUS.get(str(entry.get("status")), "–"),
-            error_text(entry.get("before"), entry.get("unit")),
-            error_text(entry.get("after"), entry.get("unit")),
-            f"{number(entry.get('noise_floor'))}{_unit(entry)}",
+            error_text(entry.get("before"), None),
+            error_text(entry.get("after"), None),
+            number(entry.get("noise_floor")),
+            _unit(entry).strip() or "1",
             listing([words(str(e["effect"])) for e in entry.get("effects") or []]) or "none",
         ]
         for name, entry in verdicts.items()
     ]
-    header = ["observable", "verdict", "rms before", "rms after", "noise floor", "effects added"]
+    header = ["observable", "verdict", "rms before", "rms after", "noise floor", "unit", "effects added"]
     return (
-        [Table(header, rows, "Errors on held-out runs, with 95 % intervals.", [1.7, 1.1, 1.6, 1.6, 1.1, 1.4])]
+        [
+            Table(
+                header,
+                rows,
+                "Errors on held-out runs, with 95 % intervals.",
+                [2.1, 1, 1.6, 1.6, 1, 0.5, 1.4],
+            )
+        ]
         if rows
         else []
     )
-
-
-def _count(count: int, name: str) -> str:
-    return f"{count} {name}{'' if count == 1 else 's'}"
-
-
-def measured_words(results: Results) -> str:
-    """Say what the batch is and what was measured in it."""
-    manifest, runs = results.batch.manifest, results.batch.runs
-    origin = {"measured": "Measured on", "simulated": "Simulated for", "published": "Published values of"}
-    cell = results.batch.cell.get("cell", manifest.get("cell", "unknown"))
-    parts = [f"{origin.get(str(manifest.get('source')), 'Values of')} cell {cell}"]
-    tool, work = manifest.get("tool") or {}, manifest.get("work") or {}
-    if tool.get("diameter_mm"):
-        teeth = f", {tool['teeth']} teeth" if tool.get("teeth") else ""
-        parts.append(f"tool ⌀{tool['diameter_mm']} mm{teeth}")
-    if work.get("material"):
-        parts.append(f"work {work['material']}")
-    planned = planned_runs(results)
-    text = "; ".join(parts) + "." + _run_words(runs[~runs.index.isin(planned)]) + _planned_words(planned)
-    return f"{text} Source: {manifest['citation']}" if manifest.get("citation") else text
-
-
-def planned_runs(results: Results) -> list[str]:
-    """Return the runs that were not cut, on which the study gives advice."""
-    told = (results.identified.get("study") or {}).get("advice") or {}
-    return [str(run) for row in told.get("configurations") or [] for run in row["runs"]]
-
-
-def _planned_words(planned: list[str]) -> str:
-    return (
-        f" {_count(len(planned), 'run')} {'is' if len(planned) == 1 else 'are'} planned, not cut."
-        if planned
-        else ""
-    )
-
-
-def _run_words(runs: pd.DataFrame) -> str:
-    if runs.empty:
-        return ""
-    operations = listing([str(o) for o in runs["operation"].dropna().unique() if str(o)])
-    one = len(runs) == 1
-    made = f" {_count(len(runs), 'cutting run')} ({operations or 'operation not stated'})"
-    recorded = int(runs["role"].isin(["identify", "validate"]).sum())
-    held = int((runs["role"] == "validate").sum())
-    if not recorded:
-        return (
-            f"{made} {'was' if one else 'were'} made; no record of {'it' if one else 'them'} is in the batch."
-        )
-    return f"{made}, {recorded} recorded, {held} of them held out: no model saw those before it was judged."

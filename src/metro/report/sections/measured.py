@@ -1,0 +1,59 @@
+"""What a batch is and what was measured in it, in words."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from metro.report.numbers import listing
+from metro.report.results import Results
+
+
+def count_of(count: int, name: str) -> str:
+    """Write a number of things: 1 run, 2 runs."""
+    return f"{count} {name}{'' if count == 1 else 's'}"
+
+
+def measured_words(results: Results) -> str:
+    """Say what the batch is and what was measured in it."""
+    manifest, runs = results.batch.manifest, results.batch.runs
+    origin = {"measured": "Measured on", "simulated": "Simulated for", "published": "Published values of"}
+    cell = results.batch.cell.get("cell", manifest.get("cell", "unknown"))
+    parts = [f"{origin.get(str(manifest.get('source')), 'Values of')} cell {cell}"]
+    tool, work = manifest.get("tool") or {}, manifest.get("work") or {}
+    if tool.get("diameter_mm"):
+        teeth = f", {tool['teeth']} teeth" if tool.get("teeth") else ""
+        parts.append(f"tool ⌀{tool['diameter_mm']} mm{teeth}")
+    if work.get("material"):
+        parts.append(f"work {work['material']}")
+    planned = planned_runs(results)
+    text = "; ".join(parts) + "." + _run_words(runs[~runs.index.isin(planned)]) + _planned_words(planned)
+    return f"{text} Source: {manifest['citation']}" if manifest.get("citation") else text
+
+
+def planned_runs(results: Results) -> list[str]:
+    """Return the runs that were not cut, on which the study gives advice."""
+    told = (results.identified.get("study") or {}).get("advice") or {}
+    return [str(run) for row in told.get("configurations") or [] for run in row["runs"]]
+
+
+def _planned_words(planned: list[str]) -> str:
+    return (
+        f" {count_of(len(planned), 'run')} {'is' if len(planned) == 1 else 'are'} planned, not cut."
+        if planned
+        else ""
+    )
+
+
+def _run_words(runs: pd.DataFrame) -> str:
+    if runs.empty:
+        return ""
+    operations = listing([str(o) for o in runs["operation"].dropna().unique() if str(o)])
+    one = len(runs) == 1
+    made = f" {count_of(len(runs), 'cutting run')} ({operations or 'operation not stated'})"
+    recorded = int(runs["role"].isin(["identify", "validate"]).sum())
+    held = int((runs["role"] == "validate").sum())
+    if not recorded:
+        return (
+            f"{made} {'was' if one else 'were'} made; no record of {'it' if one else 'them'} is in the batch."
+        )
+    return f"{made}, {recorded} recorded, {held} of them held out: no model saw those before it was judged."

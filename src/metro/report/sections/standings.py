@@ -1,0 +1,77 @@
+"""Over all batches: which settings make a face flat, and where a model is furthest from what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from metro.report.content import Paragraph, Section, Table
+from metro.report.numbers import number, percent, probability, quantity, unit
+from metro.report.results import title
+from metro.units import JSON
+
+BEST, WORST = 3, 10
+
+
+def rankings(identified: Mapping[str, JSON]) -> list[Section]:
+    """Tabulate the flattest and the least flat configuration of each batch that has a ranking of them."""
+    rows = []
+    for batch, found in sorted(identified.items()):
+        ranked = (found.get("study") or {}).get("ranking") or []
+        shown = list(enumerate(ranked, start=1))
+        shown = shown if len(shown) <= BEST + 1 else [*shown[:BEST], shown[-1]]
+        rows += [
+            [
+                batch,
+                f"{place} of {len(ranked)}",
+                str(row["configuration"]),
+                quantity(row["xm"]),
+                probability(row.get("probability_best")),
+            ]
+            for place, row in shown
+        ]
+    if not rows:
+        return []
+    header = ["batch", "rank", "configuration", "X_m", "best with probability"]
+    caption = (
+        f"The {BEST} flattest configurations and the least flat one of each batch: X_m with its 95 % "
+        "interval, and how probably each is the flattest of its batch."
+    )
+    return [Section("Configurations", [Table(header, rows, caption, [1.5, 0.7, 3, 1.4, 1.2], numeric=[4])])]
+
+
+def largest_rests(entries: Iterable[tuple[str, str, JSON]]) -> list[Section]:
+    """Tabulate the verdicts whose rest after the loop is the most times the noise.
+
+    Parameters
+    ----------
+    entries : batch, observable and verdict of each.
+    """
+    told = [
+        (float(entry["after"]["rms"]) / float(entry["noise_floor"]), batch, name, entry)
+        for batch, name, entry in entries
+        if (entry.get("after") or {}).get("rms") is not None and entry.get("noise_floor")
+    ]
+    ranked = sorted(told, key=lambda row: (-row[0], row[1], row[2]))
+    if not ranked:
+        return []
+    above = sum(ratio > 1 for ratio, *_ in ranked)
+    said = f"Larger than the noise floor: {above} of {len(ranked)}. What that means, the verdict says."
+    header = ["batch", "observable", "rest", "of the signal", "times the noise"]
+    caption = "What is left on held-out runs after the loop, the largest in units of the noise floor first."
+    if len(ranked) > WORST:
+        caption += f" The first {WORST}."
+    table = Table(header, _rows(ranked[:WORST]), caption, [1.6, 1.8, 1.2, 1, 1], numeric=[2, 3, 4])
+    return [Section("Largest residuals", [Paragraph(said), table])]
+
+
+def _rows(ranked: Sequence[tuple[float, str, str, JSON]]) -> list[list[str]]:
+    return [
+        [
+            batch,
+            title(name),
+            f"{number(entry['after']['rms'])} {unit(entry.get('unit'))}".strip(),
+            "–" if entry.get("unit") == "1" else percent(entry["after"].get("nrmse")),
+            number(ratio, 2),
+        ]
+        for ratio, batch, name, entry in ranked
+    ]
