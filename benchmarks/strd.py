@@ -45,7 +45,7 @@ standard error; the table above follows it on.
 
 | fit | rank and condition | convergence |
 | --- | --- | --- |
-| `loop/fit.py` | infinite variance of what is not determined | told (`Fit.converged`); no verdict asks yet |
+| `loop/fit.py` | infinite variance of what is not determined | `Fit.converged`; else no verdict |
 | `robot/stiffness.py` | `seen`; refused where no joint is told apart | refused at the limit of its steps |
 | `robot/friction.py` | NaN for a coefficient that the log does not determine | linear |
 | `surface/plane.py` | refused: fewer than three points, points on a line | linear |

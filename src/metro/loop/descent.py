@@ -299,6 +299,15 @@ def ahead(normal: Array, right: Array) -> float:
     return float(solution(normal, right) @ right)
 
 
+def free(candidate: Candidate, state: State, right: Array) -> np.ndarray:
+    """Mark base and effect parameters that may move downhill: (p + q,), all but those pressed to a bound."""
+    pull = right[len(state.beta) :]
+    low, high = np.array([(e.lower, e.upper) for e in candidate.parameters]).reshape(-1, 2).T
+    turning = np.array([bool(e.period) for e in candidate.parameters], dtype=bool)
+    pressed = ((state.theta <= low) & (pull < 0.0)) | ((state.theta >= high) & (pull > 0.0))
+    return np.concatenate([np.ones(len(state.beta), dtype=bool), ~pressed | turning])
+
+
 def condition(normal: Array) -> float:
     """Return the condition number of the whitened columns, brought to one length, that a normal matrix is of.
 

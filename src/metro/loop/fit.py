@@ -23,6 +23,7 @@ from metro.loop.descent import (
     ahead,
     condition,
     descend,
+    free,
     inverse,
     linearised,
     normal_equations,
@@ -277,7 +278,8 @@ def _told(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: St
     factor[p:] = 1.0
     covariance *= np.outer(factor, factor)
     covariance[p:, p:] = alike[p:, p:]
-    return _Told(covariance, ahead(normal, right), condition(normal))
+    moving = free(candidate, state, right)
+    return _Told(covariance, ahead(normal[np.ix_(moving, moving)], right[moving]), condition(normal))
 
 
 def _reestimated(

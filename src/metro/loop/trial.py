@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from metro.effects.effect import Effect
 from metro.loop import signature as rest
 from metro.loop.candidate import Candidate
@@ -67,7 +69,8 @@ def tried(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, l
         replace(
             trial,
             q_value=float(q),
-            why_not=_why_not(trial.evidence, q <= gates.false_additions, least)
+            why_not=unsettled(trial.fit)
+            or _why_not(trial.evidence, q <= gates.false_additions, least)
             or (UNLIKE if unlike(trial.effect, trial.fit) else ""),
         )
         for trial, q in zip(trials, q_values, strict=True)
@@ -98,6 +101,14 @@ def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> 
         )
         for trial in trials
     ]
+
+
+def unsettled(fitted: Fit) -> str:
+    """Say why a fit is no result, if it is none: it did not converge, or leaves an effect undetermined."""
+    if not fitted.converged:
+        return f"its fit did not converge: a step more would gain {0.5 * fitted.ahead:.2g} in log-likelihood"
+    effects = np.diag(fitted.covariance)[len(fitted.beta) :]
+    return "" if np.isfinite(effects).all() else "these runs do not determine its parameters"
 
 
 def _why_not(evidence: Evidence, found: bool, least: float) -> str:

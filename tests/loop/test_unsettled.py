@@ -1,0 +1,61 @@
+"""A fit that did not converge, or leaves an effect undetermined, is no result."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy import BEND, GAIN, GATES, Wave, problem
+
+from metro.loop import trial, verdict
+from metro.loop.candidate import Candidate
+from metro.loop.fit import fit
+from metro.loop.noise import first_noise
+from metro.loop.search import search
+from metro.loop.trial import tried, unsettled
+
+
+def fitted(task, *effects):
+    blocks = task.role("identify")
+    base = fit(Candidate(task.base), blocks, first_noise(GATES.model_form_budget, task.scatter, blocks))
+    return fit(Candidate(task.base, effects), blocks, base.noise, base) if effects else base
+
+
+def test_a_fit_is_settled_and_one_that_is_not_is_told():
+    found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
+    assert unsettled(found) == ""
+    assert "did not converge: a step more would gain 3" in unsettled(replace(found, ahead=6.0))
+
+
+def test_an_effect_that_the_base_imitates_is_not_determined():
+    blind = replace(GAIN, parameters=tuple(replace(p, plausible=None) for p in GAIN.parameters))
+    found = fitted(problem(2, phased=False), blind)
+    assert found.rank == 1  # not told apart: the effect and the base parameter that imitates it
+    assert unsettled(found) == "these runs do not determine its parameters"
+
+
+def test_an_effect_at_its_bound_is_settled():
+    low = replace(BEND, parameters=tuple(replace(p, upper=0.05, starts=(0.01,)) for p in BEND.parameters))
+    found = fitted(problem(3, truth=Wave(bend=0.2), phased=False), low)
+    assert found.theta == pytest.approx([0.05])
+    assert found.converged
+
+
+def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):
+    task = problem(1, truth=Wave(bend=0.1), phased=False)
+    base = fitted(task)
+    assert [t.why_not for t in tried(base, [BEND], base.noise, GATES, 0.004)] == [""]
+    halted = trial.fit
+    monkeypatch.setattr(trial, "fit", lambda *given: replace(halted(*given), ahead=1.0))
+    assert "did not converge" in tried(base, [BEND], base.noise, GATES, 0.004)[0].why_not
+
+
+def test_of_a_base_that_did_not_converge_nothing_is_called_clean():
+    task = problem(4, phased=False)
+    outcome = search(task, (BEND,), GATES)
+    rows = verdict.comparison(task, *[verdict.held_out(task, outcome.base)] * 2)
+    assert verdict.judge(task, outcome, rows, GATES)["status"] == "clean"
+    astray = replace(outcome, base=replace(outcome.base, ahead=6.0), final=replace(outcome.final, ahead=6.0))
+    told = verdict.judge(task, astray, rows, GATES)
+    assert told["status"] == "unexplained"
+    assert "did not converge" in told["unexplained"]["signature"]
+    assert np.isfinite(outcome.final.ahead)
