@@ -63,7 +63,7 @@ def test_an_effect_changes_the_machine_and_nothing_else_of_it(name):
 
 def test_drawn_parameters_are_those_of_the_contract():
     m = machine(4)
-    for effect in library("lobes"):
+    for effect in [one for one in library("lobes") if not one.resembled]:
         drawn = BOUNDARY_EFFECTS[effect.name].draw(np.random.default_rng(2), m)
         assert set(drawn) == set(effect.names)
 

@@ -104,11 +104,12 @@ def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> 
 
 
 def unsettled(fitted: Fit) -> str:
-    """Say why a fit is no result, if it is none: it did not converge, or leaves an effect undetermined."""
+    """Say why a fit is no result, if it is none: it did not converge, or tells no parameter of an effect."""
     if not fitted.converged:
         return f"its fit did not converge: a step more would gain {0.5 * fitted.ahead:.2g} in log-likelihood"
-    effects = np.diag(fitted.covariance)[len(fitted.beta) :]
-    return "" if np.isfinite(effects).all() else "these runs do not determine its parameters"
+    told = np.isfinite(np.diag(fitted.covariance)[len(fitted.beta) :])
+    blind = [effect for effect, place in fitted.candidate.parts(fitted.theta) if not told[place].any()]
+    return "these runs do not determine its parameters" if blind else ""
 
 
 def _why_not(evidence: Evidence, found: bool, least: float) -> str:
