@@ -61,7 +61,8 @@ _LOBES = (
     "Effects count from a size of 1: of labels drawn from the truth with the errors that the loop allows "
     "for, 95 of 100 sets speak for the effect, at its true parameters, with the log-likelihood ratio that "
     "the loop asks for (3). Of effects outside the library, the size is by how much less likely the labels "
-    "are than those that the base model would draw, over 3. Where there are too few tests for a verdict, "
+    "are than those that the base model would draw, over that of one in a hundred of these. Where there "
+    "are too few tests for a verdict, "
     "nothing counts as seen. Errors are of the probability of a held-out label."
 )
 _ARM = _FORCE.replace("Intervals:", "An effect named in a wrong joint is a wrong effect. Intervals:")
