@@ -23,6 +23,7 @@ def fitted(task, *effects):
 def test_a_fit_is_settled_and_one_that_is_not_is_told():
     found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
     assert unsettled(found) == ""
+    assert unsettled(replace(found, ahead=0.5)) == ""  # nothing beside what any gate asks
     assert "did not converge: a step more would gain 3" in unsettled(replace(found, ahead=6.0))
 
 
@@ -45,7 +46,7 @@ def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):
     base = fitted(task)
     assert [t.why_not for t in tried(base, [BEND], base.noise, GATES, 0.004)] == [""]
     halted = trial.fit
-    monkeypatch.setattr(trial, "fit", lambda *given: replace(halted(*given), ahead=1.0))
+    monkeypatch.setattr(trial, "fit", lambda *given: replace(halted(*given), ahead=2.0))
     assert "did not converge" in tried(base, [BEND], base.noise, GATES, 0.004)[0].why_not
 
 

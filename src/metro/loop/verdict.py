@@ -146,8 +146,9 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
 def rest_of(problem: Problem, outcome: Outcome, gates: Gates) -> tuple[str, Fit, tuple[Line, ...]]:
     """Describe what is left, if only on held-out runs, with the fit and the lines that tell it."""
     remaining, told_by, lines = left_over(outcome), outcome.final, outcome.lines
-    if not outcome.final.converged:  # nothing is claimed of it, least of all that nothing is left
-        return "; ".join(filter(None, [remaining, unsettled(outcome.final)])), told_by, lines
+    astray = unsettled(outcome.final)
+    if astray:  # nothing is claimed of it, least of all that nothing is left
+        return "; ".join(filter(None, [remaining, astray])), told_by, lines
     if enough_runs(problem) and not remaining:
         told_by = score(outcome.final, problem.role("validate"))
         lines = _unseen_rest(problem, told_by, gates)
