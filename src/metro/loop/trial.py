@@ -18,8 +18,8 @@ LEAST_BETTER = 0.4
 OF_THE_REST = 0.5  # an effect smaller than this share of what stays unexplained may be part of that
 
 
-# Gain in twice the log-likelihood that a step more promises, from which a fit is no result: a sixth of what an
-# effect must gain on left-out conditions. What ends a descent is a hundredth of that.
+# Gain in twice the log-likelihood that a step more promises, from which a fit is no result: a sixth of what
+# an effect must gain on left-out conditions. What ends a descent is a hundredth of that.
 SETTLED = 1.0
 UNLIKE = "no effect of the library, and it does not explain the rest either"
 
