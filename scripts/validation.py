@@ -6,7 +6,7 @@ The page of the models shows the figures, ``tests/docs`` holds each to its bound
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,27 +62,30 @@ class Check:
         )
 
 
+def mean_force_by_hand(
+    arc: Engagement, feed: float, depth: float, teeth: int, coefficients: Sequence[float]
+) -> Array:
+    """Mean force (3,), N, of even teeth: sin², sin cos, sin and cos integrated over the arc by hand."""
+    ktc, krc, kac, kte, kre, kae = coefficients
+    p, q = arc.entry, arc.exit
+    square = (q - p) / 2 - (math.sin(2 * q) - math.sin(2 * p)) / 4
+    product = (math.cos(2 * p) - math.cos(2 * q)) / 4
+    sine, cosine = math.cos(p) - math.cos(q), math.sin(q) - math.sin(p)
+    force = [
+        -feed * (ktc * product + krc * square) - kte * cosine - kre * sine,
+        feed * (ktc * square - krc * product) + kte * sine - kre * cosine,
+        feed * kac * sine + kae * (q - p),
+    ]
+    return np.array(force) * teeth * depth / (2 * math.pi)
+
+
 def force() -> Check:
     """Mean force over the radial depth: integrals of sin², sin cos, sin and cos over the arc, by hand."""
     radius, feed, depth, teeth = 6e-3, 0.05e-3, 1e-3, 4
     tool = Cutter(radius, math.radians(40.0), evenly_pitched(teeth))
-
-    def closed(arc: Engagement) -> Array:
-        ktc, krc, kac, kte, kre, kae = COEFFICIENTS
-        p, q = arc.entry, arc.exit
-        square = (q - p) / 2 - (math.sin(2 * q) - math.sin(2 * p)) / 4
-        product = (math.cos(2 * p) - math.cos(2 * q)) / 4
-        sine, cosine = math.cos(p) - math.cos(q), math.sin(q) - math.sin(p)
-        force = [
-            -feed * (ktc * product + krc * square) - kte * cosine - kre * sine,
-            feed * (ktc * square - krc * product) + kte * sine - kre * cosine,
-            feed * kac * sine + kae * (q - p),
-        ]
-        return np.array(force) * teeth * depth / (2 * math.pi)
-
     share = np.linspace(0.05, 0.95, 181)
     arcs = [engagement("side", "down", 2 * radius * s, radius) for s in share]
-    exact = np.array([closed(arc) for arc in arcs])
+    exact = np.array([mean_force_by_hand(arc, feed, depth, teeth, COEFFICIENTS) for arc in arcs])
     found = np.array(
         [mean_force(tool, EdgeLaw(), Pass(feed, depth, arc), COEFFICIENTS) for arc in arcs[::15]]
     )

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.special import beta
+from validation import mean_force_by_hand
 
 from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter, evenly_pitched
@@ -33,21 +34,6 @@ def test_mean_slot_force_is_the_closed_form():
     assert mean_force(cutter(), EdgeLaw(), Cut(c, a, SLOT), TITANIUM) == pytest.approx(expected, rel=1e-10)
 
 
-def closed_mean(engaged, feed, depth, teeth=4):
-    """Integrals of the forces over the arc, worked out by hand: sin², sin cos, sin and cos."""
-    ktc, krc, kac, kte, kre, kae = TITANIUM
-    p, q = engaged.entry, engaged.exit
-    square = (q - p) / 2 - (math.sin(2 * q) - math.sin(2 * p)) / 4
-    product = (math.cos(2 * p) - math.cos(2 * q)) / 4
-    sine, cosine = math.cos(p) - math.cos(q), math.sin(q) - math.sin(p)
-    force = [
-        -feed * (ktc * product + krc * square) - kte * cosine - kre * sine,
-        feed * (ktc * square - krc * product) + kte * sine - kre * cosine,
-        feed * kac * sine + kae * (q - p),
-    ]
-    return np.array(force) * teeth * depth / (2 * math.pi)
-
-
 @pytest.mark.parametrize("true_limit", [False, True])
 @pytest.mark.parametrize(("direction", "sign"), [("up", -1.0), ("down", 1.0), ("symmetric", -1.0)])
 def test_mean_force_at_any_immersion_is_the_integral_over_the_arc(direction, sign, true_limit):
@@ -55,7 +41,7 @@ def test_mean_force_at_any_immersion_is_the_integral_over_the_arc(direction, sig
     tool, feed = cutter(), 0.05e-3
     if true_limit:  # so large a tool that its teeth run on circles: the integrals are then those of a spline
         tool = cutter(radius=6e7)
-    expected = closed_mean(engaged, feed, 1e-3)
+    expected = mean_force_by_hand(engaged, feed, 1e-3, 4, TITANIUM)
     found = mean_basis(tool, EdgeLaw(), Cut(feed, 1e-3, engaged), true_limit) @ TITANIUM
     assert found == pytest.approx(expected, rel=1e-10)
     assert (

@@ -144,4 +144,4 @@ def test_a_yield_of_next_to_nothing_changes_nothing():
     model, rpm = StabilityModel(TWO, (SIDE, DAMPED), 0.01, softening=-1e-4), np.linspace(800.0, 2600.0, 9)
     for one in (lambda m: m.boundary(rpm), lambda m: tuple(p[0] for p in estimated([m], rpm))):
         for plain, yielded in zip(one(model), one(replace(model, yielding=1e-9)), strict=True):
-            np.testing.assert_allclose(yielded, plain, rtol=2e-2)
+            np.testing.assert_allclose(yielded, plain, rtol=1e-6)
