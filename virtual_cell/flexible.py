@@ -57,6 +57,15 @@ class Machine:
         ]
 
     @property
+    def repeats(self) -> int:
+        """How often in a turn a cut without chatter repeats: with each tooth, if no tooth differs.
+
+        Chatter may be locked to the turns (at each second tooth, say, which cuts for two): who compares whole
+        turns does not see it.
+        """
+        return 1 if self.runout or any(self.uneven) else self.teeth
+
+    @property
     def frequencies(self) -> Array:
         """Damped frequencies of all modes, Hz."""
         return np.concatenate([modes.damped for modes in self.modes])

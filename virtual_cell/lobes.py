@@ -17,7 +17,7 @@ from virtual_cell.units import Array
 
 _PER_TURN = 240  # steps of the spindle's turn
 _SETTLING = 40  # turns after entry that do not count
-_CHATTER = 0.25  # of the feed per tooth: change from turn to turn that an operator calls chatter
+_CHATTER = 0.25  # of the feed per tooth: change from tooth to tooth that an operator calls chatter
 
 
 def stable(
@@ -43,7 +43,8 @@ def stable(
     angle = 2.0 * math.pi * np.arange(_PER_TURN) / _PER_TURN
     sine, cosine = np.sin(angle), np.cos(angle)
     offsets = np.arange(teeth) * (_PER_TURN // teeth)
-    trail = np.zeros((_PER_TURN, len(rpm), 2))
+    period = _PER_TURN // teeth  # chatter may be locked to the turns: who compares these does not see it
+    trail = np.zeros((period, len(rpm), 2))
     worst = np.zeros(len(rpm))
     for i in range(turns * _PER_TURN):
         at = (i + offsets) % _PER_TURN
@@ -55,8 +56,8 @@ def stable(
             moved = (step[axis] @ state[axis][:, :, :, None])[:, :, :, 0]
             state[axis] = moved + push[axis] * force[:, axis, None, None]
         if i > _SETTLING * _PER_TURN:
-            worst = np.maximum(worst, np.abs(tip - trail[i % _PER_TURN]).max(axis=1))
-        trail[i % _PER_TURN] = tip
+            worst = np.maximum(worst, np.abs(tip - trail[i % period]).max(axis=1))
+        trail[i % period] = tip
     return worst < _CHATTER * feed
 
 

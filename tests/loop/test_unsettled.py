@@ -23,8 +23,8 @@ def fitted(task, *effects):
 def test_a_fit_is_settled_and_one_that_is_not_is_told():
     found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
     assert unsettled(found) == ""
-    assert unsettled(replace(found, ahead=0.5)) == ""  # nothing beside what any gate asks
-    assert "did not converge: a step more would gain 3" in unsettled(replace(found, ahead=6.0))
+    assert unsettled(replace(found, step=0.4)) == ""  # nothing that its interval would show
+    assert "did not converge: a step more would move a parameter by 3" in unsettled(replace(found, step=3.0))
 
 
 def test_an_effect_that_the_base_imitates_is_not_determined():
@@ -46,7 +46,7 @@ def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):
     base = fitted(task)
     assert [t.why_not for t in tried(base, [BEND], base.noise, GATES, 0.004)] == [""]
     halted = trial.fit
-    monkeypatch.setattr(trial, "fit", lambda *given: replace(halted(*given), ahead=2.0))
+    monkeypatch.setattr(trial, "fit", lambda *given: replace(halted(*given), step=2.0))
     assert "did not converge" in tried(base, [BEND], base.noise, GATES, 0.004)[0].why_not
 
 
@@ -55,8 +55,8 @@ def test_of_a_base_that_did_not_converge_nothing_is_called_clean():
     outcome = search(task, (BEND,), GATES)
     rows = verdict.comparison(task, *[verdict.held_out(task, outcome.base)] * 2)
     assert verdict.judge(task, outcome, rows, GATES)["status"] == "clean"
-    astray = replace(outcome, base=replace(outcome.base, ahead=6.0), final=replace(outcome.final, ahead=6.0))
+    astray = replace(outcome, base=replace(outcome.base, step=6.0), final=replace(outcome.final, step=6.0))
     told = verdict.judge(task, astray, rows, GATES)
     assert told["status"] == "unexplained"
     assert "did not converge" in told["unexplained"]["signature"]
-    assert np.isfinite(outcome.final.ahead)
+    assert np.isfinite(outcome.final.step)

@@ -1,11 +1,16 @@
 """The march with effects of the boundary in it, against the multipliers of the model that has them too."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from metro.dynamics.lobes import spectral_radius, stability_boundary
 from metro.dynamics.system import Cut, Structure
+from virtual_cell.flexible import Machine
 from virtual_cell.hidden import BOUNDARY_EFFECTS
+from virtual_cell.milling import in_millimetres
+from virtual_cell.modes import Modes
 from virtual_cell.recipes import boundary
 from virtual_cell.regeneration import Trials, march
 
@@ -68,3 +73,21 @@ def test_softening_and_a_missing_mode_change_the_modes_that_are_marched():
     assert mass[0] == pytest.approx(mass[1])
     np.testing.assert_allclose(y.stiffness[:, 1], 10e6 * np.array([0.9, 0.8]))
     np.testing.assert_allclose(y.omega[:, 1], 2 * np.pi * 250.0 * np.sqrt([0.9, 0.8]))
+
+
+def test_chatter_that_is_locked_to_the_turns_is_called_chatter():
+    """Of two teeth each second one cuts for two, so that every turn is as the one before."""
+    modes = (
+        Modes(np.array([373.7]), np.array([0.035]), np.array([7.9e6])),
+        Modes(np.array([294.0, 416.7]), np.array([0.033, 0.018]), np.array([7.5e6, 15.1e6])),
+    )
+    law = in_millimetres((1212.0, 537.0, 199.0), (0.0, 0.0, 0.0), (0.0, 0.0))
+    machine = Machine(modes, law, 20e-3, 2, 82e-6, 5.93e-3, "up")
+    programme = replace(boundary.PROGRAMME, rpm=(3490.0,), held_out=(), depths=(1.5e-3, 2.5e-3), beside=1)
+    done = boundary.cut_tests({}, machine, programme)
+    assert done.unstable.tolist() == [False, True]
+    last = done.history.tip[1, -20 * done.per_turn :].reshape(20, done.per_turn, 2)
+    assert np.ptp(last, axis=0).max() < 0.05 * machine.feed
+    assert done.chatter_hz()[1] == pytest.approx(3.5 * 2 * 3490.0 / 60.0, rel=0.01)
+    runout = replace(machine, runout=0.1 * machine.feed)  # then nobody can tell it from what the runout does
+    assert boundary.cut_tests({}, runout, programme).unstable.tolist() == [False]

@@ -53,7 +53,7 @@ PROGRAMME = Programme(
 )
 _WITHIN = 0.75  # of the speeds: a boundary within the depths that are tried
 _TURNS, _LAST, _ENTRY, _SCATTER = 90, 20, 5, 0.01
-_VISIBLE = 0.25  # of the feed per tooth: range over the last turns that is called chatter
+_VISIBLE = 0.25  # of the feed per tooth: range, over the last turns, of what would repeat: called chatter
 _RATE = 8192.0
 
 
@@ -61,7 +61,8 @@ _RATE = 8192.0
 class Tested:
     """The tests that are kept of a march: their places in it, and what they were.
 
-    ``within``: share of the speeds whose boundary lies within the depths that were tried.
+    ``repeats``: in a turn, of a cut without chatter. ``within``: share of the speeds whose boundary lies
+    within the depths that were tried.
     """
 
     trials: Trials
@@ -69,6 +70,7 @@ class Tested:
     kept: np.ndarray
     unstable: np.ndarray
     per_turn: int
+    repeats: int
     within: float
 
     @property
@@ -82,13 +84,14 @@ class Tested:
         return np.asarray(self.trials.depth[self.kept])
 
     def chatter_hz(self) -> Array:
-        """Strongest frequency (n,), Hz, of the tip off the orders of the spindle; NaN where it is stable."""
+        """Strongest frequency (n,), Hz, of the tip off what repeats without chatter; NaN where it is stable."""
         found = np.full(len(self.kept), np.nan)
         for i in np.flatnonzero(self.unstable):
             tip = self.history.tip[self.kept[i], -_LAST * self.per_turn :]
             spectrum = np.abs(np.fft.rfft(tip * np.hanning(len(tip))[:, None], axis=0)).sum(axis=1)
             order = np.arange(len(spectrum)) / _LAST
-            spectrum[np.abs(order - np.round(order)) < 2.5 / _LAST] = 0.0
+            kept = self.repeats * np.round(order / self.repeats)
+            spectrum[np.abs(order - kept) < 2.5 / _LAST] = 0.0
             found[i] = order[spectrum.argmax()] * self.rpm[i] / 60.0
         return found
 
@@ -105,7 +108,8 @@ def cut_tests(
     rpm, depth = (a.ravel() for a in np.meshgrid(programme.rpm, programme.depths, indexing="ij"))
     trials = machine.trials(rpm, depth, scatter=_SCATTER, entry=_ENTRY)
     history = march(trials, _TURNS, programme.per_turn, programme.seed)
-    last = history.tip[:, -_LAST * programme.per_turn :].reshape(len(rpm), _LAST, programme.per_turn, 2)
+    period = programme.per_turn // machine.repeats
+    last = history.tip[:, -_LAST * programme.per_turn :].reshape(len(rpm), -1, period, 2)
     unstable = np.ptp(last, axis=1).max(axis=(1, 2)) > _VISIBLE * machine.feed
     kept: list[int] = []
     within = 0
@@ -116,7 +120,8 @@ def cut_tests(
         kept += here[max(0, first - programme.beside) : first + programme.beside].tolist()
     places = np.array(kept)
     label = unstable[places] ^ _wrong(len(kept), machine.mislabelled, programme.seed)
-    return Tested(trials, history, places, label, programme.per_turn, within / len(programme.rpm))
+    share = within / len(programme.rpm)
+    return Tested(trials, history, places, label, programme.per_turn, machine.repeats, share)
 
 
 def _wrong(tests: int, share: float, seed: int) -> np.ndarray:

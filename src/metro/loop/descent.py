@@ -248,9 +248,8 @@ def _ways_down(blocks: Sequence[Block], system: System, *, own: bool, enough: fl
     if own or whole @ right < enough:
         return
     for damping in DAMPINGS:
-        share = 1.0 / (1.0 + damping)
         common = solution(normal + damping * np.diag(np.diag(normal)), right)
-        yield _Way(share, common, _by_run(blocks, [own_step(row, common) for row in system.rows], share))
+        yield _Way(1.0, common, _by_run(blocks, [own_step(row, common) for row in system.rows], share))
 
 
 def _by_run(blocks: Sequence[Block], steps: Sequence[Array], share: float) -> dict[str, Array]:

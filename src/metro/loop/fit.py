@@ -20,7 +20,6 @@ from metro.loop.descent import (
     ENOUGH,
     ITERATIONS,
     State,
-    ahead,
     condition,
     descend,
     free,
@@ -28,6 +27,7 @@ from metro.loop.descent import (
     linearised,
     normal_equations,
     polish,
+    solution,
 )
 from metro.loop.least_squares import least_squares
 from metro.loop.noise import Noise
@@ -41,6 +41,9 @@ ALIKE = 1e-9  # relative difference of the sums of squares of starts that are th
 UNDECIDED = 0.1  # differences in twice the log-likelihood that the noise, once known better, may turn round
 ROUNDS, SETTLED = 12, 0.2  # of noise estimation and descent; gain in twice the log-likelihood that ends them
 EM_STEPS = 8
+# Where a prediction is rough (a tool that yields leaves the cut and comes back) no step leads on down, although
+# derivatives promise one. An interval that is off by half a standard deviation holds the truth in 92 of 100.
+CONVERGED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,7 @@ class Fit:
     theta, beta : effect parameters (units of the contract), base parameters (SI).
     nuisance : each block's nonlinear unknowns, by run.
     covariance : of ``[beta, theta]``, for a dispersion of one.
-    ahead : what another step of the descent would gain in twice the log-likelihood; next to 0: converged.
+    step : by how much another step of the descent would move a parameter, in its standard deviation, at most.
     condition : of the whitened, scaled columns of base and effects; infinite: a parameter is not determined.
     log_likelihood : marginal, by run; ``chi2`` and ``elements``: whitened sum of squares and count, by run.
     """
@@ -63,7 +66,7 @@ class Fit:
     nuisance: Mapping[str, Array]
     noise: Noise
     covariance: Array
-    ahead: float
+    step: float
     condition: float
     log_likelihood: Mapping[str, float]
     chi2: Mapping[str, float]
@@ -77,8 +80,8 @@ class Fit:
 
     @property
     def converged(self) -> bool:
-        """Whether the descent ended where the likelihood is highest, to a fraction of its standard error."""
-        return self.ahead < UNDECIDED
+        """Whether the descent ended where the likelihood is highest, to what its interval would not show."""
+        return self.step < CONVERGED
 
     @property
     def total(self) -> float:
@@ -101,7 +104,7 @@ class _Told(NamedTuple):
     """What a linearisation at the end of a descent says of it; see :class:`Fit`."""
 
     covariance: Array
-    ahead: float
+    step: float
     condition: float
 
 
@@ -186,7 +189,7 @@ def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
         reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
         state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
     return _finished(
-        candidate, blocks, noise, state, _Told(fitted.covariance, fitted.ahead, fitted.condition)
+        candidate, blocks, noise, state, _Told(fitted.covariance, fitted.step, fitted.condition)
     )
 
 
@@ -279,7 +282,9 @@ def _told(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: St
     covariance *= np.outer(factor, factor)
     covariance[p:, p:] = alike[p:, p:]
     moving = free(candidate, state, right)
-    return _Told(covariance, ahead(normal[np.ix_(moving, moving)], right[moving]), condition(normal))
+    still, downhill = normal[np.ix_(moving, moving)], right[moving]
+    step = np.abs(solution(still, downhill)) / np.sqrt(np.diag(inverse(still)))
+    return _Told(covariance, float(step.max(initial=0.0)), condition(normal))
 
 
 def _reestimated(

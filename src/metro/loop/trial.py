@@ -16,11 +16,6 @@ from metro.loop.noise import Noise
 
 LEAST_BETTER = 0.4
 OF_THE_REST = 0.5  # an effect smaller than this share of what stays unexplained may be part of that
-
-
-# Gain in twice the log-likelihood that a step more promises, from which a fit is no result: a sixth of what
-# an effect must gain on left-out conditions. What ends a descent is a hundredth of that.
-SETTLED = 1.0
 UNLIKE = "no effect of the library, and it does not explain the rest either"
 
 
@@ -108,8 +103,8 @@ def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> 
 
 def unsettled(fitted: Fit) -> str:
     """Say why a fit is no result, if it is none: it did not converge, or tells no parameter of an effect."""
-    if fitted.ahead > SETTLED:
-        return f"its fit did not converge: a step more would gain {0.5 * fitted.ahead:.2g} in log-likelihood"
+    if not fitted.converged:
+        return f"its fit did not converge: a step more would move a parameter by {fitted.step:.2g} of its sd"
     told = np.isfinite(np.diag(fitted.covariance)[len(fitted.beta) :])
     blind = [effect for effect, place in fitted.candidate.parts(fitted.theta) if not told[place].any()]
     return "these runs do not determine its parameters" if blind else ""
