@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from metro.batch.canonical import write_parts
-from metro.batch.processed import COLUMNS, read_table
+from metro.batch.processed import COLUMNS, Processed, read_table
 
 
 @pytest.mark.parametrize("table", sorted(COLUMNS))
@@ -59,3 +59,15 @@ def test_a_whole_table_is_one_part(tmp_path):
     found = read_table(tmp_path / "t.parquet")
     assert found["pose"].tolist() == ["A", "B"]
     assert np.isnan(found["mxx"][1])
+
+
+def test_rows_of_a_run_come_in_the_pieces_that_were_written(tmp_path):
+    sizes = [("a", 3), ("b", 2), ("a", 1), ("c", 4)]
+    place = iter(range(100))
+    parts = [{"run": run, "x_mm": np.array([float(next(place)) for _ in range(n)])} for run, n in sizes]
+    write_parts(tmp_path / "scan.parquet", "scan", parts, {})
+    tables = Processed(tmp_path)
+    found = [piece["x_mm"].tolist() for piece in tables.pieces("scan", "a")]
+    assert [each for each in found if each] == [[0.0, 1.0, 2.0], [5.0]]
+    assert tables("scan", "a")["x_mm"].tolist() == [0.0, 1.0, 2.0, 5.0]
+    assert not sum(len(piece) for piece in tables.pieces("scan", "d"))

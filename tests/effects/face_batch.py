@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 from face_manifest import SIZE, manifest
+from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
 from metro.batch.processed import COLUMNS
@@ -116,7 +117,7 @@ def problem(hidden=nothing, work=None, *, factor=1.0, seed=1, placed=True, noise
         made["path"] = lambda: path(batch.runs.loc[run, "path"][0])
         return made[name]() if name in made else pd.DataFrame(columns=list(COLUMNS[name]))
 
-    task = flatness.problem(batch, flatness.observe(batch, read, {}), {})
+    task = flatness.problem(batch, flatness.observe(batch, FakeTables(read), {}), {})
     assert isinstance(task, Problem), task
     return task
 

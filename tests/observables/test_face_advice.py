@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
-from metro.batch.processed import COLUMNS, read_batch, read_table
+from metro.batch.processed import COLUMNS, Processed, read_batch
 from metro.observables import cutting_force, flatness
 from metro.observables.face_advice import after_loop, planned_points, planned_runs
+from metro.observables.face_repeats import cloud_of
 from metro.observables.face_scan import measured_run
 from metro.observables.face_study import study
 from metro.observables.problem import Refusal
@@ -75,7 +77,7 @@ def reader(tests):
         made = {"path": path, "loads": lambda: tests}
         return made[name]() if name in made else pd.DataFrame(columns=list(COLUMNS[name]))
 
-    return read
+    return FakeTables(read)
 
 
 def advised(batch, tests, systematic=flatness.SYSTEMATIC):
@@ -222,9 +224,7 @@ def test_faces_that_were_not_cut_rank_as_they_do_when_they_are(tmp_path):
         ingest(folder, ROOT / "config/cells", tmp_path / name, {}, "test")
     batch = read_batch(tmp_path / "plan")
     assert not (batch.runs["role"] != "").any()
-    observed = flatness.observe(
-        batch, lambda name, run=None: read_table(tmp_path / f"plan/{name}.parquet", run), {}
-    )
+    observed = flatness.observe(batch, Processed(tmp_path / "plan"), {})
     task = flatness.problem(batch, observed, {})
     rows = flatness.report(batch, observed, {}, task, base_fit(task, 0.007))["study"]["advice"][
         "configurations"
@@ -232,7 +232,7 @@ def test_faces_that_were_not_cut_rank_as_they_do_when_they_are(tmp_path):
 
     cut, none = read_batch(tmp_path / "cut"), pd.DataFrame(columns=list(COLUMNS["path"]))
     tables = [
-        measured_run(cut, run, read_table(tmp_path / "cut/scan.parquet", run), none)[0]["face_indices"]
+        measured_run(cut, run, cloud_of(Processed(tmp_path / "cut"), run), none)[0]["face_indices"]
         for run in cut.runs.index
     ]
     measured = {row["configuration"]: row for row in study(cut, pd.concat(tables), {})["ranking"]}

@@ -57,15 +57,15 @@ def test_side_faces_place_a_scan_and_are_taken_off_it():
     assert placed.method == "3-2-1"
     assert (placed.sd < 5e-6).all()
     inside = (top[:, :2] > 0.5e-3).all(axis=1)
-    assert np.abs(placed.cloud[:, :2] - top[inside, :2]).max() < 10e-6
-    assert placed.cloud[:, 2].min() > -1.1e-3
+    assert np.abs(placed.cloud[:][:, :2] - top[inside, :2]).max() < 10e-6
+    assert placed.cloud[:][:, 2].min() > -1.1e-3
     assert "sides x-, y-" in placed.remark
     assert "points of side faces and edges are left out" in placed.remark
 
 
 def test_a_face_placed_by_its_sides_has_its_own_heights_at_the_path_points():
     rng = np.random.default_rng(1)
-    scan = pd.DataFrame(away(np.vstack([face(rng), sides(rng)])) * 1e3, columns=["x_mm", "y_mm", "z_mm"])
+    scan = away(np.vstack([face(rng), sides(rng)]))
     tables, reason = measured_run(make_batch(sigma_mm=0.01), "r", scan, path_table())
     assert reason is None
     assert tables["face_placed"]["method"].tolist() == ["3-2-1"]
@@ -89,8 +89,7 @@ def test_without_sides_a_scan_on_the_outline_is_taken_as_it_lies():
 
 def test_a_lone_face_elsewhere_has_indices_and_says_what_to_scan():
     top = away(face(np.random.default_rng(3)))
-    scan = pd.DataFrame(top * 1e3, columns=["x_mm", "y_mm", "z_mm"])
-    tables, reason = measured_run(make_batch(sigma_mm=0.01), "r", scan, path_table())
+    tables, reason = measured_run(make_batch(sigma_mm=0.01), "r", top, path_table())
     assert "face_points" not in tables
     assert "face_indices" in tables
     assert "scan the top together with" in reason

@@ -1,6 +1,5 @@
 """Flatness of a batch: a synthetic face whose compliance is known, and the simulated one, end to end."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,9 +9,10 @@ import pandas as pd
 import pytest
 from cost import cost_ratio
 from face_manifest import SIZE, manifest
+from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
-from metro.batch.processed import COLUMNS, read_batch, read_table
+from metro.batch.processed import COLUMNS, Processed, read_batch
 from metro.observables import cutting_force, flatness
 from metro.observables.face_path import force_over_period, make_path, passages
 from metro.observables.flatness_model import FaceSetting
@@ -79,9 +79,7 @@ def make_batch(manifest: dict = MANIFEST, declared: float = 0.0) -> Batch:
     return Batch("plate", manifest, {"cell": "c"}, pd.DataFrame(rows).set_index("run"), {})
 
 
-def reader(
-    batch: Batch, along_x: bool = True, factor: float = 1.0, noise: float = 0.01
-) -> Callable[..., pd.DataFrame]:
+def reader(batch: Batch, along_x: bool = True, factor: float = 1.0, noise: float = 0.01) -> FakeTables:
     """Tables of a batch whose faces are the static deflection under the mean force, turned to the path."""
     rng = np.random.default_rng(5)
     values = cutting_force.coefficients(batch, {})
@@ -98,12 +96,10 @@ def reader(
         made = {"scan": lambda: scan(run), "path": lambda: path(along_x), "loads": loads}
         return made[name]() if name in made else pd.DataFrame(columns=list(COLUMNS[name]))
 
-    return read
+    return FakeTables(read)
 
 
-def observed_problem(
-    batch: Batch, read: Callable[..., pd.DataFrame]
-) -> tuple[dict[str, pd.DataFrame], Problem]:
+def observed_problem(batch: Batch, read: FakeTables) -> tuple[dict[str, pd.DataFrame], Problem]:
     observed = flatness.observe(batch, read, {})
     assert isinstance(observed, dict)
     task = flatness.problem(batch, observed, {})
@@ -219,7 +215,7 @@ def test_a_scan_that_lies_elsewhere_has_indices_but_is_not_paired() -> None:
         table = read(name, run)
         return table.assign(x_mm=table["x_mm"] + 500.0) if name == "scan" else table
 
-    observed = flatness.observe(batch, moved, {})
+    observed = flatness.observe(batch, FakeTables(moved), {})
     task = flatness.problem(batch, observed, {})
     assert isinstance(task, Refusal)
     assert "to_work" in task.reason
@@ -328,7 +324,7 @@ def test_the_simulated_plate_shows_how_stiff_the_arm_was_in_the_cut(tmp_path: Pa
 
     ingest(SIMULATED, ROOT / "config/cells", tmp_path / "p", {}, "test")
     batch = read_batch(tmp_path / "p")
-    _, task = observed_problem(batch, lambda name, run=None: read_table(tmp_path / f"p/{name}.parquet", run))
+    _, task = observed_problem(batch, Processed(tmp_path / "p"))
     assert all(isinstance(b.setting, FaceSetting) == (b.role != "calibrate") for b in task.blocks)
     misfit = {
         factor: sum(_misfit(task, factor, run) for run in ("r02", "r03", "r05", "r06"))

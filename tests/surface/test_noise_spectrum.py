@@ -73,7 +73,7 @@ def test_indices_do_not_depend_on(change: str, monkeypatch: pytest.MonkeyPatch) 
     elif change == "offset":
         points = points + 8192.0
     elif change == "chunks":
-        monkeypatch.setattr("metro.surface.cloud_passes.CHUNK", 1777)
+        monkeypatch.setattr("metro.surface.points.CHUNK", 1777)
     elif change == "float32":
         points = points.astype(np.float32)
     else:

@@ -84,7 +84,7 @@ class Tested:
         return np.asarray(self.trials.depth[self.kept])
 
     def chatter_hz(self) -> Array:
-        """Strongest frequency (n,), Hz, of the tip off what repeats without chatter; NaN where it is stable."""
+        """Strongest frequency (n,), Hz, of the tip, off what repeats anyway; NaN where it is stable."""
         found = np.full(len(self.kept), np.nan)
         for i in np.flatnonzero(self.unstable):
             tip = self.history.tip[self.kept[i], -_LAST * self.per_turn :]

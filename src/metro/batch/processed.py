@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import pandas as pd
 
@@ -88,6 +90,39 @@ def read_table(path: Path, run: str | None = None) -> pd.DataFrame:
     """Read a processed table, or the rows of one run of it."""
     filters = None if run is None else [("run", "==", run)]
     return pd.read_parquet(path, filters=filters)
+
+
+class Tables(Protocol):
+    """The canonical tables of a batch: called with a name, and perhaps a run, it returns their rows."""
+
+    def __call__(self, name: str, run: str | None = None) -> pd.DataFrame:
+        """Return a table, or the rows of one run of it."""
+
+    def pieces(self, name: str, run: str) -> Iterator[pd.DataFrame]:
+        """Yield the rows of one run of a table, some at a time."""
+
+
+@dataclass(frozen=True)
+class Processed:
+    """The canonical tables in the folder of a batch, :class:`Tables`."""
+
+    folder: Path
+
+    def __call__(self, name: str, run: str | None = None) -> pd.DataFrame:
+        """Return a table, or the rows of one run of it."""
+        return read_table(self.folder / f"{name}.parquet", run)
+
+    def pieces(self, name: str, run: str) -> Iterator[pd.DataFrame]:
+        """Yield the rows of one run of a table as ingest wrote them, a row group at a time."""
+        import pyarrow.parquet as pq
+
+        with pq.ParquetFile(self.folder / f"{name}.parquet", memory_map=False) as file:
+            place = file.schema_arrow.get_field_index("run")
+            for group in range(file.num_row_groups):
+                of = file.metadata.row_group(group).column(place).statistics
+                if of is None or of.min is None or of.min <= run <= of.max:
+                    table = file.read_row_group(group, use_threads=False).to_pandas()
+                    yield table[table["run"] == run]
 
 
 def write_batch(folder: Path, batch: Batch, provenance: Mapping[str, str]) -> None:

@@ -41,8 +41,8 @@ ALIKE = 1e-9  # relative difference of the sums of squares of starts that are th
 UNDECIDED = 0.1  # differences in twice the log-likelihood that the noise, once known better, may turn round
 ROUNDS, SETTLED = 12, 0.2  # of noise estimation and descent; gain in twice the log-likelihood that ends them
 EM_STEPS = 8
-# Where a prediction is rough (a tool that yields leaves the cut and comes back) no step leads on down, although
-# derivatives promise one. An interval that is off by half a standard deviation holds the truth in 92 of 100.
+# Where a prediction is rough (that of a tool too soft to be in balance) no step leads on down, although the
+# derivatives promise one. An interval that is off by half a deviation holds the truth in 92 cases of 100.
 CONVERGED = 0.5
 
 
@@ -188,9 +188,7 @@ def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
         near = _distinct(sorted(zip(costs, states, strict=True), key=lambda one: one[0]), ALIKE * min(costs))
         reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
         state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
-    return _finished(
-        candidate, blocks, noise, state, _Told(fitted.covariance, fitted.step, fitted.condition)
-    )
+    return _finished(candidate, blocks, noise, state, _Told(fitted.covariance, fitted.step, fitted.condition))
 
 
 def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.batch.batch import Batch
+from metro.surface.points import Points, box, changed
 from metro.surface.registration import register, see_block
 from metro.units import MM, UM, Array
 
@@ -25,13 +26,13 @@ class Placed:
     remark : what the report says of it; the reason, where the place is not known.
     """
 
-    cloud: Array
+    cloud: Points
     method: str
     sd: Array
     remark: str
 
 
-def place(batch: Batch, cloud: Array, path: Array | None) -> Placed:
+def place(batch: Batch, cloud: Points, path: Array | None) -> Placed:
     """Place a cloud (n, 3) m in the work frame; points of side faces are taken off it.
 
     Parameters
@@ -41,16 +42,16 @@ def place(batch: Batch, cloud: Array, path: Array | None) -> Placed:
     unknown = np.full(2, np.nan)
     size = (batch.manifest.get("work") or {}).get("size_mm")
     declared = "to_work" in batch.instrument("scanner")
-    if declared and (size is None or np.ptp(cloud[:, 2]) <= 2 * DEPTH):
+    if declared and (size is None or np.subtract(*box(cloud))[2] >= -2 * DEPTH):
         return Placed(cloud, "to_work", unknown, "")
     if size is None:
         return _as_it_lies(
             cloud, path, None, "its work has no size_mm, so no block can be sought in its scan"
         )
     block = see_block(cloud, np.array(size, float) * MM)
-    kept = block.on_top(cloud, DEPTH)
-    top = cloud if kept.all() else cloud[kept]
-    off = f"{np.count_nonzero(~kept)} points of side faces and edges are left out" if not kept.all() else ""
+    top = changed(cloud, lambda each: each[block.on_top(each, DEPTH)]) if block.has_sides else cloud
+    lost = len(cloud) - len(top)
+    off = f"{lost} points of side faces and edges are left out" if lost else ""
     if declared:
         return Placed(top, "to_work", unknown, off)
     try:
@@ -62,10 +63,10 @@ def place(batch: Batch, cloud: Array, path: Array | None) -> Placed:
     known = f"x is known to {u:.1f} um, y to {v:.1f} um, height and tilt are those of the face itself"
     remark = f"its scan is placed by its top and the sides {sides} ({found.method}): {known}"
     remark = f"{remark}; {off}" if off else remark
-    return Placed(found.apply(top), found.method, found.sd, remark)
+    return Placed(changed(top, found.apply), found.method, found.sd, remark)
 
 
-def _as_it_lies(cloud: Array, path: Array | None, size: list[float] | None, why: str) -> Placed:
+def _as_it_lies(cloud: Points, path: Array | None, size: list[float] | None, why: str) -> Placed:
     """Take a cloud whose outline is that of the work (its corner is the origin) as placed already."""
     unknown = np.full(2, np.nan)
     if size is not None:
@@ -74,7 +75,7 @@ def _as_it_lies(cloud: Array, path: Array | None, size: list[float] | None, why:
         low, high = path[:, :2].min(axis=0), path[:, :2].max(axis=0)
     else:
         return Placed(cloud, "", unknown, why)
-    misses = np.abs([cloud[:, :2].min(axis=0) - low, cloud[:, :2].max(axis=0) - high])
+    misses = np.abs([found[:2] - due for found, due in zip(box(cloud), (low, high), strict=True)])
     if misses.max() > WITHIN:
         reason = f"its scan does not lie on the work's outline (off by {misses.max() / MM:.3g} mm), and {why}"
         return Placed(cloud, "", unknown, f"instruments.scanner.to_work is not given, {reason}")

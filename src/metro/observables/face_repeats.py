@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
-import pandas as pd
-
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.surface.face import NESTING_INDEX
 from metro.surface.face_noise import Noise, repeat_noise
-from metro.units import MM, Array
+from metro.surface.points import Points, Spool
+from metro.units import MM
 
 
 def repeat_scans(batch: Batch) -> dict[str, tuple[str, ...]]:
@@ -38,18 +38,21 @@ def scanned_again(batch: Batch, run: str) -> bool:
     return run != first
 
 
-def noise_by_repeats(batch: Batch, read: Callable[..., pd.DataFrame]) -> Callable[[str], Noise | str | None]:
+def cloud_of(read: Tables, run: str) -> Points:
+    """Return the scan of a run, (n, 3) m, read piece by piece."""
+    pieces = read.pieces("scan", run)
+    return Spool(piece[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM for piece in pieces)
+
+
+def noise_by_repeats(batch: Batch, read: Tables) -> Callable[[str], Noise | str | None]:
     """Return a function of the run: the noise by repeat scans, why they tell none, or None without them."""
     groups = repeat_scans(batch)
     nesting = float(batch.instrument("scanner").get("nesting_index_mm", NESTING_INDEX / MM)) * MM
 
     @cache
     def of_group(runs: tuple[str, ...]) -> Noise | str:
-        clouds: list[Array] = [
-            read("scan", run)[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM for run in runs
-        ]
         try:
-            return repeat_noise(clouds, nesting)
+            return repeat_noise([cloud_of(read, run) for run in runs], nesting)
         except ValueError as error:
             return f"its repeat scans tell no noise: {error}"
 

@@ -11,6 +11,7 @@ from metro.observables.face_placing import Placed, place
 from metro.surface.face import NESTING_INDEX, Face, measure_face
 from metro.surface.face_noise import Noise
 from metro.surface.footprint import RADIUS, sample
+from metro.surface.points import Points, box
 from metro.units import JSON, MM, UM, Array
 
 MAP_CELLS = 60
@@ -43,17 +44,16 @@ FACE_TABLES: dict[str, tuple[str, ...]] = {
 
 
 def measured_run(
-    batch: Batch, run: str, scan: pd.DataFrame, path: pd.DataFrame, repeats: Noise | None = None
+    batch: Batch, run: str, cloud: Points, path: pd.DataFrame, repeats: Noise | None = None
 ) -> tuple[dict[str, pd.DataFrame], str | None]:
-    """Return the tables of one face, and why some are lacking.
+    """Return the tables of one face by its ``cloud`` (n, 3), m, and why some are lacking.
 
     Without a path or a place in the work frame there are indices and a map only. ``repeats``: noise by more
     scans of the face.
     """
-    cloud = scan[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
     if not len(cloud):
         return {}, "its scan holds no points"
-    step = float(np.spacing(np.float32(np.abs(cloud).max())))
+    step = float(np.spacing(np.float32(np.abs(box(cloud)).max())))
     points = path[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
     placed = place(batch, cloud, points if len(points) else None)
     cloud = placed.cloud
@@ -74,11 +74,11 @@ def measured_run(
         return tables, "it has no path file, so its face cannot be paired with a prediction"
     if not placed.method:
         return tables, placed.remark
-    tables["face_points"] = _points(run, cloud[~face.rejected], path, points)
+    tables["face_points"] = _points(run, cloud, face.outliers, path, points)
     aside = beside(path, RADIUS)
     if len(aside):
         at = aside[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
-        tables["face_beside"] = _points(run, cloud[~face.rejected], aside, at)
+        tables["face_beside"] = _points(run, cloud, face.outliers, aside, at)
     return tables, None
 
 
@@ -136,9 +136,9 @@ def _map(run: str, points: Array, deviations: Array) -> pd.DataFrame:
     )
 
 
-def _points(run: str, cloud: Array, path: pd.DataFrame, points: Array) -> pd.DataFrame:
+def _points(run: str, cloud: Points, outliers: np.ndarray, path: pd.DataFrame, points: Array) -> pd.DataFrame:
     """Heights in the discs of the path points; standard errors allow for noise correlated over a disc."""
-    found = sample(cloud, points[:, 0], points[:, 1])
+    found = sample(cloud, points[:, 0], points[:, 1], without=outliers)
     number = path["pass"].to_numpy()
     step = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(number) == 0)
     alone = found.sd / np.sqrt(np.maximum(found.count, 1))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.observables import cutting_force
 from metro.observables.face_advice import advice, planned_points, studied
 from metro.observables.face_blocks import (
@@ -20,7 +21,7 @@ from metro.observables.face_blocks import (
 )
 from metro.observables.face_dynamics import tip_block
 from metro.observables.face_pairing import paired
-from metro.observables.face_repeats import noise_by_repeats, scanned_again
+from metro.observables.face_repeats import cloud_of, noise_by_repeats, scanned_again
 from metro.observables.face_scan import FACE_TABLES, measured_run
 from metro.observables.flatness_model import FlatnessModel
 from metro.observables.problem import BaseFit, Problem, Refusal
@@ -34,10 +35,8 @@ OBSERVABLE = "flatness"
 SCATTER = 0.02
 SYSTEMATIC = 0.02  # of the mean force, which the coefficients and the load cells share among all runs
 
-Read = Callable[..., pd.DataFrame]
 
-
-def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
+def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Measure each scanned face: indices, deviation map, heights at the path points; and keep the load tests.
 
     Tables ``face_indices``, ``face_map``, ``face_points``, ``face_beside``, ``face_loads``, ``face_mass``,
@@ -55,7 +54,7 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
         # another scan of a face is no second piece of evidence on how it was cut
         path = path.iloc[:0] if scanned_again(batch, run) else path
         repeats = noise if isinstance(noise, Noise) else None
-        tables, reason = measured_run(batch, run, read("scan", run), path, repeats)
+        tables, reason = measured_run(batch, run, cloud_of(read, run), path, repeats)
         for name, table in tables.items():
             parts[name].append(table)
         refused += [(run, why) for why in (reason, noise) if isinstance(why, str)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -11,7 +10,7 @@ import pandas as pd
 from metro import __version__
 from metro.batch.batch import Batch
 from metro.batch.layout import OBSERVED
-from metro.batch.processed import read_batch, read_table, write_json, write_table
+from metro.batch.processed import Processed, read_batch, write_json, write_table
 from metro.loop.candidate import Candidate
 from metro.loop.fit import fit
 from metro.loop.noise import first_noise
@@ -30,7 +29,7 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
     ``settings``: ``model_form_budget``.
     """
     batch = read_batch(processed)
-    read = partial(_read, processed)
+    read = Processed(processed)
     identified: JSON = {"format": 1, "batch": batch.name, "metro": __version__}
     lacking: JSON = {}
     observed: dict[str, pd.DataFrame] = {}
@@ -55,10 +54,6 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
     observed |= {} if isinstance(feedback, Refusal) else {"yielding": feedback}
     _write(processed, batch, observed, {"code": code, "settings": json.dumps(settings, sort_keys=True)})
     write_json(processed / "identified.json", {**identified, "not_identified": lacking})
-
-
-def _read(processed: Path, name: str, run: str | None = None) -> pd.DataFrame:
-    return read_table(processed / f"{name}.parquet", run)
 
 
 def base_fit(task: Problem, budget: float) -> BaseFit | None:

@@ -9,32 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from metro.surface.areal import CellSums, Grid, Readings
 from metro.surface.indices import PERCENTILES, log_mean_floor
 from metro.surface.plane import Moments, Plane, moments_of_columns
+from metro.surface.points import Points, slices
 from metro.units import Array
 
-CHUNK = 1 << 16
-SAMPLE = (
-    250_000  # points that stand for all: the median of their residuals is known to a quarter of a per cent
-)
+SAMPLE = 60_000  # points that stand for all: the median of their residuals is known to half a per cent
 SUSPECT = 2.5  # robust deviations beyond which a point is looked at again
 TAIL = 1.0  # per cent of the points at either end that are kept for the percentiles
-
-
-class Points(Protocol):
-    """Rows of x, y, z that can be sliced again and again: an array, or a file that is read on demand."""
-
-    def __len__(self) -> int:
-        """Return the number of points."""
-
-    def __getitem__(self, rows: slice, /) -> npt.NDArray[np.floating]:
-        """Return some of the points, (k, 3)."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +45,6 @@ class Residuals:
     place: np.ndarray
     coordinates: Array
     sound: Moments
-
-
-def slices(points: Points) -> Iterator[tuple[int, Array]]:
-    """Give the place of the first point of each slice, and x, y, z of the slice as columns (3, k)."""
-    for start in range(0, len(points), CHUNK):
-        yield start, np.array(points[start : start + CHUNK].T, dtype=np.float64, order="C")
 
 
 def survey(points: Points) -> Survey:

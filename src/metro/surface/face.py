@@ -18,7 +18,6 @@ from metro.surface.areal import (
     residual_share,
 )
 from metro.surface.cloud_passes import (
-    Points,
     Residuals,
     Survey,
     box_in_plane,
@@ -34,6 +33,7 @@ from metro.surface.minimum_zone import MinimumZone, minimum_zone
 from metro.surface.noise import noise_bias, shrink
 from metro.surface.noise_spectrum import CORRELATION
 from metro.surface.plane import Plane, fit_plane, moments_of_columns, plane_of_moments
+from metro.surface.points import Points
 from metro.surface.under_noise import corrected
 from metro.units import MM, Array
 
@@ -86,13 +86,6 @@ class Face:
     def sigma_source(self) -> str:
         """Where the noise of one point comes from, in words."""
         return self.noise.source
-
-    @property
-    def rejected(self) -> np.ndarray:
-        """Mask (n,) of the points that stand out of their surroundings."""
-        mask = np.zeros(self.scanned, dtype=bool)
-        mask[self.outliers] = True
-        return mask
 
     @property
     def crop_holds(self) -> bool:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.surface.areal import cell_size, crop_margin, interior, make_grid, point_spacing
-from metro.surface.cloud_passes import Points, box_in_plane, cell_sums, survey
+from metro.surface.cloud_passes import box_in_plane, cell_sums, survey
 from metro.surface.noise import repeat_sigma
 from metro.surface.noise_spectrum import BAND, Spectrum, assumed, difference_spectrum
 from metro.surface.plane import plane_of_moments
+from metro.surface.points import Points
 from metro.units import MM, UM, Array
 
 PITCHES = 6  # least nesting index of the filter

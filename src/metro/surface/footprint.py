@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from metro.surface.points import Points, slices
 from metro.units import MM, Array
 
 RADIUS = 1.5 * MM
@@ -26,33 +27,88 @@ class Footprint:
     coverage: Array
 
 
-def sample(cloud: Array, x: Array, y: Array, radius: float = RADIUS) -> Footprint:
+def sample(
+    cloud: Points, x: Array, y: Array, radius: float = RADIUS, without: np.ndarray | None = None
+) -> Footprint:
     """Sample ``cloud`` (m, 3) in discs of ``radius`` about points ``x``, ``y`` (n,), all in one unit.
 
     A disc's tilt is taken out of its standard deviation, which is that of noise about the local plane in x
     and y.
+
+    Parameters
+    ----------
+    without : places of points that do not count, ascending.
     """
-    disc, point = pairs_within(cloud, x, y, radius)
-    u, v, z = cloud[point, 0] - x[disc], cloud[point, 1] - y[disc], cloud[point, 2]
-
-    def total(values: Array | None = None) -> Array:
-        return np.bincount(disc, weights=values, minlength=len(x)).astype(np.float64)
-
-    count = total()
-    enough = count >= LEAST_POINTS
-    safe = np.maximum(count, 1)
-    mean = total(z) / safe
-    rest = z - mean[disc]
-    for across in (u, v):  # in a full disc u and v are orthogonal to each other
-        centred = across - (total(across) / safe)[disc]
-        slope = total(centred * rest) / np.maximum(total(centred**2), np.finfo(float).tiny)
-        rest = rest - slope[disc] * centred
-    sd = np.sqrt(total(rest**2) / np.maximum(count - 3, 1))
-    sector = ((np.arctan2(v, u) + np.pi) * (4 / np.pi)).astype(np.intp) % 8
-    seen = np.bincount(np.unique(disc * 8 + sector) // 8, minlength=len(x)) / 8
+    discs = _Discs.empty(len(x))
+    for start, xyz in slices(cloud):
+        points = xyz.T
+        if without is not None:
+            first, last = np.searchsorted(without, [start, start + len(points)])
+            points = np.delete(points, without[first:last] - start, axis=0)
+        discs = discs.merge(_of_slice(points, x, y, radius))
+    enough, safe = discs.count >= LEAST_POINTS, np.maximum(discs.count - 3, 1)
+    sd = np.sqrt(np.maximum(discs.about_plane(), 0.0) / safe)
     return Footprint(
-        np.where(enough, mean, np.nan), count.astype(np.intp), np.where(enough, sd, np.nan), seen
+        np.where(enough, discs.mean[:, 2], np.nan),
+        discs.count.astype(np.intp),
+        np.where(enough, sd, np.nan),
+        discs.sector.mean(axis=1),
     )
+
+
+@dataclass(frozen=True)
+class _Discs:
+    """Count (n,), mean (n, 3) and scatter (n, 3, 3) of u, v, z in discs, and their sectors seen (n, 8)."""
+
+    count: Array
+    mean: Array
+    scatter: Array
+    sector: np.ndarray
+
+    @classmethod
+    def empty(cls, n: int) -> _Discs:
+        return cls(np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 8), dtype=bool))
+
+    def merge(self, other: _Discs) -> _Discs:
+        """Return both together, as :meth:`metro.surface.plane.Moments.merge`."""
+        count = self.count + other.count
+        share = other.count / np.maximum(count, 1.0)
+        step = other.mean - self.mean
+        between = step[:, :, None] * step[:, None, :] * (self.count * share)[:, None, None]
+        return _Discs(
+            count,
+            self.mean + step * share[:, None],
+            self.scatter + other.scatter + between,
+            self.sector | other.sector,
+        )
+
+    def about_plane(self) -> Array:
+        """Sum (n,) of squares of z about the plane in u and v, which a full disc has orthogonal."""
+        uu, vv, zz, uv, uz, vz = (
+            self.scatter[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+        )
+        tiny = np.finfo(float).tiny
+        along_u = uz / np.maximum(uu, tiny)
+        along_v = (vz - along_u * uv) / np.maximum(vv, tiny)
+        return np.asarray(zz - along_u * uz - along_v * (vz - along_u * uv))
+
+
+def _of_slice(points: Array, x: Array, y: Array, radius: float) -> _Discs:
+    disc, point = pairs_within(points, x, y, radius)
+    n = len(x)
+    coordinates = np.stack([points[point, 0] - x[disc], points[point, 1] - y[disc], points[point, 2]])
+
+    def total(values: Array) -> Array:
+        return np.bincount(disc, weights=values, minlength=n).astype(np.float64)
+
+    count = np.bincount(disc, minlength=n).astype(np.float64)
+    mean = np.stack([total(each) for each in coordinates], axis=1) / np.maximum(count, 1.0)[:, None]
+    rest = coordinates - mean[disc].T
+    scatter = np.stack([[total(a * b) for b in rest] for a in rest]).transpose(2, 0, 1)
+    angle = np.arctan2(coordinates[1], coordinates[0])
+    sector = np.zeros((n, 8), dtype=bool)
+    sector[disc, ((angle + np.pi) * (4 / np.pi)).astype(np.intp) % 8] = True
+    return _Discs(count, mean, scatter, sector)
 
 
 def pairs_within(cloud: Array, x: Array, y: Array, radius: float) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,6 @@ import numpy as np
 
 from metro.units import MM, Array
 
-MOST_POINTS = 2_000_000  # of a larger cloud so many are drawn: a face's noise is averaged out long before
 CELL = 6.0  # pitches across a cell
 LEAST_POINTS = 10
 NARROW = 0.1  # least second over largest spread (variance) of a patch: not a line
@@ -40,8 +39,6 @@ class Patches:
 
 def find_patches(points: Array, pitch: float) -> Patches:
     """Part ``points`` (n, 3) into cubic cells of six ``pitch``, at least 1 mm, and keep the flat ones."""
-    if len(points) > MOST_POINTS:
-        points = points[np.random.default_rng(0).choice(len(points), MOST_POINTS, replace=False)]
     cell = max(CELL * pitch, MM)
     corner = points.min(axis=0)
     number = ((points - corner) / cell).astype(np.int64)

@@ -16,8 +16,10 @@ from typing import Literal
 import numpy as np
 
 from metro.surface.patches import Patches, block_faces, find_patches
+from metro.surface.points import Points, drawn
 from metro.units import MM, UM, Array
 
+MOST_POINTS = 2_000_000  # of a larger cloud so many are drawn: a face's noise is averaged out long before
 ENOUGH = 20  # patches of a side that carry a datum of their own
 FEWEST = 6  # patches of a side: fewer may be a burr or a clamp
 CONDITION = 1e-6  # of the normal equations with lengths over half the diagonal; a lone face has about 1e-16
@@ -62,13 +64,18 @@ class Block:
     high: Array
     pitch: float
 
+    @property
+    def has_sides(self) -> bool:
+        """Whether more is seen than the top alone."""
+        return "z+" in self.faces and len(self.faces) > 1
+
     def on_top(self, points: Array, depth: float) -> np.ndarray:
         """Mask (n,) of the points within ``depth`` of the top's plane; of all, where no side is seen.
 
         Those nearer than half of it to a side are left out: they are of the side, or of the edge.
         """
         kept = np.ones(len(points), dtype=bool)
-        if "z+" not in self.faces or len(self.faces) == 1:
+        if not self.has_sides:
             return kept
         for name, face in self.faces.items():
             centre, normal = _plane(face, "xyz".index(name[0]))
@@ -78,11 +85,12 @@ class Block:
         return kept
 
 
-def see_block(points: Array, size: Array) -> Block:
+def see_block(points: Points, size: Array) -> Block:
     """Find the faces of a block of ``size`` (3,) in a cloud (n, 3) whose axes lie about along the work's."""
     pitch = float(np.sqrt(size[0] * size[1] / len(points)))
-    low, high = np.percentile(points, [0.5, 99.5], axis=0)
-    faces = block_faces(find_patches(points, pitch), (low + high) / 2)
+    some = drawn(points, MOST_POINTS)
+    low, high = np.percentile(some, [0.5, 99.5], axis=0)
+    faces = block_faces(find_patches(some, pitch), (low + high) / 2)
     return Block(faces, low, high, pitch)
 
 

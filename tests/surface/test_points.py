@@ -1,0 +1,72 @@
+"""Clouds in slices: what is spooled, changed, drawn and sampled piece by piece is what it is in one piece."""
+
+import numpy as np
+import pytest
+
+from metro.surface import points as room
+from metro.surface.face import measure_face
+from metro.surface.footprint import sample
+from metro.surface.points import Spool, box, changed, drawn
+
+CLOUD = np.random.default_rng(3).normal(size=(1000, 3))
+
+
+def pieces(cloud, *cuts):
+    return (each for each in np.split(cloud, cuts))
+
+
+@pytest.mark.parametrize("in_memory", [10, 10_000])
+def test_a_spooled_cloud_is_read_as_it_was_written(monkeypatch, in_memory):
+    monkeypatch.setattr(room, "IN_MEMORY", in_memory)
+    spool = Spool(pieces(CLOUD, 1, 400, 400))
+    assert len(spool) == 1000
+    for rows in (slice(None), slice(390, 410), slice(998, 2000), slice(5, 5)):
+        np.testing.assert_array_equal(spool[rows], CLOUD[rows])
+
+
+def test_points_are_moved_and_left_out_slice_by_slice(monkeypatch):
+    monkeypatch.setattr(room, "CHUNK", 64)
+    found = changed(Spool([CLOUD]), lambda each: 2.0 * each[each[:, 2] > 0.0])
+    np.testing.assert_array_equal(found[:], 2.0 * CLOUD[CLOUD[:, 2] > 0.0])
+    np.testing.assert_array_equal(box(found), [found[:].min(axis=0), found[:].max(axis=0)])
+    assert np.isinf(box(Spool([]))).all()
+
+
+def test_of_a_large_cloud_so_many_points_are_drawn_each_once(monkeypatch):
+    monkeypatch.setattr(room, "CHUNK", 64)
+    np.testing.assert_array_equal(drawn(CLOUD, 1000), CLOUD)
+    found = drawn(Spool([CLOUD]), 300)
+    assert len(np.unique(found[:, 0])) == 300
+    assert np.isin(found[:, 0], CLOUD[:, 0]).all()
+    np.testing.assert_array_equal(found, drawn(CLOUD, 300))
+
+
+def test_a_face_and_its_footprints_do_not_depend_on_the_slices(monkeypatch):
+    rng = np.random.default_rng(4)
+    x, y = (c.ravel() for c in np.meshgrid(np.arange(0, 0.06, 2e-4), np.arange(0, 0.04, 2e-4)))
+    cloud = np.column_stack([x, y, 5.0 + 0.01 * x + 3e-5 * np.sin(200 * x) + rng.normal(0, 1e-5, x.size)])
+    at, gone = rng.uniform(0.0, [[0.06], [0.04]], (2, 200)), np.array([0, 700, 701, 30_000])
+    whole, seen = measure_face(cloud), sample(np.delete(cloud, gone, axis=0), *at)
+    monkeypatch.setattr(room, "CHUNK", 1000)
+    monkeypatch.setattr(room, "IN_MEMORY", 500)
+    spool = Spool(pieces(cloud, 11, 20_000))
+    for name, index in measure_face(spool).indices.items():
+        assert index.value == pytest.approx(whole.indices[name].value, rel=1e-9), name
+    found = sample(spool, *at, without=gone)
+    np.testing.assert_array_equal(found.count, seen.count)
+    np.testing.assert_array_equal(found.coverage, seen.coverage)
+    np.testing.assert_allclose(found.height, seen.height, rtol=1e-14)
+    np.testing.assert_allclose(found.sd, seen.sd, rtol=1e-6)
+
+
+def test_the_deviation_in_a_disc_is_that_of_a_fit_of_one_slope_after_the_other():
+    rng = np.random.default_rng(5)
+    points = rng.uniform(-1.0, 1.0, (400, 3)) * [1.0, 1.0, 0.01] + [0.0, 0.0, 7.0]
+    points[:, 2] += 0.2 * points[:, 0] - 0.1 * points[:, 1]
+    inside = points[np.hypot(*points[:, :2].T) <= 1.0]
+    rest = inside[:, 2] - inside[:, 2].mean()
+    for across in inside[:, :2].T:
+        centred = across - across.mean()
+        rest = rest - (centred @ rest) / (centred @ centred) * centred
+    found = sample(points, np.zeros(1), np.zeros(1), 1.0)
+    assert found.sd[0] == pytest.approx(np.sqrt(rest @ rest / (len(inside) - 3)), rel=1e-9)
