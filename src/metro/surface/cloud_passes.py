@@ -106,7 +106,7 @@ def residuals(points: Points, plane: Plane, grid: Grid, smooth: Array, inside: n
         cells = grid.cells(uvw[0], uvw[1])
         residual = np.abs(uvw[2] - smooth.take(cells))
         some = slice(-start % stride, None, stride)
-        sampled.append((cells[some], uvw[2, some]))
+        sampled.append((cells[some].copy(), uvw[2, some].copy()))  # views would keep the whole slice
         least = SUSPECT * 1.4826 * float(np.median(residual[some])) if len(residual[some]) else 0.0
         odd = residual > least
         at = np.flatnonzero(odd)
