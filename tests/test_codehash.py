@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from metro import codehash
+from metro import codehash, syntax
 
 FILES = {
     "__init__.py": "",
@@ -27,6 +27,22 @@ FILES = {
 }
 
 
+@pytest.fixture(autouse=True)
+def cache(tmp_path_factory, monkeypatch):
+    """Return the folder in which syntax is kept: an empty one."""
+    folder = tmp_path_factory.mktemp("cache")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    forget()
+    yield folder
+    forget()
+
+
+def forget():
+    """Be as a process that has just begun."""
+    for known in (syntax.of_file, syntax._known, syntax._kept):
+        known.cache_clear()
+
+
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     """Return a package of a few modules in which the hash looks for its stages."""
@@ -34,7 +50,6 @@ def package(tmp_path, monkeypatch):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     monkeypatch.setattr(codehash, "ROOT", tmp_path)
-    codehash._module.cache_clear()
     return tmp_path
 
 
@@ -43,7 +58,7 @@ def changed(package, name, text, stage="weigh"):
     before = codehash.code_hash(stage)
     (package / name).parent.mkdir(parents=True, exist_ok=True)
     (package / name).write_text(text)
-    codehash._module.cache_clear()
+    forget()
     return codehash.code_hash(stage) != before
 
 
@@ -130,18 +145,51 @@ def real_stages():
     ]
 
 
-def test_all_stages_of_the_package_are_hashed_with_each_module_read_once(monkeypatch):
+def parsed(monkeypatch):
+    """Return a list that every source that is parsed is added to."""
     read, parse = [], ast.parse
 
     def counted(source, *args, **kwargs):
         read.append(source)
         return parse(source, *args, **kwargs)
 
-    monkeypatch.setattr(codehash.ast, "parse", counted)
-    codehash._module.cache_clear()
+    monkeypatch.setattr(syntax.ast, "parse", counted)
+    return read
+
+
+def test_all_stages_of_the_package_are_hashed_with_each_module_read_once(monkeypatch):
+    read = parsed(monkeypatch)
     hashes = {stage: codehash.code_hash(stage) for stage in real_stages()}
     assert 50 < len(read) <= len(list(Path(codehash.__file__).parent.rglob("*.py")))
     assert len(set(hashes.values())) == len(hashes)
+
+
+def test_the_next_call_parses_what_changed_and_nothing_else(package, monkeypatch):
+    first, read = codehash.code_hash("weigh"), parsed(monkeypatch)
+    forget()
+    assert codehash.code_hash("weigh") == first
+    assert read == []
+    assert changed(package, "units.py", "MM = 2e-3\n")
+    assert read == [b"MM = 2e-3\n"]
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"3.11 a": 1}', '{"3.11 a": ["b", [["c"]]]}'])
+def test_a_damaged_cache_is_written_anew(package, cache, text):
+    first = codehash.code_hash("weigh")
+    kept = cache / "metro/syntax.json"
+    whole = kept.read_bytes()
+    kept.write_text(text)
+    forget()
+    assert codehash.code_hash("weigh") == first
+    assert kept.read_bytes() == whole
+
+
+def test_without_a_place_for_the_cache_the_hash_is_the_same(package, cache, monkeypatch):
+    first = codehash.code_hash("weigh")
+    (cache / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache / "file"))
+    forget()
+    assert codehash.code_hash("weigh") == first
 
 
 def test_hashing_all_stages_costs_no_more_than_parsing_the_package_twice():

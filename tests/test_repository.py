@@ -18,7 +18,8 @@ BASE = {"units", "__init__"}
 ROOMS = {
     "units": set(),
     "__init__": set(),
-    "codehash": set(),
+    "syntax": set(),
+    "codehash": {"syntax"},
     "structure": set(),
     "formats": set(),
     "batch": {"formats"},

@@ -7,18 +7,15 @@ inside the package. Comments, layout and docstrings are not in the tree that is 
 
 from __future__ import annotations
 
-import ast
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 
+from metro import syntax
+
 ROOT = Path(__file__).parent
 PACKAGE = "metro"
-IMPORTS = (ast.Import, ast.ImportFrom)
-DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 PLUGINS = "metro.effects"  # finds its modules by itself, so that no import statement names them
 
 
@@ -46,11 +43,12 @@ def code_hash(stage: str) -> str:
     if _file(start) is None:
         raise FileNotFoundError(f"no stage {stage!r}: {PACKAGE}/stages/{stage}.py is not there")
     modules = imported_modules(start)
-    parts = [f"{name} {_module(path).digest}" for name, path in sorted(modules.items())]
+    parts = [f"{name} {syntax.of_file(path).digest}" for name, path in sorted(modules.items())]
     folders = sorted({path.parent for path in modules.values()})
     parts += [f"{path.relative_to(ROOT)} {_sha256(path.read_bytes())}" for path in _data_files(folders)]
     if PLUGINS in modules:
         parts += _installed_plugins()
+    syntax.remember()
     return _sha256("\n".join(parts).encode())
 
 
@@ -88,36 +86,13 @@ def imported_modules(start: str) -> dict[str, Path]:
     return found
 
 
-@dataclass(frozen=True)
-class _Module:
-    """A module's syntax, without its docstrings, as a hash; and what it imports, as written."""
-
-    digest: str
-    imports: tuple[ast.Import | ast.ImportFrom, ...]
-
-
-@cache
-def _module(path: Path) -> _Module:
-    tree = ast.parse(path.read_bytes(), filename=str(path))
-    imports = []
-    for node in ast.walk(tree):
-        if isinstance(node, IMPORTS):
-            imports.append(node)
-        elif isinstance(node, DOCUMENTED):
-            del node.body[: int(ast.get_docstring(node, clean=False) is not None)]
-    return _Module(_sha256(ast.dump(tree).encode()), tuple(imports))
-
-
 def _imports(path: Path, name: str) -> Iterator[str]:
     """Yield every dotted name that a module may be importing, modules and attributes alike."""
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
-    for node in _module(path).imports:
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        else:
-            above = package[: len(package) + 1 - node.level] if node.level else []
-            source = ".".join([*above, *([node.module] if node.module else [])])
-            yield from (source, *(f"{source}.{alias.name}" for alias in node.names))
+    for level, module, names in syntax.of_file(path).imports:
+        above = package[: len(package) + 1 - level] if level else []
+        source = ".".join([*above, *([module] if module else [])])
+        yield from (source, *(f"{source}.{name}" for name in names))
 
 
 def _parents(name: str) -> Iterator[str]:

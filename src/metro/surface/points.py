@@ -30,7 +30,7 @@ class Spool:
     """Points that were given piece by piece, kept in memory while they are few, else on disk."""
 
     def __init__(self, pieces: Iterable[Array]) -> None:
-        self._file = tempfile.SpooledTemporaryFile(max_size=IN_MEMORY * _ROW.itemsize)  # noqa: SIM115
+        self._file = _nameless()
         self._count = 0
         for piece in pieces:
             self._file.write(np.ascontiguousarray(piece, dtype=np.float64).tobytes())
@@ -45,6 +45,11 @@ class Spool:
         first, last, _ = rows.indices(self._count)
         self._file.seek(first * _ROW.itemsize)
         return np.frombuffer(self._file.read(max(last - first, 0) * _ROW.itemsize)).reshape(-1, 3)
+
+
+def _nameless() -> tempfile.SpooledTemporaryFile[bytes]:
+    """Open a file that is closed, and gone, with the cloud that holds it."""
+    return tempfile.SpooledTemporaryFile(max_size=IN_MEMORY * _ROW.itemsize)
 
 
 def slices(points: Points) -> Iterator[tuple[int, Array]]:
