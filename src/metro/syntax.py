@@ -1,7 +1,7 @@
 """What counts of a module's source: its syntax without docstrings, as a hash, and what it imports.
 
-Parsing the package takes a second, which every call of the workflow and every job would pay: what was found is
-kept in the user's cache folder by the content of the file.
+Parsing the package takes a second, which every call of the workflow and every job would pay: what was found
+is kept in the user's cache folder by the content of the file.
 """
 
 from __future__ import annotations
