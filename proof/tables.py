@@ -101,7 +101,9 @@ def _demand(demand: Demand | None, unit: str) -> str:
 def _met(figure: Figure) -> str:
     if figure.demand is None:
         return ""
-    return {None: "no case", True: "yes", False: "NO"}[figure.met]
+    if figure.met is None:
+        return "no case"
+    return "yes" if figure.met else "NO" if figure.missed_for_sure else "no, within chance"
 
 
 def _statuses(scores: Sequence[Score]) -> Table:

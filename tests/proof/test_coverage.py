@@ -5,6 +5,8 @@ import pytest
 
 from metro.batch.batch import Batch
 from proof.coverage import Interval, identifiable, identified, intervals, table
+from proof.statistics import Demand, share
+from proof.tables import tabulated
 
 
 def quantity(value, half):
@@ -54,7 +56,7 @@ def test_the_table_has_the_share_of_all_and_of_each_coefficient():
     ]
     rows = table(found, "waveform").rows
     assert [row[1] for row in rows] == ["83.3 %", "75.0 %", "100.0 %"]
-    assert [row[-1] for row in rows] == ["NO", "", ""]
+    assert [row[-1] for row in rows] == ["no, within chance", "", ""]
     assert [row[3] for row in rows] == ["6", "4", "2"]
 
 
@@ -63,3 +65,12 @@ def test_a_batch_that_hides_nothing_has_its_coefficients_near_the_truth():
     found = identified(7, "a")
     assert {one.way for one in found} == {"waveform", "mean"}
     assert all(abs(one.error) < 0.05 for one in found if one.way == "waveform")
+
+
+def test_a_demand_that_is_missed_by_more_than_chance_is_told_from_one_that_few_cases_miss():
+    demand = Demand(least=0.9, most=0.98)
+    figures = [
+        share("", [True] * hits + [False] * (n - hits), demand)
+        for hits, n in ((3, 3), (9, 20), (95, 100), (0, 0))
+    ]
+    assert [row[-1] for row in tabulated("", figures).rows] == ["no, within chance", "NO", "yes", "no case"]
