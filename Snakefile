@@ -1,13 +1,16 @@
 """What can be asked for: the report of every batch, and the summary of all of them."""
 
+from snakemake.logging import logger
 from snakemake.utils import min_version
 
 from metro.batch.at_work import only_one_at_work, remove_leftovers
 from metro.batch.layout import OBSERVED, PAGE
+from metro.progress import show_progress
 from metro.workflow import COMPLETE, Plan
 
 min_version("9.0")
 
+show_progress(logger, workflow.output_settings)
 plan = Plan.read(Path(workflow.basedir), overrides=config)
 shell.prefix(plan.shell_prefix)
 

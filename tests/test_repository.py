@@ -45,6 +45,7 @@ ROOMS = {
         "structure",
         *PHYSICS,
     },
+    "progress": set(),
     "workflow": {"batch", "codehash"},
     "dataset": {"batch"},
     "commands": {"batch", "report", "dataset", "workflow", "codehash"},

@@ -64,6 +64,16 @@ def test_faults_of_an_x3p_file_are_named(tmp_path):
     torn = tmp_path / "torn.x3p"
     torn.write_bytes(good[: len(good) // 2])
     assert "is not a readable X3P file" in failure(torn)
+    newer = bytearray(good)
+    newer[good.index(b"PK\x01\x02") + 6] = 84  # the version that unpacks the first member
+    torn.write_bytes(newer)
+    assert "zip file version 8.4" in failure(torn)
+    longer = bytearray(good)
+    place = good.index(b"PK\x01\x02")
+    for at in (20, 24):  # its size, packed and unpacked: past the end of the file
+        longer[place + at : place + at + 4] = (1 << 20).to_bytes(4, "little")
+    torn.write_bytes(longer)
+    assert "is not a readable X3P file" in failure(torn)
     assert "is not a readable X3P file" in failure(x3p(tmp_path / "sum.x3p", digest="0" * 32))
     assert "found a surface" in failure(x3p(tmp_path / "map.x3p", feature="SUR", shape=(5, 2, 1)))
     assert "2 layers, expected one" in failure(x3p(tmp_path / "two.x3p", shape=(5, 1, 2)))

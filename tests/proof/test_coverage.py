@@ -73,4 +73,9 @@ def test_a_demand_that_is_missed_by_more_than_chance_is_told_from_one_that_few_c
         share("", [True] * hits + [False] * (n - hits), demand)
         for hits, n in ((3, 3), (9, 20), (95, 100), (0, 0))
     ]
-    assert [row[-1] for row in tabulated("", figures, "").rows] == ["no, within chance", "NO", "yes", "no case"]
+    assert [row[-1] for row in tabulated("", figures, "").rows] == [
+        "no, within chance",
+        "NO",
+        "yes",
+        "no case",
+    ]

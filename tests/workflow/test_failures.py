@@ -21,6 +21,10 @@ def test_an_invalid_batch_says_why_and_the_others_finish(checkout):
     assert "column measured" in printed
     assert "a lot" in printed
     assert "Traceback" not in printed
+    *_, said, log = (line for line in printed.splitlines() if line)
+    assert said.startswith("published.csv: row 2")  # the cause is the last that is said
+    assert log == "(logs/ingest/gamma.log)"
+    assert "Command '" not in printed
     assert (checkout / "reports/omega/report.pdf").exists()
     assert not (checkout / "data/processed/gamma/batch.json").exists()
     table = pd.read_parquet(checkout / "reports/summary.parquet").set_index("batch")

@@ -23,7 +23,7 @@ def test_it_leaves_what_the_contract_promises(finished):
 
 def test_it_shows_its_progress_and_says_what_it_does(finished):
     assert "alpha: checking and reading the raw files" in finished.first_output
-    assert re.search(r"\d+ of 12 steps \(\d+%\) done", finished.first_output)
+    assert re.search(r"\d+ of 12 steps  alpha: writing the report  \(\d+ s\)\n", finished.first_output)
 
 
 def test_ingest_declares_every_canonical_table(finished):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +29,11 @@ def read_x3p(path: Path, kind: Kind, rows: int | None) -> Raw:
     try:
         check_archive(path, kind.title)
         content = x3pio.read(path)
-    except (x3pio.X3pError, zipfile.BadZipFile, OSError, LookupError, ValueError) as error:
-        raise FormatError(path, f"is not a readable X3P file: {error}") from error
+    except FormatError:
+        raise
+    except Exception as error:  # whatever a damaged archive makes its reader stumble over
+        message = f"is not a readable X3P file: {error or type(error).__name__}"
+        raise FormatError(path, message) from error
     if not isinstance(content, x3pio.Profile):
         found = type(content).__name__.lower()
         raise FormatError(path, f"found a {found} of ISO 25178-72, expected {kind.title}")
