@@ -70,7 +70,8 @@ def test_faults_of_an_x3p_file_are_named(tmp_path):
     assert "zip file version 8.4" in failure(torn)
     longer = bytearray(good)
     place = good.index(b"PK\x01\x02")
-    for at in (20, 24):  # its size, packed and unpacked: past the end of the file
+    longer[place + 10] = 0  # not packed
+    for at in (20, 24):  # and of a size, packed and unpacked, that is past the end of the file
         longer[place + at : place + at + 4] = (1 << 20).to_bytes(4, "little")
     torn.write_bytes(longer)
     assert "is not a readable X3P file" in failure(torn)
