@@ -16,7 +16,8 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 STREAM = "DefaultStreamHandler"  # the name of snakemake's handler that writes to the terminal
-SAID = ("Nothing to be done", "Congratulations")  # what one asks for, of what is said without an event
+# Parts of what is worth saying of what is said without an event: what one asked for, and where jobs went.
+SAID = ("Nothing to be done", "Congratulations", "has been submitted")
 SAID_LAST = (
     "Exiting because",
     "CalledProcessError",
@@ -50,7 +51,7 @@ class ProgressHandler(logging.Handler):
         self._bar = Progress(*columns, TimeRemainingColumn(), console=console, transient=True)
         self._jobs: dict[int, tuple[str, float]] = {}  # what each is about, and when it began
         self._finished: list[int] = []
-        self._failures: list[tuple[str, list[str]]] = []
+        self._failures: dict[int, tuple[str, list[str]]] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show a record, or keep what it tells for a later one."""
@@ -60,11 +61,12 @@ class ProgressHandler(logging.Handler):
             self._jobs[told.jobid] = (told.rule_msg or told.rule_name, time.monotonic())
         elif event == "job_finished":
             self._finished.append(told.job_id)
+            self._failures.pop(told.job_id, None)  # it was tried again
         elif event == "progress":
             self._progress(told.done, told.total)
         elif event == "job_error":
             words, _ = self._jobs.get(told.jobid, (told.rule_name, 0.0))
-            self._failures.append((words, [str(log) for log in told.log]))
+            self._failures[told.jobid] = (words, [str(log) for log in told.log])
             self._say(f"failed: {words}")
         elif self._is_worth_saying(record):
             self._say(self.format(record))
@@ -72,19 +74,19 @@ class ProgressHandler(logging.Handler):
     def close(self) -> None:
         """Say last what made steps fail: the last lines of a terminal are those that are read."""
         self._bar.stop()
-        for words, logs in self._failures:
+        for words, logs in self._failures.values():
             self._say(f"\n{words}: failed")
             for log in map(Path, logs):
                 said = log.read_text(errors="replace").strip() if log.is_file() else ""
                 self._say(f"{said or 'its log is empty'}\n({log})")
-        self._failures = []
+        self._failures = {}
         super().close()
 
     def _is_worth_saying(self, record: logging.LogRecord) -> bool:
         lines = str(record.msg).splitlines()
         if any(line.startswith(SAID_LAST) for line in lines[:2]):
             return False
-        return record.levelno >= logging.WARNING or str(record.msg).startswith(SAID)
+        return record.levelno >= logging.WARNING or any(part in str(record.msg) for part in SAID)
 
     def _progress(self, done: int, total: int) -> None:
         if self._console.is_terminal:
