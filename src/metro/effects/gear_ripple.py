@@ -18,6 +18,7 @@ LEAST_CYCLES, LEAST_POINTS = 2.0, 4.0  # that the longest run must show; that a 
 HIGHEST = 3000.0  # several times the ratio of any gear of an arm
 STEPS = 2.0  # per width of a line: the reciprocal of the range of angles of all runs
 MOST = 4  # lines that are followed
+APART = 2.0  # torques of lines that are more than so many times apart are starts of their own
 
 
 def _of(joint: int) -> Effect:
@@ -41,8 +42,7 @@ def _of(joint: int) -> Effect:
         torque, order, phase = effect.parameters
         step = float(orders[1] - orders[0]) if len(orders) > 1 else order.scale
         order = replace(order, upper=2.0 * HIGHEST, scale=step, starts=tuple(found.tolist()))
-        start = float(np.clip(np.median(size), torque.scale, torque.upper))
-        torque = replace(torque, starts=(start,))
+        torque = replace(torque, starts=_apart(np.clip(size, torque.scale, torque.upper)))
         return replace(effect, parameters=(torque, order, phase), sought=max(1.0, len(orders) / STEPS))
 
     return Effect(
@@ -65,6 +65,15 @@ def _of(joint: int) -> Effect:
         experiment="the same path at half and at twice the feed: a ripple stays where it is along the path",
         adapt=adapt,
     )
+
+
+def _apart(sizes: Array) -> tuple[float, ...]:
+    """Keep sizes, rising, well above the one before: a slow line may need ten times a quick one's torque."""
+    kept: list[float] = []
+    for size in np.sort(sizes).tolist():
+        if not kept or size > APART * kept[-1]:
+            kept.append(size)
+    return tuple(kept)
 
 
 def _resolved(angles: list[Array]) -> Array:
