@@ -90,3 +90,13 @@ def test_the_first_line_is_the_one_that_stands_out_of_the_noise_told_by_block(ta
     mixed = replace(task, blocks=(first, unknown))
     found = path_vibration.adapt(path_vibration.ON_WALLS, mixed)
     assert found.parameters[0].starts[0] == pytest.approx(FREQUENCY, abs=0.5 / max(SECONDS))
+
+
+def test_lines_whose_torques_are_far_apart_start_from_their_own(task):
+    """A quick line of a small torque among slow ones of ten times as much: their median would hide it."""
+    assert gear_ripple._apart(np.array([7.9, 130.0, 120.0, 25.0, 9.0])) == (7.9, 25.0, 120.0)
+    assert gear_ripple._apart(np.array([30.0, 31.0])) == (30.0,)
+    torque, order, _ = gear_ripple.EFFECT[1].adapt(gear_ripple.EFFECT[1], task).parameters
+    assert len(torque.starts) >= 1
+    assert max(torque.starts) <= torque.upper
+    assert order.starts
