@@ -224,7 +224,7 @@ def descend(
 
 
 class _Way(NamedTuple):
-    """A step to try: how much of a whole one it is, its part of base and effects, and that of each run."""
+    """A step to try: what share of a whole one it is, its part of base and effects, and that of each run."""
 
     share: float
     common: Array
@@ -249,7 +249,9 @@ def _ways_down(blocks: Sequence[Block], system: System, *, own: bool, enough: fl
         return
     for damping in DAMPINGS:
         common = solution(normal + damping * np.diag(np.diag(normal)), right)
-        yield _Way(1.0, common, _by_run(blocks, [own_step(row, common) for row in system.rows], share))
+        alone = [own_step(row, common) for row in system.rows]
+        # not a share of a whole step: it must gain as much as that for the descent to go on
+        yield _Way(1.0, common, _by_run(blocks, alone, 1.0 / (1.0 + damping)))
 
 
 def _by_run(blocks: Sequence[Block], steps: Sequence[Array], share: float) -> dict[str, Array]:
