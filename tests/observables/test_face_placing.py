@@ -104,7 +104,7 @@ def test_a_declared_transform_is_kept_and_sides_are_still_taken_off(with_sides):
     placed = place(make_batch(to_work=np.eye(4).tolist()), cloud, None)
     assert placed.method == "to_work"
     inside = (top[:, :2] > 0.5e-3).all(axis=1) if with_sides else np.ones(len(top), dtype=bool)
-    np.testing.assert_array_equal(placed.cloud, top[inside])
+    np.testing.assert_array_equal(placed.cloud[:], top[inside])
     assert ("left out" in placed.remark) == with_sides
 
 

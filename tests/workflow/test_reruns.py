@@ -121,8 +121,8 @@ def test_outputs_that_come_out_the_same_re_run_nothing_more(checkout):
     with (checkout / "src/metro/stages/predict.py").open("a") as stream:
         stream.write("\n\ndef added() -> int:\n    return 1\n")
     printed = checkout.call()
-    ran = set(re.findall(r"Finished jobid: \d+ \(Rule: (\w+)\)", printed))
-    assert "predict" in ran
-    assert "ingest" not in ran
-    assert "identify" not in ran
+    ran = set(re.findall(r"\d steps  (?:\w+: )?(.+)  \(\d+ s\)", printed))
+    assert "predicting the held-out runs" in ran
+    assert "checking and reading the raw files" not in ran
+    assert "identifying the models" not in ran
     assert checkout.planned() == {}
