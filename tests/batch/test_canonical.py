@@ -71,3 +71,5 @@ def test_rows_of_a_run_come_in_the_pieces_that_were_written(tmp_path):
     assert [each for each in found if each] == [[0.0, 1.0, 2.0], [5.0]]
     assert tables("scan", "a")["x_mm"].tolist() == [0.0, 1.0, 2.0, 5.0]
     assert not sum(len(piece) for piece in tables.pieces("scan", "d"))
+    tables("scan").to_parquet(tmp_path / "scan.parquet")  # all runs in one row group
+    assert [piece["x_mm"].tolist() for piece in tables.pieces("scan", "b")] == [[3.0, 4.0]]

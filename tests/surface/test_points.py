@@ -1,5 +1,7 @@
 """Clouds in slices: what is spooled, changed, drawn and sampled piece by piece is what it is in one piece."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -45,7 +47,10 @@ def test_a_face_and_its_footprints_do_not_depend_on_the_slices(monkeypatch):
     rng = np.random.default_rng(4)
     x, y = (c.ravel() for c in np.meshgrid(np.arange(0, 0.06, 2e-4), np.arange(0, 0.04, 2e-4)))
     cloud = np.column_stack([x, y, 5.0 + 0.01 * x + 3e-5 * np.sin(200 * x) + rng.normal(0, 1e-5, x.size)])
-    at, gone = rng.uniform(0.0, [[0.06], [0.04]], (2, 200)), np.array([0, 700, 701, 30_000])
+    at, gone = (
+        rng.uniform(0.0, [[0.06], [0.04]], (2, 200)),
+        np.array([0, 700, 701, *range(30_000, 33_000, 7)]),
+    )
     whole, seen = measure_face(cloud), sample(np.delete(cloud, gone, axis=0), *at)
     monkeypatch.setattr(room, "CHUNK", 1000)
     monkeypatch.setattr(room, "IN_MEMORY", 500)
@@ -57,6 +62,34 @@ def test_a_face_and_its_footprints_do_not_depend_on_the_slices(monkeypatch):
     np.testing.assert_array_equal(found.coverage, seen.coverage)
     np.testing.assert_allclose(found.height, seen.height, rtol=1e-14)
     np.testing.assert_allclose(found.sd, seen.sd, rtol=1e-6)
+
+
+class Made:
+    """A flat face with noise, of which no point is kept."""
+
+    def __init__(self, side):
+        self._side = side
+
+    def __len__(self):
+        return 2 * self._side**2
+
+    def __getitem__(self, rows):
+        first, last, _ = rows.indices(len(self))
+        place = np.arange(first, last)
+        x, y = np.divmod(place, self._side)
+        noise = np.random.default_rng(first).normal(0, 1e-5, len(place))
+        return np.column_stack([0.05 * x / self._side, 0.05 * y / self._side, noise])
+
+
+def test_a_face_takes_no_memory_in_proportion_to_its_points():
+    sides, peaks = (700, 1400), []
+    for side in sides:
+        tracemalloc.start()
+        measure_face(Made(side), 1e-5, "known", uncertainty=False)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    more = len(Made(sides[1])) - len(Made(sides[0]))
+    assert (peaks[1] - peaks[0]) / more < 8.0  # bytes; suspects and tails take some 3, a whole slice 32
 
 
 def test_the_deviation_in_a_disc_is_that_of_a_fit_of_one_slope_after_the_other():
