@@ -32,10 +32,15 @@ class Grid:
 
     def cells(self, u: Array, v: Array) -> np.ndarray:
         """Return the number (n,) of the cell of each point in the flattened grid."""
-        row: np.ndarray = ((u - self.corner[0]) * (1 / self.cell)).astype(np.intp)
+        row, column = (
+            np.floor((along - corner) * (1 / self.cell))
+            for along, corner in zip((u, v), self.corner, strict=True)
+        )
         row *= self.shape[1]
-        row += ((v - self.corner[1]) * (1 / self.cell)).astype(np.intp)
-        return row
+        row += column
+        # one conversion, which is slow, instead of two
+        number: np.ndarray = row.astype(np.intp)
+        return number
 
     def sums(self, cells: np.ndarray, values: Array | None = None) -> Array:
         """Return the sum of ``values`` (n,) per cell, or the number of points, in the grid's shape."""

@@ -102,8 +102,10 @@ def moments_of_columns(xyz: Array) -> Moments:
     xyz -= shift
     mean = xyz.mean(axis=1)
     xyz -= mean[:, None]
-    # six products of rows: BLAS is slow on matrices that are three wide
-    scatter = np.array([[xyz[i] @ xyz[j] for j in range(3)] for i in range(3)])
+    scatter = np.empty((3, 3))
+    for i in range(3):  # products of rows: BLAS is slow on matrices that are three wide
+        for j in range(i, 3):
+            scatter[i, j] = scatter[j, i] = xyz[i] @ xyz[j]
     return Moments(xyz.shape[1], shift[:, 0] + mean, scatter)
 
 

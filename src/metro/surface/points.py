@@ -54,6 +54,8 @@ def _nameless() -> tempfile.SpooledTemporaryFile[bytes]:
 
 def slices(points: Points) -> Iterator[tuple[int, Array]]:
     """Give the place of the first point of each slice, and x, y, z of the slice as columns (3, k)."""
+    # glibc keeps pages for blocks up to the largest that was freed; all others cost a page fault per 4 KiB
+    np.empty(16 * CHUNK * _ROW.itemsize, dtype=np.uint8)
     for start in range(0, len(points), CHUNK):
         yield start, np.array(points[start : start + CHUNK].T, dtype=np.float64, order="C")
 
