@@ -1,5 +1,6 @@
 """Flatness of a batch: a synthetic face whose compliance is known, and the simulated one, end to end."""
 
+import errno
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ from face_manifest import SIZE, manifest
 from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
+from metro.batch.findings import ContractError
 from metro.batch.processed import COLUMNS, Processed, read_batch
 from metro.observables import cutting_force, flatness
 from metro.observables.face_path import force_over_period, make_path, passages
@@ -221,6 +223,16 @@ def test_a_scan_that_lies_elsewhere_has_indices_but_is_not_paired() -> None:
     assert "to_work" in task.reason
     faces = flatness.report(batch, observed, {}, task, None)["faces"]
     assert faces["r1"]["fltt"]["value"] > 0
+
+
+def test_a_full_temporary_folder_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(flatness, "measured_run", full)
+    batch = make_batch()
+    with pytest.raises(ContractError, match="points: cannot be written: No space left on device; make room"):
+        flatness.observe(batch, reader(batch), {})
 
 
 def test_the_report_has_every_index_of_the_contract(plate: tuple) -> None:

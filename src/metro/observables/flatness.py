@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
+from metro.batch.writing import writing
 from metro.observables import cutting_force
 from metro.observables.face_advice import advice, planned_points, studied
 from metro.observables.face_blocks import (
@@ -54,7 +57,8 @@ def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataF
         # another scan of a face is no second piece of evidence on how it was cut
         path = path.iloc[:0] if scanned_again(batch, run) else path
         repeats = noise if isinstance(noise, Noise) else None
-        tables, reason = measured_run(batch, run, cloud_of(read, run), path, repeats)
+        with writing(Path(tempfile.gettempdir()) / "points"):  # of a cloud that does not fit in memory
+            tables, reason = measured_run(batch, run, cloud_of(read, run), path, repeats)
         for name, table in tables.items():
             parts[name].append(table)
         refused += [(run, why) for why in (reason, noise) if isinstance(why, str)]
