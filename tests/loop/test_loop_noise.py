@@ -137,3 +137,35 @@ def test_sigma_of_the_comparison_is_the_spread_of_simulated_runs():
     assert block_sigma(one, noise, matrix, BETA) == pytest.approx(
         (values @ synthesis.T).std(axis=0), rel=0.03
     )
+
+
+@pytest.mark.parametrize("part", [0.0, 0.4, 1.0])
+def test_what_repeats_share_of_an_error_that_they_may_share_is_told_by_them(part):
+    """Each condition has an error of its own in all repeats, the rest is each run's."""
+    rng = np.random.default_rng(8)
+    parts = []
+    for one, matrix, rest in runs(120, 0.0, repeats=3):
+        size = 3.0 * SIGMA
+        if int(one.run[1:]) % 3 == 0:
+            common = size * np.sqrt(part) * rng.normal(size=POINTS)
+        own = size * np.sqrt(1.0 - part) * rng.normal(size=POINTS)
+        error = rest + common + own
+        told = replace(one, measured=matrix @ BETA + error, alike=np.full(POINTS, size))
+        parts.append((told, matrix, error))
+    blocks = [each[0] for each in parts]
+    assert estimated(parts, first_noise(0.0, np.full(2, 0.01), blocks), steps=4).alike == pytest.approx(
+        part, abs=0.06
+    )
+    alone = [replace(one, condition=one.run) for one in blocks]
+    lonely = [(one, *rest) for one, (_, *rest) in zip(alone, parts, strict=True)]
+    assert estimated(lonely, first_noise(0.0, np.full(2, 0.01), alone), steps=4).alike == 1.0
+
+
+def test_only_what_a_model_gets_wrong_may_be_the_same_in_all_conditions():
+    """The variance of a mean over all runs: the budget stays, what repeats share falls by the conditions."""
+    blocks = [replace(one, alike=np.full(POINTS, SIGMA)) for one, _, _ in runs(12, 0.0, repeats=3)]
+    noise = noise_room.all_alike(replace(first_noise(0.1, np.zeros(2), blocks), alike=0.5))
+    signal = np.mean(blocks[0].measured ** 2)
+    mean = diagonal(blocks[0], noise) / 12
+    expected = (1.0 + 1.0 * (0.5 + 0.5 * 3)) * SIGMA**2 / 12 + 0.01 * signal
+    assert mean == pytest.approx(np.full(POINTS, expected))

@@ -33,7 +33,8 @@ def test_noise_is_read_beside_a_smooth_signal():
 
 
 def share_of_one(reading, noise, whole):
-    share, missed = signal_share(reading[:, None], np.array([noise]), whole)
+    share, missed, passed = signal_share(reading[:, None], np.array([noise]), whole)
+    np.testing.assert_allclose(passed, share[:, 0] ** 2 * noise)
     return share[:, 0], missed
 
 
@@ -53,7 +54,7 @@ def test_there_is_no_more_signal_than_the_whole_has_beyond_its_noise():
     share, missed = share_of_one(reading, 1.0, whole)
     assert share.max() < 0.05
     assert missed.max() < 0.05
-    _, missed = signal_share(rng.normal(size=(400, 6)), np.ones(6), whole, whole_noise=0.01)
+    _, missed, _ = signal_share(rng.normal(size=(400, 6)), np.ones(6), whole, whole_noise=0.01)
     assert np.mean(missed) < 0.01  # of six readings together, each of which may miss 0.4 and more
 
 
@@ -62,7 +63,7 @@ def test_a_reading_passes_that_is_clear_beside_one_that_is_noisy():
     rng = np.random.default_rng(5)
     line = np.where((np.arange(400) >= 190) & (np.arange(400) < 193), 8.0, 0.0)
     readings = np.column_stack([5.0 * rng.normal(size=400), line + 0.1 * rng.normal(size=400)])
-    share, _ = signal_share(readings, np.array([25.0, 0.01]), line)
+    share, *_ = signal_share(readings, np.array([25.0, 0.01]), line)
     assert share[190:193, 1].min() > 0.99
     assert share[:, 0].max() < 0.6
     assert np.abs((share * readings).sum(axis=1) - line)[190:193].max() < 8.0
@@ -86,4 +87,5 @@ def test_the_signal_lies_within_the_stated_error_of_its_share(size):
     signal, noise = size * rng.normal(size=(200, 300)), rng.normal(size=(200, 300))
     told = [share_of_one(a + b, 1.0, a) for a, b in zip(signal, noise, strict=True)]
     share, missed = (np.array(part) for part in zip(*told, strict=True))
-    assert np.mean((signal - share * (signal + noise)) ** 2) <= 1.05 * np.mean(missed)
+    assert np.mean((signal - share * (signal + noise)) ** 2) <= 1.05 * np.mean(missed + share**2)
+    assert np.mean(((1.0 - share) * signal) ** 2) <= 1.05 * np.mean(missed)

@@ -110,8 +110,8 @@ def _recorded(run: _Run, folder: Path, name: str, noise: Sequence[np.random.Gene
 
     def in_work(t: Array) -> Array:
         x = one.begin + t * one.speed - run.entry
-        gain = 1.0 + cell.gain_drift * np.maximum(t, 0.0)
-        return np.asarray(force.at(t, x, bench.sensor.rate) @ run.feed * gain[:, None])
+        gain = (1.0 + cell.gain_drift * np.maximum(t, 0.0))[:, None] * (1.0 + bench.calibration[:3])
+        return np.asarray(force.at(t, x, bench.sensor.rate) @ run.feed * gain)
 
     idle = replace(one, begin=idling.uniform(*_BEGIN))
     files = {"idle_log": f"robot/{name}-idle.parquet", "robot_log": f"robot/{name}-cut.parquet"}
@@ -157,7 +157,8 @@ def _loads(cell: ArmCell, bench: Bench, rng: np.random.Generator) -> list[Row]:
         for axis, level, sign in ((a, n, s) for a in range(3) for n in bench.loads for s in (1.0, -1.0)):
             for replicate in range(1, bench.repeats + 1):
                 force = sign * level * np.eye(3)[axis]
-                moved = under_load(cell, q, cell.turn @ force) @ cell.turn
+                real = force * (1.0 + bench.calibration[3])
+                moved = under_load(cell, q, cell.turn @ real) @ cell.turn
                 moved = moved + rng.normal(0.0, bench.tracker, 3)
                 row: Row = {"pose": pose, "point": "tip"}
                 row |= {f"q{i}_deg": float(q[i - 1] / DEG) for i in range(1, 7)}

@@ -30,6 +30,7 @@ _DECLINED = (
     0.12  # least singular value of the tip's Jacobian: farther than that from where the wrist is stretched
 )
 _TRIES = 60
+_CALIBRATION = 0.01  # relative, standard deviation of each axis, gauge and joint from its data sheet
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,8 @@ class Bench:
     period : of the robot's log, s. stylus, tracker : noise of profiler and of load tests, m. zero : how well
         the zero of a trace is the programmed wall, m, standard deviation.
     loads : N, of the load tests, pulled and pushed. poses : of the load tests, beside that of the cuts, rad.
+    calibration : relative errors of the dynamometer along the work's axes and, last, of the gauge of the load
+        tests.
     """
 
     size: tuple[float, float, float]
@@ -65,6 +68,7 @@ class Bench:
     zero: float
     loads: tuple[float, float]
     poses: Mapping[str, Array]
+    calibration: Array
     repeats: int = 1
     lines: Mapping[Way, Line] = field(default_factory=dict)
     plans: tuple[Plan, ...] = ()
@@ -73,9 +77,9 @@ class Bench:
 def drawn(rng: np.random.Generator, style: str) -> tuple[ArmCell, Bench]:
     """Draw an arm and its bench.
 
-    In style ``a`` the programme is always the same; in ``b`` the poses, the instruments, the block, and the
-    number of runs differ. In half of the batches joints turn round within the cuts: the place of the work is
-    drawn until they do, or do not.
+    In style ``a`` the programme is always the same; in ``b`` the poses, the instruments and how well they are
+    calibrated, the block, and the number of runs differ. In half of the batches joints turn round within the
+    cuts: the place of the work is drawn until they do, or do not.
     """
     bench = _bench(rng, style)
     drives = replace(
@@ -100,7 +104,9 @@ def drawn(rng: np.random.Generator, style: str) -> tuple[ArmCell, Bench]:
             break
     swaying = _swaying(arm, bench, plans, lines, turn)
     moves = _moves(arm, bench, plans, lines, (tuple(sorted(turning)), swaying))
-    return ArmCell(arm, drives, origin, turn, moves), replace(bench, lines=lines, plans=plans)
+    gains = rng.spawn(1)[0].normal(0.0, _CALIBRATION, 6) if style == "b" else np.zeros(6)
+    cell = ArmCell(arm, drives, origin, turn, moves, torque_gain=tuple(gains.tolist()))
+    return cell, replace(bench, lines=lines, plans=plans)
 
 
 def _bench(rng: np.random.Generator, style: str) -> Bench:
@@ -134,6 +140,7 @@ def _bench(rng: np.random.Generator, style: str) -> Bench:
         zero=float(round(rng.uniform(1.0, 5.0), 1)) * 1e-6 if varied else 3e-6,
         loads=(300.0, float(rng.choice([700.0, 900.0]))) if varied else (300.0, 900.0),
         poses=poses,
+        calibration=rng.spawn(1)[0].normal(0.0, _CALIBRATION, 4) if varied else np.zeros(4),
         repeats=int(rng.integers(1, 3)) if varied else 1,
     )
 

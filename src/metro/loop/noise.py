@@ -8,10 +8,12 @@ samples make everything significant (loop.md).
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 
@@ -33,6 +35,9 @@ class Noise:
     zero_factor : estimated size of the zeros in units of each block's ``zero_sd``.
     repeats : runs per condition: the budget is shared by the repeats of a condition, so it does not average
         out over them.
+    everywhere : conditions that what a model gets wrong is shared by, too.
+    alike : how much of the error that repeats may share (``Block.alike``) they do share, as a part of its
+        variance; the rest is each run's own. All of it, until the repeats tell.
     misfit : by axis, relative rms of what the model at hand misses, spread evenly over the elements. It is
         estimated with each fit, so that a model that misses much does not bend its parameters to please the
         elements that are measured best. What is missed is a smooth shape, the same in every run: about twelve
@@ -43,6 +48,8 @@ class Noise:
     scatter: Array
     repeats: dict[str, float]
     zero_factor: float = 1.0
+    everywhere: float = 1.0
+    alike: float = 1.0
     misfit: dict[str, float] = field(default_factory=dict)
 
 
@@ -89,9 +96,9 @@ def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION
     scale = rms if block.scale is None else block.scale
     missed = np.array([noise.misfit.get(name, 0.0) for name in names])[number] * rms
     repeats = noise.repeats.get(block.condition, 1) * block.repeats
-    alike = 0.0 if block.alike is None else block.alike
-    common = alike**2 + (noise.budget * scale) ** 2 + correlation * missed**2
-    return np.asarray(block.sigma**2 + repeats * common)
+    alike = 0.0 if block.alike is None else block.alike**2 * (1.0 + noise.alike * (repeats - 1.0))
+    wrong = (noise.budget * scale) ** 2 + correlation * missed**2
+    return np.asarray(block.sigma**2 + alike + repeats * noise.everywhere * wrong)
 
 
 def all_alike(noise: Noise) -> Noise:
@@ -99,7 +106,7 @@ def all_alike(noise: Noise) -> Noise:
 
     Then more conditions do not average it out, any more than repeats do.
     """
-    return replace(noise, repeats={name: count * len(noise.repeats) for name, count in noise.repeats.items()})
+    return replace(noise, everywhere=float(len(noise.repeats)))
 
 
 def log_scale(block: Block, noise: Noise) -> float:
@@ -143,7 +150,7 @@ def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array
 
 
 def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Array]]) -> Noise:
-    """One step of expectation–maximisation for scatter, zeros and misfit.
+    """One step of expectation–maximisation for scatter, zeros and misfit, and what repeats share.
 
     Scatter and zeros are drawn towards the prior, as if it were ``PRIOR_RUNS`` runs.
 
@@ -157,6 +164,7 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
     size = float(np.mean(noise.scatter / prior.scatter)) if p else 1.0
     pull: dict[str, float] = {}
     weight: dict[str, float] = {}
+    rests: list[tuple[Block, Array, Array]] = []
     for block, residual, directions in parts:
         if block.role == "calibrate":
             continue
@@ -169,6 +177,7 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         # The misfit as it is, not as it weighs: else it takes what the shared directions explain.
         found, uncertain = amplitude(directions, residual, diagonal(block, noise, correlation=1.0))
         left = residual - directions @ found
+        rests.append((block, left, variance))
         spread = left**2 + ((directions @ uncertain) * directions).sum(axis=1)
         excess = spread - diagonal(block, replace(noise, misfit={}))
         names, number, rms = _axes(block)
@@ -180,8 +189,30 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
     factor = {key: float(np.sqrt(np.mean(values))) for key, values in amplitudes.items()}
     misfit = {key: float(np.sqrt(max(0.0, pull[key]) / weight[key])) if weight[key] else 0.0 for key in pull}
     return replace(
-        noise, scatter=prior.scatter * factor["scatter"], zero_factor=factor["zero"], misfit=misfit
+        noise,
+        scatter=prior.scatter * factor["scatter"],
+        zero_factor=factor["zero"],
+        misfit=misfit,
+        alike=_alike(rests),
     )
+
+
+def _alike(rests: Sequence[tuple[Block, Array, Array]]) -> float:
+    """How much of ``Block.alike`` repeats share, by the products of their rests, and a standard error more.
+
+    Parameters
+    ----------
+    rests : for each run: block, what is left of it (n,), and its variance (n,).
+    """
+    shared, told = 0.0, 0.0
+    for (one, left, variance), (other, right, its) in combinations(rests, 2):
+        if one.condition != other.condition or one.alike is None or other.alike is None:
+            continue
+        if one.alike.shape == other.alike.shape:  # else they are not the same waves
+            each = one.alike * other.alike / (variance * its)
+            shared += float(each @ (left * right))
+            told += float(each @ (one.alike * other.alike))
+    return min(1.0, max(0.0, shared / told) + 1.0 / math.sqrt(told)) if told else 1.0
 
 
 def amplitude(directions: Array, residual: Array, variance: Array) -> tuple[Array, Array]:

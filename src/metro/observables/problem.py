@@ -47,8 +47,8 @@ class Block:
     zero_sd : (q,) prior standard deviations of the amplitudes of ``zeros``, SI.
     untold : (n, u) directions in which the base model may be off here since no run of the fit tells a
         parameter that matters only here, each of one standard deviation, SI; None: none.
-    alike : (n,) standard error of ``measured`` less predicted that is the same in all repeats of a condition
-        and does not average out over them, as the model-form budget does not; None: none.
+    alike : (n,) standard error of ``measured`` less predicted that may be the same in all repeats of a
+        condition, and then does not average out over them; ``Noise.alike`` of it is. None: none.
     scale : (n,) size of the signal around each element, whose fraction the model-form budget is; None: rms of
         its axis.
     symmetries : (k, m) shifts of the nuisance that leave the base model as it is (which tooth is the first

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
@@ -45,9 +44,10 @@ def wave_block(
     ----------
     points, facts : the run's rows of ``waviness_points`` and ``waviness_runs``. force : on the tip along the
         path (table ``tip_force``); None where it is not known. compliance : (6,) of the joints, rad/(N m).
-    What of the tracking error drowns in the noise of the encoders is the same in all repeats. Each joint
-    counts by what stands out of the noise of its own encoder: at the tip that of the first joints is larger,
-    by the distance to them, than what the joints of the wrist stray.
+    What of the tracking error drowns in the noise of the encoders may be the same in all repeats; their noise
+    that is taken for it is each run's own. Each joint counts by what stands out of the noise of its own
+    encoder: at the tip that of the first joints is larger, by the distance to them, than what the joints of
+    the wrist stray.
     """
     row: Any = batch.runs.loc[run]
     kept = points["kept"].to_numpy(dtype=bool)
@@ -63,7 +63,7 @@ def wave_block(
     profile = points.loc[kept, "waviness_um"].to_numpy() * UM
     profiler = float(batch.instrument("profiler").get("sigma_mm", 0.0005)) * MM
     traced = profiler**2 * facts["profile_step_mm"] * MM / GRID
-    share, missed = signal_share(by_joint / passes[:, None], coded, waves @ profile / passes, traced)
+    share, missed, passed = signal_share(by_joint / passes[:, None], coded, waves @ profile / passes, traced)
     strayed = points[STRAYED].to_numpy() * UM
     longer, _ = wave_basis(int(kept.sum()), GRID, cutoff, np.inf)
     place, axis = points.loc[kept, "x_mm"].to_numpy(), np.full(int(kept.sum()), "z")
@@ -73,7 +73,7 @@ def wave_block(
         role="validate" if row["role"] == "validate" else "identify",
         order=int(row["order"]),
         measured=waves @ profile,
-        sigma=np.broadcast_to(passes * math.sqrt(traced), length.shape),
+        sigma=passes * np.sqrt(traced + passed),
         alike=passes * np.sqrt(missed),
         setting=WavyCut(
             by_joint=by_joint,

@@ -55,7 +55,7 @@ def white_noise(series: Array) -> float:
 
 def signal_share(
     readings: Array, noise: Array, whole: Array, whole_noise: float = 0.0
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Share w (n, k) of each wave of several readings that is signal, Wiener's S/(S + N), and what is left.
 
     S is the mean power of the neighbouring waves less that of the noise, where it is more than chance gives
@@ -72,7 +72,8 @@ def signal_share(
     Returns
     -------
     tuple
-        w (n, k), and the variance (n,) of the sum of the signals less the sum of w times the readings.
+        w (n, k), and by what the sum of w times the readings is off the sum of the signals: the variance (n,)
+        of the signal that does not pass, and that of the noise which does.
     """
     from scipy.stats import chi2
 
@@ -93,7 +94,7 @@ def signal_share(
         share[:, i] = signal / (signal + noise[i])
         missed += (1.0 - share[:, i]) ** 2 * (np.maximum(power - noise[i], 0.0) + noise[i] * error)
     missed = np.minimum(missed, most(whole - (share * readings).sum(axis=1)))
-    return share, missed + share**2 @ noise
+    return share, missed, share**2 @ noise
 
 
 def _moving_sum(values: Array, window: Array) -> Array:
