@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from metro.formats import FormatError
-from metro.formats.registry import read, read_cloud
+from metro.formats.registry import read, read_pieces
 
 POINTS = np.random.default_rng(3).normal(size=(1000, 3)).astype(np.float32).astype(np.float64)
 LINES = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in POINTS.tolist())
@@ -50,7 +50,7 @@ def path(request, tmp_path):
 
 @pytest.mark.parametrize("rows", [1000, 999, 333, 64])
 def test_the_pieces_are_the_whole(path, rows):
-    pieces = list(read_cloud(path, rows))
+    pieces = list(read_pieces(path, "cloud", rows))
     whole = read(path, "cloud").to_numpy()
     np.testing.assert_array_equal(np.vstack([piece.to_numpy() for piece in pieces]), whole)
     assert max(map(len, pieces)) <= rows
@@ -66,7 +66,7 @@ def test_a_fault_in_a_later_piece_is_named_by_its_line_in_the_file(tmp_path, nam
     path = tmp_path / name
     path.write_text("\n".join(lines))
     with pytest.raises(FormatError, match=rf"line {first + 701}, column z: found 'x'"):
-        list(read_cloud(path, 100))
+        list(read_pieces(path, "cloud", 100))
 
 
 @pytest.mark.parametrize("name", ["binary.ply", "ascii.ply", "binary.pcd", "ascii.pcd", "scan.pts"])
@@ -74,17 +74,17 @@ def test_a_file_that_ends_early_is_refused_by_pieces_too(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(FILES[name][: len(FILES[name]) * 3 // 4])
     with pytest.raises(FormatError, match=r"ends early|fewer than three"):
-        list(read_cloud(path, 100))
+        list(read_pieces(path, "cloud", 100))
 
 
 def test_dropped_points_are_counted_piece_by_piece(tmp_path):
     path = tmp_path / "scan.xyz"
     path.write_text("1 2 3\nnan nan nan\n4 5 6\n7 8 nan\n7 8 9\n")
-    assert [piece.attrs["dropped"] for piece in read_cloud(path, 2)] == [1, 1, 0]
+    assert [piece.attrs["dropped"] for piece in read_pieces(path, "cloud", 2)] == [1, 1, 0]
 
 
 def test_two_points_are_no_cloud(tmp_path):
     path = tmp_path / "scan.xyz"
     path.write_text("1 2 3\n4 5 6\n")
     with pytest.raises(FormatError, match="found 2 rows, expected at least 3"):
-        list(read_cloud(path, 1))
+        list(read_pieces(path, "cloud", 1))

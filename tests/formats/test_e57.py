@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cloud_files import POINTS, failure, written
 
-from metro.formats.registry import read, read_cloud, sniff
+from metro.formats.registry import read, read_pieces, sniff
 
 PAGE, HELD = 1024, 1020
 HEADER = struct.Struct("<8sIIQQQQ")
@@ -119,7 +119,7 @@ def test_scaled_integers_intensity_and_points_marked_invalid(tmp_path):
 def test_scans_are_joined_by_their_poses(tmp_path, rows):
     placed = pose(QUARTER, (1.0, 2.0, 3.0))
     path = scan(tmp_path, e57([doubles(POINTS), doubles(POINTS[:3], placed)]))
-    pieces = list(read_cloud(path, rows)) if rows else [read(path, "cloud")]
+    pieces = list(read_pieces(path, "cloud", rows)) if rows else [read(path, "cloud")]
     shift = np.array([1000.0, 2000.0, 3000.0])
     turned = np.column_stack([-POINTS[:3, 1], POINTS[:3, 0], POINTS[:3, 2]]) + shift
     found = np.concatenate([piece.to_numpy() for piece in pieces])

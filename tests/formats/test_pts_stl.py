@@ -7,7 +7,7 @@ import pytest
 from cloud_files import POINTS, array, failure, written
 
 from metro.formats import FormatError
-from metro.formats.registry import read_cloud
+from metro.formats.registry import read_pieces
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
 TETRAHEDRON = CORNERS[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]
@@ -31,7 +31,9 @@ def test_pts_pieces_cut_anywhere_are_the_whole(tmp_path, rows):
     many = np.random.default_rng(0).normal(size=(12, 3))
     text = block(many[:5]) + block(many[5:5]) + block(many[5:11], " 9 1 2 3") + block(many[11:])
     path = written(tmp_path, text, "scan.pts")
-    np.testing.assert_array_equal(np.vstack([piece.to_numpy() for piece in read_cloud(path, rows)]), many)
+    np.testing.assert_array_equal(
+        np.vstack([piece.to_numpy() for piece in read_pieces(path, "cloud", rows)]), many
+    )
 
 
 @pytest.mark.parametrize(
@@ -104,4 +106,4 @@ def test_faults_of_an_stl_file_are_named(tmp_path, content, parts):
 def test_a_short_line_in_a_later_piece_is_named_by_its_line_in_the_file(tmp_path):
     text = block(POINTS).replace("7.0 -8.0 9.0", "7.0 -8.0")
     with pytest.raises(FormatError, match="line 5: found fewer than three"):
-        list(read_cloud(written(tmp_path, text, "scan.pts"), 2))
+        list(read_pieces(written(tmp_path, text, "scan.pts"), "cloud", 2))

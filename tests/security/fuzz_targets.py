@@ -16,7 +16,7 @@ from metro.batch.findings import ContractError, errors
 from metro.batch.manifest import read_manifest
 from metro.batch.tables import read_table
 from metro.formats import FormatError
-from metro.formats.registry import read, read_cloud, read_frfs, sniff
+from metro.formats.registry import read, read_frfs, read_pieces, sniff
 
 ROOT = Path(__file__).parents[2]
 ROWS = 24  # of a sample: small enough that every byte is hit now and then
@@ -87,7 +87,7 @@ def _reader(kind, file):
         except FormatError:
             told = True
         if kind == "cloud":
-            list(read_cloud(path, 10))
+            list(read_pieces(path, "cloud", 10))
         if kind == "frf":
             read_frfs(path)
         read(path, kind)

@@ -7,6 +7,7 @@ from metro.signals import plausible
 
 TIME = np.arange(1000) / 5000.0
 FORCE = np.outer(np.sin(np.linspace(0.0, 20.0, 500)), [300.0, 500.0, 100.0])
+PEAK = float(np.linalg.norm(FORCE, axis=1).max())
 JOINTS = [f"q{i}" for i in range(1, 7)]
 SIZE = np.array([200.0, 100.0, 30.0])
 PATH = np.column_stack([np.linspace(-10.0, 210.0, 50), np.full(50, 40.0), np.zeros(50)])
@@ -29,16 +30,16 @@ def test_a_rate_that_is_not_quite_the_declared_one_or_not_declared_is_no_unit():
 @pytest.mark.parametrize("known", [None, 700.0])
 def test_a_force_over_the_chips_section_tells_its_unit(factor, unit, known):
     """A peak of 592 N over 0.2 mm2: 2960 N/mm2, of aluminium with its edge force."""
-    told = plausible.cutting_force(factor * FORCE, 0.2, known)
+    told = plausible.cutting_force(factor * PEAK, 0.2, known)
     assert bool(told) == bool(unit)
     assert unit in told
 
 
 def test_a_soft_work_is_not_taken_for_kilonewtons_where_its_coefficient_is_declared():
-    soft = 0.004 * FORCE  # 12 N/mm2
+    soft = 0.004 * PEAK  # 12 N/mm2
     assert "declare coefficients.ktc_n_mm2" in plausible.cutting_force(soft, 0.2, None)
     assert plausible.cutting_force(soft, 0.2, 30.0) == ""
-    assert plausible.cutting_force(soft, np.nan, None) == plausible.cutting_force(0 * FORCE, 0.2, None) == ""
+    assert plausible.cutting_force(soft, np.nan, None) == plausible.cutting_force(0.0, 0.2, None) == ""
 
 
 def test_angles_in_radians_and_jumps_of_a_counter_are_told_with_their_row():

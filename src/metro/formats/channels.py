@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,7 +48,7 @@ class Channel:
     name, unit : as the file has them; the unit is "" where the file says none.
     shape : of its values; a vector may have further dimensions of 1.
     numeric : whether its values are real numbers.
-    load : gives the first so many values, all where None: an array of as many.
+    load : gives some of its values, an array of as many.
     clock : what the file says of the times of its values, where there may be no channel of time.
     """
 
@@ -56,12 +57,14 @@ class Channel:
     unit: str
     shape: tuple[int, ...]
     numeric: bool
-    load: Callable[[int | None], np.ndarray]
+    load: Callable[[slice], np.ndarray]
     clock: Clock | None = None
 
 
-def read_channels(path: Path, kind: Kind, channels: Sequence[Channel], rows: int | None) -> Raw:
+def channel_pieces(path: Path, kind: Kind, channels: Sequence[Channel], rows: int | None) -> Iterator[Raw]:
     """Read those channels that are columns of a kind, in the columns' units; the others are ignored.
+
+    They come in pieces of so many rows, all at once where None; there is always one.
 
     A channel is named as the column (``fx_n``), or without its unit (``Fx``) and has a unit of its own;
     Where none is the time, it is that of the channels' clocks, which must be one. The unit of a response is
@@ -86,13 +89,20 @@ def read_channels(path: Path, kind: Kind, channels: Sequence[Channel], rows: int
     first = wanted[use[0]]
     for column, each in wanted.items():
         _check_values(path, column, each, first)
-    check_unpacked(path, 8 * len(wanted) * math.prod(first.shape), kind.title)
-    frame = pd.DataFrame(
-        {name: each.load(rows).astype(np.float64) * factors[name] for name, each in wanted.items()}
-    )
-    if "response" in wanted:
-        frame.attrs["response_unit"] = response_unit(path, wanted["response"])
-    return Raw(frame, lambda row: f"sample {row + 1}")
+    count = math.prod(first.shape)
+    step = count if rows is None else rows
+    check_unpacked(path, 8 * len(wanted) * min(step, count), kind.title)
+    unit = {"response_unit": response_unit(path, wanted["response"])} if "response" in wanted else {}
+    for start in range(0, max(count, 1), max(step, 1)):
+        some = slice(start, min(start + step, count))
+        loaded = {name: each.load(some).astype(np.float64) * factors[name] for name, each in wanted.items()}
+        frame = pd.DataFrame(loaded)
+        frame.attrs.update(unit)
+        yield Raw(frame, partial(_sample, start))
+
+
+def _sample(start: int, row: int) -> str:
+    return f"sample {start + row + 1}"
 
 
 def column_of(kind: Kind, name: str) -> str:
@@ -157,9 +167,8 @@ def _time(path: Path, channels: Sequence[Channel]) -> list[Channel]:
             message = f"{each.label}: found another start or step of time than {first.label} has"
             raise FormatError(path, f"{message}, expected one for all: save them at one rate")
 
-    def load(rows: int | None) -> np.ndarray:
-        count = math.prod(first.shape)
-        return clock.offset + clock.step * np.arange(count if rows is None else min(rows, count))
+    def load(some: slice) -> np.ndarray:
+        return clock.offset + clock.step * np.arange(*some.indices(math.prod(first.shape)))
 
     return [Channel(f"the time of {first.label}", "t_s", "s", first.shape, True, load)]
 

@@ -8,6 +8,7 @@ Times count from the trigger: those before it are negative.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -16,15 +17,15 @@ import pandas as pd
 from metro.formats.channels import column_of, factor
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw, columns_to_read
-from metro.formats.text import Layout, fields, lines, numbers
+from metro.formats.text import Layout, fields, lines, number_pieces
 
 _PREAMBLE_LINES = 200
 _SAMPLES = 8
 _NAME_AND_UNIT = re.compile(r"(.*?)\s*[\[(](.*)[\])]")
 
 
-def read_dynoware(path: Path, kind: Kind, rows: int | None) -> Raw:
-    """Read the channels Time, Fx, Fy and Fz in s or ms and N or kN; other channels are ignored.
+def dynoware_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
+    """Read the channels Time, Fx, Fy and Fz in s or ms and N or kN, in pieces; other channels are ignored.
 
     Raises
     ------
@@ -45,8 +46,8 @@ def read_dynoware(path: Path, kind: Kind, rows: int | None) -> Raw:
         at = names.index(name)
         unit = units[at] if at < len(units) else ""
         factors[name] = factor(path, name, f"line {number}", own[at], unit)
-    raw = numbers(path, layout, use, rows)
-    return Raw(raw.frame.mul(pd.Series(factors)), raw.place)
+    for raw in number_pieces(path, layout, use, rows):
+        yield Raw(raw.frame.mul(pd.Series(factors)), raw.place)
 
 
 def _channel_line(path: Path) -> tuple[int, str]:

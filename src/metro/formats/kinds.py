@@ -87,8 +87,10 @@ def columns_to_read(path: Path, kind: Kind, names: Sequence[str]) -> list[str]:
     return wanted
 
 
-def checked(path: Path, kind: Kind, raw: Raw, least: int) -> pd.DataFrame:
+def checked(path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf) -> pd.DataFrame:
     """Check a table and return it as the contract has it.
+
+    It is a whole one, or a piece that comes ``after`` a value of the column that rises.
 
     A cloud's rows without coordinates are dropped, their number is in ``attrs["dropped"]``. Everywhere else a
     value that is not finite is an error, but for the 0 Hz line of an FRF, where integration divides by zero.
@@ -107,7 +109,7 @@ def checked(path: Path, kind: Kind, raw: Raw, least: int) -> pd.DataFrame:
         _check_finite(path, frame, raw.place)
     at_least(path, kind, len(frame), least)
     if kind.rising:
-        _check_rising(path, frame, kind.rising, raw.place)
+        _check_rising(path, frame, kind.rising, raw.place, after)
     for name in kind.whole:
         _check_whole(path, frame, name, raw.place)
     for name, (low, high) in RANGES.items():
@@ -144,12 +146,14 @@ def _check_finite(path: Path, frame: pd.DataFrame, place: Callable[[int], str]) 
             raise FormatError(path, f"{place(row)}, column {name}: found {found}, expected a finite number")
 
 
-def _check_rising(path: Path, frame: pd.DataFrame, name: str, place: Callable[[int], str]) -> None:
-    values = frame[name].to_numpy()
+def _check_rising(
+    path: Path, frame: pd.DataFrame, name: str, place: Callable[[int], str], after: float
+) -> None:
+    values = np.concatenate([[after], frame[name].to_numpy()])
     falls = np.diff(values) <= 0.0
     if falls.any():
-        row = int(np.argmax(falls)) + 1
-        found = f"found {values[row]:.9g} after {values[row - 1]:.9g}"
+        row = int(np.argmax(falls))
+        found = f"found {values[row + 1]:.9g} after {values[row]:.9g}"
         raise FormatError(path, f"{place(row)}, column {name}: {found}, expected a larger value in every row")
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from metro.formats import matlab_file, matlab_hdf5
-from metro.formats.channels import Channel, read_channels
+from metro.formats.channels import Channel, channel_pieces
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
 from metro.formats.matlab_file import Variable
@@ -14,30 +14,31 @@ from metro.formats.matlab_file import Variable
 STARTS = (matlab_file.START, *matlab_hdf5.STARTS)
 
 
-def read_mat(path: Path, kind: Kind, rows: int | None) -> Raw:
-    """Read the vectors that are columns of a kind; other variables are ignored.
+def mat_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
+    """Read the vectors that are columns of a kind in pieces; other variables are ignored.
 
     Units that names do not tell stand in a structure ``units``, a text per channel: ``units.Fx = 'kN'``.
 
     Raises
     ------
     FormatError
-        As :func:`metro.formats.channels.read_channels`, and where the file is damaged, cut off or unpacks to
+        As :func:`metro.formats.channels.channel_pieces`, and where the file is damaged, cut off or unpacks to
         more than a recording can be, or points to other files.
     """
     with path.open("rb") as stream:
         head = stream.read(len(matlab_file.START))
     if head == matlab_file.START:
-        return _read(path, kind, list(matlab_file.variables_of(path, kind.title)), rows)
-    return _read_hdf5(path, kind, rows)
+        yield from _read(path, kind, list(matlab_file.variables_of(path, kind.title)), rows)
+    else:
+        yield from _read_hdf5(path, kind, rows)
 
 
-def _read_hdf5(path: Path, kind: Kind, rows: int | None) -> Raw:
+def _read_hdf5(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     import h5py
 
     try:
         with h5py.File(path, "r", locking=False) as file:
-            return _read(path, kind, list(matlab_hdf5.variables_of_hdf5(path, file)), rows)
+            yield from _read(path, kind, list(matlab_hdf5.variables_of_hdf5(path, file)), rows)
     except FormatError:
         raise
     except Exception as error:  # of a damaged file, HDF5 raises whatever the damage makes it stumble over
@@ -45,7 +46,7 @@ def _read_hdf5(path: Path, kind: Kind, rows: int | None) -> Raw:
         raise FormatError(path, message) from error
 
 
-def _read(path: Path, kind: Kind, variables: Sequence[Variable], rows: int | None) -> Raw:
+def _read(path: Path, kind: Kind, variables: Sequence[Variable], rows: int | None) -> Iterator[Raw]:
     units = {
         one.name.lower(): one.text
         for each, _ in _walk(variables)
@@ -58,7 +59,7 @@ def _read(path: Path, kind: Kind, variables: Sequence[Variable], rows: int | Non
         for each, prefix in _walk(variables)
         if not each.fields and each.text is None
     ]
-    return read_channels(path, kind, channels, rows)
+    return channel_pieces(path, kind, channels, rows)
 
 
 def _walk(variables: Sequence[Variable]) -> Iterator[tuple[Variable, str]]:

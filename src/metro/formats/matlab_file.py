@@ -37,7 +37,7 @@ class Variable:
     name : its name.
     shape : of its values, () where it has none.
     kind : ``numbers``, or in words what else it is.
-    load : gives the first so many of its numbers, column by column; all where None.
+    load : gives some of its numbers, column by column.
     text : of a text.
     fields : of a structure.
     """
@@ -45,7 +45,7 @@ class Variable:
     name: str
     shape: tuple[int, ...] = ()
     kind: str = "numbers"
-    load: Callable[[int | None], np.ndarray] = lambda _: np.empty(0)
+    load: Callable[[slice], np.ndarray] = lambda _: np.empty(0)
     text: str | None = None
     fields: tuple[Variable, ...] = ()
 
@@ -168,7 +168,7 @@ def _numbers(elements: _Elements, name: str, shape: tuple[int, ...]) -> Variable
     values = elements.numbers()
     if len(values) != math.prod(shape):
         raise elements.damaged(f"variable {name}: found {len(values)} numbers, expected {math.prod(shape)},")
-    return Variable(name, shape, load=lambda rows: values[:rows])
+    return Variable(name, shape, load=lambda some: values[some])
 
 
 def _fields(elements: _Elements, depth: int) -> Iterator[Variable]:

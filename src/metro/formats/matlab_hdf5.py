@@ -69,12 +69,12 @@ def _of_data(path: Path, name: str, item: h5py.Dataset, stated: str) -> Variable
     if stated == "char" and item.dtype.kind == "u" and math.prod(shape) <= _LONGEST:
         return Variable(name, shape, "text", text="".join(map(chr, np.ravel(item[()]).tolist())))
     if item.dtype.kind in "iuf" and stated != "char":
-        return Variable(name, shape, load=lambda rows: _values(item, rows))
+        return Variable(name, shape, load=lambda some: _values(item, some))
     pairs = item.dtype.names == ("real", "imag")
     return Variable(name, shape, "complex numbers" if pairs else stated or "no numbers")
 
 
-def _values(item: Any, rows: int | None) -> np.ndarray:
-    """Return the first so many values of a vector, whichever of its dimensions is the long one."""
-    part = item[()] if not item.shape else item[tuple(slice(0, rows) for _ in item.shape)]
-    return np.ravel(part)[:rows]
+def _values(item: Any, some: slice) -> np.ndarray:
+    """Return some values of a vector, whichever of its dimensions is the long one."""
+    part = item[()] if not item.shape else item[tuple(some if size > 1 else slice(1) for size in item.shape)]
+    return np.ravel(part)

@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 
 from metro.formats import matlab, rosbag, rsi, tdms
-from metro.formats.dynoware import read_dynoware
+from metro.formats.dynoware import dynoware_pieces
 from metro.formats.e57 import SIGNATURE, e57_pieces
 from metro.formats.errors import FormatError
 from metro.formats.kinds import KINDS, Kind, Raw, at_least, checked
 from metro.formats.pcd import pcd_pieces
 from metro.formats.ply import ply_pieces
 from metro.formats.pts import pts_pieces
-from metro.formats.signals import read_csv, read_npz, read_parquet
+from metro.formats.signals import csv_pieces, parquet_pieces, read_npz
 from metro.formats.stl import stl_pieces
 from metro.formats.uff import COHERENCE, FRF, Function, read_functions, read_uff
 from metro.formats.x3p import read_x3p
@@ -57,14 +57,20 @@ class Format:
     pieces: Pieces | None = None
 
 
+def _pieces(
+    title: str, suffixes: tuple[str, ...], starts: tuple[bytes, ...], kinds: tuple[str, ...], pieces: Pieces
+) -> Format:
+    """Describe a format that is read in pieces: the first is what :attr:`Format.read` gives."""
+    return Format(title, suffixes, starts, kinds, lambda *asked: next(pieces(*asked)), pieces)
+
+
 def _cloud(title: str, suffixes: tuple[str, ...], starts: tuple[bytes, ...], pieces: Pieces) -> Format:
-    """Describe a format of clouds: its first piece is what :attr:`Format.read` gives."""
-    return Format(title, suffixes, starts, ("cloud",), lambda *asked: next(pieces(*asked)), pieces)
+    return _pieces(title, suffixes, starts, ("cloud",), pieces)
 
 
 # Content is asked first, in this order; plain text comes last because it has no mark of its own.
 FORMATS = (
-    Format("Parquet", (".parquet", ".pq"), (b"PAR1",), _TABLES, read_parquet),
+    _pieces("Parquet", (".parquet", ".pq"), (b"PAR1",), _TABLES, parquet_pieces),
     Format("NumPy archive", (".npz",), (b"PK\x03\x04",), ("frf",), read_npz),
     _cloud("PLY", (".ply",), (b"ply\n", b"ply\r"), ply_pieces),
     _cloud("PCD", (".pcd",), (b"# .PCD", b"#.PCD", b"VERSION"), pcd_pieces),
@@ -72,14 +78,14 @@ FORMATS = (
     Format("universal", (".uff", ".unv", ".uf"), _UNIVERSAL, ("frf",), read_uff),
     Format("KUKA RSI recording", (".rsi", ".xml"), rsi.STARTS, ("robot",), rsi.read_rsi),
     Format("ROS 2 bag", (".mcap", ".db3"), rosbag.STARTS, ("robot",), rosbag.read_rosbag),
-    Format("DynoWare text export", (".txt", ".csv"), (b"DynoWare",), ("force",), read_dynoware),
-    Format("TDMS", (".tdms",), (tdms.START,), _CHANNELS, tdms.read_tdms),
-    Format("MATLAB", (".mat",), matlab.STARTS, _CHANNELS, matlab.read_mat),
+    _pieces("DynoWare text export", (".txt", ".csv"), (b"DynoWare",), ("force",), dynoware_pieces),
+    _pieces("TDMS", (".tdms",), (tdms.START,), _CHANNELS, tdms.tdms_pieces),
+    _pieces("MATLAB", (".mat",), matlab.STARTS, _CHANNELS, matlab.mat_pieces),
     Format("X3P", (".x3p",), (b"PK\x03\x04",), ("profile",), read_x3p),
     _cloud("PTS", (".pts",), _ANY, pts_pieces),
     _cloud("STL", (".stl",), _ANY, stl_pieces),
     _cloud("point list", (".xyz", ".txt", ".asc", ".csv"), _ANY, xyz_pieces),
-    Format("CSV", (".csv", ".txt"), _ANY, _CHANNELS, read_csv),
+    _pieces("CSV", (".csv", ".txt"), _ANY, _CHANNELS, csv_pieces),
 )
 
 
@@ -103,19 +109,21 @@ def read(path: Path, kind: str) -> pd.DataFrame:
     return checked(path, KINDS[kind], _format_of(path, kind).read(path, KINDS[kind], None), KINDS[kind].least)
 
 
-def read_cloud(path: Path, rows: int) -> Iterator[pd.DataFrame]:
-    """Read a point cloud in pieces of so many points, for what is larger than memory; as :func:`read`.
+def read_pieces(path: Path, kind: str, rows: int) -> Iterator[pd.DataFrame]:
+    """Read a data file as :func:`read` in pieces of so many rows, for what is larger than memory.
 
-    Parquet, compressed PCD and STL are read whole.
+    Formats that have no pieces (compressed PCD, STL, X3P, bags, …) are read whole.
     """
-    kind, found = KINDS["cloud"], 0
-    format_ = _format_of(path, "cloud")
-    whole = (format_.read(path, kind, None) for _ in range(1))
-    for raw in format_.pieces(path, kind, rows) if format_.pieces else whole:
-        table = checked(path, kind, raw, 0)
+    asked, found = KINDS[kind], 0
+    format_ = _format_of(path, kind)
+    whole = (format_.read(path, asked, None) for _ in range(1))
+    last = -np.inf
+    for raw in format_.pieces(path, asked, rows) if format_.pieces else whole:
+        table = checked(path, asked, raw, 0, after=last)
         found += len(table)
+        last = table[asked.rising].iloc[-1] if asked.rising and len(table) else last
         yield table
-    at_least(path, kind, found, kind.least)
+    at_least(path, asked, found, asked.least)
 
 
 def sniff(path: Path, kind: str) -> None:

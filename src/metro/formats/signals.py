@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,13 @@ import pandas as pd
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw, columns_to_read
 from metro.formats.limits import check_archive, check_unpacked
-from metro.formats.text import Layout, fields, is_number, lines, numbers, separator
+from metro.formats.text import Layout, fields, is_number, lines, number_pieces, separator
 
 _ARRAYS = ("freq_hz", "frf", "coherence")
 
 
-def read_csv(path: Path, kind: Kind, rows: int | None) -> Raw:
-    """Read a CSV table: a header line, columns parted by commas or tabs, ``#`` comments.
+def csv_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
+    """Read a CSV table in pieces: a header line, columns parted by commas or tabs, ``#`` comments.
 
     Extra columns are ignored; the case of names and the spaces around them do not matter.
     """
@@ -32,11 +33,12 @@ def read_csv(path: Path, kind: Kind, rows: int | None) -> Raw:
             f"line {number}: found numbers, expected a header with the columns {', '.join(kind.required)}"
         )
         raise FormatError(path, message)
-    return numbers(path, Layout(tuple(names), parted_by, number), columns_to_read(path, kind, names), rows)
+    layout = Layout(tuple(names), parted_by, number)
+    yield from number_pieces(path, layout, columns_to_read(path, kind, names), rows)
 
 
-def read_parquet(path: Path, kind: Kind, rows: int | None) -> Raw:
-    """Read a Parquet table; column names as in CSV."""
+def parquet_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
+    """Read a Parquet table in pieces of so many rows, or at once; column names as in CSV."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -47,25 +49,46 @@ def read_parquet(path: Path, kind: Kind, rows: int | None) -> Raw:
         use = columns_to_read(path, kind, names)
         wanted = {stored[names.index(name)]: name for name in use}
         _check_numeric(path, {name: file.schema_arrow.field(key).type for key, name in wanted.items()})
-        check_unpacked(path, _unpacked(file.metadata, wanted), kind.title)
-        if rows is None:
-            table = file.read(columns=list(wanted))
-        else:
-            batches = file.iter_batches(batch_size=rows, columns=list(wanted))
-            none = file.schema_arrow.empty_table().select(list(wanted))
-            first = [batch for batch, _ in zip(batches, range(1), strict=False)]
-            table = pa.Table.from_batches(first) if first else none
+        check_unpacked(path, _unpacked(file.metadata, wanted, whole=rows is None), kind.title)
+        start = 0
+        for table in _tables(file, list(wanted), rows):
+            columns = {name: table[key].to_numpy().astype(np.float64) for key, name in wanted.items()}
+            yield Raw(pd.DataFrame(columns), partial(_row, start))
+            start += table.num_rows
     except (pa.ArrowException, OSError, ValueError) as error:  # of a damaged file, Arrow raises any of them
         raise FormatError(path, f"is not a readable Parquet file: {error}") from error
-    columns = {name: table[key].to_numpy().astype(np.float64) for key, name in wanted.items()}
-    return Raw(pd.DataFrame(columns), lambda row: f"row {row + 1}")
 
 
-def _unpacked(metadata: Any, columns: Iterable[str]) -> int:
-    """Return the bytes of so many columns as float64, or as the file states their pages unpacked, if more."""
-    groups = (metadata.row_group(i) for i in range(metadata.num_row_groups))
-    pages = sum(group.column(i).total_uncompressed_size for group in groups for i in range(group.num_columns))
-    return int(max(8 * metadata.num_rows * len(list(columns)), pages))
+def _tables(file: Any, columns: list[str], rows: int | None) -> Iterator[Any]:
+    """Yield an Arrow table per piece; one without rows where the file has none."""
+    import pyarrow as pa
+
+    if rows is None or not file.metadata.num_rows:
+        yield file.read(columns=columns)
+        return
+    for batch in file.iter_batches(batch_size=rows, columns=columns, use_threads=False):
+        yield pa.Table.from_batches([batch])
+
+
+def _row(start: int, row: int) -> str:
+    return f"row {start + row + 1}"
+
+
+def _unpacked(metadata: Any, columns: Iterable[str], *, whole: bool) -> int:
+    """Return the bytes of so many columns as float64, or as the file states their pages unpacked, if more.
+
+    Of the ``whole`` file, or else of its largest row group.
+    """
+    groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
+    width = 8 * len(list(columns))
+    sizes = [
+        max(
+            width * group.num_rows,
+            sum(group.column(i).total_uncompressed_size for i in range(group.num_columns)),
+        )
+        for group in groups
+    ]
+    return int(sum(sizes) if whole else max(sizes, default=0))
 
 
 def _check_numeric(path: Path, types: dict[str, object]) -> None:

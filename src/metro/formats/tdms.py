@@ -9,6 +9,7 @@ a word, and it trusts the sizes that a damaged file states.
 
 from __future__ import annotations
 
+import mmap
 import re
 import struct
 from collections.abc import Iterator
@@ -18,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from metro.formats.channels import Channel, Clock, read_channels
+from metro.formats.channels import Channel, Clock, channel_pieces
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
 
@@ -46,14 +47,17 @@ class _Object:
     index: tuple[int, int, int] | None = None  # type, values and bytes in a chunk
     pieces: list[np.ndarray] = field(default_factory=list)  # each (chunks, values in a chunk)
 
-    def load(self, rows: int | None) -> np.ndarray:
-        """Return the first so many values, all where None."""
-        taken, left = [np.empty(0)], sum(piece.size for piece in self.pieces) if rows is None else rows
+    def load(self, some: slice) -> np.ndarray:
+        """Return some of the values."""
+        first, last, _ = some.indices(sum(piece.size for piece in self.pieces))
+        taken, begun = [np.empty(0)], 0
         for piece in self.pieces:
-            if left <= 0:
-                break
-            taken.append(piece[: -(-left // piece.shape[1])].reshape(-1)[:left])
-            left -= len(taken[-1])
+            start, stop = max(first - begun, 0), min(last - begun, piece.size)
+            if start < stop:
+                chunk = start // piece.shape[1]
+                near = piece[chunk : -(-stop // piece.shape[1])].reshape(-1)
+                taken.append(near[start - chunk * piece.shape[1] :][: stop - start])
+            begun += piece.size
         return np.concatenate(taken)
 
 
@@ -97,8 +101,8 @@ def _dtype(path: Path, kind: int, order: str, what: str) -> np.dtype:
     return np.dtype(order + _TYPES[kind])
 
 
-def read_tdms(path: Path, kind: Kind, rows: int | None) -> Raw:
-    """Read the channels of all groups that are columns of a kind; other channels are ignored.
+def tdms_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
+    """Read the channels of all groups that are columns of a kind in pieces; other channels are ignored.
 
     A channel's unit is its property ``unit_string``. Where no channel is the time, it is that of the
     waveforms, ``wf_start_offset`` and ``wf_increment``, which must be the same for all that are read.
@@ -106,11 +110,16 @@ def read_tdms(path: Path, kind: Kind, rows: int | None) -> Raw:
     Raises
     ------
     FormatError
-        As :func:`metro.formats.channels.read_channels`, and where the file is damaged or cut off, or holds
+        As :func:`metro.formats.channels.channel_pieces`, and where the file is damaged or cut off, or holds
         values that are not scaled.
     """
-    objects = _objects(path, np.memmap(path, dtype=np.uint8, mode="r"))
-    return read_channels(path, kind, [one for each in objects.values() for one in _channels(each)], rows)
+    with path.open("rb") as stream:
+        mapped = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+    objects = _objects(path, np.frombuffer(mapped, dtype=np.uint8))
+    channels = [one for each in objects.values() for one in _channels(each)]
+    for piece in channel_pieces(path, kind, channels, rows):
+        yield piece
+        mapped.madvise(mmap.MADV_DONTNEED)  # pages that were read would count as this process's memory
 
 
 def _channels(one: _Object) -> Iterator[Channel]:

@@ -84,23 +84,18 @@ class Layout:
     decimal: str = "."
 
 
-def numbers(path: Path, layout: Layout, use: Sequence[str], rows: int | None) -> Raw:
-    """Read the columns ``use`` of a text file as floats, and no more than so many rows; None reads all.
+def number_pieces(
+    path: Path, layout: Layout, use: Sequence[str], rows: int | None, limit: int | None = None
+) -> Iterator[Raw]:
+    """Read the columns ``use`` of a text file as floats; the other columns may hold anything.
 
-    The other columns may hold anything.
+    They come in pieces of so many rows, all at once where None, ``limit`` rows together; there is always one.
 
     Raises
     ------
     FormatError
         With line and column where a field is not a number, or a line has more fields than the header.
     """
-    return next(number_pieces(path, layout, use, rows))
-
-
-def number_pieces(
-    path: Path, layout: Layout, use: Sequence[str], rows: int | None, limit: int | None = None
-) -> Iterator[Raw]:
-    """Read as :func:`numbers` in pieces of so many rows, ``limit`` rows together; there is always one."""
     start = 0
     try:
         for frame in _parse(path, layout, use, rows, limit=limit, dtype=np.float64):

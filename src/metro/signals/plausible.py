@@ -24,9 +24,13 @@ LOWEST_BAND_HZ = 5.0
 
 def clock(time_s: Array, declared_hz: float | None) -> str:
     """Compare the rate of the stamps (n,), n ≥ 2, with the declared one."""
+    return clock_of(float(np.median(np.diff(time_s))), declared_hz)
+
+
+def clock_of(step: float, declared_hz: float | None) -> str:
+    """Compare the rate of stamps that are a ``step`` (s) apart with the declared one."""
     if declared_hz is None:
         return ""
-    step = float(np.median(np.diff(time_s)))
     ratio = step * declared_hz
     if 1 / MOST_OFF <= ratio <= MOST_OFF:
         return ""
@@ -36,11 +40,11 @@ def clock(time_s: Array, declared_hz: float | None) -> str:
     return f"{found}: {hint}; export seconds"
 
 
-def cutting_force(force_n: Array, chip_mm2: float, known_n_mm2: float | None) -> str:
-    """Compare the largest force (n, 3) with the section of the chip, a_p f_z (NaN: not known)."""
+def cutting_force(largest_n: float, chip_mm2: float, known_n_mm2: float | None) -> str:
+    """Compare the largest force with the section of the chip, a_p f_z (NaN: not known)."""
     if not chip_mm2 > 0.0:
         return ""
-    found = float(np.linalg.norm(force_n, axis=1).max()) / chip_mm2
+    found = largest_n / chip_mm2
     low, high = SPECIFIC_N_MM2 if known_n_mm2 is None else (known_n_mm2 * share for share in ABOUT_KNOWN)
     if found == 0.0 or low <= found <= high:
         return ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -27,17 +28,62 @@ class Finding(NamedTuple):
     message: str
 
 
+@dataclass(frozen=True)
+class Steps:
+    """Steps between time stamps, s.
+
+    ``typical`` is their median; ``count``, ``mean`` and ``variance`` are of those that are no gap; ``gaps``
+    counts those that are, ``lost`` is what they are together beyond the typical, ``longest`` of all.
+    """
+
+    typical: float
+    count: int
+    mean: float
+    variance: float
+    gaps: int
+    lost: float
+    longest: float
+
+    def joined(self, other: Steps) -> Steps:
+        """Return the steps of this part of a record and of the next, whose gaps are told by this typical."""
+        count = self.count + other.count
+        share = other.count / max(count, 1)
+        apart = other.mean - self.mean
+        within = (1.0 - share) * self.variance + share * other.variance
+        return Steps(
+            self.typical,
+            count,
+            self.mean + share * apart,
+            within + share * (1.0 - share) * apart**2,
+            self.gaps + other.gaps,
+            self.lost + other.lost,
+            max(self.longest, other.longest),
+        )
+
+
+def steps(time_s: Array, typical: float | None = None) -> Steps:
+    """Return the steps of the time stamps (n,), s, strictly rising, n ≥ 2; ``typical``: where it is known."""
+    every = np.diff(time_s)
+    typical = float(np.median(every)) if typical is None else typical
+    gaps = every > GAP * typical
+    regular = every[~gaps]
+    mean, variance = (float(np.mean(regular)), float(np.var(regular))) if len(regular) else (0.0, 0.0)
+    lost = float(np.sum(every[gaps] - typical))
+    return Steps(typical, len(regular), mean, variance, int(gaps.sum()), lost, float(np.max(every)))
+
+
 def sampling(time_s: Array, declared_hz: float | None = None) -> list[Finding]:
-    """Check rate, jitter and gaps of the time stamps (n,), s, strictly rising, n ≥ 2.
+    """Check rate, jitter and gaps of the time stamps (n,), s, strictly rising, n ≥ 2."""
+    return sampled(steps(time_s), declared_hz)
+
+
+def sampled(found: Steps, declared_hz: float | None = None) -> list[Finding]:
+    """Check rate, jitter and gaps by the steps of a record.
 
     The rate is one over the mean step, gaps left out; a median would inherit the rounding of time stamps.
     """
-    steps = np.diff(time_s)
-    typical = float(np.median(steps))
-    gaps = steps > GAP * typical
-    regular = steps[~gaps]
-    rate = 1.0 / float(np.mean(regular))
-    return [_rate(rate, declared_hz), _jitter(float(np.std(regular)) * rate), _gaps(steps, gaps, typical)]
+    rate = 1.0 / found.mean
+    return [_rate(rate, declared_hz), _jitter(float(np.sqrt(found.variance)) * rate), _gaps(found)]
 
 
 def _rate(rate: float, declared_hz: float | None) -> Finding:
@@ -57,14 +103,12 @@ def _jitter(jitter: float) -> Finding:
     return Finding("jitter", jitter, JITTER_LIMIT, ok, message + hint)
 
 
-def _gaps(steps: Array, gaps: np.ndarray, typical: float) -> Finding:
-    count = int(np.count_nonzero(gaps))
-    if count == 0:
+def _gaps(found: Steps) -> Finding:
+    if found.gaps == 0:
         return Finding("gaps", 0.0, 0.0, True, "no samples are missing")
-    lost = float(np.sum(steps[gaps] - typical))
-    longest = float(np.max(steps)) / MS
-    message = f"{count} gaps, the longest {longest:.3g} ms, {lost / typical:.0f} samples missing in all"
-    return Finding("gaps", float(count), 0.0, False, f"{message}: the logger lost data")
+    missing = f"{found.lost / found.typical:.0f} samples missing in all"
+    message = f"{found.gaps} gaps, the longest {found.longest / MS:.3g} ms, {missing}"
+    return Finding("gaps", float(found.gaps), 0.0, False, f"{message}: the logger lost data")
 
 
 def flat_tops(name: str, values: Array, full_scale: float | None = None) -> Finding:
@@ -108,21 +152,37 @@ def _longest_run(true: np.ndarray) -> tuple[int, int]:
 
 def dead(name: str, values: Array) -> Finding:
     """Check that a channel moves at all."""
-    span = float(np.ptp(values))
+    return moving(name, float(np.ptp(values)), float(values[0]))
+
+
+def moving(name: str, span: float, first: float) -> Finding:
+    """Check that a channel moves at all, by the span of its values and the first of them."""
     ok = span > 0.0
-    found = f"{name} stands at {values[0]:.5g} throughout: is the channel connected?"
+    found = f"{name} stands at {first:.5g} throughout: is the channel connected?"
     message = f"{name} moves" if ok else found
     return Finding("dead channel", span, 0.0, ok, message)
 
 
 def alike(names: tuple[str, ...], values: Array) -> Finding:
     """Check that no two channels (n, k) that move are the same, but for the sign."""
-    pairs = [(i, j) for i in range(len(names)) for j in range(i) if np.ptp(values[:, i]) > 0.0]
-    same = [
-        f"{names[j]} and {names[i]}"
-        for i, j in pairs
-        if np.array_equal(values[:, i], values[:, j]) or np.array_equal(values[:, i], -values[:, j])
-    ]
+    return apart(names, same_pairs(values), np.ptp(values, axis=0))
+
+
+def same_pairs(values: Array) -> set[tuple[int, int, bool]]:
+    """Find pairs i > j of channels (n, k) that are the same (True), or the same but for the sign (False)."""
+    signed = {True: values, False: -values}
+    return {
+        (i, j, kept)
+        for i in range(values.shape[1])
+        for j in range(i)
+        for kept, other in signed.items()
+        if np.array_equal(values[:, i], other[:, j])
+    }
+
+
+def apart(names: tuple[str, ...], pairs: set[tuple[int, int, bool]], span: Array) -> Finding:
+    """Check that no channels that move, by their span (k,), are among the pairs that are the same."""
+    same = [f"{names[j]} and {names[i]}" for i, j, _ in sorted(pairs) if span[i] > 0.0]
     message = f"{same[0]} are one signal: is one cable in two inputs?" if same else "channels differ"
     return Finding("channels alike", float(len(same)), 0.0, not same, message)
 
@@ -142,16 +202,27 @@ def air_offset(names: tuple[str, ...], values: Array) -> list[Finding]:
     The record is parted into blocks; air is the run of blocks at either end whose scatter is below a tenth of
     the cut's. A record that has no such part tells nothing of its zero, and gives no finding.
     """
+    return zero_in_air(names, *blocks_of(values), float(np.max(np.abs(values))))
+
+
+def blocks_of(values: Array) -> tuple[Array, Array]:
+    """Return scatter, all channels together (b,), and means (b, k) of the blocks that channels part into."""
     blocks = values[: len(values) // AIR_BLOCKS * AIR_BLOCKS].reshape(AIR_BLOCKS, -1, values.shape[1])
     if blocks.shape[1] < 2:
+        return np.zeros(0), np.zeros((0, values.shape[1]))
+    return np.sqrt(np.sum(np.var(blocks, axis=1), axis=1)), blocks.mean(axis=1)
+
+
+def zero_in_air(names: tuple[str, ...], activity: Array, mean: Array, largest: float) -> list[Finding]:
+    """Check the zero as :func:`air_offset`, by the blocks of a record and the largest of its values."""
+    if not len(activity):
         return []
-    activity = np.sqrt(np.sum(np.var(blocks, axis=1), axis=1))
     quiet = activity < AIR_ACTIVITY * float(np.quantile(activity, 0.9))
     air = np.logical_and.accumulate(quiet) | np.logical_and.accumulate(quiet[::-1])[::-1]
     if not air.any() or air.all():
         return []
-    zero = blocks[air].mean(axis=(0, 1))
-    limit = OFFSET_LIMIT * float(np.max(np.abs(values)))
+    zero = mean[air].mean(axis=0)
+    limit = OFFSET_LIMIT * largest
     return [_offset(name, float(value), limit) for name, value in zip(names, zero, strict=True)]
 
 

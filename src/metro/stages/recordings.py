@@ -17,9 +17,10 @@ from metro.batch.findings import Finding as Problem
 from metro.batch.manifest import signed_axes
 from metro.dynamics.hits import Hit, fault
 from metro.formats import FormatError
-from metro.formats.registry import ReadFrf, read, read_cloud, read_frfs
+from metro.formats.registry import ReadFrf, read, read_frfs, read_pieces
 from metro.signals import plausible, quality
 from metro.signals.conversion import driving_point_sign, receptance, response_si, sensor_to_tool
+from metro.signals.record_quality import RecordQuality
 from metro.units import MS, Array
 
 FORCES = ("fx_n", "fy_n", "fz_n")
@@ -27,6 +28,7 @@ POINT = ("x_mm", "y_mm", "z_mm")
 SET = tuple(f"q{i}_set_deg" for i in range(1, 7))
 ACTUAL = tuple(f"q{i}_deg" for i in range(1, 7))
 TORQUES = tuple(f"tau{i}_nm" for i in range(1, 7))
+PIECE = 1 << 20  # samples of a force record in memory at a time
 
 # Checks that a recording must pass to be used; one that does not is left out, and the report says so.
 MUST_PASS = frozenset({"dead channel", "clipping", "channels alike", "motion", "FRF convention"})
@@ -64,10 +66,10 @@ class Recordings:
         finally:
             self.advance()
 
-    def cloud(self, file: str, rows: int) -> Iterator[pd.DataFrame]:
-        """Read a point cloud in pieces of so many points; what cannot be read ends it, a problem gathered."""
+    def pieces(self, file: str, kind: str, rows: int) -> Iterator[pd.DataFrame]:
+        """Read a file in pieces of so many rows; what cannot be read ends it, a problem gathered."""
         try:
-            yield from read_cloud(self.folder / file, rows)
+            yield from read_pieces(self.folder / file, kind, rows)
         except FormatError as error:
             self.problems.append(Problem("error", file, error.message))
         finally:
@@ -112,28 +114,40 @@ def files(batch: Batch, column: str) -> Iterator[tuple[str, str]]:
 
 
 def force(batch: Batch, recordings: Recordings) -> Iterator[Part]:
-    """Yield each dynamometer record as the force on the tool, work frame, time from the record's start."""
+    """Yield each dynamometer record as the force on the tool, work frame, time from the record's start.
+
+    A record of more than ``PIECE`` samples is read twice, piece by piece: it is written once it is known to
+    be fit for use.
+    """
     sensor = batch.instrument("dynamometer")
     axes = signed_axes(sensor.get("axes") or {})
     to_tool = sensor_to_tool(axes, float(sensor.get("rotation_deg", 0.0)), sensor.get("reads", "work"))
     for run, file in files(batch, "dynamometer"):
-        table = recordings.table(file, "force")
-        if table is None:
+        found = RecordQuality(("Fx", "Fy", "Fz"), sensor.get("range_n"))
+        count, table = 0, pd.DataFrame()
+        faults = len(recordings.problems)
+        for table in recordings.pieces(file, "force", PIECE):
+            if len(table):
+                found.add(table["t_s"].to_numpy(), table[list(FORCES)].to_numpy())
+                count += 1
+        if len(recordings.problems) > faults or not _fit_force(batch, recordings, run, file, found):
             continue
-        time, zero = _from_zero(table)
-        recordings.zeros[run] = zero
-        readings = table[list(FORCES)].to_numpy()
-        names = ("Fx", "Fy", "Fz")
-        unit = plausible.clock(time, sensor.get("rate_hz")) or _force_unit(batch, run, readings)
-        if recordings.doubt(file, unit):
-            continue
-        recordings.note(file, run, [_starts_at(zero), *quality.sampling(time, sensor.get("rate_hz"))])
-        recordings.note(file, run, quality.air_offset(names, readings))
-        full_scale = sensor.get("range_n")
-        if not recordings.fit(file, run, "dynamometer", _channels(names, readings, full_scale)):
-            continue
-        part = {"run": run, "t_s": time, **dict(zip(FORCES, to_tool @ readings.T, strict=True))}
-        yield part | ({"spindle_deg": table["spindle_deg"]} if "spindle_deg" in table else {})
+        for some in [table] if count == 1 else read_pieces(recordings.folder / file, "force", PIECE):
+            tool = to_tool @ some[list(FORCES)].to_numpy().T
+            part = {"run": run, "t_s": some["t_s"].to_numpy() - found.zero}
+            part |= dict(zip(FORCES, tool, strict=True))
+            yield part | ({"spindle_deg": some["spindle_deg"]} if "spindle_deg" in some else {})
+
+
+def _fit_force(batch: Batch, recordings: Recordings, run: str, file: str, found: RecordQuality) -> bool:
+    """Gather what there is to say of a force record; tell whether it can be used."""
+    rate = batch.instrument("dynamometer").get("rate_hz")
+    recordings.zeros[run] = found.zero
+    unit = plausible.clock_of(found.step, rate) or _force_unit(batch, run, found.largest)
+    if recordings.doubt(file, unit):
+        return False
+    recordings.note(file, run, [_starts_at(found.zero), *found.sampling(rate), *found.air_offset()])
+    return recordings.fit(file, run, "dynamometer", found.channels())
 
 
 def robot(batch: Batch, recordings: Recordings) -> Iterator[Part]:
@@ -294,9 +308,9 @@ def _channels(names: tuple[str, ...], values: Array, full_scale: float | None) -
     return [*checks, quality.alike(names, values)]
 
 
-def _force_unit(batch: Batch, run: str, readings: Array) -> str:
+def _force_unit(batch: Batch, run: str, largest: float) -> str:
     chip = float(batch.runs["axial_depth_mm"][run]) * float(batch.runs["feed_per_tooth_mm"][run])
-    return plausible.cutting_force(readings, chip, batch.manifest["coefficients"].get("ktc_n_mm2"))
+    return plausible.cutting_force(largest, chip, batch.manifest["coefficients"].get("ktc_n_mm2"))
 
 
 def _joint_doubt(table: pd.DataFrame) -> str:

@@ -31,7 +31,7 @@ def scan(batch: Batch, recordings: Recordings) -> Iterator[Part]:
     to_work = None if declared is None else np.array(declared, float)
     for run, file in files(batch, "scan"):
         kept, dropped, samples = 0, 0, []
-        for table in recordings.cloud(file, PIECE):
+        for table in recordings.pieces(file, "cloud", PIECE):
             points = table[list(POINT)].to_numpy()
             points = points if to_work is None else moved(points, to_work)
             recordings.note(file, run, [quality.Finding(*found) for found in table.attrs.get("notes", ())])
