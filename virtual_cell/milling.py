@@ -45,6 +45,11 @@ class Coefficients:
         """Factor on the edge coefficients after some metres of cut."""
         return 1.0 + self.wear * metres
 
+    def after(self, metres: float) -> Coefficients:
+        """Coefficients of an edge that has cut some metres and wears no more while they are used."""
+        factor = float(self.worn(metres))
+        return replace(self, kte=self.kte * factor, kre=self.kre * factor, kae=self.kae * factor, wear=0.0)
+
     def per_length(self, h: Array, worn: Array | float) -> tuple[Array, Array, Array]:
         """Return tangential, radial, axial force per axial length, N/m, at chip thickness ``h`` (m)."""
         edge = np.where(h > 0.0, worn, 0.0)

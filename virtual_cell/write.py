@@ -28,7 +28,7 @@ RUN_COLUMNS = (
         "scan",
         "profile",
     ),
-    "stable",
+    *("stable", "started_at"),
 )
 
 

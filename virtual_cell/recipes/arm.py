@@ -34,6 +34,7 @@ _SCATTER, _SPEED_ERROR = 0.01, 0.005
 _BEGIN = (7.0 * MM, 11.0 * MM)  # of the line, where the records begin
 _APART = 180.0  # s, from run to run
 _GRID = 0.05 * MM  # of the stylus
+CELL: Row = {"cell": "cutting-arm", "arm": {"dh": [list(row) for row in DH]}}
 
 
 @dataclass(frozen=True)
@@ -72,17 +73,11 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
     for name, parameters in effects.items():
         cell = ARM_EFFECTS[name].apply(cell, parameters)
     fresh_folder(folder)
-    loads = {wall: statics(cell, along) for wall, along in bench.lines.items()}
-    rows = []
-    for place, (plan, replicate) in enumerate(spread(bench.plans, rng), start=1):
-        name, noise, where = f"r{place:02d}", rng.spawn(5), way(plan)
-        one = Pass(bench.lines[where], loads[where], speed(bench, plan), noise[0].uniform(*_BEGIN))
-        run = _Run(cell, bench, plan, side(bench, where), one, place)
-        rows.append(_row(run, name, replicate) | _recorded(run, folder, name, noise))
+    rows, _ = cut_all(folder, cell, bench, rng)
     write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
-    write_csv(folder / "loads.csv", _loads(cell, bench, rng))
-    write_yaml(folder / "cell.yaml", {"cell": "cutting-arm", "arm": {"dh": [list(row) for row in DH]}})
-    write_yaml(folder / "batch.yaml", _manifest(folder.name, cell, bench))
+    write_csv(folder / "loads.csv", tested(cell, bench, rng))
+    write_yaml(folder / "cell.yaml", CELL)
+    write_yaml(folder / "batch.yaml", manifest(folder.name, cell, bench))
     return {
         "batch": folder.name,
         "seed": seed,
@@ -92,6 +87,38 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
     }
 
 
+def cut_all(
+    folder: Path, cell: ArmCell, bench: Bench, rng: np.random.Generator
+) -> tuple[list[Row], dict[str, Row]]:
+    """Cut and record every run of a bench into ``folder``; return the rows of the run table, and the truth.
+
+    The truth, by run: ``force_n``, the mean on the tool in full cut (3,), work frame, and ``mm_per_n`` (3,),
+    by how much the wall stands higher for more of it.
+    """
+    loads = {wall: statics(cell, along) for wall, along in bench.lines.items()}
+    rows, truth = [], {}
+    for place, (plan, replicate) in enumerate(spread(bench.plans, rng), start=1):
+        name, noise, where = f"r{place:02d}", rng.spawn(5), way(plan)
+        one = Pass(bench.lines[where], loads[where], speed(bench, plan), noise[0].uniform(*_BEGIN))
+        run = _Run(cell, bench, plan, side(bench, where), one, place)
+        force = _force(run, noise[0])
+        rows.append(_row(run, name, replicate) | _recorded(run, force, folder, name, noise[1:]))
+        truth[name] = _true(run, force)
+    return rows, truth
+
+
+def _true(run: _Run, force: SideForce) -> Row:
+    mean = force.turn.mean(axis=0) @ run.feed
+    middle = np.array([0.5 * run.one.along.length])
+
+    def stands(newtons: Array) -> float:
+        moved = given_way(run.cell, run.one.loads, middle, (run.cell.turn @ newtons)[None])[0]
+        return float(moved @ run.cell.turn @ run.wall.normal)
+
+    slope = [(stands(mean + step) - stands(mean - step)) / 2.0 for step in np.eye(3)]
+    return {"force_n": mean.tolist(), "mm_per_n": [value / MM for value in slope]}
+
+
 def _row(run: _Run, name: str, replicate: int) -> Row:
     plan = run.plan
     row: Row = {key: getattr(plan, key) for key in plan.__dataclass_fields__ if not key.endswith("_s")}
@@ -99,11 +126,12 @@ def _row(run: _Run, name: str, replicate: int) -> Row:
     return row | {"cut_length_mm": round(run.wall.length / MM, 3)}
 
 
-def _recorded(run: _Run, folder: Path, name: str, noise: Sequence[np.random.Generator]) -> Row:
+def _recorded(
+    run: _Run, force: SideForce, folder: Path, name: str, noise: Sequence[np.random.Generator]
+) -> Row:
     """Record a side cut and its idle run: both logs, the force, the trace of the wall, each its own noise."""
     cell, bench, one = run.cell, run.bench, run.one
-    settings, idling, cutting, sensing, tracing = noise
-    force = _force(run, settings)
+    idling, cutting, sensing, tracing = noise
 
     def in_base(s: Array) -> Array:
         return np.asarray(force.mean_at(s - run.entry) @ run.feed @ cell.turn.T)
@@ -147,7 +175,7 @@ def _traced(run: _Run, in_base: Callable[[Array], Array], rng: np.random.Generat
     return trace(x, z, run.bench.stylus, rng)
 
 
-def _loads(cell: ArmCell, bench: Bench, rng: np.random.Generator) -> list[Row]:
+def tested(cell: ArmCell, bench: Bench, rng: np.random.Generator) -> list[Row]:
     """Pull and push the tip along the work's axes at two levels, in each pose."""
     over = cell.in_base(np.array([0.5 * bench.size[0], 0.5 * bench.size[1], 0.0]))
     poses = {"p1": cell.arm.reach(over, cell.turn, np.array(NEAR_DEG) * DEG), **bench.poses}
@@ -169,7 +197,8 @@ def _loads(cell: ArmCell, bench: Bench, rng: np.random.Generator) -> list[Row]:
     return rows
 
 
-def _manifest(name: str, cell: ArmCell, bench: Bench) -> Row:
+def manifest(name: str, cell: ArmCell, bench: Bench) -> Row:
+    """Return batch.yaml of a batch of side cuts."""
     tool, sensor = bench.tool, bench.sensor
     yaw = math.atan2(cell.turn[1, 0], cell.turn[0, 0]) / DEG
     return {

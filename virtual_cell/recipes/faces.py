@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +27,7 @@ from virtual_cell.tip import Tip, tip_heights
 from virtual_cell.units import DEG, MM, Array
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_ply, write_yaml
 
+Listener = Callable[[str, Case, SideForce], Row]
 _SCATTER, _SPEED_ERROR = 0.01, 0.003
 _THICK_MM = 10.0
 _HAMMER_HZ, _HAMMER_NOISE = np.arange(0.5, 60.0, 0.125), 0.01
@@ -58,41 +59,70 @@ def _made(
 ) -> Row:
     cell, effects = applied(cell, hidden, rng.spawn(1)[0])
     fresh_folder(folder)
+    rows = mill_all(folder, cell, rng)
+    write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
+    write_csv(folder / "loads.csv", tested(folder, cell, rng))
+    write_yaml(folder / "cell.yaml", {"cell": "milling-arm"})
+    write_yaml(folder / "batch.yaml", manifest(folder.name, cell))
+    return {"batch": folder.name, "effects": effects}
+
+
+def mill_all(
+    folder: Path,
+    cell: FaceCell,
+    rng: np.random.Generator,
+    *,
+    after: int = 0,
+    metres: float = 0.0,
+    listen: Listener | None = None,
+) -> list[Row]:
+    """Mill and scan every face of a cell into ``folder``; return the rows of the run table.
+
+    ``after`` so many runs, and so many ``metres`` of cut of the same tool. ``listen(run, case, force)``, told
+    of every face and the force along its passes, returns what else its row has.
+    """
     rows = []
-    for place, (case, replicate) in enumerate(spread(cell.cases, rng), start=1):
+    for place, (case, replicate) in enumerate(spread(cell.cases, rng), start=after + 1):
         run = f"r{place:02d}"
-        write_ply(folder / f"scan/{run}.ply", _cut(cell, case, *rng.spawn(3)))
-        rows.append(_row(cell, case, run, place, replicate))
+        worn = replace(cell, milling=replace(cell.milling, metal=cell.milling.metal.after(metres)))
+        settings, hiding, scanning = rng.spawn(3)
+        force = _force(worn, case, settings)
+        write_ply(folder / f"scan/{run}.ply", _cut(worn, case, force, hiding, scanning))
+        heard = listen(run, case, force) if listen else {}
+        rows.append(_row(cell, case, run, place, replicate) | heard)
+        metres += rows[-1]["cut_length_mm"] * MM
     for orientation in sorted({case.orientation for case in cell.cases}):
         write_csv(folder / f"path/{orientation}.csv", path_rows(cell.passes(orientation)))
-    write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
-    _write_tests(folder, cell, rng)
-    write_yaml(folder / "cell.yaml", {"cell": "milling-arm"})
-    write_yaml(folder / "batch.yaml", _manifest(folder.name, cell))
-    return {"batch": folder.name, "effects": effects}
+    return rows
 
 
 def _cut(
     cell: FaceCell,
     case: Case,
-    settings: np.random.Generator,
+    force: SideForce,
     hiding: np.random.Generator,
     scanning: np.random.Generator,
 ) -> Array:
-    """Mill one face and scan it, each with its own chance."""
+    """Mill one face with a force along its passes, and scan it, each with its own chance."""
     passes, pose, depth = cell.passes(case.orientation), cell.poses[case.pose], case.depth_mm * MM
     tip = Tip(pose.mass, pose.a0, pose.a1, lambda at: cell.factor * np.linalg.inv(pose.compliance(at)))
-    force = _force(cell, case, settings)
+    feed = feed_axes(case)
 
     def load(s: Array) -> Array:
-        seen = force.mean_at(s)
-        return seen if passes.along == 0 else np.column_stack([-seen[:, 1], seen[:, 0], seen[:, 2]])
+        return np.asarray(force.mean_at(s) @ feed)
 
     count = len(passes.axes)
     heights = tip_heights(passes, tip, load, pass_gains(cell, count, depth))
     phase, levels = hiding.uniform(0.0, 2.0 * math.pi), pass_levels(cell, count, hiding)
     around = replace(cell.around, phase=phase, levels=levels)
     return scan(cell.scanner, cell.size, lambda at: surface(passes, heights, around, at), scanning)
+
+
+def feed_axes(case: Case) -> Array:
+    """Axes of the feed frame in the work frame, as rows (3, 3)."""
+    if case.orientation == "L":
+        return np.eye(3)
+    return np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _force(cell: FaceCell, case: Case, rng: np.random.Generator) -> SideForce:
@@ -128,8 +158,8 @@ def _row(cell: FaceCell, case: Case, run: str, place: int, replicate: int) -> Ro
     }
 
 
-def _write_tests(folder: Path, cell: FaceCell, rng: np.random.Generator) -> None:
-    """Write load tests, reduced mass and, where the tip was struck, the hammer tests of every pose."""
+def tested(folder: Path, cell: FaceCell, rng: np.random.Generator) -> list[Row]:
+    """Return the load tests; write reduced mass and, where the tip was struck, the hammer tests of poses."""
     tests, middle = cell.loads, np.array(cell.size) / 2.0
     at = (float(middle[0] / MM), float(middle[1] / MM))
     loads = [
@@ -144,11 +174,11 @@ def _write_tests(folder: Path, cell: FaceCell, rng: np.random.Generator) -> None
         )
         for name, pose in cell.poses.items()
     ]
-    write_csv(folder / "loads.csv", itertools.chain(*loads))
     write_csv(folder / "mass.csv", [mass_row(name, "P5", at, pose.mass) for name, pose in cell.poses.items()])
     if cell.hammered:
         rows = [row for name, pose in cell.poses.items() for row in _struck(folder, name, pose, middle, rng)]
         write_csv(folder / "impacts.csv", rows)
+    return list(itertools.chain(*loads))
 
 
 def _struck(folder: Path, name: str, pose: Pose, at: Array, rng: np.random.Generator) -> list[Row]:
@@ -187,7 +217,8 @@ def receptance(pose: Pose, at: Array, frequency: Array) -> Array:
     return np.asarray(np.linalg.inv(stiffness - omega**2 * pose.mass + 1j * omega * damping))
 
 
-def _manifest(name: str, cell: FaceCell) -> Row:
+def manifest(name: str, cell: FaceCell) -> Row:
+    """Return batch.yaml of a batch of faces."""
     tool, scanner = cell.milling.tool, cell.scanner
     return {
         "format": 1,

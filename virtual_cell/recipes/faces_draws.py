@@ -138,8 +138,8 @@ def drawn(rng: np.random.Generator, style: str, cases: tuple[Case, ...] | None =
         size=size,
         milling=milling,
         poses=_poses(rng, varied, size, sorted({case.pose for case in cases})),
-        loads=_loads(rng, varied, size),
-        scanner=_scanner(rng, varied, size),
+        loads=load_tests(rng, varied, size),
+        scanner=scanner_of(rng, varied, size),
         cases=cases,
         hammered=varied and bool(rng.uniform() < 1.0 / 3.0),
     )
@@ -226,14 +226,15 @@ def _compliance(arm: Arm, origin: Array, wrist: str, size: tuple[float, float]) 
     return tip_compliance(arm, origin, rotation_rpy(0.0, 0.0, WRIST_YAW_DEG[wrist] * DEG), size, NEAR)
 
 
-def _loads(rng: np.random.Generator, varied: bool, size: tuple[float, float]) -> LoadTests:
+def load_tests(rng: np.random.Generator, varied: bool, size: tuple[float, float]) -> LoadTests:
+    """Draw how the tip is pulled at nine places of a plate."""
     x, y = ((10.0, 0.5 * extent / MM, extent / MM - 10.0) for extent in size)
     places = tuple((float(round(a, 1)), float(round(b, 1))) for a in x for b in y)
     repeats = int(rng.integers(2, 4)) if varied else 2
     return LoadTests(places, (150.0, 250.0), repeats, 2.0 * UM)
 
 
-def _scanner(rng: np.random.Generator, varied: bool, size: tuple[float, float]) -> Scanner:
+def scanner_of(rng: np.random.Generator, varied: bool, size: tuple[float, float]) -> Scanner:
     """Draw a scanner; it stands somewhere about the plate, looking down, and where it stands is known."""
     if not varied:
         spacing, sigma, correlated, off, turn = 1.0 * MM, 15.0 * UM, 0.5, 8.0 * UM, (90.0, 0.0, 0.0)
