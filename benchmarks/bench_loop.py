@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import pytest
 
-from metro.batch.processed import read_batch, read_table
+from metro.batch.processed import Processed, read_batch
 from metro.effects import library
 from metro.loop.search import Gates, search
 from metro.loop.verdict import comparison, held_out, judge
@@ -38,7 +38,7 @@ def task_of(folder, repeats, held):
         recipe.make(folder / "blind-test", HIDDEN, 3)
     ingest(folder / "blind-test", folder, folder / "out", {}, "test")
     batch = read_batch(folder / "out")
-    observed = force.observe(batch, lambda name, run: read_table(folder / "out" / f"{name}.parquet", run), {})
+    observed = force.observe(batch, Processed(folder / "out"), {})
     return force.problem(batch, observed, {})
 
 

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 from command_cost import cost
 
 from metro.codehash import code_hash
@@ -24,20 +26,25 @@ SIZES = {"force": (500_000, 2_000_000, 8_000_000), "scan": (1_000_000, 4_000_000
 BUNDLED = {"force": "clean-slot", "scan": "irb6640-face"}
 METRO = (sys.executable, "-c", "from metro.cli import app; app()")
 IDENTIFY = '{"model_form_budget": 0.007}'
+CHANNELS = ("fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm")
+PIECE = 1 << 20  # rows that are written at once
 REVOLUTION = 100  # samples of 6000 rpm at 10 kHz
 
 
 def write_record(path, count):
-    """Write a record of three teeth that cut after a second of air, by one revolution after the other."""
+    """Write six channels of three teeth that cut after a second of air, revolution by revolution."""
     rng = np.random.default_rng(0)
     angle = 2 * np.pi * np.arange(REVOLUTION) / REVOLUTION
     tooth = np.maximum(np.sin(3 * angle), 0.0)
     force = np.column_stack([-80.0 * tooth, 150.0 * tooth, 40.0 * tooth])
-    signal = np.resize(force, (count, 3))
-    signal[:10_000] = 0.0
-    signal += rng.normal(0.0, 1.0, signal.shape)
-    columns = dict(zip(("fx_n", "fy_n", "fz_n"), signal.T, strict=True))
-    pd.DataFrame({"t_s": np.arange(count) / 10_000, **columns}).to_parquet(path)
+    schema = pa.schema([("t_s", pa.float64()), *((name, pa.float32()) for name in CHANNELS)])
+    with pq.ParquetWriter(path, schema) as writer:
+        for start in range(0, count, PIECE):
+            place = np.arange(start, min(start + PIECE, count))
+            signal = np.where(place[:, None] >= 10_000, force[place % REVOLUTION], 0.0)
+            signal = np.hstack([signal, 0.01 * signal]) + rng.normal(0.0, 1.0, (len(place), 6))
+            arrays = [pa.array(place / 10_000), *(pa.array(each.astype("f4")) for each in signal.T)]
+            writer.write_table(pa.table(arrays, schema=schema))
 
 
 def write_face(path, count):

@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from metro.batch.processed import read_batch, read_table
+from metro.batch.processed import Processed, read_batch
 from metro.effects import library
 from metro.loop.search import Gates, search
 from metro.loop.verdict import comparison, held_out, judge
@@ -27,7 +27,7 @@ def closed(folder, effects, seed):
     make(folder / "blind-test", effects, seed)
     ingest(folder / "blind-test", folder, folder / "out", {}, "test")
     batch = read_batch(folder / "out")
-    observed = force.observe(batch, lambda name, run: read_table(folder / "out" / f"{name}.parquet", run), {})
+    observed = force.observe(batch, Processed(folder / "out"), {})
     task = force.problem(batch, observed, {})
     outcome = search(task, library("force"), GATES)
     rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from metro.batch.processed import read_batch, read_table
+from metro.batch.processed import Processed, read_batch
 from metro.effects import library
 from metro.loop.search import Gates, search
 from metro.observables import joint_force
@@ -25,9 +25,7 @@ def cell(tmp_path_factory):
     out = tmp_path_factory.mktemp("kr160") / "out"
     ingest(ROOT / "data" / "raw" / "kr160-side", ROOT / "config" / "cells", out, {}, "test")
     batch = read_batch(out)
-    return batch, joint_force.observe(
-        batch, lambda name, run=None: read_table(out / f"{name}.parquet", run), {}
-    )
+    return batch, joint_force.observe(batch, Processed(out), {})
 
 
 def found(cell, torque=None, *, force=None, manifest=None):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from metro.batch.processed import read_batch, read_table
+from metro.batch.processed import Processed, read_batch
 from metro.effects import library
 from metro.effects.stiffness_scale import OF_ARM, apply
 from metro.loop.candidate import Candidate
@@ -100,10 +100,7 @@ def arm_outcome(folder, out):
     """Force coefficients of a batch of the arm, then the loop on its deformation."""
     ingest(folder, ROOT / "config" / "cells", out, {}, "test")
     batch = read_batch(out)
-
-    def read(name, run=None):
-        return read_table(out / f"{name}.parquet", run)
-
+    read = Processed(out)
     observed = force.observe(batch, read, {})
     task = force.problem(batch, observed, {})
     blocks = task.role("identify")

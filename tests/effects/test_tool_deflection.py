@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from blind import clean
 
-from metro.batch.processed import read_batch, read_table
+from metro.batch.processed import Processed, read_batch
 from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
@@ -49,9 +49,7 @@ def test_the_stiffness_of_a_tool_that_yields_beside_its_runout_is_found(tmp_path
     recipe.make(tmp_path / "blind-test", {"tool_runout": RUNOUT, "tool_deflection": SPRING}, seed)
     ingest(tmp_path / "blind-test", tmp_path, tmp_path / "out", {}, "test")
     batch = read_batch(tmp_path / "out")
-    observed = force.observe(
-        batch, lambda name, run: read_table(tmp_path / "out" / f"{name}.parquet", run), {}
-    )
+    observed = force.observe(batch, Processed(tmp_path / "out"), {})
     task = force.problem(batch, observed, {})
     prior = first_noise(0.007, task.scatter, task.blocks)
     fitted = fit(Candidate(task.base), task.blocks, prior)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from metro.batch.processed import read_batch, read_table
+from metro.batch.processed import Processed, read_batch
 from metro.effects import library, told_of
 from metro.loop.candidate import Candidate
 from metro.loop.fit import fit
@@ -34,7 +34,7 @@ def cell(tmp_path_factory):
     """The bundled batch of the robot's side cuts, and how its tables are read."""
     out = tmp_path_factory.mktemp("kr160") / "out"
     ingest(ROOT / "data" / "raw" / "kr160-side", ROOT / "config" / "cells", out, {}, "test")
-    return read_batch(out), lambda name, run=None: read_table(out / f"{name}.parquet", run)
+    return read_batch(out), Processed(out)
 
 
 def test_the_give_is_the_compliance_of_the_tip_along_the_wall_normal(cell):

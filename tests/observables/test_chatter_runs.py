@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
 from metro.batch.processed import COLUMNS
@@ -59,7 +60,7 @@ def batch(**columns):
 
 def observe(made, records, **tables):
     source = {"force": dict(zip(made.runs.index, records, strict=True)), **tables}
-    return observe_chatter(made, lambda name, run: source[name][run], MODES).set_index("run")
+    return observe_chatter(made, FakeTables(lambda name, run: source[name][run]), MODES).set_index("run")
 
 
 def test_a_vibration_off_the_orders_is_chatter_and_runout_is_not():
@@ -138,7 +139,8 @@ def shown_of(made, records):
     def read(name, run):
         return source[name][run]
 
-    return observe_records(made, read, observe_chatter(made, read, MODES))
+    tables = FakeTables(read)
+    return observe_records(made, tables, observe_chatter(made, tables, MODES))
 
 
 def test_chatter_is_shown_beside_the_stable_cut_nearest_in_speed_then_depth():
@@ -189,7 +191,7 @@ def test_without_a_modal_test_the_records_still_tell_chatter_and_the_lobes_are_r
     def read(name, run=None):
         return source[name][run] if name in source else pd.DataFrame(columns=list(COLUMNS[name]))
 
-    found = lobes.observe(made, read, {})
+    found = lobes.observe(made, FakeTables(read), {})
     assert (found["chatter_runs"]["probability"].iloc[0] > 0.5) == bool(order)
     refused = lobes.problem(made, found, {})
     assert isinstance(refused, Refusal)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from metro.batch.processed import read_batch, read_table
+from metro.batch.processed import Processed, read_batch
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import COEFFICIENTS, Cut
@@ -42,9 +42,7 @@ class Observed:
     def __init__(self, folder, out):
         ingest(folder, ROOT / "config" / "cells", out, {}, "test")
         self.batch = read_batch(out)
-        self.observed = force.observe(
-            self.batch, lambda name, run: read_table(out / f"{name}.parquet", run), {}
-        )
+        self.observed = force.observe(self.batch, Processed(out), {})
         self.task = force.problem(self.batch, self.observed, {})
 
     def identified(self):

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
 from metro.observables.force_orders import observe
@@ -23,7 +24,7 @@ def speed_of(reading_deg, seconds=0.5, seed=1):
     record = pd.DataFrame(100.0 * wave + rng.normal(size=wave.shape), columns=["fx_n", "fy_n", "fz_n"])
     record = record.assign(t_s=time, spindle_deg=tacho)
     runs = pd.DataFrame([ROW | {"feed_per_tooth_mm": 0.1}], index=["r1"])
-    found = observe(Batch("small", MANIFEST, {"cell": "c"}, runs, {}), lambda *_: record, {})
+    found = observe(Batch("small", MANIFEST, {"cell": "c"}, runs, {}), FakeTables(lambda *_: record), {})
     (row,) = found["spindle"].to_dict("records")
     return row["spindle_rpm"], row["spindle_rpm_sd"]
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from metro.batch.processed import read_batch, read_table
+from metro.batch.processed import Processed, read_batch
 from metro.loop.candidate import Candidate
 from metro.loop.fit import fit
 from metro.loop.noise import first_noise
@@ -69,7 +69,7 @@ def identified(folder, out):
     """The pipeline's way from the raw folder to the coefficients."""
     ingest(folder, CELLS, out, {}, "test")
     records = read_batch(out)
-    observed = force.observe(records, lambda name, run: read_table(out / f"{name}.parquet", run), {})
+    observed = force.observe(records, Processed(out), {})
     task = force.problem(records, observed, {})
     prior = first_noise(0.007, task.scatter, task.blocks)
     base = fit(Candidate(task.base), task.blocks, prior)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from metro.signals.orders import (
     advance,
+    aligned,
     highest_order,
     order_averages,
     order_matrix,
@@ -133,3 +134,11 @@ def test_one_wild_order_is_drawn_towards_its_neighbours_but_not_lost():
     true = np.var(np.repeat(rng.normal(size=25), 400)) * 0.5 / 25
     assert others < 0.1 * own
     assert own == pytest.approx(true, rel=1.5)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, 2.9, 5.5])
+def test_a_waveform_is_turned_back_to_where_it_was(turn):
+    rng = np.random.default_rng(5)
+    value = rng.normal(size=(3, 25)) / (1.0 + np.arange(25) // 2)
+    turned = advance(value.T, turn).T + 1e-4 * rng.normal(size=value.shape)
+    np.testing.assert_allclose(aligned(turned, value), value, atol=1e-3)

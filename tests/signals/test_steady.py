@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metro.signals.steady import segments
+from metro.signals.steady import segments, turns
 
 TURN = 100  # samples per revolution
 
@@ -27,7 +27,7 @@ def record(air=0, entry=0, steady=0, leaving=0, *, after=0, zero=3.0):
 
 def test_air_entry_steady_exit_are_told_apart():
     signal = record(20, 10, 60, 10, after=20)
-    found = segments(signal, TURN, settling=10 * TURN)
+    found = segments(turns([signal], TURN), settling=10 * TURN)
     assert 30 * TURN <= found.steady.start <= 36 * TURN
     assert 84 * TURN <= found.steady.stop <= 90 * TURN
     assert found.air[: 19 * TURN].all()
@@ -38,31 +38,31 @@ def test_air_entry_steady_exit_are_told_apart():
 
 def test_a_record_of_steady_cutting_alone_is_kept_whole():
     signal = record(steady=40)
-    found = segments(signal, TURN, settling=10 * TURN)
+    found = segments(turns([signal], TURN), settling=10 * TURN)
     assert (found.steady.start, found.steady.stop) == (0, len(signal))
     assert not found.air.any()
 
 
 def test_a_record_that_begins_in_the_cut_is_settled_at_its_end_only():
     signal = record(steady=40, leaving=5, after=20)
-    found = segments(signal, TURN, settling=5 * TURN)
+    found = segments(turns([signal], TURN), settling=5 * TURN)
     assert found.steady.start == 0
     assert 34 * TURN <= found.steady.stop <= 40 * TURN
 
 
 def test_a_large_zero_offset_is_not_a_cut():
-    found = segments(record(30, 2, 50, 2, after=30, zero=25.0), TURN, settling=2 * TURN)
+    found = segments(turns([record(30, 2, 50, 2, after=30, zero=25.0)], TURN), settling=2 * TURN)
     assert found.steady.start >= 32 * TURN
     assert found.steady.stop <= 82 * TURN
 
 
 def test_a_cut_that_is_over_before_full_engagement_is_refused():
     with pytest.raises(ValueError, match="before the tool is fully engaged"):
-        segments(record(20, 5, 10, 5, after=20), TURN, settling=8 * TURN)
+        segments(turns([record(20, 5, 10, 5, after=20)], TURN), settling=8 * TURN)
 
 
 def test_the_longest_of_two_cuts_is_taken():
     signal = np.concatenate([record(10, 0, 15, 0, after=10), record(10, 0, 50, 0, after=10)])
-    found = segments(signal, TURN, settling=0)
+    found = segments(turns([signal], TURN), settling=0)
     assert found.steady.start == pytest.approx(45 * TURN, abs=TURN)
     assert found.steady.stop == pytest.approx(95 * TURN, abs=TURN)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from metro.batch.processed import read_batch, read_table
+from metro.batch.processed import Processed, read_batch
 from metro.observables import lobes
 from metro.stages.ingest import ingest
 from virtual_cell.recipes import chatter
@@ -19,11 +19,7 @@ def seen(tmp_path_factory):
     truth = chatter.make(folder / "chatter-slots")
     ingest(folder / "chatter-slots", CELLS, folder / "out", {}, "")
     batch = read_batch(folder / "out")
-
-    def read(name, run=None):
-        return read_table(folder / "out" / f"{name}.parquet", run)
-
-    return batch, lobes.observe(batch, read, {}), truth
+    return batch, lobes.observe(batch, Processed(folder / "out"), {}), truth
 
 
 @pytest.mark.slow

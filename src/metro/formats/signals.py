@@ -16,6 +16,7 @@ from metro.formats.limits import check_archive, check_unpacked
 from metro.formats.text import Layout, fields, is_number, lines, number_pieces, separator
 
 _ARRAYS = ("freq_hz", "frf", "coherence")
+_BUFFER = 1 << 20  # bytes of a Parquet file that are read at once
 
 
 def csv_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
@@ -43,7 +44,8 @@ def parquet_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     import pyarrow.parquet as pq
 
     try:
-        file = pq.ParquetFile(path)
+        # without a buffer of its own Arrow keeps what it has read of all row groups
+        file = pq.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER)
         stored = file.schema_arrow.names
         names = [name.strip().lower() for name in stored]
         use = columns_to_read(path, kind, names)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.observables.force_orders import orbit_rate, spindle_angle, with_orbit
+from metro.observables.force_record import ForceRecord
 from metro.signals import orders, steady
 from metro.signals.asynchronous import whole_spectrum
 from metro.signals.chatter import UNDECIDED, Detection, detect
@@ -27,12 +30,9 @@ COLUMNS = (
 RECORD_COLUMNS = ("run", "part", "x", "value", "on_order")
 TURNS_SHOWN = 12  # of a record, in its picture
 LABELS = {"no": 1, "yes": 0}  # of the operator, in the column ``stable``: 1 is unstable
-AXES = ["fx_n", "fy_n", "fz_n"]
-
-Read = Callable[..., pd.DataFrame]
 
 
-def observe_chatter(batch: Batch, read: Read, modes: pd.DataFrame) -> pd.DataFrame:
+def observe_chatter(batch: Batch, read: Tables, modes: pd.DataFrame) -> pd.DataFrame:
     """Look for chatter in every run with a dynamometer record, and measure every stylus trace.
 
     Returns
@@ -57,13 +57,13 @@ def measured(chatter: pd.DataFrame) -> pd.DataFrame:
     return told.assign(unstable=(told["probability"] > 0.5).astype(int))
 
 
-def _observed(batch: Batch, run: str, read: Read) -> JSON:
+def _observed(batch: Batch, run: str, read: Tables) -> JSON:
     """Row of a run; empty where it has neither record nor trace."""
     row: Any = batch.runs.loc[run]
     files = {name: isinstance(row.get(name), str) and bool(row[name]) for name in ("dynamometer", "profile")}
     if not any(files.values()):
         return {}
-    found, note = _detection(batch, run, read("force", run)) if files["dynamometer"] else (None, "")
+    found, note = _detection(batch, run, read) if files["dynamometer"] else (None, "")
     told: JSON = {"kind": "", "separable": None, "signs": ""}
     if found is not None:
         told = {name: getattr(found, name) for name in COLUMNS if hasattr(found, name)}
@@ -80,17 +80,21 @@ def _observed(batch: Batch, run: str, read: Read) -> JSON:
     }
 
 
-def _detection(batch: Batch, run: str, record: pd.DataFrame) -> tuple[Detection | None, str]:
-    """Return what the record of a run says, or why it says nothing."""
+def _detection(batch: Batch, run: str, read: Tables) -> tuple[Detection | None, str]:
+    """Return what the record of a run says, or why it says nothing; of a long one, its worst stretch."""
     teeth = int(batch.manifest["tool"]["teeth"])
     try:
-        time, angle, signal = _steady_cut(batch, run, record)
-        found = detect(time, angle, signal, teeth)
-        if found.probability <= UNDECIDED or np.isfinite(record["spindle_deg"]).all():
-            return found, ""
-        wandering = detect(time, followed(time, angle, signal, teeth), signal, teeth)
+        found = [_detected(cut, teeth) for cut in _steady_cuts(batch, run, read)]
     except ValueError as error:
         return None, str(error)
+    return max(found, key=lambda one: one[0].probability)
+
+
+def _detected(cut: _Cut, teeth: int) -> tuple[Detection, str]:
+    found = detect(cut.time, cut.angle, cut.signal, teeth)
+    if found.probability <= UNDECIDED or cut.known:
+        return found, ""
+    wandering = detect(cut.time, followed(cut.time, cut.angle, cut.signal, teeth), cut.signal, teeth)
     if wandering.probability > UNDECIDED:
         return found, ""
     # chatter beside an order can be taken for wander, and wander for chatter
@@ -105,8 +109,21 @@ def _detection(batch: Batch, run: str, record: pd.DataFrame) -> tuple[Detection 
     return left_open, "without a tacho a speed that wanders would look the same"
 
 
-def _steady_cut(batch: Batch, run: str, record: pd.DataFrame) -> tuple[Array, Array, Array]:
-    """Time (n,), s, angle of the spindle (n,), rad, and force (n, 3), N, of the steady cut of a run.
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """A stretch of a steady cut: ``time`` (n,) s, ``angle`` of the spindle (n,) rad, ``signal`` (n, 3) N.
+
+    ``known``: whether a tacho tells the angle.
+    """
+
+    time: Array
+    angle: Array
+    signal: Array
+    known: bool
+
+
+def _steady_cuts(batch: Batch, run: str, read: Tables) -> Iterator[_Cut]:
+    """Yield the steady cut of a run in stretches.
 
     Raises
     ------
@@ -114,19 +131,21 @@ def _steady_cut(batch: Batch, run: str, record: pd.DataFrame) -> tuple[Array, Ar
         If there is none.
     """
     row: Any = batch.runs.loc[run]
-    time, signal = record["t_s"].to_numpy(float), record[AXES].to_numpy(float)
-    rate, nominal = (len(time) - 1) / (time[-1] - time[0]), float(row["spindle_rpm"]) / 60.0
+    record = ForceRecord(read, run)
+    nominal = float(row["spindle_rpm"]) / 60.0
     teeth, orbit = int(batch.manifest["tool"]["teeth"]), orbit_rate(row) / (2.0 * math.pi)
     # a cut that is still entering may chatter already: no settling is left off but a turn
-    cut = steady.segments(signal, rate / nominal, round(rate / nominal)).steady
-    time, tacho = time[cut], record["spindle_deg"].to_numpy(float)[cut]
-    signal = with_orbit(time, signal[cut], orbit)
-    highest = orders.highest_order(rate, nominal, teeth)
-    angle, _, _ = spindle_angle(time, signal, tacho, nominal=nominal, orbit=orbit, highest=highest)
-    return time, angle, signal
+    found = steady.segments(record.turns(record.rate / nominal), round(record.rate / nominal))
+    highest = orders.highest_order(record.rate, nominal, teeth)
+    for part in record.stretches(found.steady):
+        signal = with_orbit(part.time, part.signal, orbit)
+        angle, _, _ = spindle_angle(
+            part.time, signal, part.tacho, nominal=nominal, orbit=orbit, highest=highest
+        )
+        yield _Cut(part.time, angle, signal, bool(np.isfinite(part.tacho).all()))
 
 
-def observe_records(batch: Batch, read: Read, chatter: pd.DataFrame) -> pd.DataFrame:
+def observe_records(batch: Batch, read: Tables, chatter: pd.DataFrame) -> pd.DataFrame:
     """Return the spectrum and the last turns of a cut that chattered, and of one beside it that did not.
 
     They are the two that are nearest to each other in speed, and among those in depth.
@@ -149,20 +168,20 @@ def observe_records(batch: Batch, read: Read, chatter: pd.DataFrame) -> pd.DataF
         }
         nearest = pairs.assign(**apart).sort_values(["rpm", "depth_mm"], kind="stable").iloc[0]
         runs = [str(nearest["run"]), str(nearest["run_stable"])]
-    parts = [_record(batch, run, read("force", run)) for run in runs]
+    parts = [_record(batch, run, read) for run in runs]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(RECORD_COLUMNS))
 
 
-def _record(batch: Batch, run: str, record: pd.DataFrame) -> pd.DataFrame:
-    """Spectrum and last turns of the steady cut of one run."""
-    time, angle, signal = _steady_cut(batch, run, record)
-    frequency, amplitude, on_order = whole_spectrum(time, angle, signal)
-    few = angle > angle[-1] - 2.0 * math.pi * TURNS_SHOWN
-    centred = signal - signal.mean(axis=0)
+def _record(batch: Batch, run: str, read: Tables) -> pd.DataFrame:
+    """Spectrum and last turns of the steady cut of one run, of a long one of its last stretch."""
+    (cut,) = deque(_steady_cuts(batch, run, read), maxlen=1)
+    frequency, amplitude, on_order = whole_spectrum(cut.time, cut.angle, cut.signal)
+    few = cut.angle > cut.angle[-1] - 2.0 * math.pi * TURNS_SHOWN
+    centred = cut.signal - cut.signal.mean(axis=0)
     trace = centred[few, int(np.argmax(centred.std(axis=0)))]
     parts = [
         {"part": "spectrum", "x": frequency, "value": amplitude, "on_order": on_order},
-        {"part": "force", "x": time[few], "value": trace, "on_order": False},
+        {"part": "force", "x": cut.time[few], "value": trace, "on_order": False},
     ]
     table = pd.concat([pd.DataFrame(part) for part in parts], ignore_index=True)
     return table.assign(run=run)[list(RECORD_COLUMNS)]

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.cutting.cutter import Cutter
 from metro.observables import cutting_force
 from metro.observables.arm_give import give_of, giving_arm
 from metro.observables.force_coefficients import AXES
+from metro.observables.force_record import ForceRecord, Stretch
 from metro.observables.problem import Refusal
 from metro.signals import orders, steady
 from metro.units import DEG, JSON, MM, RPM, Array
@@ -23,10 +26,8 @@ BLOCKS_PER_ORBIT = 8  # of helical runs: what changes with the orbit is seen up 
 MOST_BLOCKS = 16
 REVOLUTIONS_PER_BLOCK, REVOLUTIONS_PER_ORBIT_BLOCK = 16, 8
 
-Read = Callable[..., pd.DataFrame]
 
-
-def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
+def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Turn dynamometer records into order averages: tables ``orders`` and ``spindle`` (speed of each run)."""
     runs = recorded(batch)
     if not runs:
@@ -35,7 +36,7 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
     if isinstance(tool, Refusal):
         return tool
     arm = giving_arm(batch, read)
-    results = [_observed(batch, run, read("force", run), tool) for run in runs]
+    results = [_observed(batch, run, read, tool) for run in runs]
     tables = [result for result in results if not isinstance(result, Refusal)]
     for _, row in tables:
         force = np.array([row[f"mean_{axis}_n"] for axis in AXES])
@@ -56,51 +57,96 @@ def recorded(batch: Batch) -> list[str]:
     return [str(run) for run, file in table["dynamometer"].items() if isinstance(file, str) and file]
 
 
-def _observed(
-    batch: Batch, run: str, record: pd.DataFrame, tool: Cutter
-) -> tuple[pd.DataFrame, JSON] | Refusal:
+def _observed(batch: Batch, run: str, read: Tables, tool: Cutter) -> tuple[pd.DataFrame, JSON] | Refusal:
     """Order averages of a run's steady cut, and what was found on the way."""
-    time, signal = record["t_s"].to_numpy(), record[["fx_n", "fy_n", "fz_n"]].to_numpy()
+    record = ForceRecord(read, run)
     row: Any = batch.runs.loc[run]
-    rate = (len(time) - 1) / (time[-1] - time[0])
-    nominal = row["spindle_rpm"] / 60.0
+    nominal, settling = row["spindle_rpm"] / 60.0, _settling(row, tool)
+    turns = record.turns(record.rate / nominal)
     try:
-        found = steady.segments(signal, rate / nominal, round(rate * _settling(row, tool)))
+        found = steady.segments(turns, round(record.rate * settling))
     except ValueError as error:
         return Refusal(f"run {run}: {error}")
     air = _zeroing(found)
-    zero = signal[air].mean(axis=0) if air.any() else np.zeros(3)
-    settling = _settling(row, tool) if found.steady.start > 0 else 0.0
-    at = {
-        "zero_at_s": float(time[air].mean() if air.any() else time[0]),
-        "contact_s": float(time[found.steady.start] - 0.5 * settling),
-    }
-    time, signal = time[found.steady], signal[found.steady] - zero
+    zero = turns.mean[air].mean(axis=0) if air.any() else np.zeros(3)
+    when = (np.flatnonzero(air).mean() + 0.5) * turns.length / record.rate if air.any() else 0.0
     orbit = orbit_rate(row) / (2.0 * math.pi)
-    signal = with_orbit(time, signal, orbit)
-    highest = orders.highest_order(rate, nominal, tool.teeth)
-    tacho = record["spindle_deg"].to_numpy()[found.steady]
-    angle, speed, deviation = spindle_angle(
-        time, signal, tacho, nominal=nominal, orbit=orbit, highest=highest
-    )
-    averages = orders.order_averages(time, angle, signal, highest, time_blocks(time, nominal, orbit))
+    highest = orders.highest_order(record.rate, nominal, tool.teeth)
+    parts = [_part(part, zero, nominal, orbit, highest) for part in record.stretches(found.steady)]
+    first, last = parts[0], parts[-1]
+    averages = _together(parts, time_blocks(first.time[0], last.time[1], nominal, orbit))
+    share = np.array([part.time[1] - part.time[0] for part in parts])
+    share /= share.sum()
+    mean = share @ np.array([part.mean for part in parts])
+    deviation = math.sqrt(sum((w * part.deviation) ** 2 for w, part in zip(share, parts, strict=True)))
     summary = {
         "run": run,
-        "spindle_rpm": (speed - orbit) * 60.0,
+        "spindle_rpm": (float(share @ [part.speed for part in parts]) - orbit) * 60.0,
         "spindle_rpm_sd": deviation * 60.0,
-        "steady_from_s": float(time[0]),
-        "steady_to_s": float(time[-1]),
-        "air_s": float(air.sum() / rate),
-        **at,
+        "steady_from_s": first.time[0],
+        "steady_to_s": last.time[1],
+        "air_s": float(found.quiet.sum() * turns.length / record.rate),
+        "zero_at_s": record.start + when,
+        "contact_s": first.time[0] - (0.5 * settling if found.steady.start > 0 else 0.0),
         **{f"zero_{axis}_n": float(value) for axis, value in zip(AXES, zero, strict=True)},
-        **{
-            f"mean_{axis}_n": float(value)
-            for axis, value in zip(AXES, _whole_mean(angle, signal), strict=True)
-        },
+        **{f"mean_{axis}_n": float(value) for axis, value in zip(AXES, mean, strict=True)},
     }
     return pd.concat(
         [_long(run, i, average) for i, average in enumerate(averages)], ignore_index=True
     ), summary
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A stretch of the steady cut: its order averages, speed (rev/s) and mean force; ``time``: its ends, s.
+
+    ``known``: whether a tacho tells its angle, so that its waveform is where that of the other stretches is.
+    """
+
+    time: tuple[float, float]
+    averages: list[orders.OrderAverage]
+    speed: float
+    deviation: float
+    mean: Array
+    known: bool
+
+
+def _part(part: Stretch, zero: Array, nominal: float, orbit: float, highest: int) -> _Part:
+    """Take the order averages of a stretch: as many blocks as if it were the whole cut."""
+    signal = with_orbit(part.time, part.signal - zero, orbit)
+    angle, speed, deviation = spindle_angle(
+        part.time, signal, part.tacho, nominal=nominal, orbit=orbit, highest=highest
+    )
+    ends = float(part.time[0]), float(part.time[-1])
+    averages = orders.order_averages(part.time, angle, signal, highest, time_blocks(*ends, nominal, orbit))
+    known = bool(np.isfinite(part.tacho).all())
+    return _Part(ends, averages, speed, deviation, _whole_mean(angle, signal), known)
+
+
+def _together(parts: list[_Part], blocks: int) -> list[orders.OrderAverage]:
+    """Return the averages of all stretches in as many blocks as the whole cut has, each of neighbours.
+
+    Without a tacho every stretch has an angle of its own: their waveforms are turned to that of the first.
+    """
+    if len(parts) == 1:
+        return parts[0].averages
+    first = parts[0].averages[0].value
+    every = [
+        replace(each, value=each.value if part.known else orders.aligned(each.value, first))
+        for part in parts
+        for each in part.averages
+    ]
+    count = min(max(1, blocks), len(every))
+    return [
+        orders.OrderAverage(
+            np.mean([each.value for each in group], axis=0),
+            np.mean([each.variance for each in group], axis=0) / len(group),
+            float(np.mean([each.middle for each in group])),
+        )
+        for group in (
+            every[a:b] for a, b in pairwise(np.linspace(0, len(every), count + 1).round().astype(int))
+        )
+    ]
 
 
 def spindle_angle(
@@ -127,24 +173,24 @@ def _tacho_speed(time: Array, angle: Array) -> tuple[float, float]:
 
 
 def _zeroing(found: steady.Segments) -> np.ndarray:
-    """Where to read the zero, (n,) bool: in the air before the cut, which no discharge of the cut has bent.
+    """Revolutions to read the zero from: in the air before the cut, which no discharge of the cut has bent.
 
     Only where there is none, in the air after it.
     """
-    before = found.air.copy()
-    before[found.steady.start :] = False
-    return before if before.any() else found.air
+    before = found.quiet.copy()
+    before[found.steady.start // found.turns.length :] = False
+    return before if before.any() else found.quiet
 
 
-def time_blocks(time: Array, revolutions_per_s: float, orbit: float) -> int:
-    """Return into how many time blocks to cut a record: what changes shows, each has enough revolutions.
+def time_blocks(start: float, end: float, revolutions_per_s: float, orbit: float) -> int:
+    """Return into how many time blocks to cut a record from start to end, s.
 
-    ``orbit``: rev/s of the orbit in helical milling.
+    What changes shows, and each has enough revolutions. ``orbit``: rev/s of the orbit in helical milling.
     """
-    revolutions = float(time[-1] - time[0]) * revolutions_per_s
+    revolutions = (end - start) * revolutions_per_s
     if orbit == 0.0:
         return min(TIME_BLOCKS, int(revolutions / REVOLUTIONS_PER_BLOCK))
-    wanted = math.ceil(BLOCKS_PER_ORBIT * abs(orbit) * (time[-1] - time[0]))
+    wanted = math.ceil(BLOCKS_PER_ORBIT * abs(orbit) * (end - start))
     most: int = min(wanted, MOST_BLOCKS, int(revolutions / REVOLUTIONS_PER_ORBIT_BLOCK))
     return most
 

@@ -10,10 +10,11 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.observables import chatter_runs, lobe_methods, lobe_positions, printed_modes, stability
 from metro.observables.lobe_cases import Case, Change, boundaries, cases_of, estimates
 from metro.observables.lobe_positions import Tip
-from metro.observables.modal_test import Read, observe_modes
+from metro.observables.modal_test import observe_modes
 from metro.observables.problem import Refusal
 from metro.observables.quantity import quantity
 from metro.units import JSON, MM, Array
@@ -109,7 +110,7 @@ class LabelProblem:
         return every
 
 
-def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
+def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Identify the modes of every position and solve the lobes of the cuts that were made there.
 
     Tables ``modes``, ``frf_used``, ``stabilisation``, ``lobes`` (diagram per position), ``lobe_runs``
@@ -152,7 +153,7 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
     }
 
 
-def _heard(batch: Batch, read: Read, reason: str) -> dict[str, pd.DataFrame] | Refusal:
+def _heard(batch: Batch, read: Tables, reason: str) -> dict[str, pd.DataFrame] | Refusal:
     """Where there are no modes: what the records of the cuts say of chatter, if any says something."""
     unknown = pd.DataFrame(columns=["used", "frequency_hz", "damping"], dtype=float)
     chatter = chatter_runs.observe_chatter(batch, read, unknown)

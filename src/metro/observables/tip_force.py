@@ -209,7 +209,8 @@ def about_air(batch: Batch, run: str, record: pd.DataFrame, wall: Wall) -> Recor
     teeth = (batch.manifest.get("tool") or {}).get("teeth", 1)
     feed = row["feed_per_tooth_mm"] * MM * teeth * row["spindle_rpm"] / 60.0
     try:
-        found = steady.segments(signal, rate * 60.0 / row["spindle_rpm"], round(rate * wall.leaving / feed))
+        turns = steady.turns([signal], rate * 60.0 / row["spindle_rpm"])
+        found = steady.segments(turns, round(rate * wall.leaving / feed))
     except ValueError as error:
         return Refusal(str(error))
     zero = signal[found.air].mean(axis=0) if found.air.any() else np.zeros(3)

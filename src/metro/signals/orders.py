@@ -19,6 +19,7 @@ SPEED_SEARCH = 0.006
 REVOLUTIONS_PER_SEGMENT = 4.0
 FINE_STEPS = 20  # to either side of the best of the search
 WORTH = (0.0, 0.67, 0.51)  # degrees of freedom of a difference of first and second order, in white noise
+NEWTON = 4  # steps to the best of the trials of an angle
 PADDING = 16  # of the Fourier transform of the search: well below a step at the highest order
 
 
@@ -72,6 +73,21 @@ def advance(coefficients: Array, angle: float) -> Array:
     return shifted
 
 
+def aligned(coefficients: Array, like: Array) -> Array:
+    """Turn order coefficients (channels, 2H+1) to where their waveform is most nearly that of ``like``."""
+    spectra = [each[:, 1::2] - 1j * each[:, 2::2] for each in (coefficients, like)]
+    cross = (spectra[0] * spectra[1].conj()).sum(axis=0)
+    order = np.arange(1, len(cross) + 1)
+    trial = np.linspace(0.0, 2.0 * math.pi, 2 * PADDING * len(cross), endpoint=False)
+    match = (cross * np.exp(1j * np.outer(trial, order))).real.sum(axis=1)
+    best = float(trial[np.argmax(match)])
+    for _ in range(NEWTON):
+        turned = cross * np.exp(1j * order * best)
+        bend = float((order**2 * turned).real.sum())
+        best -= float((order * turned).imag.sum()) / bend if bend > 0.0 else 0.0
+    return advance(coefficients.T, best).T
+
+
 def highest_order(rate: float, revolutions_per_s: float, teeth: int) -> int:
     """Highest order that is worth keeping: six tooth passings, at most 48.
 
@@ -123,8 +139,12 @@ def spindle_speed(time: Array, signal: Array, nominal: float, highest: int) -> t
 
 def _spectra(time: Array, signal: Array, pieces: list[slice], speed: float, highest: int) -> ComplexArray:
     """Amplitudes of each segment at the orders 1…highest, (segments, orders, channels)."""
-    matrix = order_matrix(2.0 * math.pi * speed * time, highest)
-    parts = np.stack([matrix[piece].T @ _centred(signal[piece]) for piece in pieces])
+    parts = np.stack(
+        [
+            order_matrix(2.0 * math.pi * speed * time[piece], highest).T @ _centred(signal[piece])
+            for piece in pieces
+        ]
+    )
     return np.asarray(parts[:, 1::2] - 1j * parts[:, 2::2])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,15 +12,53 @@ from metro.units import Array
 IN_AIR, CUTTING = 0.12, 0.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """A record by its revolutions, all that is left of it once it has been read.
+
+    Attributes
+    ----------
+    length : samples of a revolution. samples : of the record; a last revolution that is not whole is none.
+    mean, square : (turns, channels) mean of each revolution, and of its squares.
+    """
+
+    length: int
+    samples: int
+    mean: Array
+    square: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Segments:
-    """The steady cut of a record, and where it is in the air: (n,) bool."""
+    """The steady cut of a record, and which of its revolutions (turns,) are in the air."""
 
+    turns: Turns
     steady: slice
-    air: np.ndarray
+    quiet: np.ndarray
+
+    @property
+    def air(self) -> np.ndarray:
+        """Where the record is in the air, (n,) bool."""
+        every = np.repeat(self.quiet, self.turns.length)
+        return np.pad(every, (0, self.turns.samples - len(every)))
 
 
-def segments(signal: Array, samples_per_revolution: float, settling: int) -> Segments:
+def turns(pieces: Iterable[Array], samples_per_revolution: float) -> Turns:
+    """Read a record (n, channels), piece by piece, revolution by revolution of the spindle."""
+    length, samples = max(2, round(samples_per_revolution)), 0
+    left: Array | None = None
+    found: list[tuple[Array, Array]] = []
+    for piece in pieces:
+        samples += len(piece)
+        joined = piece if left is None else np.concatenate([left, piece])
+        whole = len(joined) // length
+        each, left = joined[: whole * length].reshape(whole, length, -1), joined[whole * length :]
+        found.append((each.mean(axis=1), (each**2).mean(axis=1)))
+    mean, square = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return Turns(length, samples, mean, square)
+
+
+def segments(record: Turns, settling: int) -> Segments:
     """Find the steady cut and the air in a record by the level of the force in each revolution.
 
     The level is the rms of all channels about the air's zero. Revolutions below 12 % of the typical level are
@@ -28,7 +67,6 @@ def segments(signal: Array, samples_per_revolution: float, settling: int) -> Seg
 
     Parameters
     ----------
-    signal : (n, channels). samples_per_revolution : of the spindle.
     settling : samples from the first contact to the full engagement.
 
     Raises
@@ -36,25 +74,22 @@ def segments(signal: Array, samples_per_revolution: float, settling: int) -> Seg
     ValueError
         If less than six revolutions are left.
     """
-    length = max(2, round(samples_per_revolution))
-    count = len(signal) // length
+    length, samples, count = record.length, record.samples, len(record.mean)
     if count < 6:
-        return Segments(slice(0, len(signal)), np.zeros(len(signal), dtype=bool))
-    turns = signal[: count * length].reshape(count, length, -1)
-    level = _level(turns, np.zeros(signal.shape[1]))
+        return Segments(record, slice(0, samples), np.zeros(count, dtype=bool))
+    level = _level(record, np.zeros(record.mean.shape[1]))
     quiet = level < IN_AIR * np.quantile(level, 0.9)
     if quiet.any():
-        level = _level(turns, turns[quiet].mean(axis=(0, 1)))
+        level = _level(record, record.mean[quiet].mean(axis=0))
     typical = np.median(level[level > 0.5 * np.quantile(level, 0.9)])
     first, last = _longest(level > CUTTING * typical)
-    air = np.repeat(_clear(level < IN_AIR * typical), length)
     start = first * length + (settling if first > 0 else 0)
-    stop = last * length - settling if last < count else len(signal)
+    stop = last * length - settling if last < count else samples
     if stop - start < 6 * length:
         raise ValueError(
             "the cut is over before the tool is fully engaged: fewer than six steady revolutions"
         )
-    return Segments(slice(start, stop), np.pad(air, (0, len(signal) - len(air))))
+    return Segments(record, slice(start, stop), _clear(level < IN_AIR * typical))
 
 
 def _clear(quiet: np.ndarray) -> np.ndarray:
@@ -64,8 +99,9 @@ def _clear(quiet: np.ndarray) -> np.ndarray:
     return clear if clear.any() else quiet
 
 
-def _level(turns: Array, zero: Array) -> Array:
-    return np.asarray(np.sqrt(((turns - zero) ** 2).sum(axis=2).mean(axis=1)))
+def _level(record: Turns, zero: Array) -> Array:
+    about = (record.square - 2.0 * zero * record.mean + zero**2).sum(axis=1)
+    return np.asarray(np.sqrt(np.maximum(about, 0.0)))
 
 
 def _longest(mask: np.ndarray) -> tuple[int, int]:

@@ -28,7 +28,7 @@ POINT = ("x_mm", "y_mm", "z_mm")
 SET = tuple(f"q{i}_set_deg" for i in range(1, 7))
 ACTUAL = tuple(f"q{i}_deg" for i in range(1, 7))
 TORQUES = tuple(f"tau{i}_nm" for i in range(1, 7))
-PIECE = 1 << 20  # samples of a force record in memory at a time
+PIECE = 1 << 19  # samples of a force record in memory at a time
 
 # Checks that a recording must pass to be used; one that does not is left out, and the report says so.
 MUST_PASS = frozenset({"dead channel", "clipping", "channels alike", "motion", "FRF convention"})
