@@ -22,6 +22,7 @@ from metro.units import Array
 
 PRIOR_RUNS = 4
 MISFIT_CORRELATION = 12.0
+LARGEST_ZERO = 4.0  # of its deviation: a zero that is farther off is something else that is taken for it
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +192,7 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
     return replace(
         noise,
         scatter=prior.scatter * factor["scatter"],
-        zero_factor=factor["zero"],
+        zero_factor=min(factor["zero"], LARGEST_ZERO),
         misfit=misfit,
         alike=_alike(rests),
     )
