@@ -2,7 +2,8 @@
 
 ``coverage`` needs no seal: its batches hide nothing, and what is counted is how often intervals hold. Nor
 does ``faces``: what is compared is the faces that are predicted with those that are scanned. ``next`` asks
-for runs where a verdict is undetermined, cuts them, and counts how often they decide.
+for runs where a verdict is undetermined, cuts them, and counts how often they decide; ``joint`` puts all
+observables together against each alone; ``campaign`` follows a tool that wears and a machine that gets warm.
 """
 
 from __future__ import annotations
@@ -22,9 +23,7 @@ def main(arguments: list[str] | None = None) -> None:
     if options.command == "coverage":
         _coverage(options)
     else:
-        {"make": _make, "run": _run, "open": _open, "faces": _faces, "next": _next}[options.command](
-            Layout(options.out), options
-        )
+        _COMMANDS[options.command](Layout(options.out), options)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -48,9 +47,14 @@ def _parser() -> argparse.ArgumentParser:
     planned = commands.add_parser("next", help="how often runs that `metro next` plans decide")
     planned.add_argument("--batches", type=int, default=60)
     planned.add_argument("--seed", type=int, default=1)
-    for command in (make, run, opening, faces, planned):
+    joint = commands.add_parser("joint", help="what all observables say together against each alone")
+    joint.add_argument("--batches", type=int, default=32)
+    joint.add_argument("--seed", type=int, default=1)
+    campaign = commands.add_parser("campaign", help="whether wear and warm-up over batches are followed")
+    campaign.add_argument("--seed", type=int, default=1)
+    for command in (make, run, opening, faces, planned, joint, campaign):
         command.add_argument("out", type=Path, help="folder of this proof")
-    for command in (make, coverage, run, opening, planned):
+    for command in (make, coverage, run, opening, planned, joint, campaign):
         command.add_argument("--jobs", type=int, default=2, help="worker processes")
     return parser
 
@@ -97,6 +101,24 @@ def _next(out: Layout, options: argparse.Namespace) -> None:
     printed(tables(*asked_and_cut(out, options.batches, options.seed, options.jobs)), Console())
 
 
+def _joint(out: Layout, options: argparse.Namespace) -> None:
+    from rich.console import Console
+
+    from proof.joint import attributed, tables
+    from proof.show import printed
+
+    printed(tables(attributed(out, options.batches, options.seed, options.jobs)), Console())
+
+
+def _campaign(out: Layout, options: argparse.Namespace) -> None:
+    from rich.console import Console
+
+    from proof.campaign import followed, tables
+    from proof.show import printed
+
+    printed(tables(followed(out, options.seed, options.jobs)), Console())
+
+
 def _coverage(options: argparse.Namespace) -> None:
     from rich.console import Console
 
@@ -105,6 +127,17 @@ def _coverage(options: argparse.Namespace) -> None:
 
     found = coverage(options.batches, options.seed, options.style, options.jobs)
     printed([table(found, way) for way in WAYS], Console())
+
+
+_COMMANDS = {
+    "make": _make,
+    "run": _run,
+    "open": _open,
+    "faces": _faces,
+    "next": _next,
+    "joint": _joint,
+    "campaign": _campaign,
+}
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
 """Joint batches: side cuts and faces of one block by one arm with one tool, and one cause in all of them.
 
 The side cuts are those of :mod:`arm`, with force, torques and wall; then faces are milled on the top of the
-block with the wrist in two positions, scanned, and the dynamometer is read along the first pass of each. What
-is hidden of the arm or the tool acts in every run; a stiffness may differ between walls and faces, which is
-then not one cause.
+block with the wrist in two positions, and scanned; of those that are held out the dynamometer is read along
+the first pass. What is hidden of the arm or the tool acts in every run; a stiffness may differ between walls
+and faces, which is then not one cause.
 """
 
 from __future__ import annotations
@@ -59,6 +59,9 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
     KeyError
         For a cause that is not known.
     """
+    unknown = sorted(set(hidden) - set(SHOWN))
+    if unknown:
+        raise KeyError(*unknown)
     rng = np.random.default_rng([seed, 59])
     cell, bench = drawn(rng, style)
     plates = _plates(cell, bench, rng.spawn(1)[0], varied=style == "b")
@@ -85,8 +88,6 @@ def _draw(name: str, rng: np.random.Generator, cell: ArmCell) -> Parameters:
         return {"factor": round(float(np.exp(drawn_signed(rng, 0.03, 0.4))), 3), "joint": "all"}
     if name == "tool_runout":
         return {"radius_um": drawn_size(rng, 2.0, 25.0), "angle_deg": drawn_angle(rng)}
-    if name not in SHOWN:
-        raise KeyError(name)
     return ARM_EFFECTS[name].draw(rng, cell)
 
 
@@ -140,14 +141,16 @@ def _gauged(plates: FaceCell, bench: Bench) -> FaceCell:
 
 
 class _Listener:
-    """The dynamometer under the block, along the first pass of every face; ``truth`` of what it read."""
+    """The dynamometer under the block, along the first pass of a face; ``truth`` of what it read."""
 
     def __init__(self, folder: Path, bench: Bench, plates: FaceCell, rng: np.random.Generator) -> None:
         self.folder, self.bench, self.plates, self.rng = folder, bench, plates, rng
         self.truth: dict[str, Row] = {}
 
     def __call__(self, run: str, case: Case, force: SideForce) -> Row:
-        """Record the first pass of a face."""
+        """Record the first pass of a face that is held out."""
+        if case.role != "validate":
+            return {}
         passes, feed = self.plates.passes(case.orientation), faces.feed_axes(case)
         sensor, gain = self.bench.sensor, 1.0 + self.bench.calibration[:3]
 

@@ -1,0 +1,84 @@
+"""Is the split of an error right? What came with the predicted force, as stated and as it truly was.
+
+The simulator tells the true mean force of a run, and by how much more of it moves the wall or the face. What
+the predicted force adds to the error is that much of its distance from the true one; what is stated knows of
+the force only what the dynamometer reads.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from metro.observables.upstream import mean_forces
+from metro.units import JSON, Array
+from proof.statistics import Demand, Figure, median
+
+WHEN = "after"
+CLOSE = Demand(most=0.1)
+
+
+@dataclass(frozen=True)
+class Fed:
+    """A held-out run whose force was measured: rms error (mm), and how much of it came with the force.
+
+    ``stated`` by the chain of prediction, ``true`` by the simulator, mm.
+    """
+
+    observable: str
+    run: str
+    total: float
+    stated: float
+    true: float
+
+    @property
+    def off(self) -> float:
+        """By how much the stated part differs from the true one, in parts of the whole error."""
+        return abs(self.stated - self.true) / self.total
+
+
+def fed(processed: Path, truth: JSON) -> tuple[Fed, ...]:
+    """Return the held-out runs of a batch whose error was split.
+
+    Parameters
+    ----------
+    truth : by run its ``force_n`` (3,) and ``mm_per_n`` (3,), work frame.
+    """
+    chain: JSON = json.loads((processed / "loop.json").read_text())["chain"]
+    forces = mean_forces(pd.read_parquet(processed / "comparison.parquet"))
+    return tuple(
+        Fed(
+            observable,
+            part["run"],
+            part["total"],
+            part["upstream"],
+            came(truth[part["run"]], forces[part["run"]][WHEN]),
+        )
+        for observable, told in chain.items()
+        for part in told["runs"]
+        if part["when"] == WHEN
+    )
+
+
+def came(truth: JSON, predicted: Array) -> float:
+    """Return what a predicted mean force (3,), N, adds to the error, mm."""
+    missing = np.array(truth["force_n"]) - predicted
+    return abs(float(np.array(truth["mm_per_n"]) @ missing))
+
+
+def split_figures(found: Sequence[Fed]) -> list[Figure]:
+    """Return how far the stated parts are from the true ones, by observable."""
+    return [
+        median(
+            f"{name}: stated part of the force less the true one, in parts of the error",
+            [one.off for one in found if one.observable == name],
+            CLOSE,
+            "%",
+        )
+        for name in sorted({one.observable for one in found})
+    ]
