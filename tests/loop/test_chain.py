@@ -83,6 +83,21 @@ def test_the_two_parts_add_up_place_by_place():
     assert found.total == pytest.approx(run.measured - COMPLIANCE * 30.0, abs=1e-6)
 
 
+def test_what_the_measured_force_may_be_off_by_is_the_doubt_of_the_parts():
+    """Two errors of 3 N and 4 N, each by itself, are one of 5 N, whatever was predicted."""
+    problem, fitted = held_out(SHAPE)
+    (run,) = problem.role("validate")
+    fed = {"measured": run, "before": replace(run, setting=30.0), "after": run}
+    fed |= {name: replace(run, setting=TRUE + off) for name, off in (("one", 3.0), ("other", -4.0))}
+    told = split(problem, {"before": fitted, "after": fitted}, {"v": fed})
+    for when in ("before", "after"):
+        assert told[when]["doubt"] == pytest.approx(5.0 * COMPLIANCE, rel=1e-3)
+    assert f"{5.0 * COMPLIANCE:.2g} mm (one standard deviation)" in told["words"]
+    without = split(problem, {"before": fitted, "after": fitted}, {"v": dict(list(fed.items())[:3])})
+    assert without["before"]["doubt"] == 0.0
+    assert without["before"]["upstream"] == told["before"]["upstream"]
+
+
 def test_mean_forces_are_those_of_the_rows_by_run_and_axis():
     angle = np.arange(0, 360, 3.0)
     rows = pd.concat(

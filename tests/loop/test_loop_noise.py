@@ -172,12 +172,9 @@ def test_only_what_a_model_gets_wrong_may_be_the_same_in_all_conditions():
 
 
 def test_a_zero_that_hardly_shows_is_not_blown_up_to_explain_what_a_model_misses():
-    """Its direction is a thousandth of what is missed: without a bound it grows until it is all of it."""
-    parts = []
-    for one, matrix, rest in (part for part in runs(200, 0.01, missed=0.3) if part[0].setting.feed == 3.0):
-        faint = replace(one, zeros=0.02 * np.cos(5 * np.arange(POINTS))[:, None])
-        parts.append((faint, matrix, rest))
+    """Runs are off by a hundred times what their zeros may be: that is no zero."""
+    parts = [
+        (replace(one, zeros=0.01 * one.zeros), matrix, rest) for one, matrix, rest in runs(60, 0.01, zero=1.0)
+    ]
     found = estimated(parts, first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts]))
-    assert found.zero_factor <= noise_room.LARGEST_ZERO
-    rms = np.sqrt(np.mean([np.mean(one.measured**2) for one, *_ in parts]))
-    assert found.misfit["x"] * rms == pytest.approx(0.3, rel=0.35)
+    assert 2.0 < found.zero_factor <= 4.0
