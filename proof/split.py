@@ -17,17 +17,18 @@ import pandas as pd
 
 from metro.observables.upstream import mean_forces
 from metro.units import JSON, Array
-from proof.statistics import Demand, Figure, median
+from proof.statistics import NORMAL, Demand, Figure, median, share
 
 WHEN = "after"
-CLOSE = Demand(most=0.1)
+CLOSE, HELD = Demand(most=0.1), Demand(0.9)
 
 
 @dataclass(frozen=True)
 class Fed:
     """A held-out run whose force was measured: rms error (mm), and how much of it came with the force.
 
-    ``stated`` by the chain of prediction, ``true`` by the simulator, mm.
+    ``stated`` by the chain of prediction, with the standard deviation ``doubt``, ``true`` by the simulator,
+    mm.
     """
 
     observable: str
@@ -35,6 +36,12 @@ class Fed:
     total: float
     stated: float
     true: float
+    doubt: float
+
+    @property
+    def held(self) -> bool:
+        """Whether the true part is within the 95 % interval of the stated one."""
+        return abs(self.stated - self.true) <= NORMAL * self.doubt
 
     @property
     def off(self) -> float:
@@ -58,6 +65,7 @@ def fed(processed: Path, truth: JSON) -> tuple[Fed, ...]:
             part["total"],
             part["upstream"],
             came(truth[part["run"]], forces[part["run"]][WHEN]),
+            part["doubt"],
         )
         for observable, told in chain.items()
         for part in told["runs"]
@@ -73,7 +81,7 @@ def came(truth: JSON, predicted: Array) -> float:
 
 def split_figures(found: Sequence[Fed]) -> list[Figure]:
     """Return how far the stated parts are from the true ones, by observable."""
-    return [
+    close = [
         median(
             f"{name}: stated part of the force less the true one, in parts of the error",
             [one.off for one in found if one.observable == name],
@@ -82,3 +90,5 @@ def split_figures(found: Sequence[Fed]) -> list[Figure]:
         )
         for name in sorted({one.observable for one in found})
     ]
+    held = [one.held for one in found]
+    return [*close, share("part of the force: its interval holds the true one", held, HELD)]

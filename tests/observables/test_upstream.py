@@ -7,7 +7,8 @@ import pytest
 from metro.observables.deformation_model import CutWall
 from metro.observables.flatness_model import FaceSetting
 from metro.observables.problem import Block
-from metro.observables.upstream import mean_forces, with_forces
+from metro.observables.tip_force import SYSTEMATIC
+from metro.observables.upstream import OFF, mean_forces, with_forces
 
 FORCES = {name: np.array([10.0, 20.0, 30.0]) * share for name, share in (("measured", 1.0), ("before", 1.2))}
 ALONG = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])  # of the wall: rises and falls about its mean
@@ -26,6 +27,14 @@ def test_the_force_of_a_wall_is_changed_by_what_the_prediction_is_off_where_it_w
     assert fed["measured"].setting.force == pytest.approx(ALONG)
     assert fed["before"].setting.force == pytest.approx(ALONG + np.array([2.0, 4.0, 6.0]))
     assert with_forces(wall, FORCES, {"w1": "prediction"}) is None
+
+
+def test_the_measured_force_is_off_by_a_share_of_the_whole_along_each_axis():
+    wall = block(CutWall(np.zeros((2, 6)), np.zeros((2, 6)), ALONG, np.eye(3)[1], 1e-3, 1e-2, np.arange(2)))
+    fed = with_forces(wall, FORCES, {"w1": "dynamometer"})
+    off = SYSTEMATIC["dynamometer"] * np.linalg.norm(FORCES["measured"])
+    moved = [fed[name].setting.force - fed["measured"].setting.force for name in OFF]
+    assert np.array(moved) == pytest.approx(np.repeat(off * np.eye(3)[:, None], 2, axis=1))
 
 
 def test_a_face_takes_the_mean_force_and_what_has_no_force_takes_none():

@@ -1,6 +1,7 @@
 """The proof of joint batches: what counts as named together and alone, and as the part of the force."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -64,7 +65,7 @@ def test_every_kind_can_be_hidden_and_a_contradiction_is_one():
 
 
 def test_the_part_of_the_force_is_that_of_the_error_of_the_mean_force_along_what_is_compared(tmp_path):
-    parts = {"total": 0.01, "upstream": 0.0035, "own": 0.009}
+    parts = {"total": 0.01, "upstream": 0.0035, "own": 0.009, "doubt": 0.0003}
     runs = [{"run": "r1", "when": when, **parts} for when in ("before", "after")]
     (tmp_path / "loop.json").write_text(json.dumps({"chain": {"deformation": {"runs": runs}}}))
     rows = [
@@ -78,7 +79,9 @@ def test_the_part_of_the_force_is_that_of_the_error_of_the_mean_force_along_what
     (one,) = fed(tmp_path, truth)
     assert one.true == pytest.approx(0.004)
     assert one.off == pytest.approx(0.05)
-    assert split_figures([one])[0].met
+    assert one.held
+    assert not replace(one, doubt=0.0002).held
+    assert [figure.met for figure in split_figures([one])] == [True, True]
 
 
 def test_the_tables_name_the_joint_and_the_status():

@@ -1,7 +1,8 @@
 """The chain of prediction: what an observable's error owes to the predicted force, and what is its own.
 
 With p(F) the prediction from a force F, measured less p(F predicted) is the sum of what is the observable's
-own, measured less p(F measured), and of what came from upstream, p(F measured) less p(F predicted).
+own, measured less p(F measured), and of what came from upstream, p(F measured) less p(F predicted). A force
+that is measured wrong moves as much from the one part to the other: the parts are only as good as it is.
 """
 
 from __future__ import annotations
@@ -20,17 +21,22 @@ WHENS = ("before", "after")
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Error of one run in the rows of the comparison, SI, (m,) each: all of it, from upstream, its own."""
+    """Error of one run in the rows of the comparison, SI, (m,) each: all of it, from upstream, its own.
+
+    ``doubt``: standard deviation of the two parts by that of the measured force.
+    """
 
     total: Array
     upstream: Array
     own: Array
+    doubt: Array
 
 
-def parts(fitted: Fit, measured: Block, predicted: Block) -> Parts:
+def parts(fitted: Fit, measured: Block, predicted: Block, off: Sequence[Block] = ()) -> Parts:
     """Split the error of a held-out run; the blocks are fed with the measured and with the predicted force.
 
-    Of the run itself only its own unknowns are taken, with the measured force.
+    Of the run itself only its own unknowns are taken, with the measured force. ``off``: fed with forces that
+    differ from the measured one by a standard deviation of each of its errors.
     """
     scored = score(fitted, [measured])
     model, nuisance = scored.candidate.model(scored.theta), scored.nuisance[measured.run]
@@ -39,9 +45,11 @@ def parts(fitted: Fit, measured: Block, predicted: Block) -> Parts:
         matrix, offset = model.design(block, nuisance, scored.beta)
         return block.to_rows(offset + matrix @ scored.beta)
 
-    own = measured.to_rows(measured.measured) - prediction(measured)
-    upstream = prediction(measured) - prediction(predicted)
-    return Parts(own + upstream, upstream, own)
+    with_measured = prediction(measured)
+    own = measured.to_rows(measured.measured) - with_measured
+    upstream = with_measured - prediction(predicted)
+    moved = [prediction(block) - with_measured for block in off]
+    return Parts(own + upstream, upstream, own, np.sqrt(np.sum(np.square([0.0 * own, *moved]), axis=0)))
 
 
 def split(problem: Problem, fits: Mapping[str, Fit], fed: Mapping[str, Mapping[str, Block]]) -> JSON:
@@ -50,18 +58,19 @@ def split(problem: Problem, fits: Mapping[str, Fit], fed: Mapping[str, Mapping[s
     Parameters
     ----------
     fits : base and final fit, by ``before`` and ``after``. fed : by held-out run, its block fed with the
-        force as ``measured``, and as predicted ``before`` and ``after``.
+        force as ``measured``, and as predicted ``before`` and ``after``; by any other name as it may be where
+        what measures it is off.
 
     Returns
     -------
     JSON
-        ``unit``; for before and after the rms ``total``, ``upstream``, ``own``, and ``share``, of the mean
-        square error that goes when the measured force is put in (negative: the two had made up for each
-        other); the same by run.
+        ``unit``; for before and after the rms ``total``, ``upstream``, ``own``, ``doubt`` (standard deviation
+        of upstream and own by the measured force), and ``share``, of the mean square error that goes when the
+        measured force is put in (negative: the two had made up for each other); the same by run.
     """
     told: JSON = {"unit": problem.unit, "runs": []}
     for when in WHENS:
-        by_run = {run: parts(fits[when], blocks["measured"], blocks[when]) for run, blocks in fed.items()}
+        by_run = {run: _parts(fits[when], blocks, when) for run, blocks in fed.items()}
         told[when] = _figures(list(by_run.values()), problem.si)
         told["runs"] += [
             {"run": run, "when": when, **_figures([one], problem.si)} for run, one in by_run.items()
@@ -69,13 +78,17 @@ def split(problem: Problem, fits: Mapping[str, Fit], fed: Mapping[str, Mapping[s
     return told | {"words": in_words(told)}
 
 
+def _parts(fitted: Fit, blocks: Mapping[str, Block], when: str) -> Parts:
+    off = [block for name, block in blocks.items() if name not in {"measured", *WHENS}]
+    return parts(fitted, blocks["measured"], blocks[when], off)
+
+
 def _figures(found: Sequence[Parts], si: float) -> JSON:
-    total, upstream, own = (
-        float(np.sqrt(np.mean(np.concatenate([getattr(one, name) for one in found]) ** 2))) / si
-        for name in ("total", "upstream", "own")
-    )
-    share = 1.0 - (own / total) ** 2 if total > 0.0 else 0.0
-    return {"total": total, "upstream": upstream, "own": own, "share": share}
+    told = {
+        name: float(np.sqrt(np.mean(np.concatenate([getattr(one, name) for one in found]) ** 2))) / si
+        for name in ("total", "upstream", "own", "doubt")
+    }
+    return told | {"share": 1.0 - (told["own"] / told["total"]) ** 2 if told["total"] > 0.0 else 0.0}
 
 
 def in_words(told: JSON) -> str:
@@ -84,7 +97,8 @@ def in_words(told: JSON) -> str:
     sentences = [
         f"{when.capitalize()}, the error with the predicted force is {told[when]['total']:.3g} {unit} rms "
         f"and with the measured force {told[when]['own']:.3g} {unit}: the force accounts for "
-        f"{told[when]['upstream']:.3g} {unit}."
+        f"{told[when]['upstream']:.3g} {unit}, of which {told[when]['doubt']:.2g} {unit} (one standard "
+        "deviation) may be the error of the measured force."
         for when in WHENS
     ]
     return " ".join(sentences)

@@ -16,10 +16,12 @@ import pandas as pd
 from metro.observables.deformation_model import CutWall
 from metro.observables.flatness_model import FaceSetting
 from metro.observables.problem import Block
+from metro.observables.tip_force import SYSTEMATIC
 from metro.units import Array
 
 AXES = ["x", "y", "z"]
 COLUMNS = ("measured", "before", "after")
+OFF = ("off in x", "off in y", "off in z")  # the measured force as it may be if the dynamometer is off
 Forces = Mapping[str, Array]
 
 
@@ -41,6 +43,9 @@ def mean_forces(comparison: pd.DataFrame) -> dict[str, Forces]:
 def with_forces(block: Block, forces: Forces, sources: Mapping[str, str]) -> dict[str, Block] | None:
     """Return a block fed with the force as measured, and as predicted before and after; None: it takes none.
 
+    And with what would have been measured if the dynamometer were off along x, y or z, by the share of the
+    whole force to which it is known.
+
     ``sources``: by run, where the force of a wall is taken from; it is changed by what the prediction is off,
     where it is measured. The transients of a face stay those of the force that it was made with: what the
     forces differ by is followed as it stands.
@@ -52,6 +57,8 @@ def with_forces(block: Block, forces: Forces, sources: Mapping[str, str]) -> dic
         values = dict(forces)
     else:
         return None
+    size = SYSTEMATIC["dynamometer"] * float(np.linalg.norm(forces["measured"]))
+    values |= {name: values["measured"] + size * axis for name, axis in zip(OFF, np.eye(3), strict=True)}
     return {
         name: replace(block, setting=replace(setting, force=np.asarray(force)))
         for name, force in values.items()

@@ -52,6 +52,9 @@ def _story(told: list[JSON]) -> list[Item]:
     return [table, *(Paragraph(sentence(note), "warning") for note in notes)]
 
 
+PARTS = ("total", "upstream", "own", "doubt")  # of an error that came with a force
+
+
 def cause_name(cause: JSON) -> str:
     """Name of a cause, and of the joint that it is of."""
     joint = (cause.get("where") or {}).get("joint", "all")
@@ -72,7 +75,7 @@ def upstream(results: Results) -> Section | None:
         [
             title(name),
             when,
-            *(f"{number(told[when][part])} {unit(told['unit'])}" for part in ("total", "upstream", "own")),
+            *(f"{number(told[when][part])} {unit(told['unit'])}" for part in PARTS),
             percent(told[when]["share"]),
         ]
         for name, told in chain.items()
@@ -83,12 +86,14 @@ def upstream(results: Results) -> Section | None:
     text = (
         "In held-out runs with a dynamometer the force is both predicted and measured. The error of what "
         "follows from the force is split: what the predicted force adds, and what is left with the measured "
-        "one. Where the verdict starts from the measured force, its error is the latter."
+        "one. Where the verdict starts from the measured force, its error is the latter. A dynamometer that "
+        "is off moves as much from one part to the other as stands under known to."
     )
-    header = ["observable", "loop", "with predicted force", "from the force", "with measured force", "share"]
+    header = ["observable", "loop", "with predicted force", "from the force", "with measured force"]
+    header += ["known to", "share"]
     caption = (
         "Rms error by where it comes from. Share: of the mean square error that goes when the measured force "
-        "is put in; below zero where the two errors make up for each other."
+        "is put in; below zero where the two errors make up for each other. Known to: one standard deviation."
     )
-    table = Table(header, rows, caption, [1.6, 0.8, 1.4, 1.2, 1.4, 0.8], numeric=[2, 3, 4, 5])
+    table = Table(header, rows, caption, [1.5, 0.7, 1.2, 1.1, 1.2, 0.9, 0.7], numeric=[2, 3, 4, 5, 6])
     return Section("From force to shape", [Paragraph(text), table])
