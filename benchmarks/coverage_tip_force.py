@@ -10,14 +10,13 @@ mean of its nine |measured - estimated|.
 
 import sys
 import tempfile
-from functools import partial
 from pathlib import Path
 from unittest import mock
 
 import numpy as np
 import pandas as pd
 
-from metro.batch.processed import read_batch, read_table
+from metro.batch.processed import Processed, read_batch
 from metro.observables import joint_force
 from metro.observables.robot_tables import robot_tables
 from metro.stages.identify import base_fit
@@ -59,7 +58,7 @@ def judged(seed, style):
         late, forces = simulated(raw, seed, style)
         ingest(raw, Path(folder), processed, {}, "")
         batch = read_batch(processed)
-        read = partial(_read, processed)
+        read = Processed(processed)
         means = robot_tables(batch, read, {}, None).get("robot_means", pd.DataFrame())
         observed = joint_force.observe(batch, read, {})
         task = joint_force.problem(batch, observed, {})
@@ -81,10 +80,6 @@ def judged(seed, style):
         for run, one in clocks.items()
     ]
     return means, pd.DataFrame(told), len(rows)
-
-
-def _read(processed, name, run=None):
-    return read_table(processed / f"{name}.parquet", run)
 
 
 def summary(means, clocks, runs):

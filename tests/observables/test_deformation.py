@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
 from metro.observables import deformation, tip_force
@@ -177,7 +178,7 @@ class Cell:
         return {"robot": self.logs, "profile": self.profiles}[name][run]
 
     def task(self, identified=None):
-        observed = deformation.observe(self.batch, self.read, identified or {})
+        observed = deformation.observe(self.batch, FakeTables(self.read), identified or {})
         return observed, deformation.problem(self.batch, observed, identified or {})
 
 
@@ -324,10 +325,12 @@ def test_a_dynamometer_gives_the_mean_of_the_steady_cut_about_its_air(cell):
     t = np.arange(0, 6, 1 / rate)
     cutting = (t > 1) & (t < 5)
     ripple = 1 + 0.5 * np.sin(2 * np.pi * 3 / turn * t)
-    record = pd.DataFrame({"t_s": t})
+    record = pd.DataFrame({"t_s": t, "spindle_deg": np.nan})
     for name, mean, zero in (("fx_n", 90.0, 3.0), ("fy_n", -150.0, -2.0), ("fz_n", 40.0, 1.0)):
         record[name] = mean * ripple * cutting + zero
-    found = tip_force.from_dynamometer(cell.batch, "r1", record, wall(cell.batch, "r1"))
+    found = tip_force.from_dynamometer(
+        cell.batch, "r1", FakeTables(lambda *_: record), wall(cell.batch, "r1")
+    )
     np.testing.assert_allclose(found[["fx_n", "fy_n", "fz_n"]].iloc[0], [90, -150, 40], rtol=0.01)
 
 
@@ -341,7 +344,7 @@ def test_a_wall_of_unknown_side_is_refused(cell):
 
 def test_an_arm_of_which_nothing_is_known_is_refused(cell):
     batch = replace(cell.batch, cell={"cell": "mystery"})
-    refusal = deformation.observe(batch, cell.read, {})
+    refusal = deformation.observe(batch, FakeTables(cell.read), {})
     assert isinstance(refusal, Refusal)
     assert "mystery" in refusal.reason
 

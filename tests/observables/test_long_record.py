@@ -1,6 +1,7 @@
 """A force record that is read in stretches tells what the whole of it does."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -8,9 +9,12 @@ import pytest
 from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
-from metro.observables import force_orders
-from metro.observables.force_record import ForceRecord
+from metro.batch.processed import Processed, read_batch
+from metro.observables import deformation, force_orders, joint_force
+from metro.observables.long_record import LongRecord
+from metro.stages.ingest import ingest
 
+ROOT = Path(__file__).parents[2]
 RATE, RPM, TEETH = 5000.0, 6000.0, 2
 MANIFEST = {"tool": {"diameter_mm": 12, "teeth": TEETH, "helix_deg": 30}}
 ROW = {"order": 1, "dynamometer": "a.csv", "operation": "slot", "spindle_rpm": RPM, "feed_per_tooth_mm": 0.1}
@@ -36,7 +40,7 @@ def record(seconds=8.0, wander=0.0, tacho=False):
 
 
 def observed(table, stretch, monkeypatch):
-    monkeypatch.setattr("metro.observables.force_record.STRETCH", stretch)
+    monkeypatch.setattr("metro.observables.long_record.STRETCH", stretch)
     runs = pd.DataFrame([ROW], index=["r1"])
     batch = Batch("small", MANIFEST, {"cell": "c"}, runs, {})
     return force_orders.observe(batch, FakeTables(lambda *_: table), {})
@@ -45,8 +49,8 @@ def observed(table, stretch, monkeypatch):
 @pytest.mark.parametrize("stretch", [100_000, 20_000, 7_777, 5_000])
 def test_stretches_are_the_record_and_parts_of_it(stretch, monkeypatch):
     table = record()
-    monkeypatch.setattr("metro.observables.force_record.STRETCH", stretch)
-    found = ForceRecord(FakeTables(lambda *_: table), "r1")
+    monkeypatch.setattr("metro.observables.long_record.STRETCH", stretch)
+    found = LongRecord(FakeTables(lambda *_: table), "r1")
     assert (found.samples, found.start) == (len(table), 10.0)
     assert found.rate == pytest.approx(RATE)
     for place in (None, slice(100, 39_000), slice(14_000, 14_010)):
@@ -94,3 +98,16 @@ def test_a_speed_that_changes_over_a_long_record_smears_stretches_less_than_the_
         strongest.append(np.sqrt(2.0 * power.min()))
     assert strongest[0] < 55.0
     assert strongest[1] == pytest.approx(60.0, abs=0.6)
+
+
+def test_the_force_on_a_robots_tool_is_the_same_in_stretches(tmp_path, monkeypatch):
+    """Per revolution every 5 ms, and its mean over the steady cut."""
+    ingest(ROOT / "data" / "raw" / "kr160-side", ROOT / "config" / "cells", tmp_path / "out", {}, "test")
+    batch, found = read_batch(tmp_path / "out"), []
+    for size in (10**6, 3_000):
+        monkeypatch.setattr("metro.observables.long_record.STRETCH", size)
+        read = Processed(tmp_path / "out")
+        tables = joint_force.observe(batch, read, {}), deformation.observe(batch, read, {})
+        found.append((tables[0]["tool_force"], tables[1]["tip_force"]))
+    for whole, parts in zip(*found, strict=True):
+        pd.testing.assert_frame_equal(whole, parts, rtol=1e-9, atol=1e-9)

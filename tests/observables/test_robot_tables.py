@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
 from metro.observables.robot_tables import SPACING, _waves, robot_tables
@@ -63,7 +64,7 @@ def tables():
     loads = pd.DataFrame(columns=["pose", *(f"q{i}_deg" for i in range(1, 7))], dtype=float)
     record = pd.DataFrame(columns=["t_s", "fx_n", "fy_n", "fz_n"], dtype=float)
     kept = {"robot": robot, "loads": loads, "force": record}
-    return robot_tables(batch, lambda name, _run=None: kept[name], KNOWN, None)
+    return robot_tables(batch, FakeTables(lambda name, _run=None: kept[name]), KNOWN, None)
 
 
 def test_the_steady_mean_is_the_force_within_its_interval(tables):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.observables import tip_force
 from metro.observables.deformation_model import DeformationModel
 from metro.observables.load_tests import ANGLES, best_compliance, usable
@@ -18,8 +18,6 @@ from metro.observables.wall import Wall, wall
 from metro.observables.wall_profile import in_one_pose
 from metro.robot.kinematics import arm_of_cell
 from metro.units import DEG, Array
-
-Read = Callable[..., pd.DataFrame]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +48,7 @@ class GivingArm:
         return float(face.normal @ self.model.contributions(middle, force) @ self.compliance)
 
 
-def giving_arm(batch: Batch, read: Read) -> GivingArm | Refusal:
+def giving_arm(batch: Batch, read: Tables) -> GivingArm | Refusal:
     """Return the arm of a batch's cell."""
     arm = arm_of_cell(batch.cell, batch.manifest)
     if arm is None:
@@ -59,7 +57,7 @@ def giving_arm(batch: Batch, read: Read) -> GivingArm | Refusal:
     return GivingArm(model, loads, best_compliance(batch, model, loads))
 
 
-def give_of(batch: Batch, run: str, read: Read, arm: GivingArm | Refusal, force: Array) -> float:
+def give_of(batch: Batch, run: str, read: Tables, arm: GivingArm | Refusal, force: Array) -> float:
     """How far a run's wall stands proud under its mean force (3,) N, m: nothing on a machine that is no arm.
 
     The force is the measured one, as the speed is that of the record: what the model predicts changes by a

@@ -14,7 +14,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.force_orders import orbit_rate, spindle_angle, with_orbit
-from metro.observables.force_record import ForceRecord
+from metro.observables.long_record import LongRecord
 from metro.signals import orders, steady
 from metro.signals.asynchronous import whole_spectrum
 from metro.signals.chatter import UNDECIDED, Detection, detect
@@ -131,7 +131,7 @@ def _steady_cuts(batch: Batch, run: str, read: Tables) -> Iterator[_Cut]:
         If there is none.
     """
     row: Any = batch.runs.loc[run]
-    record = ForceRecord(read, run)
+    record = LongRecord(read, run)
     nominal = float(row["spindle_rpm"]) / 60.0
     teeth, orbit = int(batch.manifest["tool"]["teeth"]), orbit_rate(row) / (2.0 * math.pi)
     # a cut that is still entering may chatter already: no settling is left off but a turn

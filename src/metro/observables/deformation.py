@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.observables import tip_force
 from metro.observables.arm_give import GivingArm, giving_arm
 from metro.observables.deformation_blocks import SYSTEMATIC, cutoff, wall_blocks
@@ -26,10 +27,8 @@ from metro.units import JSON, MM
 OBSERVABLE = "deformation"
 SCATTER = 0.005  # of a joint from run to run: what scatters is the force, which each wall allows for
 
-Read = Callable[..., pd.DataFrame]
 
-
-def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
+def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Tip forces along the path, points along the walls, observability of the joints, and the load tests.
 
     Tables ``tip_force``, ``profile_points``, ``observability``, ``arm_loads``, ``deformation_refused``.
@@ -53,7 +52,7 @@ def observe(batch: Batch, read: Read, identified: JSON) -> dict[str, pd.DataFram
 
 
 def _observed(
-    batch: Batch, run: str, read: Read, known: GivingArm, identified: JSON
+    batch: Batch, run: str, read: Tables, known: GivingArm, identified: JSON
 ) -> dict[str, pd.DataFrame | Refusal]:
     """Tables of one run, or why it has none."""
     face, arm = wall(batch, run), known.model.arm
@@ -65,7 +64,7 @@ def _observed(
         tables["observability"] = per_joint
     if isinstance(sensorless, Refusal):
         tables["sensorless force"] = sensorless
-    force, source = tip_force.from_dynamometer(batch, run, read("force", run), face), "dynamometer"
+    force, source = tip_force.from_dynamometer(batch, run, read, face), "dynamometer"
     if isinstance(force, Refusal):
         force, source = sensorless, "torque"
     if isinstance(force, Refusal):

@@ -16,7 +16,7 @@ from metro.cutting.cutter import Cutter
 from metro.observables import cutting_force
 from metro.observables.arm_give import give_of, giving_arm
 from metro.observables.force_coefficients import AXES
-from metro.observables.force_record import ForceRecord, Stretch
+from metro.observables.long_record import LongRecord, Stretch
 from metro.observables.problem import Refusal
 from metro.signals import orders, steady
 from metro.units import DEG, JSON, MM, RPM, Array
@@ -59,7 +59,7 @@ def recorded(batch: Batch) -> list[str]:
 
 def _observed(batch: Batch, run: str, read: Tables, tool: Cutter) -> tuple[pd.DataFrame, JSON] | Refusal:
     """Order averages of a run's steady cut, and what was found on the way."""
-    record = ForceRecord(read, run)
+    record = LongRecord(read, run)
     row: Any = batch.runs.loc[run]
     nominal, settling = row["spindle_rpm"] / 60.0, _settling(row, tool)
     turns = record.turns(record.rate / nominal)

@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.observables import tip_force
-from metro.observables.arm_give import Read
 from metro.observables.clock import Clock, clock
-from metro.observables.joint_force_model import JointForceModel, TorqueRun, in_waves, running
+from metro.observables.joint_force_model import ForceRecord, JointForceModel, TorqueRun, in_waves, running
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.observables.tip_force import ACTUAL, FORCE, JOINTS, TORQUE
@@ -36,7 +36,7 @@ WORK = ("x", "y", "z")
 LONG, SHORT = 50.0, 5.0  # mm, of waves along the path as the report names them
 
 
-def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
+def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Torques of each cut less those of its idle run, and the dynamometer's force beside them.
 
     Tables ``joint_torque`` (per bin of the path), ``tool_force`` (per 5 ms), ``joint_force_refused``.
@@ -46,7 +46,7 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
         return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
     torques, forces, refused = [], [], []
     for run in batch.with_files("robot_log", "idle_log", "dynamometer"):
-        force = _force(batch, run, read("force", run))
+        force = _force(batch, run, read)
         torque = force if isinstance(force, Refusal) else _torque(batch, run, read("robot", run), arm, force)
         if isinstance(torque, Refusal) or isinstance(force, Refusal):
             reason = torque.reason if isinstance(torque, Refusal) else ""
@@ -63,16 +63,31 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
     }
 
 
-def _force(batch: Batch, run: str, record: pd.DataFrame) -> pd.DataFrame | Refusal:
+def _force(batch: Batch, run: str, read: Tables) -> pd.DataFrame | Refusal:
     """Force about the zero of the air, each value the mean over a revolution of the spindle."""
-    found = tip_force.about_air(batch, run, record, wall(batch, run))
+    found = tip_force.about_air(batch, run, read, wall(batch, run))
     if isinstance(found, Refusal):
         return found
     row: Any = batch.runs.loc[run]
-    turn = 60.0 / row["spindle_rpm"]
-    grid = np.arange(0.0, found.time[-1], GRID)
-    mean = running(found.time, found.signal).mean(grid, np.full(len(grid), turn))
+    turn, length = 60.0 / row["spindle_rpm"], found.record.end - found.record.start
+    grid = np.arange(0.0, length, GRID)
+    ends = np.unique(np.clip(np.concatenate([grid - 0.5 * turn, grid + 0.5 * turn]), 0.0, length))
+    mean = _integral(found, ends).mean(grid, np.full(len(grid), turn))
     return pd.DataFrame({"t_s": grid, **dict(zip(FORCE, mean.T, strict=True))})
+
+
+def _integral(found: tip_force.AboutAir, places: Array) -> ForceRecord:
+    """Return the running integral of a record about its zero at rising times (k,), s, from its start."""
+    integral, before, last = np.zeros((len(places), 3)), np.zeros(3), (np.zeros(0), np.zeros((0, 3)))
+    for part in found.record.stretches():
+        here = part.time - found.record.start, part.signal - found.zero
+        time, force = (np.concatenate(ends) for ends in zip(last, here, strict=True))
+        whole = running(time, force).integral
+        inside = (places >= time[0]) & (places <= time[-1])
+        for axis in range(3):
+            integral[inside, axis] = before[axis] + np.interp(places[inside], time, whole[:, axis])
+        before, last = before + whole[-1], (time[-1:], force[-1:])
+    return ForceRecord(places, integral)
 
 
 def _torque(

@@ -25,7 +25,7 @@ class Stretch:
     tacho: Array
 
 
-class ForceRecord:
+class LongRecord:
     """The dynamometer record of a run.
 
     Attributes

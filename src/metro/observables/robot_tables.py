@@ -8,7 +8,6 @@ the tip's tracking error), ``arm_map`` and ``arm_ellipsoids`` (stiffness over th
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.observables import tip_force
 from metro.observables.joint_force import REPEATABLE
 from metro.observables.problem import Refusal
@@ -32,7 +32,6 @@ from metro.signals.segmentation import knees
 from metro.surface.profile import part
 from metro.units import JSON, MM, N_UM, UM, Array
 
-Read = Callable[..., pd.DataFrame]
 CALIBRATED = tip_force.SYSTEMATIC["dynamometer"]
 GRID, MARGIN = (
     13,
@@ -41,7 +40,7 @@ GRID, MARGIN = (
 
 
 def robot_tables(
-    batch: Batch, read: Read, identified: JSON, points: pd.DataFrame | None
+    batch: Batch, read: Tables, identified: JSON, points: pd.DataFrame | None
 ) -> dict[str, pd.DataFrame]:
     """Return the tables that a batch with an arm has; none without one.
 
@@ -95,7 +94,7 @@ def _found(cut: Log, idle: Log, arm: Arm, face: Wall) -> _Found:
     return _Found(told, by_index, REPEATABLE * np.sqrt(noise_variance(cut.torque)))
 
 
-def _forces(batch: Batch, run: str, read: Read, one: _Found, wander: Array) -> dict[str, pd.DataFrame]:
+def _forces(batch: Batch, run: str, read: Tables, one: _Found, wander: Array) -> dict[str, pd.DataFrame]:
     """Tables of the sensorless force of a run, or why there is none; ``wander`` (6,) of all runs."""
     told = one.told
     if isinstance(told, Refusal):
@@ -123,10 +122,10 @@ def _forces(batch: Batch, run: str, read: Read, one: _Found, wander: Array) -> d
     return {"robot_joints": joints, "robot_force": course, "robot_means": means}
 
 
-def _means(batch: Batch, run: str, read: Read, mean: Array, sd: Array) -> pd.DataFrame:
+def _means(batch: Batch, run: str, read: Tables, mean: Array, sd: Array) -> pd.DataFrame:
     """Mean force (3,) of the steady cut by axis, its standard errors, and the dynamometer's where it is."""
     table = pd.DataFrame({"axis": list("xyz"), "sensorless_n": mean, "sensorless_sd_n": sd})
-    record = tip_force.from_dynamometer(batch, run, read("force", run), wall(batch, run))
+    record = tip_force.from_dynamometer(batch, run, read, wall(batch, run))
     if isinstance(record, Refusal):
         return table.assign(dynamometer_n=np.nan, dynamometer_sd_n=np.nan)
     measured = record[FORCE].to_numpy(dtype=float)[0]
@@ -181,7 +180,7 @@ def _waves(batch: Batch, points: pd.DataFrame) -> pd.DataFrame:
 
 
 def _stiffness(
-    batch: Batch, read: Read, arm: Arm, start: Array | None, identified: JSON
+    batch: Batch, read: Tables, arm: Arm, start: Array | None, identified: JSON
 ) -> dict[str, pd.DataFrame]:
     """Stiffness of the tip around the work, and its ellipsoid in the first cut and each load pose."""
     compliance, covariance = _compliance(batch, identified)

@@ -11,7 +11,9 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.observables import cutting_force
+from metro.observables.long_record import LongRecord
 from metro.observables.problem import Refusal
 from metro.observables.wall import Wall
 from metro.robot.drive_torques import TURNING
@@ -180,41 +182,46 @@ def from_torques(
     return _table(told.s, told.x, found.force, sd, found.condition), per_joint
 
 
-def from_dynamometer(batch: Batch, run: str, record: pd.DataFrame, wall: Wall) -> pd.DataFrame | Refusal:
+def from_dynamometer(batch: Batch, run: str, read: Tables, wall: Wall) -> pd.DataFrame | Refusal:
     """Mean force of the steady cut, about the zero of the air where there is any; constant along the wall."""
-    found = about_air(batch, run, record, wall)
+    found = about_air(batch, run, read, wall)
     if isinstance(found, Refusal):
         return found
-    cut = found.signal[found.steady]
-    turns = len(cut) * (found.time[1] - found.time[0]) * batch.runs.loc[run, "spindle_rpm"] / 60.0
-    return _constant(cut.mean(axis=0), cut.std(axis=0) / math.sqrt(turns), wall)
+    count, total, square = 0, np.zeros(3), np.zeros(3)
+    for part in found.record.stretches(found.steady):
+        signal = part.signal - found.zero
+        total, square = total + signal.sum(axis=0), square + (signal**2).sum(axis=0)
+        count += len(signal)
+    mean = total / count
+    row: Any = batch.runs.loc[run]
+    turns = count / found.record.rate * row["spindle_rpm"] / 60.0
+    return _constant(mean, np.sqrt(np.maximum(square / count - mean**2, 0.0) / turns), wall)
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
-    """Dynamometer record about the zero of the air: ``time`` (n,) s, ``signal`` (n, 3) N, the steady cut."""
+class AboutAir:
+    """A dynamometer record, its ``zero`` (3,) N in the air, and where in it the steady cut is."""
 
-    time: Array
-    signal: Array
+    record: LongRecord
+    zero: Array
     steady: slice
 
 
-def about_air(batch: Batch, run: str, record: pd.DataFrame, wall: Wall) -> Record | Refusal:
+def about_air(batch: Batch, run: str, read: Tables, wall: Wall) -> AboutAir | Refusal:
     """Take the zero of a record from where the tool is in the air, if it is anywhere."""
     row: Any = batch.runs.loc[run]
-    signal, time = record[FORCE].to_numpy(dtype=float), record["t_s"].to_numpy(dtype=float)
-    if len(time) < 2:
+    record = LongRecord(read, run)
+    if record.samples < 2:
         return Refusal("no dynamometer record")
-    rate = (len(time) - 1) / (time[-1] - time[0])
     teeth = (batch.manifest.get("tool") or {}).get("teeth", 1)
     feed = row["feed_per_tooth_mm"] * MM * teeth * row["spindle_rpm"] / 60.0
+    turns = record.turns(record.rate * 60.0 / row["spindle_rpm"])
     try:
-        turns = steady.turns([signal], rate * 60.0 / row["spindle_rpm"])
-        found = steady.segments(turns, round(rate * wall.leaving / feed))
+        found = steady.segments(turns, round(record.rate * wall.leaving / feed))
     except ValueError as error:
         return Refusal(str(error))
-    zero = signal[found.air].mean(axis=0) if found.air.any() else np.zeros(3)
-    return Record(time - time[0], signal - zero, found.steady)
+    zero = turns.mean[found.quiet].mean(axis=0) if found.quiet.any() else np.zeros(3)
+    return AboutAir(record, zero, found.steady)
 
 
 def from_coefficients(

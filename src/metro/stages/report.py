@@ -10,7 +10,7 @@ import pandas as pd
 
 from metro.batch import provenance
 from metro.batch.batch import Batch
-from metro.batch.processed import read_batch, read_table, write_json
+from metro.batch.processed import Processed, read_batch, write_json
 from metro.batch.writing import write_atomically
 from metro.observables import force_metrics
 from metro.observables.end_stiffness import end_stiffness
@@ -59,10 +59,7 @@ def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> R
     tables = {name: table for name, table in tables.items() if len(table)}
     tables |= _force_figures(batch, tables.get("comparison"))
     identified = _json(reports / "identified.json")
-
-    def read(name: str, run: str | None = None) -> pd.DataFrame:
-        return read_table(processed / f"{name}.parquet", run)
-
+    read = Processed(processed)
     tables |= robot_tables(batch, read, identified, tables.get("waviness_points"))
     return Results(
         batch=batch,
