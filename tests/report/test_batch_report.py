@@ -133,5 +133,5 @@ def test_single_values_per_run_and_axis_are_tabulated_and_not_drawn_as_curves():
     one = synthetic.tables()["comparison"].query("observable == 'deformation'").iloc[:1]
     text = " ".join(text_of(batch_report(replace(synthetic.results(), tables={"comparison": one}))))
     assert "Errors on held-out runs, rms (mm)" in text
-    assert "parity on held-out runs" in text
+    assert "Parity on held-out runs" in text
     assert "residual of all held-out runs" not in text

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from metro import __version__
 from metro.report.document import Cover, compile_pdf
 from metro.report.results import Results
@@ -13,6 +15,7 @@ from metro.report.sections.provenance import provenance
 from metro.report.sections.published import published
 from metro.report.sections.quality import quality, with_flags
 from metro.report.sections.robot import robot
+from metro.report.sections.setup import setup
 from metro.report.sections.study import study
 from metro.report.sections.surface import flatness
 from metro.report.sections.verdict import summary
@@ -22,6 +25,7 @@ def batch_report(results: Results) -> bytes:
     """Return the report as a PDF; the same bytes for the same results."""
     sections = [
         with_flags(with_causes(summary(results), results), results),
+        setup(results),
         quality(results),
         published(results),
         identification(results),
@@ -34,4 +38,6 @@ def batch_report(results: Results) -> bytes:
         provenance(results),
     ]
     cover = Cover(results.title, results.batch.name, f"metro {__version__}")
-    return compile_pdf(cover, [section for section in sections if section is not None])
+    first, second, *rest = (section for section in sections if section is not None)
+    # a first page that is full of verdicts stands alone
+    return compile_pdf(cover, [first, replace(second, page=bool(results.verdicts())), *rest])

@@ -14,6 +14,7 @@ from metro.report.figures import verdicts as figures
 from metro.report.numbers import listing, number, unit, words
 from metro.report.phrases import plain
 from metro.report.results import OBSERVABLES, title
+from metro.report.sections import findings
 from metro.report.sections.memory import memory_section
 from metro.report.sections.standings import largest_rests, rankings
 from metro.report.sections.verdict import STATUS, change, effect_words, error_text, known_interval
@@ -193,7 +194,7 @@ def _pictures(entries: list[tuple[str, str, JSON]]) -> list[Item]:
         alt = "; ".join(f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in part)
         figure = figures.changes(part, "error on held-out runs (% of the signal)")
         items.append(
-            Picture(figure, "Held-out error of every batch, with 95 % intervals and the noise floor.", alt)
+            Picture(figure, f"{findings.changed(part)} Errors with 95 % intervals, and the noise floor.", alt)
         )
     return items
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -16,6 +17,8 @@ from metro.report.style import to_svg
 from metro.units import JSON
 
 TEMPLATE = "report.typ"
+# the space between a number and its unit, at which no line is to end
+UNIT = re.compile(r"(?<=\d) (?=(?:%|[mµ]?m|[km]?N|k?Hz|rpm|m?s|kg|N/\w+)(?![^\W\d]))")
 NO_LINKS: Mapping[str, str] = MappingProxyType({})
 
 
@@ -45,7 +48,8 @@ def compile_pdf(cover: Cover, sections: Sequence[Section], links: Mapping[str, s
             "links": dict(links),
             "sections": [_section(s, i, folder) for i, s in enumerate(sections)],
         }
-        (folder / "content.json").write_text(json.dumps(content), encoding="utf-8")
+        told = UNIT.sub("\u00a0", json.dumps(content, ensure_ascii=False))
+        (folder / "content.json").write_text(told, encoding="utf-8")
         pdf: bytes = typst.compile(
             str(template),
             root=str(folder),

@@ -84,3 +84,9 @@ class Results:
 def title(observable: str) -> str:
     """Name of an observable as an engineer says it."""
     return TITLES.get(observable, observable.replace("_", " "))
+
+
+def heading(observable: str) -> str:
+    """Name of an observable as it starts a line."""
+    name = title(observable)
+    return name[0].upper() + name[1:]

@@ -9,7 +9,8 @@ from metro.report.content import Heading, Item, Paragraph, Picture, Section, Tab
 from metro.report.figures import comparison as figures
 from metro.report.figures import surface
 from metro.report.numbers import listing, number, percent, unit
-from metro.report.results import OBSERVABLES, Results, title
+from metro.report.results import OBSERVABLES, Results, heading, title
+from metro.report.sections import findings
 from metro.report.sections.face_pairing import pairing_items
 from metro.report.sections.force import force_items
 from metro.report.sections.lobes import cut_items
@@ -25,7 +26,7 @@ def comparison(results: Results) -> Section:
         frame = results.compared(observable)
         if frame is not None:
             name = title(observable)
-            items.append(Heading(name[0].upper() + name[1:]))
+            items.append(Heading(heading(observable)))
             merit = force_items(results) if observable == "force" else []
             items += cut_items(results, frame) if observable == "lobes" else _values(frame, name, merit)
             items += pairing_items(frame) if observable == "flatness" else []
@@ -47,9 +48,10 @@ def _values(frame: pd.DataFrame, name: str, merit: list[Item]) -> list[Item]:
 
     def parity() -> Picture:
         by_axis = ", axis by axis," if len(figures.axes_of(frame)) > 1 else ","
+        about = f"Parity on held-out runs{by_axis} and distribution of the residual beside the noise."
         return Picture(
             figures.parity(frame, name),
-            f"{whole}: parity on held-out runs{by_axis} and distribution of the residual beside the noise.",
+            f"{whole}. {findings.scatter(frame)} {about}",
             f"Scatter of predicted over measured {name} and histogram of both residuals; {words}.",
         )
 
@@ -57,10 +59,13 @@ def _values(frame: pd.DataFrame, name: str, merit: list[Item]) -> list[Item]:
         return [errors(frame), parity()]
     if merit:
         return [*merit, *_curves(frame, name, words), parity()]
-    about = f"{whole}, residual of all held-out runs: median and the band that holds 80 % of the values"
+    about = (
+        f"{whole}. {findings.offsets(frame)} Residual of all held-out runs: median and the band that holds "
+        "80 % of the values"
+    )
     alt = f"Residual of the base model and of the model with effects; {words}."
     if len(figures.axes_of(frame)) == 1:
-        caption = f"{about}; parity; and distribution of the residual beside the noise alone."
+        caption = f"{about}. Parity and distribution: {findings.scatter(frame)}"
         judged = [Picture(figures.judged(frame, name), caption, alt)]
     else:
         judged = [Picture(figures.residuals(frame, name), f"{about}.", alt), parity()]
@@ -76,7 +81,7 @@ def _curves(frame: pd.DataFrame, name: str, words: str) -> list[Item]:
     items: list[Item] = [
         Picture(
             figures.overlay(frame, name),
-            f"Measured {name}, base model, and model with the effects found, held-out runs.{part}{repeats}",
+            f"{findings.left(frame)} Measured {name} and predictions, held-out runs.{part}{repeats}",
             f"Measured and predicted {name} for {len(shown)} held-out runs; {words}.",
         )
     ]
@@ -84,7 +89,8 @@ def _curves(frame: pd.DataFrame, name: str, words: str) -> list[Item]:
         items.append(
             Picture(
                 surface.face_points(frame),
-                "Deviation at path points of the first held-out runs, and what each prediction leaves.",
+                f"{findings.left(frame)} Deviation at path points of the first held-out runs, and what each "
+                "prediction leaves.",
                 f"Maps of measured deviation and of both residuals; {words}.",
             )
         )

@@ -12,6 +12,7 @@ from metro.report.content import Item, Picture, Table
 from metro.report.figures import force as figures
 from metro.report.numbers import number, with_interval
 from metro.report.results import Results
+from metro.report.sections import findings
 
 LONGEST = 30
 # metric, its title, and whether its share of the measured is told
@@ -37,14 +38,14 @@ def force_items(results: Results) -> list[Item]:
         metrics_table(metrics),
         Picture(
             figures.spectrum(orders, teeth),
-            "Cutting force: order spectrum, measured and what the predictions leave, rms over the held-out "
-            f"runs. Ticks stand at the tooth passing, every {teeth} orders.",
+            f"{findings.peak_order(orders)} Order spectrum, measured and what the predictions leave, rms "
+            f"over the held-out runs. Ticks stand at the tooth passing, every {teeth} orders.",
             _spectrum_words(orders),
         ),
         Picture(
             figures.tooth_peaks(peaks),
-            f"Largest magnitude within each pitch, the {teeth} teeth of a run in the order of passing; "
-            "whiskers: 95 % interval of predicted less measured.",
+            f"{findings.tooth_peaks(peaks)} Largest magnitude within each pitch, the {teeth} teeth of a run "
+            "in the order of passing; whiskers: 95 % interval of predicted less measured.".lstrip(),
             f"Bars of the measured peak of each of {teeth} teeth, and the predicted ones beside them.",
         ),
     ]
@@ -97,7 +98,14 @@ def _cell(row: Mapping[Hashable, Any], share: bool, whole: bool) -> str:
     if not whole:
         return number(row["value"])
     text = with_interval(float(row["value"]), [float(row["lo"]), float(row["hi"])])
-    return f"{text} ({number(row['percent'], 2)}\u00a0%)" if share else text
+    return f"{text} ({_share(row)}\u00a0%)" if share else text
+
+
+def _share(row: Mapping[Hashable, Any]) -> str:
+    """Write the share of the measured to the digit that the error's interval leaves it."""
+    scale = abs(row["percent"] / row["value"]) if row["value"] else 0.0
+    interval = [row["percent"] + scale * (row[end] - row["value"]) for end in ("lo", "hi")]
+    return with_interval(row["percent"], interval).partition(" ")[0]
 
 
 def _spectrum_words(orders: pd.DataFrame) -> str:

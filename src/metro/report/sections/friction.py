@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 
 from metro.report.content import Bullets, Heading, Item, Picture, Table
@@ -35,10 +36,13 @@ def friction(results: Results) -> list[Item]:
     if told.ngroups:
         items.append(Bullets([f"{_joints(list(joints))}: {remark}." for remark, joints in told]))
     if curve is not None:
+        viscous = (table["viscous"] * table["fastest_deg_s"] * DEG).to_numpy(float)
+        most = int(np.nanargmax(viscous))
         about = (
-            "Torque that each joint's friction takes at its speeds, the weight of the links taken away: "
-            "means of bins with their scatter, and the line of the table. Of a joint that turns one way "
-            "only the slope alone means anything."
+            f"Viscous friction is largest in joint {table['joint'].iloc[most]}, {number(viscous[most], 2)} "
+            "N m at the top speed driven. Torque that each joint's friction takes at its speeds, the weight "
+            "of the links taken away: means of bins with their scatter, and the line of the table. Of a "
+            "joint that turns one way only the slope alone means anything."
         )
         items.append(Picture(figures.friction(curve, table), about, about))
     return items

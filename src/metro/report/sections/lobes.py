@@ -7,8 +7,9 @@ import pandas as pd
 
 from metro.report.content import Bullets, Heading, Item, Picture, Table
 from metro.report.figures import lobes as figures
-from metro.report.numbers import number, probability, quantity
+from metro.report.numbers import listing, number, probability, quantity
 from metro.report.results import Results
+from metro.report.sections import findings
 from metro.report.sections.chatter import chatter_items
 from metro.units import JSON, Array
 
@@ -25,14 +26,20 @@ def boundaries(results: Results) -> list[Item]:
     items: list[Item] = [Heading("Stability"), _lowest(blocks)]
     methods, boundary = results.tables.get("lobe_methods"), results.tables.get("lobes_final")
     if boundary is not None and results.compared("lobes") is None:
-        caption = "Stability boundary with its bands."
+        lowest = findings.lowest_boundary(boundary, [("depth_mm", "")])
+        caption = f"{lowest} Stability boundary with its bands.".lstrip()
         chart = figures.lobes_chart(boundary, _NO_TESTS, results.tables.get("lobe_islands"))
         items.append(Picture(chart, caption, caption))
     if methods is not None:
         items += _methods(methods, boundary)
     stations = results.tables.get("lobe_stations")
     if boundary is not None and boundary["position"].nunique() > 1:
-        caption = "Stability boundaries of all positions."
+        best = boundary.groupby("position")["depth_mm"].min()
+        caption = (
+            f"At every speed a cut is stable up to {number(best.min())} mm at position {best.idxmin()} and "
+            f"up to {number(best.max())} mm at position {best.idxmax()}. Stability boundaries of all "
+            "positions."
+        )
         if boundary["interpolated"].any():
             caption += " Dashed: with modes interpolated between the positions where they were measured."
         items.append(Picture(figures.positions_chart(boundary), caption, caption))
@@ -55,16 +62,17 @@ def _lowest(blocks: list[JSON]) -> Table:
 
 
 def _methods(methods: pd.DataFrame, boundary: pd.DataFrame | None) -> list[Item]:
+    lines = [("depth_mm", " by all modes together"), ("single_mode_mm", " by single modes")]
     caption = (
-        "The boundary by each method, with the coefficients of the base model. Published diagrams of this "
-        "kind take the lowest of all modes solved alone, by complete discretisation with Euler's method "
-        "(CDSEM)."
+        f"{findings.lowest_boundary(methods, lines)} The boundary by each method, with the "
+        "coefficients of the base model. Published diagrams of this kind take the lowest of all "
+        "modes solved alone, by complete discretisation with Euler's method (CDSEM)."
     )
-    governing = "The mode that, solved alone, chatters first: direction and number by rising frequency."
+    governing = f"{_governing_words(methods)} Direction and number by rising frequency."
     return [
         Picture(figures.methods_chart(methods), caption, caption),
         Bullets(agreement(methods, boundary)),
-        Picture(figures.governing_modes(methods), governing, _governing_words(methods)),
+        Picture(figures.governing_modes(methods), governing, governing),
     ]
 
 
@@ -103,7 +111,8 @@ def _spread(change: Array) -> str:
 
 def _governing_words(methods: pd.DataFrame) -> str:
     share = methods["governing_mode"].value_counts(normalize=True)
-    return "Share of the speeds: " + ", ".join(f"{m} {100 * s:.0f} %" for m, s in share.items()) + "."
+    told = listing([f"{mode} at {100 * s:.0f} % of the speeds" for mode, s in share.items()])
+    return f"The mode that, solved alone, chatters first is {told}."
 
 
 def _stations(stations: pd.DataFrame) -> Table:

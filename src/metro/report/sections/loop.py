@@ -8,7 +8,8 @@ from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Sec
 from metro.report.figures import verdicts as figures
 from metro.report.numbers import number, percent, probability, quantity, unit, words
 from metro.report.phrases import plain
-from metro.report.results import Results, title
+from metro.report.results import Results, heading
+from metro.report.sections import findings
 from metro.report.sections.verdict import STATUS, error_text, left_words, parameter_name, sentence
 from metro.units import JSON
 
@@ -20,8 +21,7 @@ def loop(results: Results) -> Section:
     items: list[Item] = []
     pictures: list[Picture] = []
     for observable, entry in results.verdicts().items():
-        name, told = title(observable), results.told(observable)
-        name = f"{name[0].upper()}{name[1:]}"
+        name, told = heading(observable), results.told(observable)
         items.append(Heading(f"{name}: {STATUS.get(str(entry.get('status')), '–')}"))
         items += _observable(observable, entry, told, left_words(results, observable))
         pictures += [*_runs(name, told, entry.get("unit")), *_signature(name, told)]
@@ -50,8 +50,9 @@ def _runs(name: str, told: JSON, shown: str | None) -> list[Picture]:
     if not blocks:
         return []
     alt = f"rms residual of {len(blocks)} runs before and after, in the order of cutting."
-    chart = figures.runs(blocks, shown or told.get("unit") or "", (told.get("noise") or {}).get("floor"))
-    return [Picture(chart, f"{name}: residual of every run, in the order of cutting.", alt)]
+    named, floor = shown or told.get("unit") or "", (told.get("noise") or {}).get("floor")
+    caption = f"{name}. {findings.above_floor(blocks, floor, named)} Residual of every run."
+    return [Picture(figures.runs(blocks, named, floor), caption, alt)]
 
 
 def _signature(name: str, told: JSON) -> list[Picture]:

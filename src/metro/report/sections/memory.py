@@ -100,8 +100,8 @@ def _pictures(rows: Sequence[JSON]) -> list[Item]:
             for name, row in zip(names, part, strict=True)
         )
         caption = (
-            "Each batch's estimate with its own 95 % interval, the course through them, and what the next "
-            "batch is to measure (95 %)."
+            f"{alt[0].upper()}{alt[1:]}. Each batch's estimate with its own 95 % interval, the course "
+            "through them, and what the next batch is to measure (95 %)."
         )
         items.append(Picture(figures.courses(part, names), caption, alt))
     return items

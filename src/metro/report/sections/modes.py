@@ -8,7 +8,8 @@ import pandas as pd
 
 from metro.report.content import Heading, Item, Picture, Table
 from metro.report.figures import modal as figures
-from metro.report.numbers import quantity
+from metro.report.numbers import percent, quantity
+from metro.report.sections.measured import count_of
 from metro.units import JSON
 
 LONGEST = 30
@@ -37,12 +38,16 @@ def modes(found: list[JSON], tables: Mapping[str, pd.DataFrame]) -> list[Item]:
         return items
     alt = f"Measured frequency responses ({len(drawn)} lines) with the modal model over them."
     caption = "Measured frequency responses and what the modes reconstruct"
-    caption += " (in brackets: what they leave, rms over rms)." if "error" in drawn else "."
-    items.append(Picture(figures.responses(drawn), caption, alt))
+    if "error" in drawn:
+        most = percent(float(drawn["error"].max()))
+        caption = f"The modes leave at most {most} of a response. {caption} (in brackets: what they leave)"
+    items.append(Picture(figures.responses(drawn), f"{caption}.", alt))
     diagram = tables.get("stabilisation")
     if diagram is not None:
+        poles = int(diagram["recurs"].sum())
         caption = (
-            "Stabilisation diagram: the poles of every model order; one that recurs at a quarter of them, "
+            f"{poles} of {len(diagram)} poles recur and make {count_of(len(found), 'mode')}. Stabilisation "
+            "diagram: the poles of every model order; one that recurs at a quarter of them, "
             "with like frequency, damping and shape starts a mode of the maximum-likelihood fit."
         )
         alt = f"Poles of {diagram['order'].nunique()} model orders over frequency."

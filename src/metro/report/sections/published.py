@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
@@ -191,7 +192,11 @@ def _forces(results: Results, table: pd.DataFrame) -> list[Item]:
         f"{row['axial_depth_mm']:g} mm per orbit"
     )
     means = forces[["fx_n", "fy_n", "fz_n"]].mean()
-    caption = f"Force on the tool over one orbit, computed from the printed coefficients: {settings}."
+    plane = float(np.hypot(forces["fx_n"], forces["fy_n"]).max())
+    caption = (
+        f"The force reaches {number(plane)} N in the plane and {number(forces['fz_n'].max())} N along z. "
+        f"Force on the tool over one orbit, computed from the printed coefficients: {settings}."
+    )
     said = [str(note).partition("validation: ")[2] for note in table["note"].dropna()]
     text = (
         f"Mean along z {number(means['fz_n'])} N; in the plane the force turns with the orbit, "

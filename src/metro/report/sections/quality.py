@@ -13,16 +13,26 @@ from metro.report.results import Results
 from metro.report.sections.chatter import chatter_flags
 
 LONGEST, MOST_NAMES, MOST_FLAGS = 40, 24, 5
+MEANING = {
+    "FRF convention": "sign of the imaginary part at the resonances",
+    "channels alike": "pairs of channels that are one signal",
+    "clipping": "samples in a row at an end of the range",
+    "dead channel": "span of a channel, in its unit",
+    "gaps": "gaps in a record",
+    "jitter": "scatter of the time step over the step",
+    "missing points": "share of a scan's grid without a point",
+    "motion": "travel of a joint in a cut (°)",
+    "sampling rate": "rate (Hz); limit: as declared",
+    "time zero": "first time of a record (s)",
+    "zero in air": "mean force while the tool cuts air (N)",
+}
 
 
 def quality(results: Results) -> Section:
     """List what failed, then each kind of check with the range of its values."""
     table = results.tables.get("qc")
-    page = bool(results.verdicts())  # a first page that is full of verdicts stands alone
     if table is None:
-        return Section(
-            "Data quality", [Paragraph("No signal was read, so there was nothing to check.")], page
-        )
+        return Section("Data quality", [Paragraph("No signal was read, so there was nothing to check.")])
     failed = table[~table["ok"].astype(bool)]
     checks = table["check"].nunique()
     items: list[Item] = []
@@ -41,7 +51,7 @@ def quality(results: Results) -> Section:
         )
         items.append(_failures(failed))
     items.append(_checked(table))
-    return Section("Data quality", items, page)
+    return Section("Data quality", items)
 
 
 def with_flags(first: Section, results: Results) -> Section:
@@ -109,8 +119,7 @@ def _checked(table: pd.DataFrame) -> Table:
     rows = []
     for check, part in table.groupby("check", sort=True):
         failed = int((~part["ok"].astype(bool)).sum())
-        rows.append(
-            [words(str(check)), str(len(part)), str(failed), _span(part["value"]), _limit(part["limit"])]
-        )
-    header = ["check", "times", "failed", "values", "limit"]
-    return Table(header, rows, "What was checked.", [2, 0.7, 0.7, 2, 1], numeric=[1, 2, 3, 4])
+        ends = (_span(part["value"]), _limit(part["limit"]))
+        rows.append([words(str(check)), MEANING.get(str(check), "–"), str(len(part)), str(failed), *ends])
+    header = ["check", "its value", "times", "failed", "values", "limit"]
+    return Table(header, rows, "What was checked.", [1.3, 2.8, 0.6, 0.6, 1.7, 0.8], numeric=[2, 3, 4, 5])

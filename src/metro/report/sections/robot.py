@@ -100,10 +100,12 @@ def _course(results: Results, means: pd.DataFrame) -> list[Item]:
         return []
     beside = means.loc[means["dynamometer_n"].notna(), "run"].drop_duplicates()
     runs = [str(r) for r in dict.fromkeys([*beside, *force["run"].drop_duplicates()])][: figures.RUNS]
+    off = (means["sensorless_n"] - means["dynamometer_n"]).abs() if len(beside) else None
+    found = "" if off is None else f"The steady means are {number(off.max(), 2)} N off at most. "
     caption = (
-        "Force on the tool along the wall from the torques of the joints, smoothed, with the 95 % band "
-        "of each "
-        f"place; cut-in and cut-out shaded. Runs {listing(runs)} of {force['run'].nunique()}."
+        f"{found}Force on the tool along the wall from the torques of the joints, smoothed, with the "
+        f"95 % band of each place; cut-in and cut-out shaded. Runs {listing(runs)} of "
+        f"{force['run'].nunique()}."
     )
     return [Picture(figures.courses(force, means, runs), caption, caption)]
 
@@ -194,13 +196,21 @@ def _waviness(results: Results) -> list[Item]:
         runs = [str(r) for r in [*(r for r in held if r in known), *(r for r in known if r not in held)]]
         shown = runs[: figures.RUNS]
         caption = (
-            "Waves of the wall beside those of the tip's tracking error in the cut and in the idle run, "
-            "all through "
-            "the profile's filter; the encoders' noise is in the latter two. "
+            f"{_alike(blocks)}Waves of the wall beside those of the tip's tracking error in the cut and in "
+            "the idle run, all through the profile's filter; the encoders' noise is in the latter two. "
             f"Runs {listing(shown)} of {len(runs)}."
         )
         items.append(Picture(figures.waviness(points, shown), caption, caption))
     return items if len(items) > 1 else []
+
+
+def _alike(blocks: JSON) -> str:
+    """Say how alike the wall's waves and those of the tip's error are; empty where that is not known."""
+    known = [block["correlation"] for block in blocks.values() if block.get("correlation") is not None]
+    values = [float(c["value"]) if isinstance(c, dict) else float(c) for c in known]
+    if not values:
+        return ""
+    return f"Wall and tip error correlate with {number(min(values), 2)} to {number(max(values), 2)}. "
 
 
 def _waves(blocks: JSON) -> Table:
@@ -238,10 +248,10 @@ def _spectra(results: Results) -> list[Item]:
     table, lines = results.tables.get("robot_spectra"), results.tables.get("robot_lines")
     if table is None:
         return []
+    found = "No line stands" if lines is None else f"{len(lines)} lines stand"
     caption = (
-        "Spectra of the tip's path error by the encoders (multitaper), all runs: over time and along the "
-        "path. "
-        "Marks: significant lines."
+        f"{found} out of the noise. Spectra of the tip's path error by the encoders (multitaper), all runs: "
+        "over time and along the path. Marks: significant lines."
     )
     items: list[Item] = [
         Heading("Spectra of the path error"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
@@ -36,11 +37,28 @@ def _factors(found: JSON) -> list[Item]:
     rows = found.get("ranking") or []
     if rows and len(rows[0].get("levels") or {}) > 1:
         caption = (
-            "Configurations (small) and their geometric means over the other factors (joined). On this "
-            "logarithmic axis lines that are not parallel are an interaction."
+            f"{_strongest(found)}Configurations (small) and their geometric means over the other factors "
+            "(joined). On this logarithmic axis lines that are not parallel are an interaction."
         )
         items.append(Picture(figures.interactions(rows), caption, caption))
     return items
+
+
+def _strongest(found: JSON) -> str:
+    """Name the factor of the largest influence on the faces; empty where none is told from scatter."""
+    levels = [
+        (term["term"], level)
+        for term in found["terms"]
+        if (term.get("p_value") or 1.0) < LEVEL
+        for level in term.get("levels") or []
+    ]
+    if not levels:
+        return "No factor stands out of the scatter. "
+    term, level = max(levels, key=lambda item: abs(math.log(item[1]["factor"]["value"])))
+    return (
+        f"The largest influence has {term}: {listing(level['level'])} over {level['over']} multiplies X_m by "
+        f"{quantity(level['factor'])}. "
+    )
 
 
 def _words(found: JSON) -> str:
@@ -156,7 +174,12 @@ def _model(found: JSON) -> str:
 
 def _ranking_caption(found: JSON) -> str:
     beside = "" if found.get("printed") else ", with 95 % intervals and the probability of being the best"
-    return f"Ranking of the configurations{beside}; beside it the predicted rank over the measured one."
+    agreed = (found.get("after_loop") or {}).get("agreement") or found.get("agreement") or {}
+    rank = agreed.get("spearman")
+    alike = f" Measured and predicted rank correlate with {quantity(rank)}." if rank else ""
+    first = (found.get("ranking") or [{}])[0].get("configuration")
+    best = f"The flattest is {first}.{alike} " if first else ""
+    return f"{best}Ranking of the configurations{beside}; beside it the predicted rank over the measured one."
 
 
 def _agreements(found: JSON) -> list[tuple[str, JSON]]:

@@ -169,7 +169,12 @@ def _maps(results: Results, contacts: pd.DataFrame | None) -> list[Item]:
     if frame is None:
         return []
     number_of = frame["run"].nunique()
-    caption = "Deviation of the faces from their least-squares planes"
+    heights, runs = frame["deviation_um"].to_numpy(float), frame["run"].to_numpy()
+    low, high = int(heights.argmin()), int(heights.argmax())
+    caption = (
+        f"The faces lie {number(-heights[low])} µm below their planes at most ({runs[low]}) and "
+        f"{number(heights[high])} µm above ({runs[high]}). Deviation from the least-squares planes"
+    )
     caption += f", {figures.MAPS} of {number_of}" if number_of > figures.MAPS else ""
     caption += (
         "; triangles: where the minimum zone touches, upper plane ▲, lower ▼."

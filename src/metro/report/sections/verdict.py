@@ -10,7 +10,8 @@ from metro.report.figures.comparison import coordinate, overlay
 from metro.report.figures.verdicts import Change
 from metro.report.numbers import listing, number, percent, probability, quantity, unit, with_interval, words
 from metro.report.phrases import plain, rest_words
-from metro.report.results import Results, title
+from metro.report.results import Results, heading, title
+from metro.report.sections import findings
 from metro.report.sections.measured import count_of, measured_words
 from metro.units import JSON
 
@@ -27,8 +28,7 @@ STATUS = {
 
 def sentence(observable: str, entry: JSON, left: str = "") -> str:
     """Say the verdict on an observable in a few sentences, with its numbers and what is ``left``."""
-    name, status = title(observable), str(entry.get("status"))
-    start = name[0].upper() + name[1:]
+    start, status = heading(observable), str(entry.get("status"))
     floor = entry.get("noise_floor")
     noise = f" (noise floor {number(floor)}{_unit(entry)})" if floor is not None else ""
     found = listing([effect_words(effect) for effect in entry.get("effects") or []])
@@ -186,7 +186,7 @@ def summary(results: Results) -> Section:
         items.append(
             Picture(
                 figures.changes(told, "error on held-out runs (% of the signal)"),
-                "Error on held-out runs before and after what was found is added, with 95 % intervals.",
+                f"{findings.changed(told)} Errors with 95 % intervals, and the noise floor.",
                 "; ".join(f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in told),
             )
         )
@@ -216,7 +216,7 @@ def _one_run(results: Results) -> list[Item]:
             continue
         square = (frame["measured"] - frame["before"]) ** 2
         run = str(square.groupby(frame["run"]).mean().idxmax())
-        caption = f"The held-out run that the base model misses most, {run}: {title(name)}."
+        caption = f"{heading(name)}. {findings.missed(frame, run)}"
         return [Picture(overlay(frame[frame["run"] == run], title(name)), caption, caption)]
     return []
 
@@ -243,8 +243,8 @@ def print_check(results: Results) -> list[Item]:
     errata = int(table["note"].fillna("").str.contains("erratum: ").sum())
     text = (
         f"{len(table)} printed values were transcribed, {pairs} of them with a prediction beside them; "
-        f"every printed error was recomputed. {flagged or 'None'} cannot be right as printed; "
-        f"for {errata or 'none'} an erratum is stated."
+        f"every printed error was recomputed. {f'{flagged} cannot' if flagged else 'All can'} be right as "
+        f"printed; for {errata or 'none'} an erratum is stated."
     )
     return [Paragraph(text)]
 

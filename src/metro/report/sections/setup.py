@@ -1,0 +1,115 @@
+"""What the batch was measured with and at: tool, work, instruments as declared, and the conditions of cut."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pandas as pd
+
+from metro.report.content import Heading, Item, Section, Table
+from metro.report.numbers import listing, unit, words
+from metro.report.results import Results
+from metro.units import JSON
+
+LONGEST, MOST_RUNS = 40, 8
+# end of a key → its unit; the longest that fits counts
+ENDINGS = {
+    "_deg": "deg",
+    "_hz": "Hz",
+    "_kg": "kg",
+    "_m": "m",
+    "_mm": "mm",
+    "_ms": "ms",
+    "_n": "N",
+    "_n_mm": "N/mm",
+    "_n_mm2": "N/mm2",
+    "_nm": "N m",
+    "_rpm": "rpm",
+    "_s": "s",
+    "_um": "um",
+}
+CONDITIONS = {
+    "operation": "operation",
+    "spindle_rpm": "speed (rpm)",
+    "feed_per_tooth_mm": "feed per tooth (mm)",
+    "axial_depth_mm": "axial depth (mm)",
+    "radial_depth_mm": "radial depth (mm)",
+    "direction": "direction",
+    "orbit_rpm": "orbit (rpm)",
+    "feed_direction_deg": "feed direction (°)",
+    **{name: name for name in ("wrist", "location", "orientation", "pose")},
+}
+
+
+def setup(results: Results) -> Section | None:
+    """Write the declared tool, work and instruments, and the conditions with their runs; None without any."""
+    items = [*_declared(results.batch.manifest), *_conditions(results.batch.runs)]
+    return Section("What was measured", items) if items else None
+
+
+def _declared(manifest: JSON) -> list[Item]:
+    parts: JSON = {name: manifest.get(name) or {} for name in ("tool", "work")}
+    parts |= {words(name): value or {} for name, value in (manifest.get("instruments") or {}).items()}
+    known = {f"known: {words(k)}": v or {} for k, v in (manifest.get("known") or {}).items()}
+    rows = [[name, "; ".join(_values(values))] for name, values in (parts | known).items() if values]
+    if not rows:
+        return []
+    caption = "Tool, work and instruments as batch.yaml declares them; nothing of this was inferred."
+    return [Heading("Tool and instruments"), Table(["what", "declared"], rows, caption, [1, 5], small=True)]
+
+
+def _values(values: JSON) -> Iterator[str]:
+    """Write each value of a mapping with its name and unit; matrices are left to the manifest."""
+    for key, value in values.items():
+        ending = max((end for end in ENDINGS if key.endswith(end)), key=len, default="")
+        name, shown = words(key.removesuffix(ending)), unit(ENDINGS.get(ending))
+        after = f"{'' if shown == '°' else ' '}{shown}" if shown else ""
+        if isinstance(value, dict):
+            yield f"{name} {', '.join(f'{k}: {v}' for k, v in value.items())}"
+        elif isinstance(value, list) and value and all(isinstance(v, int | float) for v in value):
+            yield f"{name} {', '.join(f'{v:g}' for v in value)}{after}"
+        elif isinstance(value, int | float | str):
+            yield f"{name} {f'{value:g}' if isinstance(value, float) else value}{after}"
+
+
+def _conditions(runs: pd.DataFrame) -> list[Item]:
+    """Tabulate the settings that differ, runs of one condition together; tell those all runs share once."""
+    columns = [name for name in CONDITIONS if name in runs and _given(runs[name]).any()]
+    if runs.empty or not columns:
+        return []
+    shared = [name for name in columns if runs[name].nunique(dropna=False) == 1]
+    told = [name for name in columns if name not in shared]
+    by = [runs[name].map(_cell) for name in told]
+    groups = list(runs.groupby(by, sort=False)) if by else [((), runs)]
+    rows = [
+        [
+            *map(str, key if isinstance(key, tuple) else (key,)),
+            *(_named(part, r) for r in ("identify", "validate")),
+        ]
+        for key, part in groups
+    ]
+    same = listing([f"{CONDITIONS[name]} {_cell(runs[name].iloc[0])}" for name in shared])
+    caption = "Conditions of the cuts, and the runs that identify and that judge the models."
+    caption += f" All runs: {same}." if same else ""
+    caption += f" The first {LONGEST} of {len(rows)}; runs.csv has all." if len(rows) > LONGEST else ""
+    header = [*(CONDITIONS[name] for name in told), "identification", "held out"]
+    widths = [*([1.0] * len(told)), 2.2, 2.2]
+    table = Table(header, rows[:LONGEST], caption, widths, small=True)
+    return [Heading("Conditions"), table]
+
+
+def _given(column: pd.Series) -> pd.Series:
+    return column.notna() & (column.astype(str) != "")
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(value or "–")
+
+
+def _named(part: pd.DataFrame, role: str) -> str:
+    """Name the runs of a role; of many, the first and how many more."""
+    names = [str(run) for run in part.index[part["role"] == role]]
+    more = f" and {len(names) - MOST_RUNS} more" if len(names) > MOST_RUNS else ""
+    return ", ".join(names[:MOST_RUNS]) + more or "–"

@@ -1,0 +1,37 @@
+"""What a batch was measured with and at, as its manifest and its table of runs say."""
+
+from dataclasses import replace
+
+import pandas as pd
+import synthetic_results as synthetic
+
+from metro.report.sections.setup import setup
+
+
+def tables(manifest, **columns):
+    results = synthetic.results()
+    runs = pd.DataFrame(columns, index=["r1", "r2", "r3"])
+    section = setup(replace(results, batch=replace(results.batch, manifest=manifest, runs=runs)))
+    return section and [item for item in section.items if hasattr(item, "rows")]
+
+
+def test_keys_of_the_manifest_become_names_and_units():
+    instruments = {"dynamometer": {"rate_hz": 4096, "range_n": 5000, "axes": {"x": "-y"}}, "scanner": None}
+    manifest = {"tool": {"diameter_mm": 16, "pitch_deg": [120, 240]}, "instruments": instruments}
+    (table,) = tables(manifest, role=["identify"] * 3)
+    assert table.rows == [
+        ["tool", "diameter 16 mm; pitch 120, 240°"],
+        ["dynamometer", "rate 4096 Hz; range 5000 N; axes x: -y"],
+    ]
+
+
+def test_runs_of_one_condition_stand_together_and_what_all_share_is_told_once():
+    roles = ["identify", "validate", "identify"]
+    (table,) = tables({}, role=roles, spindle_rpm=4000.0, axial_depth_mm=[0.5, 0.5, 2.0])
+    assert table.header == ["axial depth (mm)", "identification", "held out"]
+    assert table.rows == [["0.5", "r1", "r2"], ["2", "r3", "–"]]
+    assert "All runs: speed (rpm) 4000." in table.caption
+
+
+def test_a_batch_that_declares_nothing_has_no_such_section():
+    assert tables({}, role=["identify"] * 3) is None
