@@ -127,7 +127,10 @@ def simulate(
     *,
     kind: Annotated[
         str,
-        typer.Option(help="What is measured: force, joint_force, deformation, waviness, flatness, lobes."),
+        typer.Option(
+            help="What is measured: force, joint_force, deformation, waviness, flatness, lobes.",
+            autocompletion=observables,
+        ),
     ] = "force",
     effect: Annotated[
         list[str] | None,
@@ -147,17 +150,9 @@ def simulate(
     """
     from metro.commands.simulate import simulate as write
 
+    folders = {"root": root, "truth": truth}
     with readable_errors():
-        write(
-            name,
-            kind=kind,
-            effects=effect or [],
-            seed=seed,
-            style=style,
-            root=root,
-            truth=truth,
-            as_json=as_json,
-        )
+        write(name, kind=kind, effects=effect or [], seed=seed, style=style, as_json=as_json, **folders)
 
 
 @app.command()
@@ -282,12 +277,17 @@ def frf_export(
     position: Annotated[
         str, typer.Option(help="Position of the tests; needed where there are several.")
     ] = "",
+    as_json: AsJson = False,
 ) -> None:
-    """Write a batch's FRFs as a universal file (datasets 58b), for other programs of modal analysis."""
+    """Write a batch's FRFs as a universal file (datasets 58b), for other programs of modal analysis.
+
+    Example: `metro frf-export data/processed/trimule-helical trimule.uff`
+    """
     from metro.stages.frf_export import frf_export as write
 
     with readable_errors():
-        typer.echo("\n".join(write(processed, out, position)))
+        told = write(processed, out, position)
+        typer.echo(json.dumps({"file": str(out), "told": told}) if as_json else "\n".join(told))
 
 
 @app.command(rich_help_panel=STAGES)

@@ -51,7 +51,11 @@ def test_programs_get_the_verdict_and_the_words(explain):
 
 @pytest.mark.parametrize(
     ("arguments", "told"),
-    [(("late", "lobes"), "found verdicts on force, expected one on lobes"), (("nobody",), "call snakemake")],
+    [
+        (("late", "lobes"), "found verdicts on force, expected one on lobes"),
+        (("nobody",), "nobody: there are no results of such a batch; batches with results: "),
+        (("nobody",), "late"),
+    ],
 )
 def test_what_is_not_there_is_an_error(explain, arguments, told):
     result = explain(*arguments)

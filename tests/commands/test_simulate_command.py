@@ -22,6 +22,13 @@ def simulate(*arguments):
     return CliRunner().invoke(app, ["simulate", *arguments])
 
 
+def test_a_kind_that_is_none_is_refused_with_those_that_there_are(folder):
+    result = simulate("try-1", "--kind", "nonsense")
+    assert result.exit_code == 1
+    assert "found 'nonsense', expected one of: force, joint_force, deformation" in result.stderr
+    assert not (folder / "data/raw/try-1").exists()
+
+
 class Simulator:
     """Stands for the simulator: notes what it is asked, and fills the folder."""
 
@@ -65,7 +72,7 @@ def test_a_batch_has_its_name_when_it_is_whole(folder, monkeypatch):
     [
         (("Try One",), "is no name for a batch"),
         (("try", "--effect", "no_such_effect"), "no effect 'no_such_effect'"),
-        (("try", "--kind", "temperature"), "invalid choice: 'temperature'"),
+        (("try", "--kind", "temperature"), "found 'temperature', expected one of"),
     ],
 )
 def test_a_mistake_is_told_in_one_line(folder, arguments, told):

@@ -1,5 +1,7 @@
 """Export of FRFs: what a batch holds comes back from the universal file, by our reader and by another."""
 
+import json
+
 import numpy as np
 import pytest
 import yaml
@@ -63,6 +65,13 @@ def test_frf_files_come_back_as_receptances(files, tmp_path):
     for function, share in zip(found, (1.0, 0.5, -0.2), strict=True):
         np.testing.assert_array_equal(function.frequency, FREQUENCY)
         np.testing.assert_allclose(function.values, receptance(FREQUENCY, share), rtol=1e-12)
+
+
+def test_programs_get_json(files, tmp_path):
+    result = export(files, tmp_path / "out.uff", "--position", "2", "--json")
+    content = json.loads(result.stdout)
+    assert content["file"] == str(tmp_path / "out.uff")
+    assert "1 FRFs of position 2" in content["told"][-1]
 
 
 def test_another_program_reads_what_is_exported(files, tmp_path):

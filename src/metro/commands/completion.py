@@ -8,11 +8,14 @@ from pathlib import Path
 OBSERVABLES = ("force", "joint_force", "deformation", "waviness", "flatness", "lobes")
 
 
+def with_results(reports: Path) -> list[str]:
+    """Return the batches that have results in a folder."""
+    return sorted(path.parent.name for path in reports.glob("*/verdict.json"))
+
+
 def batches(incomplete: str) -> Iterator[str]:
     """Yield the batches that have results in the working folder."""
-    for path in sorted(Path("reports").glob("*/verdict.json")):
-        if path.parent.name.startswith(incomplete):
-            yield path.parent.name
+    return (name for name in with_results(Path("reports")) if name.startswith(incomplete))
 
 
 def observables(incomplete: str) -> Iterator[str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from metro.batch.findings import ContractError, Finding
+from metro.commands.completion import with_results
 from metro.commands.output import print_json
 from metro.report.content import Paragraph
 from metro.report.numbers import number, percent, probability, unit, words
@@ -73,6 +74,12 @@ def read(batch: str, processed: Path, reports: Path) -> Results:
 
     from metro.batch.processed import read_batch
 
+    known = with_results(reports)
+    if batch not in known and not (processed / batch).is_dir():
+        there = (
+            f"batches with results: {', '.join(known)}" if known else "no batch has any yet: call snakemake"
+        )
+        raise ContractError([Finding("error", batch, f"there are no results of such a batch; {there}")])
     files = [processed / batch / name for name in ("batch.json", "runs.parquet", "loop.json")]
     files += [reports / batch / name for name in ("identified.json", "verdict.json")]
     missing = [

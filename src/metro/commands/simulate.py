@@ -16,6 +16,7 @@ from metro.batch.discover import NAME, NAME_IN_WORDS
 from metro.batch.findings import BatchError, ContractError, Finding
 from metro.batch.whole_folder import whole_folder
 from metro.batch.writing import write_atomically
+from metro.commands.completion import OBSERVABLES
 from metro.commands.output import print_json
 
 PROGRAM = "virtual_cell"
@@ -47,6 +48,9 @@ def simulate(
     folder = root / name
     if not NAME.fullmatch(name):
         raise BatchError([Finding("error", name, f"is no name for a batch: it is made of {NAME_IN_WORDS}")])
+    if kind not in OBSERVABLES:
+        expected = f"found {kind!r}, expected one of: {', '.join(OBSERVABLES)}"
+        raise BatchError([Finding("error", "--kind", expected)])
     if folder.exists():
         raise BatchError([Finding("error", str(folder), "is there already: choose another name")])
     if importlib.util.find_spec(PROGRAM) is None:
