@@ -192,8 +192,11 @@ def _floor(rest: Array, on_order: np.ndarray, length: int) -> Array:
     from scipy.ndimage import median_filter
 
     free = np.flatnonzero(~on_order)
-    size = (1, int(_NEIGHBOURS * length) | 1, 1)
-    level = median_filter(rest[:, free], size, mode="reflect") / math.log(2.0)
+    size = int(_NEIGHBOURS * length) | 1
+    # one spectrum at a time: for one dimension SciPy has a median whose cost hardly grows with the size
+    each = np.moveaxis(rest[:, free], 1, 2).reshape(-1, len(free))
+    median = np.array([median_filter(one, size, mode="reflect") for one in each])
+    level = np.moveaxis(median.reshape(len(rest), -1, len(free)), 2, 1) / math.log(2.0)
     place = np.clip(np.searchsorted(free, np.arange(len(on_order))), 0, len(free) - 1)
     rise = np.maximum(length / np.maximum(np.arange(len(on_order)), 1), 1.0)
     return np.asarray(np.maximum(level[:, place] * rise[:, None], 1e-12 * rest.max()))

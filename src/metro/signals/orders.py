@@ -41,15 +41,15 @@ class OrderAverage:
 
 def order_matrix(angle: Array, highest: int) -> Array:
     """Matrix (n, 2·highest+1) that makes a waveform from its order coefficients; ``angle`` (n,) in rad."""
-    matrix = np.empty((len(angle), 2 * highest + 1))
-    matrix[:, 0] = 1.0
+    rows = np.empty((2 * highest + 1, len(angle)))
+    rows[0] = 1.0
     phase = np.exp(1j * angle)
-    power = np.ones_like(phase)
+    power = np.full_like(phase, math.sqrt(2.0))
     for order in range(1, highest + 1):
         power = power * phase
-        matrix[:, 2 * order - 1] = math.sqrt(2.0) * power.real
-        matrix[:, 2 * order] = math.sqrt(2.0) * power.imag
-    return matrix
+        rows[2 * order - 1] = power.real
+        rows[2 * order] = power.imag
+    return rows.T
 
 
 def to_orders(waveform: Array, highest: int) -> Array:
