@@ -274,6 +274,13 @@ def batch():
     return Batch("synthetic", manifest, {"cell": "kr160"}, runs, plan)
 
 
+STAGES = {
+    "ingest": {"code": "1" * 64, "settings": {"holdout": None}},
+    "loop": {"code": "2" * 64, "settings": {"seed": 1}},
+    "report": {"code": "c0de", "settings": {"style": "plain"}},
+}
+
+
 def results():
     sources = {f"r0{i}.csv": f"{i:064x}" for i in range(1, 10)}
-    return Results(batch(), tables(), identified(), verdict(), told(), sources, {"style": "plain"}, "c0de")
+    return Results(batch(), tables(), identified(), verdict(), told(), sources, STAGES, {"numpy": "2.1.0"})

@@ -60,19 +60,24 @@ def record(processed: Path, reports: Path, settings: JSON, code: str) -> JSON:
     processed, reports : the batch's folders.
     settings, code : those of the report's own stage; the others' stand in the metadata of their tables.
     """
-    stages = {stage: _stage(processed / f"{table}.parquet") for stage, table in WRITTEN_BY.items()}
-    stages["report"] = {"code": code, "settings": settings}
     return {
         "format": 1,
         "batch": processed.resolve().name,
         "metro": __version__,
         "python": platform.python_version(),
         "packages": packages(),
-        "stages": {stage: made for stage, made in stages.items() if made},
+        "stages": stages(processed, settings, code),
         "raw": sources(processed),
         "processed": hashes(processed, (path.name for path in processed.iterdir())),
         "results": hashes(reports, RESULTS),
     }
+
+
+def stages(processed: Path, settings: JSON, code: str) -> dict[str, JSON]:
+    """Return ``code`` and ``settings`` by stage, in their order; the report's own are given."""
+    made = {stage: _stage(processed / f"{table}.parquet") for stage, table in WRITTEN_BY.items()}
+    made["report"] = {"code": code, "settings": settings}
+    return {stage: one for stage, one in made.items() if one}
 
 
 def sources(processed: Path) -> dict[str, str]:

@@ -31,7 +31,8 @@ class Results:
     tables : processed tables by name; a table that is absent or has no rows is not there.
     identified, verdict, loop : content of the JSON files of the same names.
     sources : SHA-256 by source file.
-    settings, code : settings of this stage, and the hash of its code.
+    stages : of each stage its ``settings``, and ``code``, the hash of its code.
+    packages : version by package that the results were made with.
     """
 
     batch: Batch
@@ -40,8 +41,8 @@ class Results:
     verdict: JSON
     loop: JSON
     sources: Mapping[str, str] = field(default_factory=dict)
-    settings: JSON = field(default_factory=dict)
-    code: str = ""
+    stages: Mapping[str, JSON] = field(default_factory=dict)
+    packages: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def title(self) -> str:

@@ -68,8 +68,8 @@ def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> R
         verdict=_json(reports / "verdict.json"),
         loop=_json(processed / "loop.json"),
         sources=_sources(processed),
-        settings=settings,
-        code=code,
+        stages=provenance.stages(processed, settings, code),
+        packages=provenance.packages(),
     )
 
 

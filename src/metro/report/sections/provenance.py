@@ -10,6 +10,7 @@ from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Tab
 from metro.report.numbers import listing
 from metro.report.phrases import sentence
 from metro.report.results import Results, title
+from metro.units import JSON
 
 LONGEST, ABREAST, DIGITS = 240, 3, 12
 LIMITS = {
@@ -28,8 +29,9 @@ LIMITS = {
 
 
 def provenance(results: Results) -> Section:
-    """Write hold-out plan, limits of the models, settings, versions and the hash of every source file."""
-    return Section("Provenance", [*_plan(results), *_limits(results), *_code(results), *_sources(results)])
+    """Write hold-out plan, limits of the models, code and settings of every stage, versions, source files."""
+    parts = _plan(results), _limits(results), _code(results), _sources(results), _approval()
+    return Section("Provenance", [item for part in parts for item in part])
 
 
 def _plan(results: Results) -> list[Item]:
@@ -67,14 +69,32 @@ def _limits(results: Results) -> list[Item]:
 
 def _code(results: Results) -> list[Item]:
     rows = [
-        ["metro", __version__],
-        ["code of this stage", results.code or "–"],
-        ["batch", results.batch.name],
-        ["list of source files", _of_all(results)],
+        [stage, str(made.get("code", ""))[:DIGITS], _settings(made.get("settings"))]
+        for stage, made in results.stages.items()
     ]
-    rows += [[key, json.dumps(value, ensure_ascii=False)] for key, value in sorted(results.settings.items())]
-    caption = "Versions, settings, and the SHA-256 of the list of source files as sha256sum would write it."
-    return [Heading("Code and settings"), Table(["what", "value"], rows, caption, [1, 4], small=True)]
+    listed = "the list of the source files and their SHA-256, as sha256sum writes it"
+    rows.append(["sources", _of_all(results)[:DIGITS], listed])
+    caption = (
+        f"What each stage was made by: metro {__version__}, the first {DIGITS} digits of the hash of the "
+        "stage's code, and its settings; provenance.json has all digits."
+    )
+    versions = ", ".join(f"{name} {number}" for name, number in sorted(results.packages.items()))
+    packages = [Paragraph(f"Packages: {versions}.", "note")] if versions else []
+    table = Table(["stage", "hash", "settings"], rows, caption, [1, 2, 6], small=True)
+    return [Heading("Code and settings"), table, *packages]
+
+
+def _settings(made: JSON | None) -> str:
+    return ", ".join(f"{key}: {json.dumps(value)}" for key, value in sorted((made or {}).items())) or "–"
+
+
+def _approval() -> list[Item]:
+    """Leave room for the names of those who answer for the report."""
+    rows = [[role, "", "", ""] for role in ("measured", "evaluated", "approved")]
+    return [
+        Heading("Approval"),
+        Table(["", "name", "date", "signature"], rows, "Who answers for this report.", [1, 2, 1, 2]),
+    ]
 
 
 def _of_all(results: Results) -> str:

@@ -1,0 +1,25 @@
+"""The report says by what code and settings each stage made it, and leaves room for who answers for it."""
+
+from synthetic_results import results
+
+from metro.report.content import Paragraph, Table
+from metro.report.sections.provenance import provenance
+
+
+def test_every_stage_stands_with_its_code_and_settings():
+    items = provenance(results()).items
+    (made,) = (item for item in items if isinstance(item, Table) and item.header[0] == "stage")
+    assert [list(row) for row in made.rows[:-1]] == [
+        ["ingest", "1" * 12, "holdout: null"],
+        ["loop", "2" * 12, "seed: 1"],
+        ["report", "c0de", 'style: "plain"'],
+    ]
+    assert made.rows[-1][0] == "sources"
+    notes = [item.text for item in items if isinstance(item, Paragraph) and item.look == "note"]
+    assert any("numpy 2.1.0" in note for note in notes)
+
+
+def test_who_measured_evaluated_and_approved_can_sign():
+    *_, last = provenance(results()).items
+    assert [row[0] for row in last.rows] == ["measured", "evaluated", "approved"]
+    assert list(last.header[1:]) == ["name", "date", "signature"]
