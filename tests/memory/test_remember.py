@@ -137,6 +137,23 @@ def test_a_campaign_of_one_batch_has_no_history():
     assert [memory[key] for key in ("series", "pooled", "recurring", "undecided")] == [[], [], [], []]
 
 
+def test_what_all_batches_may_get_wrong_alike_is_in_the_course_of_a_coefficient():
+    """Twenty batches are as far off together as one: the budget does not average out."""
+    records, _ = drawn(np.random.default_rng(4), 20)
+    plain = {row["quantity"]: np.array(row["track"]) for row in remember(records)["series"]}
+    for one in records:
+        one.told.setdefault("observables", {}).setdefault("force", {})["noise"] = {"budget": 0.01}
+    for row in remember(records)["series"]:
+        low, middle, high = np.array(row["track"]).T
+        own = plain[row["quantity"]].T
+        np.testing.assert_allclose(middle, own[1])
+        coefficient = row["quantity"].startswith("cutting coefficient")
+        wrong = 0.0196 * np.abs(middle) if coefficient and not row["effect"] else 0.0
+        np.testing.assert_allclose(middle - low, np.hypot(own[1] - own[0], wrong), rtol=1e-4)
+        np.testing.assert_allclose(high - middle, np.hypot(own[2] - own[1], wrong), rtol=1e-4)
+    assert any(name.startswith("cutting coefficient") for name in plain)
+
+
 @pytest.mark.slow
 def test_over_many_campaigns_intervals_cover_as_they_say():
     covered, coming, false = [], [], 0

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,10 +19,11 @@ from metro.units import JSON, Array
 SETTLED = {"clean", "explained"}
 CLAIMED = {"explained", "partly_explained"}
 HOUR, DAY = 3600.0, 86400.0
-_NORMAL = 1.959963984540054  # half width of a 95 % interval; by Student's t it is longer, so this is cautious
+NORMAL = 1.959963984540054  # half width of a 95 % interval; by Student's t it is longer, so this is cautious
 # What a parameter belongs to; all others to the cell.
 _OF_TOOL = {"tool_runout", "tool_deflection"}
 _OF_TOOL_AND_WORK = {"tool_wear", "chip_size_effect", "process_damping"}
+_COEFFICIENT = "cutting coefficient "
 # Which tooth is the first is told by no batch: their deviations cannot be compared from batch to batch.
 _NOT_COMPARABLE = {"pitch_error"}
 
@@ -61,7 +62,8 @@ class Entry:
     """A parameter in one batch.
 
     ``less_neutral``: less the value at which the effect changes nothing. ``found``: claimed there.
-    ``sensitivity``: relative change of the prediction per sd. ``budget``: what a model may get wrong.
+    ``sensitivity``: relative change of the prediction per sd. ``budget``: what a model may get wrong, as a
+    part of what it predicts.
     """
 
     batch: str
@@ -160,7 +162,7 @@ def _effects(record: Record) -> Iterator[Told]:
                     less_neutral=one["less_neutral"],
                     found=found,
                     sensitivity=float(tried["size"]) / length if length else math.nan,
-                    budget=float((told.get("noise") or {}).get("budget") or math.nan),
+                    budget=_budget(record, observable),
                 )
                 yield (_owner(record, name), observable, name, quantity), entry, one["unit"], one["signed"]
 
@@ -187,7 +189,7 @@ def _quantities(record: Record) -> Iterator[Told]:
     tables: list[tuple[str, str, Mapping[str, object]]] = [
         (
             record.owner("tool", "work"),
-            "cutting coefficient ",
+            _COEFFICIENT,
             force.get("waveform") or force.get("mean") or {},
         ),
         (record.owner(), "tip compliance ", record.identified.get("tip") or {}),
@@ -206,7 +208,15 @@ def _quantities(record: Record) -> Iterator[Told]:
         for name, quantity in table.items():
             entry = _entry(record.name, quantity)
             if entry and isinstance(quantity, dict):
-                yield (owner, "", "", prefix + name), entry, str(quantity.get("unit") or ""), False
+                budget = _budget(record, "force") if prefix == _COEFFICIENT else math.nan
+                key = owner, "", "", prefix + name
+                yield key, replace(entry, budget=budget), str(quantity.get("unit") or ""), False
+
+
+def _budget(record: Record, observable: str) -> float:
+    """Return the declared model-form budget of an observable; NaN where its loop tells none."""
+    told = (record.told.get("observables") or {}).get(observable) or {}
+    return float((told.get("noise") or {}).get("budget") or math.nan)
 
 
 def _entry(batch: str, quantity: object) -> Entry | None:
@@ -215,7 +225,7 @@ def _entry(batch: str, quantity: object) -> Entry | None:
     low, high = quantity.get("ci95") or (None, None)
     if low is None or high is None or not high > low:
         return None
-    return Entry(batch, float(quantity["value"]), 0.5 * (high - low) / _NORMAL)
+    return Entry(batch, float(quantity["value"]), 0.5 * (high - low) / NORMAL)
 
 
 def _clock(started: Sequence[float | None]) -> tuple[list[int], Array, str]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from metro.memory.course import ENOUGH, Course, course
-from metro.memory.history import CLAIMED, Record, Series, histories, natural
+from metro.memory.history import CLAIMED, NORMAL, Record, Series, histories, natural
 from metro.memory.regression import level
 from metro.units import JSON, Array
 
@@ -65,10 +65,22 @@ def _series(one: Series, followed: Course, q_value: float | None) -> JSON:
         "mean": _quantity([float(part[0]) for part in mean.interval()], one.unit),
         "change": _quantity(followed.change, one.unit) if changes and followed.change else None,
         "step_between": [one.entries[i].batch for i in (before, before + 1)] if before is not None else None,
-        "track": followed.track.tolist(),
+        "track": _absolute(followed.track, 0.0 if one.effect else _typical(one.column("budget")) or 0.0),
         "next": {"t": followed.next_at, **_quantity(followed.after.tolist(), one.unit)},
         "scatter": followed.scatter,
     }
+
+
+def _absolute(track: Array, alike: float) -> list[list[float]]:
+    """Widen a course (n, 3), low, middle, high, by what all batches may get wrong alike, as a part of it.
+
+    However many batches there are, that does not average out; what changes between them is known better.
+    """
+    low, middle, high = track.T
+    wrong = NORMAL * alike * np.abs(middle)
+    ends = middle - np.hypot(middle - low, wrong), middle, middle + np.hypot(high - middle, wrong)
+    columns: list[list[float]] = np.stack(ends, axis=1).tolist()
+    return columns
 
 
 def _pooled(series: Sequence[Series]) -> list[JSON]:
