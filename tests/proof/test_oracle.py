@@ -15,11 +15,15 @@ ANGLE = 2.0 * np.pi * np.arange(POINTS) / POINTS
 
 @dataclass(frozen=True)
 class Wave:
-    """b (1 + twist) cos τ + c sin τ + bump cos 3τ + ripple sin 5τ, c free: ``twist`` is absorbed by b."""
+    """b (1 + twist) cos τ + c sin τ + bump cos 3τ + ripple sin 5τ, c free: ``twist`` is absorbed by b.
+
+    ``late`` cos 7τ hardly shows in the runs of the fit.
+    """
 
     twist: float = 0.0
     bump: float = 0.0
     ripple: float = 0.0
+    late: float = 0.0
 
     @property
     def parameters(self):
@@ -28,9 +32,13 @@ class Wave:
     def nuisance_starts(self, _block):
         return np.zeros((1, 0))
 
-    def design(self, _block, _nuisance, _beta=None):
+    def design(self, block, _nuisance, _beta=None):
         matrix = np.stack([(1.0 + self.twist) * np.cos(ANGLE), np.sin(ANGLE)], axis=1)
-        return matrix, self.bump * np.cos(3.0 * ANGLE) + self.ripple * np.sin(5.0 * ANGLE)
+        late = self.late * (1.0 if block.role == "validate" else 1e-3)
+        waves = (
+            self.bump * np.cos(3.0 * ANGLE) + self.ripple * np.sin(5.0 * ANGLE) + late * np.cos(7.0 * ANGLE)
+        )
+        return matrix, waves
 
 
 def effect(name):
@@ -40,7 +48,7 @@ def effect(name):
     return Effect(name, ("toy",), (EffectParameter(name, "1", -5.0, 5.0, 0.1, (-1.0,)),), apply, "", "", "")
 
 
-LIBRARY = (effect("twist"), effect("bump"), effect("ripple"))
+LIBRARY = (effect("twist"), effect("bump"), effect("ripple"), effect("late"))
 
 
 def problem(truth):
@@ -88,7 +96,7 @@ def test_of_two_effects_each_has_its_own_size():
 
 def test_of_an_effect_of_one_joint_the_oracle_is_told_the_form_of_that_joint():
     bump, ripple = (
-        replace(e, name="gap", form=f"joint {i}", where={"joint": i}) for i, e in enumerate(LIBRARY[1:], 1)
+        replace(e, name="gap", form=f"joint {i}", where={"joint": i}) for i, e in enumerate(LIBRARY[1:3], 1)
     )
     task = problem(Wave(ripple=0.9))
     found = oracle(task, {"gap": {"joint": 2, "ripple": 0.9, "phase_deg": 3.0}}, (bump, ripple), BUDGET)
@@ -120,3 +128,10 @@ def test_what_no_run_tells_of_the_base_model_is_no_noise(name, library):
     # of what the library lacks, the size is what is beyond noise and untold together
     beyond = np.sqrt(max(0.0, sure["before"] ** 2 - 10.0 * SIGMA**2)) / SIGMA
     assert unsure["sizes"][name] == pytest.approx(beyond if name == "chip" else sure["sizes"][name], rel=0.05)
+
+
+def test_an_effect_that_the_runs_of_the_fit_do_not_tell_keeps_its_true_size():
+    """Fitted, it would be anything between its bounds of five."""
+    found = oracle(problem(Wave(late=0.3)), {"late": {"late": 0.3}}, LIBRARY, BUDGET)
+    assert found["sizes"]["late"] == pytest.approx(0.3 / np.sqrt(2.0) / SIGMA, rel=0.05)
+    assert found["after"] == pytest.approx(SIGMA, rel=0.1)
