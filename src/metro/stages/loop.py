@@ -10,14 +10,13 @@ from __future__ import annotations
 import json
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
 from metro import __version__
 from metro.batch.batch import Batch
-from metro.batch.processed import read_batch, read_table, write_json, write_table
+from metro.batch.processed import Processed, read_batch, read_table, write_json, write_table
 from metro.effects import library
 from metro.loop.batch_story import brief
 from metro.loop.fit import Fit
@@ -98,8 +97,7 @@ def closed(
             if only is not None and module.OBSERVABLE not in only:
                 continue
             if state.found and module in OBSERVED_WITH_COEFFICIENTS:
-                read = partial(_read, processed)
-                again = module.observe(state.batch, read, state.identified)
+                again = module.observe(state.batch, Processed(processed), state.identified)
                 state.observed |= {} if isinstance(again, Refusal) else again
             task = task_of(module, state.batch, state.observed, state.identified)
             outcome = _close(state, task)
@@ -122,10 +120,6 @@ def _rank_again(state: Closing, task: Problem, final: Fit) -> None:
         fitted = identified_fit(task, final)
         told = flatness.report(state.batch, state.observed, state.identified, with_effects, fitted)
         state.identified = merged(state.identified, after_loop(told))
-
-
-def _read(processed: Path, name: str, run: str | None = None) -> pd.DataFrame:
-    return read_table(processed / f"{name}.parquet", run)
 
 
 def _close(state: Closing, task: Task) -> Outcome | None:
