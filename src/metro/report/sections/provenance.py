@@ -72,8 +72,9 @@ def _code(results: Results) -> list[Item]:
         [stage, str(made.get("code", ""))[:DIGITS], _settings(made.get("settings"))]
         for stage, made in results.stages.items()
     ]
-    listed = "the list of the source files and their SHA-256, as sha256sum writes it"
-    rows.append(["sources", _of_all(results)[:DIGITS], listed])
+    whole = _of_all(results)
+    listed = f"{whole}: of the list of the source files, as sha256sum writes it"
+    rows.append(["sources", whole[:DIGITS], listed])
     caption = (
         f"What each stage was made by: metro {__version__}, the first {DIGITS} digits of the hash of the "
         "stage's code, and its settings; provenance.json has all digits."
