@@ -101,6 +101,10 @@ def test_a_constant_channel_is_dead_and_not_clipped():
     assert quality.dead("Fz", WAVE).ok
 
 
+def air_offset(names, values):
+    return quality.zero_in_air(names, *quality.blocks_of(values), float(np.abs(values).max()))
+
+
 def cut(offset, air):
     random = np.random.default_rng(3)
     force = 200.0 * np.sin(2.0 * np.pi * 50.0 * TIME) + 150.0
@@ -111,18 +115,18 @@ def cut(offset, air):
 
 @pytest.mark.parametrize("air", [(0.4, 0.0), (0.0, 0.4), (0.3, 0.3)])
 def test_the_zero_is_read_where_the_tool_cuts_air(air):
-    found = quality.air_offset(("Fx", "Fy"), cut(np.array([40.0, -1.0]), air))
+    found = air_offset(("Fx", "Fy"), cut(np.array([40.0, -1.0]), air))
     assert [finding.ok for finding in found] == [False, True]
     assert found[0].value == pytest.approx(40.0, abs=0.3)
     assert found[1].value == pytest.approx(-1.0, abs=0.3)
 
 
 def test_a_record_of_the_cut_alone_tells_nothing_of_its_zero():
-    assert quality.air_offset(("Fx", "Fy"), cut(np.array([40.0, 0.0]), (0.0, 0.0))) == []
+    assert air_offset(("Fx", "Fy"), cut(np.array([40.0, 0.0]), (0.0, 0.0))) == []
 
 
 def test_a_record_too_short_for_blocks_tells_nothing_of_its_zero():
-    assert quality.air_offset(("Fx",), np.ones((60, 1))) == []
+    assert air_offset(("Fx",), np.ones((60, 1))) == []
 
 
 def test_missing_points_are_reported_as_a_share():

@@ -30,17 +30,17 @@ def test_air_entry_steady_exit_are_told_apart():
     found = segments(turns([signal], TURN), settling=10 * TURN)
     assert 30 * TURN <= found.steady.start <= 36 * TURN
     assert 84 * TURN <= found.steady.stop <= 90 * TURN
-    assert found.air[: 19 * TURN].all()
-    assert found.air[-19 * TURN :].all()
-    assert not found.air[20 * TURN : 100 * TURN].any()
-    assert signal[found.air].mean(axis=0) == pytest.approx([3.0, 3.0], abs=0.1)
+    assert found.quiet[:19].all()
+    assert found.quiet[-19:].all()
+    assert not found.quiet[20:100].any()
+    assert found.turns.mean[found.quiet].mean(axis=0) == pytest.approx([3.0, 3.0], abs=0.1)
 
 
 def test_a_record_of_steady_cutting_alone_is_kept_whole():
     signal = record(steady=40)
     found = segments(turns([signal], TURN), settling=10 * TURN)
     assert (found.steady.start, found.steady.stop) == (0, len(signal))
-    assert not found.air.any()
+    assert not found.quiet.any()
 
 
 def test_a_record_that_begins_in_the_cut_is_settled_at_its_end_only():

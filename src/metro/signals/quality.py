@@ -196,15 +196,6 @@ def motion(set_deg: Array) -> Finding:
     return Finding("motion", travel, 0.0, travel > 0.0, message)
 
 
-def air_offset(names: tuple[str, ...], values: Array) -> list[Finding]:
-    """Check the zero of force channels (n, k) where the tool cuts air at the record's start or end.
-
-    The record is parted into blocks; air is the run of blocks at either end whose scatter is below a tenth of
-    the cut's. A record that has no such part tells nothing of its zero, and gives no finding.
-    """
-    return zero_in_air(names, *blocks_of(values), float(np.max(np.abs(values))))
-
-
 def blocks_of(values: Array) -> tuple[Array, Array]:
     """Return scatter, all channels together (b,), and means (b, k) of the blocks that channels part into."""
     blocks = values[: len(values) // AIR_BLOCKS * AIR_BLOCKS].reshape(AIR_BLOCKS, -1, values.shape[1])
@@ -214,7 +205,15 @@ def blocks_of(values: Array) -> tuple[Array, Array]:
 
 
 def zero_in_air(names: tuple[str, ...], activity: Array, mean: Array, largest: float) -> list[Finding]:
-    """Check the zero as :func:`air_offset`, by the blocks of a record and the largest of its values."""
+    """Check the zero of force channels where the tool cuts air at the record's start or end.
+
+    Air is the run of blocks at either end whose scatter is below a tenth of the cut's. A record that has no
+    such part tells nothing of its zero, and gives no finding.
+
+    Parameters
+    ----------
+    activity, mean : of the blocks, as of :func:`blocks_of`. largest : of the values, without their sign.
+    """
     if not len(activity):
         return []
     quiet = activity < AIR_ACTIVITY * float(np.quantile(activity, 0.9))

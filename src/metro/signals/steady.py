@@ -36,12 +36,6 @@ class Segments:
     steady: slice
     quiet: np.ndarray
 
-    @property
-    def air(self) -> np.ndarray:
-        """Where the record is in the air, (n,) bool."""
-        every = np.repeat(self.quiet, self.turns.length)
-        return np.pad(every, (0, self.turns.samples - len(every)))
-
 
 def turns(pieces: Iterable[Array], samples_per_revolution: float) -> Turns:
     """Read a record (n, channels), piece by piece, revolution by revolution of the spindle."""
