@@ -98,3 +98,12 @@ def test_a_channel_that_stands_at_another_level_in_each_piece_moves():
     time, values = record()
     values[:, 0] = np.where(np.arange(COUNT) < 5000, 1.0, 2.0)
     assert gathered(time, values, [5000]).channels()[0].ok
+
+
+@pytest.mark.parametrize("cuts", CUTS)
+def test_a_flat_top_that_lies_half_in_one_piece_and_half_in_the_next(cuts):
+    time, values = record()
+    values[4997:5003, 1] = 130.0
+    found = gathered(time, values, cuts).channels()[3]
+    assert not found.ok
+    assert "stands at 130 for 6 samples" in found.message

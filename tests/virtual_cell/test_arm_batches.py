@@ -1,6 +1,7 @@
 """Batches of a cutting arm: force, torques, wall and load tests agree, by a kinematics written here."""
 
 import hashlib
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -291,3 +292,15 @@ def test_the_zero_of_a_trace_is_off_by_a_few_micrometres_from_run_to_run(tmp_pat
     assert np.ptp(off, axis=1).max() < 0.1  # each trace as a whole
     assert len(set(off.mean(axis=1).round(2))) == 2
     assert np.abs(off).max() < 12.0
+
+
+def test_the_gauge_of_the_load_tests_is_off_by_its_calibration():
+    """The force that is written down is not the one that moves the tip."""
+    cell, bench = drawn(np.random.default_rng(5), "b")
+    assert 0.0 < np.abs(bench.calibration).max() < 0.05
+    moved = []
+    for error in (0.0, 0.1):
+        exact = replace(bench, tracker=0.0, calibration=np.array([0.0, 0.0, 0.0, error]))
+        rows = pd.DataFrame(arm.tested(cell, exact, np.random.default_rng(1)))
+        moved.append(rows[["dx_mm", "dy_mm", "dz_mm"]].to_numpy())
+    np.testing.assert_allclose(moved[1], 1.1 * moved[0], atol=2e-4)
