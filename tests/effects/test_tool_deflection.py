@@ -73,6 +73,28 @@ def test_applying_sets_the_tips_compliance_and_nothing_else():
     assert (changed.cutter, changed.law, changed.sensor) == (model.cutter, model.law, model.sensor)
 
 
+def test_a_tool_that_is_too_soft_to_cut_steadily_is_beyond_the_model():
+    slot = Cut(70e-6, 1.5e-3, Engagement(0.0, math.pi))
+    setting = ForceSetting(slot, 0.0, 8, Recording((0.1,), 0.1, 520.0), 0.0)
+    block = SimpleNamespace(setting=setting, zeros=np.zeros((51, 0)))
+    tool = Cutter(6e-3, math.radians(35), evenly_pitched(2), 8e-6, 0.7)
+    stiff, soft = (
+        ForceModel(tool, EdgeLaw(), true_path=False, structure=Structure(compliance=(1 / 40e6, 1 / across)))
+        for across in (20e6, 0.4e6)
+    )
+    assert stiff.beyond(block, STEEL) == ""
+    assert "find no balance" in soft.beyond(block, STEEL)
+    assert replace(soft, structure=Structure()).beyond(block, STEEL) == ""
+    taken = 0.5 ** np.arange(1, 12)  # what a search sees there: the first of these that is in balance
+    seen = soft.design(block, np.zeros(1), STEEL)[0]
+    first = next(
+        model
+        for model in (replace(soft, structure=Structure(compliance=(s / 40e6, s / 0.4e6))) for s in taken)
+        if not model.beyond(block, STEEL)
+    )
+    assert np.array_equal(seen, first.design(block, np.zeros(1), STEEL)[0])
+
+
 @pytest.mark.parametrize("direction", [0.0, math.pi / 2, 0.7])
 def test_a_spring_is_the_same_spring_in_a_turned_feed_frame(direction):
     along, across, mixed = Structure(compliance=(3e-7, 1e-7)).seen(direction)

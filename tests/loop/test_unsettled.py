@@ -1,6 +1,6 @@
 """A fit that did not converge, or leaves an effect undetermined, is no result."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -48,6 +48,43 @@ def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):
     halted = trial.fit
     monkeypatch.setattr(trial, "fit", lambda *given: replace(halted(*given), step=2.0))
     assert "did not converge" in tried(base, [BEND], base.noise, GATES, 0.004)[0].why_not
+
+
+@dataclass(frozen=True)
+class Brittle(Wave):
+    """A wave that has no prediction for a run whose order exceeds ``last``, once it is bent."""
+
+    last: int = 99
+
+    def beyond(self, block, _beta):
+        return "it breaks" if self.bend and block.order > self.last else ""
+
+
+def brittle(last, *roles):
+    """A problem whose bent model breaks at the runs of ``roles`` after the one of order ``last``."""
+    task = problem(1, truth=Wave(bend=0.1), phased=False)
+    late = tuple(replace(block, order=last + 1 if block.role in roles else 0) for block in task.blocks)
+    return replace(task, base=Brittle(**vars(task.base), last=last), blocks=late)
+
+
+def test_where_the_model_does_not_hold_a_fit_is_no_result():
+    sound, broken = brittle(7), brittle(7, "identify")
+    assert unsettled(fitted(sound, BEND)) == ""
+    first = broken.role("identify")[0].run
+    assert unsettled(fitted(broken, BEND)) == f"in {first} it breaks"
+    assert search(sound, (BEND,), GATES).names == ("bend",)
+    outcome = search(broken, (BEND,), GATES)
+    assert outcome.names == ()
+    assert [trial.why_not for trial in outcome.trials] == [f"in {first} it breaks"]
+
+
+def test_nothing_is_claimed_that_has_no_prediction_for_a_held_out_run():
+    task = brittle(7, "validate")
+    outcome = search(task, (BEND,), GATES)
+    assert outcome.names == ("bend",)  # the fit knows nothing of these runs
+    left = verdict.stands(task, outcome)
+    assert left.names == ()
+    assert left.trials[0].why_not == f"in {task.role('validate')[0].run} it breaks"
 
 
 def test_of_a_base_that_did_not_converge_nothing_is_called_clean():

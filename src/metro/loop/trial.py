@@ -13,6 +13,7 @@ from metro.loop.candidate import Candidate
 from metro.loop.evidence import Evidence, compare, hold_out, leave_out, missed, weights
 from metro.loop.fit import Fit, fit
 from metro.loop.noise import Noise
+from metro.observables.problem import Block, Limited
 
 LEAST_BETTER = 0.4
 OF_THE_REST = 0.5  # an effect smaller than this share of what stays unexplained may be part of that
@@ -102,12 +103,24 @@ def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> 
 
 
 def unsettled(fitted: Fit) -> str:
-    """Say why a fit is no result, if it is none: it did not converge, or tells no parameter of an effect."""
+    """Say why a fit is no result, if it is none.
+
+    It did not converge, or tells no parameter of an effect, or its model does not hold there.
+    """
     if not fitted.converged:
         return f"its fit did not converge: a step more would move a parameter by {fitted.step:.2g} of its sd"
     told = np.isfinite(np.diag(fitted.covariance)[len(fitted.beta) :])
     blind = [effect for effect, place in fitted.candidate.parts(fitted.theta) if not told[place].any()]
-    return "these runs do not determine its parameters" if blind else ""
+    return "these runs do not determine its parameters" if blind else beyond(fitted, fitted.blocks)
+
+
+def beyond(fitted: Fit, blocks: Sequence[Block]) -> str:
+    """Name the first of ``blocks`` for which a fitted model has no prediction, and why; empty: none."""
+    model = fitted.candidate.model(fitted.theta)
+    if not isinstance(model, Limited):
+        return ""
+    reasons = ((block.run, model.beyond(block, fitted.beta)) for block in blocks)
+    return next((f"in {run} {reason}" for run, reason in reasons if reason), "")
 
 
 def _why_not(evidence: Evidence, found: bool, least: float) -> str:

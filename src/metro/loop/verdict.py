@@ -15,7 +15,7 @@ from metro.loop.fit import Fit, polished, score
 from metro.loop.noise import block_sigma
 from metro.loop.search import Gates, Outcome, Trial, withdrawn
 from metro.loop.signature import Line, in_words, share_left, signature
-from metro.loop.trial import unsettled
+from metro.loop.trial import beyond, unsettled
 from metro.observables.problem import BaseFit, Problem
 from metro.observables.quantity import quantity
 from metro.units import JSON, Array
@@ -102,12 +102,14 @@ def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
 def stands(problem: Problem, outcome: Outcome) -> Outcome:
     """Return an outcome whose effects the held-out runs do not speak against: else it has none.
 
-    They do where these runs are predicted worse, and are less likely, with the effects than without. Nothing
-    is fitted or chosen by them.
+    They do where these runs are predicted worse, and are less likely, with the effects than without, and
+    where the model with the effects has no prediction for one of them. Nothing is fitted or chosen by them.
     """
     held = problem.role("validate")
     if not held or not outcome.names:
         return outcome
+    if nowhere := beyond(outcome.final, held):
+        return withdrawn(outcome, nowhere)
     before, after = held_out_rms(problem, outcome.base), held_out_rms(problem, outcome.final)
     worse = before is not None and after is not None and after > before
     unlikelier = score(outcome.final, held).total < score(outcome.base, held).total - AGAINST

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -138,14 +139,27 @@ class ForceModel:
         tool, highest = (self.cutter, self.law, setting.cut), setting.highest
         if beta is None or not any(self.structure.compliance):
             return _order_basis(*tool, highest, self.true_path)[..., None]
+        return np.stack([each.orders for each in self._yielding(setting, beta)], axis=3)
+
+    def _yielding(self, setting: ForceSetting, beta: Array) -> list[_Yielding]:
+        """Return the force on a tool that yields, in each direction of feed that is computed."""
         worn = tuple((beta[:6] * np.repeat([1.0, self.law.edge(setting.cut_length)], 3)).tolist())
-        feeds = FEEDS if setting.helix else (setting.feed_direction,)
-        springs = [self.structure.seen(feed) for feed in feeds]
-        bases = [
-            _yielding_orders(*tool, spring, worn, highest=highest, true_path=self.true_path)
-            for spring in springs
+        return [
+            _yielding_orders(
+                *(self.cutter, self.law, setting.cut, self.structure.seen(feed), worn),
+                highest=setting.highest,
+                true_path=self.true_path,
+            )
+            for feed in (FEEDS if setting.helix else (setting.feed_direction,))
         ]
-        return np.stack(bases, axis=3)
+
+    def beyond(self, block: Block, beta: Array) -> str:
+        """Say that a tool this soft would not cut steadily, where force and deflection have no balance."""
+        if not any(self.structure.compliance) or all(
+            each.balanced for each in self._yielding(block.setting, beta)
+        ):
+            return ""
+        return "force and deflection find no balance: a tool this soft would not cut steadily"
 
     def _lost(self, chipped: Chipped, setting: ForceSetting) -> Array:
         """Order coefficients of what a chipped tooth changes in the force, as if the tool did not yield."""
@@ -205,6 +219,13 @@ def _order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path
     return basis
 
 
+class _Yielding(NamedTuple):
+    """Order coefficients of a tool that yields, and whether they are those of its whole compliance."""
+
+    orders: Array
+    balanced: bool
+
+
 @lru_cache(maxsize=1024)
 def _yielding_orders(
     cutter: Cutter,
@@ -215,18 +236,21 @@ def _yielding_orders(
     *,
     highest: int,
     true_path: bool,
-) -> Array:
-    """Order coefficients of a tool that yields; one too soft to cut steadily is taken half as soft."""
+) -> _Yielding:
+    """Return the orders of a tool that yields; one too soft to cut steadily is taken half as soft.
+
+    So that a search has a slope to follow; no fit that ends there is a result (``ForceModel.beyond``).
+    """
     along, across, mixed = spring
     compliance = np.array([[along, mixed], [mixed, across]])
-    sharp = np.array(coefficients)
+    sharp, balanced = np.array(coefficients), True
     while True:
         try:
             basis = yielding_basis(cutter, law, cut, sharp, compliance, true_path=true_path)
         except NotBalancedError:
-            compliance = 0.5 * compliance
+            compliance, balanced = 0.5 * compliance, False
         else:
             break
     orders = to_orders(basis, highest)
     orders.flags.writeable = False
-    return orders
+    return _Yielding(orders, balanced)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -119,6 +119,15 @@ class Model(Protocol):
 
         A model that is not linear in the base parameters is so about ``beta`` (None: not known yet).
         """
+        ...
+
+
+@runtime_checkable
+class Limited(Protocol):
+    """A model that has no prediction for some values of its parameters, only something to search on by."""
+
+    def beyond(self, block: Block, beta: Array) -> str:
+        """Why it has none for a block, in words that follow the run's name; empty: it has one."""
         ...
 
 
