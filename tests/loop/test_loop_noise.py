@@ -23,8 +23,6 @@ def test_whitening_is_the_dense_inverse_square_root(size, directions, seed):
     assert root @ covariance @ root.T == pytest.approx(np.eye(size), abs=1e-9)
     rest = rng.normal(size=size)
     assert np.sum(whiten(rest) ** 2) == pytest.approx(rest @ np.linalg.solve(covariance, rest))
-    determinant = whiten.log_shared + np.sum(np.log(variance))
-    assert determinant == pytest.approx(np.linalg.slogdet(covariance)[1], abs=1e-9)
 
 
 def runs(count, scatter, missed=0.0, zero=0.0, repeats=1):
@@ -120,6 +118,33 @@ def test_misfit_weighs_many_neighbours_as_one_element():
     once = SIGMA**2 + rms2
     count = POINTS * once / (SIGMA**2 + noise_room.MISFIT_CORRELATION * rms2)
     assert noise_room.log_scale(one, noise) == pytest.approx(count * (np.log(once / SIGMA**2) - 1.0))
+
+
+def test_what_is_shared_adds_what_dense_algebra_says_and_nothing_by_a_misfit():
+    one, matrix, _ = runs(1, 0.02)[0]
+    noise = Noise(0.01, np.array([0.01, 0.03]), {one.condition: 2}, misfit={"x": 1.0})
+    directions = shared(one, noise, matrix, BETA)
+    variance = diagonal(one, replace(noise, misfit={}))
+    dense = np.linalg.slogdet(np.diag(variance) + directions @ directions.T)[1] - np.sum(np.log(variance))
+    assert noise_room.log_shared(one, noise, directions) == pytest.approx(dense)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.02, 0.3])
+@pytest.mark.parametrize(("bad", "off", "below"), [(0.05, 0.03, 0.5), (0.1, 0.03, 0.3), (0.04, 0.025, 0.2)])
+def test_a_misfit_stays_where_it_is_found_wherever_it_is_sought_from(start, bad, off, below):
+    """Elements that are measured well are missed, others are nearer than their error: whole steps go on."""
+    well, turn = np.arange(POINTS) % 2 == 0, np.where(np.arange(POINTS) % 4 < 2, 1.0, -1.0)
+    rest = np.where(well, off, below * bad) * turn
+    parts = [
+        (replace(one, sigma=np.where(well, 0.01, bad), measured=matrix @ BETA + rest), matrix, rest)
+        for one, matrix, _ in runs(3, 0.0)
+    ]
+    prior = first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts])
+    near, still = (
+        estimated(parts, replace(prior, misfit={"x": start}), steps).misfit["x"] for steps in (30, 31)
+    )
+    assert near == pytest.approx(still, rel=0.02)
+    assert still > 0.0
 
 
 def test_sigma_of_the_comparison_is_the_spread_of_simulated_runs():

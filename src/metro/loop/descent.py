@@ -102,9 +102,8 @@ def linearised(
         whiten = noise_room.whitener(noise_room.diagonal(block, noise), directions)
         rest = whiten(block.measured - predicted)
         chi2[block.run] = float(rest @ rest)
-        log_likelihood[block.run] = -0.5 * (
-            chi2[block.run] + whiten.log_shared + noise_room.log_scale(block, noise)
-        )
+        determinant = noise_room.log_shared(block, noise, directions) + noise_room.log_scale(block, noise)
+        log_likelihood[block.run] = -0.5 * (chi2[block.run] + determinant)
         if derivatives != "none":
             effect, own = sensitivities(model, moved, block, nuisance, state.beta, predicted=predicted)
             whitened = whiten(np.hstack([matrix, effect, own]))

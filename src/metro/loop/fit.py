@@ -7,7 +7,7 @@ combinations of their starting values; the noise is re-estimated from the rest a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -288,14 +288,35 @@ def _told(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: St
 def _reestimated(
     candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State
 ) -> Noise:
+    """Estimate the noise from the rest: from what it was, or from no misfit on, whichever is likelier.
+
+    A misfit hides from what whole runs share what that would explain, and may then never come down.
+    """
+    starts = [noise, replace(noise, misfit={})] if any(noise.misfit.values()) else [noise]
+    reached = [_expected(candidate, blocks, prior, start, state) for start in starts]
+    if len(reached) == 1:
+        return reached[0]
+    return min(reached, key=lambda one: linearised(candidate, blocks, one, state, derivatives="none").cost)
+
+
+def _expected(
+    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State
+) -> Noise:
+    """Take some steps of expectation–maximisation for the noise."""
     model = candidate.model(state.theta)
+    parts = []
+    for block in blocks:
+        matrix, offset = model.design(block, state.nuisance[block.run], state.beta)
+        parts.append((block, block.measured - offset - matrix @ state.beta, matrix))
     for _ in range(EM_STEPS):
-        parts = []
-        for block in blocks:
-            matrix, offset = model.design(block, state.nuisance[block.run], state.beta)
-            rest = block.measured - offset - matrix @ state.beta
-            parts.append((block, rest, noise_room.shared(block, noise, matrix, state.beta)))
-        noise = noise_room.updated(noise, prior, parts)
+        noise = noise_room.updated(
+            noise,
+            prior,
+            [
+                (block, rest, noise_room.shared(block, noise, matrix, state.beta))
+                for block, rest, matrix in parts
+            ],
+        )
     return noise
 
 

@@ -22,6 +22,9 @@ from metro.units import Array
 
 PRIOR_RUNS = 4
 MISFIT_CORRELATION = 12.0
+# Of the way to the misfit found: a larger one lets the elements that are measured best weigh less, and is then
+# found smaller, so that whole steps would go to and fro about the point where it stays.
+MISFIT_STEP = 0.5
 LARGEST_ZERO = 4.0  # of its deviation: a zero that is farther off is something else that is taken for it
 
 
@@ -56,15 +59,11 @@ class Noise:
 
 @dataclass(frozen=True)
 class Whitener:
-    """The inverse square root of a block's covariance, in factored form: 1 − vectors × shrink × vectorsᵀ.
-
-    ``log_shared`` is what the shared directions add to the logarithm of its determinant.
-    """
+    """The inverse square root of a block's covariance, in factored form: 1 − vectors × shrink × vectorsᵀ."""
 
     inverse_sd: Array
     vectors: Array
     shrink: Array
-    log_shared: float
 
     def __call__(self, values: Array) -> Array:
         """Apply to a vector (n,) or to the columns of a matrix (n, k)."""
@@ -120,6 +119,16 @@ def log_scale(block: Block, noise: Noise) -> float:
     return float(np.sum(once / diagonal(block, noise) * (np.log(once / known) - 1.0)))
 
 
+def log_shared(block: Block, noise: Noise, directions: Array) -> float:
+    """Return what the shared directions (n, k) add to the logarithm of the determinant if nothing is missed.
+
+    Elements that a misfit leaves uncounted tell less of what a whole run shares. That must gain nothing
+    either: else a model that misses a little is likelier than one that misses nothing.
+    """
+    scaled = directions / np.sqrt(diagonal(block, replace(noise, misfit={})))[:, None]
+    return float(np.linalg.slogdet(np.eye(scaled.shape[1]) + scaled.T @ scaled)[1])
+
+
 def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
     """Directions in which the whole block may be off together, (n, k), each of one standard deviation."""
     zeros = block.zeros * (block.zero_sd * noise.zero_factor)
@@ -137,7 +146,7 @@ def whitener(variance: Array, directions: Array) -> Whitener:
     power = np.maximum(power, 0.0)
     root = np.sqrt(1.0 + power)
     # 1 − 1/root over the power, without the loss of digits where there is next to none of it.
-    return Whitener(inverse_sd, scaled @ turn, 1.0 / (root * (1.0 + root)), float(np.log1p(power).sum()))
+    return Whitener(inverse_sd, scaled @ turn, 1.0 / (root * (1.0 + root)))
 
 
 def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
@@ -182,13 +191,17 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         spread = left**2 + ((directions @ uncertain) * directions).sum(axis=1)
         excess = spread - diagonal(block, replace(noise, misfit={}))
         names, number, rms = _axes(block)
-        pulled = np.bincount(number, rms**2 * excess / variance**2)
-        weighed = np.bincount(number, (rms**2 / variance) ** 2)
-        for name, one, other in zip(names, pulled, weighed, strict=True):
+        pulls = np.bincount(number, rms**2 * excess / variance**2)
+        weights = np.bincount(number, (rms**2 / variance) ** 2)
+        for name, one, other in zip(names, pulls, weights, strict=True):
             pull[name] = pull.get(name, 0.0) + float(one)
             weight[name] = weight.get(name, 0.0) + float(other)
     factor = {key: float(np.sqrt(np.mean(values))) for key, values in amplitudes.items()}
-    misfit = {key: float(np.sqrt(max(0.0, pull[key]) / weight[key])) if weight[key] else 0.0 for key in pull}
+    misfit: dict[str, float] = {}
+    for name, pulled in pull.items():
+        square = max(0.0, pulled) / weight[name] if weight[name] else 0.0
+        before = noise.misfit.get(name, 0.0) ** 2
+        misfit[name] = math.sqrt(MISFIT_STEP * square + (1.0 - MISFIT_STEP) * before)
     return replace(
         noise,
         scatter=prior.scatter * factor["scatter"],
