@@ -24,3 +24,26 @@ RPM = 2.0 * math.pi / 60.0
 N_MM2 = 1e6
 N_MM = 1e3
 N_UM = 1e6
+
+PRINTED = {
+    "1": "",
+    "um": "µm",
+    "deg": "°",
+    "mdeg": "m°",
+    "N/mm2": "N/mm²",
+    "N mm2": "N mm²",
+    "um/min": "µm/min",
+    "N/um": "N/µm",
+    "N*m/rad": "N m/rad",
+}
+
+
+def printed(unit: str | None) -> str:
+    """Return a unit of the outputs as it is printed: µm for um, nothing for 1."""
+    return PRINTED.get(unit or "", unit or "")
+
+
+def printed_name(name: str, unit: str | None = "") -> str:
+    """Return the name of a quantity as words, without the unit that it ends in: radius_um → radius."""
+    tail = "_" + (unit or "").replace("/", "_").replace(" ", "_").lower()
+    return (name[: -len(tail)] if unit and name.lower().endswith(tail) else name).replace("_", " ")

@@ -74,4 +74,4 @@ def problem(truth=None, *, seed=0, transfer=1.0):
         matrix, offset = truth.design(blank, np.zeros(0))
         made = matrix[:, 0] * transfer * (1 + 0.01 * rng.normal()) + offset + SIGMA * rng.normal(size=count)
         blocks.append(replace(blank, measured=made))
-    return Problem("waviness", "mm", 1e-3, WavinessModel(), tuple(blocks), np.array([0.02]))
+    return Problem("waviness", "um", 1e-6, WavinessModel(), tuple(blocks), np.array([0.02]))

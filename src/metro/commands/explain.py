@@ -12,7 +12,7 @@ from metro.batch.findings import ContractError, Finding
 from metro.commands.completion import with_results
 from metro.commands.output import print_json
 from metro.report.content import Paragraph
-from metro.report.numbers import number, percent, probability, unit, words
+from metro.report.numbers import number, percent, probability, words
 from metro.report.phrases import plain
 from metro.report.results import Results, title
 from metro.report.sections.measured import measured_words
@@ -25,7 +25,7 @@ from metro.report.sections.verdict import (
     print_check,
     sentence,
 )
-from metro.units import JSON
+from metro.units import JSON, printed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -155,7 +155,7 @@ def _bars(entry: JSON) -> Iterator[RenderableType]:
         table.add_row(Text(label), Text(bar(size, top, WIDTH, floor), style=colour), Text(f"{text} {more}"))
     if floor is not None:
         table.add_row(
-            "", Text("│ noise floor", style="dim"), Text(f"{number(floor)} {unit(entry.get('unit'))}")
+            "", Text("│ noise floor", style="dim"), Text(f"{number(floor)} {printed(entry.get('unit'))}")
         )
     yield table
 

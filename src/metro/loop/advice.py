@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from metro.effects.effect import Effect
 from metro.loop import signature as rest
 from metro.loop.experiment import Prospect, best_view, prospects
 from metro.loop.fit import Fit
 from metro.loop.rivals import Rival
 from metro.loop.search import Outcome
 from metro.observables.problem import Block, Problem, Proposal
+from metro.units import Array, printed, printed_name
 
 LEAST_RUNS = 2  # to identify on
 WORTH = 0.5  # probability of deciding below which a run is not worth naming
@@ -77,15 +79,18 @@ def left_over(outcome: Outcome) -> str:
 def _resembled(likeness: Fit) -> str:
     """Name what is not of the library and would lower the rest, with the values that do it best."""
     found = [
-        f"{_words(effect.name)} ("
-        + ", ".join(
-            f"{_words(name)} {value:.3g}" for name, value in effect.values(likeness.theta[place]).items()
-        )
-        + ")"
+        f"{_words(effect.name)} ({', '.join(_values(effect, likeness.theta[place]))})"
         for effect, place in likeness.candidate.parts(likeness.theta)
         if effect.resembled
     ]
     return f"{' and a '.join(found)}, which is no effect of the library"
+
+
+def _values(effect: Effect, theta: Array) -> list[str]:
+    return [
+        f"{printed_name(one.name, one.unit)} {value:.3g} {printed(one.unit)}".rstrip()
+        for one, value in zip(effect.reported, (effect.matrix @ theta).tolist(), strict=True)
+    ]
 
 
 def _to_decide(problem: Problem, outcome: Outcome) -> str:

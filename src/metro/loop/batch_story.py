@@ -11,7 +11,7 @@ from metro.loop.causes import SPEAKS, Judged, judged
 from metro.loop.trial import Gates
 from metro.loop.verdict import bounded, finite, parameters
 from metro.loop.witnesses import Closed, Key, Witness, shared
-from metro.units import JSON
+from metro.units import JSON, printed, printed_name
 
 BRIEF = ("cause", "where", "status", "probability", "parameters", "seen_in")
 ENDS = {
@@ -141,11 +141,16 @@ def _words(one: Judged, entry: JSON) -> str:
 
 def _says(witness: JSON) -> str:
     values = [
-        f"{name.replace('_', ' ')} {value['value']:.3g} ± {(value['ci95'][1] - value['ci95'][0]) / 2:.2g}"
+        _value(name, value)
         for name, value in witness["parameters"].items()
         if isinstance(value, dict) and value["value"] is not None and value["ci95"][0] is not None
     ]
     return f"{witness['says']} ({', '.join(values)})" if values else str(witness["says"])
+
+
+def _value(name: str, entry: JSON) -> str:
+    value, (low, high), unit = entry["value"], entry["ci95"], entry["unit"]
+    return f"{printed_name(name, unit)} {value:.3g} ± {(high - low) / 2:.2g} {printed(unit)}".rstrip()
 
 
 def _named(cause: str, where: JSON) -> str:

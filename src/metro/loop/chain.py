@@ -14,7 +14,7 @@ import numpy as np
 
 from metro.loop.fit import Fit, score
 from metro.observables.problem import Block, Problem
-from metro.units import JSON, Array
+from metro.units import JSON, Array, printed
 
 WHENS = ("before", "after")
 
@@ -93,7 +93,7 @@ def _figures(found: Sequence[Parts], si: float) -> JSON:
 
 def in_words(told: JSON) -> str:
     """Say how much of the error came with the force."""
-    unit = told["unit"]
+    unit = printed(told["unit"])
     sentences = [
         f"{when.capitalize()}, the error with the predicted force is {told[when]['total']:.3g} {unit} rms "
         f"and with the measured force {told[when]['own']:.3g} {unit}: the force accounts for "

@@ -22,8 +22,8 @@ from metro.units import Array
 
 PRIOR_RUNS = 4
 MISFIT_CORRELATION = 12.0
-# Of the way to the misfit found: a larger one lets the elements that are measured best weigh less, and is then
-# found smaller, so that whole steps would go to and fro about the point where it stays.
+# Of the way to the misfit found: a larger one lets the elements that are measured best weigh less, and is
+# then found smaller, so that whole steps would go to and fro about the point where it stays.
 MISFIT_STEP = 0.5
 LARGEST_ZERO = 4.0  # of its deviation: a zero that is farther off is something else that is taken for it
 

@@ -22,6 +22,7 @@ from metro.loop.rivals import Rival, believed, contested
 from metro.loop.session import Step, scan
 from metro.loop.trial import Gates, Trial, tried, without
 from metro.observables.problem import Problem
+from metro.units import printed
 
 __all__ = ["Gates", "Outcome", "Trial", "search"]
 
@@ -178,7 +179,9 @@ def _dim(base: Fit, effects: Iterable[Effect]) -> dict[str, str]:
             continue
         left = dimmed(Candidate(base.candidate.base, (effect,)), base)
         if left.share < DIM:
-            words[effect.name] = HIDDEN.format(100.0 * left.share, left.least, effect.parameters[0].unit)
+            words[effect.name] = HIDDEN.format(
+                100.0 * left.share, left.least, printed(effect.parameters[0].unit)
+            )
     return words
 
 

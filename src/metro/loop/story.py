@@ -18,7 +18,7 @@ from metro.loop.verdict import (
     why_not,
 )
 from metro.observables.problem import Block, Problem
-from metro.units import JSON, Array
+from metro.units import JSON, Array, printed
 
 MOST_PROPOSALS = 5
 SENTENCES = {
@@ -173,7 +173,7 @@ def in_words(verdict: JSON) -> str:
     sentence = SENTENCES[verdict["status"]].format(named=named, rivals=rivals)
     before, after, left = verdict["before"], verdict["after"], verdict["unexplained"]
     if before and after:
-        unit = "" if verdict["unit"] == "1" else f" {verdict['unit']}"
+        unit = f" {printed(verdict['unit'])}".rstrip()
         sentence += f" On held-out runs the error is {before['rms']:.3g}{unit} rms before"
         sentence += f" and {after['rms']:.3g}{unit} after."
     return sentence + (f" What is left: {left['signature']}." if left else "")

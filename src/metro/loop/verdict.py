@@ -18,7 +18,7 @@ from metro.loop.signature import Line, in_words, share_left, signature
 from metro.loop.trial import beyond, unsettled
 from metro.observables.problem import BaseFit, Problem
 from metro.observables.quantity import quantity
-from metro.units import JSON, Array
+from metro.units import JSON, Array, printed
 
 COMPARISON = (
     *("observable", "run", "axis", "t_s", "angle_deg", "s_mm", "x_mm", "y_mm"),
@@ -306,6 +306,7 @@ def _unexplained(
     over = share * float(np.sqrt((rows["measured"] ** 2).mean())) if len(rows) and share else None
     if outcome.likeness and len(rows):
         words += (
-            f"; with that the error would be {held_out_rms(problem, outcome.likeness):.3g} {problem.unit} rms"
+            f"; with that the error would be {held_out_rms(problem, outcome.likeness):.3g} "
+            f"{printed(problem.unit)} rms"
         )
     return {"rms": over, "unit": problem.unit, "signature": words}

@@ -60,7 +60,7 @@ def place(batch: Batch, cloud: Points, path: Array | None) -> Placed:
         return _as_it_lies(top, path, size, str(error))
     sides = ", ".join(name for name in found.faces if name != "z+")
     u, v = found.sd / UM
-    known = f"x is known to {u:.1f} um, y to {v:.1f} um, height and tilt are those of the face itself"
+    known = f"x is known to {u:.1f} µm, y to {v:.1f} µm, height and tilt are those of the face itself"
     remark = f"its scan is placed by its top and the sides {sides} ({found.method}): {known}"
     remark = f"{remark}; {off}" if off else remark
     return Placed(changed(top, found.apply), found.method, found.sd, remark)

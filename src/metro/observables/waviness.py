@@ -19,7 +19,7 @@ from metro.observables.waviness_model import WavinessModel
 from metro.observables.waviness_points import ENCODER, wave_points
 from metro.observables.waviness_report import transfer, waviness_of
 from metro.robot.kinematics import Arm, arm_of_cell
-from metro.units import JSON, MM, Array
+from metro.units import JSON, MM, UM, Array
 
 OBSERVABLE = "waviness"
 SCATTER = 0.02
@@ -99,14 +99,14 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         f"{_cutoff(batch) / MM:g} mm (ISO 16610-21); one cut-off is left out at both ends. Waves longer than "
         "the cut-off, and those as long as the feed marks, are not compared.",
         "The encoders' noise is "
-        f"{np.sqrt((used[ENCODER] ** 2).sum(axis=1)).median():.2g} um at the tip, every "
+        f"{np.sqrt((used[ENCODER] ** 2).sum(axis=1)).median():.2g} µm at the tip, every "
         f"{used['log_step_mm'].median():.2g} mm: each wave of each joint counts by what of it may be more.",
         *_said_of_shifts(used),
         *([] if compliance.any() else ["No joint compliance is known: torques twist no joint here."]),
         *([] if forces else ["No force on the tip is known: no joint passes a gap here."]),
         *notes,
     )
-    return Problem(OBSERVABLE, "mm", MM, WavinessModel(), blocks, np.array([SCATTER]), SYSTEMATIC, said)
+    return Problem(OBSERVABLE, "um", UM, WavinessModel(), blocks, np.array([SCATTER]), SYSTEMATIC, said)
 
 
 def _said_of_shifts(facts: pd.DataFrame) -> list[str]:

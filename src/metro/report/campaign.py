@@ -11,14 +11,14 @@ from metro import __version__
 from metro.report.content import Bullets, Item, Paragraph, Picture, Section, Table
 from metro.report.document import Cover, compile_pdf
 from metro.report.figures import verdicts as figures
-from metro.report.numbers import listing, number, unit, words
+from metro.report.numbers import listing, number, words
 from metro.report.phrases import plain
 from metro.report.results import OBSERVABLES, title
 from metro.report.sections import findings
 from metro.report.sections.memory import memory_section
 from metro.report.sections.standings import largest_rests, rankings
 from metro.report.sections.verdict import STATUS, change, effect_words, error_text, known_interval
-from metro.units import JSON
+from metro.units import JSON, printed
 
 TITLE = "Campaign summary"
 PER_FIGURE = 24
@@ -172,7 +172,7 @@ def _verdicts(entries: list[tuple[str, str, JSON]]) -> list[Item]:
             STATUS.get(str(entry.get("status")), "–"),
             error_text(entry.get("before"), None),
             error_text(entry.get("after"), None),
-            unit(entry.get("unit")) or "1",
+            printed(entry.get("unit")) or "1",
             number(entry.get("noise_floor")),
             "; ".join(effect_words(e) for e in entry.get("effects") or []) or "none",
         ]

@@ -5,17 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-UNITS = {
-    "1": "",
-    "um": "µm",
-    "deg": "°",
-    "mdeg": "m°",
-    "N/mm2": "N/mm²",
-    "N mm2": "N mm²",
-    "um/min": "µm/min",
-    "N/um": "N/µm",
-    "N*m/rad": "N m/rad",
-}
+from metro.units import printed
+
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SKEW = 0.25
 
@@ -70,13 +61,8 @@ def quantity(entry: Any, with_unit: bool = True) -> str:
         )
     else:
         text = value if isinstance(value, str) else with_interval(value, ci95)
-    shown = unit(entry.get("unit"))
+    shown = printed(entry.get("unit"))
     return f"{text}{'' if shown == '°' else ' '}{shown}" if with_unit and shown else text
-
-
-def unit(name: str | None) -> str:
-    """Return a unit as it is printed: µm for um, nothing for 1."""
-    return UNITS.get(name or "", name or "")
 
 
 def percent(share: float | None) -> str:

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from metro.report import style
-from metro.report.numbers import unit as shown_unit
-from metro.units import Array
+from metro.units import Array, printed
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -259,5 +258,5 @@ def _bands(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def _label(text: str, frame: pd.DataFrame) -> str:
-    unit = shown_unit(str(frame["unit"].iloc[0]))
+    unit = printed(str(frame["unit"].iloc[0]))
     return f"{text} ({unit})" if unit else text

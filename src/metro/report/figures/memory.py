@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from metro.report import style
-from metro.report.numbers import unit as shown_unit
-from metro.units import JSON
+from metro.units import JSON, printed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,4 +62,4 @@ def _course(axes: Axes, row: JSON) -> None:
         zorder=3,
     )
     axes.set_xlabel(CLOCKS.get(row["clock"], "batch, in the order of their names"))
-    axes.set_ylabel(shown_unit(row["unit"]))
+    axes.set_ylabel(printed(row["unit"]))

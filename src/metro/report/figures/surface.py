@@ -9,8 +9,7 @@ import pandas as pd
 
 from metro.report import style
 from metro.report.figures.comparison import predictions
-from metro.report.numbers import unit as shown_unit
-from metro.units import Array
+from metro.units import Array, printed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +27,7 @@ def face_points(frame: pd.DataFrame) -> Figure:
     frame : rows of comparison.parquet of flatness, with ``x_mm`` and ``y_mm``.
     """
     runs = [str(run) for run in frame["run"].drop_duplicates()][:RUNS]
-    unit = shown_unit(str(frame["unit"].iloc[0]))
+    unit = printed(str(frame["unit"].iloc[0]))
     kinds = predictions(frame)
     with style.style():
         figure, grid = style.new_figure(

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from metro.report import style
-from metro.report.numbers import unit as shown_unit
-from metro.units import JSON
+from metro.units import JSON, printed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 PATTERNS, LONGEST = 8, 26  # most bars, and characters of what stands beside one
 SMALLEST = 0.1  # end of the axis where nothing is left, % of the signal
-ABREAST = 2.0  # height of the two figures that stand side by side, inches
+ABREAST = 1.9  # inches, of a figure that stands beside another
 LABEL_ROOM = 36  # characters that fit side by side under a figure of half the width
 
 
@@ -100,7 +99,7 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
         axes.margins(y=0.12)
         axes.set_ylim(bottom=0)
         axes.set(
-            ylabel=f"rms residual ({shown_unit(unit)})" if shown_unit(unit) else "rms residual",
+            ylabel=f"rms residual ({printed(unit)})" if printed(unit) else "rms residual",
             xlabel="run, in the order of cutting",
         )
         step = max(1, len(rows) // 24)

@@ -11,7 +11,7 @@ from urllib.parse import quote
 from metro import __version__
 from metro.report.campaign import TITLE
 from metro.report.content import Bullets, Item, Paragraph, Section, Table
-from metro.report.numbers import number, percent, probability, quantity, unit, words
+from metro.report.numbers import number, percent, probability, quantity, words
 from metro.report.page.curves import boundary_curves, run_curves
 from metro.report.page.faces import face_maps, point_maps
 from metro.report.page.markup import Html, badge, embedded, items_of, joined, tag
@@ -27,7 +27,7 @@ from metro.report.sections.verdict import (
     parameter_name,
     sentence,
 )
-from metro.units import JSON
+from metro.units import JSON, printed
 
 SCRIPTS = ("kit.js", "chart.js", "face.js", "page.js")
 WHOLE, PER_BATCH = 4_000_000, 400_000  # bytes that the data of all plots, and those of one batch, may take
@@ -139,7 +139,7 @@ def _errors(verdicts: Mapping[str, JSON]) -> list[Item]:
             title(name),
             _status(entry),
             *(text for when in ("before", "after") for text in _error(entry, when)),
-            f"{number(entry.get('noise_floor'))} {unit(entry.get('unit'))}".strip(),
+            f"{number(entry.get('noise_floor'))} {printed(entry.get('unit'))}".strip(),
             str(len(entry.get("held_out_runs") or [])),
         ]
         for name, entry in verdicts.items()

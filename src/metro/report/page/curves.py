@@ -14,11 +14,11 @@ from metro.report.figures.comparison import (
     predictions,
 )
 from metro.report.figures.lobes import top_of
-from metro.report.numbers import number, probability, unit, with_interval
+from metro.report.numbers import number, probability, with_interval
 from metro.report.page.packing import decimals, fitting, kept, left_out, notes, packed
 from metro.report.results import Results, title
 from metro.report.sections.lobes import placed
-from metro.units import JSON, Array
+from metro.units import JSON, Array, printed
 
 HELP = (
     "Arrow left and right: move the line. Up and down: next test cut, where there are any. + and −: zoom at "
@@ -47,7 +47,7 @@ def run_curves(results: Results, observable: str, budget: int) -> JSON | None:
     missed = (frame["measured"] - frame["before"]).abs().groupby(frame["run"].astype(str)).mean()
     shown = fitting(curves, budget, [float(missed[run]) for run in runs])
     long = "of long curves the lowest and the highest of every line in each of 200 equal parts is drawn"
-    shown_unit = unit(str(frame["unit"].iloc[0]))
+    shown_unit = printed(str(frame["unit"].iloc[0]))
     return {
         "kind": "chart",
         "title": f"Held-out runs: {title(observable)}",

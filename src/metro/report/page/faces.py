@@ -7,10 +7,10 @@ import numpy.typing as npt
 import pandas as pd
 
 from metro.report.figures.comparison import predictions
-from metro.report.numbers import number, unit
+from metro.report.numbers import number
 from metro.report.page.packing import decimals, fitting, left_out, notes, packed
 from metro.report.results import Results
-from metro.units import JSON, Array
+from metro.units import JSON, Array, printed
 
 Indices = npt.NDArray[np.intp]
 
@@ -67,7 +67,7 @@ def point_maps(results: Results, budget: int) -> JSON | None:
     missed = (frame["measured"] - frame["before"]).abs().groupby(frame["run"].astype(str)).mean()
     shown = fitting(faces, budget, [float(missed[run]) for run in runs])
     some = left_out(len(shown), len(runs), "held-out faces", "those that the base model misses most")
-    name = unit(str(frame["unit"].iloc[0]))
+    name = printed(str(frame["unit"].iloc[0]))
     return {**_map("Held-out faces at the points of the path", name, shown), "note": notes(some)}
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from metro.report.content import Item, Paragraph, Section, Table
-from metro.report.numbers import listing, number, percent, probability, quantity, unit, words
+from metro.report.numbers import listing, number, percent, probability, quantity, words
 from metro.report.phrases import sentence
 from metro.report.results import Results, title
 from metro.report.sections.verdict import parameter_name
-from metro.units import JSON
+from metro.units import JSON, printed
 
 STATUS = {
     "together": "seen by several together",
@@ -75,7 +75,7 @@ def upstream(results: Results) -> Section | None:
         [
             title(name),
             when,
-            *(f"{number(told[when][part])} {unit(told['unit'])}" for part in PARTS),
+            *(f"{number(told[when][part])} {printed(told['unit'])}" for part in PARTS),
             percent(told[when]["share"]),
         ]
         for name, told in chain.items()

@@ -8,12 +8,13 @@ import pandas as pd
 from metro.report.content import Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import comparison as figures
 from metro.report.figures import surface
-from metro.report.numbers import listing, number, percent, unit
+from metro.report.numbers import listing, number, percent
 from metro.report.results import OBSERVABLES, Results, heading, title
 from metro.report.sections import findings
 from metro.report.sections.face_pairing import pairing_items
 from metro.report.sections.force import force_items
 from metro.report.sections.lobes import cut_items
+from metro.units import printed
 
 LONGEST, SHORT = 30, 6
 FEWEST = 3  # values of a run along an axis that make a curve
@@ -42,7 +43,7 @@ def _values(frame: pd.DataFrame, name: str, merit: list[Item]) -> list[Item]:
     A force's angle starts anywhere in each run: residuals of several runs over it are no picture of anything.
     """
     rms = {k: float(np.sqrt(np.mean((frame["measured"] - frame[k]) ** 2))) for k in ("before", "after")}
-    shown = unit(str(frame["unit"].iloc[0]))
+    shown = printed(str(frame["unit"].iloc[0]))
     words = f"rms residual {number(rms['before'])} {shown} before and {number(rms['after'])} {shown} after"
     whole = name[0].upper() + name[1:]
 
@@ -99,7 +100,7 @@ def _curves(frame: pd.DataFrame, name: str, words: str) -> list[Item]:
 
 def errors(frame: pd.DataFrame) -> Table:
     """Tabulate the rms of signal and residuals by run and axis."""
-    shown = unit(str(frame["unit"].iloc[0]))
+    shown = printed(str(frame["unit"].iloc[0]))
     rows = []
     for (run, axis), part in frame.assign(axis=figures.axis_labels(frame)).groupby(
         ["run", "axis"], sort=False

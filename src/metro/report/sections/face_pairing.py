@@ -9,8 +9,8 @@ import pandas as pd
 
 from metro.report.content import Item, Paragraph, Picture, Table
 from metro.report.figures import face_pairing as figures
-from metro.report.numbers import number, unit
-from metro.units import Array
+from metro.report.numbers import number
+from metro.units import Array, printed
 
 KINDS = ("measured", "before", "after")
 LONGEST, DRAWS = 30, 200
@@ -25,7 +25,7 @@ def pairing_items(frame: pd.DataFrame) -> list[Item]:
     if faces.empty:
         return []
     median = [float(faces[f"similar_{kind}"].median()) for kind in KINDS[1:]]
-    shown = unit(str(frame["unit"].iloc[0]))
+    shown = printed(str(frame["unit"].iloc[0]))
     text = (
         f"Similarity of X_m over {len(faces)} held-out faces, median: {number(median[0])} % by the base "
         f"model, {number(median[1])} % with what the loop found; similarity is 100 − |D_r| with "

@@ -9,8 +9,8 @@ import pandas as pd
 
 from metro.report.figures.comparison import axis_labels, predictions
 from metro.report.figures.verdicts import Change
-from metro.report.numbers import listing, number, percent, unit, with_interval
-from metro.units import JSON, Array
+from metro.report.numbers import listing, number, percent, with_interval
+from metro.units import JSON, Array, printed
 
 MODELS = {"before": "the base model", "after": "the effects found"}
 NORMAL = 1.96
@@ -99,7 +99,7 @@ def above_floor(blocks: Sequence[JSON], floor: float | None, shown: str | None) 
     """Say how many runs leave more than noise would, and which the most."""
     rests = {str(b["run"]): float(b.get("rms_after") or b["rms_before"]) for b in blocks}
     worst = max(rests, key=lambda run: rests[run])
-    most = f"{worst} leaves most, {number(rests[worst])} {unit(shown)}".rstrip()
+    most = f"{worst} leaves most, {number(rests[worst])} {printed(shown)}".rstrip()
     if floor is None:
         return f"Run {most}."
     above = sum(rest > floor for rest in rests.values())
@@ -133,7 +133,7 @@ def _rounded(value: float, spread: float) -> str:
 
 
 def _unit(frame: pd.DataFrame) -> str:
-    shown = unit(str(frame["unit"].iloc[0]))
+    shown = printed(str(frame["unit"].iloc[0]))
     return f" {shown}" if shown else ""
 
 

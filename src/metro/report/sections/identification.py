@@ -7,11 +7,11 @@ from typing import Any
 import pandas as pd
 
 from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table, abreast
-from metro.report.numbers import number, quantity, unit, words
+from metro.report.numbers import number, quantity, words
 from metro.report.results import Results
 from metro.report.sections.lobes import boundaries
 from metro.report.sections.modes import modes
-from metro.units import JSON
+from metro.units import JSON, printed
 
 COEFFICIENTS = {
     "ktc": "K_tc", "krc": "K_rc", "kac": "K_ac", "kte": "K_te", "kre": "K_re", "kae": "K_ae",
@@ -82,7 +82,7 @@ def _force(force: JSON) -> list[Item]:
         rows.append(
             [
                 COEFFICIENTS[name],
-                unit(known.get("unit")),
+                printed(known.get("unit")),
                 *(quantity(c, with_unit=False) if c else "–" for c in cells),
             ]
         )
@@ -184,7 +184,7 @@ def _flat(value: Any, name: str) -> dict[str, str]:
 
 
 def _column(name: str, value: Any) -> str:
-    shown = unit(value.get("unit")) if isinstance(value, dict) else ""
+    shown = printed(value.get("unit")) if isinstance(value, dict) else ""
     title = FACES.get(name, words(name))
     return f"{title} ({shown})" if shown else title
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table, abreast
 from metro.report.figures import verdicts as figures
-from metro.report.numbers import number, percent, probability, quantity, unit, words
+from metro.report.numbers import number, percent, probability, quantity, words
 from metro.report.phrases import plain
 from metro.report.results import Results, heading
 from metro.report.sections import findings
 from metro.report.sections.verdict import STATUS, error_text, left_words, parameter_name, sentence
-from metro.units import JSON
+from metro.units import JSON, printed
 
 LONGEST = 16
 
@@ -69,7 +69,7 @@ def _signature(name: str, told: JSON) -> list[Picture]:
 
 
 def _noise_words(noise: JSON, shown: str | None) -> str:
-    floor = f"{number(noise.get('floor'))} {unit(shown)}".strip()
+    floor = f"{number(noise.get('floor'))} {printed(shown)}".strip()
     return f"Noise floor {floor}. {noise.get('words') or ''}".strip()
 
 
@@ -100,7 +100,7 @@ def _candidates(candidates: list[JSON], shown: str | None) -> list[Item]:
         ("p_value", "p", lambda c: probability(c.get("p_value"))),
         ("q_value", "q", lambda c: probability(c.get("q_value"))),
         ("held_out_gain", "held-out gain", lambda c: number(c.get("held_out_gain"), 2)),
-        ("held_out_rms", f"held-out rms ({unit(shown)})", lambda c: number(c.get("held_out_rms"))),
+        ("held_out_rms", f"held-out rms ({printed(shown)})", lambda c: number(c.get("held_out_rms"))),
         ("size", "size", lambda c: percent(c.get("size"))),
         ("weight", "weight", lambda c: number(c.get("weight"), 2)),
         ("probability", "probability", lambda c: probability(c.get("probability"))),
@@ -130,7 +130,7 @@ def _path(path: list[JSON], entry: JSON, shown: str | None) -> list[Item]:
     if len(path) < 2:
         return []
     rms = [("before_rms", "rms, identification runs"), ("held_out_rms", "rms, held-out runs")]
-    known = [(key, f"{name} ({unit(shown)})") for key, name in rms if any(step.get(key) for step in path)]
+    known = [(key, f"{name} ({printed(shown)})") for key, name in rms if any(step.get(key) for step in path)]
     rows = [
         [
             " + ".join(["base model", *(words(str(e)) for e in step.get("added") or [])]),
@@ -149,7 +149,7 @@ def _rest(entry: JSON, told: JSON, shown: str | None, left: str) -> list[Item]:
     items: list[Item] = []
     rest = entry.get("unexplained") or {}
     if rest.get("signature"):
-        size = "" if rest.get("rms") is None else f"{number(rest['rms'])} {unit(shown)} rms, "
+        size = "" if rest.get("rms") is None else f"{number(rest['rms'])} {printed(shown)} rms, "
         items.append(Paragraph(f"Unexplained: {size}{left or plain(rest['signature'])}.", "warning"))
     groups = [" and ".join(words(str(n)) for n in group) for group in entry.get("indistinguishable") or []]
     if groups:

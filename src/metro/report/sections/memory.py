@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import memory as figures
-from metro.report.numbers import listing, number, percent, probability, quantity, unit, with_interval, words
+from metro.report.numbers import listing, number, percent, probability, quantity, with_interval, words
 from metro.report.results import title
-from metro.units import JSON
+from metro.units import JSON, printed
 
 PANELS, MOST_FIGURES = 6, 4
 LONGEST = 40
@@ -51,7 +51,7 @@ def _courses(series: Sequence[JSON]) -> list[Item]:
         [
             row["owner"],
             _name(row),
-            unit(row["unit"]) or "1",
+            printed(row["unit"]) or "1",
             str(len(row["batches"])),
             quantity(row["mean"], with_unit=False),
             COURSE[row["course"]],
@@ -109,7 +109,7 @@ def _pictures(rows: Sequence[JSON]) -> list[Item]:
 
 def _sentence(row: JSON) -> str:
     change = with_interval(row["change"]["value"], row["change"]["ci95"])
-    shown = f" {unit(row['unit'])}" if unit(row["unit"]) else ""
+    shown = f" {printed(row['unit'])}" if printed(row["unit"]) else ""
     first, last = row["batches"][0], row["batches"][-1]
     what = {
         "trend": f"goes by {change}{shown} from {first} to {last}, steadily",

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from metro.report.content import Bullets, Item, Table
-from metro.report.numbers import probability, unit, with_interval
-from metro.units import Array
+from metro.report.numbers import probability, with_interval
+from metro.units import Array, printed
 
 LEAST = 3  # pairs of one quantity and axis, all of one sign
 LEAST_LINE = 10  # pairs of either sign
@@ -35,7 +35,7 @@ def bias(name: str, pairs: pd.DataFrame) -> list[Item]:
         if gain is not None and math.isfinite(gain[3]):
             less = _mean(measured - predicted)
             told.append(
-                (f"{quantity} {along}".strip(), unit(str(rows["unit"].iloc[0])), len(rows), gain, less)
+                (f"{quantity} {along}".strip(), printed(str(rows["unit"].iloc[0])), len(rows), gain, less)
             )
     if not told:
         return []

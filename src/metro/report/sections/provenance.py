@@ -12,7 +12,7 @@ from metro.report.phrases import sentence
 from metro.report.results import Results, title
 from metro.units import JSON
 
-LONGEST, ABREAST, DIGITS = 240, 3, 12
+LONGEST, ABREAST, DIGITS = 240, 4, 12
 LIMITS = {
     "force": "The force model is mechanistic and linear in its coefficients: one edge force, one pressure, "
     "no dependence on temperature or speed; the tool is rigid unless an effect says otherwise.",

@@ -9,9 +9,10 @@ import pandas as pd
 
 from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import force as figures
-from metro.report.numbers import number, unit
+from metro.report.numbers import number
 from metro.report.results import Results
 from metro.report.sections.printed_bias import bias
+from metro.units import printed
 
 CONVENTION = {"measured": "(m − p)/m", "predicted": "(m − p)/p"}
 
@@ -53,8 +54,8 @@ def _pairs(name: str, pairs: pd.DataFrame) -> list[Item]:
     clear = pairs["convention"][pairs["convention"].isin(list(CONVENTION))]
     most = str(clear.mode().iloc[0]) if len(clear) else ""
     fits = int(pairs["convention"].isin([most, "both"]).sum())
-    printed = int(pairs["printed_error_percent"].notna().sum())
-    says = f" Printed errors: {fits} of {printed} follow from {CONVENTION[most]}." if most else ""
+    stated = int(pairs["printed_error_percent"].notna().sum())
+    says = f" Printed errors: {fits} of {stated} follow from {CONVENTION[most]}." if most else ""
     columns = [_as_printed(pairs[c]) for c in ("measured", "predicted", "printed_error_percent")]
     rows = [
         [
@@ -66,7 +67,7 @@ def _pairs(name: str, pairs: pd.DataFrame) -> list[Item]:
         ]
         for i, (_, r) in enumerate(pairs.iterrows())
     ]
-    shown = unit(str(pairs["unit"].iloc[0]))
+    shown = printed(str(pairs["unit"].iloc[0]))
     header = [
         "row",
         "quantity",
@@ -99,7 +100,7 @@ def _single(rows: pd.DataFrame, results: Results) -> list[Item]:
                 str(r["row"]),
                 str(r["quantity"]),
                 f"{r['measured']:.10g}",
-                unit(str(r["unit"])),
+                printed(str(r["unit"])),
             ]
             for _, r in part.iterrows()
         ]

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import pandas as pd
 
 from metro.report.content import Heading, Item, Section, Table
-from metro.report.numbers import listing, unit, words
+from metro.report.numbers import listing, words
 from metro.report.results import Results
-from metro.units import JSON
+from metro.units import JSON, printed
 
 LONGEST, MOST_RUNS = 40, 8
 # end of a key → its unit; the longest that fits counts
@@ -62,7 +62,7 @@ def _values(values: JSON) -> Iterator[str]:
     """Write each value of a mapping with its name and unit; matrices are left to the manifest."""
     for key, value in values.items():
         ending = max((end for end in ENDINGS if key.endswith(end)), key=len, default="")
-        name, shown = words(key.removesuffix(ending)), unit(ENDINGS.get(ending))
+        name, shown = words(key.removesuffix(ending)), printed(ENDINGS.get(ending))
         after = f"{'' if shown == '°' else ' '}{shown}" if shown else ""
         if isinstance(value, dict):
             yield f"{name} {', '.join(f'{k}: {v}' for k, v in value.items())}"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from metro.report.content import Paragraph, Section, Table
-from metro.report.numbers import number, percent, probability, quantity, unit
+from metro.report.numbers import number, percent, probability, quantity
 from metro.report.results import title
-from metro.units import JSON
+from metro.units import JSON, printed
 
 BEST, WORST = 3, 10
 
@@ -69,7 +69,7 @@ def _rows(ranked: Sequence[tuple[float, str, str, JSON]]) -> list[list[str]]:
         [
             batch,
             title(name),
-            f"{number(entry['after']['rms'])} {unit(entry.get('unit'))}".strip(),
+            f"{number(entry['after']['rms'])} {printed(entry.get('unit'))}".strip(),
             "–" if entry.get("unit") == "1" else percent(entry["after"].get("nrmse")),
             number(ratio, 2),
         ]

@@ -8,12 +8,12 @@ from metro.report.content import Facts, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import verdicts as figures
 from metro.report.figures.comparison import coordinate, overlay
 from metro.report.figures.verdicts import Change
-from metro.report.numbers import listing, number, percent, probability, quantity, unit, with_interval, words
+from metro.report.numbers import listing, number, percent, probability, quantity, with_interval, words
 from metro.report.phrases import plain, rest_words
 from metro.report.results import Results, heading, title
 from metro.report.sections import findings
 from metro.report.sections.measured import count_of, measured_words
-from metro.units import JSON
+from metro.units import JSON, printed, printed_name
 
 MOST_DRAWN = 2  # verdicts beside which a first page has room for a run
 STATUS = {
@@ -62,9 +62,7 @@ def parameter_name(name: str, entry: Any) -> str:
         return parameter_name(name, entry[0])
     if not isinstance(entry, dict):
         return words(name)
-    tail = str(entry.get("unit") or "").replace("/", "_").replace(" ", "_").lower()
-    short = name[: -len(tail) - 1] if tail and name.lower().endswith("_" + tail) else name
-    return words(short)
+    return printed_name(name, str(entry.get("unit") or ""))
 
 
 def error_text(error: JSON | None, unit_name: str | None) -> str:
@@ -72,7 +70,7 @@ def error_text(error: JSON | None, unit_name: str | None) -> str:
     if not error or error.get("rms") is None:
         return "–"
     text = with_interval(error["rms"], known_interval(error))
-    shown = unit(unit_name)
+    shown = printed(unit_name)
     return f"{text} {shown}" if shown else text
 
 
@@ -119,7 +117,7 @@ def _share(error: JSON) -> str:
 
 
 def _unit(entry: JSON) -> str:
-    shown = unit(entry.get("unit"))
+    shown = printed(entry.get("unit"))
     return f" {shown}" if shown else ""
 
 
