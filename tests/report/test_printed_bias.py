@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from metro.report.content import Bullets, Table
+from metro.report.content import Bullets, Picture, Table
 from metro.report.sections.printed_bias import bias
 
 
@@ -16,7 +16,7 @@ def pairs(measured, predicted, quantity="mean force", axis="z", unit="N"):
 
 
 def told(table):
-    shown, said = bias("7", table)
+    shown, _, said = bias("7", table)
     assert isinstance(shown, Table)
     assert isinstance(said, Bullets)
     return shown.rows, " ".join(said.items)
@@ -49,6 +49,30 @@ def test_the_slope_of_values_of_either_sign_covers_the_truth_and_an_offset_is_no
     value, half = (float(part) for part in rows[0][2].split(" ± "))
     assert value - half < 1.5 < value + half
     assert value == pytest.approx(np.polyfit(predicted, more["measured"], 1)[0], abs=0.01)
+
+
+def test_the_figure_has_the_pairs_the_line_of_equals_and_that_of_the_gain():
+    rng = np.random.default_rng(2)
+    predicted = rng.normal(0.0, 0.1, 25)
+    line = pairs(0.05 + 1.5 * predicted + rng.normal(0.0, 0.01, 25), predicted, "deviation", "", "mm")
+    ratio = pairs([-1.0, -2.1, -2.9], [-2.0, -4.0, -6.0])
+    _, picture, _ = bias("6", pd.concat([line, ratio]))
+    assert isinstance(picture, Picture)
+    assert "A gain is shown of deviation and mean force z (2 of 2)" in picture.caption
+    first, second, unused = picture.figure.axes
+    assert not unused.get_visible()
+    for axes, told in ((first, line), (second, ratio)):
+        equal, gain, points = axes.lines
+        assert np.array_equal(equal.get_xdata(), equal.get_ydata())
+        assert np.array_equal(points.get_xdata(), told["predicted"])
+        assert np.array_equal(points.get_ydata(), told["measured"])
+        low, high = axes.collections[0].get_datalim(axes.transData).intervaly
+        assert low < np.interp(0.0, *gain.get_data()) < high
+    slope, offset = np.polyfit(predicted, line["measured"], 1)
+    x, y = first.lines[1].get_data()
+    assert np.polyfit(x, y, 1) == pytest.approx([slope, offset])
+    x, y = second.lines[1].get_data()
+    assert y / x == pytest.approx(np.full(2, np.exp(np.mean(np.log(ratio["measured"] / ratio["predicted"])))))
 
 
 def test_of_two_pairs_or_of_values_of_either_sign_nothing_is_told():

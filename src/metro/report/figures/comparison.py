@@ -60,7 +60,7 @@ def overlay(frame: pd.DataFrame, title: str) -> Figure:
     column, drawn = coordinate(frame), predictions(frame)
     with style.style():
         figure, grid = style.new_figure(
-            0.7 + 0.9 * rows, rows, columns, sharey=False if len(axes_of(frame)) > 1 else "all"
+            0.65 + 0.8 * rows, rows, columns, sharey=False if len(axes_of(frame)) > 1 else "all"
         )
         flat = [axes for row in grid for axes in row]
         for axes, (run, axis) in zip(flat, panels, strict=False):
@@ -100,7 +100,7 @@ def residuals(frame: pd.DataFrame, title: str) -> Figure:
     """Draw the residuals over the coordinate: median and 10–90 % band of all held-out runs."""
     axes_names = axes_of(frame)
     with style.style():
-        figure, (row,) = style.new_figure(1.55, 1, len(axes_names), sharey=True)
+        figure, (row,) = style.new_figure(1.45, 1, len(axes_names), sharey=True)
         for axes, axis in zip(row, axes_names, strict=True):
             _residual(axes, frame[axis_labels(frame) == axis], predictions(frame))
             axes.set_title(axis or title, loc="left")
@@ -113,7 +113,7 @@ def judged(frame: pd.DataFrame, title: str) -> Figure:
     """Draw side by side what :func:`residuals` and :func:`parity` do, of an observable of one axis."""
     drawn = predictions(frame)
     with style.style():
-        figure, ((left, middle, right),) = style.new_figure(1.8, 1, 3)
+        figure, ((left, middle, right),) = style.new_figure(1.65, 1, 3)
         _residual(left, frame, drawn)
         left.set_title("Residual of all runs", loc="left")
         left.set_ylabel(_label("measured − predicted", frame))
@@ -143,7 +143,7 @@ def parity(frame: pd.DataFrame, title: str) -> Figure:
     """Draw predicted over measured, axis by axis, and the distribution of the residuals."""
     names, drawn = axes_of(frame), predictions(frame)
     with style.style():
-        figure, (row,) = style.new_figure(1.75, 1, len(names) + 1)
+        figure, (row,) = style.new_figure(1.6, 1, len(names) + 1)
         for axes, name in zip(row, names, strict=False):
             _equal(axes, frame[axis_labels(frame) == name], drawn)
             axes.set_title(f"Parity, {name}" if len(names) > 1 else "Parity", loc="left")

@@ -30,7 +30,7 @@ def spectrum(orders: pd.DataFrame, teeth: int) -> Figure:
     names = sorted(orders["axis"].unique())
     drawn = predictions(orders)
     with style.style():
-        figure, (row,) = style.new_figure(1.55, 1, len(names), sharey=True)
+        figure, (row,) = style.new_figure(1.45, 1, len(names), sharey=True)
         for axes, name in zip(row, names, strict=True):
             part = orders[(orders["axis"] == name) & (orders["order"] <= HARMONICS * teeth)]
             axes.bar(part["order"], part["measured"], 0.7, color=style.GREY, alpha=0.6, label="measured")
@@ -75,7 +75,7 @@ def tooth_peaks(metrics: pd.DataFrame) -> Figure:
     }
     drawn = predictions(_as_columns(metrics))
     with style.style():
-        figure, (row,) = style.new_figure(1.55, 1, len(names))
+        figure, (row,) = style.new_figure(1.45, 1, len(names))
         for axes, name in zip(row, names, strict=True):
             part = metrics[(metrics["axis"] == name) & metrics["run"].isin(runs)]
             _bars(axes, part, place, drawn)

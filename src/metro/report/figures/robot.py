@@ -31,7 +31,7 @@ def courses(force: pd.DataFrame, means: pd.DataFrame, runs: Sequence[str]) -> Fi
     columns = min(2, len(runs))
     rows = -(-len(runs) // columns)
     with style.style():
-        figure, grid = style.new_figure(0.5 + 1.15 * rows, rows, columns)
+        figure, grid = style.new_figure(0.5 + 1.0 * rows, rows, columns)
         flat = [axes for row in grid for axes in row]
         for axes, run in zip(flat, runs, strict=False):
             _course(axes, force[force["run"] == run], means[means["run"] == run])
@@ -77,7 +77,7 @@ def stiffness(chart: pd.DataFrame, ellipsoids: pd.DataFrame) -> Figure:
     chart : rows of ``arm_map``. ellipsoids : of ``arm_ellipsoids``; the first pose is drawn.
     """
     with style.style():
-        figure, [row] = style.new_figure(2.2, 1, 3)
+        figure, [row] = style.new_figure(2.05, 1, 3)
         _map(figure, row[0], chart)
         first = ellipsoids[ellipsoids["pose"] == ellipsoids["pose"].iloc[0]]
         for axes, seen in zip(row[1:], ((0, 1), (0, 2)), strict=True):
@@ -162,7 +162,7 @@ def friction(curve: pd.DataFrame, table: pd.DataFrame) -> Figure:
     curve : rows of ``joint_friction_curve``. table : of ``joint_friction``.
     """
     with style.style():
-        figure, grid = style.new_figure(2.3, 2, 3)
+        figure, grid = style.new_figure(2.1, 2, 3)
         for axes, (_, joint) in zip([a for row in grid for a in row], table.iterrows(), strict=False):
             part = curve[curve["joint"] == joint["joint"]].sort_values("speed_deg_s")
             speed = part["speed_deg_s"].to_numpy(float)
@@ -206,7 +206,7 @@ def waviness(waves: pd.DataFrame, runs: Sequence[str]) -> Figure:
     with style.style():
         columns = min(2, len(runs))
         rows = -(-len(runs) // columns)
-        figure, grid = style.new_figure(0.5 + 1.1 * rows, rows, columns, sharey=True)
+        figure, grid = style.new_figure(0.5 + 0.95 * rows, rows, columns, sharey=True)
         flat = [axes for row in grid for axes in row]
         for axes, run in zip(flat, runs, strict=False):
             part = waves[waves["run"] == run]
@@ -232,7 +232,7 @@ def spectra(table: pd.DataFrame, lines: pd.DataFrame | None) -> Figure:
     """
     domains = [domain for domain in DOMAINS if (table["domain"] == domain[0]).any()]
     with style.style():
-        figure, [row] = style.new_figure(1.8, 1, len(domains))
+        figure, [row] = style.new_figure(1.65, 1, len(domains))
         for axes, (domain, label, unit) in zip(row, domains, strict=True):
             part = table[table["domain"] == domain]
             for name, colour in AXES:

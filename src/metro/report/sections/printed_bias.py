@@ -7,8 +7,10 @@ import math
 import numpy as np
 import pandas as pd
 
-from metro.report.content import Bullets, Item, Table
-from metro.report.numbers import probability, with_interval
+from metro.report.content import Bullets, Item, Picture, Table
+from metro.report.figures.printed import Common
+from metro.report.figures.printed import pairs as pairs_drawn
+from metro.report.numbers import listing, probability, with_interval
 from metro.units import Array, printed
 
 LEAST = 3  # pairs of one quantity and axis, all of one sign
@@ -27,23 +29,25 @@ def bias(name: str, pairs: pd.DataFrame) -> list[Item]:
 
     The p-values of gains are Holm's, over the quantities of the table.
     """
-    told = []
+    told: list[tuple[str, str, int, Told, Told]] = []
+    drawn: list[Common] = []
     axis = pairs["axis"].fillna("").astype(str)
     for (quantity, along), rows in pairs.groupby([pairs["quantity"], axis], sort=False):
         measured, predicted = (rows[c].to_numpy(dtype=float) for c in ("measured", "predicted"))
         gain = _gain(measured, predicted)
         if gain is not None and math.isfinite(gain[3]):
             less = _mean(measured - predicted)
-            told.append(
-                (f"{quantity} {along}".strip(), printed(str(rows["unit"].iloc[0])), len(rows), gain, less)
-            )
+            what, shown = f"{quantity} {along}".strip(), printed(str(rows["unit"].iloc[0]))
+            told.append((what, shown, len(rows), gain, less))
+            offset = 0.0 if _of_one_sign(measured, predicted) else _offset(measured, predicted, gain[0])
+            drawn.append(Common(what, shown, predicted, measured, gain[:3], offset))
     if not told:
         return []
     p_values = _holm(np.array([gain[3] for *_, gain, _ in told]))
     body, found = [], []
     for (what, shown, count, gain, less), p in zip(told, p_values, strict=True):
-        ratio, offset = _written(gain), f"{_written(less)} {shown}".strip()
-        body.append([what, str(count), ratio, probability(p), offset, probability(less[3])])
+        ratio, difference = _written(gain), f"{_written(less)} {shown}".strip()
+        body.append([what, str(count), ratio, probability(p), difference, probability(less[3])])
         if p <= SURE:
             found.append(f"Table {name}, {what}: measured is {ratio} times what was predicted.")
         else:
@@ -52,7 +56,20 @@ def bias(name: str, pairs: pd.DataFrame) -> list[Item]:
     caption = (
         f"Table {name}: what the pairs have in common, with 95 % intervals from the scatter of the rows."
     )
-    return [Table(header, body, caption, [1.5, 0.6, 1.4, 0.8, 1.6, 0.7]), Bullets([*found, CANNOT])]
+    table = Table(header, body, caption, [1.5, 0.6, 1.4, 0.8, 1.6, 0.7])
+    sure = [what for (what, *_), p in zip(told, p_values, strict=True) if p <= SURE]
+    finding = f"A gain is shown of {listing(sure)}" if sure else "No gain is shown"
+    about = f"Table {name}. {finding} ({len(sure)} of {len(told)}). Printed pairs, and the gain they share."
+    alt = f"Measured over predicted, {len(told)} quantities of table {name}. {finding}."
+    return [table, Picture(pairs_drawn(drawn), about, alt), Bullets([*found, CANNOT])]
+
+
+def _of_one_sign(measured: Array, predicted: Array) -> bool:
+    return bool((measured * predicted > 0.0).all())
+
+
+def _offset(measured: Array, predicted: Array, gain: float) -> float:
+    return float(np.mean(measured) - gain * np.mean(predicted))
 
 
 def _gain(measured: Array, predicted: Array) -> Told | None:
@@ -61,7 +78,7 @@ def _gain(measured: Array, predicted: Array) -> Told | None:
     Of one sign: the geometric mean. Of either sign: the slope of a line with an offset, least squares; rows
     that follow each other may be alike (Newey and West, Econometrica 55 (1987) 703).
     """
-    if len(measured) >= LEAST and (measured * predicted > 0.0).all():
+    if len(measured) >= LEAST and _of_one_sign(measured, predicted):
         value, low, high, p = _mean(np.log(measured / predicted))
         return math.exp(value), math.exp(low), math.exp(high), p
     if len(measured) < LEAST_LINE or np.ptp(predicted) == 0.0:

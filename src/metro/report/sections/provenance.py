@@ -12,7 +12,7 @@ from metro.report.phrases import sentence
 from metro.report.results import Results, title
 from metro.units import JSON
 
-LONGEST, ABREAST, DIGITS = 240, 4, 12
+LONGEST, ABREAST, DIGITS = 240, 3, 12
 LIMITS = {
     "force": "The force model is mechanistic and linear in its coefficients: one edge force, one pressure, "
     "no dependence on temperature or speed; the tool is rigid unless an effect says otherwise.",
@@ -30,7 +30,7 @@ LIMITS = {
 
 def provenance(results: Results) -> Section:
     """Write hold-out plan, limits of the models, code and settings of every stage, versions, source files."""
-    parts = _plan(results), _limits(results), _code(results), _sources(results), _approval()
+    parts = _plan(results), _limits(results), _approval(), _code(results), _sources(results)
     return Section("Provenance", [item for part in parts for item in part])
 
 
