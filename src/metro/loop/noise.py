@@ -12,7 +12,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -56,6 +56,11 @@ class Noise:
     alike: float = 1.0
     misfit: dict[str, float] = field(default_factory=dict)
 
+    @cached_property
+    def sound(self) -> Noise:
+        """The noise of a model that misses nothing."""
+        return replace(self, misfit={})
+
 
 @dataclass(frozen=True)
 class Whitener:
@@ -86,6 +91,7 @@ def _axes(block: Block) -> tuple[tuple[str, ...], np.ndarray, Array]:
     return tuple(names.tolist()), number, np.sqrt(power)[number]
 
 
+@lru_cache(maxsize=512)
 def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION) -> Array:
     """Variance of each element that nothing else shares, (n,).
 
@@ -98,7 +104,9 @@ def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION
     repeats = noise.repeats.get(block.condition, 1) * block.repeats
     alike = 0.0 if block.alike is None else block.alike**2 * (1.0 + noise.alike * (repeats - 1.0))
     wrong = (noise.budget * scale) ** 2 + correlation * missed**2
-    return np.asarray(block.sigma**2 + alike + repeats * noise.everywhere * wrong)
+    variance = np.asarray(block.sigma**2 + alike + repeats * noise.everywhere * wrong)
+    variance.flags.writeable = False
+    return variance
 
 
 def all_alike(noise: Noise) -> Noise:
@@ -115,7 +123,7 @@ def log_scale(block: Block, noise: Noise) -> float:
     In units of the variance without a misfit, which is that of every model, and less one for each element:
     elements that a misfit leaves uncounted must gain nothing by it, whatever the unit.
     """
-    once, known = diagonal(block, noise, correlation=1.0), diagonal(block, replace(noise, misfit={}))
+    once, known = diagonal(block, noise, correlation=1.0), diagonal(block, noise.sound)
     return float(np.sum(once / diagonal(block, noise) * (np.log(once / known) - 1.0)))
 
 
@@ -125,7 +133,7 @@ def log_shared(block: Block, noise: Noise, directions: Array) -> float:
     Elements that a misfit leaves uncounted tell less of what a whole run shares. That must gain nothing
     either: else a model that misses a little is likelier than one that misses nothing.
     """
-    scaled = directions / np.sqrt(diagonal(block, replace(noise, misfit={})))[:, None]
+    scaled = directions / np.sqrt(diagonal(block, noise.sound))[:, None]
     return float(np.linalg.slogdet(np.eye(scaled.shape[1]) + scaled.T @ scaled)[1])
 
 
@@ -189,7 +197,7 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         left = residual - directions @ found
         rests.append((block, left, variance))
         spread = left**2 + ((directions @ uncertain) * directions).sum(axis=1)
-        excess = spread - diagonal(block, replace(noise, misfit={}))
+        excess = spread - diagonal(block, noise.sound)
         names, number, rms = _axes(block)
         pulls = np.bincount(number, rms**2 * excess / variance**2)
         weights = np.bincount(number, (rms**2 / variance) ** 2)
