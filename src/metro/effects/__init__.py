@@ -35,7 +35,8 @@ def told_of(problem: Problem, known: Mapping[str, Mapping[str, Any]]) -> Problem
     ``known``: parameters by name, by name of the effect, in the units of the contract; one value stands for
     all entries of a list.
     """
-    effects, unable = fitted_to(library(problem.observable), problem)
+    declared = tuple(effect for effect in library(problem.observable) if effect.name in known)
+    effects, unable = fitted_to(declared, problem)
     base, notes = problem.base, []
     for name, values in known.items():
         matching = [

@@ -61,10 +61,9 @@ class DriveTorques:
         ----------
         q, rate : (m, 6) angles, rad, and speeds, rad/s, of the joints. t : (m,) s from the log's start.
         """
-        turning = np.tanh(rate / TURNING)
-        torque: Array = turning * (np.array(self.reversal) + np.outer(t, self.warmup)) + rate * np.array(
-            self.viscous
-        )
+        torque: Array = rate * np.array(self.viscous)
+        if any(self.reversal) or any(self.warmup):
+            torque += np.tanh(rate / TURNING) * (np.array(self.reversal) + np.outer(t, self.warmup))
         for one in self.ripple:
             angle = one.order * q[:, one.joint]
             cycles = one.order * rate[:, one.joint] * width / (2.0 * np.pi)

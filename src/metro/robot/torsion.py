@@ -50,7 +50,7 @@ class Torsion:
         torque : (m, 6) on the links, N m, along one cut. compliance : (6,) of static loads, rad/(N m).
         """
         twist, slope = self.at_rest(torque / np.array(self.factor), compliance)
-        return (twist + passed(torque, np.array(self.gap)) if any(self.gap) else twist), slope
+        return twist + passed(torque, np.array(self.gap)), slope
 
     def at_rest(self, torque: Array, compliance: Array) -> tuple[Array, Array]:
         """Torsion (..., 6), rad, under static loads, and its derivative by the compliances, N m."""
@@ -91,6 +91,8 @@ def passed(torque: Array, gap: Array) -> Array:
     ----------
     torque : (m, 6) N m along one cut. gap : (6,) rad.
     """
+    if not gap.any():
+        return np.zeros_like(torque)
     largest = np.abs(torque).max(axis=0, initial=0.0)
     return np.asarray(0.5 * gap * np.tanh(torque / np.where(largest > 0.0, TURNING * largest, 1.0)))
 
