@@ -1,9 +1,9 @@
 """Do planned runs decide? Batches with too few conditions are asked about, and what is planned is cut.
 
 Each batch hides one effect of the library, so small that it can just be detected, and consists of three
-narrow side cuts, along which most effects look alike. Where the verdict is ``undetermined``, ``metro next``
-plans runs from what the stages wrote; the simulator cuts exactly these, by the same tool in the same metal,
-and the pipeline runs on all runs again.
+narrow side cuts, along which most effects look alike. Where the verdict is ``undetermined``, ``metro next``,
+told how deep the machine may cut, plans runs from what the stages wrote; the simulator cuts exactly these, by
+the same tool in the same metal, and the pipeline runs on all runs again.
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ from virtual_cell.recipes.force import FEW, cut_more, make
 
 OBSERVABLE = "force"
 MOST = 12  # runs that may be planned
+LIMITS = (
+    "axial_depth_mm=0.5:4",
+)  # as deep as the owner of the machine lets it cut; the batches are 1 mm deep
 DEMAND = Demand(0.8)
 
 
@@ -124,7 +127,7 @@ def _continued(out: Layout, later: Layout, name: str) -> JSON:
     said = StringIO()
     with redirect_stdout(said):
         next_runs(
-            name, OBSERVABLE, most=MOST, limits=[], out=table, seed=0,
+            name, OBSERVABLE, most=MOST, limits=LIMITS, out=table, seed=0,
             processed=out.processed, reports=out.reports, as_json=True,
         )  # fmt: skip
     content = json.loads(said.getvalue())
