@@ -108,7 +108,8 @@ def unsettled(fitted: Fit) -> str:
     It did not converge, or tells no parameter of an effect, or its model does not hold there.
     """
     if not fitted.converged:
-        return f"its fit did not converge: a step more would move a parameter by {fitted.step:.2g} of its sd"
+        by = f"{fitted.step:.2g}" if fitted.step < 99.5 else f"{fitted.step:.0f}"
+        return f"its fit did not converge: a step more would move a parameter by {by} of its sd"
     told = np.isfinite(np.diag(fitted.covariance)[len(fitted.beta) :])
     blind = [effect for effect, place in fitted.candidate.parts(fitted.theta) if not told[place].any()]
     return "these runs do not determine its parameters" if blind else beyond(fitted, fitted.blocks)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 PATTERNS, LONGEST = 8, 26  # most bars, and characters of what stands beside one
 SMALLEST = 0.1  # end of the axis where nothing is left, % of the signal
 ABREAST = 1.75  # inches, of a figure that stands beside another
+HATCHES = ("", "/////", "xxxxx", "....", "-----", "+++++")  # axes in grey print
 LABEL_ROOM = 36  # characters that fit side by side under a figure of half the width
 
 
@@ -142,13 +143,14 @@ def signature(entries: Sequence[JSON]) -> Figure:
         figure, ((axes,),) = style.new_figure(ABREAST, width=style.HALF)
         thick = 0.8 / len(names)
         for k, name in enumerate(names):
-            colour = style.SERIES[k % len(style.SERIES)]
-            axes.barh(0, 0, color="white", edgecolor=colour, label=name)
+            colour, hatch = style.SERIES[k % len(style.SERIES)], HATCHES[k % len(HATCHES)]
+            axes.barh(0, 0, color="white", edgecolor=colour, hatch=hatch, label=name)
             for entry in entries:
                 if str(entry.get("axis") or "") == name and str(entry["label"]) in labels:
                     at = thick * ((len(names) - 1) / 2 - k) - labels.index(str(entry["label"]))
                     face = colour if entry.get("significant") else "white"
-                    axes.barh(at, _share(entry), 0.9 * thick, color=face, edgecolor=colour, lw=0.7)
+                    (bar,) = axes.barh(at, _share(entry), 0.9 * thick, color=face, lw=0.7)
+                    bar.set(edgecolor=colour, hatch=hatch)
         axes.set_yticks([-i for i in range(len(labels))], [_shown(label) for label in labels], fontsize=7)
         axes.set(ylim=(0.4 - len(labels), 0.6), xlabel="beyond the noise (% of the signal)")
         axes.set_xlim(0, 1.05 * max(SMALLEST, *map(_share, entries)))
