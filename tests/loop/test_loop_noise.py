@@ -141,7 +141,7 @@ def test_a_misfit_stays_where_it_is_found_wherever_it_is_sought_from(start, bad,
     ]
     prior = first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts])
     near, still = (
-        estimated(parts, replace(prior, misfit={"x": start}), steps).misfit["x"] for steps in (30, 31)
+        estimated(parts, replace(prior, misfit={"x": start}), steps).misfit["x"] for steps in (80, 81)
     )
     assert near == pytest.approx(still, rel=0.02)
     assert still > 0.0
