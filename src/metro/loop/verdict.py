@@ -30,6 +30,7 @@ WORSE = 2.0  # times the least rest that counts: on unseen runs, what the parame
 RESEMBLED = "no effect of the library: it is only said what the rest is like"
 BEATEN = "passed every gate, but what was added explains the runs better"
 REFUTED = "the held-out runs speak against it: they are predicted worse with it"
+MAKESHIFT = "what is predicted of a run that no fit has seen is a makeshift:"
 UNTESTED = "not tested: there is no run to judge it by that the fit has not seen"
 
 
@@ -102,14 +103,12 @@ def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
 def stands(problem: Problem, outcome: Outcome) -> Outcome:
     """Return an outcome whose effects the held-out runs do not speak against: else it has none.
 
-    They do where these runs are predicted worse, and are less likely, with the effects than without, and
-    where the model with the effects has no prediction for one of them. Nothing is fitted or chosen by them.
+    They do where these runs are predicted worse, and are less likely, with the effects than without. Nothing
+    is fitted or chosen by them.
     """
     held = problem.role("validate")
     if not held or not outcome.names:
         return outcome
-    if nowhere := beyond(outcome.final, held):
-        return withdrawn(outcome, nowhere)
     before, after = held_out_rms(problem, outcome.base), held_out_rms(problem, outcome.final)
     worse = before is not None and after is not None and after > before
     unlikelier = score(outcome.final, held).total < score(outcome.base, held).total - AGAINST
@@ -151,6 +150,8 @@ def rest_of(problem: Problem, outcome: Outcome, gates: Gates) -> tuple[str, Fit,
     astray = unsettled(outcome.final)
     if astray:  # nothing is claimed of it, least of all that nothing is left
         return "; ".join(filter(None, [remaining, astray])), told_by, lines
+    if nowhere := beyond(outcome.final, problem.role("validate")):
+        return "; ".join(filter(None, [remaining, f"{MAKESHIFT} {nowhere}"])), told_by, lines
     if enough_runs(problem) and not remaining:
         told_by = score(outcome.final, problem.role("validate"))
         lines = _unseen_rest(problem, told_by, gates)
