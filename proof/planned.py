@@ -30,7 +30,7 @@ from virtual_cell.recipes.force import FEW, cut_more, make
 
 OBSERVABLE = "force"
 MOST = 12  # runs that may be planned
-LIMITS = ("axial_depth_mm=0.5:4",)  # as the owner of the machine says; the batches are 1 to 2 mm deep
+LIMITS = ("axial_depth_mm=0.25:4",)  # as the owner of the machine says; the batches are 0.5 to 1 mm deep
 DEMAND = Demand(0.8)
 
 

@@ -43,7 +43,7 @@ class Style:
     ``tacho``; ``scatter`` relative, of the coefficients from run to run; ``feeds`` of the slots of the
     identification, in parts of the largest; ``speeds`` of the spindle, in parts of the nominal one, taken in
     turn by the conditions; ``replicates`` of those of the identification; ``narrow``: nothing is cut but
-    strips of a tenth of the diameter, along which most effects look alike.
+    strips of a tenth of the diameter and half the depth, along which most effects look alike.
     """
 
     rate: float = 8192.0
@@ -223,7 +223,7 @@ def _plans(session: Session, diameter: float, style: Style, rng: np.random.Gener
     others = () if style.narrow else ((down, 0.7), (hole, 1.0))
     held_out = () if style.narrow else ((up, 0.7), (across, 0.45), (hole, 0.7))
     if style.narrow:
-        slot = replace(down, radial_depth_mm=0.1 * diameter)
+        slot = replace(down, radial_depth_mm=0.1 * diameter, axial_depth_mm=0.5 * depth)
     return (
         *(at(slot, share) for share in style.feeds),
         *(at(plan, share) for plan, share in others),
