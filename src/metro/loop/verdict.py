@@ -150,13 +150,13 @@ def rest_of(problem: Problem, outcome: Outcome, gates: Gates) -> tuple[str, Fit,
     astray = unsettled(outcome.final)
     if astray:  # nothing is claimed of it, least of all that nothing is left
         return "; ".join(filter(None, [remaining, astray])), told_by, lines
-    if nowhere := beyond(outcome.final, problem.role("validate")):
-        return "; ".join(filter(None, [remaining, f"{MAKESHIFT} {nowhere}"])), told_by, lines
     if enough_runs(problem) and not remaining:
         told_by = score(outcome.final, problem.role("validate"))
         lines = _unseen_rest(problem, told_by, gates)
         remaining = f"only on runs that no fit has seen: {in_words(lines)}" if lines else ""
-    return remaining, told_by, lines
+    nowhere = beyond(outcome.final, problem.role("validate"))
+    makeshift = f"{MAKESHIFT} {nowhere}" if nowhere else ""
+    return "; ".join(filter(None, [remaining, makeshift])), told_by, lines
 
 
 def _unseen_rest(problem: Problem, scored: Fit, gates: Gates) -> tuple[Line, ...]:

@@ -26,9 +26,7 @@ from metro.units import DEG, JSON, MM, MS, Array
 
 OBSERVABLE = "joint_force"
 SCATTER = 0.01
-SYSTEMATIC = (
-    0.005  # what torques and dynamometer, calibrated to 1 %, share among all runs beside a common gain
-)
+SYSTEMATIC = 0.005  # beside a common gain, of torques and dynamometer that are calibrated to 1 %
 REPEATABLE = 0.1  # of the torque's noise: how well the friction of the cut is that of the idle run
 
 GRID = 5 * MS
