@@ -57,6 +57,18 @@ def test_what_is_left_is_drawn_as_a_share_of_the_signal_and_full_where_it_counts
     assert axes.get_xlim()[1] > 5.0
 
 
+def test_axes_of_what_is_left_are_told_apart_in_grey_print():
+    left = [
+        {"axis": axis, "label": label, "amplitude": 1.0, "relative": 0.02, "significant": False}
+        for axis in "xyz"
+        for label in ("all", "order 1")
+    ]
+    bars = verdicts.signature(left).axes[0].patches
+    of_axis = [{bar.get_hatch() for bar in bars[3 * k : 3 * k + 3]} for k in range(3)]
+    assert [len(hatches) for hatches in of_axis] == [1, 1, 1]  # that of the legend and of each bar
+    assert len(set().union(*of_axis)) == 3
+
+
 def test_residual_and_parity_of_one_axis_stand_in_one_figure():
     frame = rows("deformation")
     left, middle, right = comparison.judged(frame, "deformation").axes
