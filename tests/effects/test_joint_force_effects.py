@@ -61,6 +61,17 @@ def test_nothing_is_found_where_nothing_is_hidden(cell):
     assert found(cell) == []
 
 
+def test_what_all_runs_share_is_what_gains_of_one_percent_leave_beside_a_common_one(cell):
+    task = joint_force.problem(*cell, {})
+    blocks, rng, left = task.role("identify"), np.random.default_rng(0), []
+    torque = np.concatenate([block.measured for block in blocks])
+    names, joint = np.unique(np.concatenate([block.axis for block in blocks]), return_inverse=True)
+    for _ in range(300):
+        off = torque * rng.normal(0.0, 0.01, len(names))[joint]
+        left.append(off - torque * (off @ torque) / (torque @ torque))
+    assert task.systematic == pytest.approx(np.sqrt(np.mean(np.square(left)) / np.mean(torque**2)), rel=0.15)
+
+
 @pytest.mark.parametrize(("joint", "size"), [pytest.param(2, 6.0, marks=pytest.mark.slow), (6, -10.0)])
 def test_friction_that_differs_from_the_idle_run_is_found_in_its_joint(cell, joint, size):
     ((name, where, values),) = found(cell, torques(cell, joint, lambda t: size * turning(t, joint)))
