@@ -31,6 +31,7 @@ POSES = np.radians(
 )
 DOWN, UP = np.array([110.0, 150.0, 40.0]), np.array([-120.0, 70.0, 45.0])  # feed frame
 POINTS, SPACING, CUTOFF = 41, 1e-3, 8e-3
+FEED = 0.012  # m/s
 
 
 def moves(arm, q, step=1e-6):
@@ -48,8 +49,11 @@ def twisted(torque, stiffness, cubic):
     return brentq(lambda x: stiffness * x + cubic * x**3 - torque, -far, far, xtol=1e-15, rtol=1e-13)
 
 
-def deflection(arm, q, force, truth, *, cutting):
-    """Where the tip goes under a force on it; ``truth``: gap (mdeg), cubic, factor by joint 1 … 6."""
+def deflection(arm, q, force, truth, *, cutting, rate=(0.0,) * 6):
+    """Where the tip goes under a force on it; ``truth``: gap (mdeg), cubic, factor by joint 1 … 6.
+
+    Also friction (N m) on the link side of the springs, against which the joints turn at ``rate``.
+    """
     by_joint = moves(arm, q)
     torque = by_joint.T @ force
     twist = np.zeros(6)
@@ -57,6 +61,8 @@ def deflection(arm, q, force, truth, *, cutting):
         factor = truth.get("factor", {}).get(i + 1, 1.0) if cutting else 1.0
         twist[i] = twisted(torque[i] / factor, STIFFNESS[i], truth.get("cubic", {}).get(i + 1, 0.0))
         if cutting:
+            held = truth.get("friction", {}).get(i + 1, 0.0) * np.sign(rate[i])
+            twist[i] -= held / factor / STIFFNESS[i]
             twist[i] += np.sign(torque[i]) * np.radians(truth.get("gap", {}).get(i + 1, 0.0) * 1e-3) / 2
     return by_joint @ twist
 
@@ -83,9 +89,11 @@ def cut(order, role, place, size, *, truth, rng):
     q = path(pose, degrees)
     arm = Arm(ARM.dh, ARM.tool + np.array(truth.get("offset", (0, 0, 0))) * 1e-3, ARM.work)
     force = known + 0.01 * np.linalg.norm(known) * rng.normal(size=3)
-    z = np.array([normal @ deflection(arm, one, force, truth, cutting=True) for one in q])
+    rate = np.gradient(q, SPACING, axis=0) * FEED
+    z = [deflection(arm, one, force, truth, cutting=True, rate=v) for one, v in zip(q, rate, strict=True)]
+    z = np.array(z) @ normal
     kept = np.arange(4, POINTS - 4, 4)
-    setting = CutWall(q, q, np.tile(known, (POINTS, 1)), normal, SPACING, CUTOFF, kept)
+    setting = CutWall(q, q, rate, np.tile(known, (POINTS, 1)), normal, SPACING, CUTOFF, kept)
     softness = DeformationModel(ARM).per_newton(setting, 1 / STIFFNESS)
     return Block(
         run=f"r{order:02d}",

@@ -10,6 +10,7 @@ from elastic_arm import ARM
 
 from metro.effects import (
     flange_rotation,
+    friction_reversal,
     joint_backlash,
     library,
     stiffness_hardening,
@@ -25,7 +26,10 @@ from metro.observables.problem import Refusal
 from metro.robot.kinematics import Arm
 
 GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
-EFFECTS = (*joint_backlash.EFFECT, *stiffness_hardening.EFFECT, *stiffness_scale.EFFECT[1:])
+EFFECTS = (
+    *(*joint_backlash.EFFECT, *stiffness_hardening.EFFECT),
+    *(*stiffness_scale.EFFECT[2:], *friction_reversal.EFFECT),
+)
 WAYS = tuple((pose, degrees, "down" if pose else "up") for pose in (0, 2) for degrees in (0, 90))
 
 
@@ -38,6 +42,7 @@ def found(truth, seed=1, effects=EFFECTS, **made):
     [
         ({"gap": {5: 12.0}}, "joint_backlash", 5, "angle_mdeg", 12.0),
         ({"factor": {1: 0.6}}, "stiffness_scale", 1, "factor", 0.6),
+        ({"friction": {5: 40.0}}, "friction_reversal", 5, "torque_nm", 40.0),
         ({"cubic": {4: 1.5e12}}, "stiffness_hardening", 4, "cubic", 1.5e12),
         ({"factor": dict.fromkeys(range(1, 7), 0.8)}, "stiffness_scale", "all", "factor", 0.8),
     ],
@@ -147,7 +152,8 @@ def test_hardening_is_started_at_the_twist_of_the_batch_and_a_joint_that_nothing
 def test_effects_of_joints_are_refused_where_the_model_has_none():
     printed = SimpleNamespace(base=SimpleNamespace(structure=None), blocks=())
     _, unable = fitted_to((*EFFECTS, flange_rotation.EFFECT), printed)
-    assert set(unable) == {"joint_backlash", "stiffness_hardening", "flange_rotation"}
+    joints = {"joint_backlash", "stiffness_hardening", "flange_rotation", "friction_reversal"}
+    assert set(unable) == joints
     able, _ = fitted_to(EFFECTS, printed)
     assert [effect.form for effect in able] == ["all joints"]
 
@@ -160,7 +166,7 @@ def test_a_model_with_the_rotation_of_the_flange_has_nothing_to_gain_from_it():
 
 def test_a_model_without_the_rotation_of_the_flange_is_told_of_it_by_cuts_and_loads():
     base = DeformationModel(ARM, flange_rotation=0.0)
-    outcome = found({}, effects=(flange_rotation.EFFECT, *stiffness_scale.EFFECT[1:]), base=base)
+    outcome = found({}, effects=(flange_rotation.EFFECT, *stiffness_scale.EFFECT[2:]), base=base)
     assert outcome.names == ("flange_rotation",)
     share = parameters(outcome.final, "flange_rotation")["share"]
     assert share["ci95"][0] < 1.0 < share["ci95"][1]

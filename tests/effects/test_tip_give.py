@@ -12,7 +12,7 @@ from metro.loop.search import Gates, search
 from metro.observables.deformation_model import CutWall
 
 GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
-EFFECTS = (*joint_backlash.EFFECT, *stiffness_scale.EFFECT[1:], tip_give.EFFECT)
+EFFECTS = (*joint_backlash.EFFECT, *stiffness_scale.EFFECT[2:], tip_give.EFFECT)
 GIVE = 80e-9  # m/N: a tool of 12.5 N/µm
 
 

@@ -22,7 +22,7 @@ def block(setting):
 
 
 def test_the_force_of_a_wall_is_changed_by_what_the_prediction_is_off_where_it_was_measured():
-    wall = block(CutWall(np.zeros((2, 6)), np.zeros((2, 6)), ALONG, np.eye(3)[1], 1e-3, 1e-2, np.arange(2)))
+    wall = block(CutWall(*np.zeros((3, 2, 6)), ALONG, np.eye(3)[1], 1e-3, 1e-2, np.arange(2)))
     fed = with_forces(wall, FORCES, {"w1": "dynamometer"})
     assert fed["measured"].setting.force == pytest.approx(ALONG)
     assert fed["before"].setting.force == pytest.approx(ALONG + np.array([2.0, 4.0, 6.0]))
@@ -30,7 +30,7 @@ def test_the_force_of_a_wall_is_changed_by_what_the_prediction_is_off_where_it_w
 
 
 def test_the_measured_force_is_off_by_a_share_of_the_whole_along_each_axis():
-    wall = block(CutWall(np.zeros((2, 6)), np.zeros((2, 6)), ALONG, np.eye(3)[1], 1e-3, 1e-2, np.arange(2)))
+    wall = block(CutWall(*np.zeros((3, 2, 6)), ALONG, np.eye(3)[1], 1e-3, 1e-2, np.arange(2)))
     fed = with_forces(wall, FORCES, {"w1": "dynamometer"})
     off = SYSTEMATIC["dynamometer"] * np.linalg.norm(FORCES["measured"])
     moved = [fed[name].setting.force - fed["measured"].setting.force for name in OFF]

@@ -222,6 +222,17 @@ def test_the_force_is_in_balance_with_the_depth_that_the_tool_is_left():
     )
 
 
+def test_orders_that_are_not_seen_do_not_fold_to_those_that_are(monkeypatch):
+    cut = SideCut(BENCH.tool, BENCH.metal, 4000.0, 0.016, 5e-3, 4e-3, "down", 0.08)
+    found = side_force(cut, lambda _: 0.0, speed_error=0.0, phase=0.0)
+    monkeypatch.setattr("virtual_cell.side_force._FINE", 4 * len(found.turn))
+    finer = side_force(cut, lambda _: 0.0, speed_error=0.0, phase=0.0)
+    orders, finer_orders = (np.fft.rfft(one.turn, axis=0)[:13] / len(one.turn) for one in (found, finer))
+    largest = np.abs(finer_orders).max(axis=0)
+    assert (np.abs(orders - finer_orders) < 3e-4 * largest).all()
+    np.testing.assert_allclose(found.mean_at(np.array([0.04]))[0], orders[0].real, rtol=1e-12)
+
+
 def test_the_mean_force_is_that_of_the_whole_record():
     cut = SideCut(BENCH.tool, BENCH.metal, 4000.0, 0.016, 5e-3, 4e-3, "up", 0.08)
     force = side_force(cut, lambda _: 0.0, speed_error=0.0, phase=0.3)

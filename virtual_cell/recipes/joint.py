@@ -31,9 +31,9 @@ from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_
 
 # In the order of the bench: what it is called, and where it shows.
 SHOWN: Mapping[str, tuple[str, ...]] = {
-    "stiffness_scale": ("deformation", "flatness"),
+    "stiffness_scale": ("force", "deformation", "flatness"),
     "tool_offset_error": ("joint_force", "deformation"),
-    "friction_reversal": ("joint_force", "waviness"),
+    "friction_reversal": ("joint_force", "deformation", "waviness"),
     "gear_ripple": ("joint_force", "waviness"),
     "tool_runout": ("force",),
 }

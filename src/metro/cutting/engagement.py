@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -46,3 +46,21 @@ def engagement(operation: str, direction: str, radial_depth: float, radius: floa
         return Engagement(math.pi - swept, math.pi)
     half = math.asin(min(1.0, radial_depth / (2.0 * radius)))
     return Engagement(math.pi / 2.0 - half, math.pi / 2.0 + half)
+
+
+def with_wall_proud(arc: Engagement, radius: float, proud: float) -> Engagement:
+    """Return the arc of a side cut whose wall stands ``proud``, m, of where it was (below zero: deeper).
+
+    A tenth of the radial depth stays at least, the whole diameter is the most. Only a cut that ends or starts
+    along the feed (up or down) has a wall.
+
+    Parameters
+    ----------
+    radius : of the cutter, m.
+    """
+    radial = radius * (1.0 - math.cos(arc.exit - arc.entry))
+    left = min(max(radial - proud, 0.1 * radial), 2.0 * radius)
+    swept = math.acos(1.0 - left / radius)
+    if math.isclose(arc.entry, 0.0, abs_tol=1e-9):
+        return replace(arc, exit=swept)
+    return replace(arc, entry=math.pi - swept)

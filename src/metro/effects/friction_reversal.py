@@ -15,13 +15,14 @@ def _of(joint: int) -> Effect:
 
     return Effect(
         name="friction_reversal",
-        observables=("joint_force", "waviness"),
+        observables=("joint_force", "deformation", "waviness"),
         parameters=(EffectParameter("torque_nm", "N m", -300.0, 300.0, 3.0, starts=(-10.0, 10.0)),),
         apply=apply,
         part="drives",
         signature=(
-            "Torque of one joint off by a constant that changes its sign where the joint turns round; "
-            "a joint that turns one way in every run shows it as a force that does not go with the cut."
+            "Torque of one joint off by a constant that changes its sign where the joint turns round, and a "
+            "wall off by what that twists the joint; a joint that turns one way in every run shows it as a "
+            "force that does not go with the cut."
         ),
         literature="[K] section 4: waviness and force error at the reversal of joint 6",
         experiment="a path on which the joint turns round in the middle of the cut, cut and idle, both ways",

@@ -8,6 +8,7 @@ from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, per_joint
 from metro.effects.elastic_joints import with_joints
+from metro.observables.problem import Refusal
 
 
 def apply(model: Any, values: Mapping[str, float]) -> Any:
@@ -30,6 +31,23 @@ OF_MACHINE = Effect(
         "load tests at the force level of the cut, and a dynamometer in one cut to part force from stiffness"
     ),
 )
+
+
+def _gives_way(effect: Effect, problem: Any) -> Effect | Refusal:
+    if not any(getattr(block.setting, "give", 0.0) for block in problem.blocks):
+        return Refusal("")  # no machine that gives way, or it is said already that nobody knows how far
+    return effect
+
+
+OF_SIDE_CUTS = replace(
+    OF_MACHINE,
+    observables=("force",),
+    signature=(
+        "Side cuts by an arm, which gives way, that are deeper or shallower than the load tests let expect. "
+        "Seen where the arm gives way by a part of the radial depth, and by another one in other runs."
+    ),
+    adapt=_gives_way,
+)
 OF_ARM = replace(OF_MACHINE, observables=("deformation",), form="all joints", where={"joint": "all"})
 
 
@@ -50,4 +68,4 @@ def _of(joint: int) -> Effect:
     )
 
 
-EFFECT = (OF_MACHINE, OF_ARM, *per_joint(_of))
+EFFECT = (OF_MACHINE, OF_SIDE_CUTS, OF_ARM, *per_joint(_of))

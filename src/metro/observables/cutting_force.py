@@ -66,6 +66,13 @@ def cut(batch: Batch, run: str, radius: float, give: float = 0.0) -> Cut:
     )
 
 
+def feed(batch: Batch, run: str) -> float:
+    """Return the programmed feed of a run, m/s; of a tool that is not described, as if it had one tooth."""
+    row: Any = batch.runs.loc[run]
+    teeth = int((batch.manifest.get("tool") or {}).get("teeth", 1))
+    return float(row["feed_per_tooth_mm"] * MM * teeth * row["spindle_rpm"] / 60.0)
+
+
 def work_from_feed(batch: Batch, run: str) -> Array:
     """Return the rotation (3, 3) from the feed frame of a run to the work frame: a turn about z."""
     row: Any = batch.runs.loc[run]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 
@@ -25,6 +26,7 @@ from metro.robot.kinematics import Arm, arm_of_cell
 from metro.units import JSON, MM
 
 OBSERVABLE = "deformation"
+LOADED = 0.01  # load cell and gauge of the load tests, which all walls share
 SCATTER = 0.005  # of a joint from run to run: what scatters is the force, which each wall allows for
 
 
@@ -128,7 +130,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         *said,
         *notes,
     )
-    systematic = max(SYSTEMATIC[source] for source in used)
+    systematic = math.hypot(max(SYSTEMATIC[source] for source in used), LOADED)
     scatter = np.full(len(model.parameters), SCATTER)
     return Problem(
         OBSERVABLE, "mm", MM, model, (*calibrate, *walls), scatter, systematic, tuple(notes),

@@ -10,6 +10,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.observables import tip_force
+from metro.observables.cutting_force import feed
 from metro.observables.deformation_model import CutWall
 from metro.observables.problem import Block
 from metro.observables.tip_force import ACTUAL, FORCE, SET
@@ -77,7 +78,8 @@ def _wall_block(
     at_points = np.stack([np.interp(x / MM, along["x_mm"], along[name]) for name in FORCE], axis=1)
     commanded, actual = points[SET].to_numpy() * DEG, points[ACTUAL].to_numpy() * DEG
     count = len(kept)
-    setting = CutWall(commanded, actual, at_points, face.normal, SPACING, longest, kept)
+    rate = np.gradient(commanded, SPACING, axis=0) * feed(batch, run)
+    setting = CutWall(commanded, actual, rate, at_points, face.normal, SPACING, longest, kept)
     off = SYSTEMATIC[str(force["source"].iloc[0])]
     return Block(
         run=run,

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from metro.observables.problem import Block, Parameter
+from metro.robot.drive_torques import DriveTorques
 from metro.robot.kinematics import Arm
 from metro.robot.statics import joint_torque, moving_jacobian, tip_jacobian
 from metro.robot.torsion import Torsion
@@ -30,13 +31,14 @@ class CutWall:
 
     Attributes
     ----------
-    commanded, actual : (m, 6) joint angles of the log of the cut, rad.
+    commanded, actual : (m, 6) joint angles of the log of the cut, rad. rate : (m, 6) their speeds, rad/s.
     force : (m, 3) on the tool, work frame, N. normal : (3,) of the wall, out of the material.
     spacing, cutoff : of the points and of the profile's filter, m. kept : (n,) points that are compared.
     """
 
     commanded: Array
     actual: Array
+    rate: Array
     force: Array
     normal: Array
     spacing: float
@@ -71,6 +73,7 @@ class DeformationModel:
     structure : stiffness in the cut relative to the load tests.
     flange_rotation : how much of what the flange turns moves the tip: all of it, in truth.
     torsion : what the joints do beyond linear springs.
+    drives : friction that the idle run does not have, on the far side of the springs.
     drift : how far the tip has moved from one run to the next, work frame x and y, m.
     give : of what lies between flange and edge, in the cut: m of the wall per newton along its normal.
     """
@@ -79,6 +82,7 @@ class DeformationModel:
     structure: Structure = field(default_factory=Structure)
     flange_rotation: float = 1.0
     torsion: Torsion = field(default_factory=Torsion)
+    drives: DriveTorques = field(default_factory=DriveTorques)
     drift: tuple[float, float] = (0.0, 0.0)
     give: float = 0.0
 
@@ -154,11 +158,18 @@ class DeformationModel:
     def _cut(self, setting: CutWall, compliance: Array) -> tuple[Array, Array]:
         out, torque = _outwards(self.arm, self.flange_rotation, setting)
         twist, slope = self.torsion.in_cut(self.structure.in_cut(torque), compliance)
+        held = self._held(setting)
+        twist, slope = twist - held * compliance, slope - held
         # what the profile was filtered by, the prediction is filtered by: at the entry that matters
         smooth = _filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
         rest = (out * (twist - slope * compliance)).sum(axis=1) + _strayed(self.arm, setting)
         rest = rest + self.give * (setting.force @ setting.normal)
         return smooth @ (out * slope), smooth @ rest
+
+    def _held(self, setting: CutWall) -> Array:
+        """Torque (m, 6), N m, that friction keeps from the springs in the cut, as stiff as in load tests."""
+        friction = self.drives.at(setting.commanded, setting.rate, np.zeros(len(setting.rate)))
+        return np.asarray(self.structure.in_cut(friction) / np.array(self.torsion.factor))
 
     def _loaded(self, setting: LoadTest, compliance: Array) -> tuple[Array, Array]:
         moved, torque = _static(self.arm, self.flange_rotation, setting)

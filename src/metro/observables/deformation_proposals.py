@@ -98,6 +98,7 @@ def _turned(setting: CutWall, joints: Array, turn: float) -> CutWall:
         setting,
         commanded=still,
         actual=still,
+        rate=np.zeros_like(still),
         force=setting.force @ rotation.T,
         normal=rotation @ setting.normal,
     )

@@ -43,6 +43,7 @@ def block_of(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, spindle:
         cut_length=float(row["cut_before_m"]) + 0.5 * cutting_force.or_zero(row["cut_length_mm"]) * MM,
         helix=path,
         feed_ratio=float(row["spindle_rpm"]) / float(spindle["spindle_rpm"]),
+        give=float(spindle["give_mm"]) * MM,
     )
     axis = table["axis"].to_numpy().astype(str)
     mean = (table["part"] == "mean").to_numpy()

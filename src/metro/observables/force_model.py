@@ -11,6 +11,7 @@ import numpy as np
 
 from metro.cutting.chipped import Chipped
 from metro.cutting.cutter import Cutter
+from metro.cutting.engagement import with_wall_proud
 from metro.cutting.force import COEFFICIENTS, Cut, force_basis
 from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped, turned
 from metro.cutting.law import EdgeLaw
@@ -34,8 +35,9 @@ class ForceSetting:
     """What the force of a run depends on (SI): its cut, and how its record was averaged.
 
     ``feed_direction`` is the turn of the feed frame about z, rad; ``cut_length`` metres cut before the run's
-    middle since the first; ``feed_ratio`` true over nominal feed per tooth: the feed rate is as programmed,
-    so a spindle that turns slower than it says takes thicker chips. The chip is taken as proportional to it.
+    middle since the first; ``give`` how far the wall stands proud in this ``cut``, m, for an arm as stiff as
+    its load tests say; ``feed_ratio`` true over nominal feed per tooth: the feed rate is as programmed, so a
+    spindle that turns slower than it says takes thicker chips. The chip is taken as proportional to it.
     """
 
     cut: Cut
@@ -45,6 +47,7 @@ class ForceSetting:
     cut_length: float
     helix: Helix | None = None
     feed_ratio: float = 1.0
+    give: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -53,11 +56,13 @@ class Structure:
 
     ``orbit_amplitude``, ``orbit_phase`` (rad): the axial force times 1 + amplitude × cos(ψ − phase), ψ the
     direction of feed in helical milling. ``compliance`` of the tool's tip along work x, y, m/N.
+    ``stiffness_factor`` : of an arm in side cuts, against what its load tests say.
     """
 
     orbit_amplitude: float = 0.0
     orbit_phase: float = 0.0
     compliance: tuple[float, float] = (0.0, 0.0)
+    stiffness_factor: float = 1.0
 
     def seen(self, direction: float) -> tuple[float, float, float]:
         """Compliance xx, yy, xy in a frame turned about z by the direction of feed, rad: m/N."""
@@ -109,7 +114,7 @@ class ForceModel:
         A tool that yields is displaced as it is with the coefficients ``beta``; as long as they are not
         known it is rigid.
         """
-        setting: ForceSetting = block.setting
+        setting = self._cutting(block.setting)
         recording = setting.recording
         basis = advance(self._orders(setting, beta), float(nuisance[0]))
         basis = basis * np.repeat([setting.feed_ratio, self.law.edge(setting.cut_length)], 3)[:, None]
@@ -127,6 +132,14 @@ class ForceModel:
             seen = np.einsum("bhapf,bf->bhap", seen.reshape(*seen.shape[:3], count, feeds), shares)
         matrix = seen.transpose(0, 2, 1, 3).reshape(-1, count)
         return matrix, self._drift(block, recording)
+
+    def _cutting(self, setting: ForceSetting) -> ForceSetting:
+        """Return what is cut by an arm as stiff as this one: the softer, the less of a wall."""
+        more = setting.give * (1.0 / self.structure.stiffness_factor - 1.0)
+        if not more:
+            return setting
+        arc = with_wall_proud(setting.cut.engagement, self.cutter.radius, more)
+        return replace(setting, cut=replace(setting.cut, engagement=arc))
 
     def _orders(self, setting: ForceSetting, beta: Array | None) -> Array:
         """Order coefficients of the peripheral force, feed frame, (2H+1, 3, 6, feeds).
@@ -156,7 +169,7 @@ class ForceModel:
     def beyond(self, block: Block, beta: Array) -> str:
         """Say that a tool this soft would not cut steadily, where force and deflection have no balance."""
         if not any(self.structure.compliance) or all(
-            each.balanced for each in self._yielding(block.setting, beta)
+            each.balanced for each in self._yielding(self._cutting(block.setting), beta)
         ):
             return ""
         return "force and deflection find no balance: a tool this soft would not cut steadily"

@@ -61,7 +61,7 @@ def _observed(batch: Batch, run: str, read: Tables, tool: Cutter) -> tuple[pd.Da
     """Order averages of a run's steady cut, and what was found on the way."""
     record = LongRecord(read, run)
     row: Any = batch.runs.loc[run]
-    nominal, settling = row["spindle_rpm"] / 60.0, _settling(row, tool)
+    nominal, settling = row["spindle_rpm"] / 60.0, _settling(batch, run, tool)
     turns = record.turns(record.rate / nominal)
     try:
         found = steady.segments(turns, round(record.rate * settling))
@@ -203,13 +203,12 @@ def _whole_mean(angle: Array, signal: Array) -> Array:
     return mean
 
 
-def _settling(row: pd.Series, tool: Cutter) -> float:
+def _settling(batch: Batch, run: str, tool: Cutter) -> float:
     """Time from first contact to full engagement, s: one radius of travel, or one orbit of a helix."""
+    row: Any = batch.runs.loc[run]
     if row["operation"] == "helical":
         return 60.0 / abs(float(row["orbit_rpm"]))
-    return tool.radius / (
-        float(row["feed_per_tooth_mm"]) * MM * tool.teeth * float(row["spindle_rpm"]) / 60.0
-    )
+    return tool.radius / cutting_force.feed(batch, run)
 
 
 def orbit_rate(row: Any) -> float:

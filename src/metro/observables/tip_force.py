@@ -213,11 +213,9 @@ def about_air(batch: Batch, run: str, read: Tables, wall: Wall) -> AboutAir | Re
     record = LongRecord(read, run)
     if record.samples < 2:
         return Refusal("no dynamometer record")
-    teeth = (batch.manifest.get("tool") or {}).get("teeth", 1)
-    feed = row["feed_per_tooth_mm"] * MM * teeth * row["spindle_rpm"] / 60.0
     turns = record.turns(record.rate * 60.0 / row["spindle_rpm"])
     try:
-        found = steady.segments(turns, round(record.rate * wall.leaving / feed))
+        found = steady.segments(turns, round(record.rate * wall.leaving / cutting_force.feed(batch, run)))
     except ValueError as error:
         return Refusal(str(error))
     zero = turns.mean[found.quiet].mean(axis=0) if found.quiet.any() else np.zeros(3)
