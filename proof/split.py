@@ -1,8 +1,9 @@
 """Is the split of an error right? What came with the predicted force, as stated and as it truly was.
 
 The simulator tells the true mean force of a run, and by how much more of it moves the wall or the face. What
-the predicted force adds to the error is that much of its distance from the true one; what is stated knows of
-the force only what the dynamometer reads.
+the predicted force adds to the error is that much of its distance from the true one. What is stated knows of
+the force only what the dynamometer reads: it can be close to what that makes of it, and can but say how far
+the true part may be from there.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from metro.observables.upstream import mean_forces
 from metro.units import JSON, Array
@@ -27,8 +29,8 @@ CLOSE, HELD = Demand(most=0.1), Demand(0.9)
 class Fed:
     """A held-out run whose force was measured: rms error (mm), and how much of it came with the force.
 
-    ``stated`` by the chain of prediction, with the standard deviation ``doubt``, ``true`` by the simulator,
-    mm.
+    ``stated`` by the chain of prediction, with the standard deviation ``doubt``; by the simulator, ``true``,
+    and ``read`` if the force that the dynamometer reads were the true one; mm.
     """
 
     observable: str
@@ -36,6 +38,7 @@ class Fed:
     total: float
     stated: float
     true: float
+    read: float
     doubt: float
 
     @property
@@ -43,10 +46,9 @@ class Fed:
         """Whether the true part is within the 95 % interval of the stated one."""
         return abs(self.stated - self.true) <= NORMAL * self.doubt
 
-    @property
-    def off(self) -> float:
-        """By how much the stated part differs from the true one, in parts of the whole error."""
-        return abs(self.stated - self.true) / self.total
+    def off(self, other: float) -> float:
+        """By how much the stated part differs from another one, in parts of the whole error."""
+        return abs(self.stated - other) / self.total
 
 
 def fed(processed: Path, truth: JSON) -> tuple[Fed, ...]:
@@ -64,7 +66,8 @@ def fed(processed: Path, truth: JSON) -> tuple[Fed, ...]:
             part["run"],
             part["total"],
             part["upstream"],
-            came(truth[part["run"]], forces[part["run"]][WHEN]),
+            came(truth[part["run"]]["mm_per_n"], truth[part["run"]]["force_n"], forces[part["run"]][WHEN]),
+            came(truth[part["run"]]["mm_per_n"], forces[part["run"]]["measured"], forces[part["run"]][WHEN]),
             part["doubt"],
         )
         for observable, told in chain.items()
@@ -73,22 +76,21 @@ def fed(processed: Path, truth: JSON) -> tuple[Fed, ...]:
     )
 
 
-def came(truth: JSON, predicted: Array) -> float:
-    """Return what a predicted mean force (3,), N, adds to the error, mm."""
-    missing = np.array(truth["force_n"]) - predicted
-    return abs(float(np.array(truth["mm_per_n"]) @ missing))
+def came(mm_per_n: Sequence[float], force: ArrayLike, predicted: Array) -> float:
+    """Return what a predicted mean force (3,), N, adds to the error where the force is another one, mm."""
+    return abs(float(np.array(mm_per_n) @ (np.asarray(force) - predicted)))
 
 
 def split_figures(found: Sequence[Fed]) -> list[Figure]:
-    """Return how far the stated parts are from the true ones, by observable."""
-    close = [
-        median(
-            f"{name}: stated part of the force less the true one, in parts of the error",
-            [one.off for one in found if one.observable == name],
-            CLOSE,
-            "%",
-        )
-        for name in sorted({one.observable for one in found})
-    ]
+    """Return how far the stated parts are from those that were read and from the true ones, by observable."""
+    figures = []
+    for name in sorted({one.observable for one in found}):
+        those = [one for one in found if one.observable == name]
+        read, true = [one.off(one.read) for one in those], [one.off(one.true) for one in those]
+        words = f"{name}: stated part of the force less"
+        figures += [
+            median(f"{words} that of the force that is read, in parts of the error", read, CLOSE, "%"),
+            median(f"{words} the true one, in parts of the error", true, unit="%"),
+        ]
     held = [one.held for one in found]
-    return [*close, share("part of the force: its interval holds the true one", held, HELD)]
+    return [*figures, share("part of the force: its interval holds the true one", held, HELD)]

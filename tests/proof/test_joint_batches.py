@@ -69,19 +69,20 @@ def test_the_part_of_the_force_is_that_of_the_error_of_the_mean_force_along_what
     runs = [{"run": "r1", "when": when, **parts} for when in ("before", "after")]
     (tmp_path / "loop.json").write_text(json.dumps({"chain": {"deformation": {"runs": runs}}}))
     rows = [
-        {"observable": "force", "run": "r1", "axis": axis, "angle_deg": angle, "measured": 0.0, "before": 0.0}
-        | {"after": value + swing}
-        for axis, value in zip("xyz", (100.0, 50.0, 0.0), strict=True)
+        {"observable": "force", "run": "r1", "axis": axis, "angle_deg": angle, "before": 0.0}
+        | {"after": value + swing, "measured": value + read}
+        for axis, value, read in zip("xyz", (100.0, 50.0, 0.0), (1.0, 0.5, 3.0), strict=True)
         for angle, swing in ((0.0, 5.0), (180.0, -5.0))
     ]
     pd.DataFrame(rows).to_parquet(tmp_path / "comparison.parquet")
     truth = {"r1": {"force_n": [102.0, 50.0, 9.0], "mm_per_n": [0.002, 0.001, 0.0]}}
     (one,) = fed(tmp_path, truth)
     assert one.true == pytest.approx(0.004)
-    assert one.off == pytest.approx(0.05)
+    assert one.read == pytest.approx(0.0025)
+    assert [one.off(part) for part in (one.true, one.read)] == pytest.approx([0.05, 0.1])
     assert one.held
     assert not replace(one, doubt=0.0002).held
-    assert [figure.met for figure in split_figures([one])] == [True, True]
+    assert [figure.met for figure in split_figures([one])] == [True, None, True]
 
 
 def test_the_tables_name_the_joint_and_the_status():
