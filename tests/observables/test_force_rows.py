@@ -75,7 +75,9 @@ def depths(limits):
 
 def test_a_depth_beyond_what_was_cut_is_proposed_where_the_user_allows_it():
     assert 3.0 not in depths(None)
-    assert 3.0 in depths({"axial_depth_mm": (0.5, 4.0)})
+    assert 4.0 not in depths(None)
+    assert {3.0, 4.0} <= depths({"axial_depth_mm": (0.5, 4.0)})
+    assert {3.0, 3.3} & depths({"axial_depth_mm": (0.5, 3.3)}) == {3.0}  # no new depth, nearly
 
 
 def test_feeds_go_as_far_as_the_user_allows():

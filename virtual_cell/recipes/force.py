@@ -33,6 +33,7 @@ _AXES = (
 STYLES = ("a", "b")
 FEW = "few"  # a style beside these: too few runs to tell small effects from one another
 FULL_S, CUT_MM = 0.4, 120.0  # length of a straight cut as recorded, and as made
+AIR_S = 0.1  # of a record before the cut begins
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Style:
 
     rate: float = 8192.0
     noise: tuple[float, float] = (0.7, 2.5)
-    air_s: float | None = 0.1
+    air_s: float | None = AIR_S
     tacho: bool = False
     scatter: float = 0.01
     feeds: tuple[float, ...] = (0.25, 0.45, 0.7, 1.0)
@@ -117,6 +118,8 @@ def cut_more(
 ) -> None:
     """Cut planned runs after those of a batch, in their order, as the same truth has it; add their rows.
 
+    Each record begins in the air, as is asked for.
+
     Parameters
     ----------
     planned : rows of a run table without files, numbers as numbers. effects, seed, style : of the batch.
@@ -124,8 +127,7 @@ def cut_more(
     drawn = _drawn(effects, seed, style)
     with (folder / "runs.csv").open(newline="", encoding="utf-8") as stream:
         cut: list[Row] = list(csv.DictReader(stream))
-    air = drawn.plans[0].air_s
-    order = [(_planned(row, drawn.session, air), int(row["replicate"])) for row in planned]
+    order = [(_planned(row, drawn.session), int(row["replicate"])) for row in planned]
     rng = np.random.default_rng([seed, 17])
     metres = sum(float(row["cut_length_mm"]) * MM for row in cut)
     more = cut_in_order(drawn.session, order, folder, rng, after=len(cut), metres=metres)
@@ -133,7 +135,7 @@ def cut_more(
     write_csv(folder / "runs.csv", [*cut, *named], RUN_COLUMNS)
 
 
-def _planned(row: Row, session: Session, air_s: float | None) -> Plan:
+def _planned(row: Row, session: Session) -> Plan:
     """Return how a row of a run table is cut: a record as long as that of others of its length."""
     plan = Plan(
         **{name: row[name] for name in Plan.__dataclass_fields__ if name in row and row[name] is not None}
@@ -141,7 +143,7 @@ def _planned(row: Row, session: Session, air_s: float | None) -> Plan:
     if plan.operation == "helical":
         orbit_s = 60.0 / orbit_rpm(session, plan)
         return replace(plan, full_s=round(1.03 * orbit_s, 3), replicates=1)
-    return replace(plan, air_s=air_s, full_s=FULL_S * plan.cut_length_mm / CUT_MM, replicates=1)
+    return replace(plan, air_s=AIR_S, full_s=FULL_S * plan.cut_length_mm / CUT_MM, replicates=1)
 
 
 def _drawn(effects: Mapping[str, Parameters | None], seed: int, style: str) -> _Drawn:

@@ -168,14 +168,19 @@ def _spindle(setting: ForceSetting) -> float:
 def _depths(
     name: str, runs: Sequence[Block], seen: Sequence[ForceSetting], deepest: float
 ) -> Iterator[Proposal]:
-    """Propose half the least depth, and twice that if the batch went as deep elsewhere."""
+    """Propose half and twice the least depth, and the deepest, none beyond that or where the batch was."""
     like = min(runs, key=lambda block: (_setting(block).cut.axial_depth, -_feed(block)))
-    depths = [setting.cut.axial_depth for setting in seen]
-    for factor, how in ((0.5, "half"), (2.0, "twice")):
-        depth = factor * min(depths)
-        there = any(math.isclose(depth, other, rel_tol=0.2) for other in depths)
-        if depth <= (1.0 + ROUNDING) * deepest and not there:
-            words = f"{name} {depth / MM:.3g} mm deep ({how} the least depth so far)"
+    there = [setting.cut.axial_depth for setting in seen]
+    least = min(there)
+    for depth, how in (
+        (0.5 * least, "half the least depth so far"),
+        (2.0 * least, "twice the least depth so far"),
+        (deepest, "the deepest that may be set"),
+    ):
+        new = not any(math.isclose(depth, other, rel_tol=0.2) for other in there)
+        if new and depth <= (1.0 + ROUNDING) * deepest:
+            there.append(depth)
+            words = f"{name} {depth / MM:.3g} mm deep ({how})"
             yield _deep(words, like, depth / _setting(like).cut.axial_depth)
 
 

@@ -176,6 +176,8 @@ def _told(
     if len(table):
         filled = table.loc[:, [bool((table[name].notna() & (table[name] != "")).any()) for name in table]]
         lines += ["", f"{len(table)} runs, in this order:", filled.to_string(index=False, na_rep="")]
+        if "force" in names:
+            lines.append("Begin each record in the air: there the zero of the dynamometer is read.")
         lines += [f"Written to {out}."] if out else ["Write them with --out FILE.csv."]
     elif asked:
         lines.append("No row for the run table follows from that.")
