@@ -8,7 +8,8 @@ import pytest
 import synthetic_results as synthetic
 
 from metro.report.batch_report import batch_report
-from metro.report.sections.verdict import parameter_name, sentence
+from metro.report.parameters import parameter_name
+from metro.report.sections.verdict import sentence
 
 
 def text_of(pdf):

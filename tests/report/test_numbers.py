@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from metro.observables import modal_test
 from metro.report.numbers import listing, number, percent, probability, quantity, with_interval
-from metro.report.sections.verdict import parameter_name
+from metro.report.parameters import parameter_name
 
 
 @pytest.mark.parametrize(

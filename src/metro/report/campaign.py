@@ -12,12 +12,13 @@ from metro.report.content import Bullets, Item, Paragraph, Picture, Section, Tab
 from metro.report.document import Cover, compile_pdf
 from metro.report.figures import verdicts as figures
 from metro.report.numbers import listing, number, words
+from metro.report.parameters import effect_words
 from metro.report.phrases import plain
 from metro.report.results import OBSERVABLES, title
 from metro.report.sections import findings
 from metro.report.sections.memory import memory_section
 from metro.report.sections.standings import largest_rests, rankings
-from metro.report.sections.verdict import STATUS, change, effect_words, error_text, known_interval
+from metro.report.sections.verdict import STATUS, change, error_text, known_interval
 from metro.units import JSON, printed
 
 TITLE = "Campaign summary"

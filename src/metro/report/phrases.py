@@ -51,6 +51,9 @@ def plain(text: str) -> str:
 
 
 def _kind(label: str, teeth: int) -> str:
+    steady, slow, how = label.partition(", ")
+    if slow:
+        return f"{'the mean' if steady == 'mean' else _kind(steady, teeth)}, changing {how}"
     found = re.fullmatch(r"order (\d+)", label)
     if found is None:
         return {"all": "throughout", "mean": "a constant offset"}.get(label, label)

@@ -24,7 +24,7 @@ COORDINATES = {
 }
 RUNS, BINS, POINTS = 4, 60, 1200
 GAP = 5  # steps without a value at which a line is broken
-RUNS_OF_AXES = 3
+RUNS_OF_AXES, RUNS_ALONE = 3, 6
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,13 @@ def predictions(frame: pd.DataFrame) -> tuple[Prediction, ...]:
     return (ONLY,) if np.allclose(frame["before"], frame["after"], rtol=1e-12, atol=0) else (BEFORE, AFTER)
 
 
-def overlay(frame: pd.DataFrame, title: str) -> Figure:
+def overlay(frame: pd.DataFrame, title: str, *, alone: bool = False) -> Figure:
     """Draw measured values with their 95 % band and the predictions: a panel per run and axis.
 
     Of a quantity that repeats (force per revolution) the block in the middle of the record is drawn; of many
-    runs the first few, see :func:`shown_runs`.
+    runs the first few, see :func:`shown_runs`; more where no other observable wants the place (``alone``).
     """
-    panels = [(run, axis) for run in shown_runs(frame) for axis in axes_of(frame)]
+    panels = [(run, axis) for run in shown_runs(frame, alone=alone) for axis in axes_of(frame)]
     columns = len(axes_of(frame)) if len(axes_of(frame)) > 1 else min(2, len(panels))
     rows = -(-len(panels) // columns)
     column, drawn = coordinate(frame), predictions(frame)
@@ -216,9 +216,10 @@ def _abscissa(axes: Axes, column: str) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def shown_runs(frame: pd.DataFrame) -> list[str]:
+def shown_runs(frame: pd.DataFrame, *, alone: bool = False) -> list[str]:
     """Return the runs that the overlay shows: the first few in the order of the table."""
     most = RUNS if len(axes_of(frame)) == 1 else RUNS_OF_AXES
+    most = RUNS_ALONE if alone else most
     return [str(run) for run in frame["run"].drop_duplicates()][:most]
 
 

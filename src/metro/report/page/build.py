@@ -11,10 +11,11 @@ from urllib.parse import quote
 from metro import __version__
 from metro.report.campaign import TITLE
 from metro.report.content import Bullets, Item, Paragraph, Section, Table
-from metro.report.numbers import number, percent, probability, quantity, words
+from metro.report.numbers import number, percent, probability, words
 from metro.report.page.curves import boundary_curves, run_curves
 from metro.report.page.faces import face_maps, point_maps
 from metro.report.page.markup import Html, badge, embedded, items_of, joined, tag
+from metro.report.parameters import parameter_words
 from metro.report.phrases import plain
 from metro.report.results import Results, title
 from metro.report.sections.causes import with_causes
@@ -24,7 +25,6 @@ from metro.report.sections.verdict import (
     advice,
     error_text,
     left_words,
-    parameter_name,
     sentence,
 )
 from metro.units import JSON, printed
@@ -160,10 +160,7 @@ def _effects(verdicts: Mapping[str, JSON]) -> list[Item]:
         [
             words(str(effect["effect"])),
             title(name),
-            "; ".join(
-                f"{parameter_name(k, v)} {quantity(v)}" for k, v in (effect.get("parameters") or {}).items()
-            )
-            or "–",
+            "; ".join(parameter_words(str(effect["effect"]), effect.get("parameters") or {})) or "–",
             probability(effect.get("probability")),
         ]
         for name, entry in verdicts.items()

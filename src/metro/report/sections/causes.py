@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from metro.report.content import Item, Paragraph, Section, Table
-from metro.report.numbers import listing, number, percent, probability, quantity, words
+from metro.report.numbers import listing, number, percent, probability, words
+from metro.report.parameters import parameter_words
 from metro.report.phrases import sentence
 from metro.report.results import Results, title
-from metro.report.sections.verdict import parameter_name
 from metro.units import JSON, printed
 
 STATUS = {
@@ -64,8 +64,7 @@ def cause_name(cause: JSON) -> str:
 def _values(cause: JSON) -> str:
     if cause["status"] == "contradiction":
         return "not one value"
-    told = [f"{parameter_name(name, value)} {quantity(value)}" for name, value in cause["parameters"].items()]
-    return ", ".join(told) or "–"
+    return ", ".join(parameter_words(str(cause["cause"]), cause["parameters"])) or "–"
 
 
 def upstream(results: Results) -> Section | None:

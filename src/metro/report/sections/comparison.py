@@ -23,22 +23,25 @@ FEWEST = 3  # values of a run along an axis that make a curve
 def comparison(results: Results) -> Section:
     """Write for each observable overlay, residual, parity plot and the error of each run and axis."""
     items: list[Item] = []
-    for observable in OBSERVABLES:
-        frame = results.compared(observable)
-        if frame is not None:
-            name = title(observable)
-            items.append(Heading(heading(observable)))
-            merit = force_items(results) if observable == "force" else []
-            items += cut_items(results, frame) if observable == "lobes" else _values(frame, name, merit)
-            items += pairing_items(frame) if observable == "flatness" else []
+    compared = {name: frame for name in OBSERVABLES if (frame := results.compared(name)) is not None}
+    for observable, frame in compared.items():
+        items.append(Heading(heading(observable)))
+        if observable == "lobes":
+            items += cut_items(results, frame)
+            continue
+        merit = force_items(results) if observable == "force" else []
+        items += _values(frame, title(observable), merit, alone=len(compared) == 1)
+        items += pairing_items(frame) if observable == "flatness" else []
     if not items:
         nothing = "No held-out run has both a measurement and a prediction: there is nothing to compare."
         return Section("Predicted against measured", [Paragraph(nothing)])
     return Section("Predicted against measured", items)
 
 
-def _values(frame: pd.DataFrame, name: str, merit: list[Item]) -> list[Item]:
+def _values(frame: pd.DataFrame, name: str, merit: list[Item], *, alone: bool) -> list[Item]:
     """Errors, curves and parity; ``merit`` takes the place of the table of errors and of the residual.
+
+    ``alone``: no other observable is compared, so there is room for more runs.
 
     A force's angle starts anywhere in each run: residuals of several runs over it are no picture of anything.
     """
@@ -59,7 +62,7 @@ def _values(frame: pd.DataFrame, name: str, merit: list[Item]) -> list[Item]:
     if frame.groupby(["run", figures.axis_labels(frame)]).size().max() < FEWEST:
         return [errors(frame), parity()]
     if merit:
-        return [*merit, *_curves(frame, name, words), parity()]
+        return [*merit, *_curves(frame, name, words, alone=alone), parity()]
     about = (
         f"{whole}. {findings.offsets(frame)} Residual of all held-out runs: median and the band that holds "
         "80 % of the values"
@@ -70,18 +73,18 @@ def _values(frame: pd.DataFrame, name: str, merit: list[Item]) -> list[Item]:
         judged = [Picture(figures.judged(frame, name), caption, alt)]
     else:
         judged = [Picture(figures.residuals(frame, name), f"{about}.", alt), parity()]
-    return [errors(frame), *_curves(frame, name, words), *judged]
+    return [errors(frame), *_curves(frame, name, words, alone=alone), *judged]
 
 
-def _curves(frame: pd.DataFrame, name: str, words: str) -> list[Item]:
+def _curves(frame: pd.DataFrame, name: str, words: str, *, alone: bool) -> list[Item]:
     """Overlay, and maps where there are places on a face."""
-    runs, shown = frame["run"].nunique(), figures.shown_runs(frame)
+    runs, shown = frame["run"].nunique(), figures.shown_runs(frame, alone=alone)
     part = f" Runs {listing(shown)} of {runs}." if runs > len(shown) else ""
     blocks = frame["angle_deg"].notna().all() and frame["t_s"].nunique() > 1
     repeats = " One time block of each run is drawn." if blocks else ""
     items: list[Item] = [
         Picture(
-            figures.overlay(frame, name),
+            figures.overlay(frame, name, alone=alone),
             f"{findings.left(frame)} Measured {name} and predictions, held-out runs.{part}{repeats}",
             f"Measured and predicted {name} for {len(shown)} held-out runs; {words}.",
         )

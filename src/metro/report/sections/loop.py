@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table, abreast
 from metro.report.figures import verdicts as figures
-from metro.report.numbers import number, percent, probability, quantity, words
+from metro.report.numbers import number, percent, probability, words
+from metro.report.parameters import parameter_name, parameter_value
 from metro.report.phrases import plain
 from metro.report.results import Results, heading
 from metro.report.sections import findings
-from metro.report.sections.verdict import STATUS, error_text, left_words, parameter_name, sentence
+from metro.report.sections.verdict import STATUS, error_text, left_words, sentence
 from metro.units import JSON, printed
 
 LONGEST = 16
@@ -78,7 +79,7 @@ def _added(entry: JSON) -> list[Item]:
         [
             words(str(effect["effect"])) if i == 0 else "",
             parameter_name(name, value),
-            quantity(value),
+            parameter_value(str(effect["effect"]), name, value),
             probability(effect.get("probability")) if i == 0 else "",
         ]
         for effect in entry.get("effects") or []

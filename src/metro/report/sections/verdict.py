@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from metro.report.content import Facts, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import verdicts as figures
 from metro.report.figures.comparison import coordinate, overlay
 from metro.report.figures.verdicts import Change
 from metro.report.numbers import listing, number, percent, probability, quantity, with_interval, words
+from metro.report.parameters import effect_words
 from metro.report.phrases import plain, rest_words
 from metro.report.results import Results, heading, title
 from metro.report.sections import findings
 from metro.report.sections.measured import count_of, measured_words
-from metro.units import JSON, printed, printed_name
+from metro.units import JSON, printed
 
 MOST_DRAWN = 2  # verdicts beside which a first page has room for a run
 STATUS = {
@@ -46,23 +45,6 @@ def sentence(observable: str, entry: JSON, left: str = "") -> str:
         "insufficient": f"{start}: too few runs to tell. {_fall(entry)}",
     }
     return says.get(status, f"{start}: {words(status)}.").strip()
-
-
-def effect_words(effect: JSON) -> str:
-    """Name an effect with its parameters: tool runout (radius 9.80 ± 0.30 µm, angle 112.0 ± 3.0°)."""
-    told = [
-        f"{parameter_name(k, v)} {quantity(v)}".strip() for k, v in (effect.get("parameters") or {}).items()
-    ]
-    return f"{words(str(effect['effect']))} ({', '.join(told)})" if told else words(str(effect["effect"]))
-
-
-def parameter_name(name: str, entry: Any) -> str:
-    """Name of a parameter without the unit that its key ends in: radius_um → radius."""
-    if isinstance(entry, list) and entry:
-        return parameter_name(name, entry[0])
-    if not isinstance(entry, dict):
-        return words(name)
-    return printed_name(name, str(entry.get("unit") or ""))
 
 
 def error_text(error: JSON | None, unit_name: str | None) -> str:

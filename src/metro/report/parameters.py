@@ -1,0 +1,69 @@
+"""The parameters of an effect in words: named without unit, axis by axis, none where nothing is told."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from metro.effects import library
+from metro.effects.effect import EffectParameter
+from metro.report.numbers import quantity, words
+from metro.units import JSON, printed_name
+
+PER_AXIS = ("dynamometer_resonance", "charge_drift", "charge_leak")  # their lists are those of x, y and z
+NOT_TOLD = "not told"  # an interval that holds whatever the parameter may be
+
+
+def effect_words(effect: JSON) -> str:
+    """Name an effect with its parameters: tool runout (radius 9.80 ± 0.30 µm, angle 112.0 ± 3.0°)."""
+    name = str(effect["effect"])
+    told = ", ".join(parameter_words(name, effect.get("parameters") or {}))
+    return f"{words(name)} ({told})" if told else words(name)
+
+
+def parameter_words(effect: str, parameters: JSON) -> list[str]:
+    """Return each parameter with its value and interval: radius 9.80 ± 0.30 µm."""
+    return [
+        f"{parameter_name(name, entry)} {parameter_value(effect, name, entry)}".strip()
+        for name, entry in parameters.items()
+    ]
+
+
+def parameter_name(name: str, entry: Any) -> str:
+    """Name of a parameter without the unit that its key ends in: radius_um → radius."""
+    if isinstance(entry, list) and entry:
+        return parameter_name(name, entry[0])
+    if not isinstance(entry, dict):
+        return words(name)
+    return printed_name(name, str(entry.get("unit") or ""))
+
+
+def parameter_value(effect: str, name: str, entry: Any) -> str:
+    """Return a value with its interval and unit; of a list, that of each axis or item."""
+    known = _known().get((effect, name))
+    if not isinstance(entry, list):
+        return NOT_TOLD if known and _anything(entry, known) else quantity(entry)
+    told = [not known or not _anything(item, known) for item in entry]
+    if not any(told):
+        return NOT_TOLD
+    marks = [f"{axis} " for axis in "xyz"] if effect in PER_AXIS and len(entry) == 3 else [""] * len(entry)
+    last = max(i for i, one in enumerate(told) if one)
+    return ", ".join(
+        mark + (quantity(item, with_unit=i == last) if one else NOT_TOLD)
+        for i, (mark, item, one) in enumerate(zip(marks, entry, told, strict=True))
+    )
+
+
+@cache
+def _known() -> dict[tuple[str, str], EffectParameter]:
+    return {(effect.name, parameter.name): parameter for effect in library() for parameter in effect.reported}
+
+
+def _anything(entry: Any, known: EffectParameter) -> bool:
+    """Whether an interval holds all that a parameter may be."""
+    low, high = (entry.get("ci95") if isinstance(entry, dict) else None) or (None, None)
+    if low is None or high is None:
+        return False
+    if known.period is not None:
+        return bool(high - low >= known.period * (1.0 - 1e-9))
+    return bool(low <= known.lower and high >= known.upper)

@@ -1,0 +1,31 @@
+"""Parameters of effects in words: what is not told is not printed as a number."""
+
+from metro.report.parameters import NOT_TOLD, effect_words, parameter_value
+
+
+def entry(value, low, high, unit="Hz"):
+    return {"value": value, "ci95": [low, high], "unit": unit}
+
+
+def test_a_number_whose_interval_is_all_that_it_may_be_is_not_told():
+    assert parameter_value("tool_runout", "angle_deg", entry(170.0, -10.0, 350.0, "deg")) == NOT_TOLD
+    assert parameter_value("tool_runout", "angle_deg", entry(170.0, 160.0, 180.0, "deg")) == "170 ± 10°"
+    assert parameter_value("stiffness_scale", "factor", entry(5.0, 0.2, 5.0, "1")) == NOT_TOLD
+    assert parameter_value("stiffness_scale", "factor", entry(0.8, 0.7, 0.9, "1")) == "0.80 ± 0.10"
+
+
+def test_lists_name_the_axes_and_the_unit_once():
+    rigid = entry(20000.0, 100.0, 20000.0)
+    found = [entry(750.0, 700.0, 800.0), entry(990.0, 900.0, 1080.0), rigid]
+    told = parameter_value("dynamometer_resonance", "frequency_hz", found)
+    assert told == "x 750 ± 50, y 990 ± 90 Hz, z not told"
+    assert parameter_value("dynamometer_resonance", "frequency_hz", [rigid] * 3) == NOT_TOLD
+    pitch = [entry(0.2, 0.1, 0.3, "deg"), entry(-0.2, -0.3, -0.1, "deg")]
+    assert parameter_value("pitch_error", "pitch_deg", pitch) == "0.20 ± 0.10, −0.20 ± 0.10°"
+
+
+def test_an_effect_of_another_package_and_one_without_intervals_are_printed_as_they_are():
+    assert parameter_value("spindle_growth", "rate", entry(3.0, 1.0, 5.0, "um")) == "3.0 ± 2.0 µm"
+    assert parameter_value("stiffness_scale", "joint", 4) == "4"
+    whole = {"effect": "stiffness_scale", "parameters": {"joint": 4, "factor": entry(5.0, 0.2, 5.0, "1")}}
+    assert effect_words(whole) == "stiffness scale (joint 4, factor not told)"
