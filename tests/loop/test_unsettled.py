@@ -34,6 +34,16 @@ def test_an_effect_that_the_base_imitates_is_not_determined():
     assert unsettled(found) == "these runs do not determine its parameters"
 
 
+def test_an_effect_of_which_the_runs_leave_everything_open_is_not_determined():
+    found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
+    half = 2.0 * float(np.sqrt(found.covariance[-1, -1] * found.dispersion))
+    for width, settled in ((0.9 * half, False), (1.1 * half, True)):
+        ends = {"lower": found.theta[0] - width, "upper": found.theta[0] + width}
+        narrow = replace(BEND, parameters=tuple(replace(p, **ends) for p in BEND.parameters))
+        bounded = replace(found, candidate=Candidate(found.candidate.base, (narrow,)))
+        assert (unsettled(bounded) == "") is settled
+
+
 def test_an_effect_at_its_bound_is_settled():
     low = replace(BEND, parameters=tuple(replace(p, upper=0.05, starts=(0.01,)) for p in BEND.parameters))
     found = fitted(problem(3, truth=Wave(bend=0.2), phased=False), low)

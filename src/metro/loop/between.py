@@ -44,7 +44,7 @@ def between_conditions(fitted: Fit) -> Between | None:
         if block.role != "calibrate":
             groups.setdefault(block.condition, []).append(block)
     runs = sum(map(len, groups.values()))
-    if runs == len(groups) or len(groups) < 2 or not len(fitted.beta):
+    if runs == len(groups) or len(groups) < 2 or not len(fitted.noise.scattering):
         return None
     among, within, told, size, expected = 0.0, 0.0, 0.0, {}, 0.0
     for name, blocks in groups.items():
@@ -72,7 +72,7 @@ def _power(moved: Array, power: Array) -> float:
 
 
 def _deviations(fitted: Fit, block: Block) -> tuple[Array, Array, Array, Array]:
-    """Return a run's deviations of the base parameters by their own spread, and by the scatter, (p,) each.
+    """Return a run's deviations of the p scattering parameters, by their own spread and by the scatter.
 
     Then the mean square of what a unit of the second changes, over that of the signal, (p, p), and which
     share of the scatter of each parameter the run tells, (p,).
@@ -82,7 +82,7 @@ def _deviations(fitted: Fit, block: Block) -> tuple[Array, Array, Array, Array]:
     directions = noise_room.shared(block, fitted.noise, matrix, fitted.beta)
     rest = block.measured - offset - matrix @ fitted.beta
     found, uncertain = noise_room.amplitude(directions, rest, noise_room.diagonal(block, fitted.noise))
-    p = len(fitted.beta)
+    p = len(fitted.noise.scattering)
     share = 1.0 - np.diag(uncertain)[:p]
     scaled = np.where(share > TOLD, found[:p] / np.sqrt(np.maximum(share, TOLD)), 0.0)
     unit = directions[:, :p] / np.linalg.norm(block.measured)

@@ -35,7 +35,7 @@ class Noise:
     Attributes
     ----------
     budget : relative model-form budget.
-    scatter : (p,) relative run-to-run standard deviation of each base parameter.
+    scatter : (p,) relative run-to-run standard deviation of each base parameter; 0: the same in every run.
     zero_factor : estimated size of the zeros in units of each block's ``zero_sd``.
     repeats : runs per condition: the budget is shared by the repeats of a condition, so it does not average
         out over them.
@@ -55,6 +55,11 @@ class Noise:
     everywhere: float = 1.0
     alike: float = 1.0
     misfit: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def scattering(self) -> np.ndarray:
+        """Places of the base parameters that differ from run to run."""
+        return np.flatnonzero(self.scatter)
 
     @cached_property
     def sound(self) -> Noise:
@@ -143,7 +148,8 @@ def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
     if block.role == "calibrate":
         return zeros
     untold = zeros[:, :0] if block.untold is None else block.untold
-    return np.hstack([design * (beta * noise.scatter), zeros, untold])
+    at = noise.scattering
+    return np.hstack([design[:, at] * (beta[at] * noise.scatter[at]), zeros, untold])
 
 
 def whitener(variance: Array, directions: Array) -> Whitener:
@@ -175,11 +181,12 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
     Parameters
     ----------
     parts : for each run: block, residual (n,), and directions (n, k) under ``noise``. The first p directions
-        of a run are those of the base parameters, then come its zeros.
+        of a run are those of the base parameters that scatter, then come its zeros.
     """
-    p = len(noise.scatter)
+    at = prior.scattering
+    p = len(at)
     amplitudes = {"scatter": [1.0] * PRIOR_RUNS, "zero": [1.0] * PRIOR_RUNS}
-    size = float(np.mean(noise.scatter / prior.scatter)) if p else 1.0
+    size = float(np.mean(noise.scatter[at] / prior.scatter[at])) if p else 1.0
     pull: dict[str, float] = {}
     weight: dict[str, float] = {}
     rests: list[tuple[Block, Array, Array]] = []

@@ -39,9 +39,9 @@ def restless(fitted: Fit, prior: Noise) -> Restless | None:
     from scipy.stats import f
 
     runs = [block for block in fitted.blocks if block.role != "calibrate"]
-    if not len(fitted.beta) or not runs:
+    if not len(at := prior.scattering) or not runs:
         return None
-    times = float(np.mean(fitted.noise.scatter / prior.scatter))
+    times = float(np.mean(fitted.noise.scatter[at] / prior.scatter[at]))
     known = noise_room.PRIOR_RUNS
     own = ((known + len(runs)) * times**2 - known) / len(runs)
     model = fitted.candidate.model(fitted.theta)

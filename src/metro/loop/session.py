@@ -40,7 +40,8 @@ def scan(fitted: Fit, seed: int) -> Step | None:
     blocks = sorted((b for b in fitted.blocks if b.role != "calibrate"), key=lambda block: block.order)
     conditions = [block.condition for block in blocks]
     groups = [np.flatnonzero(np.array(conditions) == name) for name in dict.fromkeys(conditions)]
-    if len(blocks) < LEAST_RUNS or not len(fitted.beta) or all(len(group) == 1 for group in groups):
+    at = fitted.noise.scattering
+    if len(blocks) < LEAST_RUNS or not len(at) or all(len(group) == 1 for group in groups):
         return None
     deviation = np.array([_deviation(fitted, block) for block in blocks])
     for group in groups:
@@ -52,19 +53,20 @@ def scan(fitted: Fit, seed: int) -> Step | None:
     drawn = np.array([_cusum(_permuted(scaled, groups, rng)).max() for _ in range(PERMUTATIONS)])
     place, parameter = np.unravel_index(int(np.argmax(found)), found.shape)
     relative = deviation[place + 1 :, parameter].mean() - deviation[: place + 1, parameter].mean()
-    name = fitted.candidate.base.parameters[parameter].name
+    name = fitted.candidate.base.parameters[at[parameter]].name
     p_value = (1.0 + np.count_nonzero(drawn >= found.max() - 1e-12)) / (1.0 + PERMUTATIONS)
     return Step(name, blocks[place].run, float(relative), float(p_value))
 
 
 def _deviation(fitted: Fit, block: Block) -> Array:
-    """Return the expected relative deviation of each base parameter in a run, (p,), by what is left of it."""
+    """Return the expected relative deviations of a run's base parameters that scatter, by what is left."""
     model = fitted.candidate.model(fitted.theta)
     matrix, offset = model.design(block, fitted.nuisance[block.run], fitted.beta)
     directions = noise_room.shared(block, fitted.noise, matrix, fitted.beta)
     rest = block.measured - offset - matrix @ fitted.beta
     amplitude, _ = noise_room.amplitude(directions, rest, noise_room.diagonal(block, fitted.noise))
-    return np.asarray(amplitude[: len(fitted.beta)] * fitted.noise.scatter)
+    at = fitted.noise.scattering
+    return np.asarray(amplitude[: len(at)] * fitted.noise.scatter[at])
 
 
 def _cusum(series: Array) -> Array:

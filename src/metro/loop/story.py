@@ -57,10 +57,11 @@ def told(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> JSO
 
 def _noise(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> JSON:
     noise = outcome.final.noise
-    scatter = 100.0 * float(np.mean(noise.scatter)) if len(noise.scatter) else 0.0
+    at = noise.scattering
+    scatter = 100.0 * float(np.mean(noise.scatter[at])) if len(at) else 0.0
     words = (
         f"From run to run the base parameters scatter by {scatter:.2g} % (from repeats, drawn towards "
-        f"{100 * float(np.mean(problem.scatter)) if len(problem.scatter) else 0:.2g} %); differences below "
+        f"{100 * float(np.mean(problem.scatter[at])) if len(at) else 0:.2g} %); differences below "
         f"{100 * gates.model_form_budget:.2g} % of the signal are the declared model-form budget "
         "and nobody's effect."
     )

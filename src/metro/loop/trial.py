@@ -14,8 +14,10 @@ from metro.loop.evidence import Evidence, compare, hold_out, leave_out, missed, 
 from metro.loop.fit import Fit, fit
 from metro.loop.noise import Noise
 from metro.observables.problem import Block, Limited
+from metro.units import Array
 
 LEAST_BETTER = 0.4
+HALF_INTERVAL = 2.0  # standard deviations: half a 95 % interval
 OF_THE_REST = 0.5  # an effect smaller than this share of what stays unexplained may be part of that
 UNLIKE = "no effect of the library, and it does not explain the rest either"
 
@@ -110,9 +112,21 @@ def unsettled(fitted: Fit) -> str:
     if not fitted.converged:
         by = f"{fitted.step:.2g}" if fitted.step < 99.5 else f"{fitted.step:.0f}"
         return f"its fit did not converge: a step more would move a parameter by {by} of its sd"
-    told = np.isfinite(np.diag(fitted.covariance)[len(fitted.beta) :])
-    blind = [effect for effect, place in fitted.candidate.parts(fitted.theta) if not told[place].any()]
+    variance = np.diag(fitted.covariance)[len(fitted.beta) :] * fitted.dispersion
+    half = HALF_INTERVAL * np.sqrt(np.maximum(variance, 0.0))
+    parts = fitted.candidate.parts(fitted.theta)
+    blind = any(not _told(effect, fitted.theta[place], half[place]) for effect, place in parts)
     return "these runs do not determine its parameters" if blind else beyond(fitted, fitted.blocks)
+
+
+def _told(effect: Effect, value: Array, half: Array) -> bool:
+    """Whether the interval of any parameter leaves out something that the parameter may be."""
+    return any(
+        2.0 * width < parameter.period
+        if parameter.period is not None
+        else at - width > parameter.lower or at + width < parameter.upper
+        for parameter, at, width in zip(effect.parameters, value.tolist(), half.tolist(), strict=True)
+    )
 
 
 def beyond(fitted: Fit, blocks: Sequence[Block]) -> str:

@@ -12,7 +12,14 @@ from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables import tip_force
 from metro.observables.clock import Clock, clock
-from metro.observables.joint_force_model import ForceRecord, JointForceModel, TorqueRun, in_waves, running
+from metro.observables.joint_force_model import (
+    ForceRecord,
+    Instruments,
+    JointForceModel,
+    TorqueRun,
+    in_waves,
+    running,
+)
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.observables.tip_force import ACTUAL, FORCE, JOINTS, TORQUE
@@ -26,7 +33,7 @@ from metro.units import DEG, JSON, MM, MS, Array
 
 OBSERVABLE = "joint_force"
 SCATTER = 0.01
-SYSTEMATIC = 0.005  # beside a common gain, of torques and dynamometer that are calibrated to 1 %
+CALIBRATED = 0.01  # relative error of the torque of a joint and of an axis of the dynamometer, in all runs
 REPEATABLE = 0.1  # of the torque's noise: how well the friction of the cut is that of the idle run
 
 GRID = 5 * MS
@@ -154,6 +161,8 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         "The torques of the cut less those of the idle run at the same place are what the dynamometer's "
         "force asks of the joints; friction and gravity are those of the idle run.",
         "The sensorless force is solved from all joints by weighted least squares.",
+        "All torques may be off by one factor, and those of each joint and the force along each axis by "
+        f"{CALIBRATED:.0%} besides, the same in all runs.",
         *(
             f"Run {run}: the robot log is of another time than the dynamometer's record; it is taken to "
             "start with it."
@@ -162,8 +171,20 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         *left_out,
     )
     model = JointForceModel(arm)
+    scatter = np.zeros(len(model.parameters))
+    scatter[0] = SCATTER
     return Problem(
-        OBSERVABLE, "N", 1.0, model, blocks, np.array([SCATTER]), SYSTEMATIC, notes=notes, basis_unit="N m"
+        OBSERVABLE, "N", 1.0, model, (_instruments(), *blocks), scatter, notes=notes, basis_unit="N m"
+    )
+
+
+def _instruments() -> Block:
+    """Return what is known of the gains of joints and axes."""
+    count = len(JOINTS) + len(WORK)
+    zeros, axis = np.zeros((count, 0)), np.array([*(f"joint {i}" for i in JOINTS), *WORK])
+    known, sigma = np.zeros(count), np.full(count, CALIBRATED)
+    return Block(
+        "instruments", "instruments", "calibrate", 0, known, sigma, Instruments(), axis, zeros, known[:0], {}
     )
 
 
@@ -240,7 +261,9 @@ def report(
         return {"arm": {"not_identified": {"clock_offset_s": reason}}}
     arm = arm_of_cell(batch.cell, batch.manifest)
     assert arm is not None  # else there were no problem
-    found: dict[str, Clock] = {block.run: clock(block, arm, float(fit.beta[0])) for block in task.blocks}
+    found: dict[str, Clock] = {
+        block.run: clock(block, arm, float(fit.beta[0])) for block in task.role("identify", "validate")
+    }
     return {
         "arm": {
             "clock_offset_s": {

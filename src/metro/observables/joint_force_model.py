@@ -1,9 +1,10 @@
 """The joint force model: what the motors carry in the cut beyond the idle run, given the force on the tool.
 
 Per joint and bin of the path: torque = gain × (−Jᵀ f) + drives + payload (virtual work), with f the
-dynamometer's force, averaged over a revolution of the spindle and over the bin. The rows of the comparison
-are forces: the dynamometer's, and beside it the sensorless one, which is that plus what the rest of the
-torques makes at the tip.
+dynamometer's force, averaged over a revolution of the spindle and over the bin. Each joint's torque and each
+axis of the dynamometer may have a little gain of its own besides, to first order: what instruments are known
+to. The rows of the comparison are forces: the dynamometer's, and beside it the sensorless one, which is that
+plus what the rest of the torques makes at the tip.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from metro.robot.payload import Payload, gravity_torque
 from metro.robot.statics import joint_torque, tip_jacobian
 from metro.signals.waves import waves
 from metro.units import Array
+
+JOINTS, AXES = range(1, 7), "xyz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,11 @@ class TorqueRun:
 
 
 @dataclass(frozen=True, eq=False)
+class Instruments:
+    """What is known beforehand of the gains of joints and axes: nothing but that they are small."""
+
+
+@dataclass(frozen=True, eq=False)
 class JointForceModel:
     """Torques of the cut less those of the idle run.
 
@@ -85,26 +93,38 @@ class JointForceModel:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """One factor that all torques may be off by."""
-        return (Parameter("torque_gain", "1"),)
+        """One factor that all torques may be off by, and what each joint and each axis is off besides."""
+        names = ["torque_gain", *(f"gain_of_joint_{i}" for i in JOINTS), *(f"gain_of_{a}" for a in AXES)]
+        return tuple(Parameter(name, "1") for name in names)
 
     def nuisance_starts(self, _block: Block) -> Array:
         """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
         return np.zeros((1, 0))
 
     def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
-        """Torque (6 m, 1) per gain, and what the force does not make (6 m,), N m: waves along the path."""
+        """Torque (6 m, 10) per gain, and what the force does not make (6 m,), N m: waves along the path.
+
+        Of the instruments the gains (9, 10) themselves.
+        """
         run: Any = block.setting
+        if isinstance(run, Instruments):
+            return np.eye(10)[1:], np.zeros(9)
         drives = self.drives.at(run.q, run.rate, run.since, run.width)
         other = drives + gravity_torque(self.arm, run.q, self.payload)
-        return carried(self.arm, run, self.offset)[:, None], in_waves(other)
+        return carried(self.arm, run, self.offset), in_waves(other)
 
 
 @lru_cache(maxsize=256)
 def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
-    """Waves (6 m,), N m, of the torque that the force asks for; the log stamps it ``offset`` s later."""
-    force = run.force.mean(run.t - offset, run.width)
-    return in_waves(joint_torque(tip_jacobian(arm, run.q), force))
+    """Waves (6 m, 10), N m, of the torque that the force asks for: whole, of each joint, of each axis.
+
+    The log stamps it ``offset`` s later than the dynamometer.
+    """
+    force, jacobian = run.force.mean(run.t - offset, run.width), tip_jacobian(arm, run.q)
+    by_axis = [in_waves(joint_torque(jacobian, force * axis)) for axis in np.eye(3)]
+    whole = np.sum(by_axis, axis=0)
+    by_joint = np.kron(np.eye(6), np.ones((len(force), 1))) * whole[:, None]
+    return np.column_stack([whole, by_joint, *by_axis])
 
 
 def in_waves(torque: Array) -> Array:
