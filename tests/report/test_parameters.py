@@ -29,3 +29,5 @@ def test_an_effect_of_another_package_and_one_without_intervals_are_printed_as_t
     assert parameter_value("stiffness_scale", "joint", 4) == "4"
     whole = {"effect": "stiffness_scale", "parameters": {"joint": 4, "factor": entry(5.0, 0.2, 5.0, "1")}}
     assert effect_words(whole) == "stiffness scale (joint 4, factor not told)"
+    whole["parameters"] = {"joint": "all", "factor": entry(0.8, 0.7, 0.9, "1")}
+    assert effect_words(whole) == "stiffness scale (all joints, factor 0.80 ± 0.10)"

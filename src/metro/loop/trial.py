@@ -71,7 +71,7 @@ def tried(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, l
             trial,
             q_value=float(q),
             why_not=unsettled(trial.fit)
-            or _why_not(trial.evidence, q <= gates.false_additions, least)
+            or _why_not(trial.evidence, float(q), gates, least)
             or (UNLIKE if unlike(trial.effect, trial.fit) else ""),
         )
         for trial, q in zip(trials, q_values, strict=True)
@@ -138,9 +138,11 @@ def beyond(fitted: Fit, blocks: Sequence[Block]) -> str:
     return next((f"in {run} {reason}" for run, reason in reasons if reason), "")
 
 
-def _why_not(evidence: Evidence, found: bool, least: float) -> str:
-    if not found:
-        return f"no evidence: p = {evidence.p_value:.2g} over the runs of the fit"
+def _why_not(evidence: Evidence, q: float, gates: Gates, least: float) -> str:
+    if q > gates.false_additions:
+        told = f"no evidence: p = {evidence.p_value:.2g} over the runs of the fit"
+        by_chance = f", which one of so many reaches by chance (q = {q:.2g})"
+        return told + (by_chance if evidence.p_value <= gates.false_additions else "")
     if evidence.size < least:
         return f"changes the prediction by {100 * evidence.size:.2f} %: below {100 * least:.2g} %, immaterial"
     if evidence.size < OF_THE_REST * evidence.missed:

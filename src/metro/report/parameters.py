@@ -24,7 +24,9 @@ def effect_words(effect: JSON) -> str:
 def parameter_words(effect: str, parameters: JSON) -> list[str]:
     """Return each parameter with its value and interval: radius 9.80 ± 0.30 µm."""
     return [
-        f"{parameter_name(name, entry)} {parameter_value(effect, name, entry)}".strip()
+        "all joints"
+        if (name, entry) == ("joint", "all")
+        else f"{parameter_name(name, entry)} {parameter_value(effect, name, entry)}".strip()
         for name, entry in parameters.items()
     ]
 
