@@ -66,14 +66,18 @@ class Recordings:
         finally:
             self.advance()
 
-    def pieces(self, file: str, kind: str, rows: int) -> Iterator[pd.DataFrame]:
-        """Read a file in pieces of so many rows; what cannot be read ends it, a problem gathered."""
+    def pieces(self, file: str, kind: str, rows: int, *, again: bool = False) -> Iterator[pd.DataFrame]:
+        """Read a file in pieces of so many rows; what cannot be read ends it, a problem gathered.
+
+        ``again``: it was read before, and is no step of the progress; it may have been changed since.
+        """
         try:
             yield from read_pieces(self.folder / file, kind, rows)
         except FormatError as error:
             self.problems.append(Problem("error", file, error.message))
         finally:
-            self.advance()
+            if not again:
+                self.advance()
 
     def frfs(self, file: str) -> list[ReadFrf]:
         """Read every FRF of a file; none, and a problem gathered, where that is impossible."""
@@ -132,7 +136,8 @@ def force(batch: Batch, recordings: Recordings) -> Iterator[Part]:
                 count += 1
         if len(recordings.problems) > faults or not _fit_force(batch, recordings, run, file, found):
             continue
-        for some in [table] if count == 1 else read_pieces(recordings.folder / file, "force", PIECE):
+        again = [table] if count == 1 else recordings.pieces(file, "force", PIECE, again=True)
+        for some in again:
             tool = to_tool @ some[list(FORCES)].to_numpy().T
             part = {"run": run, "t_s": some["t_s"].to_numpy() - found.zero}
             part |= dict(zip(FORCES, tool, strict=True))
