@@ -8,7 +8,7 @@ import pytest
 
 from metro.batch.batch import Batch
 from metro.stages import scans
-from metro.stages.recordings import Recordings
+from metro.stages.reading import Recordings
 
 EYE = np.eye(4).tolist()
 

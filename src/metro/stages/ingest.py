@@ -24,7 +24,7 @@ from metro.batch.processed import COLUMNS, write_batch
 from metro.batch.writing import writing
 from metro.stages import recordings as parts
 from metro.stages import scans
-from metro.stages.recordings import Recordings
+from metro.stages.reading import Recordings
 from metro.units import JSON
 
 # Canonical table → the columns of runs.csv that name its files.

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections.abc import Hashable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,14 +11,12 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.canonical import Part
-from metro.batch.findings import Finding as Problem
 from metro.batch.manifest import signed_axes
 from metro.dynamics.hits import Hit, fault
-from metro.formats import FormatError
-from metro.formats.registry import ReadFrf, read, read_frfs, read_pieces
 from metro.signals import plausible, quality
 from metro.signals.conversion import driving_point_sign, receptance, response_si, sensor_to_tool
 from metro.signals.record_quality import RecordQuality
+from metro.stages.reading import Recordings
 from metro.units import MS, Array
 
 FORCES = ("fx_n", "fy_n", "fz_n")
@@ -29,85 +25,6 @@ SET = tuple(f"q{i}_set_deg" for i in range(1, 7))
 ACTUAL = tuple(f"q{i}_deg" for i in range(1, 7))
 TORQUES = tuple(f"tau{i}_nm" for i in range(1, 7))
 PIECE = 1 << 19  # samples of a force record in memory at a time
-
-# Checks that a recording must pass to be used; one that does not is left out, and the report says so.
-MUST_PASS = frozenset({"dead channel", "clipping", "channels alike", "motion", "FRF convention"})
-
-
-@dataclass
-class Recordings:
-    """Reads the files of a batch folder, and gathers what is wrong with them and how good they are.
-
-    Attributes
-    ----------
-    advance : called when a file has been read.
-    problems : files that could not be read; they give no part.
-    findings : rows of the quality table.
-    zeros : run → the dynamometer's first time stamp, s: the zero of all clocks of that run.
-    paths : run → extents (2,) of its programmed path in x and y, mm.
-    left_out : run and column of runs.csv of each recording that is not fit for use.
-    """
-
-    folder: Path
-    advance: Callable[[], None]
-    problems: list[Problem] = field(default_factory=list)
-    findings: list[dict[str, object]] = field(default_factory=list)
-    zeros: dict[str, float] = field(default_factory=dict)
-    paths: dict[str, Array] = field(default_factory=dict)
-    left_out: list[tuple[str, str]] = field(default_factory=list)
-
-    def table(self, file: str, kind: str) -> pd.DataFrame | None:
-        """Read a file; None, and a problem gathered, where that is impossible."""
-        try:
-            return read(self.folder / file, kind)
-        except FormatError as error:
-            self.problems.append(Problem("error", file, error.message))
-            return None
-        finally:
-            self.advance()
-
-    def pieces(self, file: str, kind: str, rows: int, *, again: bool = False) -> Iterator[pd.DataFrame]:
-        """Read a file in pieces of so many rows; what cannot be read ends it, a problem gathered.
-
-        ``again``: it was read before, and is no step of the progress; it may have been changed since.
-        """
-        try:
-            yield from read_pieces(self.folder / file, kind, rows)
-        except FormatError as error:
-            self.problems.append(Problem("error", file, error.message))
-        finally:
-            if not again:
-                self.advance()
-
-    def frfs(self, file: str) -> list[ReadFrf]:
-        """Read every FRF of a file; none, and a problem gathered, where that is impossible."""
-        try:
-            return read_frfs(self.folder / file)
-        except FormatError as error:
-            self.problems.append(Problem("error", file, error.message))
-            return []
-        finally:
-            self.advance()
-
-    def note(self, file: str, run: str, findings: list[quality.Finding]) -> None:
-        """Add findings on a file to the quality table."""
-        self.findings += [{"file": file, "run": run, **finding._asdict()} for finding in findings]
-
-    def doubt(self, file: str, message: str) -> bool:
-        """Gather a problem of a file, where there is one (""); tell whether there is."""
-        self.problems += [Problem("error", file, message)] if message else []
-        return bool(message)
-
-    def fit(self, file: str, run: str, column: str, findings: list[quality.Finding]) -> bool:
-        """Note findings on a run's recording; tell whether it can be used, and leave it out otherwise."""
-        failed = [each.check in MUST_PASS and not each.ok for each in findings]
-        told = [
-            each._replace(message=f"{each.message}; the recording is left out") if bad else each
-            for each, bad in zip(findings, failed, strict=True)
-        ]
-        self.note(file, run, told)
-        self.left_out += [(run, column)] if any(failed) else []
-        return not any(failed)
 
 
 def files(batch: Batch, column: str) -> Iterator[tuple[str, str]]:

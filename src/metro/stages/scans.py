@@ -11,7 +11,8 @@ from metro.batch.canonical import Part
 from metro.batch.findings import Finding as Problem
 from metro.signals import plausible, quality
 from metro.signals.conversion import moved
-from metro.stages.recordings import POINT, Recordings, files
+from metro.stages.reading import Recordings
+from metro.stages.recordings import POINT, files
 from metro.surface.extent import face_sides, misfit
 from metro.units import Array
 
