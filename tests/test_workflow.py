@@ -6,6 +6,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from metro.batch.findings import BatchError, ConfigError
 from metro.workflow import Plan
@@ -29,6 +31,15 @@ def test_the_names_of_the_batches_and_nothing_else_match(lab):
     assert [
         name for name in ("one", "one-more", "on", "one-", "two") if re.fullmatch(plan.any_batch, name)
     ] == plan.batches
+
+
+@given(st.sets(st.text("ab.-+(1", min_size=1, max_size=6), min_size=1, max_size=12), st.text("ab.-+(1"))
+def test_names_that_begin_alike_or_hold_signs_of_expressions_are_told_apart(names, other):
+    plan = Plan(dict.fromkeys(names), {}, "")
+    found = {name for name in {*names, other} if re.fullmatch(plan.any_batch, name)}
+    assert found == names
+    for name in names:  # as snakemake uses it: within a path
+        assert re.fullmatch(f"reports/(?P<batch>{plan.any_batch})/x", f"reports/{name}/x")["batch"] == name
 
 
 def test_the_inputs_of_a_batch_are_its_files_and_its_cell(lab):

@@ -113,7 +113,7 @@ class Plan:
     @property
     def any_batch(self) -> str:
         """Regular expression that matches the known batches and nothing else."""
-        return "|".join(re.escape(name) for name in self.found)
+        return _any_of(self.found)
 
     @property
     def shell_prefix(self) -> str:
@@ -176,6 +176,18 @@ class Plan:
     def code(self, stage: str) -> str:
         """Return the hash of the code that a stage runs."""
         return code_hash(stage)
+
+
+def _any_of(names: Iterable[str]) -> str:
+    """Return a regular expression of some names, character by character.
+
+    One after the other they would be tried in turn, for each of the hundreds of files of each batch.
+    """
+    tails: dict[str, list[str]] = {}
+    for name in names:
+        tails.setdefault(name[:1], []).append(name[1:])
+    longer = "|".join(re.escape(head) + _any_of(rest) for head, rest in tails.items() if head)
+    return f"(?:{longer}){'?' if '' in tails else ''}" if longer else ""
 
 
 def _unnameable(found: Iterable[FoundBatch]) -> Iterator[Finding]:
