@@ -44,11 +44,13 @@ def test_an_effect_of_which_the_runs_leave_everything_open_is_not_determined():
         assert (unsettled(bounded) == "") is settled
 
 
-def test_an_effect_at_its_bound_is_settled():
+def test_an_effect_at_its_bound_has_converged_and_is_no_result():
     low = replace(BEND, parameters=tuple(replace(p, upper=0.05, starts=(0.01,)) for p in BEND.parameters))
     found = fitted(problem(3, truth=Wave(bend=0.2), phased=False), low)
     assert found.theta == pytest.approx([0.05])
     assert found.converged
+    (name,) = [parameter.name for parameter in low.parameters]
+    assert unsettled(found) == f"its {name} would be beyond 0.05, which is not plausible"
 
 
 def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):

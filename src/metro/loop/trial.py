@@ -107,7 +107,8 @@ def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> 
 def unsettled(fitted: Fit) -> str:
     """Say why a fit is no result, if it is none.
 
-    It did not converge, or tells no parameter of an effect, or its model does not hold there.
+    It did not converge, or tells no parameter of an effect, or these would have to be larger than they may
+    be, or its model does not hold there.
     """
     if not fitted.converged:
         by = f"{fitted.step:.2g}" if fitted.step < 99.5 else f"{fitted.step:.0f}"
@@ -115,18 +116,23 @@ def unsettled(fitted: Fit) -> str:
     variance = np.diag(fitted.covariance)[len(fitted.beta) :] * fitted.dispersion
     half = HALF_INTERVAL * np.sqrt(np.maximum(variance, 0.0))
     parts = fitted.candidate.parts(fitted.theta)
-    blind = any(not _told(effect, fitted.theta[place], half[place]) for effect, place in parts)
-    return "these runs do not determine its parameters" if blind else beyond(fitted, fitted.blocks)
+    reasons = (_untold(effect, fitted.theta[place], half[place]) for effect, place in parts)
+    return next(filter(None, reasons), "") or beyond(fitted, fitted.blocks)
 
 
-def _told(effect: Effect, value: Array, half: Array) -> bool:
-    """Whether the interval of any parameter leaves out something that the parameter may be."""
-    return any(
-        2.0 * width < parameter.period
-        if parameter.period is not None
-        else at - width > parameter.lower or at + width < parameter.upper
-        for parameter, at, width in zip(effect.parameters, value.tolist(), half.tolist(), strict=True)
-    )
+def _untold(effect: Effect, value: Array, half: Array) -> str:
+    """Say why no parameter of an effect is told: its interval is all that it may be, or it is at the end."""
+    reason = "these runs do not determine its parameters"
+    for parameter, at, width in zip(effect.parameters, value.tolist(), half.tolist(), strict=True):
+        if parameter.period is not None:
+            told = 2.0 * width < parameter.period
+        else:
+            told = at - width > parameter.lower or at + width < parameter.upper
+            if told and at in {parameter.lower, parameter.upper} - {parameter.neutral}:
+                reason, told = f"its {parameter.name} would be beyond {at:g}, which is not plausible", False
+        if told:
+            return ""
+    return reason
 
 
 def beyond(fitted: Fit, blocks: Sequence[Block]) -> str:
