@@ -32,7 +32,7 @@ def test_the_tables_say_how_many_of_how_many():
 
 @pytest.mark.slow
 def test_planned_runs_decide_what_was_undetermined(tmp_path):
-    found, batches = asked_and_cut(Layout(tmp_path), batches=12, seed=3, jobs=2)
-    assert batches == 12
-    assert found, "no batch was undetermined: nothing is tested"
-    assert sum(one.decided for one in found) >= 0.5 * len(found)
+    found, batches = asked_and_cut(Layout(tmp_path), batches=1, seed=9, jobs=1)
+    assert batches == 1
+    assert found, "the batch was not undetermined: nothing is tested"
+    assert all(one.decided and one.right for one in found)

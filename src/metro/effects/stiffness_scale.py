@@ -42,6 +42,7 @@ def _gives_way(effect: Effect, problem: Any) -> Effect | Refusal:
 OF_SIDE_CUTS = replace(
     OF_MACHINE,
     observables=("force",),
+    form="side cuts",
     signature=(
         "Side cuts by an arm, which gives way, that are deeper or shallower than the load tests let expect. "
         "Seen where the arm gives way by a part of the radial depth, and by another one in other runs."
