@@ -10,6 +10,7 @@ import pytest
 from scipy import stats
 from toy import ANGLE, BEND, BETA, GATES, POINTS, RIPPLE, SIGMA, TWIN, Wave, problem
 
+from metro.effects.effect import EffectParameter
 from metro.loop import verdict as verdicts
 from metro.loop.search import search
 from metro.loop.signature import Line, share_left
@@ -18,6 +19,7 @@ from metro.loop.verdict import (
     COMPARISON,
     REFUTED,
     UNTESTED,
+    bounded,
     comparison,
     error,
     held_out,
@@ -233,8 +235,8 @@ def test_intervals_count_runs_not_samples_and_keep_within_bounds():
     assert run_dof(outcome.final) == 11
     assert entry["ci95"][1] - entry["value"] == pytest.approx(stats.t.ppf(0.975, 11) * sd)
     tight = replace(BEND, parameters=(replace(BEND.parameters[0], upper=0.2),))
-    bounded = closed(task, (tight,))[2]["effects"][0]["parameters"]["bend"]
-    assert bounded["ci95"][1] <= 0.2
+    bend = closed(task, (tight,))[2]["effects"][0]["parameters"]["bend"]
+    assert bend["ci95"][1] <= 0.2
 
 
 def test_the_identified_fit_hands_over_the_base_parameters_and_every_runs_phase():
@@ -276,3 +278,14 @@ def test_a_rival_that_is_no_effect_of_the_library_leaves_words_and_no_error():
     assert [found["effect"] for found in verdict["effects"]] == ["bend"]
     assert "it may be no bend but a twin" in verdict["unexplained"]["signature"]
     assert verdict["unexplained"]["rms"] is None  # nothing is left over
+
+
+def test_of_a_parameter_that_may_be_anything_it_is_said_that_nothing_is_told():
+    size = EffectParameter("size", "um", 0.0, 10.0, 1.0, starts=(1.0,))
+    angle = EffectParameter("angle", "deg", 0.0, 360.0, 10.0, starts=(0.0,), period=360.0)
+    assert "told" not in bounded(size, 4.0, 1.0, 20.0)
+    assert bounded(size, 4.0, 100.0, 20.0)["ci95"] == [0.0, 10.0]
+    assert bounded(size, 4.0, 100.0, 20.0)["told"] is False
+    assert bounded(size, 4.0, np.inf, 20.0)["told"] is False
+    assert "told" not in bounded(angle, 90.0, 20.0, 20.0)
+    assert bounded(angle, 90.0, 200.0, 20.0)["told"] is False

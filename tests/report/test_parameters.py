@@ -3,31 +3,30 @@
 from metro.report.parameters import NOT_TOLD, effect_words, parameter_value
 
 
-def entry(value, low, high, unit="Hz"):
-    return {"value": value, "ci95": [low, high], "unit": unit}
+def entry(value, low, high, unit="Hz", **more):
+    return {"value": value, "ci95": [low, high], "unit": unit} | more
 
 
-def test_a_number_whose_interval_is_all_that_it_may_be_is_not_told():
-    assert parameter_value("tool_runout", "angle_deg", entry(170.0, -10.0, 350.0, "deg")) == NOT_TOLD
-    assert parameter_value("tool_runout", "angle_deg", entry(170.0, 160.0, 180.0, "deg")) == "170 ± 10°"
-    assert parameter_value("stiffness_scale", "factor", entry(5.0, 0.2, 5.0, "1")) == NOT_TOLD
-    assert parameter_value("stiffness_scale", "factor", entry(0.8, 0.7, 0.9, "1")) == "0.80 ± 0.10"
+OPEN = entry(20000.0, 100.0, 20000.0, told=False)
+
+
+def test_a_number_of_which_nothing_is_told_is_not_printed():
+    assert parameter_value("tool_runout", entry(170.0, -10.0, 350.0, "deg", told=False)) == NOT_TOLD
+    assert parameter_value("tool_runout", entry(170.0, 160.0, 180.0, "deg")) == "170 ± 10°"
+    assert parameter_value("spindle_growth", entry(3.0, 1.0, 5.0, "um")) == "3.0 ± 2.0 µm"
+    assert parameter_value("stiffness_scale", 4) == "4"
 
 
 def test_lists_name_the_axes_and_the_unit_once():
-    rigid = entry(20000.0, 100.0, 20000.0)
-    found = [entry(750.0, 700.0, 800.0), entry(990.0, 900.0, 1080.0), rigid]
-    told = parameter_value("dynamometer_resonance", "frequency_hz", found)
-    assert told == "x 750 ± 50, y 990 ± 90 Hz, z not told"
-    assert parameter_value("dynamometer_resonance", "frequency_hz", [rigid] * 3) == NOT_TOLD
+    found = [entry(750.0, 700.0, 800.0), entry(990.0, 900.0, 1080.0), OPEN]
+    assert parameter_value("dynamometer_resonance", found) == "x 750 ± 50, y 990 ± 90 Hz, z not told"
+    assert parameter_value("dynamometer_resonance", [OPEN] * 3) == NOT_TOLD
     pitch = [entry(0.2, 0.1, 0.3, "deg"), entry(-0.2, -0.3, -0.1, "deg")]
-    assert parameter_value("pitch_error", "pitch_deg", pitch) == "0.20 ± 0.10, −0.20 ± 0.10°"
+    assert parameter_value("pitch_error", pitch) == "0.20 ± 0.10, −0.20 ± 0.10°"
 
 
-def test_an_effect_of_another_package_and_one_without_intervals_are_printed_as_they_are():
-    assert parameter_value("spindle_growth", "rate", entry(3.0, 1.0, 5.0, "um")) == "3.0 ± 2.0 µm"
-    assert parameter_value("stiffness_scale", "joint", 4) == "4"
-    whole = {"effect": "stiffness_scale", "parameters": {"joint": 4, "factor": entry(5.0, 0.2, 5.0, "1")}}
+def test_an_effect_is_named_with_its_joint_and_its_parameters():
+    whole = {"effect": "stiffness_scale", "parameters": {"joint": 4, "factor": OPEN | {"unit": "1"}}}
     assert effect_words(whole) == "stiffness scale (joint 4, factor not told)"
     whole["parameters"] = {"joint": "all", "factor": entry(0.8, 0.7, 0.9, "1")}
     assert effect_words(whole) == "stiffness scale (all joints, factor 0.80 ± 0.10)"

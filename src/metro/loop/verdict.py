@@ -248,17 +248,22 @@ def _estimated(fitted: Fit, name: str) -> tuple[Effect, Array, Array]:
 
 
 def bounded(parameter: EffectParameter, value: float, deviation: float, dof: float) -> JSON:
-    """Write an effect's parameter: its interval within the bounds, that of an angle within its period."""
+    """Write an effect's parameter: its interval within the bounds, that of an angle within its period.
+
+    ``told`` is false, and otherwise absent, where that is all that the parameter may be.
+    """
     entry = quantity(value, deviation, parameter.unit, dof)
     low, high = entry["ci95"]
     if low is None:
-        return entry
+        return entry | {"told": False}
     if parameter.period is None:
         entry["ci95"] = [max(low, parameter.lower), min(high, parameter.upper)]
+        told = low > parameter.lower or high < parameter.upper
     else:
         half = min(0.5 * (high - low), 0.5 * parameter.period)
         entry["ci95"] = [value - half, value + half]
-    return entry
+        told = high - low < parameter.period
+    return entry if told else entry | {"told": False}
 
 
 def identified_fit(problem: Problem, fitted: Fit) -> BaseFit:

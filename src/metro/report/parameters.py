@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
-from metro.effects import library
-from metro.effects.effect import EffectParameter
 from metro.report.numbers import quantity, words
 from metro.units import JSON, printed_name
 
@@ -26,7 +23,7 @@ def parameter_words(effect: str, parameters: JSON) -> list[str]:
     return [
         "all joints"
         if (name, entry) == ("joint", "all")
-        else f"{parameter_name(name, entry)} {parameter_value(effect, name, entry)}".strip()
+        else f"{parameter_name(name, entry)} {parameter_value(effect, entry)}".strip()
         for name, entry in parameters.items()
     ]
 
@@ -40,12 +37,11 @@ def parameter_name(name: str, entry: Any) -> str:
     return printed_name(name, str(entry.get("unit") or ""))
 
 
-def parameter_value(effect: str, name: str, entry: Any) -> str:
+def parameter_value(effect: str, entry: Any) -> str:
     """Return a value with its interval and unit; of a list, that of each axis or item."""
-    known = _known().get((effect, name))
     if not isinstance(entry, list):
-        return NOT_TOLD if known and _anything(entry, known) else quantity(entry)
-    told = [not known or not _anything(item, known) for item in entry]
+        return quantity(entry) if _told(entry) else NOT_TOLD
+    told = [_told(item) for item in entry]
     if not any(told):
         return NOT_TOLD
     marks = [f"{axis} " for axis in "xyz"] if effect in PER_AXIS and len(entry) == 3 else [""] * len(entry)
@@ -56,16 +52,5 @@ def parameter_value(effect: str, name: str, entry: Any) -> str:
     )
 
 
-@cache
-def _known() -> dict[tuple[str, str], EffectParameter]:
-    return {(effect.name, parameter.name): parameter for effect in library() for parameter in effect.reported}
-
-
-def _anything(entry: Any, known: EffectParameter) -> bool:
-    """Whether an interval holds all that a parameter may be."""
-    low, high = (entry.get("ci95") if isinstance(entry, dict) else None) or (None, None)
-    if low is None or high is None:
-        return False
-    if known.period is not None:
-        return bool(high - low >= known.period * (1.0 - 1e-9))
-    return bool(low <= known.lower and high >= known.upper)
+def _told(entry: Any) -> bool:
+    return not isinstance(entry, dict) or entry.get("told", True)

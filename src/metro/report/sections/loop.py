@@ -79,7 +79,7 @@ def _added(entry: JSON) -> list[Item]:
         [
             words(str(effect["effect"])) if i == 0 else "",
             parameter_name(name, value),
-            parameter_value(str(effect["effect"]), name, value),
+            parameter_value(str(effect["effect"]), value),
             probability(effect.get("probability")) if i == 0 else "",
         ]
         for effect in entry.get("effects") or []
