@@ -62,6 +62,20 @@ def test_nothing_is_found_where_nothing_is_hidden(cell):
     assert found(cell) == []
 
 
+def test_the_gains_of_joints_and_of_axes_each_add_up_to_that_of_all(cell):
+    task = joint_force.problem(*cell, {})
+    block = task.role("identify")[0]
+    whole, joints, axes = np.split(task.base.design(block, np.zeros(0))[0], [1, 7], axis=1)
+    np.testing.assert_allclose(joints.sum(axis=1), whole[:, 0], atol=1e-9)
+    np.testing.assert_allclose(axes.sum(axis=1), whole[:, 0], atol=1e-9)
+    for i, axis in enumerate(np.eye(3)):
+        record = replace(block.setting.force, integral=block.setting.force.integral * axis)
+        alone = replace(block, setting=replace(block.setting, force=record))
+        np.testing.assert_allclose(task.base.design(alone, np.zeros(0))[0][:, 0], axes[:, i], atol=1e-9)
+        of_joint = np.asarray(block.axis) == f"joint {i + 1}"
+        assert not joints[~of_joint, i].any()
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_instruments_that_are_a_percent_off_are_no_effect_and_their_gains_are_told(cell, seed):
     rng = np.random.default_rng(seed)

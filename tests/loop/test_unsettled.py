@@ -44,6 +44,14 @@ def test_an_effect_of_which_the_runs_leave_everything_open_is_not_determined():
         assert (unsettled(bounded) == "") is settled
 
 
+def test_an_effect_that_may_not_be_negative_and_is_nothing_is_at_no_end():
+    found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
+    one_sided = replace(BEND, parameters=tuple(replace(p, lower=0.0) for p in BEND.parameters))
+    assert one_sided.parameters[0].neutral == 0.0
+    candidate = Candidate(found.candidate.base, (one_sided,))
+    assert unsettled(replace(found, candidate=candidate, theta=np.zeros(1))) == ""
+
+
 def test_an_effect_at_its_bound_has_converged_and_is_no_result():
     low = replace(BEND, parameters=tuple(replace(p, upper=0.05, starts=(0.01,)) for p in BEND.parameters))
     found = fitted(problem(3, truth=Wave(bend=0.2), phased=False), low)

@@ -306,6 +306,17 @@ def test_without_an_idle_run_the_force_comes_from_the_coefficients_and_the_notes
     )
 
 
+def test_the_joints_turn_as_fast_as_the_feed_takes_them_along_the_wall(cell):
+    _, task = cell.task()
+    feed = 0.06e-3 * 3 * 4000.0 / 60.0
+    for block in task.role("identify", "validate"):
+        setting = block.setting
+        travelled = setting.commanded[-1] - setting.commanded[0]
+        turned = np.trapezoid(setting.rate, dx=setting.spacing / feed, axis=0)
+        np.testing.assert_allclose(turned, travelled, atol=0.03 * np.abs(travelled).max())
+        assert np.abs(travelled).max() > 1e-3
+
+
 def test_a_tool_that_yields_is_given_the_depth_that_it_really_cuts(cell):
     """The fixed point: nominal radial depth less what the wall stands proud under that depth's force."""
     batch = replace(cell.batch, manifest=cell.batch.manifest | {"coefficients": COEFFICIENTS})
