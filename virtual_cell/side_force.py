@@ -18,9 +18,7 @@ from virtual_cell.motion import Straight
 from virtual_cell.units import MM, RPM, Array
 
 _PER_TURN, _PLACES = 72, 14
-_FINE = (
-    2880  # of 72 a turn, orders that are not seen would fold to seen ones: 6 % of order 9, 0.5 % of the mean
-)
+_FINE = 2880  # of 72, orders that are not seen would fold to seen ones: 6 % of order 9
 _BALANCE = 5  # each iteration gains a factor of compliance × slope of the force: about ten
 
 

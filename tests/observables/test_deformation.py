@@ -317,6 +317,18 @@ def test_the_joints_turn_as_fast_as_the_feed_takes_them_along_the_wall(cell):
         assert np.abs(travelled).max() > 1e-3
 
 
+def test_without_a_feed_in_the_run_table_walls_are_predicted_all_the_same(cell):
+    other, (_, task) = Cell(), cell.task()
+    other.batch = replace(other.batch, runs=other.batch.runs.assign(feed_per_tooth_mm=np.nan))
+    told = other.task()[1]
+    for block, known in zip(told.role("identify"), task.role("identify"), strict=True):
+        matrix, offset = told.base.design(block, np.zeros(0), np.full(6, 1e-6))
+        assert np.isfinite(matrix).all()
+        assert np.isfinite(offset).all()
+        assert not block.setting.rate.any()
+        assert known.setting.rate.any()
+
+
 def test_a_tool_that_yields_is_given_the_depth_that_it_really_cuts(cell):
     """The fixed point: nominal radial depth less what the wall stands proud under that depth's force."""
     batch = replace(cell.batch, manifest=cell.batch.manifest | {"coefficients": COEFFICIENTS})

@@ -1,6 +1,7 @@
 """Rows of the run table for force runs that could be made next: what the model predicts is what is cut."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,3 +87,11 @@ def test_feeds_go_as_far_as_the_user_allows():
         for limits in ({"feed_per_tooth_mm": (0.0, 0.2)}, {"feed_per_tooth_mm": (0.0, 0.3)})
     ]
     assert feeds == pytest.approx([0.2e-3, 0.3e-3])
+
+
+def test_a_cut_of_another_kind_has_no_wall_that_gives_way_as_that_of_the_run_that_it_is_like():
+    giving = [replace(run, setting=replace(run.setting, give=1e-4)) for run in RUNS]
+    found = {one.words: one.blocks[0].setting.give for one in feasible(giving, CUTTER) if one.made}
+    sides = [give for words, give in found.items() if "side cut" in words]
+    assert sides
+    assert not any(sides)

@@ -83,6 +83,7 @@ def test_the_part_of_the_force_is_that_of_the_error_of_the_mean_force_along_what
     assert one.held
     assert not replace(one, doubt=0.0002).held
     assert [figure.met for figure in split_figures([one])] == [True, None, True]
+    assert [figure.value for figure in split_figures([one])] == pytest.approx([0.1, 0.05, 1.0])
 
 
 def test_the_tables_name_the_joint_and_the_status():

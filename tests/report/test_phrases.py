@@ -27,6 +27,16 @@ def test_orders_are_told_by_what_makes_them():
     )
 
 
+def test_what_changes_along_a_run_is_no_constant_offset():
+    told = rest_words(
+        [place("z", "mean, along the run", 0.02), place("x", "order 1, once per orbit", 0.01)], 3
+    )
+    assert told == (
+        "the mean, changing along the run (z 2.0 % of the signal); "
+        "once per revolution, changing once per orbit (x 1.0 % of the signal)"
+    )
+
+
 def test_what_is_not_significant_is_not_told():
     assert rest_words([place("x", "order 1", 0.5, significant=False)], 3) == ""
 

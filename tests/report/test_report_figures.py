@@ -35,6 +35,14 @@ def test_overlay_of_force_has_a_panel_per_run_and_axis_and_one_revolution_in_eac
     assert all(lines(axes)["measured"].size == 120 for axes in figure.axes)
 
 
+def test_an_observable_that_is_alone_is_drawn_for_more_runs():
+    frame = rows("force")
+    runs = [frame[frame["run"] == frame["run"].iloc[0]].assign(run=f"r{i}") for i in range(8)]
+    many = pd.concat(runs, ignore_index=True)
+    drawn = [len(comparison.overlay(many, "force", alone=alone).axes) // 3 for alone in (False, True)]
+    assert drawn == [3, 6]
+
+
 def test_a_line_is_broken_where_nothing_was_measured():
     frame = rows("deformation")
     gap = frame[(frame["s_mm"] < 20) | (frame["s_mm"] > 30)]

@@ -78,7 +78,8 @@ def _wall_block(
     at_points = np.stack([np.interp(x / MM, along["x_mm"], along[name]) for name in FORCE], axis=1)
     commanded, actual = points[SET].to_numpy() * DEG, points[ACTUAL].to_numpy() * DEG
     count = len(kept)
-    rate = np.gradient(commanded, SPACING, axis=0) * feed(batch, run)
+    # where the run table does not tell the feed, nothing is told of what goes with it
+    rate = np.gradient(commanded, SPACING, axis=0) * np.nan_to_num(feed(batch, run))
     setting = CutWall(commanded, actual, rate, at_points, face.normal, SPACING, longest, kept)
     off = SYSTEMATIC[str(force["source"].iloc[0])]
     return Block(

@@ -215,7 +215,7 @@ def _sides(like: Block, kinds: Collection[str], cutter: Cutter) -> Iterator[Prop
         if name not in kinds:
             arc = engagement("side", direction, width, cutter.radius)
             words = f"{name}, {width / MM:.3g} mm wide at {_feed(like) / MM:.3g} mm per tooth"
-            side = replace(setting, cut=replace(setting.cut, engagement=arc))
+            side = replace(setting, cut=replace(setting.cut, engagement=arc), give=0.0)
             given = {"operation": "side", "direction": direction, "radial_depth_mm": width / MM}
             yield _proposal(words, like, side, Made(like.run, given=given))
     if "a slot" not in kinds:
@@ -224,7 +224,7 @@ def _sides(like: Block, kinds: Collection[str], cutter: Cutter) -> Iterator[Prop
         cut = replace(setting.cut, axial_depth=depth, engagement=SLOT)
         given = {"operation": "slot", "direction": "slot", "radial_depth_mm": 2.0 * cutter.radius / MM}
         made = Made(like.run, {"axial_depth_mm": 0.5}, given)
-        yield _proposal(words, like, replace(setting, cut=cut), made)
+        yield _proposal(words, like, replace(setting, cut=cut, give=0.0), made)
 
 
 def _across(name: str, like: Block, seen: Sequence[ForceSetting]) -> Iterator[Proposal]:
