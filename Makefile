@@ -3,13 +3,22 @@
 export OPENBLAS_NUM_THREADS := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-.PHONY: reports test proof-small setup lint lock clean
+.PHONY: reports test docs first-page proof-small setup lint lock clean
 
 reports: setup
 	snakemake
 
 test: lint
 	pytest -n 2 --dist loadgroup $(PYTEST_ARGS)
+
+# The pages that are made from the code, and the documentation as a site in build/site.
+docs: setup
+	python scripts/reference.py docs
+	mkdocs build --strict
+
+# The picture on the first page of the documentation: page 1 of a report.
+first-page: reports
+	python scripts/first_page.py reports/kr160-side/report.pdf docs/figures/first-page.png
 
 # Blind batches, few of them: fails where a demand is missed by more than chance.
 proof-small: setup

@@ -1,16 +1,17 @@
-"""Write the reference of every key and column from the schemas: ``python scripts/reference.py docs``.
+"""Write the reference of every key, column and effect: ``python scripts/reference.py docs``.
 
-What a key may be comes from the schema, what it means from ``reference.yaml`` beside this file; a key
-without a meaning, and a meaning without a key, are errors.
+What a key may be comes from the schema, what an effect is from its file, what each key, column and parameter
+means from ``reference.yaml`` beside this file; one without a meaning, and a meaning without one, are errors.
 """
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 
 import yaml
+from reference_effects import effects_page, row
 
 from metro.batch.columns import TABLES, Column
 from metro.units import JSON
@@ -18,7 +19,7 @@ from metro.units import JSON
 ROOT = Path(__file__).parents[1]
 MEANINGS = Path(__file__).with_suffix(".yaml")
 BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
-PARAMETERS = "[data contract](data-contract.md#effect-names-and-parameters-the-library-grows)"
+PARAMETERS = "[effects](reference-effects.md)"
 NOTE = "<!-- Made by `python scripts/reference.py docs`: change the schemas or scripts/reference.yaml. -->\n"
 
 
@@ -34,10 +35,10 @@ def pages() -> dict[str, str]:
     batch = [
         "# Reference: batch.yaml, cell.yaml and the tables\n",
         NOTE,
-        "Frames, signs and zeros, and what each column means: [data contract](data-contract.md).\n",
+        "Frames, signs and zeros: [data contract](data-contract.md#signs-frames-and-zeros).\n",
         *keys("batch.yaml", "batch", meanings["batch"]),
         *keys("cell.yaml", "cell", meanings["cell"]),
-        *(line for name, table in TABLES.items() for line in _columns(f"{name}.csv", table)),
+        *columns(TABLES, meanings["columns"]),
     ]
     config = [
         "# Reference: config/config.yaml\n",
@@ -46,7 +47,11 @@ def pages() -> dict[str, str]:
         "An unknown key is an error.\n",
         *keys("config/config.yaml", "config", meanings["config"], _defaults()),
     ]
-    return {"reference-batch.md": "\n".join(batch), "reference-config.md": "\n".join(config)}
+    return {
+        "reference-batch.md": "\n".join(batch),
+        "reference-config.md": "\n".join(config),
+        "reference-effects.md": effects_page(NOTE, meanings["effects"]),
+    }
 
 
 def keys(title: str, name: str, meanings: JSON, defaults: dict[str, str] | None = None) -> list[str]:
@@ -63,10 +68,10 @@ def keys(title: str, name: str, meanings: JSON, defaults: dict[str, str] | None 
     if set(found) != set(meanings):
         raise ValueError(f"{MEANINGS.name}, {name}: differ in {sorted(set(found) ^ set(meanings))}")
     head = ["key", "required", "value", *(["default"] if defaults else []), "meaning"]
-    lines = [f"## {title}\n", _row(head), _row(["---"] * len(head))]
+    lines = [f"## {title}\n", row(head), row(["---"] * len(head))]
     for path, (inner, needed) in found.items():
         default = [f"`{defaults[path]}`" if path in defaults else ""] if defaults else []
-        lines.append(_row([f"`{path}`", "yes" if needed else "", allowed(inner), *default, meanings[path]]))
+        lines.append(row([f"`{path}`", "yes" if needed else "", allowed(inner), *default, meanings[path]]))
     effects = ", ".join(f"`{path.removeprefix('known.')}`" for path in every if path not in found)
     return [
         *lines,
@@ -96,9 +101,25 @@ def allowed(schema: JSON) -> str:
     return f"{schema.get('description', words)}{bounds}"
 
 
-def _columns(title: str, table: Sequence[Column]) -> list[str]:
-    rows = [_row([f"`{c.name}`", "yes" if c.required else "", c.expected]) for c in table]
-    return [f"## {title}\n", _row(["column", "required", "cell"]), _row(["---"] * 3), *rows, ""]
+def columns(tables: Mapping[str, Sequence[Column]], meanings: Mapping[str, str]) -> list[str]:
+    """Return the sections of the tables, line by line.
+
+    Raises
+    ------
+    ValueError
+        A column has no meaning, or a meaning has no column.
+    """
+    named = {f"{name}.{column.name}" for name, table in tables.items() for column in table}
+    if named != set(meanings):
+        raise ValueError(f"{MEANINGS.name}, columns: differ in {sorted(named ^ set(meanings))}")
+    lines = []
+    for name, table in tables.items():
+        lines += [f"## {name}.csv\n", row(["column", "required", "cell", "meaning"]), row(["---"] * 4)]
+        for column in table:
+            needed, meaning = "yes" if column.required else "", meanings[f"{name}.{column.name}"]
+            lines.append(row([f"`{column.name}`", needed, column.expected, meaning]))
+        lines.append("")
+    return lines
 
 
 def _defaults() -> dict[str, str]:
@@ -108,10 +129,6 @@ def _defaults() -> dict[str, str]:
     inner = {f"{name}.{key}": value for name, part in parts.items() for key, value in part.items()}
     flat = {key: value for key, value in content.items() if key not in parts}
     return {key: json.dumps(value) for key, value in (flat | inner).items()}
-
-
-def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ from typing import Any
 
 SHIM, OWN = "https://unpkg.com/iframe-worker/shim", "assets/iframe-worker.js"
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
-EM = 100.0  # units of a drawing per em of the text around it
+EM = 100.0  # units of a drawing per em of its letters
+SIZE = 1.15  # of its letters, which are lower than those of the text around it
 STEPS = {1: "M", 2: "L", 3: "Q", 4: "C", 79: "Z"}  # codes of a matplotlib path
 
 
@@ -40,6 +41,7 @@ def drawn(formula: str, displayed: bool) -> str:
     source = " ".join(formula.split())
     font = FontProperties(family="STIXGeneral", size=EM, math_fontfamily="stix")
     width, height, depth, *_ = MathTextParser("path").parse(f"${source}$", dpi=72, prop=font)
+    scale = SIZE / EM
     outline = TextPath((0, 0), f"${source}$", prop=font)
     path = " ".join(
         STEPS[int(code)] + ("" if code == 79 else " ".join(f"{number:.0f}" for number in points))
@@ -48,7 +50,8 @@ def drawn(formula: str, displayed: bool) -> str:
     svg = (
         f'<svg role="img" aria-label="{html.escape(source)}" fill="currentColor" '
         f'viewBox="0 {depth - height:.0f} {width:.0f} {height:.0f}" '
-        f'style="height:{height / EM:.2f}em;max-width:100%;vertical-align:{-depth / EM:.2f}em">'
+        f'style="width:{scale * width:.2f}em;height:{scale * height:.2f}em;max-width:none;'
+        f'vertical-align:{-scale * depth:.2f}em">'
         f'<path transform="scale(1 -1)" d="{path}"/></svg>'
     )
-    return f'<div style="text-align:center">{svg}</div>' if displayed else svg
+    return f'<div class="formula">{svg}</div>' if displayed else svg

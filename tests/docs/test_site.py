@@ -8,7 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pypdfium2
 import pytest
+import yaml
 
 ROOT = Path(__file__).parents[2]
 FETCHED = re.compile(
@@ -59,6 +61,42 @@ def test_formulas_are_drawings_that_say_what_they_are(site):
     page = (site / "errata.html").read_text(encoding="utf-8")
     assert 'role="img" aria-label="X_g \\leq X_a \\leq X_m"' in page
     assert "arithmatex" not in re.sub(r"<code>.*?</code>", "", page)
+
+
+def test_every_page_has_one_name_on_the_first_page_and_in_the_menu():
+    index = (ROOT / "docs/index.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| \[(.+?)\]\(([\w-]+\.md)\) \|", index, re.MULTILINE)
+    titles = {
+        path.name: path.open(encoding="utf-8").readline()[2:-1] for path in (ROOT / "docs").glob("*.md")
+    }
+    assert {page: name for name, page in rows} == {k: v for k, v in titles.items() if k != "index.md"}
+    navigation = yaml.load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"), yaml.BaseLoader)["nav"]
+    (first, *groups) = navigation
+    in_menu = [page for group in groups for pages in group.values() for page in pages]
+    assert (first, in_menu) == ("index.md", [page for _, page in rows])
+    headings = re.findall(r"^### (.+)$", index, re.MULTILINE)
+    assert headings == [name for group in groups for name in group]
+
+
+def test_a_formula_keeps_its_size_in_a_narrow_cell():
+    hooks = runpy.run_path(str(ROOT / "scripts/site_hooks.py"))
+    for formula in (r"\frac{1}{k}", r"X_g \leq X_a \leq X_m"):
+        shown = hooks["drawn"](formula, displayed=False)
+        drawn = [float(each) for each in re.search(r'viewBox="0 \S+ (\d+) (\d+)"', shown).groups()]
+        style = re.search(r'style="width:([\d.]+)em;height:([\d.]+)em;max-width:none;', shown).groups()
+        expected = [hooks["SIZE"] * each / hooks["EM"] for each in drawn]
+        assert [float(each) for each in style] == pytest.approx(expected, abs=0.01)
+
+
+def test_the_picture_of_a_report_is_small_and_a_script_makes_it(tmp_path):
+    own = (ROOT / "docs/figures/first-page.png").read_bytes()
+    assert own.startswith(b"\x89PNG")
+    assert len(own) < 150_000
+    document = pypdfium2.PdfDocument.new()
+    document.new_page(595, 842)
+    document.save(tmp_path / "report.pdf")
+    picture = runpy.run_path(str(ROOT / "scripts/first_page.py"))["picture"]
+    assert 0 < picture(tmp_path / "report.pdf", tmp_path / "page.png") < len(own)
 
 
 def test_a_formula_that_cannot_be_drawn_is_an_error():

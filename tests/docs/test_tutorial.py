@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pypdfium2
 import pytest
 
@@ -38,12 +39,35 @@ def test_every_line_of_the_tutorial_works_and_finds_what_was_hidden(tmp_path):
     )
     assert done.returncode == 0, done.stdout + done.stderr
     lab = tmp_path / "lab"
-    verdict = json.loads((lab / "reports/first-slots/verdict.json").read_text())["observables"]["force"]
+    page = PAGE.read_text(encoding="utf-8")
+    told = re.findall(r"radius ([\d.]+) ± ([\d.]+) µm,\s+angle ([\d.]+) ± ([\d.]+)°", page)
+    for batch, values in zip(("first-cuts", "my-slots"), told, strict=True):
+        found = runout_of(lab, batch)
+        radius, angle = found["radius_um"], found["angle_deg"]
+        low, high = radius["ci95"]
+        assert low < 12 < high
+        assert abs((angle["value"] - 40 + 45) % 90 - 45) < 3 * np.diff(angle["ci95"])[0] / 2
+        shown = [radius["value"], np.diff(radius["ci95"])[0] / 2, angle["value"] % 90]
+        numbers = [float(value) for value in values]
+        assert [*numbers[:2], numbers[2] % 90] == pytest.approx(shown, rel=0.02)
+    document = pypdfium2.PdfDocument(lab / "reports/first-cuts/report.pdf")
+    assert "tool runout" in document[0].get_textpage().get_text_range()
+    assert [path.name for path in tmp_path.iterdir()] == ["lab"]
+
+
+def runout_of(lab, batch):
+    verdict = json.loads((lab / f"reports/{batch}/verdict.json").read_text())["observables"]["force"]
     assert verdict["status"] == "explained"
     (runout,) = verdict["effects"]
     assert runout["effect"] == "tool_runout"
-    low, high = runout["parameters"]["radius_um"]["ci95"]
-    assert low < 12 < high
-    document = pypdfium2.PdfDocument(lab / "reports/first-slots/report.pdf")
-    assert "tool runout" in document[0].get_textpage().get_text_range()
-    assert [path.name for path in tmp_path.iterdir()] == ["lab"]
+    return runout["parameters"]
+
+
+def test_what_the_page_says_is_printed_has_lines_of_commands_that_are_run():
+    """A box of what is printed stands below a box that is run, and names the batch as that does."""
+    page = PAGE.read_text(encoding="utf-8")
+    prints = re.findall(r'^```text title="prints"$', page, re.MULTILINE)
+    assert len(prints) >= 8
+    for before in re.split(r'^```text title="prints"$', page, flags=re.MULTILINE)[:-1]:
+        closed = before.rstrip().rpartition("```")[0]
+        assert closed.rpartition("```")[2].startswith("shell\n")

@@ -1,9 +1,6 @@
-"""The library of effects: its own, those of other packages, and the documented example."""
+"""The library of effects; the documented example of another package: ``tests/docs``."""
 
-import re
-import sys
-from importlib import metadata
-from pathlib import Path
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,34 +8,15 @@ import pytest
 
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
-from metro.cutting.force import COEFFICIENTS, Cut
+from metro.cutting.force import Cut
 from metro.cutting.law import EdgeLaw
 from metro.effects import library, told_of
 from metro.effects.effect import fitted_to
 from metro.observables.dynamometer import Recording
 from metro.observables.force_model import ForceModel, ForceSetting
-from metro.observables.problem import Block, Problem
+from metro.observables.problem import Problem, Refusal
 
 RECORDING = Recording((0.5,), 1.0, 50.0)
-DOCS = Path(__file__).parents[2] / "docs" / "effects.md"
-
-
-@pytest.fixture
-def third_party(tmp_path, monkeypatch):
-    """A distribution on the path, as pip would leave it, whose module is the example of the documentation."""
-    (code,) = re.findall(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
-    (points,) = re.findall(r"```toml\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
-    name, target = re.search(r'^(\w+) = "([\w.]+:\w+)"$', points, re.MULTILINE).groups()
-    assert '[project.entry-points."metro.effects"]' in points
-    module, _ = target.split(":")
-    (tmp_path / f"{module}.py").write_text(code, encoding="utf-8")
-    info = tmp_path / "shop_effects-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: shop-effects\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[metro.effects]\n{name} = {target}\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    yield name
-    sys.modules.pop(module, None)
 
 
 def test_the_package_finds_its_own_effects_in_the_order_of_their_names():
@@ -65,33 +43,6 @@ def test_every_effect_is_described_and_can_be_started(effect):
         assert parameter.scale > 0
         # an angle is turned into the one turn that its bounds span
         assert parameter.period in {None, parameter.upper - parameter.lower}
-
-
-def test_an_effect_of_another_package_is_found_by_its_entry_point(third_party):
-    assert third_party in {entry.name for entry in metadata.entry_points(group="metro.effects")}
-    assert third_party in {effect.name for effect in library("force")}
-    assert len(library()) == len({(effect.name, effect.form) for effect in library()})
-
-
-def test_without_that_package_it_is_not_there():
-    assert "edge_dulling" not in {effect.name for effect in library()}
-
-
-def test_the_documented_effect_does_to_the_force_what_it_says(third_party):
-    effect = next(effect for effect in library("force") if effect.name == third_party)
-    model = ForceModel(Cutter(6e-3, 0.5, evenly_pitched(2)), EdgeLaw())
-    cut = Cut(1e-4, 1e-3, Engagement(0.0, np.pi))
-    zeros = np.zeros(39)
-    setting = ForceSetting(cut, 0.0, 6, Recording((0.5,), 1.0, 100.0), 2.0)
-    block = Block(
-        "r1", "c", "identify", 1, zeros, zeros + 1, setting,
-        np.repeat(["x", "y", "z"], 13), np.zeros((39, 0)), np.zeros(0), {},
-    )  # fmt: skip
-    changed = effect.apply(model, {"edge_share_per_m": 0.1})
-    before, after = (m.design(block, np.zeros(1))[0] for m in (model, changed))
-    edge = [COEFFICIENTS.index(name) for name in ("kte", "kre", "kae")]
-    assert after[:, edge] == pytest.approx(1.2 * before[:, edge])  # two metres cut
-    assert after[:, :3] == pytest.approx(before[:, :3])
 
 
 def test_the_base_model_is_told_of_what_the_manifest_declares():
@@ -127,3 +78,12 @@ def test_a_model_without_the_part_that_an_effect_changes_is_not_asked_for_it():
     assert able == ()
     assert unable["payload_error"] == "what is predicted here has no payload"
     assert set(unable) == {effect.name for effect in library("joint_force")}
+
+
+def test_what_changes_nothing_in_a_batch_is_not_missed_unless_it_is_asked_for():
+    some = next(effect for effect in library("force") if not effect.part)
+    moot = replace(some, name="moot", adapt=lambda *_: Refusal("no run is helical", moot=True))
+    lacking = replace(some, name="lacking", adapt=lambda *_: Refusal("no second feed"))
+    problem = SimpleNamespace(base=object())
+    assert fitted_to((moot, lacking), problem) == ((), {"lacking": "no second feed"})
+    assert fitted_to((moot,), problem, moot=True)[1] == {"moot": "no run is helical"}
