@@ -10,9 +10,12 @@ import pandas as pd
 import pytest
 from drawn_page import EVIL, written_page
 
-from metro.report.page.faces import coarse
-from metro.report.page.markup import embedded, tag
-from metro.report.page.packing import decimals, fitting, kept, packed
+from metro.report.content import Bullets, Table
+from metro.report.page.curves import run_curves
+from metro.report.page.faces import coarse, face_maps
+from metro.report.page.markup import embedded, items_of, tag
+from metro.report.page.packing import decimals, fitting, gaps, kept, packed
+from metro.report.results import Results
 
 VOID = {"meta", "img", "hr", "br", "link", "input"}
 
@@ -57,12 +60,15 @@ def plots(page, place):
 def test_nothing_is_loaded_from_elsewhere_and_links_lead_to_reports_and_sections(page):
     parsed = Parsed(page)
     targets = {a["id"] for _, a in parsed.elements if "id" in a}
+    beside = ("report.pdf", "verdict.json", "identified.json", "provenance.json")
+    files = {"", "summary.pdf", *(f"{batch}/{file}" for batch in ("late", "early") for file in beside)}
     for name, attributes in parsed.elements:
         assert name not in {"link", "iframe", "object", "base"}
         assert attributes.get("src", "data:").startswith("data:")
         link = attributes.get("href", "")
-        assert link in ("", "late/report.pdf", "early/report.pdf") or link[1:] in targets
+        assert link in files or link[1:] in targets
         assert not any(key.startswith("on") or key == "style" for key in attributes)
+    assert files <= {"", *(a.get("href") for _, a in parsed.elements)}
     policy = next(a["content"] for _, a in parsed.elements if "http-equiv" in a)
     assert policy.startswith("default-src 'none'; img-src data:; script-src 'sha256-")
     assert "https://" not in page
@@ -103,9 +109,7 @@ def test_curves_and_boundary_carry_what_was_measured(page):
         pytest.approx(1.0, abs=0.01),
     )
     boundary = drawn["Stability boundary"]["curves"][0]
-    assert boundary["told"][0].startswith(
-        "1000 rpm: 2.00 ± 0.20 mm, chatter at 88.0 Hz (hopf); base model 1.50"
-    )
+    assert boundary["told"][0].startswith("1000 rpm: 2.00 ± 0.20 mm, chatter at 88.0 Hz; base model 1.50")
     assert [(m["look"], m["y"]) for m in boundary["marks"]] == [("stable", 1.0), ("chatter", 3.0)]
 
 
@@ -134,9 +138,90 @@ def test_thinning_keeps_every_peak_that_is_seen():
 def test_a_face_of_many_points_becomes_means_of_neighbourhoods():
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(200.0), np.arange(10.0)))
     across, along, z = coarse(pd.DataFrame({"x_mm": x, "y_mm": y, "deviation_um": 3.0 * x}))
-    assert (z.shape, len(across), along.tolist()) == ((10, 50), 50, list(np.arange(10.0)))
+    assert (z.shape, len(across), along.tolist()) == ((10, 100), 100, list(np.arange(10.0)))
     assert z.mean() == pytest.approx(3.0 * x.mean())
-    assert np.abs(z - 3.0 * across).max() <= 3.0 * 199 / 50 / 2 + 1e-9
+    assert np.abs(z - 3.0 * across).max() <= 3.0 * 199 / 100 / 2 + 1e-9
+
+
+def test_a_face_that_fits_is_drawn_as_it_was_measured_and_its_extremes_are_always_of_all_places(page):
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(60.0), np.arange(35.0)))
+    known = pd.DataFrame({"x_mm": x, "y_mm": y, "deviation_um": np.sin(7.0 * x + y)})
+    assert coarse(known)[2].ravel() == pytest.approx(known["deviation_um"].to_numpy())
+    z = np.zeros(2000)
+    z[777] = 90.0
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(1000.0), np.arange(2.0)))
+    large = pd.DataFrame({"run": "r1", "x_mm": x, "y_mm": y, "deviation_um": z + 0.01 * x})
+    drawn = face_maps(Results(None, {"face_map": large}, {}, {}, {}), 400_000)["curves"][0]["layers"][0]
+    assert drawn["told"] == "from 0 to 97.8"
+    assert unpacked(drawn["z"]).max() < 20.0  # the mean of a neighbourhood
+
+
+def test_all_faces_of_a_batch_have_one_limit_of_colours_and_each_its_own(page):
+    plot = plots(page, 1)["Faces, all runs"]
+    whole = np.concatenate([unpacked(face["layers"][0]["z"]) for face in plot["curves"]])
+    assert plot["limit"] == pytest.approx(np.quantile(np.abs(whole), 0.98), rel=1e-3)
+    own = [face["layers"][0]["limit"] for face in plot["curves"]]
+    assert (own[0], own[1]) == (pytest.approx(4 * own[1]), pytest.approx(own[0] / 4))
+    assert own[1] < plot["limit"] < own[0]
+    assert (plot["mm"], plot["first"]) == (1e-3, ["r1"])
+
+
+def test_a_gap_is_eight_usual_steps_and_is_kept_when_a_curve_is_thinned():
+    x = np.concatenate([np.arange(3000.0), np.arange(5000.0, 6000.0)])
+    assert gaps(x).tolist() == [3000]
+    assert gaps(np.array([0.0, 1.0, 2.0, 9.9, 10.9])).size == 0
+    assert gaps(np.array([0.0, 1.0, 2.0, 10.1, 11.1])).tolist() == [3]
+    assert gaps(np.ones(3)).size == 0
+    at = kept([np.sin(x)], gaps(x))
+    assert {2999, 3000} <= set(at.tolist())
+    assert len(at) < 1000
+
+
+def test_where_nothing_was_measured_a_curve_is_broken_and_the_run_missed_most_comes_first(page):
+    plot = plots(page, 0)["Held-out runs: waviness of the wall"]
+    assert [curve["gaps"] for curve in plot["curves"]] == [[40], [40]]
+    assert plot["first"] == ["w2", "z", "all"]
+    assert plot["options"] == {"w1": "w1: rms 0.200 → 0.100 µm", "w2": "w2: rms 0.800 → 0.100 µm"}
+    assert plot["curves"][1]["said"] == "w2, along z"
+
+
+def test_one_value_per_axis_makes_one_plot_over_the_axes(page):
+    plot = plots(page, 0)["Held-out runs: cutting force"]
+    (curve,) = plot["curves"]
+    assert (plot["x"], curve["rows"]) == ("axis", ["x", "y", "z"])
+    assert unpacked(curve["lines"][0]["y"]) == pytest.approx([78.0, -176.0, -35.0], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("run", "rows"), [("table 6, 71–73", ["71", "72", "73"]), ("table 6, 71–75", ["1", "2", "3"])]
+)
+def test_places_of_a_table_are_named_by_the_printed_rows_where_these_are_known(run, rows):
+    blank = dict.fromkeys(("t_s", "angle_deg", "s_mm", "x_mm", "y_mm"), np.nan)
+    frame = pd.DataFrame(
+        {"observable": "flatness", "run": run, "axis": "z", **blank, "measured": [1.0, 2.0, 3.0],
+         "before": 1.0, "after": 1.0, "sigma": 0.1, "unit": "mm"}
+    )  # fmt: skip
+    drawn = run_curves(Results(None, {"comparison": frame}, {}, {}, {}), "flatness", 10_000)
+    assert (drawn["x"], drawn["curves"][0]["rows"]) == ("row of the table", rows)
+
+
+def test_responses_are_logarithms_of_the_measured_and_of_the_modal_receptance(page):
+    plot = plots(page, 0)["Frequency responses"]
+    assert (plot["first"], plot["log"]) == (["1", "1x → 2x"], True)
+    measured, modal = (unpacked(line["y"]) for line in plot["curves"][1]["lines"])
+    hz = unpacked(plot["curves"][1]["x"])
+    exact = np.abs(1e-8 / (1 - (hz / 120.0) ** 2 + 0.04j * hz / 120.0))
+    assert 10.0**measured == pytest.approx(exact, rel=1e-3)
+    assert modal - measured == pytest.approx(np.full(200, np.log10(1.01)), abs=1e-4)
+
+
+def test_names_of_batches_lead_to_them_and_values_stay_with_their_intervals():
+    table = Table(["reason", "batches"], [["a mean of 9.80 ± 0.30 mm over all of it", "b1, other"]], "c")
+    made = items_of([Bullets(["b1, cutting force: b1 again"]), table], {"b1": "#batch-b1"})
+    assert '<li><a href="#batch-b1">b1</a>, cutting force: b1 again</li>' in made
+    assert '<td class="long"><a href="#batch-b1">b1</a>, other</td>' in made
+    assert "a mean of 9.80\u00a0±\u00a00.30\u00a0mm over" in made
+    assert "tabindex" not in made  # only what scrolls is a stop: the page finds out itself
 
 
 def test_what_does_not_fit_is_left_out_by_worth_and_the_order_stays():

@@ -179,6 +179,166 @@ def test_a_face_is_turned_and_read_with_keys(page):
     assert canvas.evaluate("c => c.toDataURL()") == before
 
 
+def unfolded(page, batch):
+    page.locator(f"#batch-{batch} > summary").click()
+    page.wait_for_selector(f"#batch-{batch} .plot")
+
+
+def test_a_line_is_broken_where_nothing_was_measured(page):
+    unfolded(page, "early")
+    chart = plot(page, "Held-out runs: waviness of the wall").locator("svg.chart")
+    parts = [p.get_attribute("d").count("M") for p in chart.locator("path.line").all()]
+    assert parts == [2] * 6  # three lines; below them zero, and what either prediction leaves
+    assert [p.get_attribute("d").count("M") for p in chart.locator("path.area").all()] == [2, 2]
+
+
+def test_one_value_per_axis_is_a_mark_with_its_interval(page):
+    unfolded(page, "early")
+    name = "Held-out runs: cutting force"
+    here = page.locator("#batch-early figure.plot").filter(has=page.get_by_role("heading", name=name))
+    chart = here.locator("svg.chart")
+    assert chart.locator("g > .mark.measured").count() == 3
+    assert chart.locator("g > .mark.before").count() == 6  # and what is left over
+    assert [bar.get_attribute("d").count("L") for bar in chart.locator("path.bar").all()] == [3, 3]
+    assert chart.locator("path.line.measured").count() == 0
+    assert [t.text_content() for t in chart.locator("text.middle").all()][:3] == ["x", "y", "z"]
+    assert here.locator("output").inner_text() == (
+        "axis y: measured −176.0 ± 2.0 N; base model (nothing added) −156.0 N; left over: −20.0 N "
+        "(table 7, test 2)"
+    )
+
+
+def test_a_peak_above_the_frame_is_pointed_at_and_seen_when_zoomed_into(page):
+    here = plot(page, "Stability boundary")
+    note = here.get_by_text("goes on above")
+    assert here.locator("svg .beyond").count() == 2
+    assert note.is_visible()
+    here.locator("svg.chart").focus()
+    for _ in range(6):
+        page.keyboard.press("ArrowRight")
+    assert read(page, "Stability boundary").startswith("1800 rpm: 20.0 ± 2.0 mm")
+    page.keyboard.press("+")
+    assert here.locator("svg .beyond").count() == 0
+    assert not note.is_visible()
+    assert "20" in [t.text_content() for t in here.locator("svg text.end").all()]
+    page.keyboard.press("Home")
+    assert here.locator("svg .beyond").count() == 2
+
+
+def test_what_is_left_over_is_read_and_only_what_keys_lead_to_is_spoken(page):
+    name = "Held-out runs: cutting force"
+    chart, spoken = plot(page, name).locator("svg.chart"), plot(page, name).locator(".unseen")
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 60)
+    assert "left over: base model −12.0 N, with effects found −1.0 N" in read(page, name)
+    assert spoken.text_content() == ""
+    chart.focus()
+    page.keyboard.press("End")
+    assert spoken.text_content() == read(page, name)
+    assert read(page, name).startswith("spindle angle 357 °")
+    assert read(page, name).endswith("(r1, along x)")
+    assert chart.get_attribute("aria-label") == f"{name}: r1, along x"
+
+
+def test_a_drag_past_the_edge_shows_the_part_up_to_it_and_another_axis_keeps_it(page):
+    name = "Held-out runs: cutting force"
+    chart = plot(page, name).locator("svg.chart")
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 50)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] + 60, box["y"] + 60, steps=4)
+    page.mouse.up()
+    seen, told = ticks(page, name), read(page, name).partition(":")[0]
+    assert seen[0] == "290"
+    assert "350" in seen
+    plot(page, name).get_by_label("axis").select_option("y")
+    assert (ticks(page, name), read(page, name).partition(":")[0]) == (seen, told)
+
+
+def test_a_face_is_turned_by_drag_and_coloured_by_itself(page):
+    here = plot(page, "Faces, all runs")
+    canvas = here.locator("canvas")
+    picture = "c => c.toDataURL()"
+    assert canvas.evaluate("c => getComputedStyle(c).touchAction") == "none"
+    toggle = here.get_by_role("button", name="Scale to this face")
+    first = canvas.evaluate(picture)
+    toggle.click()
+    assert toggle.get_attribute("aria-pressed") == "true"
+    assert canvas.evaluate(picture) != first
+    toggle.click()
+    assert canvas.evaluate(picture) == first
+    box = canvas.bounding_box()
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 160, box["y"] + 110)
+    page.mouse.up()
+    assert canvas.evaluate(picture) != first
+
+
+def test_a_link_unfolds_its_batch_again_after_all_were_folded(page, address):
+    batch = page.locator("#batch-late")
+    link = page.locator("a[href='#batch-late']").first
+    link.click()
+    page.get_by_role("button", name="Fold all", exact=True).click()
+    assert batch.get_attribute("open") is None
+    link.click()
+    assert batch.get_attribute("open") is not None
+
+
+def test_paper_gets_every_plot_and_the_page_is_folded_again_after_it(page):
+    assert page.locator("#batch-early .plot").count() == 0
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.locator("details.batch[open]").count() == 2
+    assert page.locator("#batch-early .plot").count() == 3
+    page.emulate_media(media="print")
+    assert not page.get_by_role("button", name="Larger").first.is_visible()
+    assert plot(page, "Faces, all runs").locator("h4 small").inner_text() == "r1, measured, less its plane"
+    page.emulate_media(media="screen")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.locator("#batch-early").get_attribute("open") is None
+    assert page.locator("#batch-late").get_attribute("open") is not None
+
+
+def test_verdicts_are_sifted_and_sorted(page):
+    table = page.locator("table[data-verdicts]")
+    rows = table.locator("tbody tr:visible")
+    assert rows.count() == 5
+    page.get_by_role("button", name="needs attention 1").click()
+    assert rows.count() == 1
+    assert "waviness" in rows.first.inner_text()
+    page.get_by_role("button", name="all 5").click()
+
+    def column(i):
+        return [row.locator("td").nth(i).inner_text() for row in rows.all()]
+
+    head = table.get_by_role("columnheader", name="observable")
+    head.get_by_role("button").click()
+    assert head.get_attribute("aria-sort") == "ascending"
+    assert column(1) == sorted(column(1))
+    head.get_by_role("button").click()
+    assert head.get_attribute("aria-sort") == "descending"
+    assert column(1) == sorted(column(1), reverse=True)
+
+
+def test_text_of_plots_is_readable_on_a_telephone(page):
+    page.set_viewport_size({"width": 420, "height": 800})
+    page.wait_for_timeout(200)
+    for chart in page.locator("svg.chart").all():
+        assert chart.locator("text").first.evaluate("t => t.getBoundingClientRect().height") > 11
+    for canvas in page.locator("canvas.face").all():
+        shown, drawn = canvas.evaluate("c => [c.getBoundingClientRect().width, c.width]")
+        assert drawn == pytest.approx(shown, abs=1)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 420
+    value = plot(page, "Stability boundary").locator("output .short").first
+    assert (value.inner_text(), value.evaluate("v => v.getClientRects().length")) == ("2.00 ± 0.20", 1)
+    assert page.locator(".scroll[tabindex='0']").count() >= 1
+    page.set_viewport_size({"width": 1100, "height": 800})
+    page.wait_for_timeout(200)
+    assert page.locator(".scroll[tabindex='0']").count() == 0
+
+
 @pytest.mark.skipif(
     not AXE.is_file(), reason="axe-core is not installed (npm install axe-core, or METRO_AXE)"
 )

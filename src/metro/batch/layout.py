@@ -18,10 +18,11 @@ OBSERVED: tuple[str, ...] = (
     ),
     "face_planned",
     *("modes", "lobes", "frf_used", "stabilisation", "lobe_runs", "lobes_refused"),
-    *("lobe_methods", "lobe_islands", "lobe_stations", "chatter_runs", "chatter_records"),
+    *("mode_shapes", "mode_mac", "lobe_methods", "lobe_islands", "lobe_stations"),
+    *("chatter_runs", "chatter_records"),
     *("published_errors", "published_modes", "published_loads", "published_matrices"),
     "published_forces",
 )
 
 # What the plots of the campaign's page are drawn from
-PAGE: tuple[str, ...] = ("comparison", "lobes", "lobes_final", "lobe_islands", "face_map")
+PAGE: tuple[str, ...] = ("comparison", "lobes", "lobes_final", "lobe_islands", "frf_used", "face_map")

@@ -1,6 +1,8 @@
-"""Curves of held-out runs and stability boundaries, as a page draws them."""
+"""Curves of held-out runs, measured and predicted, as a page draws them."""
 
 from __future__ import annotations
+
+import re
 
 import numpy as np
 import pandas as pd
@@ -13,16 +15,25 @@ from metro.report.figures.comparison import (
     coordinate,
     predictions,
 )
-from metro.report.figures.lobes import top_of
-from metro.report.numbers import number, probability, with_interval
-from metro.report.page.packing import decimals, fitting, kept, left_out, notes, packed
+from metro.report.numbers import number
+from metro.report.page.packing import (
+    THINNED,
+    decimals,
+    fitting,
+    gaps,
+    kept,
+    left_out,
+    notes,
+    packed,
+    rms_by_run,
+)
 from metro.report.results import Results, title
-from metro.report.sections.lobes import placed
 from metro.units import JSON, Array, printed
 
 HELP = (
-    "Arrow left and right: move the line. Up and down: next test cut, where there are any. + and −: zoom at "
-    "the line. Shift with an arrow: move the part that is seen. Home: all of it. Mouse: drag over a part to "
+    "Arrow left and right: move the line. Page up and page down: ten places on or back. End: to the last "
+    "place. Up and down: next test cut, where there are any. + and −: zoom at the line; the heights follow. "
+    "Shift with an arrow: move the part that is seen. Home: all of it. Mouse or finger: drag over a part to "
     "see it, double click for all."
 )
 
@@ -32,44 +43,77 @@ def run_curves(results: Results, observable: str, budget: int) -> JSON | None:
     frame = results.compared(observable)
     if frame is None or observable == "lobes":
         return None
-    column, drawn, label = coordinate(frame), predictions(frame), axis_labels(frame)
-    runs = [str(run) for run in frame["run"].drop_duplicates()]
-    curves, thinned = [], False
+    column, drawn = coordinate(frame), predictions(frame)
+    frame = frame.assign(run=frame["run"].astype(str), axis=axis_labels(frame))
+    if not column and not frame.duplicated(["run", "axis"]).any():
+        # one value per axis: the axes are the places
+        frame, keys = frame.assign(label=frame["axis"], axis=""), ["run"]
+    else:
+        keys = ["run", "axis", "part"]
+    runs = list(frame["run"].drop_duplicates())
+    entries, thinned = [], False
     for run in runs:
-        mine = []
-        for axis in axes_of(frame):
-            rows = frame[(frame["run"] == run) & (label == axis)]
-            for block, part in _blocks(rows):
-                curve, fewer = _curve(part, column, drawn)
-                mine.append({"key": [run, axis or "–", block], **curve})
-                thinned |= fewer
-        curves.append({"curves": mine})
-    missed = (frame["measured"] - frame["before"]).abs().groupby(frame["run"].astype(str)).mean()
-    shown = fitting(curves, budget, [float(missed[run]) for run in runs])
-    long = "of long curves the lowest and the highest of every line in each of 200 equal parts is drawn"
-    shown_unit = printed(str(frame["unit"].iloc[0]))
+        curves = []
+        for key, rows in _parts(frame[frame["run"] == run]):
+            curve, fewer = _curve(rows, column, drawn)
+            said = [run, *([f"along {key[0]}"] if key[0] else []), *([key[1]] if key[1] != "all" else [])]
+            curves.append({"key": [run, *key][: len(keys)], "said": ", ".join(said), **curve})
+            thinned |= fewer
+        entries.append({"curves": curves})
+    missed = {kind.column: _missed(frame, kind) for kind in drawn}
+    shown = fitting(entries, budget, [missed["before"][run] for run in runs])
+    unit = printed(str(frame["unit"].iloc[0]))
+    name = title(observable)
     return {
         "kind": "chart",
-        "title": f"Held-out runs: {title(observable)}",
-        "x": COORDINATES.get(column, "place in the table"),
-        "y": f"{title(observable)} ({shown_unit})" if shown_unit else title(observable),
-        "unit": shown_unit,
-        "keys": ["run", "axis", "part"],
+        "title": f"Held-out runs: {name}",
+        "x": COORDINATES.get(column, "row of the table" if "part" in keys else "axis"),
+        "y": f"{name} ({unit})" if unit else name,
+        "unit": unit,
+        "keys": keys,
+        "options": {run: run_option(run, [missed[kind.column][run] for kind in drawn], unit) for run in runs},
+        "first": _first(frame, keys, max(runs, key=lambda run: missed["before"][run])),
         "curves": [curve for entry in shown for curve in entry["curves"]],
         "note": notes(
             left_out(len(shown), len(runs), "held-out runs", "those that the base model misses most"),
-            long * thinned,
+            THINNED * thinned,
         ),
         "help": HELP,
     }
 
 
-def _blocks(rows: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
-    """Part what repeats over the revolution by its time in the record; all else is one piece."""
-    times = np.unique(rows["t_s"].dropna())
-    if rows["angle_deg"].isna().any() or times.size < 2:
-        return [("all", rows)] if len(rows) else []
-    return [(f"{number(float(t))} s", rows[rows["t_s"] == t]) for t in times]
+def _missed(rows: pd.DataFrame, kind: Prediction) -> dict[str, float]:
+    rest = (rows["measured"] - rows[kind.column]).to_numpy(float)
+    return rms_by_run(rest, rows["run"].to_numpy(str))
+
+
+def run_option(run: str, errors: list[float], unit: str) -> str:
+    """Name a run with its error before, and after where anything was added."""
+    return f"{run}: rms {' → '.join(number(error) for error in errors)} {unit}".rstrip()
+
+
+def _first(frame: pd.DataFrame, keys: list[str], run: str) -> list[str]:
+    """Return the key of the curve of a run that the base model misses most."""
+
+    def missed(part: tuple[list[str], pd.DataFrame]) -> float:
+        return float(((part[1]["measured"] - part[1]["before"]) ** 2).mean())
+
+    key, _ = max(_parts(frame[frame["run"] == run]), key=missed)
+    return [run, *key][: len(keys)]
+
+
+def _parts(rows: pd.DataFrame) -> list[tuple[list[str], pd.DataFrame]]:
+    """Part a run by axis, and what repeats over the revolution by its time in the record."""
+    found = []
+    for axis in axes_of(rows):
+        mine = rows[rows["axis"] == axis]
+        times = np.unique(mine["t_s"].dropna())
+        if mine["angle_deg"].isna().any() or times.size < 2:
+            found.append(([axis, "all"], mine))
+        else:
+            told = (f"at {number(float(t))} s of the record" for t in times)
+            found += [([axis, text], mine[mine["t_s"] == t]) for text, t in zip(told, times, strict=True)]
+    return found
 
 
 def _curve(part: pd.DataFrame, column: str, drawn: tuple[Prediction, ...]) -> tuple[JSON, bool]:
@@ -77,111 +121,26 @@ def _curve(part: pd.DataFrame, column: str, drawn: tuple[Prediction, ...]) -> tu
     part = part.sort_values(column, kind="stable") if column else part
     measured, half = part["measured"].to_numpy(float), 1.96 * part["sigma"].to_numpy(float)
     predicted = [part[kind.column].to_numpy(float) for kind in drawn]
-    x = part[column].to_numpy(float) if column else np.arange(1.0, len(part) + 1)
-    at = kept([measured, *predicted])
-    band = {"low": packed((measured - half)[at]), "high": packed((measured + half)[at])}
+    x: Array = part[column].to_numpy(float) if column else np.arange(1.0, len(part) + 1)
+    after = gaps(x)
+    at = kept([measured, *predicted], after)
     lines = [{"name": "measured", "look": "measured", "y": packed(measured[at])}]
     if np.isfinite(half).any():
-        lines[0] |= band
+        lines[0] |= {"low": packed((measured - half)[at]), "high": packed((measured + half)[at])}
     looks = zip(drawn, predicted, strict=True)
     lines += [{"name": kind.label, "look": kind.column, "y": packed(y[at])} for kind, y in looks]
     width = float(np.nanmedian(half)) if np.isfinite(half).any() else np.nan
     digits = decimals(width, float(np.nanmax(np.abs(measured))))
-    return {"x": packed(x[at]), "lines": lines, "decimals": digits, "places": len(part)}, len(at) < len(part)
+    curve = {"x": packed(x[at]), "lines": lines, "decimals": digits, "places": len(part)}
+    curve |= {"gaps": np.searchsorted(at, after).tolist()}
+    return (curve if column else {**curve, "rows": _rows(part)}), len(at) < len(part)
 
 
-def boundary_curves(results: Results, budget: int) -> JSON | None:
-    """Return the stability boundary of every position before and after, with its test cuts and islands."""
-    tables = results.tables
-    after = tables.get("lobes_final", tables.get("lobes"))
-    if after is None:
-        return None
-    before, islands = tables.get("lobes"), tables.get("lobe_islands")
-    compared = results.compared("lobes")
-    cuts = None if compared is None else placed(results, compared)
-    positions = list(after["position"].drop_duplicates())
-    curves = [_boundary(position, after, before, cuts, islands) for position in positions]
-    shown = fitting(curves, budget, [-float(i) for i in range(len(curves))])
-    return {
-        "kind": "chart",
-        "title": "Stability boundary",
-        "x": "spindle speed (rpm)",
-        "y": "depth of cut (mm)",
-        "unit": "mm",
-        "keys": ["position"],
-        "curves": shown,
-        "note": notes(left_out(len(shown), len(positions), "positions", "the first")),
-        "help": HELP,
-    }
-
-
-def _boundary(
-    position: object,
-    after: pd.DataFrame,
-    before: pd.DataFrame | None,
-    cuts: pd.DataFrame | None,
-    islands: pd.DataFrame | None,
-) -> JSON:
-    line = after[after["position"] == position].sort_values("rpm").reset_index(drop=True)
-    base = None if before is None else _at_speeds(before[before["position"] == position], line["rpm"])
-    changed = base is not None and not np.allclose(
-        *(base["depth_mm"], line["depth_mm"]), rtol=1e-9, atol=0, equal_nan=True
-    )
-    lines = [_depths(line, "boundary with effects found" if changed else "boundary (nothing added)", "after")]
-    if changed and base is not None:
-        lines.append({"name": "base model", "look": "before", "y": packed(base["depth_mm"].to_numpy(float))})
-    here = None if cuts is None else cuts[cuts["position"].astype(str) == str(position)]
-    none = pd.DataFrame({"depth_mm": []})
-    top = 1.15 * top_of(line["depth_mm"], none if here is None else here)
-    spans = [] if islands is None else islands[islands["position"] == position].to_dict("records")
-    return {
-        "key": [str(position)],
-        "x": packed(line["rpm"].to_numpy(float)),
-        "lines": lines,
-        "told": [_told(row, base, i if changed else None) for i, row in line.iterrows()],
-        "marks": [] if here is None else [_mark(row) for _, row in here.iterrows()],
-        "spans": [[float(s["rpm"]), float(s["from_mm"]), float(s["to_mm"])] for s in spans],
-        "range": [0.0, top],
-        "places": len(line),
-    }
-
-
-def _depths(line: pd.DataFrame, name: str, look: str) -> JSON:
-    band: dict[str, Array] = {
-        key: line[f"depth_{key}_mm"].to_numpy(float) for key in ("lo", "hi") if f"depth_{key}_mm" in line
-    }
-    entry = {"name": name, "look": look, "y": packed(line["depth_mm"].to_numpy(float))}
-    return entry | ({"low": packed(band["lo"]), "high": packed(band["hi"])} if len(band) == 2 else {})
-
-
-def _at_speeds(base: pd.DataFrame, rpm: pd.Series) -> pd.DataFrame | None:
-    """Return the base model's boundary at the speeds of the other; None where it was solved elsewhere."""
-    rows = base.set_index("rpm")
-    known = rows.index.is_unique and len(rows) > 0
-    return rows.reindex(rpm).reset_index() if known else None
-
-
-def _told(row: pd.Series, base: pd.DataFrame | None, place: object) -> str:
-    """Say what the boundary is at one speed, in the report's numbers."""
-    text = f"{number(row['rpm'], 4)} rpm: {_depth(row)} mm"
-    if np.isfinite(row["chatter_hz"]):
-        text += f", chatter at {number(row['chatter_hz'])} Hz ({row['kind']})"
-    if base is not None and isinstance(place, int):
-        text += f"; base model {_depth(base.iloc[place])} mm"
-    return text
-
-
-def _depth(row: pd.Series) -> str:
-    return with_interval(row["depth_mm"], [row.get("depth_lo_mm"), row.get("depth_hi_mm")])
-
-
-def _mark(row: pd.Series) -> JSON:
-    chatter = bool(row["measured"] > 0.5)
-    cut = f"{row['run']}: {number(row['depth_mm'])} mm at {number(row['rpm'], 4)} rpm"
-    odds = f"P(chatter) {probability(row['before'])} before, {probability(row['after'])} after"
-    return {
-        "x": float(row["rpm"]),
-        "y": float(row["depth_mm"]),
-        "look": "chatter" if chatter else "stable",
-        "told": f"Test cut {cut}: {'chatter' if chatter else 'stable'}; {odds}",
-    }
+def _rows(part: pd.DataFrame) -> list[str]:
+    """Name the places of a table: by axis, by the printed rows where a run is a span of them, or counted."""
+    if "label" in part:
+        return [str(label) for label in part["label"]]
+    span = re.search(r"(\d+)–(\d+)$", str(part["run"].iloc[0]))
+    first, last = (int(span[1]), int(span[2])) if span else (1, 0)
+    start = first if last - first + 1 == len(part) else 1
+    return [str(start + i) for i in range(len(part))]

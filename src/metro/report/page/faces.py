@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from metro.report.figures.comparison import predictions
 from metro.report.numbers import number
-from metro.report.page.packing import decimals, fitting, left_out, notes, packed
+from metro.report.page.curves import run_option
+from metro.report.page.packing import (
+    Indices,
+    decimals,
+    fitting,
+    left_out,
+    notes,
+    packed,
+    rms_by_run,
+)
 from metro.report.results import Results
 from metro.units import JSON, Array, printed
 
-Indices = npt.NDArray[np.intp]
-
-MOST = 50  # places of a face along either direction
+MOST = 100  # places of a face along either direction
+MM = {"µm": 1e-3, "mm": 1.0}  # of a unit of height
+SEEN = 0.98  # share of the heights that the scale of colours tells apart
 HELP = (
-    "Arrows: turn the face. Shift with an arrow: move the ring from place to place. + and −: heights. Home: "
-    "as it was. T: from above. Mouse: drag to turn, point at a place to read it."
+    "Arrows: turn the face. Shift with an arrow: move the ring from place to place. End: the ring to the "
+    "highest place. + and −: heights. Home: as it was. T: from above. Mouse or finger: drag to turn, point "
+    "at a place to read it."
 )
 
 
@@ -28,17 +37,28 @@ def face_maps(results: Results, budget: int) -> JSON | None:
         return None
     known = frame.dropna(subset=["deviation_um"])
     runs = [str(run) for run in known["run"].drop_duplicates()]
+    limit = _limit(known["deviation_um"].to_numpy(float))
     faces, coarser = [], False
     for run in runs:
-        x, y, z = coarse(known[known["run"] == run])
-        coarser |= z.size < int((known["run"] == run).sum())
-        layer = {"name": "measured, less its plane", **_layer(z.ravel())}
-        faces.append({"key": [run], "columns": len(x), "x": packed(x), "y": packed(y), "layers": [layer]})
+        mine = known[known["run"] == run]
+        x, y, z = coarse(mine)
+        coarser |= z.size < len(mine)
+        layer = _layer("measured, less its plane", z.ravel(), mine["deviation_um"].to_numpy(float))
+        places = {"x": packed(x), "y": packed(y)}
+        faces.append({"key": [run], "said": run, "columns": len(x), **places, "layers": [layer]})
     spread = known.groupby(known["run"].astype(str))["deviation_um"].std().fillna(0.0)
     shown = fitting(faces, budget, [float(spread[run]) for run in runs])
-    means = f"each face is drawn by the means of up to {MOST} × {MOST} neighbourhoods"
+    means = (
+        f"each face is drawn by the means of up to {MOST} × {MOST} neighbourhoods, its extremes are of all "
+        "places"
+    )
     some = left_out(len(shown), len(runs), "faces", "the least flat")
-    return {**_map("Faces, all runs", "µm", shown), "note": notes(some, means * coarser)}
+    first = max(runs, key=lambda run: float(spread[run]))
+    return {
+        **_map("Faces, all runs", "µm", limit, shown),
+        "first": [first],
+        "note": notes(some, means * coarser),
+    }
 
 
 def point_maps(results: Results, budget: int) -> JSON | None:
@@ -47,32 +67,43 @@ def point_maps(results: Results, budget: int) -> JSON | None:
     if frame is None or frame[["x_mm", "y_mm"]].isna().any(axis=None):
         return None
     kinds = predictions(frame)
-    runs = [str(run) for run in frame["run"].drop_duplicates()]
+    frame = frame.assign(run=frame["run"].astype(str))
+    runs = list(frame["run"].drop_duplicates())
+    height = frame["measured"].to_numpy(float)
+    limit = _limit(height - frame.groupby("run")["measured"].transform("mean").to_numpy(float))
     faces = []
     for run in runs:
         part = frame[frame["run"] == run]
         measured = part["measured"].to_numpy(float)
-        half = 1.96 * float(part["sigma"].median())
-        middle = float(measured.mean())
-        limit = _limit(measured - middle)  # one scale of colours for all that is compared
-        layers = [{"name": "measured", **_layer(measured, half, middle, limit)}]
+        half, middle = 1.96 * float(part["sigma"].median()), float(measured.mean())
+        layers = [_layer("measured", measured, measured, half, middle)]
         for kind in kinds:
             predicted = part[kind.column].to_numpy(float)
+            rest = measured - predicted
             layers += [
-                {"name": f"predicted: {kind.label}", **_layer(predicted, half, middle, limit)},
-                {"name": f"left by: {kind.label}", **_layer(measured - predicted, half, 0.0, limit)},
+                _layer(f"predicted: {kind.label}", predicted, predicted, half, middle),
+                _layer(f"left by: {kind.label}", rest, rest, half),
             ]
         places = {"x": packed(part["x_mm"].to_numpy(float)), "y": packed(part["y_mm"].to_numpy(float))}
-        faces.append({"key": [run], "columns": 0, **places, "layers": layers})
-    missed = (frame["measured"] - frame["before"]).abs().groupby(frame["run"].astype(str)).mean()
-    shown = fitting(faces, budget, [float(missed[run]) for run in runs])
+        faces.append({"key": [run], "said": run, "columns": 0, **places, "layers": layers})
+    names = frame["run"].to_numpy(str)
+    rests = [rms_by_run(height - frame[kind.column].to_numpy(float), names) for kind in kinds]
+    missed = rests[0]
+    shown = fitting(faces, budget, [missed[run] for run in runs])
     some = left_out(len(shown), len(runs), "held-out faces", "those that the base model misses most")
-    name = printed(str(frame["unit"].iloc[0]))
-    return {**_map("Held-out faces at the points of the path", name, shown), "note": notes(some)}
+    unit = printed(str(frame["unit"].iloc[0]))
+    options = {run: run_option(run, [rest[run] for rest in rests], unit) for run in runs}
+    drawn = _map("Held-out faces at the points of the path", unit, limit, shown)
+    return {
+        **drawn,
+        "options": options,
+        "first": [max(runs, key=lambda run: missed[run])],
+        "note": notes(some),
+    }
 
 
 def coarse(part: pd.DataFrame) -> tuple[Array, Array, Array]:
-    """Return places x (m,), y (n,) and heights (n, m) of a face, no more than 50 along either direction.
+    """Return places x (m,), y (n,) and heights (n, m) of a face, no more than 100 along either direction.
 
     A height is the mean of those measured in its neighbourhood, NaN where there is none.
     """
@@ -95,18 +126,24 @@ def _grouped(places: Array) -> tuple[Indices, Array]:
     return group, (edges[1:] + edges[:-1]) / 2.0
 
 
-def _limit(z: Array) -> float:
-    """Return the height at which a scale of colours that is even about zero ends."""
-    return float(np.nanquantile(np.abs(z), 0.995)) or 1.0
+def _limit(deviation: Array) -> float:
+    """Return the deviation at which a scale of colours ends: few are beyond it."""
+    return float(np.nanquantile(np.abs(deviation), SEEN)) or 1.0
 
 
-def _layer(z: Array, half: float = np.nan, middle: float = 0.0, limit: float = 0.0) -> JSON:
-    """Return heights, their scale of colours (``middle`` ± ``limit``), and the extremes in words."""
-    known = z[np.isfinite(z)]
-    limit = limit or _limit(known - middle)
-    told = f"from {number(float(known.min()))} to {number(float(known.max()))}"
-    return {"z": packed(z), "middle": middle, "limit": limit, "decimals": decimals(half, limit), "told": told}
+def _layer(name: str, z: Array, all_of_it: Array, half: float = np.nan, middle: float = 0.0) -> JSON:
+    """Return heights as they are drawn, and the extremes of all of them in words.
+
+    The colours of the face alone end at ``middle`` ± ``limit``.
+    """
+    low, high = float(np.nanmin(all_of_it)), float(np.nanmax(all_of_it))
+    limit = _limit(all_of_it - middle)
+    told = f"from {number(low)} to {number(high)}"
+    digits = decimals(half, limit)
+    return {"name": name, "z": packed(z), "middle": middle, "limit": limit, "decimals": digits, "told": told}
 
 
-def _map(title: str, name: str, faces: list[JSON]) -> JSON:
-    return {"kind": "map", "title": title, "unit": name, "keys": ["run"], "curves": faces, "help": HELP}
+def _map(title: str, unit: str, limit: float, faces: list[JSON]) -> JSON:
+    """Return a plot of faces; ``limit`` is that of the colours of all faces of the batch."""
+    size = {"unit": unit, "mm": MM.get(unit, 1.0), "limit": limit}
+    return {"kind": "map", "title": title, **size, "keys": ["run"], "curves": faces, "help": HELP}

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from metro.report.content import Abreast, Bullets, Facts, Heading, Item, Paragraph, Picture, Simple, Table
+from metro.report.document import UNIT
 from metro.report.style import to_svg
 
 SHORT = 26  # characters of a cell that is not broken into lines
@@ -61,7 +62,7 @@ def items_of(items: Sequence[Item], links: Mapping[str, str], level: int = 3) ->
 
     Parameters
     ----------
-    links : name of a batch → where a table's cell with that name leads to. level : of headings among them.
+    links : name of a batch → where it leads to, in tables and lists. level : of headings among them.
     """
     flat = [part for item in items for part in (item.items if isinstance(item, Abreast) else [item])]
     return joined([_item(item, links, level) for item in flat])
@@ -70,9 +71,9 @@ def items_of(items: Sequence[Item], links: Mapping[str, str], level: int = 3) ->
 def _item(item: Simple, links: Mapping[str, str], level: int) -> Html:
     match item:
         case Paragraph():
-            return tag("p", item.text, class_=item.look)
+            return tag("p", _unbroken(item.text), class_=item.look)
         case Bullets():
-            return tag("ul", *(tag("li", text) for text in item.items))
+            return tag("ul", *(tag("li", _linked(text, links)) for text in item.items))
         case Heading():
             return tag(f"h{level}", item.text)
         case Facts():
@@ -96,20 +97,28 @@ def _table(table: Table, links: Mapping[str, str]) -> Html:
         tag("tr", *(_cell(n, c, links) for n, c in zip(table.header, row, strict=True))) for row in table.rows
     ]
     caption = tag("caption", table.caption)
-    # wide tables scroll by themselves, and with the keyboard
-    return tag(
-        "div",
-        tag("table", caption, tag("thead", head), tag("tbody", *rows)),
-        class_="scroll",
-        tabindex="0",
-        role="group",
-        aria_label=table.caption,
-    )
+    verdicts = {"data_verdicts": ""} if {"batch", "verdict"} <= set(table.header) else {}
+    inside = tag("table", caption, tag("thead", head), tag("tbody", *rows), **verdicts)
+    return tag("div", inside, class_="scroll", role="group", aria_label=table.caption)
 
 
 def _cell(column: str, text: str, links: Mapping[str, str]) -> Html:
-    if column == "batch" and text in links:
-        return tag("td", tag("a", text, href=links[text]), class_="short")
     if column == "verdict":
         return tag("td", badge(text))
-    return tag("td", text, class_="short") if len(text) <= SHORT else tag("td", text)
+    if column in ("batch", "batches"):
+        return tag("td", _linked(text, links), class_="short" if column == "batch" else "long")
+    return (
+        tag("td", text, class_="short") if len(text) <= SHORT else tag("td", _unbroken(text), class_="long")
+    )
+
+
+def _linked(text: str, links: Mapping[str, str]) -> Html:
+    """Let the names of batches in a list, or before what is said of one, lead to them."""
+    names = text.split(", ")
+    parts = [tag("a", name, href=links[name]) if name in links else _unbroken(name) for name in names]
+    return joined([joined([", ", part]) if i else part for i, part in enumerate(parts)])
+
+
+def _unbroken(text: str) -> str:
+    """Keep a value, its interval and its unit on one line."""
+    return UNIT.sub("\u00a0", text.replace(" ± ", "\u00a0±\u00a0"))

@@ -13,9 +13,13 @@ import numpy.typing as npt
 from metro.report.numbers import listing
 from metro.units import JSON, Array
 
+Indices = npt.NDArray[np.intp]
+
 STEPS = 65534  # of the span of a curve; the code after them says that there is no value
 PARTS = 200  # into which a long curve is cut
 LONG = 6 * PARTS  # places that a curve may have before it is thinned
+GAP = 8  # median steps of a curve that make a gap, over which nothing is joined
+THINNED = "of long curves the lowest and the highest of every line in each of 200 equal parts is drawn"
 
 
 def packed(values: Array) -> JSON:
@@ -27,17 +31,27 @@ def packed(values: Array) -> JSON:
     return {"low": low, "high": high, "data": base64.b64encode(code.tobytes()).decode()}
 
 
-def kept(lines: Sequence[Array]) -> npt.NDArray[np.intp]:
+def gaps(x: Array) -> Indices:
+    """Return the places (of a coordinate in rising order) that come after a gap: eight median steps."""
+    step = np.diff(x)
+    known = step[step > 0]
+    return 1 + np.flatnonzero(step > GAP * np.median(known)) if known.size else np.zeros(0, dtype=np.intp)
+
+
+def kept(lines: Sequence[Array], after: Indices | None = None) -> Indices:
     """Return the places of a curve that are seen: in each of 200 equal parts, every line's extremes.
 
     Parameters
     ----------
     lines : (n,) each. All n places are kept where there are no more than six times as many as parts.
+    after : places after a gap: they are kept, and those before it.
     """
     count = len(lines[0])
     if count <= LONG:
         return np.arange(count)
     places = [np.array([0, count - 1])]
+    if after is not None:
+        places += [after - 1, after]
     for part in np.array_split(np.arange(count), PARTS):
         for line in lines:
             at = part[np.isfinite(line[part])]
@@ -76,3 +90,8 @@ def notes(*told: str) -> str:
     """Join remarks to one sentence; empty where there are none."""
     text = listing([each for each in told if each])
     return text[:1].upper() + text[1:] + "." if text else ""
+
+
+def rms_by_run(rest: Array, run: npt.NDArray[np.str_]) -> dict[str, float]:
+    """Return the root mean square of what is left of every run."""
+    return {str(name): float(np.sqrt(np.nanmean(rest[run == name] ** 2))) for name in np.unique(run)}

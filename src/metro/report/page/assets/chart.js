@@ -1,152 +1,170 @@
 // Lines over one coordinate: a part of it can be seen larger, and the values under a movable line are read out.
 
-const BOX = { width: 760, height: 320, left: 66, right: 14, top: 10, bottom: 44 };
+const BOX = { left: 66, right: 14, top: 10, main: 266, between: 16, strip: 96, bottom: 44 };
 
 function chart(host, plot) {
-  const inside = { x: BOX.width - BOX.left - BOX.right, y: BOX.height - BOX.top - BOX.bottom };
   const clip = `clip-${frames + 1}`;
   const ground = svg("g");
   const cursor = svg("g", { class: "cursor" });
-  const picked = svg("rect", { class: "picked", y: BOX.top, height: inside.y, width: 0 });
-  const drawing = svg("svg", { viewBox: `0 0 ${BOX.width} ${BOX.height}`, class: "chart" },
-    svg("clipPath", { id: clip }, svg("rect", { x: BOX.left, y: BOX.top, width: inside.x, height: inside.y })),
-    ground, picked, cursor);
+  const picked = svg("rect", { class: "picked", y: BOX.top, width: 0 });
+  const opening = svg("rect", { x: BOX.left, y: BOX.top });
+  const drawing = svg("svg", { class: "chart" }, svg("clipPath", { id: clip }, opening), ground, picked, cursor);
   const [, across, unit = ""] = /^(.*?)(?: \((.*)\))?$/.exec(plot.x);
-  const legend = html("ul", { class: "legend" });
-  let curve, from, to, low, high, at, mark, read;
+  const above = html("li", {}, "▲ goes on above: zoom in to see it");
+  let curve, panels = [], from, to, at = 0, mark = null;
+  const around = frame(host, plot, drawing, resize);
 
-  const px = (x) => BOX.left + ((x - from) / (to - from)) * inside.x;
-  const py = (y) => BOX.top + ((high - y) / (high - low)) * inside.y;
+  const inside = () => around.width() - BOX.left - BOX.right;
+  const px = (x) => BOX.left + ((x - from) / (to - from)) * inside();
+  const py = (panel) => (y) => panel.top + ((panel.high - y) / (panel.high - panel.low)) * panel.tall;
+  const bottom = () => panels[panels.length - 1].top + panels[panels.length - 1].tall;
   const place = (event) => {
     const area = drawing.getBoundingClientRect();
-    const x = ((event.clientX - area.left) / area.width) * BOX.width;
-    const y = ((event.clientY - area.top) / area.height) * BOX.height;
-    return { x, y, value: from + ((x - BOX.left) / inside.x) * (to - from) };
+    const scale = around.width() / area.width;
+    const x = Math.min(Math.max((event.clientX - area.left) * scale, BOX.left), BOX.left + inside());
+    return { x, y: (event.clientY - area.top) * scale, value: from + ((x - BOX.left) / inside()) * (to - from) };
   };
 
   function choose(next) {
-    curve = { ...next, x: unpack(next.x), marks: next.marks || [], spans: next.spans || [] };
+    const before = curve && { ends: whole(), x: curve.x[at] };
+    curve = { ...next, x: unpack(next.x), marks: next.marks || [], gaps: new Set(next.gaps || []) };
     curve.lines = next.lines.map((line) => ({ ...line, y: unpack(line.y),
       low: line.low && unpack(line.low), high: line.high && unpack(line.high) }));
-    at = Math.floor(curve.x.length / 2);
+    const main = { ...next, lines: curve.lines, marks: curve.marks, label: plot.y, top: BOX.top, tall: BOX.main };
+    const strip = { lines: rest(), label: `left over${plot.unit ? ` (${plot.unit})` : ""}`,
+      top: BOX.top + BOX.main + BOX.between, tall: BOX.strip };
+    panels = strip.lines.length ? [main, strip] : [main];
     mark = null;
     name();
-    all();
+    around.choose(next.said || "");
+    const span = whole(), size = span[1] - span[0];
+    // a curve over the same coordinate is seen as the one before was
+    const same = before && span.every((end, i) => Math.abs(end - before.ends[i]) < 1e-3 * size);
+    at = same ? nearest(curve.x, before.x) : Math.floor(curve.x.length / 2);
+    if (!same) [from, to] = span;
+    resize();
+  }
+
+  // Measured less predicted, over the interval of the measured value about zero.
+  function rest() {
+    const [measured, ...predicted] = curve.lines;
+    if (measured.look !== "measured" || plot.log) return [];
+    const half = measured.low && measured.low.map((low, i) => (measured.high[i] - low) / 2);
+    const zero = { look: "zero", y: measured.y.map(() => 0), low: half && half.map((h) => -h), high: half };
+    return [zero, ...predicted.map((line) => ({ ...line, y: measured.y.map((y, i) => y - line.y[i]) }))];
+  }
+
+  function whole() {
+    if (curve.rows) return [0.5, curve.rows.length + 0.5];
+    return ends([...curve.x, ...curve.marks.map((m) => m.x)], 0);
   }
 
   function all() {
-    [from, to] = ends([...curve.x, ...curve.marks.map((m) => m.x)], 0);
+    [from, to] = whole();
     redraw();
   }
 
-  function ends(values, margin) {
-    const known = values.filter(Number.isFinite);
-    let first = known.length ? Math.min(...known) : 0;
-    let last = known.length ? Math.max(...known) : 1;
-    if (first === last) [first, last] = [first - 1, last + 1];
-    return [first - margin * (last - first), last + margin * (last - first)];
+  // The heights that a panel shows: of what is seen; the whole may have some of its own.
+  function heights(panel) {
+    const [first, last] = whole();
+    if (panel.range && to - from > 0.999 * (last - first)) return panel.range;
+    const lines = panel.lines.flatMap((line) => [line.y, line.low, line.high].filter(Boolean));
+    const marks = (panel.marks || []).filter((m) => m.x >= from && m.x <= to).map((m) => m.y);
+    const [low, high] = ends([...lines.flatMap((line) => [...line].filter((_, i) => reached(i))), ...marks], 0.05);
+    return [panel.range ? panel.range[0] : low, high];
   }
 
-  function heights() {
-    if (curve.range) return curve.range;
-    const seen = (_, i) => curve.x[i] >= from && curve.x[i] <= to;
-    const lines = curve.lines.flatMap((line) => [line.y, line.low, line.high].filter(Boolean));
-    return ends(lines.flatMap((line) => [...line].filter(seen)), 0.05);
-  }
+  // Places that are seen, and those next to them, to which their lines go.
+  const reached = (i) => (curve.x[i + 1] ?? Infinity) >= from && (curve.x[i - 1] ?? -Infinity) <= to;
+  const seen = (i) => curve.x[i] >= from && curve.x[i] <= to;
 
   function name() {
     const swatch = (look) => svg("svg", { viewBox: "0 0 26 10", class: "swatch", "aria-hidden": "true" },
-      look === "stable" || look === "chatter" ? symbol(look, 13, 5)
+      look === "stable" || look === "chatter" || (curve.rows && look !== "band") ? symbol(look, 13, 5)
         : svg("path", { class: `line ${look}`, d: "M0 5H26" }));
     const entries = curve.lines.map((line) => [line.look, line.name]);
     if (curve.lines.some((line) => line.low)) entries.push(["band", "95 % interval"]);
     if (curve.marks.some((m) => m.look === "stable")) entries.push(["stable", "stable cut"]);
     if (curve.marks.some((m) => m.look === "chatter")) entries.push(["chatter", "chatter"]);
-    if (curve.spans.length) entries.push(["span", "stable island"]);
-    legend.replaceChildren(...entries.map(([look, text]) => html("li", {}, swatch(look), ` ${text}`)));
+    if ((curve.spans || []).length) entries.push(["span", "stable island"]);
+    around.legend.replaceChildren(
+      ...entries.map(([look, text]) => html("li", {}, swatch(look), ` ${text}`)), above);
   }
 
-  function symbol(look, x, y) {
-    return look === "stable" ? svg("circle", { class: "mark stable", cx: x, cy: y, r: 4 })
-      : svg("path", { class: "mark chatter", d: `M${x - 4} ${y - 4}l8 8m0 -8l-8 8` });
-  }
-
-  function path(y) {
-    let pen = "M", d = "";
-    y.forEach((value, i) => {
-      if (!Number.isFinite(value)) { pen = "M"; return; }
-      d += `${pen}${px(curve.x[i]).toFixed(1)} ${py(value).toFixed(1)}`;
-      pen = "L";
-    });
-    return d;
-  }
-
-  function band(line) {
-    const known = [...line.low.keys()].filter((i) => Number.isFinite(line.low[i] + line.high[i]));
-    const point = (values) => (i) => `${px(curve.x[i]).toFixed(1)} ${py(values[i]).toFixed(1)}`;
-    return known.length ? `M${known.map(point(line.low)).join("L")}L${
-      known.reverse().map(point(line.high)).join("L")}Z` : "";
+  function resize() {
+    const width = around.width();
+    fill(drawing, { viewBox: `0 0 ${width} ${bottom() + BOX.bottom}` });
+    for (const each of [opening, picked]) fill(each, { height: bottom() - BOX.top });
+    fill(opening, { width: inside() });
+    redraw();
   }
 
   function redraw() {
-    [low, high] = heights();
-    const parts = [];
-    const along = ticks(from, to, 8);
-    const up = ticks(low, high, 6);
-    for (const x of along.places) {
-      parts.push(svg("path", { class: "grid", d: `M${px(x)} ${BOX.top}v${inside.y}` }),
-        svg("text", { x: px(x), y: BOX.height - 26, class: "middle" }, fixed(x, along.decimals)));
-    }
-    for (const y of up.places) {
-      parts.push(svg("path", { class: "grid", d: `M${BOX.left} ${py(y)}h${inside.x}` }),
-        svg("text", { x: BOX.left - 6, y: py(y) + 4, class: "end" }, fixed(y, up.decimals)));
-    }
-    parts.push(svg("text", { x: BOX.left + inside.x / 2, y: BOX.height - 6, class: "middle" }, plot.x),
-      svg("text", { transform: `translate(13 ${BOX.top + inside.y / 2}) rotate(-90)`, class: "middle" }, plot.y));
-    const lines = svg("g", { "clip-path": `url(#${clip})` });
-    for (const [x, y0, y1] of curve.spans) {
-      lines.append(svg("path", { class: "line span", d: `M${px(x)} ${py(y0)}V${py(y1)}` }));
-    }
-    for (const line of curve.lines.filter((one) => one.low)) {
-      lines.append(svg("path", { class: "band", d: band(line) }));
-    }
-    for (const line of curve.lines) {
-      lines.append(svg("path", { class: `line ${line.look}`, d: path(line.y) }));
-      if (curve.x.length <= 60 && line.look === "measured") {
-        line.y.forEach((y, i) => Number.isFinite(y) && lines.append(
-          svg("circle", { class: "dot", cx: px(curve.x[i]), cy: py(y), r: 2 })));
-      }
-    }
-    for (const m of curve.marks) lines.append(symbol(m.look, px(m.x), py(m.y)));
-    ground.replaceChildren(...parts, lines);
+    for (const panel of panels) [panel.low, panel.high] = heights(panel);
+    const out = arrows(panels[0], curve, seen, panels[0].high, px, BOX.top);
+    above.hidden = !out.length;
+    ground.replaceChildren(...scale(), ...panels.flatMap(upright), ...out);
     point();
+  }
+
+  function scale() {
+    const along = curve.rows ? ticks(from, to, inside() / 30, 1) : ticks(from, to, Math.min(8, inside() / 55));
+    const told = (x) => (curve.rows ? curve.rows[Math.round(x) - 1] || "" : fixed(x, along.decimals));
+    const lines = along.places.flatMap((x) => [
+      ...panels.map((panel) => svg("path", { class: "grid", d: `M${px(x)} ${panel.top}v${panel.tall}` })),
+      svg("text", { x: px(x), y: bottom() + 18, class: "middle" }, told(x))]);
+    return [...lines,
+      svg("text", { x: BOX.left + inside() / 2, y: bottom() + 38, class: "middle" }, plot.x)];
+  }
+
+  function upright(panel) {
+    const y = py(panel), middle = panel.top + panel.tall / 2;
+    const span = panel.high - panel.low;
+    const up = ticks(panel.low, panel.high, Math.round(panel.tall / 36), plot.log && span > 2 ? 1 : 0);
+    const told = (value) => (plot.log ? power(value, span > 2 ? 1 : 2) : fixed(value, up.decimals));
+    const lines = up.places.flatMap((value) => [
+      svg("path", { class: "grid", d: `M${BOX.left} ${y(value)}h${inside()}` }),
+      svg("text", { x: BOX.left - 6, y: y(value) + 4, class: "end" }, told(value))]);
+    const foot = svg("path", { class: "foot", d: `M${BOX.left} ${panel.top}v${panel.tall}h${inside()}` });
+    return [...lines, foot, svg("text", { transform: `translate(13 ${middle}) rotate(-90)`, class: "middle" }, panel.label),
+      drawn(panel, curve, px, y, clip)];
+  }
+
+  function value(y) {
+    return plot.log ? power(y, 3) : fixed(y, curve.decimals);
   }
 
   function told() {
     if (mark !== null) return curve.marks[mark].told;
     if (curve.told) return curve.told[at];
-    const value = (line) => {
-      const half = line.low ? (line.high[at] - line.low[at]) / 2 : NaN;
-      const give = Number.isFinite(half) ? ` ± ${fixed(half, curve.decimals)}` : "";
-      return `${line.name} ${fixed(line.y[at], curve.decimals)}${give}${plot.unit ? ` ${plot.unit}` : ""}`;
+    const after = plot.unit ? ` ${plot.unit}` : "";
+    const half = ({ low, high }) => {
+      const size = low ? (high[at] - low[at]) / 2 : NaN;
+      return Number.isFinite(size) ? ` ± ${fixed(size, curve.decimals)}` : "";
     };
+    const lines = curve.lines.map((line) => `${line.name} ${value(line.y[at])}${half(line)}${after}`);
+    const left = (panels[1] ? panels[1].lines.slice(1) : []).map(
+      (line, i, { length }) => `${length > 1 ? `${line.name} ` : ""}${value(line.y[at])}${after}`);
     const step = ticks(from, to, 400).decimals;
-    return `${across} ${fixed(curve.x[at], step)} ${unit}: ${curve.lines.map(value).join("; ")}`;
+    const where = curve.rows ? `${across} ${curve.rows[at]}` : `${across} ${fixed(curve.x[at], step)} ${unit}`;
+    return `${where}: ${lines.join("; ")}${left.length ? `; left over: ${left.join(", ")}` : ""}`;
   }
 
   function point() {
     const x = mark === null ? curve.x[at] : curve.marks[mark].x;
-    cursor.replaceChildren(svg("path", { d: `M${px(x)} ${BOX.top}v${inside.y}` }));
-    if (mark !== null) cursor.append(svg("circle", { cx: px(x), cy: py(curve.marks[mark].y), r: 8 }));
-    else for (const line of curve.lines) {
-      if (Number.isFinite(line.y[at])) cursor.append(svg("circle", { cx: px(x), cy: py(line.y[at]), r: 4 }));
+    cursor.replaceChildren(svg("path", { d: `M${px(x)} ${BOX.top}V${bottom()}` }));
+    const ring = (panel, y, r) => y >= panel.low && y <= panel.high
+      && cursor.append(svg("circle", { cx: px(x), cy: py(panel)(y), r }));
+    if (mark !== null) ring(panels[0], curve.marks[mark].y, 8);
+    else for (const panel of panels) {
+      for (const line of panel.lines) if (line.look !== "zero") ring(panel, line.y[at], 4);
     }
     cursor.style.display = x < from || x > to ? "none" : "";
-    if (read) read.textContent = told();
+    around.tell(told());
   }
 
   function see(first, last) {
-    const [lowest, highest] = ends([...curve.x, ...curve.marks.map((m) => m.x)], 0);
+    const [lowest, highest] = whole();
     const width = Math.min(highest - lowest, Math.max(last - first, (highest - lowest) / 500));
     from = Math.min(Math.max(lowest, (first + last - width) / 2), highest - width);
     to = from + width;
@@ -176,7 +194,7 @@ function chart(host, plot) {
 
   const pan = (share) => see(from + share * (to - from), to + share * (to - from));
   const keys = { "+": () => zoom(0.5), "=": () => zoom(0.5), "-": () => zoom(2), Home: all,
-    ArrowUp: () => next(1), ArrowDown: () => next(-1),
+    End: () => step(curve.x.length), ArrowUp: () => next(1), ArrowDown: () => next(-1),
     PageUp: () => step(10), PageDown: () => step(-10) };
   drawing.addEventListener("keydown", (event) => {
     const sign = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
@@ -186,33 +204,36 @@ function chart(host, plot) {
     action();
   });
 
-  let start = null;
-  drawing.addEventListener("pointerdown", (event) => { start = place(event); });
-  drawing.addEventListener("pointermove", (event) => {
-    const here = place(event);
-    if (start && event.buttons) {
-      fill(picked, { x: Math.min(start.x, here.x), width: Math.abs(start.x - here.x) }, []);
-      return;
-    }
-    const near = curve.marks.findIndex((m) => Math.hypot(px(m.x) - here.x, py(m.y) - here.y) < 9);
+  function hover(here) {
+    const near = curve.marks.findIndex((m) => Math.hypot(px(m.x) - here.x, py(panels[0])(m.y) - here.y) < 9);
     mark = near < 0 ? null : near;
     at = nearest(curve.x, here.value);
     point();
+  }
+
+  let start = null;
+  drawing.addEventListener("pointerdown", (event) => {
+    start = place(event);
+    hover(start);
+    drawing.setPointerCapture(event.pointerId); // a drag that ends beside the plot ends at its edge
+  });
+  drawing.addEventListener("pointermove", (event) => {
+    const here = place(event);
+    if (start) fill(picked, { x: Math.min(start.x, here.x), width: Math.abs(start.x - here.x) });
+    else hover(here);
   });
   const release = (event) => {
-    const here = place(event);
-    if (start && event.type === "pointerup" && Math.abs(here.x - start.x) > 5) {
-      see(Math.min(start.value, here.value), Math.max(start.value, here.value));
-    }
+    const here = place(event), first = start;
     start = null;
-    fill(picked, { width: 0 }, []);
+    fill(picked, { width: 0 });
+    if (first && event.type === "pointerup" && Math.abs(here.x - first.x) > 5) {
+      see(Math.min(first.value, here.value), Math.max(first.value, here.value));
+    }
   };
   drawing.addEventListener("pointerup", release);
-  drawing.addEventListener("pointerleave", release);
+  drawing.addEventListener("pointercancel", release);
   drawing.addEventListener("dblclick", all);
 
-  const tools = [chooser(plot.keys, plot.curves, choose), button("Larger", () => zoom(0.5)),
-    button("Smaller", () => zoom(2)), button("All", all)];
-  read = frame(host, plot, drawing, tools, legend);
-  point();
+  around.tools.append(chooser(plot, choose), button("Larger", () => zoom(0.5)),
+    button("Smaller", () => zoom(2)), button("All", all));
 }

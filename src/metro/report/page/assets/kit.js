@@ -2,8 +2,9 @@
 // What all plots share: making elements, unpacking numbers, writing numbers, choosing among curves.
 
 const SVG = "http://www.w3.org/2000/svg";
+const WIDEST = 760; // a drawing is as wide as its place, and scaled up where that is wider
 
-function fill(element, attributes, children) {
+function fill(element, attributes, children = []) {
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
   element.append(...children);
   return element;
@@ -38,15 +39,33 @@ function fixed(value, decimals) {
   return minus((decimals < 0 ? Math.round(value / step) * step : value).toFixed(Math.max(0, decimals)));
 }
 
+// A number given by its decadic logarithm, to so many digits: 3.16·10⁻⁷, 10⁻⁷ where that is all.
+function power(logarithm, digits) {
+  if (!Number.isFinite(logarithm)) return "–";
+  const [share, exponent] = (10 ** logarithm).toExponential(digits - 1).split("e");
+  const raised = [...String(Number(exponent))].map((sign) => (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[sign])).join("");
+  return `${share === "1" ? "" : `${share}·`}10${raised}`;
+}
+
 // Round places between two ends: 1, 2 or 5 times a power of ten apart; with the decimals that they need.
-function ticks(low, high, most) {
-  const rough = (high - low) / most;
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((factor) => factor * power).find((size) => size >= rough * 0.999);
+function ticks(low, high, most, least = 0) {
+  const rough = Math.max(least, (high - low) / most);
+  const scale = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((factor) => factor * scale).find((size) => size >= rough * 0.999);
   const first = Math.ceil(low / step - 1e-9);
   const count = Math.max(0, Math.floor(high / step + 1e-9) - first + 1);
   const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   return { places: Array.from({ length: count }, (_, i) => (first + i) * step), decimals };
+}
+
+// The least and the greatest of the values that are known, and a share of their span beside them.
+function ends(values, margin) {
+  const known = values.filter(Number.isFinite);
+  let first = known.reduce((a, b) => Math.min(a, b), Infinity);
+  let last = known.reduce((a, b) => Math.max(a, b), -Infinity);
+  if (!known.length) [first, last] = [0, 1];
+  if (first === last) [first, last] = [first - 1, last + 1];
+  return [first - margin * (last - first), last + margin * (last - first)];
 }
 
 function nearest(values, place) {
@@ -59,30 +78,31 @@ function nearest(values, place) {
 
 function button(text, action) {
   const made = html("button", { type: "button" }, text);
-  made.addEventListener("click", action);
+  made.addEventListener("click", () => action(made));
   return made;
 }
 
-function labelled(name, options, chosen) {
-  const select = html("select", {}, ...options.map((text) => html("option", { value: text }, text)));
+function labelled(name, options, chosen, told = (value) => value) {
+  const select = html("select", {}, ...options.map((value) => html("option", { value }, told(value))));
   select.addEventListener("change", () => chosen(select.value));
   return { select, label: html("label", {}, `${name} `, select) };
 }
 
 // One choice for each part of a curve's key that varies; a later one offers what the earlier ones leave.
-function chooser(names, curves, chosen) {
+function chooser({ keys, curves, first = curves[0].key, options = {} }, chosen) {
   const host = html("span", { class: "choices" });
-  const key = [...curves[0].key];
+  const key = [...first];
   function build() {
     const had = host.contains(document.activeElement)
       ? [...host.querySelectorAll("select")].findIndex((s) => s === document.activeElement) : -1;
     host.replaceChildren();
     let left = curves;
-    names.forEach((name, i) => {
-      const options = [...new Set(left.map((curve) => curve.key[i]))];
-      if (!options.includes(key[i])) key[i] = options[0];
+    keys.forEach((name, i) => {
+      const offered = [...new Set(left.map((curve) => curve.key[i]))];
+      if (!offered.includes(key[i])) key[i] = offered[0];
       if (new Set(curves.map((curve) => curve.key[i])).size > 1) {
-        const { select, label } = labelled(name, options, (value) => { key[i] = value; build(); });
+        const { select, label } = labelled(name, offered, (value) => { key[i] = value; build(); },
+          (value) => options[value] || value);
         select.value = key[i];
         host.append(label);
       }
@@ -97,16 +117,47 @@ function chooser(names, curves, chosen) {
 
 let frames = 0;
 
-// What every plot stands in: title, choices, the drawing, what is read there, and how to go about it.
-function frame(host, plot, drawing, tools, legend) {
+// What every plot stands in: title with the choice, tools, the drawing, what is read there, and how.
+function frame(host, plot, drawing, redrawn) {
   const id = `plot-${(frames += 1)}`;
-  const read = html("output", { "aria-live": "polite" });
+  const choice = html("small");
+  const tools = html("div", { class: "tools" });
+  const legend = html("ul", { class: "legend" });
+  const read = html("output", { "aria-live": "off" });
+  const spoken = html("p", { class: "unseen", "aria-live": "polite" });
   const help = html("details", { class: "help" }, html("summary", {}, "Keys and mouse"),
     html("p", { id: `${id}-help` }, plot.help));
-  fill(drawing, { tabindex: "0", role: "application", "aria-label": plot.title,
-    "aria-describedby": `${id}-help` }, []);
-  host.append(fill(html("figure", { class: "plot", id, "aria-label": plot.title }), {}, [
-    html("h4", {}, plot.title), html("div", { class: "tools" }, ...tools), legend, drawing, read,
-    ...(plot.note ? [html("p", { class: "note" }, plot.note)] : []), help]));
-  return read;
+  fill(drawing, { tabindex: "0", role: "application", "aria-label": plot.title, "aria-describedby": `${id}-help` });
+  const figure = fill(html("figure", { class: "plot", id, "aria-label": plot.title }), {}, [
+    html("h4", {}, `${plot.title} `, choice), tools, legend, drawing, read, spoken,
+    ...(plot.note ? [html("p", { class: "note" }, plot.note)] : []), help]);
+  host.append(figure);
+  let keyed = false, said = "", width = WIDEST;
+  // Only what a key has led to is spoken: a mouse passes over hundreds of values
+  drawing.addEventListener("keydown", () => { keyed = true; }, true);
+  drawing.addEventListener("keyup", () => { keyed = false; }, true);
+  drawing.addEventListener("pointermove", () => { keyed = false; }, true);
+  const measure = () => {
+    const found = Math.min(WIDEST, Math.round(drawing.getBoundingClientRect().width));
+    const changed = found > 0 && found !== width;
+    if (found > 0) width = found;
+    return changed;
+  };
+  measure();
+  new ResizeObserver(() => measure() && redrawn()).observe(figure);
+  return {
+    tools, legend,
+    width: () => width,
+    choose(text) {
+      said = text;
+      choice.textContent = text;
+      drawing.setAttribute("aria-label", text ? `${plot.title}: ${text}` : plot.title);
+    },
+    tell(text) {
+      const parts = (said ? `${text} (${said})` : text).split(/([−\d.]+ ± [\d.]+)/);
+      // a value stays on one line with its interval
+      read.replaceChildren(...parts.map((part, i) => (i % 2 ? html("span", { class: "short" }, part) : part)));
+      if (keyed) spoken.textContent = read.textContent;
+    },
+  };
 }

@@ -1,5 +1,7 @@
 // Plots are drawn when their batch is unfolded for the first time; a link to a batch unfolds it.
 
+const batches = [...document.querySelectorAll("details.batch")];
+
 function unfold(batch) {
   const data = batch.querySelector("script.data");
   if (!data) return;
@@ -8,21 +10,36 @@ function unfold(batch) {
   data.remove();
 }
 
-function follow() {
-  const batch = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+function follow(hash) {
+  const batch = document.getElementById(decodeURIComponent(hash.slice(1)));
   if (!batch || !batch.matches("details.batch")) return;
   batch.open = true;
   batch.scrollIntoView();
   batch.querySelector("summary").focus();
 }
 
-for (const batch of document.querySelectorAll("details.batch")) {
-  batch.addEventListener("toggle", () => batch.open && unfold(batch));
-}
+for (const batch of batches) batch.addEventListener("toggle", () => batch.open && unfold(batch));
 for (const each of document.querySelectorAll("button[data-fold]")) {
   each.addEventListener("click", () => {
-    for (const batch of document.querySelectorAll("details.batch")) batch.open = each.dataset.fold === "open";
+    for (const batch of batches) batch.open = each.dataset.fold === "open";
   });
 }
-addEventListener("hashchange", follow);
-follow();
+// The second click on a link changes no hash, but the batch may have been folded since the first
+for (const link of document.querySelectorAll('a[href^="#batch-"]')) {
+  link.addEventListener("click", () => follow(link.hash));
+}
+addEventListener("hashchange", () => follow(location.hash));
+
+// Paper unfolds nothing: all is drawn before, and folded again after
+let folded = [];
+addEventListener("beforeprint", () => {
+  folded = batches.filter((batch) => !batch.open);
+  for (const batch of batches) {
+    batch.open = true;
+    unfold(batch);
+  }
+});
+addEventListener("afterprint", () => {
+  for (const batch of folded) batch.open = false;
+});
+follow(location.hash);
