@@ -203,7 +203,7 @@ def test_a_form_of_third_degree_is_what_its_parameters_say():
     [
         ({"hidden": lambda number, **_cut: 15e-3 * (number >= 3)}, "pass"),
         ({"hidden": lambda number, **_cut: -20e-3 * (number == 2)}, "pass 3"),
-        ({"work": spot}, "is a bump at x"),
+        ({"work": spot}, "bulges at x"),
     ],
     ids=["step", "one pass deeper", "hard spot"],
 )

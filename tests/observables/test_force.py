@@ -23,6 +23,7 @@ from metro.observables import force
 from metro.observables.dynamometer import Recording
 from metro.observables.force_coefficients import correlation
 from metro.observables.force_model import ForceModel, ForceSetting
+from metro.observables.mean_forces import mean_forces
 from metro.observables.problem import BaseFit, Block, Problem
 from metro.observables.quantity import quantity
 from metro.signals.orders import order_matrix
@@ -73,6 +74,25 @@ def clean(tmp_path_factory):
 def test_mean_forces_of_all_five_feeds_give_the_published_coefficients(slotting):
     found = slotting.identified()["mean_all_runs"]
     assert {name: entry["value"] for name, entry in found.items()} == pytest.approx(PUBLISHED, rel=1e-3)
+
+
+def test_mean_forces_lie_on_the_lines_of_the_coefficients_that_made_them(clean):
+    """The simulator's coefficients put the measured means where they are, but for noise and gain."""
+    found = clean.identified()
+    table = mean_forces(clean.batch, clean.observed, {"force": found})["mean_forces"]
+    assert sorted(table["run"].unique()) == sorted(clean.batch.runs.index)
+    rest = table["measured_n"] - table["fitted_n"]
+    assert np.sqrt(np.mean(rest**2) / np.mean(table["measured_n"] ** 2)) < 0.02
+    slots = table[(table["operation"] == "slot") & (table["axis"] == "y")]
+    slope, start = np.polyfit(slots["feed_per_tooth_mm"], slots["fitted_n"], 1)
+    value = {name: entry["value"] for name, entry in found["mean_all_runs"].items()}
+    teeth, depth = 3, 2.0  # Altintas: the mean across a slot is N a/4 (Ktc c + 4/π Kte)
+    assert slope == pytest.approx(teeth * depth / 4.0 * value["ktc"], rel=1e-3)
+    assert start == pytest.approx(teeth * depth / np.pi * value["kte"], rel=1e-3)
+
+
+def test_without_coefficients_there_are_no_lines(clean):
+    assert mean_forces(clean.batch, clean.observed, {}) == {}
 
 
 @real

@@ -54,6 +54,17 @@ def test_a_pair_and_its_reciprocal_may_be_equal():
     np.testing.assert_allclose(test.modes["stiffness_n_m"], STIFFNESS, rtol=1e-4)
 
 
+def test_shapes_and_their_likeness_are_those_of_the_structure():
+    rows = [frf_rows(receptance(i, noise=0.003, seed=i), f"{i + 1}x") for i in range(3)]
+    test = observed(*rows)
+    shapes = test.shapes.pivot_table(index="response", columns="frequency_hz", values="real").to_numpy()
+    np.testing.assert_allclose(shapes, SHAPES, atol=0.02)
+    assert np.abs(test.shapes["imag"]).max() < 0.02
+    between = (SHAPES[:, 0] @ SHAPES[:, 1]) ** 2 / np.prod((SHAPES**2).sum(axis=0))
+    found = test.alike["mac"].to_numpy().reshape(2, 2)
+    np.testing.assert_allclose(found, [[1.0, between], [between, 1.0]], atol=0.02)
+
+
 def test_repeated_frf_files_tell_the_error():
     rows = [frf_rows(receptance(0, noise=0.05, seed=i), replicate=i + 1) for i in range(4)]
     test = observed(*rows)

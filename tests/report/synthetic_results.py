@@ -262,6 +262,7 @@ def batch():
     runs = pd.DataFrame(
         {
             "role": ["identify"] * 6 + ["validate"] * 4, "operation": ["slot"] * 9 + ["face"], "pose": "1",
+            "order": range(1, 11), "dynamometer": "",
             "spindle_rpm": np.linspace(1200, 3900, 10), "axial_depth_mm": np.linspace(0.4, 1.9, 10),
         },
         index=pd.Index(ids, name="run"),

@@ -9,7 +9,7 @@ import synthetic_results as synthetic
 
 from metro.report.batch_report import batch_report
 from metro.report.parameters import parameter_name
-from metro.report.sections.verdict import sentence
+from metro.report.sections.verdict import verdict_words
 
 
 def text_of(pdf):
@@ -108,11 +108,11 @@ def test_every_status_has_its_sentence(status, words):
     entry = synthetic.observable(
         status, effects=[synthetic.RUNOUT], indistinguishable=[["tool_wear", "charge_drift"]]
     )
-    assert words in sentence("force", entry)
+    assert words in verdict_words("force", entry)
 
 
 def test_an_error_that_did_not_change_is_said_once():
-    assert "goes from" not in sentence("force", synthetic.observable("unexplained", 5.0, 5.0))
+    assert "goes from" not in verdict_words("force", synthetic.observable("unexplained", 5.0, 5.0))
 
 
 def test_parameters_lose_the_unit_in_their_name():

@@ -10,9 +10,10 @@ import synthetic_results as synthetic
 from metro.observables.force_metrics import metrics, order_spectrum
 from metro.report.content import Facts, Picture, Table
 from metro.report.figures import force as figures
-from metro.report.sections.force import force_items
+from metro.report.sections.force import force_items, mean_items
 from metro.report.sections.quality import quality
-from metro.report.sections.verdict import error_text, summary
+from metro.report.sections.summary import summary
+from metro.report.sections.verdict import error_text
 
 TEETH = 4
 
@@ -39,6 +40,39 @@ def test_where_nothing_was_added_there_is_no_second_column(tables):
     table = force_items(replace(synthetic.results(), tables=both))[0]
     assert not table.faint
     assert len(table.header) == 6
+
+
+def mean_table():
+    cuts = [("slot", "slot", 12.0, 100.0), ("side", "up", 4.0, 60.0)]
+    rows = [
+        {"run": f"r{i}{j}", "axis": axis, "role": "validate" if j == 2 else "identify",
+         "operation": operation, "direction": direction, "radial_depth_mm": width,
+         "axial_depth_mm": 2.0, "spindle_rpm": 6000.0,
+         "feed_per_tooth_mm": feed, "fitted_n": per_mm * feed + 10.0, "measured_n": per_mm * feed + 10.0}
+        for i, (operation, direction, width, per_mm) in enumerate(cuts)
+        for j, feed in enumerate((0.05, 0.1, 0.15))
+        for axis in "xyz"
+    ]  # fmt: skip
+    table = pd.DataFrame(rows)
+    off = (table["run"] == "r02") & (table["axis"] == "y")
+    return table.assign(measured_n=table["measured_n"] + 3.0 * off)
+
+
+def test_mean_forces_stand_on_the_lines_of_their_cuts_and_the_one_missed_most_is_named():
+    (picture,) = mean_items(mean_table())
+    assert "most in r02 along y, by 3.00 N" in picture.caption
+    panel = picture.figure.axes[0]
+    legend = [text.get_text() for text in picture.figure.legends[0].get_texts()]
+    assert legend == ["slot, 12 mm wide", "up, 4 mm wide"]
+    line, filled, held = panel.get_lines()[:3]
+    np.testing.assert_allclose(line.get_ydata(), [15.0, 20.0, 25.0])
+    assert len(filled.get_xdata()) == 2
+    assert (held.get_xdata().tolist(), held.get_markerfacecolor()) == ([0.15], "none")
+
+
+def test_of_one_feed_there_is_no_line_to_draw():
+    assert mean_items(mean_table().query("feed_per_tooth_mm == 0.1")) == []
+    assert mean_items(None) == []
 
 
 def test_a_batch_without_measured_forces_has_no_figures_of_merit():

@@ -57,6 +57,37 @@ def test_a_mode_that_is_not_resolved_is_marked():
     assert "not resolved" not in plain.caption
 
 
+def shapes():
+    """Three modes at three points: the first two alike but for their size, the third against them."""
+    values = {30.0: [1.0, 0.5, 0.2], 50.0: [2.0, 1.0, 0.4], 80.0: [1.0, -0.5, -0.2]}
+    rows = [
+        {"position": "1", "direction": "x", "frequency_hz": f, "resolved": f != 80.0, "reference": f"{i}x",
+         "response": "1x", "real": v, "imag": 0.0}
+        for f, shape in values.items()
+        for i, v in enumerate(shape, start=1)
+    ]  # fmt: skip
+    pairs = [(a, b, 1.0 if a == b or {a, b} == {30.0, 50.0} else 0.5) for a in values for b in values]
+    alike = pd.DataFrame(pairs, columns=["first_hz", "second_hz", "mac"]).assign(position="1", direction="x")
+    return {"mode_shapes": pd.DataFrame(rows), "mode_mac": alike}
+
+
+def test_shapes_are_drawn_to_their_largest_and_like_ones_are_counted():
+    picture = next(
+        item for item in modes(synthetic.identified()["modes"], shapes()) if isinstance(item, Picture)
+    )
+    assert "have 1 of 3 pairs of modes at the 3 points" in picture.caption
+    panels = [axes for axes in picture.figure.axes if axes.get_title(loc="left")]
+    drawn = [axes.get_lines()[1].get_ydata() for axes in panels]
+    np.testing.assert_allclose(drawn, [[1.0, 0.5, 0.2], [1.0, 0.5, 0.2], [1.0, -0.5, -0.2]])
+    assert [axes.get_title(loc="left") for axes in panels] == ["30.00 Hz", "50.00 Hz", "80.00 Hz *"]
+
+
+def test_two_points_make_no_shape():
+    few = shapes()
+    few["mode_shapes"] = few["mode_shapes"][few["mode_shapes"]["reference"] != "3x"]
+    assert not [item for item in modes(synthetic.identified()["modes"], few) if isinstance(item, Picture)]
+
+
 def test_the_section_has_the_diagram_where_the_batch_has_one():
     tables = synthetic.tables()
     without = [item for item in modes(synthetic.identified()["modes"], tables) if isinstance(item, Picture)]

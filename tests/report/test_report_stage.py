@@ -14,7 +14,9 @@ def write_results(processed, reports):
     write_batch(processed, synthetic.batch(), {"sources": json.dumps({"runs.csv": "ab" * 32})})
     for name, table in synthetic.tables().items():
         write_table(processed / f"{name}.parquet", table, {"sources": json.dumps({f"{name}.csv": "cd" * 32})})
-    for name in {"stations", "robot"} - set(synthetic.tables()):  # ingest writes every table, empty or not
+    for name in {"stations", "robot", "hit", "force"} - set(
+        synthetic.tables()
+    ):  # ingest writes every table, empty or not
         write_table(processed / f"{name}.parquet", pd.DataFrame(columns=list(COLUMNS[name])), {})
     reports.mkdir()
     (reports / "identified.json").write_text(json.dumps(synthetic.identified()))

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import synthetic_results as synthetic
 
-from metro.report.content import Bullets, Paragraph, Picture, Table
+from metro.report.content import Bullets, Picture, Table
 from metro.report.figures import robot as figures
 from metro.report.sections.robot import robot
 from metro.report.style import to_svg
@@ -145,7 +145,7 @@ def test_a_line_is_tabulated_and_none_is_said():
     items = content(robot_spectra=spectra(), robot_lines=LINES)
     row = table_with(items, "Lines in the path error").rows[0]
     assert row[:4] == ["r1", "z", "0.6000 ± 0.0039 Hz", "8.00 ± 0.98"]
-    said = [item.text for item in content(robot_spectra=spectra()) if isinstance(item, Paragraph)]
+    said = [item.caption for item in content(robot_spectra=spectra()) if isinstance(item, Picture)]
     assert any("No line" in text for text in said)
 
 

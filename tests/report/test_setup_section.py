@@ -33,5 +33,18 @@ def test_runs_of_one_condition_stand_together_and_what_all_share_is_told_once():
     assert "All runs: speed (rpm) 4000." in table.caption
 
 
+def test_a_setting_that_a_run_does_not_have_is_a_dash():
+    (table,) = tables({}, role=["identify"] * 3, operation="slot", orbit_rpm=[20.0, float("nan"), 30.0])
+    assert [row[0] for row in table.rows] == ["20", "–", "30"]
+
+
+def test_it_is_said_how_runs_were_held_out():
+    section = setup(synthetic.results())
+    assert section is not None
+    told = " ".join(getattr(item, "text", "") for item in section.items)
+    assert "before any signal was read: from the column role of runs.csv. Seed 1." in told
+    assert "To identify on: 6 runs; held out: 4 runs." in told
+
+
 def test_a_batch_that_declares_nothing_has_no_such_section():
     assert tables({}, role=["identify"] * 3) is None

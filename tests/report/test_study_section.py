@@ -8,7 +8,7 @@ import synthetic_results as synthetic
 from metro.report.content import Bullets, Heading, Paragraph, Picture, Table
 from metro.report.document import Cover, compile_pdf
 from metro.report.sections.study import study
-from metro.report.sections.verdict import summary
+from metro.report.sections.summary import summary
 
 q = synthetic.q
 NAMES = [("A", "L"), ("A", "T"), ("B", "L"), ("B", "T")]

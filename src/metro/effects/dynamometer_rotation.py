@@ -24,6 +24,6 @@ EFFECT = Effect(
         "Forces in the plane turned by the same angle in every run. K_t and K_r, where they are to be found "
         "from the same forces, take the turn for a change of theirs whatever is cut."
     ),
-    literature="a turn of (K_t, K_r) and a turn of (F_x, F_y) are the same thing: physics.md, section 2",
+    literature="a turn of (K_t, K_r) and a turn of (F_x, F_y) are the same thing in a linear force law",
     experiment="a known force along the table's x axis: push the dynamometer with a load cell along a slot",
 )

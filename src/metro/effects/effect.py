@@ -156,10 +156,13 @@ def by_name(parameters: tuple[EffectParameter, ...], entries: list[Any]) -> dict
     return {name: found if names.count(name) > 1 else found[0] for name, found in taken.items()}
 
 
-def fitted_to(effects: tuple[Effect, ...], problem: Any) -> tuple[tuple[Effect, ...], dict[str, str]]:
+def fitted_to(
+    effects: tuple[Effect, ...], problem: Any, *, moot: bool = False
+) -> tuple[tuple[Effect, ...], dict[str, str]]:
     """Fit effects to a batch's ``problem``: those that it may show, and of the others why it cannot.
 
-    Of what the base model has already (a refusal without a reason) nothing is said.
+    Of what the base model has already (a refusal without a reason) nothing is said, and of what would change
+    nothing here only where ``moot`` asks for it.
     """
     able: list[Effect] = []
     unable: dict[str, str] = {}
@@ -169,7 +172,7 @@ def fitted_to(effects: tuple[Effect, ...], problem: Any) -> tuple[tuple[Effect, 
             continue
         adapted = effect.adapt(effect, problem) if effect.adapt else effect
         if isinstance(adapted, Refusal):
-            unable |= {effect.name: adapted.reason} if adapted.reason else {}
+            unable |= {effect.name: adapted.reason} if adapted.reason and (moot or not adapted.moot) else {}
         else:
             able.append(adapted)
     return tuple(able), {name: why for name, why in unable.items() if name not in {e.name for e in able}}

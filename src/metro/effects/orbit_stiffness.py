@@ -19,7 +19,9 @@ def apply(model: Any, values: Values) -> Any:
 
 
 def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
-    """Only helical runs show it."""
+    """Only helical runs show it, and no other is changed by it."""
+    if not any(block.setting.helix for block in problem.blocks):
+        return Refusal("no run is helical", moot=True)
     if not any(block.setting.helix for block in problem.role("identify")):
         return Refusal("no helical run is among those of the identification")
     return effect

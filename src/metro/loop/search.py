@@ -30,9 +30,7 @@ MOST_EFFECTS = 4
 NOT_VISIBLE = 0.02
 ABSORBED = "the base parameters imitate all but {:.1f} % of its signature"
 DIM = 0.1
-HIDDEN = (
-    "the zeros of each run (its offset, its place) take all but {:.1f} % of it: it shows from {:.2g} {} on"
-)
+HIDDEN = "the zeros of each run (its offset, its place) take all but {:.1f} % of it: it shows from {} on"
 UNBELIEVED = "more stays unexplained with it than it explains"
 EVEN = 0.5  # least share explained by effects that are claimed
 SESSION = 0.005  # p-value of a step along the session that counts
@@ -180,7 +178,7 @@ def _dim(base: Fit, effects: Iterable[Effect]) -> dict[str, str]:
         left = dimmed(Candidate(base.candidate.base, (effect,)), base)
         if left.share < DIM:
             words[effect.name] = HIDDEN.format(
-                100.0 * left.share, left.least, printed(effect.parameters[0].unit)
+                100.0 * left.share, f"{left.least:.2g} {printed(effect.parameters[0].unit)}".rstrip()
             )
     return words
 

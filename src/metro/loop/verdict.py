@@ -285,11 +285,16 @@ def _candidate(problem: Problem, trial: Trial, why_not: str) -> JSON:
         "effect": trial.effect.name,
         "probability": trial.weight,
         "held_out_rms": held_out_rms(problem, trial.fit),
-        "held_out_gain": finite(trial.evidence.gain),
+        "held_out_gain": gain(trial),
         "p_value": trial.evidence.p_value,
         "size": trial.evidence.size,
         "why_not": why_not,
     }
+
+
+def gain(trial: Trial) -> float | None:
+    """Return what conditions left out gain by a trial; None where that was not worth computing."""
+    return finite(trial.evidence.gain) if trial.evidence.held_out else None
 
 
 def held_out_rms(problem: Problem, fitted: Fit) -> float | None:

@@ -33,7 +33,7 @@ def _of_passes(number: np.ndarray) -> Iterator[tuple[str, Array]]:
     yield "grows with the pass number", rank[:, None]
     yield "grows with the pass number, along a bent line", np.column_stack([rank**2, rank**3])
     for one in passes[1:-1]:
-        yield f"pass {one} is higher or lower than the others", (number == one).astype(float)[:, None]
+        yield f"pass {one} is off the others", (number == one).astype(float)[:, None]
     for one in passes[2:-1]:
         yield f"steps at pass {one}", (number >= one).astype(float)[:, None]
     yield "differs from pass to pass", (number[:, None] == passes).astype(float)
@@ -62,7 +62,7 @@ def _spots(x: Array, y: Array) -> Iterator[tuple[str, Array]]:
     for at_x in grids[0]:
         for at_y in grids[1]:
             bump = np.exp(-0.5 * ((x - at_x) ** 2 + (y - at_y) ** 2) / (apart / 2) ** 2)
-            yield f"is a bump at x {at_x / MM:.0f} mm, y {at_y / MM:.0f} mm", bump[:, None]
+            yield f"bulges at x {at_x / MM:.0f} mm, y {at_y / MM:.0f} mm", bump[:, None]
 
 
 def _to_unit(values: Array) -> Array:

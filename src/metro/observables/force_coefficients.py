@@ -70,7 +70,7 @@ def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.
     if not straight:
         return Refusal("all runs are helical: their mean forces turn with the orbit")
     circular, true = (
-        np.array([_mean_design(model, block, path) for block in straight]).reshape(-1, 3, 6)
+        np.array([mean_design(model, block, true_path=path) for block in straight]).reshape(-1, 3, 6)
         for path in (False, True)
     )
     target = means.loc[[block.run for block in straight]].to_numpy()
@@ -109,7 +109,7 @@ def _left_out(designs: Array, rest: Array) -> Array:
     return np.asarray(np.sqrt((moves**2).sum(axis=(0, 2))))
 
 
-def _mean_design(model: ForceModel, block: Block, true_path: bool) -> Array:
+def mean_design(model: ForceModel, block: Block, *, true_path: bool) -> Array:
     """Mean force per unit of each coefficient at the nominal feed, (3, 6), in the comparison's frame."""
     nominal = replace(block, setting=replace(block.setting, feed_ratio=1.0))
     matrix, _ = replace(model, true_path=true_path).design(nominal, np.zeros(1), None)

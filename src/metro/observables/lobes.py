@@ -113,10 +113,11 @@ class LabelProblem:
 def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Identify the modes of every position and solve the lobes of the cuts that were made there.
 
-    Tables ``modes``, ``frf_used``, ``stabilisation``, ``lobes`` (diagram per position), ``lobe_runs``
-    (probability per run with a depth), ``chatter_runs`` (what the runs' own records say), ``chatter_records``
-    (a record of each kind), those of :mod:`metro.observables.lobe_methods`, ``lobes_refused`` (reasons and
-    notes). Without modes: what the records say of chatter, and why there are no lobes.
+    Tables ``modes``, ``mode_shapes``, ``mode_mac``, ``frf_used``, ``stabilisation``, ``lobes`` (diagram per
+    position), ``lobe_runs`` (probability per run with a depth), ``chatter_runs`` (what the runs' own records
+    say), ``chatter_records`` (a record of each kind), those of :mod:`metro.observables.lobe_methods`,
+    ``lobes_refused`` (reasons and notes). Without modes: what the records say of chatter, and why there are
+    no lobes.
     """
     test = observe_modes(read, batch.instrument("hammer"))
     modes, notes = test.modes, test.notes
@@ -144,6 +145,7 @@ def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFr
     said = [("refusal", reason)] if reason else []
     refused = pd.DataFrame([*said, *(("note", n) for n in notes)], columns=["kind", "reason"], dtype=str)
     found_modes = {"modes": modes, "frf_used": test.used, "stabilisation": test.stabilisation}
+    found_modes |= {"mode_shapes": test.shapes, "mode_mac": test.alike}
     return {
         **found_modes,
         **tables,

@@ -11,6 +11,7 @@ import pandas as pd
 
 from metro.dynamics.modal import ModalModel, identify_modes
 from metro.dynamics.modes import Mode
+from metro.dynamics.shapes import mac
 from metro.observables.receptance import Receptance, arranged, from_files, from_records, scatter
 from metro.units import JSON, N_UM, Array, ComplexArray
 
@@ -33,12 +34,16 @@ class ModalTest:
     modes : one row per mode.
     used : the receptances on the lines that were fitted, with what the modes make of them.
     stabilisation : the poles of every model order, their cluster, and whether it recurs.
+    shapes : each mode's residue at each pair, 1 at the driving point.
+    alike : the modal assurance criterion of every two modes.
     notes : what could not be had.
     """
 
     modes: pd.DataFrame
     used: pd.DataFrame
     stabilisation: pd.DataFrame
+    shapes: pd.DataFrame
+    alike: pd.DataFrame
     notes: list[str]
 
 
@@ -52,7 +57,7 @@ def observe_modes(read: Read, hammer: JSON) -> ModalTest:
     """
     notes: list[str] = []
     measured, decay = receptances(read, hammer, notes), _decay(hammer)
-    modes, used, diagrams = [], [], []
+    modes, used, diagrams, shapes, alike = [], [], [], [], []
     for (position, direction), found in _by_direction(measured, notes).items():
         name = f"position {position}, direction {direction}"
         group, inputs = arranged(found)
@@ -64,9 +69,18 @@ def observe_modes(read: Read, hammer: JSON) -> ModalTest:
         modes.append(_mode_rows(position, direction, model))
         used.append(_used_rows(group, model, keep))
         diagrams.append(_diagram_rows(position, direction, model))
+        shapes.append(_shape_rows(group, direction, model))
+        alike.append(_alike_rows(position, direction, model))
         notes += [f"{name}: {note}" for note in _doubts(model)]
     columns = (*MODE_COLUMNS, *_MORE_COLUMNS)
-    return ModalTest(_joined(modes, columns), _joined(used, ()), _joined(diagrams, ()), notes)
+    return ModalTest(
+        modes=_joined(modes, columns),
+        used=_joined(used, ()),
+        stabilisation=_joined(diagrams, ()),
+        shapes=_joined(shapes, ()),
+        alike=_joined(alike, ()),
+        notes=notes,
+    )
 
 
 def receptances(read: Read, hammer: JSON, notes: list[str]) -> list[Receptance]:
@@ -225,6 +239,35 @@ def _diagram_rows(position: str, direction: str, model: ModalModel) -> pd.DataFr
             "recurs": diagram.recurs[diagram.member],
         }
     )
+
+
+def _shape_rows(group: list[Receptance], direction: str, model: ModalModel) -> pd.DataFrame:
+    """Return each mode's shape, a row for each pair of the group."""
+    rows = [
+        (
+            item.position,
+            direction,
+            mode.frequency,
+            mode.resolved,
+            item.reference,
+            item.response,
+            z.real,
+            z.imag,
+        )
+        for mode in model.modes
+        for item, z in zip(group, mode.shape, strict=True)
+    ]
+    columns = ["position", "direction", "frequency_hz", "resolved", "reference", "response", "real", "imag"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def _alike_rows(position: str, direction: str, model: ModalModel) -> pd.DataFrame:
+    """Return how alike the shapes of every two modes are at the pairs that were measured."""
+    shapes = np.array([mode.shape for mode in model.modes]).reshape(len(model.modes), -1)
+    frequency = [mode.frequency for mode in model.modes]
+    first, second = (grid.ravel() for grid in np.meshgrid(frequency, frequency, indexing="ij"))
+    columns = {"position": position, "direction": direction, "first_hz": first, "second_hz": second}
+    return pd.DataFrame({**columns, "mac": mac(shapes, shapes).ravel()})
 
 
 def _used_rows(group: list[Receptance], model: ModalModel, keep: np.ndarray) -> pd.DataFrame:

@@ -208,6 +208,13 @@ class BaseFit:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why an observable, or a quantity, cannot be had from this batch: which key, table or file it lacks."""
+    """Why an observable, or a quantity, cannot be had from this batch.
+
+    Attributes
+    ----------
+    reason : which key, table or file it lacks. moot : whether nothing in the batch would be changed by it, so
+        that it is not missed.
+    """
 
     reason: str
+    moot: bool = False

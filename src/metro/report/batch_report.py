@@ -17,8 +17,9 @@ from metro.report.sections.quality import quality, with_flags
 from metro.report.sections.robot import robot
 from metro.report.sections.setup import setup
 from metro.report.sections.study import study
+from metro.report.sections.summary import summary
 from metro.report.sections.surface import flatness
-from metro.report.sections.verdict import summary
+from metro.report.sections.terms import terms
 
 
 def batch_report(results: Results) -> bytes:
@@ -35,9 +36,9 @@ def batch_report(results: Results) -> bytes:
         comparison(results),
         upstream(results),
         loop(results),
+        terms(results),
         provenance(results),
     ]
     cover = Cover(results.title, results.batch.name, f"metro {__version__}")
     first, second, *rest = (section for section in sections if section is not None)
-    # a first page that is full of verdicts stands alone
-    return compile_pdf(cover, [first, replace(second, page=bool(results.verdicts())), *rest])
+    return compile_pdf(cover, [first, replace(second, page=True), *rest])

@@ -18,7 +18,7 @@ from metro.report.results import OBSERVABLES, title
 from metro.report.sections import findings
 from metro.report.sections.memory import memory_section
 from metro.report.sections.standings import largest_rests, rankings
-from metro.report.sections.verdict import STATUS, change, error_text, known_interval
+from metro.report.sections.verdict import STATUS, change, error_text, known_interval, next_words
 from metro.units import JSON, printed
 
 TITLE = "Campaign summary"
@@ -83,9 +83,7 @@ def campaign_sections(
 ) -> list[Section]:
     """Return what the summary says, for whatever it is set in."""
     entries = _entries(verdicts)
-    nexts = [
-        f"{b}, {title(n)}: {plain(e['next_experiment'])}" for b, n, e in entries if e.get("next_experiment")
-    ]
+    nexts = [f"{b}, {title(n)}: {told}" for b, n, e in entries if (told := next_words(e))]
     return [
         *_failed(failed or {}),
         Section(
@@ -181,8 +179,8 @@ def _verdicts(entries: list[tuple[str, str, JSON]]) -> list[Item]:
     ]
     header = ["batch", "observable", "verdict", "before", "after", "unit", "noise", "effects added"]
     caption = (
-        "Errors on held-out runs (rms, with 95 % intervals; – where one condition was held out) before and "
-        "after the effects that were found."
+        "Errors on held-out runs (rms, with 95 % intervals; none where one condition was held out) before "
+        "and after the effects that were found."
     )
     return [Table(header, rows, caption, [1.5, 1.3, 1, 1.25, 1.25, 0.5, 0.75, 2.1])] if rows else []
 
@@ -219,11 +217,14 @@ def _untold(entries: list[tuple[str, str, JSON]], identified: Mapping[str, JSON]
 
 
 def _missing(identified: Mapping[str, JSON]) -> list[list[str]]:
-    """Return a row for each reason and quantity, with the batches that it holds for."""
+    """Return a row for each reason, with the quantities and the batches that it holds for."""
     batches: dict[tuple[str, str], list[str]] = {}
     for batch, content in sorted(identified.items()):
         for name, reason in (content.get("not_identified") or {}).items():
             told = re.sub(r"^cell \S+: ", "", str(reason)).rstrip(".")
-            batches.setdefault((told, words(str(name))), []).append(batch)
-    ranked = sorted(batches.items(), key=lambda item: -len(item[1]))
-    return [[reason, name, ", ".join(found)] for (reason, name), found in ranked]
+            batches.setdefault((told, title(str(name))), []).append(batch)
+    alike: dict[tuple[str, str], list[str]] = {}
+    for (reason, name), found in batches.items():
+        alike.setdefault((reason, ", ".join(found)), []).append(name)
+    ranked = sorted(alike.items(), key=lambda item: -len(item[0][1].split(", ")))
+    return [[reason, listing(names), found] for (reason, found), names in ranked]

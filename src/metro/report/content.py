@@ -40,6 +40,7 @@ class Table:
     strong : rows that stand out.
     faint : columns that are set in grey.
     small : set in small type (hashes, long lists).
+    tall : with room to write in by hand.
     """
 
     header: Sequence[str]
@@ -50,6 +51,7 @@ class Table:
     strong: Sequence[int] = ()
     faint: Sequence[int] = ()
     small: bool = False
+    tall: bool = False
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,6 @@ def plain(text: str) -> str:
     """
     text = re.sub(r"(, to describe what is left):.*$", r"\1", text)
     text = re.sub(r"(?<=\d )um\b", "µm", text)
-    text = re.sub(r"(it shows from \S+) 1 on", r"\1 on", text)
     text = re.sub(r"\ball along in (\w+)", r"throughout in \1", text)
     text = re.sub(r"\bmean in (\w+)", r"a constant offset in \1", text)
     text = re.sub(r"\border 1 in (\w+)", r"once per revolution in \1", text)

@@ -14,6 +14,8 @@ from metro.batch.processed import Processed, read_batch, write_json
 from metro.batch.writing import write_atomically
 from metro.observables import force_metrics
 from metro.observables.end_stiffness import end_stiffness
+from metro.observables.mean_forces import mean_forces
+from metro.observables.record_view import record_tables
 from metro.observables.robot_tables import robot_tables
 from metro.report.batch_report import batch_report
 from metro.report.results import Results
@@ -21,6 +23,7 @@ from metro.units import JSON
 
 TABLES = (
     "qc",
+    "spindle",
     "comparison",
     "face_indices",
     "face_contacts",
@@ -34,6 +37,8 @@ TABLES = (
     "yielding",
     "frf_used",
     "stabilisation",
+    "mode_shapes",
+    "mode_mac",
     "waviness_points",
     "joint_friction",
     "joint_friction_curve",
@@ -43,6 +48,8 @@ TABLES = (
     "published_loads",
     "published_forces",
 )
+
+FORCE_TABLES = ("orders", "spindle", "force_refused")
 
 
 def report(processed: Path, reports: Path, settings: JSON, code: str) -> None:
@@ -54,13 +61,16 @@ def report(processed: Path, reports: Path, settings: JSON, code: str) -> None:
 
 def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> Results:
     """Read what the stages before left; tables that are absent or empty are left out."""
-    tables = {name: pd.read_parquet(p) for name in TABLES if (p := processed / f"{name}.parquet").exists()}
+    tables = _tables(processed, TABLES)
     batch = read_batch(processed)
     tables = {name: table for name, table in tables.items() if len(table)}
     tables |= _force_figures(batch, tables.get("comparison"))
     identified = _json(reports / "identified.json")
     read = Processed(processed)
     tables |= robot_tables(batch, read, identified, tables.get("waviness_points"))
+    tables |= mean_forces(batch, _tables(processed, FORCE_TABLES), identified) | record_tables(
+        batch, read, tables.get("qc")
+    )
     return Results(
         batch=batch,
         tables=tables | end_stiffness(read),
@@ -71,6 +81,10 @@ def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> R
         stages=provenance.stages(processed, settings, code),
         packages=provenance.packages(),
     )
+
+
+def _tables(processed: Path, names: tuple[str, ...]) -> dict[str, pd.DataFrame]:
+    return {name: pd.read_parquet(p) for name in names if (p := processed / f"{name}.parquet").exists()}
 
 
 def _force_figures(batch: Batch, comparison: pd.DataFrame | None) -> dict[str, pd.DataFrame]:

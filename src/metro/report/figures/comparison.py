@@ -113,7 +113,7 @@ def judged(frame: pd.DataFrame, title: str) -> Figure:
     """Draw side by side what :func:`residuals` and :func:`parity` do, of an observable of one axis."""
     drawn = predictions(frame)
     with style.style():
-        figure, ((left, middle, right),) = style.new_figure(1.65, 1, 3)
+        figure, ((left, middle, right),) = style.new_figure(1.5, 1, 3)
         _residual(left, frame, drawn)
         left.set_title("Residual of all runs", loc="left")
         left.set_ylabel(_label("measured − predicted", frame))
@@ -143,7 +143,7 @@ def parity(frame: pd.DataFrame, title: str) -> Figure:
     """Draw predicted over measured, axis by axis, and the distribution of the residuals."""
     names, drawn = axes_of(frame), predictions(frame)
     with style.style():
-        figure, (row,) = style.new_figure(1.6, 1, len(names) + 1)
+        figure, (row,) = style.new_figure(1.5, 1, len(names) + 1)
         for axes, name in zip(row, names, strict=False):
             _equal(axes, frame[axis_labels(frame) == name], drawn)
             axes.set_title(f"Parity, {name}" if len(names) > 1 else "Parity", loc="left")

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 HARMONICS = 6
 RUNS = 4
+LEGEND_ROOM = 108  # characters, of which each entry takes six for its line
+MARKS = ("o", "s", "^", "D", "v", "P", "X")
 REVOLUTIONS = 2.0
 
 
@@ -148,3 +150,35 @@ def _envelope(time: Array, force: Array, revolution: float) -> tuple[Array, Arra
     bands = np.array([(time[w].mean(), force[w].min(), force[w].mean(), force[w].max()) for w in whole])
     at, low, middle, high = bands.T
     return at, low, middle, high
+
+
+def means(table: pd.DataFrame, group: list[str]) -> Figure:
+    """Draw the mean force of every straight cut over the feed per tooth, and the lines of the coefficients.
+
+    Parameters
+    ----------
+    table : ``axis, role, feed_per_tooth_mm, measured_n, fitted_n``. group : of each row, the settings that
+        its cut shares with others but for the feed.
+    """
+    names = sorted(table["axis"].unique())
+    labels = list(dict.fromkeys(group))
+    with style.style():
+        figure, (row,) = style.new_figure(2.1, 1, len(names))
+        for axes, name in zip(row, names, strict=True):
+            for k, label in enumerate(labels):
+                part = table[(table["axis"] == name) & (np.array(group) == label)]
+                part = part.sort_values("feed_per_tooth_mm", kind="stable")
+                feed, colour = part["feed_per_tooth_mm"], style.SERIES[k % len(style.SERIES)]
+                axes.plot(feed, part["fitted_n"], color=colour, lw=0.9)
+                for role, face in (("identify", colour), ("validate", "none")):
+                    of_role = (part["role"] == role).to_numpy()
+                    dots = feed[of_role], part["measured_n"][of_role]
+                    axes.plot(*dots, MARKS[k % len(MARKS)], color=colour, ms=4, mfc=face)
+                axes.plot([], [], MARKS[k % len(MARKS)] + "-", color=colour, ms=4, lw=0.9, label=label)
+            axes.set_title(name, loc="left")
+            axes.set_xlabel("feed per tooth (mm)")
+        row[0].set_ylabel("mean force (N)")
+        handles, told = row[0].get_legend_handles_labels()
+        abreast = max(1, min(len(told), LEGEND_ROOM // (max(map(len, told)) + 6)))
+        figure.legend(handles, told, loc="outside upper center", ncols=abreast, fontsize=8)
+    return figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -11,9 +11,10 @@ from metro.report import style
 from metro.report.numbers import number
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
 DIAGRAMS = 4
+MOST_SHAPES = 16
 
 
 def responses(frf: pd.DataFrame) -> Figure:
@@ -90,3 +91,55 @@ def stabilisation(diagram: pd.DataFrame, frf: pd.DataFrame) -> Figure:
         grid[-1][0].set_xlabel("frequency (Hz)")
         style.legend_above(figure, grid[0][0])
     return figure
+
+
+def shapes(residues: pd.DataFrame, alike: pd.DataFrame) -> Figure:
+    """Draw the shape of each mode over the points of one direction, and how alike every two are.
+
+    Parameters
+    ----------
+    residues : ``frequency_hz, point, real, imag, resolved``. alike : ``first_hz, second_hz, mac``.
+    """
+    from matplotlib.figure import Figure as Canvas
+
+    panels = list(residues.groupby("frequency_hz", sort=True))[:MOST_SHAPES]
+    points = list(residues["point"].unique())
+    at = np.arange(len(points))
+    with style.style():
+        canvas = Canvas(figsize=(style.WIDTH, 0.7 + 0.62 * -(-len(panels) // 4)), layout="constrained")
+        halves: Any = canvas.subfigures(1, 2, width_ratios=[1.9, 1])
+        left, right = halves
+        grid = left.subplots(-(-len(panels) // 4), 4, squeeze=False, sharex=True, sharey=True)
+        for axes, (_, part) in zip(grid.flat, panels, strict=False):
+            value = part.set_index("point").loc[points]
+            most = float(np.hypot(value["real"], value["imag"]).max())
+            axes.axhline(0, color=style.GREY, lw=0.6)
+            axes.plot(at, value["real"] / most, "o-", color=style.AFTER, ms=2.5, lw=0.9, label="in phase")
+            axes.plot(at, value["imag"] / most, "x:", color=style.BEFORE, ms=3, lw=0.7, label="a quarter off")
+            star = "" if value["resolved"].all() else " *"
+            axes.set_title(
+                f"{number(part['frequency_hz'].iloc[0], 4)} Hz{star}", loc="left", fontsize=7.5, pad=2
+            )
+            axes.set_xticks(at, points, fontsize=7)
+            axes.set(ylim=(-1.15, 1.15))
+            axes.tick_params(labelsize=7)
+        for axes in grid.flat[len(panels) :]:
+            axes.set_visible(False)
+        left.supylabel("shape, largest 1", fontsize=9)
+        handles, labels = grid.flat[0].get_legend_handles_labels()
+        left.legend(handles, labels, loc="outside upper center", ncols=2)
+        _alike(right, alike)
+    return canvas
+
+
+def _alike(part: SubFigure, alike: pd.DataFrame) -> None:
+    matrix = alike.pivot_table(index="first_hz", columns="second_hz", values="mac")
+    axes = part.subplots()
+    image = axes.imshow(matrix, vmin=0, vmax=1, cmap=style.SEQUENTIAL, origin="lower")
+    place = np.arange(len(matrix))
+    names = [number(float(frequency), 4) for frequency in matrix.index]
+    axes.set_xticks(place, names, rotation=90, fontsize=6.5)
+    axes.set_yticks(place, names, fontsize=6.5)
+    axes.grid(visible=False)
+    axes.set_xlabel("mode (Hz)")
+    part.colorbar(image, ax=axes, location="top", label="MAC", shrink=0.8)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AXES = (("x", style.AFTER), ("y", style.BEFORE), ("z", style.GREEN))
-RUNS = 4
+RUNS = 2
 SHADES = {"cut-in": 0.16, "cut-out": 0.16, "steady": 0.06}
 DOMAINS = (("time", "frequency (Hz)", "µm²/Hz"), ("path", "waves per mm", "µm² mm"))
 NORMAL = 1.96

@@ -53,15 +53,17 @@ def _pair(axes: Axes, ranking: Sequence[JSON], across: str, beside: str) -> None
         at = np.unique(x)
         means = [np.exp(np.log(y[x == place]).mean()) for place in at]
         axes.plot(x, y, marker, color=colour, markersize=3.5, alpha=0.45, markeredgewidth=0)
-        axes.plot(at, means, marker + "-", color=colour, markersize=5, label=f"{_short(beside)} {level}")
+        axes.plot(at, means, marker + "-", color=colour, markersize=5, label=_level(beside, level))
     axes.set_xticks(list(places.values()), list(places))
     axes.set_xlim(-0.35, len(places) - 0.65)
     axes.set_xlabel(across)
     axes.legend()
 
 
-def _short(name: str) -> str:
-    return name.partition(" (")[0]
+def _level(factor: str, level: str) -> str:
+    """Write a level behind its factor, the unit behind both: axial depth 1.5 mm."""
+    name, _, unit = factor.partition(" (")
+    return f"{name} {level} {unit.removesuffix(')')}".rstrip()
 
 
 def ticks(axes: Axes, values: Sequence[float]) -> None:

@@ -16,10 +16,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PATTERNS, LONGEST = 8, 26  # most bars, and characters of what stands beside one
+PATTERNS, LONGEST = 8, 30  # most bars, and characters of what stands beside one
 SMALLEST = 0.1  # end of the axis where nothing is left, % of the signal
-ABREAST = 1.75  # inches, of a figure that stands beside another
+ABREAST = 1.55  # inches, of a figure that stands beside another
 HATCHES = ("", "/////", "xxxxx", "....", "-----", "+++++")  # axes in grey print
+MOST_NAMED = 18  # runs along an axis of half the width
 LABEL_ROOM = 36  # characters that fit side by side under a figure of half the width
 
 
@@ -80,7 +81,7 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
         b for b in blocks if b.get("role") in {"identify", "validate"} and b.get("rms_before") is not None
     ]
     rows = sorted(rows, key=lambda b: b.get("order") or 0)
-    x = np.arange(1, len(rows) + 1)
+    x, size = np.arange(1, len(rows) + 1), 22 if len(rows) <= MOST_NAMED else 8
     with style.style():
         figure, ((axes,),) = style.new_figure(ABREAST, width=style.HALF)
         changed = any(b.get("rms_after") not in {None, b["rms_before"]} for b in rows)
@@ -93,7 +94,7 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
             for key, colour, mark, name in series[: 1 + changed] if at else []:
                 value = [float(v) if (v := rows[i].get(key)) is not None else np.nan for i in at]
                 face, label = (colour if filled else "white"), f"{name}, {words}"
-                drawn = axes.scatter(x[at], value, marker=mark, s=22, fc=face, ec=colour, label=label)
+                drawn = axes.scatter(x[at], value, marker=mark, s=size, fc=face, ec=colour, label=label)
                 drawn.set_clip_on(False)  # a run without residual stands on the axis
         if floor is not None:
             axes.axhline(floor, color=style.MEASURED, lw=0.8, ls=":", label="noise floor")
@@ -103,7 +104,7 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
             ylabel=f"rms residual ({printed(unit)})" if printed(unit) else "rms residual",
             xlabel="run, in the order of cutting",
         )
-        step = max(1, len(rows) // 24)
+        step = -(-len(rows) // MOST_NAMED)
         rotation = 90 if sum(len(str(b["run"])) + 2 for b in rows[::step]) > LABEL_ROOM else 0
         axes.set_xticks(x[::step], [str(b["run"]) for b in rows][::step], rotation=rotation)
         handles, labels = axes.get_legend_handles_labels()

@@ -17,6 +17,7 @@ from metro.report.sections.lobes import cut_items
 from metro.units import printed
 
 LONGEST, SHORT = 30, 6
+ABREAST = 2  # runs in one figure, so that figures break over pages
 FEWEST = 3  # values of a run along an axis that make a curve
 
 
@@ -62,7 +63,7 @@ def _values(frame: pd.DataFrame, name: str, merit: list[Item], *, alone: bool) -
     if frame.groupby(["run", figures.axis_labels(frame)]).size().max() < FEWEST:
         return [errors(frame), parity()]
     if merit:
-        return [*merit, *_curves(frame, name, words, alone=alone), parity()]
+        return [merit[0], *_curves(frame, name, words, alone=alone), *merit[1:], parity()]
     about = (
         f"{whole}. {findings.offsets(frame)} Residual of all held-out runs: median and the band that holds "
         "80 % of the values"
@@ -82,13 +83,18 @@ def _curves(frame: pd.DataFrame, name: str, words: str, *, alone: bool) -> list[
     part = f" Runs {listing(shown)} of {runs}." if runs > len(shown) else ""
     blocks = frame["angle_deg"].notna().all() and frame["t_s"].nunique() > 1
     repeats = " One time block of each run is drawn." if blocks else ""
-    items: list[Item] = [
-        Picture(
-            figures.overlay(frame, name, alone=alone),
-            f"{findings.left(frame)} Measured {name} and predictions, held-out runs.{part}{repeats}",
-            f"Measured and predicted {name} for {len(shown)} held-out runs; {words}.",
+    abreast = ABREAST if len(figures.axes_of(frame)) > 1 else len(shown)
+    items: list[Item] = []
+    for i in range(0, len(shown), abreast):
+        runs_here = shown[i : i + abreast]
+        about = f"{findings.left(frame)} Measured {name} and predictions, held-out runs.{part}{repeats}"
+        items.append(
+            Picture(
+                figures.overlay(frame[frame["run"].isin(runs_here)], name, alone=alone),
+                f"The same of {listing(runs_here)}." if i else about,
+                f"Measured and predicted {name} for {listing(runs_here)}; {words}.",
+            )
         )
-    ]
     if frame[["x_mm", "y_mm"]].notna().all().all():
         items.append(
             Picture(

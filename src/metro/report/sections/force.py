@@ -6,15 +6,24 @@ import math
 from collections.abc import Hashable, Mapping
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from metro.report.content import Item, Picture, Table
 from metro.report.figures import force as figures
-from metro.report.numbers import number, with_interval
+from metro.report.numbers import number, percent, with_interval
 from metro.report.results import Results
 from metro.report.sections import findings
 
-LONGEST = 30
+LONGEST, MOST_GROUPS = 30, 8
+# settings of a cut by which its mean force differs but for the feed, and how their values are read
+SETTINGS = {
+    "operation": "",
+    "direction": "",
+    "spindle_rpm": "rpm",
+    "axial_depth_mm": "mm deep",
+    "radial_depth_mm": "mm wide",
+}
 # metric, its title, and whether its share of the measured is told
 COLUMNS = (
     ("nrmse", "NRMSE (%)", False),
@@ -49,6 +58,36 @@ def force_items(results: Results) -> list[Item]:
             f"Bars of the measured peak of each of {teeth} teeth, and the predicted ones beside them.",
         ),
     ]
+
+
+def mean_items(table: pd.DataFrame | None) -> list[Item]:
+    """Draw the mean forces over the feed with the coefficients' lines; nothing where all have one feed."""
+    if table is None or table["feed_per_tooth_mm"].nunique() < 2:
+        return []
+    differ = [name for name in SETTINGS if name in table and table[name].nunique(dropna=False) > 1]
+    group = [_cut({name: row[name] for name in differ}) for row in table.to_dict("records")]
+    if len(set(group)) > MOST_GROUPS:
+        return []
+    rest = table["measured_n"] - table["fitted_n"]
+    share = float(np.sqrt(np.mean(rest**2) / np.mean(table["measured_n"] ** 2)))
+    worst = table.iloc[int(rest.abs().argmax())]
+    missed = abs(worst["measured_n"] - worst["fitted_n"])
+    about = (
+        f"The coefficients miss the mean forces by {percent(share)} rms, most in {worst['run']} along "
+        f"{worst['axis']}, by {number(missed)} N. Mean force over whole revolutions of straight cuts; lines: "
+        "the coefficients from the mean forces of all runs. Open: held-out runs."
+    )
+    return [Picture(figures.means(table, group), about, about)]
+
+
+def _cut(settings: Mapping[Hashable, Any]) -> str:
+    """Name a cut by the settings that differ: slot; down, 4 mm wide."""
+    told = [
+        f"{value:g} {SETTINGS[str(name)]}" if isinstance(value, float | int) else str(value)
+        for name, value in settings.items()
+        if not (name == "operation" and "direction" in settings) and pd.notna(value)
+    ]
+    return ", ".join(told) or "all cuts"
 
 
 def metrics_table(metrics: pd.DataFrame) -> Table:

@@ -7,8 +7,9 @@ from typing import Any
 import pandas as pd
 
 from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table, abreast
-from metro.report.numbers import number, quantity, words
-from metro.report.results import Results
+from metro.report.numbers import listing, number, quantity, words
+from metro.report.results import Results, title
+from metro.report.sections.force import mean_items
 from metro.report.sections.lobes import boundaries
 from metro.report.sections.modes import modes
 from metro.units import JSON, printed
@@ -41,7 +42,7 @@ def identification(results: Results) -> Section:
     """Write every block of ``identified.json``, and the reasons why others are missing."""
     found = results.identified
     items: list[Item] = [
-        *_force(found.get("force") or {}),
+        *_force(found.get("force") or {}, mean_items(results.tables.get("mean_forces"))),
         *_yielding(results.tables.get("yielding")),
         *modes(found.get("modes") or [], results.tables),
         *boundaries(results),
@@ -53,13 +54,13 @@ def identification(results: Results) -> Section:
     missing = _reasons(found)
     if missing:
         items.append(Heading("Not identified"))
-        items.append(Bullets([f"{name}: {reason.rstrip('.')}." for name, reason in missing.items()]))
+        items.append(Bullets([f"{name}: {reason}." for name, reason in missing]))
     return Section("Identification", items)
 
 
-def _reasons(found: JSON) -> dict[str, str]:
-    """Return why blocks, and parts of blocks, are missing, by name."""
-    own = {words(str(name)): str(reason) for name, reason in (found.get("not_identified") or {}).items()}
+def _reasons(found: JSON) -> list[tuple[str, str]]:
+    """Return why blocks, and parts of blocks, are missing: those of one reason together."""
+    own = {title(str(name)): str(reason) for name, reason in (found.get("not_identified") or {}).items()}
     for block, content in found.items():
         if isinstance(content, dict) and block != "not_identified":
             parts = content.get("not_identified") or {}
@@ -67,10 +68,14 @@ def _reasons(found: JSON) -> dict[str, str]:
                 f"{words(block)}, {RUN_BLOCKS.get(name, words(name))}": str(reason)
                 for name, reason in parts.items()
             }
-    return own
+    alike: dict[str, list[str]] = {}
+    for name, reason in own.items():
+        alike.setdefault(reason.rstrip("."), []).append(name)
+    return [(listing(names), reason) for reason, names in alike.items()]
 
 
-def _force(force: JSON) -> list[Item]:
+def _force(force: JSON, drawn: list[Item]) -> list[Item]:
+    """Write the coefficients, what is ``drawn`` of them, and the speeds."""
     sets = {key: force[key] for key in FORCE_SETS if force.get(key)}
     if not sets:
         return []
@@ -90,6 +95,7 @@ def _force(force: JSON) -> list[Item]:
     caption = f"Cutting coefficients with 95 % intervals; the edge terms count along the {edge} edge length."
     header = ["coefficient", "unit", *(FORCE_SETS[key] for key in sets)]
     items: list[Item] = [Heading("Cutting force"), Table(header, rows, caption, [1, 0.8, *([2] * len(sets))])]
+    items += drawn
     warnings = force.get("warnings") or []
     items += [Bullets([f"{str(warning).rstrip('.')}." for warning in warnings])] if warnings else []
     speeds = force.get("spindle_rpm") or {}
@@ -185,8 +191,8 @@ def _flat(value: Any, name: str) -> dict[str, str]:
 
 def _column(name: str, value: Any) -> str:
     shown = printed(value.get("unit")) if isinstance(value, dict) else ""
-    title = FACES.get(name, words(name))
-    return f"{title} ({shown})" if shown else title
+    named = FACES.get(name, words(name))
+    return f"{named} ({shown})" if shown else named
 
 
 def _text(value: Any) -> str:

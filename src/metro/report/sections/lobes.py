@@ -25,11 +25,7 @@ def boundaries(results: Results) -> list[Item]:
         return chatter_items(results)
     items: list[Item] = [Heading("Stability"), _lowest(blocks)]
     methods, boundary = results.tables.get("lobe_methods"), results.tables.get("lobes_final")
-    if boundary is not None and results.compared("lobes") is None:
-        lowest = findings.lowest_boundary(boundary, [("depth_mm", "")])
-        caption = f"{lowest} Stability boundary with its bands.".lstrip()
-        chart = figures.lobes_chart(boundary, _NO_TESTS, results.tables.get("lobe_islands"))
-        items.append(Picture(chart, caption, caption))
+    items += boundary_items(results)
     if methods is not None:
         items += _methods(methods, boundary)
     stations = results.tables.get("lobe_stations")
@@ -46,6 +42,17 @@ def boundaries(results: Results) -> list[Item]:
     if stations is not None:
         items.append(_stations(stations))
     return items + chatter_items(results)
+
+
+def boundary_items(results: Results) -> list[Item]:
+    """Draw the boundary of a batch without a test of it; nothing where tests stand beside it elsewhere."""
+    boundary = results.tables.get("lobes_final")
+    if boundary is None or results.compared("lobes") is not None:
+        return []
+    lowest = findings.lowest_boundary(boundary, [("depth_mm", "")])
+    caption = f"{lowest} Stability boundary with its bands.".lstrip()
+    chart = figures.lobes_chart(boundary, _NO_TESTS, results.tables.get("lobe_islands"))
+    return [Picture(chart, caption, caption)]
 
 
 def _lowest(blocks: list[JSON]) -> Table:

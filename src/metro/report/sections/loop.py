@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table, abreast
 from metro.report.figures import verdicts as figures
-from metro.report.numbers import number, percent, probability, words
+from metro.report.numbers import listing, number, percent, probability, words
 from metro.report.parameters import parameter_name, parameter_value
 from metro.report.phrases import plain
 from metro.report.results import Results, heading
 from metro.report.sections import findings
-from metro.report.sections.verdict import STATUS, error_text, left_words, sentence
+from metro.report.sections.verdict import STATUS, error_text, left_words, next_words, verdict_words
 from metro.units import JSON, printed
 
 LONGEST = 16
@@ -37,13 +37,13 @@ def _observable(observable: str, entry: JSON, told: JSON, left: str) -> list[Ite
     shown = entry.get("unit") or told.get("unit")
     noise = told.get("noise") or {}
     words_told = str(told.get("words") or "").partition(" What is left: ")[0]
-    items: list[Item] = [Paragraph(words_told or sentence(observable, entry, left))]
+    items: list[Item] = [Paragraph(words_told or verdict_words(observable, entry, left))]
     if noise:
         items.append(Paragraph(_noise_words(noise, shown)))
     items += _added(entry)
     items += _candidates(told.get("candidates") or entry.get("candidates") or [], shown)
     items += _path(told.get("path") or [], entry, shown)
-    return [*items, *_rest(entry, told, shown, left)]
+    return [*items, *_rest(entry, told, left)]
 
 
 def _runs(name: str, told: JSON, shown: str | None) -> list[Picture]:
@@ -146,21 +146,20 @@ def _path(path: list[JSON], entry: JSON, shown: str | None) -> list[Item]:
     return [Table(header, rows, caption, [2.4, *([1.4] * len(known)), 1], numeric=numeric)]
 
 
-def _rest(entry: JSON, told: JSON, shown: str | None, left: str) -> list[Item]:
+def _rest(entry: JSON, told: JSON, left: str) -> list[Item]:
     items: list[Item] = []
     rest = entry.get("unexplained") or {}
     if rest.get("signature"):
-        size = "" if rest.get("rms") is None else f"{number(rest['rms'])} {printed(shown)} rms, "
-        items.append(Paragraph(f"Unexplained: {size}{left or plain(rest['signature'])}.", "warning"))
+        items.append(Paragraph(f"Unexplained: {left or plain(rest['signature'])}.", "warning"))
     groups = [" and ".join(words(str(n)) for n in group) for group in entry.get("indistinguishable") or []]
     if groups:
         items.append(Paragraph("Cannot be told apart with these data: " + "; ".join(groups) + "."))
-    hidden = [
-        plain(f"{words(str(c['effect']))}: {c.get('why', '')}".rstrip(": "))
-        for c in told.get("cannot_be_seen") or []
-    ]
+    hidden: dict[str, list[str]] = {}
+    for one in told.get("cannot_be_seen") or []:
+        hidden.setdefault(str(one.get("why") or ""), []).append(words(str(one["effect"])))
     if hidden:
-        items += [Paragraph("Cannot be seen in this batch:"), Bullets(hidden)]
-    if entry.get("next_experiment"):
-        items.append(Paragraph(f"Measure next: {plain(entry['next_experiment']).rstrip('.')}."))
+        alike = [plain(f"{listing(names)}: {why}".rstrip(": ")) for why, names in hidden.items()]
+        items += [Paragraph("Cannot be seen in this batch:"), Bullets(alike)]
+    if told_next := next_words(entry):
+        items.append(Paragraph(f"Measure next: {told_next}."))
     return items

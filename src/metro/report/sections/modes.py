@@ -8,11 +8,13 @@ import pandas as pd
 
 from metro.report.content import Heading, Item, Picture, Table
 from metro.report.figures import modal as figures
-from metro.report.numbers import percent, quantity
+from metro.report.numbers import number, percent, quantity
 from metro.report.sections.measured import count_of
 from metro.units import JSON
 
 LONGEST = 30
+FEWEST_POINTS = 3  # that make a shape
+ALIKE = 0.9  # MAC from which two shapes are taken for one
 KEYS = (
     ("frequency", "frequency (Hz)"),
     ("damping", "damping ratio"),
@@ -33,25 +35,71 @@ def modes(found: list[JSON], tables: Mapping[str, pd.DataFrame]) -> list[Item]:
         caption += f" The first {LONGEST} of {len(found)} are shown; identified.json has all."
     rows = [_row(mode) for mode in found[:LONGEST]]
     items: list[Item] = [Heading("Modes"), Table(header, rows, caption, [0.7, 0.8, 1.3, 1.5, 1.8, 1.4])]
-    drawn = _magnitudes(tables.get("frf_used"))
-    if drawn is None:
-        return items
+    drawn, diagram = _magnitudes(tables.get("frf_used")), tables.get("stabilisation")
+    if drawn is not None:
+        items += [_responses(drawn), *([_diagram(diagram, drawn, len(found))] if diagram is not None else [])]
+    return [*items, *_shapes(tables.get("mode_shapes"), tables.get("mode_mac"))]
+
+
+def _responses(drawn: pd.DataFrame) -> Picture:
     alt = f"Measured frequency responses ({len(drawn)} lines) with the modal model over them."
     caption = "Measured frequency responses and what the modes reconstruct"
     if "error" in drawn:
         most = percent(float(drawn["error"].max()))
         caption = f"The modes leave at most {most} of a response. {caption} (in brackets: what they leave)"
-    items.append(Picture(figures.responses(drawn), f"{caption}.", alt))
-    diagram = tables.get("stabilisation")
-    if diagram is not None:
-        poles = int(diagram["recurs"].sum())
-        caption = (
-            f"{poles} of {len(diagram)} poles recur and make {count_of(len(found), 'mode')}. Stabilisation "
-            "diagram: the poles of every model order; one that recurs at a quarter of them, "
-            "with like frequency, damping and shape starts a mode of the maximum-likelihood fit."
+    return Picture(figures.responses(drawn), f"{caption}.", alt)
+
+
+def _diagram(diagram: pd.DataFrame, drawn: pd.DataFrame, modes_found: int) -> Picture:
+    poles = int(diagram["recurs"].sum())
+    caption = (
+        f"{poles} of {len(diagram)} poles recur and make {count_of(modes_found, 'mode')}. Stabilisation "
+        "diagram: the poles of every model order; one that recurs at a quarter of them, "
+        "with like frequency, damping and shape starts a mode of the maximum-likelihood fit."
+    )
+    alt = f"Poles of {diagram['order'].nunique()} model orders over frequency."
+    return Picture(figures.stabilisation(diagram, drawn), caption, alt)
+
+
+def largest_response(tables: Mapping[str, pd.DataFrame]) -> list[Item]:
+    """Draw the response with the highest peak, of the driving points if there are any; else nothing."""
+    drawn = _magnitudes(tables.get("frf_used"))
+    if drawn is None:
+        return []
+    pair = ["position", "reference", "response"]
+    driving = drawn["reference"] == drawn["response"]
+    drawn = drawn[driving] if driving.any() else drawn
+    highest = drawn.loc[drawn.groupby(pair)["measured_m_n"].idxmax()].nlargest(1, "measured_m_n").iloc[0]
+    part = drawn[(drawn[pair] == highest[pair]).all(axis=1)]
+    what = "response of a driving point" if driving.any() else "response"
+    about = (
+        f"The highest {what}, {number(highest['measured_m_n'])} m/N at "
+        f"{number(highest['frequency_hz'], 4)} Hz. Measured, and what the modes reconstruct."
+    )
+    return [Picture(figures.responses(part), about, about)]
+
+
+def _shapes(residues: pd.DataFrame | None, alike: pd.DataFrame | None) -> list[Item]:
+    """Draw the shapes of the modes of each direction that was hit or measured at several points."""
+    if residues is None or alike is None:
+        return []
+    items: list[Item] = []
+    by = ["position", "direction"]
+    of_direction = dict(tuple(alike.groupby(by)))
+    for key, part in residues.groupby(by, sort=False):
+        roving = "reference" if part["reference"].nunique() > 1 else "response"
+        if part[roving].nunique() < FEWEST_POINTS:
+            continue
+        close = of_direction[key]
+        above = close[(close["first_hz"] < close["second_hz"]) & (close["mac"] > ALIKE)]
+        total = part["frequency_hz"].nunique()
+        pairs = total * (total - 1) // 2
+        about = (
+            f"Like shapes (MAC over {ALIKE:g}) have {len(above) or 'none'} of {pairs} pairs of modes at the "
+            f"{part[roving].nunique()} points of position {key[0]}, direction {key[1]}: more points would "
+            "part them. Shapes of the modes, and the modal assurance criterion of every two."
         )
-        alt = f"Poles of {diagram['order'].nunique()} model orders over frequency."
-        items.append(Picture(figures.stabilisation(diagram, drawn), caption, alt))
+        items.append(Picture(figures.shapes(part.assign(point=part[roving]), close), about, about))
     return items
 
 

@@ -61,7 +61,7 @@ def bias(name: str, pairs: pd.DataFrame) -> list[Item]:
     finding = f"A gain is shown of {listing(sure)}" if sure else "No gain is shown"
     about = f"Table {name}. {finding} ({len(sure)} of {len(told)}). Printed pairs, and the gain they share."
     alt = f"Measured over predicted, {len(told)} quantities of table {name}. {finding}."
-    return [table, Picture(pairs_drawn(drawn), about, alt), Bullets([*found, CANNOT])]
+    return [table, Picture(pairs_drawn(drawn), about, alt), Bullets(found)]
 
 
 def _of_one_sign(measured: Array, predicted: Array) -> bool:

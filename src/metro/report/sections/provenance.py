@@ -1,4 +1,4 @@
-"""Where everything came from: hold-out plan, limits of the models, settings, code, source files."""
+"""Where everything came from: limits of the models, settings, code, source files."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import json
 
 from metro import __version__
 from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
-from metro.report.numbers import listing
 from metro.report.phrases import sentence
 from metro.report.results import Results, title
 from metro.units import JSON
 
-LONGEST, ABREAST, DIGITS = 240, 3, 12
+LONGEST, SHORT, DIGITS = 240, 16, 12
 LIMITS = {
     "force": "The force model is mechanistic and linear in its coefficients: one edge force, one pressure, "
     "no dependence on temperature or speed; the tool is rigid unless an effect says otherwise.",
@@ -29,32 +28,9 @@ LIMITS = {
 
 
 def provenance(results: Results) -> Section:
-    """Write hold-out plan, limits of the models, code and settings of every stage, versions, source files."""
-    parts = _plan(results), _limits(results), _approval(), _code(results), _sources(results)
+    """Write limits of the models, code and settings of every stage, versions, source files."""
+    parts = _limits(results), _approval(), _code(results), _sources(results)
     return Section("Provenance", [item for part in parts for item in part])
-
-
-def _plan(results: Results) -> list[Item]:
-    plan = results.batch.plan
-    if not plan.get("identify") and not plan.get("validate"):
-        reason = str(plan.get("how") or "no run was recorded").rstrip(".")
-        printed = "; which printed rows were held out is said below" if results.verdicts() else ""
-        return [Heading("Hold-out plan"), Paragraph(f"No run was held out: {reason}{printed}.")]
-    rows = [
-        [words, _runs(plan.get(key) or [])]
-        for key, words in (("identify", "identification"), ("validate", "held out"))
-    ]
-    how = f"Made from the manifest before any signal was read: {plan.get('how', 'not stated')}"
-    seed = f" Seed {plan['seed']}." if plan.get("seed") is not None else ""
-    return [
-        Heading("Hold-out plan"),
-        Paragraph(how.rstrip(".") + "." + seed),
-        Table(["role", "runs"], rows, "Who identifies and who judges.", [1, 5]),
-    ]
-
-
-def _runs(names: list[str]) -> str:
-    return f"{len(names)}: {listing([str(n) for n in names])}" if names else "none"
 
 
 def _limits(results: Results) -> list[Item]:
@@ -76,8 +52,8 @@ def _code(results: Results) -> list[Item]:
     listed = f"{whole}: of the list of the source files, as sha256sum writes it"
     rows.append(["sources", whole[:DIGITS], listed])
     caption = (
-        f"What each stage was made by: metro {__version__}, the first {DIGITS} digits of the hash of the "
-        "stage's code, and its settings; provenance.json has all digits."
+        f"Made with metro {__version__}. Hash of each stage's code (first {DIGITS} digits; provenance.json "
+        "has all) and its settings."
     )
     versions = ", ".join(f"{name} {number}" for name, number in sorted(results.packages.items()))
     packages = [Paragraph(f"Packages: {versions}.", "note")] if versions else []
@@ -94,7 +70,7 @@ def _approval() -> list[Item]:
     rows = [[role, "", "", ""] for role in ("measured", "evaluated", "approved")]
     return [
         Heading("Approval"),
-        Table(["", "name", "date", "signature"], rows, "Who answers for this report.", [1, 2, 1, 2]),
+        Table(["", "name", "date", "signature"], rows, "", [1, 2, 1, 2], tall=True),
     ]
 
 
@@ -108,14 +84,12 @@ def _sources(results: Results) -> list[Item]:
     if not results.sources:
         return [Heading("Source files"), Paragraph("The processed tables name no source files.")]
     shown = [[name, digest[:DIGITS]] for name, digest in sorted(results.sources.items())[:LONGEST]]
-    height = -(-len(shown) // ABREAST)
-    shown += [["", ""]] * (ABREAST * height - len(shown))
-    rows = [[cell for part in range(ABREAST) for cell in shown[part * height + i]] for i in range(height)]
-    caption = (
-        f"The {len(results.sources)} source files and the first {DIGITS} digits of the SHA-256 of each; "
-        "provenance.json has all of them."
-    )
+    abreast = 4 if max(len(name) for name, _ in shown) <= SHORT else 3
+    height = -(-len(shown) // abreast)
+    shown += [["", ""]] * (abreast * height - len(shown))
+    rows = [[cell for part in range(abreast) for cell in shown[part * height + i]] for i in range(height)]
+    caption = f"The {len(results.sources)} source files and the first {DIGITS} digits of the SHA-256 of each."
     caption += f" The first {LONGEST} files." if len(results.sources) > LONGEST else ""
-    header = ["file", "SHA-256"] * ABREAST
-    table = Table(header, rows, caption, [1.2, 1] * ABREAST, small=True)
+    header = ["file", "SHA-256"] * abreast
+    table = Table(header, rows, caption, [1.2, 1] * abreast, small=True)
     return [Heading("Source files"), table]

@@ -11,7 +11,7 @@ from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Sec
 from metro.report.figures import force as figures
 from metro.report.numbers import number
 from metro.report.results import Results
-from metro.report.sections.printed_bias import bias
+from metro.report.sections.printed_bias import CANNOT, bias
 from metro.units import printed
 
 CONVENTION = {"measured": "(m − p)/m", "predicted": "(m − p)/p"}
@@ -27,6 +27,8 @@ def published(results: Results) -> Section | None:
     for name, rows in table.groupby("table", sort=False):
         pairs = rows[rows["predicted"].notna()]
         items += _pairs(str(name), pairs) if len(pairs) else []
+    if any(isinstance(item, Picture) for item in items):
+        items.append(Paragraph(CANNOT, "note"))
     items += _single(table[table["predicted"].isna()], results)
     items += _modes(results.tables.get("published_modes"))
     items += _matrices(tip)
@@ -60,7 +62,7 @@ def _pairs(name: str, pairs: pd.DataFrame) -> list[Item]:
     rows = [
         [
             str(r["row"]),
-            " ".join(filter(None, [str(r["quantity"]), str(r["axis"] or "") if pd.notna(r["axis"]) else ""])),
+            _named(r),
             *(column[i] for column in columns),
             number(r["of_measured_percent"], 4),
             number(r["of_predicted_percent"], 4),
@@ -98,7 +100,7 @@ def _single(rows: pd.DataFrame, results: Results) -> list[Item]:
         body = [
             [
                 str(r["row"]),
-                str(r["quantity"]),
+                _named(r),
                 f"{r['measured']:.10g}",
                 printed(str(r["unit"])),
             ]
@@ -114,6 +116,11 @@ def _single(rows: pd.DataFrame, results: Results) -> list[Item]:
             )
         )
     return items
+
+
+def _named(row: pd.Series) -> str:
+    """Name the quantity of a printed value, and the axis that it is along."""
+    return f"{row['quantity']} {row['axis'] if pd.notna(row['axis']) else ''}".strip()
 
 
 def _as_printed(values: pd.Series) -> list[str]:

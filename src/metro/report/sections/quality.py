@@ -11,6 +11,7 @@ from metro.report.content import Item, Paragraph, Section, Table
 from metro.report.numbers import listing, number, words
 from metro.report.results import Results
 from metro.report.sections.chatter import chatter_flags
+from metro.report.sections.records import record_items
 
 LONGEST, MOST_NAMES, MOST_FLAGS = 40, 24, 5
 MEANING = {
@@ -50,8 +51,7 @@ def quality(results: Results) -> Section:
             )
         )
         items.append(_failures(failed))
-    items.append(_checked(table))
-    return Section("Data quality", items)
+    return Section("Data quality", [*items, _checked(table), *record_items(results)])
 
 
 def with_flags(first: Section, results: Results) -> Section:

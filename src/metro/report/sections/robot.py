@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pandas as pd
 
-from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
+from metro.report.content import Bullets, Heading, Item, Picture, Section, Table
 from metro.report.figures import robot as figures
-from metro.report.numbers import listing, number, percent, probability, quantity
+from metro.report.numbers import listing, number, probability, quantity
 from metro.report.results import Results
 from metro.report.sections.friction import friction
 from metro.report.sections.stiffness import LONGEST, arm_stiffness, band, more, stations
@@ -232,16 +232,23 @@ def _waves(blocks: JSON) -> Table:
 
 
 def _shares(blocks: JSON) -> list[Item]:
-    known = {run: b["joint_share"] for run, b in blocks.items() if b.get("joint_share")}
+    known = [block["joint_share"] for block in blocks.values() if block.get("joint_share")]
     if not known:
         return []
-    rows = [[run, *(percent(share) for share in shares)] for run, shares in list(known.items())[:LONGEST]]
+    shares = np.array(known, dtype=float)
+    told = {"least": shares.min(axis=0), "median": np.median(shares, axis=0), "greatest": shares.max(axis=0)}
+    rows = [[name, *(_whole_percent(share) for share in values)] for name, values in told.items()]
     caption = (
-        "Share of each joint in the variance of the tip's waves; below zero: it works against the others."
+        f"Share of each joint in the variance of the tip's waves, over {len(known)} runs; below zero: it "
+        "works against the others."
     )
-    header = ["run", *(f"joint {i}" for i in range(1, 7))]
+    header = ["", *(f"joint {i}" for i in range(1, 7))]
     widths, numeric = [0.7, *([1.0] * 6)], [1, 2, 3, 4, 5, 6]
-    return [Table(header, rows, caption + more(len(known)), widths, numeric=numeric, small=True)]
+    return [Table(header, rows, caption, widths, numeric=numeric, small=True)]
+
+
+def _whole_percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %".replace("-0 %", "0 %").replace("-", "−")
 
 
 def _spectra(results: Results) -> list[Item]:
@@ -250,17 +257,14 @@ def _spectra(results: Results) -> list[Item]:
         return []
     found = "No line stands" if lines is None else f"{len(lines)} lines stand"
     caption = (
-        f"{found} out of the noise. Spectra of the tip's path error by the encoders (multitaper), all runs: "
-        "over time and along the path. Marks: significant lines."
+        f"{found} out of the noise at a chance of one in a hundred per spectrum. Spectra of the tip's path "
+        "error by the encoders (multitaper), all runs: over time and along the path. Marks: such lines."
     )
     items: list[Item] = [
         Heading("Spectra of the path error"),
         Picture(figures.spectra(table, lines), caption, caption),
     ]
     if lines is None:
-        items.append(
-            Paragraph("No line stands out of the noise at a chance of one in a hundred per spectrum.")
-        )
         return items
     strongest = lines.sort_values("amplitude_um", ascending=False).head(LONGEST // 2)
     rows = [

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import pandas as pd
 
-from metro.report.content import Heading, Item, Section, Table
+from metro.report.content import Heading, Item, Paragraph, Section, Table
 from metro.report.numbers import listing, words
 from metro.report.results import Results
+from metro.report.sections.measured import count_of
 from metro.units import JSON, printed
 
 LONGEST, MOST_RUNS = 40, 8
@@ -44,7 +46,7 @@ CONDITIONS = {
 def setup(results: Results) -> Section | None:
     """Write the declared tool, work and instruments, and the conditions with their runs; None without any."""
     items = [*_declared(results.batch.manifest), *_conditions(results.batch.runs)]
-    return Section("What was measured", items) if items else None
+    return Section("What was measured", [*items, *_plan(results)]) if items else None
 
 
 def _declared(manifest: JSON) -> list[Item]:
@@ -98,13 +100,27 @@ def _conditions(runs: pd.DataFrame) -> list[Item]:
     return [Heading("Conditions"), table]
 
 
+def _plan(results: Results) -> list[Item]:
+    """Say who held runs out, when and how."""
+    plan = results.batch.plan
+    if not plan.get("identify") and not plan.get("validate"):
+        reason = str(plan.get("how") or "no run was recorded").rstrip(".")
+        told = "; which printed rows were held out is said below" if results.verdicts() else ""
+        return [Heading("Hold-out plan"), Paragraph(f"No run was held out: {reason}{told}.")]
+    how = f"Made from the manifest before any signal was read: {plan.get('how', 'not stated')}"
+    seed = f" Seed {plan['seed']}." if plan.get("seed") is not None else ""
+    used, held = (count_of(len(plan.get(role) or []), "run") for role in ("identify", "validate"))
+    told = f"{how.rstrip('.')}.{seed} To identify on: {used}; held out: {held}."
+    return [Heading("Hold-out plan"), Paragraph(told)]
+
+
 def _given(column: pd.Series) -> pd.Series:
     return column.notna() & (column.astype(str) != "")
 
 
 def _cell(value: object) -> str:
     if isinstance(value, float):
-        return f"{value:g}"
+        return "–" if math.isnan(value) else f"{value:g}"
     return str(value or "–")
 
 

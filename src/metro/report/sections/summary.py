@@ -1,0 +1,216 @@
+"""The first page: what was measured, the verdicts, what to trust, what to measure next, the key numbers."""
+
+from __future__ import annotations
+
+from metro.report.content import Bullets, Facts, Heading, Item, Paragraph, Picture, Section, Table
+from metro.report.figures import verdicts as figures
+from metro.report.figures.comparison import coordinate, overlay
+from metro.report.numbers import listing, number, percent, probability, quantity, words
+from metro.report.phrases import sentence
+from metro.report.results import Results, heading, title
+from metro.report.sections import findings
+from metro.report.sections.lobes import boundary_items
+from metro.report.sections.measured import count_of, measured_words
+from metro.report.sections.modes import largest_response
+from metro.report.sections.trust import trust
+from metro.report.sections.verdict import (
+    STATUS,
+    change,
+    error_text,
+    known_interval,
+    left_words,
+    next_words,
+    unit_after,
+    verdict_words,
+)
+from metro.units import JSON
+
+MOST_DRAWN = 2  # verdicts beside which a first page has room for a run
+
+
+def summary(results: Results) -> Section:
+    """Write the first page: what it says, the key numbers, errors before and after, the run missed most."""
+    verdicts = results.verdicts()
+    items = [*first_words(results), *_key_numbers(verdicts)]
+    told = [c for c in (change(title(name), entry) for name, entry in verdicts.items()) if c is not None]
+    if told:
+        items.append(
+            Picture(
+                figures.changes(told, "error on held-out runs (% of the signal)"),
+                f"{findings.changed(told)} Errors with 95 % intervals, and the noise floor.",
+                "; ".join(f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in told),
+            )
+        )
+    drawn = _one_run(results) if len(verdicts) <= MOST_DRAWN else []
+    return Section("Summary", [*items, *drawn, *([] if verdicts else _identified(results))])
+
+
+def first_words(results: Results) -> list[Item]:
+    """Say what was measured, the verdicts, what to trust and what to measure next."""
+    verdicts = results.verdicts()
+    told = [verdict_words(name, entry, left_words(results, name)) for name, entry in verdicts.items()]
+    nexts = [f"{title(n)}: {words_next}" for n, e in verdicts.items() if (words_next := next_words(e))]
+    lacking = (results.identified.get("not_identified") or {}).get("lobes")
+    if not verdicts and lacking and results.identified.get("modes"):
+        nexts = [f"For a verdict on {title('lobes')}: {lacking}"]
+    measure: list[Item] = [Heading("What to measure next"), Bullets([sentence(text) for text in nexts])]
+    return [
+        Paragraph(measured_words(results)),
+        *(Paragraph(text, "verdict") for text in told or [no_verdict(results)]),
+        Heading("What to trust"),
+        Bullets(trust(results)),
+        *(measure if nexts else []),
+        *advice(results.identified),
+        *print_check(results),
+    ]
+
+
+def advice(found: JSON) -> list[Item]:
+    """Name the planned configuration that is predicted to be the flattest."""
+    study = found.get("study") or {}
+    told = (study.get("after_loop") or {}).get("advice") or study.get("advice")
+    if not told:
+        return []
+    best, count = told["configurations"][0], len(told["configurations"])
+    text = (
+        f"Of {count} planned configurations of faces, none of them cut, {best['configuration']} is predicted "
+        f"to be the flattest: X_m {quantity(best['xm_predicted'])}, the best with probability "
+        f"{probability(best['probability_best'])}. Nothing was measured of these."
+    )
+    return [Paragraph(text)]
+
+
+def _one_run(results: Results) -> list[Item]:
+    """Draw the held-out run that the base model misses most, of the first observable that has curves."""
+    for name in results.verdicts():
+        frame = results.compared(name) if name != "lobes" else None
+        if frame is None or not coordinate(frame):
+            continue
+        square = (frame["measured"] - frame["before"]) ** 2
+        run = str(square.groupby(frame["run"]).mean().idxmax())
+        caption = f"{heading(name)}. {findings.missed(frame, run)}"
+        return [Picture(overlay(frame[frame["run"] == run], title(name)), caption, caption)]
+    return []
+
+
+def _identified(results: Results) -> list[Item]:
+    """Give the mode that yields most, and the boundary or the response that tells what was identified."""
+    yielding = [mode for mode in results.identified.get("modes") or [] if _peak(mode) > 0.0]
+    if not yielding:
+        return []
+    softest = max(yielding, key=_peak)
+    where = f"position {softest['position']}, direction {softest['direction']}"
+    facts = Facts(
+        [
+            ("mode that yields most", quantity(softest["frequency"]), where),
+            ("damping ratio", quantity(softest["damping"], with_unit=False), "of critical damping"),
+            ("stiffness", quantity(softest["stiffness"]), "at the driving point"),
+            ("receptance at its peak", f"{number(_peak(softest))} m/N", "1 / (2 damping ratio · stiffness)"),
+        ]
+    )
+    return [facts, *boundary_items(results), *largest_response(results.tables)]
+
+
+def _peak(mode: JSON) -> float:
+    """Receptance of a mode alone at its peak, m/N; 0 where its stiffness is not known."""
+    stiffness, damping = mode.get("stiffness"), mode.get("damping")
+    if not stiffness or not damping or not mode.get("resolved", True):
+        return 0.0
+    return float(1.0 / (2.0 * damping["value"] * stiffness["value"]))
+
+
+def no_verdict(results: Results) -> str:
+    """Say that nothing was compared, and what was identified instead."""
+    nothing = "No held-out measurement could be compared with a prediction in this batch: no verdict."
+    return f"{nothing} {_identified_words(results.identified)}".strip()
+
+
+def _identified_words(found: JSON) -> str:
+    """Name what was identified, for a batch that has nothing else to show."""
+    modes = len(found.get("modes") or [])
+    named = [
+        f"{modes} mode{'s' if modes > 1 else ''}" if modes else "",
+        "cutting coefficients" if found.get("force") else "",
+        "joint stiffness" if (found.get("arm") or {}).get("joint_stiffness") else "",
+        "flatness of faces" if found.get("faces") else "",
+    ]
+    told = listing([name for name in named if name])
+    return f"Identified: {told}." if told else ""
+
+
+def print_check(results: Results) -> list[Item]:
+    """Say on the first page of a published batch what became of its printed errors."""
+    table = results.tables.get("published_errors")
+    if table is None:
+        return []
+    pairs, flagged = int(table["predicted"].notna().sum()), int((table["flag"].fillna("") != "").sum())
+    errata = int(table["note"].fillna("").str.contains("erratum: ").sum())
+    text = (
+        f"{len(table)} printed values were transcribed, {pairs} of them with a prediction beside them; "
+        f"every printed error was recomputed. {f'{flagged} cannot' if flagged else 'All can'} be right as "
+        f"printed; for {errata or 'none'} an erratum is stated."
+    )
+    return [Paragraph(text)]
+
+
+def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
+    if len(verdicts) == 1:
+        ((_, entry),) = verdicts.items()
+        before, after = entry.get("before") or {}, entry.get("after") or {}
+        return [
+            Facts(
+                [
+                    (
+                        "verdict",
+                        STATUS.get(str(entry.get("status")), "–"),
+                        count_of(len(entry.get("held_out_runs") or []), "held-out run"),
+                    ),
+                    (
+                        "error before",
+                        error_text(before, entry.get("unit")),
+                        _share(before),
+                    ),
+                    (
+                        "error after",
+                        error_text(after, entry.get("unit")),
+                        _share(after),
+                    ),
+                    (
+                        "noise floor",
+                        f"{number(entry.get('noise_floor'))}{unit_after(entry)}",
+                        "rms of the compared value",
+                    ),
+                ]
+            )
+        ]
+    rows = [
+        [
+            title(name),
+            STATUS.get(str(entry.get("status")), "–"),
+            error_text(entry.get("before"), None),
+            error_text(entry.get("after"), None),
+            number(entry.get("noise_floor")),
+            unit_after(entry).strip() or "1",
+            listing([words(str(e["effect"])) for e in entry.get("effects") or []]) or "none",
+        ]
+        for name, entry in verdicts.items()
+    ]
+    header = ["observable", "verdict", "rms before", "rms after", "noise floor", "unit", "effects added"]
+    return (
+        [
+            Table(
+                header,
+                rows,
+                "Errors on held-out runs, with 95 % intervals.",
+                [2.1, 1, 1.6, 1.6, 1, 0.5, 1.4],
+            )
+        ]
+        if rows
+        else []
+    )
+
+
+def _share(error: JSON) -> str:
+    """Write an error as a share of the signal, and why it has no interval where it has none."""
+    point = error.get("rms") is not None and known_interval(error) is None
+    return f"{percent(error.get('nrmse'))} of the signal{'; one condition: no interval' if point else ''}"

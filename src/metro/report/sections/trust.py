@@ -1,0 +1,120 @@
+"""What of a batch may be relied on: how far, for which cuts; which causes are findings, which but leads."""
+
+from __future__ import annotations
+
+import math
+
+import pandas as pd
+
+from metro.report.numbers import listing, number, percent, probability, words
+from metro.report.results import Results, heading
+from metro.units import JSON, printed
+
+SURE = 0.95  # probability from which a cause is a finding
+HOLDS = ("clean", "explained")
+# settings of a cut: as one says them, and their unit
+NUMBERS = {
+    "feed_per_tooth_mm": ("feed per tooth", "mm"),
+    "axial_depth_mm": ("axial depth", "mm"),
+    "radial_depth_mm": ("radial depth", "mm"),
+    "spindle_rpm": ("spindle speed", "rpm"),
+}
+NAMES = ("operation", "direction", "wrist", "location", "orientation", "pose")
+NOTHING = (
+    "What is identified holds within its intervals for the set-up as declared. No prediction was put to the "
+    "test here: how well these values predict a cut is not known."
+)
+
+
+def trust(results: Results) -> list[str]:
+    """Say of each verdict how far the prediction holds, how sure its causes are, and for which cuts.
+
+    Verdicts that were tested on cuts of the same settings share a paragraph.
+    """
+    alike: dict[str, list[str]] = {}
+    for name, entry in results.verdicts().items():
+        said = " ".join(filter(None, [_reach(name, entry), _causes(entry)]))
+        alike.setdefault(_tested(results, entry), []).append(said)
+    return [f"{' '.join(said)} {tested}".rstrip() for tested, said in alike.items()] or [NOTHING]
+
+
+def trust_in(results: Results, observable: str) -> str:
+    """Say of one verdict what :func:`trust` says of all."""
+    entry = results.verdicts()[observable]
+    return " ".join(filter(None, [_reach(observable, entry), _causes(entry), _tested(results, entry)]))
+
+
+def _reach(observable: str, entry: JSON) -> str:
+    """Say how far predictions were off on runs that no fit saw, at the upper end of the interval."""
+    name, status = heading(observable), str(entry.get("status"))
+    if status == "insufficient":
+        return f"{name}: nothing; no prediction was tested."
+    size = _size(entry)
+    if status in HOLDS:
+        model = "with what was added, predictions" if entry.get("effects") else "predictions"
+        return f"{name}: {model} hold to {size}."
+    after, floor = (entry.get("after") or {}).get("rms"), entry.get("noise_floor")
+    times = f", {number(after / floor, 2)} times the noise" if after and floor and after > floor else ""
+    return f"{name}: the measured values, not the predictions; these are off by up to {size}{times}."
+
+
+def _size(entry: JSON) -> str:
+    """Write the upper end of the error after the loop's 95 % interval, in its unit and of the signal."""
+    after, unit = entry.get("after") or {}, printed(entry.get("unit"))
+    rms = after.get("rms")
+    if rms is None:
+        return "an unknown error"
+    ends = [x for x in after.get("ci95") or [] if x is not None and math.isfinite(x)]
+    high, alone = max([rms, *ends]), "" if ends else "; one condition: no interval"
+    if unit == "1" or not unit:
+        return f"{number(high, 2)} rms of the probability"
+    share = after.get("nrmse")
+    of_signal = f" rms ({percent(share * high / rms)} of the signal{alone})" if share and rms else " rms"
+    return f"{number(high, 2)} {unit}{of_signal}"
+
+
+def _tested(results: Results, entry: JSON) -> str:
+    """Name the settings of the cuts that judged a prediction, and those of which there was but one."""
+    runs = results.batch.runs
+    judged = runs[runs.index.isin([str(run) for run in entry.get("held_out_runs") or []])]
+    if judged.empty:
+        return ""
+    names = [told for column in NAMES if column in judged and (told := _levels(column, judged[column]))]
+    known = [(*NUMBERS[c], sorted(judged[c].dropna().unique())) for c in NUMBERS if c in judged]
+    ranges = [f"{name} {_range(values)} {unit}" for name, unit, values in known if len(values) > 1]
+    single = [told for column in NAMES[1:] if column in runs and (told := _but_one(column, runs, judged))]
+    single += [f"{name} ({values[0]:g} {unit})" for name, unit, values in known if len(values) == 1]
+    tested = f"Tested on {listing([*names, *ranges])}" if names or ranges else "Tested"
+    return f"{tested}{f', at one {listing(single)} only' if single else ''}."
+
+
+def _levels(column: str, values: pd.Series) -> str:
+    # a slot is cut up and down at once
+    levels = sorted({str(v) for v in values.dropna()} - {"", "slot" if column == "direction" else ""})
+    if not levels or (len(levels) == 1 and column != "operation"):
+        return ""
+    told = listing(levels)
+    return f"{told} cuts" if column == "operation" else f"{column} {told}"
+
+
+def _but_one(column: str, runs: pd.DataFrame, judged: pd.DataFrame) -> str:
+    """Name the one level of a setting that was tested where the batch has others; empty elsewhere."""
+    tested, all_levels = ({str(v) for v in part[column].dropna()} - {""} for part in (judged, runs))
+    return f"{column} ({min(tested)})" if len(tested) == 1 and len(all_levels) > 1 else ""
+
+
+def _range(values: list[float]) -> str:
+    ends = f"{values[0]:g}", f"{values[-1]:g}"
+    return " and ".join(ends) if len(values) == 2 else " to ".join(ends)
+
+
+def _causes(entry: JSON) -> str:
+    """Part the causes that are as good as certain from those that are only the likeliest."""
+    told: dict[bool, list[str]] = {True: [], False: []}
+    for effect in entry.get("effects") or []:
+        chance = effect.get("probability")
+        name = f"{words(str(effect['effect']))} (probability {probability(chance)})"
+        told[chance is not None and chance >= SURE].append(name)
+    found = f"A finding: {listing(told[True])}." if told[True] else ""
+    lead = f"A lead, not a finding: {listing(told[False])}." if told[False] else ""
+    return f"{found} {lead}".strip()

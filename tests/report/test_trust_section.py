@@ -1,0 +1,113 @@
+"""What may be relied on: how far, for which cuts, which causes; and where the verdict needs nothing more."""
+
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+import synthetic_results as synthetic
+
+from metro.report.results import Results
+from metro.report.sections.summary import first_words, summary
+from metro.report.sections.trust import NOTHING, trust, trust_in
+from metro.report.sections.verdict import next_words
+
+RUNS = pd.DataFrame(
+    {
+        "role": ["identify", "validate", "validate", "validate"],
+        "operation": ["slot", "slot", "side", "side"],
+        "direction": ["slot", "slot", "up", "down"],
+        "feed_per_tooth_mm": [0.1, 0.05, 0.08, 0.12],
+        "axial_depth_mm": 2.0,
+        "radial_depth_mm": [12.0, 12.0, 4.0, 4.0],
+        "spindle_rpm": 6000.0,
+    },
+    index=pd.Index(["r1", "r2", "r3", "r4"], name="run"),
+)
+
+
+def results(**observables) -> Results:
+    batch = replace(synthetic.batch(), runs=RUNS)
+    return replace(synthetic.results(), batch=batch, verdict={"observables": observables}, loop={})
+
+
+def entry(status="clean", runs=("r2", "r3", "r4"), **more):
+    return synthetic.observable(status, 10.0, 2.0, held_out_runs=list(runs), **more)
+
+
+def test_a_prediction_holds_to_the_upper_end_of_its_interval_for_the_cuts_that_tested_it():
+    (said,) = trust(results(force=entry()))
+    assert said.startswith("Cutting force: predictions hold to 2.2 N rms (1.8 % of the signal).")
+    assert "side and slot cuts, direction down and up" in said
+    assert "feed per tooth 0.05 to 0.12 mm and radial depth 4 and 12 mm" in said
+    assert said.endswith("at one axial depth (2 mm) and spindle speed (6000 rpm) only.")
+
+
+def test_without_an_interval_it_is_said_that_there_is_none():
+    (said,) = trust(results(force=entry(runs=["r2"])))
+    assert "hold to 2.0 N rms (1.7 % of the signal; one condition: no interval)." in said
+
+
+def test_a_setting_of_which_one_level_alone_was_tested_is_named():
+    (said,) = trust(results(force=entry(runs=["r3"])))
+    assert "Tested on side cuts, at one direction (up), feed per tooth (0.08 mm)" in said
+
+
+@pytest.mark.parametrize("status", ["partly_explained", "undetermined", "unexplained"])
+def test_predictions_that_miss_something_are_not_to_be_relied_on(status):
+    (said,) = trust(results(force=entry(status, noise_floor=0.5)))
+    assert "the measured values, not the predictions" in said
+    assert "4.0 times the noise" in said
+
+
+def test_without_enough_runs_nothing_is_to_be_relied_on():
+    assert "nothing; no prediction was tested" in trust(results(force=entry("insufficient", runs=[])))[0]
+
+
+def test_a_sure_cause_is_a_finding_and_a_likely_one_a_lead():
+    effects = [
+        {"effect": "tool_runout", "probability": 0.99, "parameters": {}},
+        {"effect": "tool_wear", "probability": 0.6, "parameters": {}},
+    ]
+    said = trust_in(results(force=entry("explained", effects=effects)), "force")
+    assert "A finding: tool runout (probability 0.990)." in said
+    assert "A lead, not a finding: tool wear (probability 0.600)." in said
+    assert "with what was added, predictions hold" in said
+
+
+def test_verdicts_that_the_same_cuts_tested_share_a_paragraph():
+    both = trust(results(force=entry(), waviness=entry(unit="um")))
+    assert len(both) == 1
+    assert both[0].count("Tested on") == 1
+    apart = trust(results(force=entry(), waviness=entry(unit="um", runs=["r2"])))
+    assert len(apart) == 2
+
+
+def test_the_error_of_a_probability_is_no_share_of_a_signal():
+    assert (
+        "0.12 rms of the probability"
+        in trust(results(lobes=synthetic.observable("clean", 0.4, 0.11, unit="1")))[0]
+    )
+
+
+def test_without_a_verdict_it_is_said_that_no_prediction_was_tested():
+    assert trust(results()) == [NOTHING]
+
+
+def test_what_to_measure_next_says_where_the_verdict_does_without():
+    assert next_words(entry("clean", next_experiment="a slot.")) == "a slot (the verdict does not need it)"
+    assert next_words(entry("unexplained", next_experiment="a slot.")) == "a slot"
+    assert next_words(entry("clean", next_experiment=None)) == ""
+
+
+def test_the_first_page_of_a_batch_without_a_verdict_gives_the_mode_that_yields_most():
+    modes = synthetic.identified()["modes"]
+    stiff = {**modes[0], "stiffness": synthetic.q(1e9, 1e7, "N/m")}
+    soft = {**modes[0], "stiffness": synthetic.q(2e6, 1e5, "N/m"), "damping": synthetic.q(0.05, 0.001, "1")}
+    silent = replace(
+        results(), identified={"modes": [stiff, soft]}, tables={"frf_used": synthetic.responses()}
+    )
+    facts, picture = summary(silent).items[-2:]
+    told = {label: value for label, value, _ in facts.items}
+    assert told["receptance at its peak"] == "5.00·10⁻⁶ m/N"  # 1 / (2 · 0.05 · 2e6)
+    assert "highest response" in picture.caption
+    assert any("Identified: 2 modes" in getattr(item, "text", "") for item in first_words(silent))
