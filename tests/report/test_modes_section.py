@@ -6,7 +6,7 @@ import synthetic_results as synthetic
 
 from metro.report.content import Picture, Table
 from metro.report.figures import modal
-from metro.report.sections.modes import modes
+from metro.report.sections.modes import largest_response, modes
 
 
 def diagram():
@@ -80,6 +80,16 @@ def test_shapes_are_drawn_to_their_largest_and_like_ones_are_counted():
     drawn = [axes.get_lines()[1].get_ydata() for axes in panels]
     np.testing.assert_allclose(drawn, [[1.0, 0.5, 0.2], [1.0, 0.5, 0.2], [1.0, -0.5, -0.2]])
     assert [axes.get_title(loc="left") for axes in panels] == ["30.00 Hz", "50.00 Hz", "80.00 Hz *"]
+
+
+def test_the_response_on_the_first_page_is_that_of_a_driving_point():
+    frf = synthetic.responses()
+    larger = frf.assign(reference="2x", real_m_n=9 * frf["real_m_n"], imag_m_n=9 * frf["imag_m_n"])
+    (picture,) = largest_response({"frf_used": pd.concat([frf, larger])})
+    assert "of a driving point" in picture.caption
+    assert picture.figure.axes[0].get_title(loc="left").startswith("position 1: 1x → 1x")
+    (other,) = largest_response({"frf_used": larger})
+    assert "of a driving point" not in other.caption
 
 
 def test_two_points_make_no_shape():

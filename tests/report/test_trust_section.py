@@ -52,6 +52,16 @@ def test_a_setting_of_which_one_level_alone_was_tested_is_named():
     assert "Tested on side cuts, at one direction (up), feed per tooth (0.08 mm)" in said
 
 
+def test_a_setting_that_the_whole_batch_shares_is_no_limit_of_the_test():
+    posed = results(force=entry())
+    posed = replace(
+        posed, batch=replace(posed.batch, runs=RUNS.assign(pose="p1", wrist=["A", "B", "B", "B"]))
+    )
+    (said,) = trust(posed)
+    assert "at one wrist (B), axial depth" in said
+    assert "pose" not in said
+
+
 @pytest.mark.parametrize("status", ["partly_explained", "undetermined", "unexplained"])
 def test_predictions_that_miss_something_are_not_to_be_relied_on(status):
     (said,) = trust(results(force=entry(status, noise_floor=0.5)))
