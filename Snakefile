@@ -1,17 +1,25 @@
 """What can be asked for: the report of every batch, and the summary of all of them."""
 
+import sys
+
 from snakemake.logging import logger
 from snakemake.utils import min_version
 
 from metro.batch.at_work import only_one_at_work, remove_leftovers
+from metro.batch.findings import ContractError
 from metro.batch.layout import OBSERVED, PAGE
+from metro.commands.alike import alike_as_one
 from metro.progress import show_progress
 from metro.workflow import COMPLETE, Plan
 
 min_version("9.0")
 
-show_progress(logger, workflow.output_settings)
-plan = Plan.read(Path(workflow.basedir), overrides=config)
+show_progress(logger, workflow.output_settings, shorten=alike_as_one)
+try:
+    plan = Plan.read(Path(workflow.basedir), overrides=config)
+except ContractError as error:
+    # As an error of snakemake it would be followed by where in the program it was raised.
+    sys.exit(str(error))
 shell.prefix(plan.shell_prefix)
 
 

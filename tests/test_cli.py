@@ -40,6 +40,36 @@ def test_every_command_and_option_has_a_help_text(command):
     assert all(param.help for param in chosen.params if param.name != "help")
 
 
+@pytest.mark.parametrize("command", [*COMMANDS, *STAGES])
+def test_the_help_shows_every_placeholder(command):
+    """Markdown eats what stands in angle brackets: reports/<batch> was shown as reports/."""
+    import typer
+
+    chosen = typer.main.get_command(cli.app).commands[command]
+    told = [chosen.help, *(param.help for param in chosen.params)]
+    assert not [text for text in told if "<" in text or text.rstrip(".").endswith("/")]
+
+
+def test_the_help_says_where_a_batch_is_looked_for():
+    assert "data/raw/BATCH" in call("verify", "--help").output
+    assert "reports/BATCH" in call("loop", "--help").output
+
+
+def test_a_query_of_two_forms_is_a_wrong_call():
+    result = call("query", "SELECT 1", "--csv", "--json")
+    assert (result.exit_code, result.stderr) == (2, "--json: found --csv, too, expected one of them\n")
+
+
+@pytest.mark.parametrize("given", ["late", "data/raw/late", "reports/late", "data/processed/late"])
+def test_frfs_are_exported_of_a_batch_however_it_is_named(given, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for file in ("data/raw/late/batch.yaml", "data/processed/late/batch.json", "reports/late/verdict.json"):
+        (tmp_path / file).parent.mkdir(parents=True)
+        (tmp_path / file).write_text("")
+    monkeypatch.setattr("metro.stages.frf_export.frf_export", lambda *asked: [str(asked[0])])
+    assert call("frf-export", given, "out.uff").output == "data/processed/late\n"
+
+
 def test_a_new_batch_passes_its_own_check(tmp_path):
     made = call("new-batch", "first-cut", "--root", tmp_path)
     assert made.exit_code == 0
@@ -49,7 +79,7 @@ def test_a_new_batch_passes_its_own_check(tmp_path):
 
 def test_a_new_batch_of_a_wrong_name_is_refused_in_one_line(tmp_path):
     result = call("new-batch", "First Cut", "--root", tmp_path)
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert result.stderr.startswith("First Cut: is no name for a batch")
     assert not list(tmp_path.iterdir())
 

@@ -2,11 +2,13 @@
 
 import io
 import logging
+import re
 from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
+from metro.commands.alike import alike_as_one
 from metro.progress import STREAM, ProgressHandler, show_progress
 
 
@@ -23,8 +25,8 @@ def tell(handler, event=None, level=logging.INFO, msg="", **told):
     handler.handle(record)
 
 
-def begin(handler, job, words):
-    tell(handler, "job_info", jobid=job, rule_msg=words, rule_name="rule")
+def begin(handler, job, words, rule="rule", **wildcards):
+    tell(handler, "job_info", jobid=job, rule_msg=words, rule_name=rule, wildcards=wildcards)
 
 
 def end(handler, job, done, total=12):
@@ -102,3 +104,68 @@ def test_only_the_handler_of_the_terminal_is_replaced_and_only_in_an_ordinary_ru
     assert (terminal in logger.handlers) == bool(asked)
     logger.warning("careful")
     assert text.getvalue() == "careful\n"
+
+
+@pytest.fixture
+def terminal():
+    """Return a handler that writes to a terminal, and what it has written since it was last asked."""
+    text = io.StringIO()
+    handler = ProgressHandler(Console(file=text, soft_wrap=True, force_terminal=True, width=200))
+    place = [0]
+
+    def written():
+        plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text.getvalue()[place[0] :])
+        place[0] = len(text.getvalue())
+        return plain
+
+    yield handler, written
+    handler.close()
+
+
+def test_the_bar_stands_from_the_first_step_on_and_names_what_is_at_work(terminal):
+    handler, written = terminal
+    tell(handler, "run_info", msg="Job stats", stats={"ingest": 2, "loop": 1, "campaign": 1, "total": 4})
+    assert written() == ""
+    begin(handler, 1, "alpha: checking", "ingest", batch="alpha")
+    shown = written()
+    assert "0 of 4 steps" in shown
+    assert "0:00:00" in shown
+    assert "alpha: ingest" in shown
+    begin(handler, 2, "beta: checking", "ingest", batch="beta")
+    begin(handler, 3, "alpha: tracing", "loop", batch="alpha")
+    assert "alpha: ingest, beta: ingest and 1 more" in written()
+    end(handler, 1, 1, total=4)
+    written()
+    fail(handler, 2)
+    written()
+    begin(handler, 4, "the summary", "campaign")
+    shown = written()
+    assert "1 of 4 steps" in shown
+    assert "alpha: loop, summary" in shown
+    assert "beta: ingest" not in shown
+
+
+def test_steps_count_by_the_time_that_they_take(terminal):
+    handler, _ = terminal
+    tell(handler, "run_info", msg="Job stats", stats={"ingest": 1, "loop": 1, "all": 1, "total": 3})
+    begin(handler, 1, "", "ingest", batch="a")
+    (bar,) = handler._bar.tasks
+    end(handler, 1, 1, total=3)
+    after_ingest = bar.percentage
+    begin(handler, 2, "", "loop", batch="a")
+    end(handler, 2, 2, total=3)
+    assert 0 < after_ingest < 10
+    assert bar.percentage == 100
+
+
+def test_a_log_that_says_the_same_of_many_rows_is_told_in_a_line(tmp_path):
+    text = io.StringIO()
+    handler = ProgressHandler(Console(file=text, soft_wrap=True), alike_as_one)
+    lines = [f'runs.csv: row {row} (r{row}): column scan: "s{row}.csv" is not there' for row in range(2, 28)]
+    (tmp_path / "a.log").write_text("\n".join(lines))
+    begin(handler, 1, "alpha: reading")
+    fail(handler, 1, tmp_path / "a.log")
+    handler.close()
+    assert [line for line in text.getvalue().splitlines() if "runs.csv" in line] == [
+        'runs.csv: rows 2–27: column scan: "s2.csv" (and 25 more) is not there'
+    ]

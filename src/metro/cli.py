@@ -3,20 +3,41 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from metro import __version__
-from metro.commands.completion import batches, observables
+from metro.commands.completion import batches, effects, observables
+from metro.commands.hidden import Style
+from metro.commands.stage_calls import campaign, identify, ingest, loop, predict, report
 
 STAGES = "Stages, in their order (called by snakemake)"
 
+
+class Readable(TyperGroup):
+    """Commands that tell an error of the user's making in words: exit code 2 of a wrong call, else 1."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Call the command."""
+        try:
+            return super().invoke(ctx)
+        except Exception as error:
+            from metro.batch.findings import ContractError
+            from metro.codehash import ChangedCodeError
+            from metro.commands.calls import CallError
+            from metro.formats import FormatError
+
+            if not isinstance(error, ContractError | FormatError | ChangedCodeError):
+                raise
+            typer.echo(str(error), err=True)
+            raise typer.Exit(2 if isinstance(error, CallError) else 1) from None
+
+
 app = typer.Typer(
+    cls=Readable,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
@@ -25,16 +46,10 @@ app = typer.Typer(
     "as it should be, 2 the call itself is wrong. Tab completion: `metro --install-completion`.",
 )
 
-Cells = Annotated[Path, typer.Option(help="Folder of the cells' descriptions (<cell>.yaml).")]
-Processed = Annotated[
-    Path, typer.Option(help="Folder of the batch's canonical tables.", exists=True, file_okay=False)
-]
-Reports = Annotated[Path, typer.Option(help="Folder of the batch's results: reports/<batch>.")]
-Settings = Annotated[str, typer.Option(help="What config.yaml says to this stage, as JSON.")]
+Cells = Annotated[Path, typer.Option(help="Folder of the cells' descriptions (CELL.yaml).")]
 Root = Annotated[Path, typer.Option(help="Folder of all batches' canonical tables.")]
 Results = Annotated[Path, typer.Option(help="Folder of all batches' results.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
-Code = Annotated[str, typer.Option(help="Hash of the code that the workflow was planned with.")]
 
 
 def _print_version(asked: bool) -> None:
@@ -52,53 +67,23 @@ def main(
     """Hold the options that come before the command."""
 
 
-@contextmanager
-def readable_errors() -> Iterator[None]:
-    """Print an error of the user's making as one block without a traceback, and exit with code 1."""
-    try:
-        yield
-    except Exception as error:
-        from metro.batch.findings import ContractError
-        from metro.codehash import ChangedCodeError
-        from metro.formats import FormatError
-
-        if not isinstance(error, ContractError | FormatError | ChangedCodeError):
-            raise
-        typer.echo(str(error), err=True)
-        raise typer.Exit(1) from None
-
-
-def _run(stage: str, settings: str, code: str, **folders: Any) -> None:
-    """Run a stage with the code that the workflow was planned with, or not at all."""
-    from metro.batch.at_work import job_at_work
-    from metro.codehash import require_code
-
-    with job_at_work(Path.cwd()), readable_errors():
-        require_code(stage, code)
-        function = getattr(import_module(f"metro.stages.{stage}"), stage)
-        function(**folders, settings=json.loads(settings), code=code)
-
-
 @app.command()
 def check(
-    folders: Annotated[list[Path], typer.Argument(help="Batch folders, e.g. data/raw/my-batch.")],
+    folders: Annotated[list[str], typer.Argument(help="Batches: their names, or folders of raw files.")],
     cells: Cells = Path("config/cells"),
     as_json: AsJson = False,
 ) -> None:
     """Check batches against the data contract, before anything is computed.
 
     Prints what is there, what can be computed from it, what is missing for the rest, and every error with its
-    file, row and column. Takes seconds and changes nothing. The exit code is 1 when a batch has an error.
+    file, row and column; alike errors of many rows as one. Takes seconds and changes nothing. The exit code
+    is 1 when a batch has an error, 2 when a folder is none.
 
     Example: `metro check data/raw/*`
     """
-    if as_json:
-        from metro.commands.check import check_as_json
+    from metro.commands.check import check_batches
 
-        raise typer.Exit(check_as_json(folders, cells))
-    from metro.batch.check import check_command
-
-    raise typer.Exit(max(check_command(folder, cells) for folder in folders))
+    raise typer.Exit(check_batches(folders, cells, as_json))
 
 
 @app.command("new-batch")
@@ -112,13 +97,14 @@ def new_batch(
     Example: `metro new-batch side-milling-17`
     """
     from metro.batch.template import new_batch as write
+    from metro.commands.calls import require_name
 
-    with readable_errors():
-        folder = write(root, name)
-        if as_json:
-            typer.echo(json.dumps({"batch": name, "folder": str(folder)}))
-            return
-        typer.echo(f"{folder} is there. Fill it in, then call: metro check {folder}")
+    require_name(name)
+    folder = write(root, name)
+    if as_json:
+        typer.echo(json.dumps({"batch": name, "folder": str(folder)}))
+        return
+    typer.echo(f"{folder} is there. Fill it in, then call: metro check {folder}")
 
 
 @app.command()
@@ -134,10 +120,12 @@ def simulate(
     ] = "force",
     effect: Annotated[
         list[str] | None,
-        typer.Option(help="An effect to hide: NAME, its size drawn, or NAME:PARAMETER=VALUE,…"),
+        typer.Option(
+            help="An effect to hide: NAME, its size drawn, or NAME:PARAMETER=VALUE,…", autocompletion=effects
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of everything that is drawn.")] = 0,
-    style: Annotated[str, typer.Option(help="How it is measured: a or b.")] = "a",
+    style: Annotated[Style, typer.Option(help="How it is measured.")] = Style.a,
     root: Annotated[Path, typer.Option(help="Where the batch's folder is made.")] = Path("data/raw"),
     truth: Annotated[Path, typer.Option(help="Folder for the file that says what is hidden.")] = Path(
         "truth"
@@ -151,13 +139,14 @@ def simulate(
     from metro.commands.simulate import simulate as write
 
     folders = {"root": root, "truth": truth}
-    with readable_errors():
-        write(name, kind=kind, effects=effect or [], seed=seed, style=style, as_json=as_json, **folders)
+    write(name, kind=kind, effects=effect or [], seed=seed, style=style, as_json=as_json, **folders)
 
 
 @app.command()
 def status(
-    snakefile: Annotated[Path, typer.Option(help="The workflow.")] = Path("Snakefile"),
+    snakefile: Annotated[
+        Path | None, typer.Option(help="The workflow: of this folder, else of the checkout of metro.")
+    ] = None,
     reports: Results = Path("reports"),
     as_json: AsJson = False,
 ) -> None:
@@ -169,13 +158,14 @@ def status(
     """
     from metro.commands.status import status_command
 
-    with readable_errors():
-        status_command(snakefile, reports, as_json)
+    status_command(snakefile, reports, as_json)
 
 
 @app.command()
 def explain(
-    batch: Annotated[str, typer.Argument(help="Name of the batch.", autocompletion=batches)],
+    batch: Annotated[
+        str, typer.Argument(help="The batch: its name, or a folder of it.", autocompletion=batches)
+    ],
     observable: Annotated[
         str, typer.Argument(help="Only this observable, with all candidates.", autocompletion=observables)
     ] = "",
@@ -183,19 +173,20 @@ def explain(
     reports: Results = Path("reports"),
     as_json: AsJson = False,
 ) -> None:
-    """Tell what the first page of a batch's report tells: verdicts, errors, candidates, what to measure next.
+    """Tell what the first page of a report tells: verdicts, causes, what to trust, what to measure next.
 
     Example: `metro explain kr160-side deformation`
     """
     from metro.commands.explain import explain as tell
 
-    with readable_errors():
-        tell(batch, observable, processed, reports, as_json)
+    tell(batch, observable, processed, reports, as_json)
 
 
 @app.command("next")
 def next_runs(
-    batch: Annotated[str, typer.Argument(help="Name of the batch.", autocompletion=batches)],
+    batch: Annotated[
+        str, typer.Argument(help="The batch: its name, or a folder of it.", autocompletion=batches)
+    ],
     *,
     observable: Annotated[str, typer.Option(help="Only this observable.", autocompletion=observables)] = "",
     runs: Annotated[int, typer.Option(min=1, help="Most runs, per observable.")] = 12,
@@ -213,11 +204,13 @@ def next_runs(
 
     Example: `metro next side-milling-17 --limit axial_depth_mm=0.5:4 --out next.csv`
     """
+    from metro.commands.next_runs import at_work, checked_call
     from metro.stages.next_runs import next_runs as plan
 
     folders = {"processed": processed, "reports": reports}
-    with readable_errors():
-        plan(batch, observable, most=runs, limits=limit or [], out=out, seed=seed, as_json=as_json, **folders)
+    name = checked_call(batch, observable, limit or [], **folders)
+    with at_work(f"{name}: planning runs, as long as a loop takes"):
+        plan(name, observable, most=runs, limits=limit or [], out=out, seed=seed, as_json=as_json, **folders)
 
 
 @app.command()
@@ -236,42 +229,40 @@ def query(
     """
     from metro.commands.query import query as ask
 
-    with readable_errors():
-        ask(sql, processed, reports, as_json, as_csv)
+    ask(sql, processed, reports, as_json, as_csv)
 
 
 @app.command()
 def verify(
-    reports: Annotated[
-        Path, typer.Argument(help="The batch's results: reports/<batch>.", exists=True, file_okay=False)
-    ],
-    raw: Annotated[Path | None, typer.Option(help="Raw files, where not in data/raw/<batch>.")] = None,
+    batch: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Batches: their names, or folders of results; all, if none.", autocompletion=batches
+        ),
+    ] = None,
+    raw: Annotated[Path | None, typer.Option(help="Raw files, where not in data/raw/BATCH.")] = None,
     processed: Annotated[
-        Path | None, typer.Option(help="Canonical tables, where not in data/processed/<batch>.")
+        Path | None, typer.Option(help="Canonical tables, where not in data/processed/BATCH.")
     ] = None,
     config: Annotated[Path, typer.Option(help="The settings in force.")] = Path("config/config.yaml"),
     as_json: AsJson = False,
 ) -> None:
-    """Recompute the hashes from raw files to report, and say what changed since the report was made.
+    """Recompute the hashes from raw files to report, and say what changed since the reports were made.
 
     The exit code is 1 when a file differs. Other code, settings or packages are told; they change nothing in
     a report that is there.
 
-    Example: `metro verify reports/kr160-side`
+    Example: `metro verify kr160-side`
     """
     from metro.commands.verify import verify_command
 
-    with readable_errors():
-        raise typer.Exit(verify_command(reports, raw, processed, config, as_json))
+    raise typer.Exit(verify_command(batch or [], raw, processed, config, as_json))
 
 
 @app.command("frf-export")
 def frf_export(
-    processed: Annotated[
-        Path,
-        typer.Argument(
-            help="The batch's canonical tables: data/processed/<batch>.", exists=True, file_okay=False
-        ),
+    batch: Annotated[
+        str, typer.Argument(help="The batch: its name, or a folder of it.", autocompletion=batches)
     ],
     out: Annotated[Path, typer.Argument(help="The universal file that is written, e.g. my-batch.uff.")],
     position: Annotated[
@@ -281,67 +272,14 @@ def frf_export(
 ) -> None:
     """Write a batch's FRFs as a universal file (datasets 58b), for other programs of modal analysis.
 
-    Example: `metro frf-export data/processed/trimule-helical trimule.uff`
+    Example: `metro frf-export trimule-helical trimule.uff`
     """
+    from metro.commands.which import processed_folder
     from metro.stages.frf_export import frf_export as write
 
-    with readable_errors():
-        told = write(processed, out, position)
-        typer.echo(json.dumps({"file": str(out), "told": told}) if as_json else "\n".join(told))
+    told = write(processed_folder(batch), out, position)
+    typer.echo(json.dumps({"file": str(out), "told": told}) if as_json else "\n".join(told))
 
 
-@app.command(rich_help_panel=STAGES)
-def ingest(
-    folder: Annotated[Path, typer.Argument(help="The batch's folder.", exists=True, file_okay=False)],
-    cells: Cells,
-    out: Annotated[Path, typer.Option(help="Folder that the canonical tables are written to.")],
-    settings: Settings,
-    code: Code,
-) -> None:
-    """Check and read a batch's raw files; write canonical tables with one frame, one sign, named units."""
-    _run("ingest", settings, code, folder=folder, cells=cells, out=out)
-
-
-@app.command(rich_help_panel=STAGES)
-def identify(processed: Processed, settings: Settings, code: Code) -> None:
-    """Identify the models from the identification runs: force coefficients, modes, stiffness."""
-    _run("identify", settings, code, processed=processed)
-
-
-@app.command(rich_help_panel=STAGES)
-def predict(processed: Processed, settings: Settings, code: Code) -> None:
-    """Predict with the base models what was measured on the held-out runs."""
-    _run("predict", settings, code, processed=processed)
-
-
-@app.command(rich_help_panel=STAGES)
-def loop(processed: Processed, reports: Reports, settings: Settings, code: Code) -> None:
-    """Trace what the prediction leaves over to its causes, and say how far each explains it."""
-    _run("loop", settings, code, processed=processed, reports=reports)
-
-
-@app.command(rich_help_panel=STAGES)
-def report(processed: Processed, reports: Reports, settings: Settings, code: Code) -> None:
-    """Write the batch's report as PDF."""
-    _run("report", settings, code, processed=processed, reports=reports)
-
-
-@app.command(rich_help_panel=STAGES)
-def campaign(
-    *,
-    reports: Annotated[
-        list[Path] | None, typer.Argument(help="The batches' result folders.", exists=True, file_okay=False)
-    ] = None,
-    processed: Annotated[
-        Path, typer.Option(help="Folder that holds the batches' canonical tables: data/processed.")
-    ],
-    out: Annotated[Path, typer.Option(help="Folder that the summary is written to.")],
-    unfinished: Annotated[
-        list[str] | None, typer.Option(help="A batch that failed, and the log that says why: BATCH=LOG.")
-    ] = None,
-    settings: Settings,
-    code: Code,
-) -> None:
-    """Summarise all batches: one PDF, one table, and what became of parameters from batch to batch."""
-    logs = dict(each.split("=", 1) for each in unfinished or [])
-    _run("campaign", settings, code, reports=reports or [], processed=processed, out=out, unfinished=logs)
+for stage in (ingest, identify, predict, loop, report, campaign):
+    app.command(rich_help_panel=STAGES)(stage)

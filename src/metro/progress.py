@@ -1,5 +1,8 @@
 """What snakemake says while it works: a line for each finished step, a bar, and the causes of failures last.
 
+The bar stands from the first step on, says which are at work, and counts steps by the time that they take:
+with each step as one it would stand still where nearly all of the time goes.
+
 Its own log, with everything that it has to say, is in ``.snakemake/log`` all the same; a dry run says what it
 always does, and so does a call that asks for more (``--verbose``, ``--printshellcmds``).
 """
@@ -8,12 +11,14 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 STREAM = "DefaultStreamHandler"  # the name of snakemake's handler that writes to the terminal
 # Parts of what is worth saying of what is said without an event: what one asked for, and where jobs went.
@@ -22,34 +27,67 @@ SAID_LAST = (
     "Exiting because",
     "CalledProcessError",
 )  # beginnings of what the logs of failed steps say better
+# Typical seconds of a step, by its rule; what is not named takes none.
+SECONDS = {"ingest": 1, "identify": 4, "predict": 3, "loop": 34, "report": 4, "campaign": 5}
+MOST_SHOWN = 2  # steps at work that the bar names
+PACE = 3600.0  # s over which the speed is taken that tells what is left: a step may take minutes
 
 
-def show_progress(logger: logging.Logger, settings: Any) -> None:
+def show_progress(
+    logger: logging.Logger, settings: Any, shorten: Callable[[Iterable[str]], list[str]] = list
+) -> None:
     """Let snakemake's ``logger`` write to the terminal through :class:`ProgressHandler`.
 
-    ``settings`` : ``output_settings`` of the workflow.
+    Parameters
+    ----------
+    settings : ``output_settings`` of the workflow.
+    shorten : what to say of the lines of a failed step's log.
     """
     if settings.dryrun or settings.verbose or settings.debug_dag or settings.printshellcmds:
         return
     for handler in list(logger.handlers):
         if handler.name == STREAM and isinstance(handler, logging.StreamHandler):
-            own = ProgressHandler(Console(file=handler.stream, highlight=False, soft_wrap=True))
+            own = ProgressHandler(Console(file=handler.stream, highlight=False, soft_wrap=True), shorten)
             own.setFormatter(handler.formatter)
             own.filters = list(handler.filters)
             logger.removeHandler(handler)
             logger.addHandler(own)
 
 
+@dataclass(frozen=True)
+class Step:
+    """A step: what its message says of it, its name beside the bar, its rule, and when it began."""
+
+    words: str
+    name: str = ""
+    rule: str = ""
+    began: float = field(default_factory=time.monotonic)
+
+
 class ProgressHandler(logging.Handler):
     """Writes the records of a run of snakemake to a console."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, shorten: Callable[[Iterable[str]], list[str]] = list) -> None:
         super().__init__()
+        self._shorten = shorten
         self.name = STREAM
         self._console = console
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("left:"))
-        self._bar = Progress(*columns, TimeRemainingColumn(), console=console, transient=True)
-        self._jobs: dict[int, tuple[str, float]] = {}  # what each is about, and when it began
+        self._bar = Progress(
+            BarColumn(bar_width=20),
+            TextColumn("{task.fields[steps]}"),
+            TimeElapsedColumn(),
+            TextColumn("left:"),
+            TimeRemainingColumn(),
+            TextColumn("{task.description}", markup=False),
+            console=console,
+            transient=True,
+            speed_estimate_period=PACE,
+        )
+        self._task: TaskID | None = None  # none before the first step
+        self._planned: Mapping[str, int] = {}  # steps by rule, and the total
+        self._steps: dict[int, Step] = {}
+        self._at_work: dict[int, str] = {}  # their names
+        self._seconds = 0  # that the finished steps typically take
         self._finished: list[int] = []
         self._failures: dict[int, tuple[str, list[str]]] = {}
 
@@ -57,15 +95,19 @@ class ProgressHandler(logging.Handler):
         """Show a record, or keep what it tells for a later one."""
         told: Any = record
         event = str(getattr(record, "event", None))
-        if event == "job_info":
-            self._jobs[told.jobid] = (told.rule_msg or told.rule_name, time.monotonic())
+        if event == "run_info":
+            self._planned = getattr(record, "stats", {})
+        elif event == "job_info":
+            self._begin(told.jobid, _step(told))
         elif event == "job_finished":
             self._finished.append(told.job_id)
+            self._at_work.pop(told.job_id, None)
             self._failures.pop(told.job_id, None)  # it was tried again
         elif event == "progress":
             self._progress(told.done, told.total)
         elif event == "job_error":
-            words, _ = self._jobs.get(told.jobid, (told.rule_name, 0.0))
+            words = self._steps.get(told.jobid, Step(told.rule_name)).words
+            self._at_work.pop(told.jobid, None)
             self._failures[told.jobid] = (words, [str(log) for log in told.log])
             self._say(f"failed: {words}")
         elif self._is_worth_saying(record):
@@ -78,7 +120,8 @@ class ProgressHandler(logging.Handler):
             self._say(f"\n{words}: failed")
             for log in map(Path, logs):
                 said = log.read_text(errors="replace").strip() if log.is_file() else ""
-                self._say(f"{said or 'its log is empty'}\n({log})")
+                lines = self._shorten(said.splitlines()) or ["its log is empty"]
+                self._say("\n".join([*lines, f"({log})"]))
         self._failures = {}
         super().close()
 
@@ -88,18 +131,44 @@ class ProgressHandler(logging.Handler):
             return False
         return record.levelno >= logging.WARNING or any(part in str(record.msg) for part in SAID)
 
+    def _begin(self, job: int, step: Step) -> None:
+        self._steps[job] = step
+        self._at_work[job] = step.name
+        if self._task is None and self._console.is_terminal:
+            seconds = sum(SECONDS.get(rule, 0) * count for rule, count in self._planned.items())
+            planned = self._planned.get("total", 0)
+            self._task = self._bar.add_task("", total=seconds or None, steps=f"0 of {planned} steps")
+            self._bar.start()
+        self._show()
+
     def _progress(self, done: int, total: int) -> None:
-        if self._console.is_terminal:
-            if not self._bar.tasks:
-                self._bar.start()
-                self._bar.add_task("", total=total)
-            self._bar.update(self._bar.tasks[0].id, completed=done, total=total)
         for job in self._finished:
-            words, began = self._jobs.get(job, ("", time.monotonic()))
-            took = time.monotonic() - began
-            self._say(f"{done:{len(str(total))}} of {total} steps  {words}  ({took:.0f} s)")
+            step = self._steps.get(job, Step(""))
+            self._seconds += SECONDS.get(step.rule, 0)
+            took = time.monotonic() - step.began
+            self._say(f"{done:{len(str(total))}} of {total} steps  {step.words}  ({took:.0f} s)")
         self._finished.clear()
+        self._show(steps=f"{done} of {total} steps")
+
+    def _show(self, steps: str = "") -> None:
+        """Bring the bar up to date, where there is one."""
+        if self._task is None:
+            return
+        names = list(self._at_work.values())
+        more = f" and {len(names) - MOST_SHOWN} more" if len(names) > MOST_SHOWN else ""
+        words = f"{', '.join(names[:MOST_SHOWN])}{more}"
+        if steps:
+            self._bar.update(self._task, steps=steps)
+        self._bar.update(self._task, completed=self._seconds, description=words, refresh=True)
 
     def _say(self, text: str) -> None:
         if text and text != "None":
             self._console.print(escape(text))
+
+
+def _step(told: Any) -> Step:
+    """Return the step that begins, named by its batch and stage."""
+    batch = (getattr(told, "wildcards", None) or {}).get("batch")
+    stage = "summary" if told.rule_name == "campaign" else told.rule_name
+    name = f"{batch}: {stage}" if batch else stage
+    return Step(told.rule_msg or told.rule_name, name, told.rule_name)

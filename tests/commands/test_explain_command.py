@@ -2,12 +2,16 @@
 
 import json
 
+import pandas as pd
 import pytest
+from rich.console import Console, Group
+from small_campaign import STAGE, q
 from typer.testing import CliRunner
 
+from metro.batch.processed import write_json, write_table
 from metro.cli import app
-from metro.commands.explain import bar
-from metro.report.sections.verdict import sentence
+from metro.commands.bars import bar, error_bars
+from metro.report.sections.verdict import next_words, verdict_words
 
 
 @pytest.fixture
@@ -22,9 +26,10 @@ def explain(campaign):
 def test_it_says_what_the_report_says(explain, campaign):
     printed = explain("late").stdout
     entry = json.loads((campaign / "reports/late/verdict.json").read_text())["observables"]["force"]
-    assert sentence("force", entry) in printed
+    assert verdict_words("force", entry) in printed
     assert "Batch late" in printed
-    assert "Measure next: a slot at twice the feed." in printed
+    assert f"Measure next: {next_words(entry)}." in printed
+    assert "a slot at twice the feed" in printed
 
 
 def test_errors_are_drawn_to_one_scale_with_the_floor(explain):
@@ -50,17 +55,88 @@ def test_programs_get_the_verdict_and_the_words(explain):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "code", "told"),
     [
-        (("late", "lobes"), "found verdicts on force, expected one on lobes"),
-        (("nobody",), "nobody: there are no results of such a batch; batches with results: "),
-        (("nobody",), "late"),
+        (("late", "lobes"), 1, "late: found verdicts on force, expected one on lobes"),
+        (("late", "forse"), 2, 'forse: is no observable (did you mean "force"?)'),
+        (("lates",), 2, 'lates: there is no such batch (did you mean "late"?)'),
+        (("nobody",), 2, "nobody: there is no such batch; there are: early, late"),
     ],
 )
-def test_what_is_not_there_is_an_error(explain, arguments, told):
+def test_what_is_not_there_is_an_error_in_one_line(explain, arguments, code, told):
     result = explain(*arguments)
-    assert result.exit_code == 1
-    assert told in result.stderr
+    assert (result.exit_code, result.stderr) == (code, f"{told}\n")
+
+
+@pytest.fixture
+def two_observables(own_campaign):
+    """Return a function that prints a batch with a cause behind two verdicts, and a check that failed."""
+    processed, reports = own_campaign / "data/processed/late", own_campaign / "reports/late"
+    content = json.loads((reports / "verdict.json").read_text())
+    (entry,) = content["observables"].values()
+    observables = {"force": entry, "deformation": entry, "flatness": entry}
+    write_json(reports / "verdict.json", {**content, "observables": observables})
+    cause = {
+        "cause": "stiffness_scale",
+        "where": {},
+        "seen_in": ["deformation", "force"],
+        "parameters": {"factor": q(0.85, 0.04, "1")},
+        "probability": 0.9999,
+        "status": "confirmed",
+        "words": "",
+    }
+    write_json(processed / "loop.json", {"format": 1, "observables": {}, "causes": [cause]})
+    failed = {"check": "clipping", "value": 9.0, "limit": 3.0, "ok": False, "message": "saturated"}
+    sound = {**failed, "ok": True, "message": ""}
+    rows = [{**row, "file": f"force/r{i}.csv", "run": f"r{i}"} for i, row in enumerate((failed, sound), 1)]
+    write_table(processed / "qc.parquet", pd.DataFrame(rows), STAGE)
+
+    def explain(*arguments):
+        return CliRunner(env={"COLUMNS": "400"}).invoke(app, ["explain", "late", *arguments]).stdout
+
+    return explain
+
+
+def test_the_causes_behind_several_verdicts_and_the_flags_of_the_first_page_are_told(two_observables):
+    printed = two_observables()
+    (row,) = (line for line in printed.splitlines() if "confirmed" in line)
+    assert "deformation of the wall and cutting force" in row
+    assert "factor 0.850 ± 0.040" in row
+    assert "Flagged in the raw data: force/r1.csv: saturated." in printed
+    assert "r2.csv" not in printed
+
+
+def test_of_one_observable_only_its_causes_are_told(two_observables):
+    assert "confirmed" in two_observables("deformation")
+    assert "confirmed" not in two_observables("flatness")
+
+
+def test_programs_get_causes_and_flags(two_observables):
+    content = json.loads(two_observables("--json"))
+    assert [cause["cause"] for cause in content["causes"]] == ["stiffness_scale"]
+    assert content["flags"] == ["Flagged in the raw data: force/r1.csv: saturated."]
+
+
+@pytest.mark.parametrize("width", [64, 80, 100, 200])
+def test_bars_are_whole_with_their_numbers_in_one_line_each(campaign, width):
+    entry = json.loads((campaign / "reports/late/verdict.json").read_text())["observables"]["force"]
+    console = Console(width=width, color_system=None)
+    with console.capture() as caught:
+        console.print(Group(*error_bars(entry, width)))
+    before, after, floor = caught.get().splitlines()
+    assert "…" not in before + after
+    assert before.index("│") == after.index("│")
+    assert "█ 11.8 ± 1.2 N (12 % of the signal)" in before
+    assert "│ noise floor" in floor
+
+
+def test_a_terminal_too_narrow_for_bar_and_numbers_keeps_the_bar():
+    errors = {"rms": 11.8, "nrmse": 0.1, "ci95": [10.0, 13.0]}
+    entry = {"before": errors, "after": errors, "noise_floor": 5.9, "unit": "N"}
+    console = Console(width=40, color_system=None)
+    with console.capture() as caught:
+        console.print(Group(*error_bars(entry, 40)))
+    assert "base model   ██████│██████" in caught.get()
 
 
 @pytest.mark.parametrize(

@@ -17,12 +17,16 @@ HEAVY = {
 # Heavy packages → the modules that may have them, and no others, once they are imported. What a function
 # imports does not count: it is there when it is used. (numpy comes with metro.units.)
 MODULES = {
-    (): ("", "cli", "codehash", "commands.completion", "commands.output"),
+    (): (
+        *("", "cli", "codehash"),
+        *(f"commands.{name}" for name in ("alike", "calls", "completion", "hidden", "output", "stage_calls")),
+        "commands.which",
+    ),
     ("numpy",): ("commands.query", "commands.status", "dataset.results", "dataset.views"),
     ("numpy", "yaml"): ("workflow", "commands.simulate", "commands.verify"),
-    ("numpy", "pandas", "pyarrow"): ("commands.explain",),
+    ("numpy", "pandas", "pyarrow"): ("commands.bars", "commands.explain"),
     ("numpy", "pandas", "pyarrow", "yaml"): (
-        "commands.check",
+        *("commands.check", "commands.next_runs"),
         *(f"stages.{name}" for name in ("ingest", "identify", "predict", "loop", "report", "campaign")),
         "stages.frf_export",
     ),

@@ -1,16 +1,20 @@
 """What must run, as snakemake says it, and the verdicts that are there."""
 
 import json
+import shutil
 import subprocess
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
 from metro.batch.findings import ContractError
+from metro.batch.template import new_batch
 from metro.cli import app
 from metro.commands.status import planned
 
+ROOT = Path(__file__).parents[2]
 HEADER = "output_file\tdate\trule\tlog-file(s)\tstatus\tplan"
 LINES = [
     HEADER,
@@ -80,8 +84,50 @@ def test_what_snakemake_complains_of_is_passed_on(snakemake):
     assert "data/raw: holds no batch" in result.stderr
 
 
-def test_a_folder_without_a_workflow_is_an_error(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_workflow_that_is_not_there_is_a_wrong_call(snakemake):
+    result = CliRunner().invoke(app, ["status", "--snakefile", "nope"])
+    assert (result.exit_code, result.stderr) == (2, "--snakefile: nope is not there\n")
+    assert snakemake.asked == []
+
+
+def test_a_folder_of_its_own_has_the_workflow_of_the_checkout(snakemake, own_campaign):
+    (own_campaign / "Snakefile").unlink()
+    assert CliRunner().invoke(app, ["status"]).exit_code == 0
+    assert snakemake.asked[0][-1] == str(ROOT / "Snakefile")
+
+
+def test_a_folder_without_any_workflow_says_what_to_do(snakemake, own_campaign, monkeypatch):
+    (own_campaign / "Snakefile").unlink()
+    monkeypatch.setattr("metro.commands.status.INSTALLED", own_campaign / "none")
     result = CliRunner().invoke(app, ["status"])
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert "--snakefile" in result.stderr
+
+
+@pytest.fixture
+def unread(snakemake, own_campaign):
+    """Let the raw files of one batch, of two in the folder, wait to be read; both have nothing but them."""
+    for name in ("late", "early"):
+        shutil.rmtree(own_campaign / "data/raw" / name)
+    shutil.copytree(ROOT / "config", own_campaign / "config")
+    for name in ("late", "early"):
+        new_batch(own_campaign / "data/raw", name)
+    snakemake.stdout += "\ndata/processed/late/qc.parquet\t-\tingest\t\tmissing\tupdate pending"
+    return own_campaign / "data/raw"
+
+
+def test_a_batch_that_the_check_refuses_is_told_with_the_first_error(unread):
+    (unread / "late/batch.yaml").write_text("format: [1\n")
+    (unread / "early/batch.yaml").write_text("format: [1\n")  # it need not be read: its tables are there
+    printed = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["status"]).stdout
+    assert "refused: batch.yaml: line 2: expected" in printed
+    assert "1 refused: metro check says all" in printed
+    content = json.loads(CliRunner().invoke(app, ["status", "--json"]).stdout)["batches"]
+    assert content["late"]["refused"].startswith("batch.yaml: line 2")
+    assert "refused" not in content["early"]
+
+
+def test_a_batch_that_waits_and_is_sound_is_not_refused(unread):
+    printed = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["status"]).stdout
+    assert "refused" not in printed
+    assert "ingest, identify, report (missing)" in printed

@@ -165,6 +165,56 @@ def test_a_stage_whose_table_is_not_there_is_left_out(own_campaign):
     ]
 
 
+@pytest.mark.parametrize("named", ["late", "data/raw/late", "data/processed/late", "reports/late/"])
+def test_a_batch_is_named_by_its_name_or_any_of_its_folders(own_campaign, named):
+    result = CliRunner().invoke(app, ["verify", named, "--json"])
+    assert json.loads(result.stdout)["batch"] == "late"
+
+
+def test_several_batches_are_verified_each_and_without_a_name_all(own_campaign):
+    append(own_campaign / "reports/early/report.pdf")
+    for named in (["late", "early"], []):
+        result = CliRunner().invoke(app, ["verify", *named, "--json"])
+        assert result.exit_code == 1
+        unchanged = {one["batch"]: one["unchanged"] for one in json.loads(result.stdout)}
+        assert unchanged == {"late": True, "early": False}
+    printed = CliRunner().invoke(app, ["verify"]).stdout
+    assert "reports/early: files changed" in printed
+    assert "reports/late: the files are those" in printed
+
+
+def test_what_hinders_one_batch_is_told_among_the_others(own_campaign):
+    (own_campaign / "reports/early/provenance.json").unlink()
+    result = CliRunner().invoke(app, ["verify"])
+    assert result.exit_code == 1
+    assert "reports/early/provenance.json: is not there" in result.stdout
+    assert "reports/late: the files are those" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["lates"], 'lates: there is no such batch (did you mean "late"?)'),
+        (["late", "early", "--raw", "x"], "--raw: is the folder of one batch: name that batch"),
+        (["--processed", "x"], "--processed: is the folder of one batch: name that batch"),
+    ],
+)
+def test_a_wrong_call_is_told_in_one_line(own_campaign, arguments, told):
+    result = CliRunner().invoke(app, ["verify", *arguments])
+    assert (result.exit_code, result.stderr) == (2, f"{told}\n")
+
+
+def test_raw_files_are_looked_for_where_the_settings_say(own_campaign):
+    shutil.move(own_campaign / "data/raw", own_campaign / "lab")
+    (own_campaign / "config").mkdir()
+    (own_campaign / "config/config.yaml").write_text(
+        "raw_roots: [lab]\ncells: config/cells\nholdout: {share: 0.34, seed: 1}\n"
+        "loop: {model_form_budget: 0.007, materiality: 0.004, false_additions: 0.05, "
+        "held_out_gain: 3.0, seed: 1}\n"
+    )
+    assert differences() == (0, [])
+
+
 def test_sets_of_hashes_are_compared_by_name():
     found = compare("raw", {"a": "1", "b": "2", "c": "3"}, {"a": "1", "b": "9", "d": "4"})
     assert [(d.name, d.change, d.was, d.now) for d in found] == [

@@ -1,9 +1,11 @@
-"""Names that a shell completes when the tab key is pressed: batches and observables."""
+"""Names that a shell completes when the tab key is pressed: batches, observables and effects."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+
+import typer
 
 OBSERVABLES = ("force", "joint_force", "deformation", "waviness", "flatness", "lobes")
 
@@ -21,3 +23,11 @@ def batches(incomplete: str) -> Iterator[str]:
 def observables(incomplete: str) -> Iterator[str]:
     """Yield the observables of the contract."""
     return (name for name in OBSERVABLES if name.startswith(incomplete))
+
+
+def effects(context: typer.Context, incomplete: str) -> Iterator[str]:
+    """Yield the effects that a simulated batch of the kind asked for may hide."""
+    from metro.commands.hidden import EFFECTS
+
+    known = EFFECTS.get(context.params.get("kind") or "force", {})
+    return (name for name in known if name.startswith(incomplete))

@@ -3,36 +3,34 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from metro.batch.findings import ContractError, Finding
-from metro.commands.completion import with_results
+from metro.commands.bars import error_bars
+from metro.commands.calls import require_verdict
 from metro.commands.output import print_json
-from metro.report.content import Paragraph
-from metro.report.numbers import number, percent, probability, words
-from metro.report.phrases import plain
+from metro.commands.which import batch_name
+from metro.report.content import Item, Paragraph, Section, Table
+from metro.report.numbers import number, probability, words
 from metro.report.results import Results, title
+from metro.report.sections.causes import with_causes
 from metro.report.sections.measured import measured_words
-from metro.report.sections.verdict import (
-    STATUS,
-    advice,
-    change,
-    error_text,
-    left_words,
-    print_check,
-    sentence,
-)
-from metro.units import JSON, printed
+from metro.report.sections.quality import with_flags
+from metro.report.sections.summary import advice, no_verdict, print_check
+from metro.report.sections.trust import trust, trust_in
+from metro.report.sections.verdict import STATUS, left_words, next_words, verdict_words
+from metro.units import JSON
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
-    from rich.table import Table
+    from rich.table import Table as Grid
 
 FEW = 5  # candidates shown where all observables are
-WIDTH = 40
+# What the first page tells besides verdicts; a table without rows is left out, as in a report.
+TABLES = ("published_errors", "qc", "chatter_runs", "lobes_final", "lobe_runs")
 COLOURS = {"clean": "green", "explained": "green", "insufficient": "yellow", "undetermined": "yellow"}
 
 
@@ -41,29 +39,30 @@ def explain(batch: str, observable: str, processed: Path, reports: Path, as_json
 
     Parameters
     ----------
-    batch : its name. observable : one of its observables; "" for all of them.
+    batch : its name, or a folder of it. observable : one of its observables; "" for all of them.
 
     Raises
     ------
+    CallError
+        There is no such batch, or no such observable.
     ContractError
         The batch has no results, or no verdict on the observable.
     """
-    results = read(batch, processed, reports)
+    results = read(batch_name(batch, processed, reports), processed, reports)
     verdicts = results.verdicts()
-    if observable and observable not in verdicts:
-        there = f"found verdicts on {', '.join(verdicts)}" if verdicts else "found no verdict at all"
-        raise ContractError([Finding("error", batch, f"{there}, expected one on {observable}")])
+    require_verdict(results.batch.name, observable, verdicts)
     chosen = {observable: verdicts[observable]} if observable else verdicts
     if as_json:
         print_json(_content(results, chosen))
         return
     from rich.console import Console, Group
 
-    Console(highlight=False, markup=False).print(Group(*_parts(results, chosen, None if observable else FEW)))
+    console = Console(highlight=False, markup=False)
+    console.print(Group(*_parts(results, chosen, None if observable else FEW, console.width)))
 
 
 def read(batch: str, processed: Path, reports: Path) -> Results:
-    """Read the results of a batch that the words need: no table but the printed errors.
+    """Read the results of a batch that the words of the first page need.
 
     Raises
     ------
@@ -74,12 +73,6 @@ def read(batch: str, processed: Path, reports: Path) -> Results:
 
     from metro.batch.processed import read_batch
 
-    known = with_results(reports)
-    if batch not in known and not (processed / batch).is_dir():
-        there = (
-            f"batches with results: {', '.join(known)}" if known else "no batch has any yet: call snakemake"
-        )
-        raise ContractError([Finding("error", batch, f"there are no results of such a batch; {there}")])
     files = [processed / batch / name for name in ("batch.json", "runs.parquet", "loop.json")]
     files += [reports / batch / name for name in ("identified.json", "verdict.json")]
     missing = [
@@ -88,9 +81,9 @@ def read(batch: str, processed: Path, reports: Path) -> Results:
     if missing:
         raise ContractError(missing)
     loop, identified, verdict = (json.loads(file.read_text(encoding="utf-8")) for file in files[2:])
-    printed = processed / batch / "published_errors.parquet"
-    table = pd.read_parquet(printed) if printed.is_file() else pd.DataFrame()
-    tables = {"published_errors": table} if len(table) else {}
+    there = {name: path for name in TABLES if (path := processed / batch / f"{name}.parquet").is_file()}
+    read = {name: pd.read_parquet(path) for name, path in there.items()}
+    tables = {name: table for name, table in read.items() if len(table)}
     return Results(read_batch(processed / batch), tables, identified, verdict, loop)
 
 
@@ -100,8 +93,11 @@ def _content(results: Results, chosen: dict[str, JSON]) -> JSON:
         "title": results.title,
         "measured": measured_words(results),
         "notes": _notes(results),
+        "flags": [item.text for item in _flags(results) if isinstance(item, Paragraph)],
+        "causes": results.loop.get("causes") or [],
+        "trust": trust(results),
         "observables": {
-            name: {"words": sentence(name, entry, left_words(results, name)), **entry}
+            name: {"words": verdict_words(name, entry, left_words(results, name)), **entry}
             for name, entry in chosen.items()
         },
     }
@@ -113,89 +109,83 @@ def _notes(results: Results) -> list[str]:
     return [item.text for item in items if isinstance(item, Paragraph)]
 
 
-def _parts(results: Results, chosen: dict[str, JSON], most: int | None) -> Iterator[RenderableType]:
+def _flags(results: Results) -> list[Item]:
+    """Return what the first page says is wrong in the raw data."""
+    return list(with_flags(Section("", []), results).items)
+
+
+def _causes(results: Results, observable: str) -> list[Item]:
+    """Return what the first page says of the causes behind several verdicts; those of one observable."""
+    told = results.loop.get("causes") or []
+    mine = [cause for cause in told if not observable or observable in cause["seen_in"]]
+    return list(with_causes(Section("", []), replace(results, loop={**results.loop, "causes": mine})).items)
+
+
+def _parts(
+    results: Results, chosen: dict[str, JSON], most: int | None, width: int
+) -> Iterator[RenderableType]:
     from rich.text import Text
 
     yield Text(results.title, style="bold")
     yield Text(measured_words(results))
     if not chosen:
-        yield Text("\nNo held-out measurement could be compared with a prediction in this batch: no verdict.")
+        yield Text(f"\n{no_verdict(results)}\n{' '.join(trust(results))}")
+    yield from _shown(_flags(results))
     for text in _notes(results):
         yield Text(f"\n{text}")
     for name, entry in chosen.items():
         status = str(entry.get("status"))
-        told = sentence(name, entry, left_words(results, name))
+        told = verdict_words(name, entry, left_words(results, name))
         yield Text(f"\n{title(name)}: {STATUS.get(status, status)}", f"bold {COLOURS.get(status, 'red')}")
         yield Text(told)
-        yield from _bars(entry)
+        yield from error_bars(entry, width)
         yield from _candidates(results, name, entry, most)
-        if entry.get("next_experiment"):
-            yield Text(f"Measure next: {plain(entry['next_experiment']).rstrip('.')}.", style="bold")
+        yield Text(f"To trust: {trust_in(results, name).partition(': ')[2]}")
+        if told_next := next_words(entry):
+            yield Text(f"Measure next: {told_next}.", style="bold")
+    yield from _shown(_causes(results, "" if most else next(iter(chosen))))
 
 
-def _bars(entry: JSON) -> Iterator[RenderableType]:
-    """Draw the errors on held-out runs as bars over one scale, the floor that noise sets as a mark."""
-    from rich.table import Table
+def _shown(items: list[Item]) -> Iterator[RenderableType]:
+    """Show what a report says in a table, and in paragraphs that stand out."""
     from rich.text import Text
 
-    floor = entry.get("noise_floor")
-    errors = [entry.get("before") or {}, entry.get("after") or {}]
-    sizes = [float(error["rms"]) for error in errors if error.get("rms") is not None]
-    top = max((size for size in [*sizes, floor or 0.0] if math.isfinite(size)), default=0.0)
-    if top <= 0 or len(sizes) < len(errors):
-        return
-    told = change("", entry)
-    shares = [told.before, told.after] if told else [None, None]
-    table = Table.grid(padding=(0, 1))
-    for label, error, size, share, colour in zip(
-        ("base model", "with effects"), errors, sizes, shares, ("yellow", "cyan"), strict=True
-    ):
-        text = error_text(error, entry.get("unit"))
-        more = f"({percent(share / 100)} of the signal)" if share is not None else ""
-        table.add_row(Text(label), Text(bar(size, top, WIDTH, floor), style=colour), Text(f"{text} {more}"))
-    if floor is not None:
-        table.add_row(
-            "", Text("│ noise floor", style="dim"), Text(f"{number(floor)} {printed(entry.get('unit'))}")
-        )
-    yield table
+    for item in items:
+        if isinstance(item, Paragraph):
+            yield Text(f"\n{item.text}", style="yellow")
+        elif isinstance(item, Table):
+            yield Text(f"\n{item.caption}", style="bold")
+            yield _grid(item.header, item.rows)
 
 
-def bar(size: float, top: float, width: int, mark: float | None = None) -> str:
-    """Return a bar of ``size`` in ``width`` characters that stand for ``top``, to an eighth of a character.
+def _grid(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Grid:
+    from rich.table import Table as Grid
 
-    ``mark`` is a value at which a line stands, over the bar or behind its end.
-    """
-    eighths = round(8 * width * min(max(size / top, 0.0), 1.0))
-    text = ("█" * (eighths // 8) + " ▏▎▍▌▋▊▉"[eighths % 8]).ljust(width)[:width]
-    if mark is None:
-        return text
-    at = min(int(width * min(max(mark / top, 0.0), 1.0)), width - 1)
-    return f"{text[:at]}│{text[at + 1 :]}"
+    grid = Grid(show_edge=False, pad_edge=False, header_style="bold")
+    for name in header:
+        grid.add_column(name, overflow="fold")
+    for row in rows:
+        grid.add_row(*row)
+    return grid
 
 
-def _candidates(results: Results, name: str, entry: JSON, most: int | None) -> Iterator[Table]:
+def _candidates(results: Results, name: str, entry: JSON, most: int | None) -> Iterator[RenderableType]:
     """Yield the table of the effects that were tried, those that were added first."""
-    from rich.table import Table
-
     tried = results.told(name).get("candidates") or entry.get("candidates") or []
     if not tried:
         return
     added = {str(effect["effect"]): effect for effect in entry.get("effects") or []}
-    ranked = sorted(tried, key=_rank)
-    table = Table(show_edge=False, pad_edge=False, header_style="bold")
-    for header in ("effect tried", "probability", "held-out gain", "p", "outcome"):
-        table.add_column(header, overflow="fold")
-    for effect in added.values():
-        table.add_row(words(str(effect["effect"])), probability(effect.get("probability")), "", "", "added")
-    rest = [one for one in ranked if str(one["effect"]) not in added]
+    rest = [one for one in sorted(tried, key=_rank) if str(one["effect"]) not in added]
+    rows = [
+        [words(one), probability(effect.get("probability")), "", "", "added"] for one, effect in added.items()
+    ]
     for one in rest[:most]:
         shown = (probability(one.get("probability")), _gain(one), probability(one.get("p_value")))
-        table.add_row(words(str(one["effect"])), *shown, str(one.get("why_not") or one.get("verdict") or "–"))
+        rows.append([words(str(one["effect"])), *shown, str(one.get("why_not") or one.get("verdict") or "–")])
     if most is not None and len(rest) > most:
-        table.add_row(
-            f"… and {len(rest) - most} more", "", "", "", f"metro explain {results.batch.name} {name}"
-        )
-    yield table
+        more = f"metro explain {results.batch.name} {name}"
+        rows.append([f"… and {len(rest) - most} more", "", "", "", more])
+    yield _grid(["effect tried", "probability", "held-out gain", "p", "outcome"], rows)
 
 
 def _rank(candidate: JSON) -> tuple[float, float]:

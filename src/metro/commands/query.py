@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from metro.batch.findings import ContractError, Finding
+from metro.commands.calls import wrong_call
 from metro.commands.output import print_csv, print_json, print_table
 from metro.dataset.views import connect, view_names
 
@@ -23,11 +24,13 @@ def query(sql: str, processed: Path, reports: Path, as_json: bool, as_csv: bool)
 
     Raises
     ------
+    CallError
+        Two forms are asked for.
     ContractError
         The SQL is not one statement that only reads, or DuckDB cannot carry it out.
     """
     if as_json and as_csv:
-        raise ContractError([Finding("error", "query", "found --json and --csv, expected one of them")])
+        raise wrong_call("--json", "found --csv, too, expected one of them")
     if not sql.strip():
         header, rows = _views(processed, reports)
     else:

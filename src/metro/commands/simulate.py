@@ -12,11 +12,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from metro.batch.discover import NAME, NAME_IN_WORDS
-from metro.batch.findings import BatchError, ContractError, Finding
+from metro.batch.findings import BatchError, ContractError, Finding, suggestion
 from metro.batch.whole_folder import whole_folder
 from metro.batch.writing import write_atomically
-from metro.commands.completion import OBSERVABLES
+from metro.commands.calls import require_name, wrong_call
+from metro.commands.hidden import EFFECTS, Style, hidden
 from metro.commands.output import print_json
 
 PROGRAM = "virtual_cell"
@@ -28,7 +28,7 @@ def simulate(
     kind: str,
     effects: Sequence[str],
     seed: int,
-    style: str,
+    style: Style,
     root: Path,
     truth: Path,
     as_json: bool,
@@ -42,15 +42,17 @@ def simulate(
 
     Raises
     ------
+    CallError
+        The name is not one of a batch; there is no such kind, effect or parameter, or a value is not one.
     ContractError
-        The name is not one of a batch, the folder is there already, or the simulator is not, or refuses.
+        The folder is there already, or the simulator is not, or refuses.
     """
     folder = root / name
-    if not NAME.fullmatch(name):
-        raise BatchError([Finding("error", name, f"is no name for a batch: it is made of {NAME_IN_WORDS}")])
-    if kind not in OBSERVABLES:
-        expected = f"found {kind!r}, expected one of: {', '.join(OBSERVABLES)}"
-        raise BatchError([Finding("error", "--kind", expected)])
+    require_name(name)
+    if kind not in EFFECTS:
+        expected = suggestion(kind, EFFECTS) or f", expected one of: {', '.join(EFFECTS)}"
+        raise wrong_call("--kind", f"found {kind!r}{expected}")
+    chosen = [word for effect in effects for word in ("--effect", *hidden(effect, kind))]
     if folder.exists():
         raise BatchError([Finding("error", str(folder), "is there already: choose another name")])
     if importlib.util.find_spec(PROGRAM) is None:
@@ -59,7 +61,7 @@ def simulate(
     secret = truth / f"{name}.truth.json"
     with whole_folder(folder) as filled:
         told = filled.with_suffix(".truth.json")
-        _call(kind, filled, effects, ("--seed", str(seed), "--style", style, "--truth", str(told)))
+        _call(kind, filled, ("--seed", str(seed), "--style", style, "--truth", str(told), *chosen))
         write_atomically(secret, lambda stream: stream.write(told.read_bytes()))
     if as_json:
         print_json({"batch": name, "folder": str(folder), "truth": str(secret)})
@@ -67,14 +69,12 @@ def simulate(
     sys.stdout.write(f"{folder} is there. What it hides stands in {secret}. Call: snakemake\n")
 
 
-def _call(kind: str, folder: Path, effects: Sequence[str], options: Sequence[str]) -> None:
+def _call(kind: str, folder: Path, options: Sequence[str]) -> None:
     """Let the simulator fill a folder."""
     command = [sys.executable, "-m", PROGRAM, kind, str(folder), *options]
-    for effect in effects:
-        hidden, _, settings = effect.partition(":")
-        command += ["--effect", hidden, *filter(None, settings.split(","))]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         said = (done.stderr.strip() or "it failed without a word").splitlines()[-1]
-        wrong = " (the parameters of an effect are given all, or none)" if said.startswith("KeyError") else ""
-        raise ContractError([Finding("error", PROGRAM, said + wrong)])
+        # The tool is drawn by the seed: how many teeth it has is not known before.
+        teeth = " (pitch_deg takes a number for each tooth)" if "pitch_deg" in " ".join(options) else ""
+        raise ContractError([Finding("error", PROGRAM, f"could not make the batch{teeth}: {said}")])

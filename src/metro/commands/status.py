@@ -10,34 +10,53 @@ import csv
 import json
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from metro.batch.findings import ContractError, Finding
+from metro.commands.calls import wrong_call
 from metro.commands.output import print_json, print_table
 
 STAGES = ("ingest", "identify", "predict", "loop", "report")
 COLUMNS = ("output_file", "rule", "status", "plan")
 LAST_LINES = 20
+# The workflow of this folder, and that of the checkout metro is installed from.
+HERE, INSTALLED = Path("Snakefile"), Path(__file__).resolve().parents[3] / "Snakefile"
 
 
 @dataclass
 class BatchStatus:
-    """Stages that must run, in their order, with snakemake's reason; verdict by observable."""
+    """Stages that must run, in their order, with snakemake's reason; verdict by observable.
+
+    ``refused`` : the first error that the check of its raw files finds; "" where there is none.
+    """
 
     needs: dict[str, str] = field(default_factory=dict)
     verdicts: dict[str, str] = field(default_factory=dict)
+    refused: str = ""
 
 
-def status_command(snakefile: Path, reports: Path, as_json: bool) -> None:
-    """Print what is up to date, what is not, and the verdicts that are there."""
-    found, summary = planned(_ask_snakemake(snakefile))
+def status_command(snakefile: Path | None, reports: Path, as_json: bool) -> None:
+    """Print what is up to date, what is not and why, and the verdicts that are there.
+
+    Parameters
+    ----------
+    snakefile : the workflow; None: the one of this folder, else that of the checkout metro is installed from.
+    """
+    workflow = _workflow(snakefile)
+    found, summary = planned(_ask_snakemake(workflow))
     for name, batch in found.items():
         batch.verdicts = verdicts(reports / name)
+    _look_for_refused({name: batch for name, batch in found.items() if STAGES[0] in batch.needs}, workflow)
     if as_json:
         batches = {
-            name: {"up_to_date": not batch.needs, "needs": batch.needs, "verdicts": batch.verdicts}
+            name: {
+                "up_to_date": not batch.needs,
+                "needs": batch.needs,
+                "verdicts": batch.verdicts,
+                **({"refused": batch.refused} if batch.refused else {}),
+            }
             for name, batch in found.items()
         }
         print_json(
@@ -46,9 +65,12 @@ def status_command(snakefile: Path, reports: Path, as_json: bool) -> None:
         return
     rows = [[name, _needs(batch), _verdicts(batch)] for name, batch in found.items()]
     print_table(["batch", "needs", "verdicts"], rows)
+    refused = sum(bool(batch.refused) for batch in found.values())
     waiting = sum(bool(batch.needs) for batch in found.values())
     told = f"{waiting} of {len(found)} batches need snakemake" if waiting else "every batch is up to date"
     sys.stdout.write(told + (", and so does the summary\n" if summary else "\n"))
+    if refused:
+        sys.stdout.write(f"{refused} refused: metro check says all that is to be mended\n")
 
 
 def planned(lines: Iterable[str]) -> tuple[dict[str, BatchStatus], bool]:
@@ -97,11 +119,36 @@ def verdicts(reports: Path) -> dict[str, str]:
     return {name: str(entry.get("status")) for name, entry in (content.get("observables") or {}).items()}
 
 
+def _workflow(snakefile: Path | None) -> Path:
+    """Return the file of the workflow."""
+    if snakefile is not None:
+        if not snakefile.is_file():
+            raise wrong_call("--snakefile", f"{snakefile} is not there")
+        return snakefile
+    found = next((path for path in (HERE, INSTALLED) if path.is_file()), None)
+    if found is None:
+        message = "is not there: call metro where you call snakemake, or name the workflow with --snakefile"
+        raise wrong_call(str(HERE), message)
+    return found
+
+
+def _look_for_refused(unread: Mapping[str, BatchStatus], workflow: Path) -> None:
+    """Say of batches whose raw files are to be read that they cannot be, where that is so."""
+    if not unread:
+        return
+    from metro.batch.check import check
+    from metro.batch.findings import errors
+    from metro.workflow import Plan
+
+    plan = Plan.read(workflow.resolve().parent, {})
+    for name, batch in unread.items():
+        if name in plan.found:
+            found = errors(check(plan.found[name].folder, Path(plan.cells), plan.config["holdout"]).problems)
+            batch.refused = str(found[0]) if found else ""
+
+
 def _ask_snakemake(snakefile: Path) -> list[str]:
     """Return the lines that ``snakemake --summary`` prints; nothing is run or written by it."""
-    if not snakefile.is_file():
-        message = "is not there: call metro where you call snakemake, or name it with --snakefile"
-        raise ContractError([Finding("error", str(snakefile), message)])
     command = [sys.executable, "-m", "snakemake", "--summary", "--snakefile", str(snakefile)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -118,6 +165,8 @@ def _reason(status: str) -> str:
 def _needs(batch: BatchStatus) -> str:
     if not batch.needs:
         return "up to date"
+    if batch.refused:
+        return f"refused: {batch.refused}"
     stages = list(batch.needs)
     reason = next((why for why in batch.needs.values() if why != "a stage before it"), "")
     return ", ".join(stages) + (f" ({reason})" if reason else "")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -13,7 +13,9 @@ from metro.batch.discover import batch_files
 from metro.batch.findings import ContractError, Finding
 from metro.batch.provenance import Difference, compare, hashes, sha256
 from metro.codehash import code_hash
+from metro.commands.calls import wrong_call
 from metro.commands.output import print_json
+from metro.commands.which import PROCESSED, RAW, REPORTS, REPORTS_FILE, names, raw_roots, reports_folder
 from metro.units import JSON
 from metro.workflow import Plan
 
@@ -27,33 +29,66 @@ BY_NAME = {
 
 
 def verify_command(
-    reports: Path, raw: Path | None, processed: Path | None, config: Path, as_json: bool
+    given: Sequence[str], raw: Path | None, processed: Path | None, config: Path, as_json: bool
 ) -> int:
-    """Print what changed since a report was made; return the exit code, 1 where a file differs."""
+    """Print what changed since reports were made; return the exit code, 1 where a file differs.
+
+    Parameters
+    ----------
+    given : batches, each by its name or a folder of it; none: all that have results.
+    raw, processed : folders of one batch, where they are not in the usual places.
+    """
     import typer
 
-    name = reports.resolve().name
-    raw, processed = raw or Path("data/raw") / name, processed or Path("data/processed") / name
-    made, found = verify(reports, raw, processed, config)
-    broken = any(difference.in_files for difference in found)
-    digest = sha256(reports / provenance.FILE)
+    if len(given) != 1 and (raw or processed):
+        raise wrong_call("--raw" if raw else "--processed", "is the folder of one batch: name that batch")
+    all_of_them = given or [str(REPORTS / name) for name in names([REPORTS], REPORTS_FILE)]
+    if not all_of_them:
+        raise ContractError([Finding("error", str(REPORTS), "holds no results yet: call snakemake")])
+    folders = [reports_folder(one) for one in all_of_them]  # a wrong name before anything is computed
+    contents: list[JSON] = []
+    for folder in folders:
+        try:
+            contents.append(_compared(folder, raw, processed, config))
+        except ContractError as error:
+            if len(folders) == 1:
+                raise
+            contents.append({"batch": folder.resolve().name, "unchanged": False, "error": str(error)})
     if as_json:
-        content = {"batch": name, "unchanged": not broken, "provenance_sha256": digest, "recorded": made}
-        print_json({**content, "differences": [asdict(difference) for difference in found]})
-        return int(broken)
-    for one in found:
-        typer.echo(f"{one.kind:<10}{one.change:<9}{one.name}{_values(one)}")
+        print_json(contents[0] if len(given) == 1 else contents)
+    else:
+        for folder, content in zip(folders, contents, strict=True):
+            typer.echo("\n".join(_told(folder, content)))
+    return int(not all(content["unchanged"] for content in contents))
+
+
+def _compared(reports: Path, raw: Path | None, processed: Path | None, config: Path) -> JSON:
+    """Return what became of one report, as programs are told it."""
+    name = reports.resolve().name
+    raw = raw or next((root / name for root in raw_roots(config) if (root / name).is_dir()), RAW / name)
+    made, found = verify(reports, raw, processed or PROCESSED / name, config)
+    return {
+        "batch": name,
+        "unchanged": not any(difference.in_files for difference in found),
+        "provenance_sha256": sha256(reports / provenance.FILE),
+        "recorded": made,
+        "differences": [asdict(difference) for difference in found],
+    }
+
+
+def _told(reports: Path, content: JSON) -> list[str]:
+    """Say for people what became of one report."""
+    if "error" in content:
+        return [content["error"]]
+    differences = [Difference(**one) for one in content["differences"]]
+    made = content["recorded"]
     counts = ", ".join(f"{len(made[kind])} {kind}" for kind in ("raw", "processed", "results"))
-    typer.echo(
-        f"{reports}: "
-        + (
-            "files changed since the report was made"
-            if broken
-            else f"the files are those it was made of: {counts}"
-        )
-    )
-    typer.echo(f"SHA-256 of {provenance.FILE}: {digest}")
-    return int(broken)
+    same = f"the files are those it was made of: {counts}"
+    return [
+        *(f"{one.kind:<10}{one.change:<9}{one.name}{_values(one)}" for one in differences),
+        f"{reports}: {same if content['unchanged'] else 'files changed since the report was made'}",
+        f"SHA-256 of {provenance.FILE}: {content['provenance_sha256']}",
+    ]
 
 
 def verify(reports: Path, raw: Path, processed: Path, config: Path) -> tuple[JSON, list[Difference]]:

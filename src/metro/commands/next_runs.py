@@ -1,0 +1,57 @@
+"""``metro next``: the call is checked before the search, and a terminal is told that this takes its time."""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+
+from metro.batch.planned import limits_of
+from metro.commands.calls import part_of_the_call, require_verdict
+from metro.commands.status import verdicts
+from metro.commands.which import batch_name
+
+
+def checked_call(
+    batch: str, observable: str, limits: Sequence[str], *, processed: Path, reports: Path
+) -> str:
+    """Return the name of the batch that runs are to be planned for.
+
+    Parameters
+    ----------
+    batch : its name, or a folder of it. observable : only this one; "" for all. limits : ``COLUMN=LOW:HIGH``.
+
+    Raises
+    ------
+    CallError
+        There is no such batch or observable, or a limit is not one.
+    ContractError
+        The batch has no results, or no verdict on the observable.
+    """
+    name = batch_name(batch, processed, reports)
+    with part_of_the_call():
+        limits_of(limits)
+    require_verdict(name, observable, verdicts(reports / name))
+    return name
+
+
+@contextmanager
+def at_work(what: str) -> Iterator[None]:
+    """Say on a terminal, for as long as this block lasts, what is done and since when.
+
+    What the block prints comes after it, when the line of the terminal is free again.
+    """
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    shown = Progress(
+        *columns, console=console, transient=True, redirect_stdout=False, disable=not console.is_terminal
+    )
+    with redirect_stdout(io.StringIO()) as told, shown:
+        shown.add_task(what, total=None)
+        yield
+    sys.stdout.write(told.getvalue())
