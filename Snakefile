@@ -5,10 +5,10 @@ import sys
 from snakemake.logging import logger
 from snakemake.utils import min_version
 
+from metro.batch.alike import alike_as_one
 from metro.batch.at_work import only_one_at_work, remove_leftovers
 from metro.batch.findings import ContractError
 from metro.batch.layout import OBSERVED, PAGE
-from metro.commands.alike import alike_as_one
 from metro.progress import show_progress
 from metro.workflow import COMPLETE, Plan
 

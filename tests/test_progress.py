@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from metro.commands.alike import alike_as_one
+from metro.batch.alike import alike_as_one
 from metro.progress import STREAM, ProgressHandler, show_progress
 
 

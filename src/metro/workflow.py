@@ -17,6 +17,7 @@ from operator import getitem
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from metro.batch.cell import cells_findings, shared_cells
 from metro.batch.config import load_config
 from metro.batch.discover import FoundBatch, discover
 from metro.batch.findings import BatchError, Finding
@@ -91,13 +92,15 @@ class Plan:
         """Read the settings and find the batches.
 
         ``config/config.yaml`` is taken from the working directory, else from the checkout; so is the folder
-        of cells. ``overrides`` are the sections given to snakemake by ``--config`` or ``--configfile``.
+        of cells, as `metro check` has it. ``overrides`` are the sections given to snakemake by ``--config``
+        or ``--configfile``.
         """
-        config = load_config(_here_or(checkout, Path("config/config.yaml")), overrides)
-        cells = _here_or(checkout, Path(config["cells"]))
+        settings = Path("config/config.yaml")
+        config = load_config(settings if settings.exists() else checkout / settings, overrides)
+        cells = shared_cells(Path(config["cells"]), checkout)
         roots = [Path(root) for root in config["raw_roots"]]
         found = {batch.name: batch for batch in discover(roots, cells)}
-        problems = list(_unnameable(found.values()))
+        problems = [*cells_findings(cells), *_unnameable(found.values())]
         if not found:
             where = ", ".join(map(str, roots))
             problems.append(Finding("error", where, "holds no batch: no folder with a batch.yaml"))
@@ -195,7 +198,3 @@ def _unnameable(found: Iterable[FoundBatch]) -> Iterator[Finding]:
     for path in (str(path) for batch in found for path in batch.inputs):
         if "{" in path or "}" in path:
             yield Finding("error", path, "has a brace in its name, which snakemake cannot handle: rename it")
-
-
-def _here_or(checkout: Path, path: Path) -> Path:
-    return path if path.exists() or path.is_absolute() else checkout / path

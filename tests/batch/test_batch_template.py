@@ -33,6 +33,24 @@ def test_every_key_of_the_contract_stands_in_the_template_and_is_valid_when_unco
     assert [str(problem) for problem in check(folder, tmp_path).problems if problem.severity != "note"] == []
 
 
+def test_the_examples_of_the_other_files_follow_the_contract(tmp_path):
+    folder = new_batch(tmp_path, "my-cut")
+    text = (folder / "README.md").read_text()
+    examples = dict(re.findall(r"^## An example of (\S+)\n\n```\n(.*?)```$", text, re.MULTILINE | re.DOTALL))
+    assert list(examples) == ["impacts.csv", "loads.csv", "cell.yaml"]
+    for name, content in examples.items():
+        (folder / name).write_text(content)
+    (folder / "hammer").mkdir()
+    for record in ("tip-x-1", "tip-x-2"):
+        rows = "".join(f"{i / 1000},{i % 7},{i % 5}\n" for i in range(50))
+        (folder / f"hammer/{record}.csv").write_text(f"t_s,force_n,response\n{rows}")
+    rows = "".join(f"{i},1,0\n" for i in range(20))
+    (folder / "hammer/tip-y.csv").write_text(f"frequency_hz,real,imag\n{rows}")
+    report = check(folder, tmp_path)
+    assert [str(problem) for problem in report.problems if problem.severity != "note"] == []
+    assert {"3 rows in impacts.csv", "4 rows in loads.csv"} <= set(report.there)
+
+
 def test_the_run_table_has_every_column_and_repeats_spread_at_random(tmp_path):
     lines = (new_batch(tmp_path, "my-cut") / "runs.csv").read_text().splitlines()
     assert lines[0].split(",") == [column.name for column in RUNS]

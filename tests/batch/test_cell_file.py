@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from metro.batch.cell import read_cell, stations_path
+from metro.batch.cell import cells_findings, read_cell, shared_cells, stations_path
 
 CELLS = Path(__file__).parents[2] / "config/cells"
 
@@ -24,6 +24,30 @@ def test_a_cell_that_nobody_describes_is_rigid_and_said_to_be(tmp_path):
     assert (cell, source) == ({"cell": "kr160"}, None)
     assert findings[0].severity == "note"
     assert "nothing is known of cell kr160 (rigid)" in findings[0].message
+
+
+@pytest.mark.parametrize("name", ["kr-160", "KR160", "kr16"])
+def test_the_known_cell_that_a_name_is_a_slip_of_is_named_in_a_warning(tmp_path, name):
+    (finding,) = read_cell(tmp_path, CELLS, name)[2]
+    assert finding.severity == "warning"
+    assert finding.message.endswith('(did you mean "kr160"?)')
+
+
+def test_a_folder_without_cells_of_its_own_has_those_of_the_checkout(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    _, source, findings = read_cell(tmp_path, Path("config/cells"), "kr160")
+    assert (source, findings) == (CELLS / "kr160.yaml", [])
+    (tmp_path / "config/cells").mkdir(parents=True)
+    assert read_cell(tmp_path, Path("config/cells"), "kr160")[1] is None
+
+
+def test_a_folder_of_cells_that_was_asked_for_must_be_there(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for cells in (Path("nope"), tmp_path / "nope"):
+        (finding,) = cells_findings(shared_cells(cells))
+        assert str(finding) == f"{cells}: is not a folder, expected that of the shared cells"
+    nobodys = shared_cells(Path("config/cells"), tmp_path)
+    assert (nobodys, cells_findings(nobodys)) == (Path("config/cells"), [])
 
 
 def test_the_batch_s_own_cell_goes_before_the_shared_one(tmp_path):

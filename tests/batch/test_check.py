@@ -6,10 +6,11 @@ import pytest
 from conftest import edit
 from rich.console import Console
 
-from metro.batch.check import check, check_command, load
+from metro.batch.check import check, load
 from metro.batch.findings import BatchError
 from metro.batch.processed import COLUMNS, read_batch, write_batch
 from metro.batch.show import render
+from metro.workflow import Plan
 
 ROOT = Path(__file__).parents[2]
 REAL = Path(os.environ.get("METRO_REAL_DATA", ROOT / "../shared/real")) / "batches"
@@ -85,6 +86,24 @@ def test_a_fault_of_the_tool_does_not_bring_forth_others(batch):
     ]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "column"),
+    [("hole_diameter_mm: 16", "hole_diameter_mm: 16,5", "hole_diameter_mm"), ("cell: bench", "cell: [", "")],
+)
+def test_a_manifest_that_cannot_be_read_does_not_bring_forth_others(batch, old, new, column):
+    orbit = (batch / "runs.csv").read_text().replace(",slot,6000", ",helical,6000").replace("\nr", "\n90,r")
+    (batch / "runs.csv").write_text(f"orbit_rpm,{orbit}")
+    edit(batch / "batch.yaml", old, new)
+    found = [problem for problem in check(batch, batch).problems if problem.severity != "note"]
+    assert [(problem.file, problem.column) for problem in found] == [("batch.yaml", column)]
+
+
+def test_a_helical_run_needs_the_hole_that_nobody_states(batch):
+    edit(batch / "batch.yaml", "hole_diameter_mm: 16\n", "")
+    edit(batch / "runs.csv", "r2,slot,6000", "r2,helical,6000")
+    assert "helical needs hole_diameter_mm" in printed(check(batch, batch))
+
+
 def test_a_dynamometer_that_is_not_declared_is_assumed_and_said_to_be(batch):
     edit(batch / "batch.yaml", "instruments:\n  dynamometer: {rate_hz: 1000}\n", "")
     assert any(problem.column == "instruments.dynamometer" for problem in check(batch, batch).problems)
@@ -109,6 +128,23 @@ def test_the_stations_of_the_cell_are_read_from_beside_it(batch, tmp_path):
     )
     (cells / "table.csv").write_text("position,x_mm,y_mm,z_mm,kx_n_um,ky_n_um,kz_n_um\n1,0,0,0,10,20,30\n")
     assert load(batch, cells).stations["ky_n_um"].tolist() == [20.0]
+
+
+def test_a_folder_of_cells_that_is_not_there_stops_the_batch(batch):
+    (finding,) = [problem for problem in check(batch, batch / "nope").problems if problem.severity == "error"]
+    assert str(finding) == f"{batch / 'nope'}: is not a folder, expected that of the shared cells"
+
+
+def test_check_and_the_workflow_take_the_same_cell_in_a_folder_without_cells(batch, monkeypatch):
+    edit(batch / "batch.yaml", "cell: bench", "cell: kr160")
+    monkeypatch.chdir(batch.parent)
+    plan = Plan.read(ROOT, {"raw_roots": ["."]})
+    assert plan.found["trial"].cell_file == ROOT / "config/cells/kr160.yaml"
+    assert not [problem for problem in check(batch).problems if problem.column == "cell"]
+    assert load(batch).batch.cell == load(batch, Path(plan.cells)).batch.cell
+    assert "arm" in load(batch).batch.cell
+    with pytest.raises(BatchError, match="nope: is not a folder, expected that of the shared cells"):
+        Plan.read(ROOT, {"raw_roots": ["."], "cells": "nope"})
 
 
 def test_an_frf_without_a_unit_is_a_receptance(batch):
@@ -136,10 +172,3 @@ def test_what_is_printed_holds_every_problem_and_the_verdict(batch):
 def test_brackets_in_a_message_are_printed_as_they_are(batch):
     edit(batch / "runs.csv", "r2,slot,6000", "r2,slot,[red]6")
     assert "[red]6" in printed(check(batch, batch))
-
-
-def test_the_exit_code_is_that_of_the_verdict(batch, capsys):
-    assert check_command(batch, batch) == 0
-    edit(batch / "runs.csv", "r2,slot,6000", "r2,slot,fast")
-    assert check_command(batch, batch) == 1
-    assert "fast" in capsys.readouterr().out

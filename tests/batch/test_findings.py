@@ -1,6 +1,6 @@
 import pytest
 
-from metro.batch.findings import BatchError, Finding, shown, suggestion
+from metro.batch.findings import BatchError, Finding, misspelt, shown, suggestion
 
 
 def test_a_finding_in_a_table_names_file_row_run_and_column():
@@ -21,6 +21,20 @@ def test_an_error_shows_every_problem():
 @pytest.mark.parametrize(("name", "near"), [("theeth", "teeth"), ("Teeth", "teeth"), ("zzz", None)])
 def test_a_misspelt_name_is_answered_with_the_nearest(name, near):
     assert suggestion(name, ["teeth", "helix_deg"]) == (f' (did you mean "{near}"?)' if near else "")
+
+
+@pytest.mark.parametrize("name", ["axis", "Axes", "aexs", "axe", "aaxes"])
+def test_one_letter_makes_a_slip(name):
+    assert misspelt(name, ["reads", "axes"]) == ("axes" if len(name) >= len("axes") else None)
+
+
+@pytest.mark.parametrize("name", ["reader", "rates", "range_x_n", "robot", "n", "rang"])
+def test_more_than_a_letter_or_a_unit_makes_another_word(name):
+    assert misspelt(name, ["rate_hz", "range_n", "reads", "robot_log"]) is None
+
+
+def test_a_name_without_its_unit_is_a_slip():
+    assert misspelt("range", ["rate_hz", "range_n"]) == "range_n"
 
 
 def test_a_long_value_is_shortened():

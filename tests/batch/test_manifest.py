@@ -116,8 +116,11 @@ def test_a_scanner_pose_printed_to_five_digits_is_a_rigid_motion(batch):
     ("old", "new", "column"),
     [
         ("cell: bench", "cell: bench\noperator: somebody", "operator"),
-        ("cell: bench", "cell: bench\ntittle: a", "tittle"),
-        ("rate_hz: 1000", "rate_hz: 1000, range: 5", "instruments.dynamometer.range"),
+        ("cell: bench", "cell: bench\nhole: a", "hole"),
+        ("rate_hz: 1000", "rate_hz: 1000, model: 9257B", "instruments.dynamometer.model"),
+        ("rate_hz: 1000", "rate_hz: 1000, noise_x_n: 2", "instruments.dynamometer.noise_x_n"),
+        ("rate_hz: 1000", "rate_hz: 1000, rate_khz: 1", "instruments.dynamometer.rate_khz"),
+        ("  dynamometer:", "  robot: {maker: a}\n  dynamometer:", "instruments.robot"),
         ("  dynamometer:", "  microphone: {rate_hz: 5}\n  dynamometer:", "instruments.microphone"),
         ("teeth: 4", "teeth: 4, coating: none", "tool.coating"),
     ],
@@ -126,6 +129,67 @@ def test_a_field_that_may_have_been_added_is_a_warning(batch, old, new, column):
     edit(batch / "batch.yaml", old, new)
     findings = read_manifest(batch)[1]
     assert [(finding.severity, finding.column) for finding in findings] == [("warning", column)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "column", "near"),
+    [
+        ("cell: bench", "cell: bench\ntittle: a", "tittle", "title"),
+        ("instruments:", "instrumnets:", "instrumnets", "instruments"),
+        ("  dynamometer:", "  dynamometr:", "instruments.dynamometr", "dynamometer"),
+        ("rate_hz: 1000", "axis: {x: -x, y: y, z: -z}", "instruments.dynamometer.axis", "axes"),
+        ("rate_hz: 1000", "rate_hz: 1000, range: 5", "instruments.dynamometer.range", "range_n"),
+        ("rate_hz: 1000", "Reads: tool", "instruments.dynamometer.Reads", "reads"),
+    ],
+)
+def test_a_slip_of_the_pen_for_a_key_that_is_absent_is_an_error(batch, old, new, column, near):
+    edit(batch / "batch.yaml", old, new)
+    assert faults(batch) == [f'batch.yaml: {column}: is not a known key (did you mean "{near}"?)']
+
+
+@pytest.mark.parametrize(
+    ("written", "hint"),
+    [
+        ("12,5", "write 12.5"),
+        ("12, 5", "write 12.5"),
+        ("8,192", "write 8192 or 8.192"),
+        ("1,000,000", "write 1000000"),
+    ],
+)
+def test_a_comma_in_a_number_is_an_error_that_says_how_to_write_it(batch, written, hint):
+    edit(batch / "batch.yaml", "rate_hz: 1000", f"rate_hz: {written}, range_n: 5,000")
+    found = [fault.split(": expected")[0] for fault in faults(batch)]
+    assert found[0].startswith("batch.yaml: instruments.dynamometer.rate_hz: found ")
+    assert found[0].endswith(f"expected a number > 0: {hint}")
+    assert found[1].endswith('range_n: found "5,000", expected a number > 0: write 5000 or 5.000')
+
+
+def test_a_comma_that_parts_two_keys_is_left_alone(batch):
+    edit(batch / "batch.yaml", "rate_hz: 1000", "rate_hz: 1000, 5: 3")
+    assert [finding.column for finding in read_manifest(batch)[1]] == ["instruments.dynamometer.5"]
+
+
+@pytest.mark.parametrize(
+    ("limits", "severity", "message"),
+    [
+        (
+            "{axial: [1, 2]}",
+            "error",
+            "limits.axial: is no column of runs.csv that can be limited (did you mean",
+        ),
+        (
+            "{axial_depth_mm: [2, 1]}",
+            "error",
+            "limits.axial_depth_mm: found [2, 1], expected the least first",
+        ),
+        ("{power_kw: [0, 5]}", "warning", "limits.power_kw: is no column of runs.csv"),
+    ],
+)
+def test_limits_are_of_columns_and_begin_with_the_least(batch, limits, severity, message):
+    edit(batch / "batch.yaml", "cell: bench", f"cell: bench\nlimits: {limits}")
+    (finding,) = read_manifest(batch)[1]
+    assert finding.severity == severity
+    assert message in str(finding)
 
 
 def test_a_published_batch_needs_a_citation_and_its_values(batch):

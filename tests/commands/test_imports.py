@@ -18,8 +18,8 @@ HEAVY = {
 # imports does not count: it is there when it is used. (numpy comes with metro.units.)
 MODULES = {
     (): (
-        *("", "cli", "codehash"),
-        *(f"commands.{name}" for name in ("alike", "calls", "completion", "hidden", "output", "stage_calls")),
+        *("", "cli", "codehash", "batch.alike"),
+        *(f"commands.{name}" for name in ("calls", "completion", "hidden", "output", "stage_calls")),
         "commands.which",
     ),
     ("numpy",): ("commands.query", "commands.status", "dataset.results", "dataset.views"),

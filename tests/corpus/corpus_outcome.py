@@ -46,7 +46,8 @@ def outcome(folder: Path, out: Path) -> Outcome:
     else:
         tables = {name: pd.read_parquet(out / folder.name / f"{name}.parquet") for name in COLUMNS}
         flags = tables["qc"][~tables["qc"]["ok"]]
-        said = tuple(f"{row.file}: {row.run}: {row.message}" for row in flags.itertuples())
+        parts = ((row.file, row.run, row.message) for row in flags.itertuples())
+        said = tuple(": ".join(part for part in said if part) for said in parts)
         found = Outcome("flagged" if said else "read", "ingest", said, tables)
     return replace(found, said=tuple(message.replace(f"{folder}/", "") for message in found.said))
 

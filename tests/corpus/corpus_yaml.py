@@ -33,6 +33,35 @@ MANIFEST = {
     "a number in quotes": ("diameter_mm: 10", 'diameter_mm: "10"', "diameter_mm", "expected a number"),
     "a unit behind a number": ("diameter_mm: 10", "diameter_mm: 10 mm", "diameter_mm", "10 mm", "expected"),
     "a decimal comma": ("[212.5, 0.0, 279.9]", "[212,5, 0,0, 279,9]", "tool_in_flange_mm", "expected"),
+    "a decimal comma in braces": (
+        "diameter_mm: 10",
+        "diameter_mm: 12,5",
+        "diameter_mm",
+        "12,5",
+        "write 12.5",
+    ),
+    "two decimal commas that end alike": (
+        "overhang_mm: 40",
+        "overhang_mm: 40,5, x: 12,5",
+        "overhang_mm",
+        "40,5",
+        "write 40.5",
+    ),
+    "a comma for thousands": ("rate_hz: 1000", "rate_hz: 8,192", "rate_hz", "8,192", "write 8192 or 8.192"),
+    "commas for millions": ("range_n: 5000", "range_n: 1,000,000", "range_n", "write 1000000"),
+    "a misspelt instrument": ("dynamometer:", "dynamometr:", "dynamometr", "dynamometer"),
+    "a misspelt section": ("instruments:", "instrument:", "instrument", "instruments"),
+    "a singular for a plural": (AXES, "axis: {x: x, y: y, z: z}", "dynamometer.axis", "axes"),
+    "two letters exchanged": ("rate_hz: 1000", "raet_hz: 1000", "dynamometer.raet_hz", "rate_hz"),
+    "a key without its unit": ("rate_hz: 1000", "rotation: 30", "dynamometer.rotation", "rotation_deg"),
+    "a key with another unit": ("range_n: 5000", "range_kn: 5", "dynamometer.range_kn", "range_n"),
+    "a key of another program": ("rate_hz: 1000", "model: 9257B", "dynamometer.model", "not a known key"),
+    "an instrument of another program": (
+        "  hammer:",
+        "  microphone: {rate_hz: 44100}\n  hammer:",
+        "instruments.microphone",
+        "not a known key",
+    ),
     "two coordinates of three": ("[212.5, 0.0, 279.9]", "[212.5, 0.0]", "tool_in_flange_mm", "expected"),
     "yes where text is due": ("title: A sound little batch", "title: yes", "title", "expected text"),
     "a blank value": ("diameter_mm: 10", "diameter_mm: ", "diameter_mm", "expected"),
@@ -82,6 +111,45 @@ MANIFEST = {
         "tool_runuot",
         "tool_runout",
     ),
+    "a parameter without its unit": (
+        "instruments:",
+        "known: {tool_runout: {radius: 7}}\ninstruments:",
+        "known.tool_runout.radius",
+        "expected radius_um, angle_deg",
+    ),
+    "a parameter with a decimal comma": (
+        "instruments:",
+        "known: {tool_runout: {radius_um: 7,35, angle_deg: 40}}\ninstruments:",
+        "known.tool_runout.radius_um",
+        "7,35",
+        "expected a number",
+    ),
+    "an effect of a seventh joint": (
+        "instruments:",
+        "known: {friction_reversal: {joint: 7, torque_nm: 5}}\ninstruments:",
+        "known.friction_reversal.joint",
+        "7",
+        "expected a joint, 1 to 6",
+    ),
+    "an effect that is told by half": (
+        "instruments:",
+        "known: {tool_runout: {radius_um: 7}}\ninstruments:",
+        "known.tool_runout",
+        "lacks angle_deg",
+    ),
+    "a limit of no column": (
+        "instruments:",
+        "limits: {axial: [1, 2]}\ninstruments:",
+        "limits.axial",
+        "axial_depth_mm",
+    ),
+    "limits the wrong way round": (
+        "instruments:",
+        "limits: {axial_depth_mm: [4, 1]}\ninstruments:",
+        "limits.axial_depth_mm",
+        "[4, 1]",
+        "expected the least first",
+    ),
     "coefficients in N/m2": (
         "instruments:",
         "coefficients: {ktc_n_mm2: 9.58e+8}\ninstruments:",
@@ -99,7 +167,12 @@ MANIFEST = {
     "an anchor that holds itself": ("title: A sound little batch", "title: &a [*a]", "alias"),
     "two documents": ("title:", "---\ntitle:", "document"),
 }
-FLAGGED = ("an unknown section",)
+FLAGGED = (
+    "an unknown section",
+    "a key of another program",
+    "an instrument of another program",
+    "an effect that is told by half",
+)
 ARM = (
     "[[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], "
     "[0, -90, 0, 0],\n       [0, 0, 215, 0]]"

@@ -5,12 +5,29 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from metro.batch.documents import read_yaml, schema_findings
-from metro.batch.findings import Finding, Severity, linked_outside
+from metro.batch.documents import Likeness, read_yaml, schema_findings
+from metro.batch.findings import Finding, Severity, linked_outside, misspelt
 from metro.units import JSON
 
 FILE = "cell.yaml"
+CELLS = Path("config/cells")  # unless config.yaml or the command line says otherwise
+CHECKOUT = Path(__file__).parents[3]  # where this package is used from a checkout
 SHORTEST_ARM_MM = 10.0
+
+
+def shared_cells(cells: Path, checkout: Path = CHECKOUT) -> Path:
+    """Return where the folder of shared cells is: as named, else, if relative, the same of the checkout."""
+    return next((folder for folder in (cells, checkout / cells) if folder.is_dir()), cells)
+
+
+def cells_findings(cells: Path) -> list[Finding]:
+    """Report a folder of shared cells, as `shared_cells` has it, that was asked for and is not there.
+
+    The one that nobody asked for need not be: where there is no checkout, no cells are shared.
+    """
+    if cells == CELLS or cells.is_dir():
+        return []
+    return [Finding("error", str(cells), "is not a folder, expected that of the shared cells")]
 
 
 def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, list[Finding]]:
@@ -19,7 +36,7 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
     Parameters
     ----------
     folder : the batch, whose own ``cell.yaml`` goes before.
-    cells : folder of the shared cells, with files ``<cell>.yaml``.
+    cells : folder of the shared cells, with files ``<cell>.yaml``; of the checkout where it is not here.
     name : the cell that the manifest names.
 
     Returns
@@ -28,12 +45,16 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
     source : the file that it comes from; None where nothing is known.
     findings : what is wrong, missing or assumed.
     """
+    cells = shared_cells(cells)
     own, shared = folder / FILE, cells / f"{name}.yaml"
     plain = Path(name).name == name and "\0" not in name  # else it would lead out of the folder of cells
     source = own if own.exists() else shared if plain and shared.is_file() else None
     if source is None:
+        near = misspelt(name, sorted(path.stem for path in cells.glob("*.yaml")))
         note = f"nothing is known of cell {name} (rigid): neither {FILE} nor {shared} is there"
-        return {"cell": name}, None, [Finding("note", "batch.yaml", note, column="cell")]
+        note += f' (did you mean "{near}"?)' if near else ""
+        severity: Severity = "warning" if near else "note"
+        return {"cell": name}, None, [Finding(severity, "batch.yaml", note, column="cell")]
     file = FILE if source is own else str(shared)
     outside = linked_outside(folder, own, FILE) if source is own else []
     content, findings = ({}, outside) if outside else read_yaml(source, file)
@@ -76,6 +97,6 @@ def stations_path(cell: JSON, source: Path | None) -> Path | None:
     return source.parent / stations if source is not None and isinstance(stations, str) else None
 
 
-def _unknown_key(_path: tuple[str, ...], resembles: bool) -> Severity:
+def _unknown_key(_path: tuple[str, ...], like: Likeness) -> Severity:
     """Say how bad an unknown key is: the contract lets fields be added, but a misspelt one must not pass."""
-    return "error" if resembles else "warning"
+    return "error" if like else "warning"

@@ -12,18 +12,17 @@ import pandas as pd
 from metro.batch import rules
 from metro.batch.batch import Batch
 from metro.batch.capabilities import Capability, capabilities
-from metro.batch.cell import read_cell, stations_path
+from metro.batch.cell import CELLS, cells_findings, read_cell, shared_cells, stations_path
 from metro.batch.discover import NAME, NAME_IN_WORDS
 from metro.batch.files import file_findings
 from metro.batch.findings import BatchError, Finding, errors, linked_outside
 from metro.batch.holdout import plan
 from metro.batch.manifest import FILE, read_manifest, with_defaults
-from metro.batch.runs import design_findings, filled, recorded, run_findings
+from metro.batch.runs import HOLE, design_findings, filled, recorded, run_findings
 from metro.batch.tables import Table, read_table
 from metro.units import JSON
 
 HOLDOUT: JSON = {"share": 0.34, "seed": 1}
-CELLS = Path("config/cells")
 
 
 @dataclass(frozen=True)
@@ -102,17 +101,6 @@ def load(folder: Path, cells: Path = CELLS, holdout: JSON = HOLDOUT) -> Loaded:
     return Loaded(batch, findings=found.findings, **frames)
 
 
-def check_command(folder: Path, cells: Path = CELLS) -> int:
-    """Print the check of a batch; return the exit code, 1 where there is an error."""
-    from rich.console import Console
-
-    from metro.batch.show import render
-
-    report = check(folder, cells)
-    Console(highlight=False).print(render(report))
-    return 0 if report.ok else 1
-
-
 def _read(folder: Path, cells: Path, holdout: JSON) -> _Read:
     """Read and check all of a batch; go on after an error as far as makes sense."""
     manifest, findings = read_manifest(folder)
@@ -126,8 +114,10 @@ def _read(folder: Path, cells: Path, holdout: JSON) -> _Read:
         findings += more
     tables["stations"], more = _stations(cell, source)
     findings += more
-    sound = manifest if not errors(findings) else _without_faults(manifest, findings)
-    findings += [*run_findings(tables["runs"], sound), *rules.impact_findings(tables["impacts"])]
+    faulty = {finding.column.split(".")[0] for finding in errors(findings) if finding.file == FILE}
+    sound = {key: value for key, value in manifest.items() if key not in faulty}
+    unread = not manifest or HOLE in faulty
+    findings += [*run_findings(tables["runs"], sound, unread), *rules.impact_findings(tables["impacts"])]
     findings += [*rules.load_findings(tables["loads"]), *rules.mass_findings(tables["mass"])]
     findings += [*rules.published_findings(tables["published"]), *rules.station_findings(tables["stations"])]
     findings += file_findings(folder, tables["runs"], tables["impacts"])
@@ -146,7 +136,8 @@ def _read(folder: Path, cells: Path, holdout: JSON) -> _Read:
 def _cell(folder: Path, cells: Path, manifest: JSON) -> tuple[JSON, Path | None, list[Finding]]:
     """Read the cell that the manifest names."""
     name = manifest.get("cell")
-    return read_cell(folder, cells, name) if isinstance(name, str) else ({}, None, [])
+    cell, source, findings = read_cell(folder, cells, name) if isinstance(name, str) else ({}, None, [])
+    return cell, source, [*cells_findings(shared_cells(cells)), *findings]
 
 
 def _stations(cell: JSON, source: Path | None) -> tuple[Table, list[Finding]]:
@@ -164,12 +155,6 @@ def _stations(cell: JSON, source: Path | None) -> tuple[Table, list[Finding]]:
     return table, findings
 
 
-def _without_faults(manifest: JSON, findings: list[Finding]) -> JSON:
-    """Return the manifest without the sections that have an error, for the checks that rest on it."""
-    faulty = {finding.column.split(".")[0] for finding in errors(findings) if finding.file == FILE}
-    return {key: value for key, value in manifest.items() if key not in faulty}
-
-
 def _about_the_whole(manifest: JSON, tables: Mapping[str, Table], runs: pd.DataFrame) -> list[Finding]:
     """Say what the batch as a whole leaves open."""
     found = []
@@ -184,7 +169,7 @@ def _about_the_whole(manifest: JSON, tables: Mapping[str, Table], runs: pd.DataF
         )
         found.append(Finding("note", tables["runs"].file, message))
     declared = manifest.get("instruments") or {}
-    if (runs["dynamometer"] != "").any() and "dynamometer" not in declared:
+    if (runs["dynamometer"] != "").any() and "dynamometer" not in declared and manifest:
         message = "is missing: taken to read the force on the work, its axes those of the work"
         found.append(Finding("warning", FILE, message, column="instruments.dynamometer"))
     return found

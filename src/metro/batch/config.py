@@ -30,7 +30,7 @@ def load_config(path: Path, overrides: Mapping[str, Any] | None = None) -> JSON:
     content, findings = read_yaml(path, file)
     if not findings:
         content |= dict(overrides or {})
-        findings = schema_findings(content, "config", file, lambda _path, _near: "error")
+        findings = schema_findings(content, "config", file, lambda _path, _like: "error")
     if errors(findings):
         raise ConfigError(findings)
     return content

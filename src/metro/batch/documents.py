@@ -9,11 +9,11 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import yaml
 
-from metro.batch.findings import Finding, Severity, resembling, shown, suggestion
+from metro.batch.findings import Finding, Severity, misspelt, resembling, shown, suggestion
 
 if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
@@ -22,11 +22,14 @@ if TYPE_CHECKING:
         JSON,
     )  # which imports NumPy, and this module is imported at every call of snakemake
 
-# How bad an unknown key is: called with the keys that lead to it, and whether it resembles a known one.
-UnknownKey = Callable[[tuple[str, ...], bool], Severity]
-
+# What an unknown key is to the known ones: like none, like one, or a slip of the pen for one that is absent.
+Likeness = Literal["", "like", "slip"]
+# How bad an unknown key is: called with the keys that lead to it, and with that.
+UnknownKey = Callable[[tuple[str, ...], Likeness], Severity]
 
 LARGEST = 1 << 20  # bytes: a description that people write has some thousands
+THOUSAND = 3  # digits of a group
+_BEFORE_COMMA = re.compile(r"[-+]?[0-9][0-9.]*")
 _TRUTH = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
 
 
@@ -56,11 +59,21 @@ class _Loader(yaml.SafeLoader):
 
 
 def _mapping(loader: _Loader, node: yaml.MappingNode) -> JSON:
-    """Construct a mapping whose keys are text and stand once."""
+    """Construct a mapping whose keys are text and stand once.
+
+    In braces a comma ends a value: of ``{diameter_mm: 12,5}`` the 5 would be a key without one. It is put
+    back, and the value is what was written, a text.
+    """
     loader.flatten_mapping(node)
     content: JSON = {}
+    before, number = "", ""  # the last key, and what was written as its value where that is a number
     for key_node, value_node in node.value:
         key = str(key_node.value)
+        written = value_node.value if isinstance(value_node, yaml.ScalarNode) else None
+        if number and key.isdecimal() and written == "":
+            number = content[before] = f"{number},{key}"
+            continue
+        before, number = key, written if written and _BEFORE_COMMA.fullmatch(written) else ""
         if key in content:
             raise yaml.constructor.ConstructorError(
                 None, None, f'key "{key}" stands twice', key_node.start_mark
@@ -204,7 +217,7 @@ def _in_words(fault: ValidationError, file: str, unknown: UnknownKey) -> Iterato
         for key in given:
             if key not in known:
                 message = f"is not a known key{suggestion(key, known)}"
-                severity = unknown(path, resembling(key, known) is not None)
+                severity = unknown(path, _likeness(key, known, given))
                 yield Finding(severity, file, message, column=".".join((*path, key)))
     elif fault.validator == "required":
         for key in rule["required"]:
@@ -214,5 +227,23 @@ def _in_words(fault: ValidationError, file: str, unknown: UnknownKey) -> Iterato
                     "error", file, f"is missing, expected {expected}", column=".".join((*path, key))
                 )
     else:
-        message = f"found {shown(given)}, expected {expectation(rule)}"
+        hint = without_comma(given) if rule.get("type") in {"number", "integer"} else ""
+        message = f"found {shown(given)}, expected {expectation(rule)}{hint}"
         yield Finding("error", file, message, column=".".join(path))
+
+
+def _likeness(key: str, known: list[str], given: Mapping[str, Any]) -> Likeness:
+    """Say what an unknown key of a mapping is to the known ones."""
+    if misspelt(key, [name for name in known if name not in given]):
+        return "slip"
+    return "like" if resembling(key, known) else ""
+
+
+def without_comma(given: Any) -> str:
+    """Say, to follow a message, how a number written with a comma is to be written; "" of anything else."""
+    if not isinstance(given, str) or not re.fullmatch(r"[-+]?[0-9]+(,[0-9]+)+", given):
+        return ""
+    whole, *rest = given.split(",")
+    numbers = ["".join((whole, *rest))] if all(len(group) == THOUSAND for group in rest) else []
+    numbers += [] if rest[1:] else [f"{whole}.{rest[0]}"]
+    return f": write {' or '.join(numbers)}" if numbers else ""

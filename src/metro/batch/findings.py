@@ -6,10 +6,14 @@ import difflib
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Literal
 
 Severity = Literal["error", "warning", "note"]
+PAIR = 2  # letters that have changed places
+UNITS = {"mm", "deg", "hz", "n", "nm", "ms", "s"}  # at the end of keys
+SHORTEST_WORD = 4  # letters: of shorter ones, one letter makes another word
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,35 @@ def resembling(name: str, known: Iterable[str]) -> str | None:
     without_unit = [entry for entry in by_lower if entry.startswith(f"{name.lower()}_")]
     matches = without_unit or difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)
     return by_lower[matches[0]] if matches else None
+
+
+def misspelt(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that ``name`` is a slip of the pen for: its unit left out, or one letter.
+
+    One letter of four or more is wrong, missing, too many, or has changed places with the next.
+    """
+    for entry in known:
+        stem, _, unit = entry.rpartition("_")
+        without_unit = unit in UNITS and name.lower() == stem
+        if without_unit or _one_slip(name.lower(), entry.lower()):
+            return entry
+    return None
+
+
+def _one_slip(one: str, other: str) -> bool:
+    """Tell whether two words are the same but for a letter, or for two that have changed places."""
+    if min(len(one), len(other)) < SHORTEST_WORD:
+        return False
+    head = _shared_length(one, other)
+    one, other = one[head:], other[head:]
+    tail = _shared_length(one[::-1], other[::-1])
+    one, other = one[: len(one) - tail], other[: len(other) - tail]
+    return max(len(one), len(other)) <= 1 or (len(one) == PAIR and one == other[::-1])
+
+
+def _shared_length(one: str, other: str) -> int:
+    """Count the letters with which two words begin alike."""
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(one, other, strict=False)))
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

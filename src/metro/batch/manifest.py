@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from metro.batch.documents import read_yaml, schema_findings
-from metro.batch.findings import Finding, Severity, linked_outside, shown
+from metro.batch.documents import Likeness, read_yaml, schema_findings
+from metro.batch.findings import Finding, Severity, linked_outside, resembling, shown, suggestion
+from metro.batch.known import known_findings
+from metro.batch.planned import NUMBERS
 from metro.units import JSON, Array
 
 FILE = "batch.yaml"
@@ -37,6 +39,9 @@ def read_manifest(folder: Path) -> tuple[JSON, list[Finding]]:
         if value is not None and not any(_overlap(path, column) for column in faulty):
             message = rule(value)
             findings += [Finding("error", FILE, message, column=path)] if message else []
+    for section, check in SECTIONS.items():
+        if section in content and not any(_overlap(section, column) for column in faulty):
+            findings += check(content[section], FILE)
     return content, findings + _about_the_folder(content, folder)
 
 
@@ -90,10 +95,13 @@ INSTRUMENT_DEFAULTS: dict[str, JSON] = {
 }
 
 
-def _unknown_key(path: tuple[str, ...], resembles: bool) -> Severity:
-    """Say how bad an unknown key is: the contract lets fields be added, but a misspelt one must not pass."""
+def _unknown_key(path: tuple[str, ...], like: Likeness) -> Severity:
+    """Say how bad an unknown key is: the contract lets fields be added, but a misspelt one must not pass.
+
+    Other programs add keys at the top and of instruments: there a likeness alone is none of a misspelt one.
+    """
     may_be_added = not path or (path[0] == "instruments" and path[-1] != "axes")
-    return "error" if resembles and not may_be_added else "warning"
+    return "error" if like == "slip" or (like and not may_be_added) else "warning"
 
 
 def _overlap(path: str, column: str) -> bool:
@@ -141,6 +149,18 @@ def _axes(axes: JSON) -> str | None:
     return None
 
 
+def _limits(limits: JSON, file: str) -> Iterator[Finding]:
+    """Check that limits are of columns that ``metro next`` sets, the least before the greatest."""
+    for name, (low, high) in limits.items():
+        column = f"limits.{name}"
+        if name not in NUMBERS:
+            like = resembling(name, NUMBERS)
+            message = f"is no column of runs.csv that can be limited{suggestion(name, NUMBERS)}"
+            yield Finding("error" if like else "warning", file, message, column=column)
+        elif low > high:
+            yield Finding("error", file, f"found {[low, high]}, expected the least first", column=column)
+
+
 def _rotation_fault(matrix: Array) -> str | None:
     """Say what keeps a (3, 3) matrix from being a rotation."""
     if np.abs(matrix.T @ matrix - np.eye(3)).max() > ORTHONORMAL:
@@ -183,6 +203,8 @@ def _not_metres(least: float) -> Callable[[Any], str | None]:
     return rule
 
 
+# Section of the manifest → check(section, file) of what a schema cannot say of its keys.
+SECTIONS: dict[str, Callable[[JSON, str], Iterable[Finding]]] = {"known": known_findings, "limits": _limits}
 # Semantic checks of what a schema cannot say: path of keys → rule(value) → message or None.
 RULES: dict[str, Callable[[Any], str | None]] = {
     "tool": _tool,

@@ -13,6 +13,7 @@ from metro.batch.findings import Finding
 from metro.batch.tables import Table
 from metro.units import JSON, MM
 
+HOLE = "hole_diameter_mm"  # key of batch.yaml
 # What makes the condition of a run, and how it is written in the name of one that the table leaves blank.
 SETTINGS = {
     "operation": "",
@@ -30,17 +31,24 @@ SETTINGS = {
 }
 
 
-def run_findings(table: Table, manifest: JSON) -> Iterator[Finding]:
-    """Check the rows against each other, and against the tool and the hole of ``batch.yaml``."""
+def run_findings(table: Table, manifest: JSON, hole_unread: bool = False) -> Iterator[Finding]:
+    """Check the rows against each other, and against the tool and the hole of ``batch.yaml``.
+
+    Parameters
+    ----------
+    table : the run table.
+    manifest : what of ``batch.yaml`` is sound.
+    hole_unread : whether the hole may be stated there and could not be read: its lack is no fault then.
+    """
     diameter = _length((manifest.get("tool") or {}).get("diameter_mm"))
-    hole = _length(manifest.get("hole_diameter_mm"))
+    hole = _length(manifest.get(HOLE))
     yield from _twice(table, "run", table.frame["run"])
     yield from _twice(table, "order", table.frame["order"].fillna(_places(table.frame)))
     for position, row in table.sound():
         faults = [
             *_sizes(row, diameter),
             *_immersion(row, diameter),
-            *(_helical(row, diameter, hole) if row["operation"] == "helical" else []),
+            *(_helical(row, diameter, hole, hole_unread) if row["operation"] == "helical" else []),
         ]
         yield from (table.finding(position, column, message) for column, message in faults)
 
@@ -177,14 +185,16 @@ def _immersion(row: Mapping[str, Any], diameter: float | None) -> Iterator[tuple
         yield "direction", 'found "slot", expected up or down, as the tool\'s width is not fully engaged'
 
 
-def _helical(row: Mapping[str, Any], diameter: float | None, hole: float | None) -> Iterator[tuple[str, str]]:
+def _helical(
+    row: Mapping[str, Any], diameter: float | None, hole: float | None, hole_unread: bool
+) -> Iterator[tuple[str, str]]:
     """Check that a helical run has an orbit and a hole that the tool can make."""
     if not abs(row["orbit_rpm"]) > 0:
         yield "orbit_rpm", "is blank or zero, expected the speed of the orbit of a helical run"
     if hole is None:
-        yield "operation", "helical needs hole_diameter_mm in batch.yaml"
+        yield from [] if hole_unread else [("operation", f"helical needs {HOLE} in batch.yaml")]
     elif diameter is not None and not diameter < hole < 2 * diameter:
         yield (
             "operation",
-            f"hole_diameter_mm {hole:g}: expected between one and two tool diameters ({diameter:g})",
+            f"{HOLE} {hole:g}: expected between one and two tool diameters ({diameter:g})",
         )

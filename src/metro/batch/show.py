@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from metro.batch.alike import alike_as_one
 from metro.batch.check import CheckReport
 from metro.batch.findings import Finding
+from metro.batch.manifest import FILE
 
 if TYPE_CHECKING:
     from rich.console import Group, RenderableType
@@ -29,10 +31,13 @@ def _parts(report: CheckReport) -> Iterator[RenderableType]:
 
     yield Text(f"{report.folder}", style="bold")
     yield Padding(Text("\n".join((*report.there, f"hold-out: {report.plan['how']}"))), (0, 0, 1, 2))
-    yield _can(report)
+    unread = any(one.file == FILE and one.severity == "error" and not one.column for one in report.problems)
+    if not unread:  # else the table would say of each observable that it cannot be computed
+        yield _can(report)
     for severity in ("note", "warning", "error"):
-        for finding in (finding for finding in report.problems if finding.severity == severity):
-            yield Text.assemble((f"{severity:8}", COLOURS[severity]), str(finding))
+        told = [str(finding) for finding in report.problems if finding.severity == severity]
+        for line in alike_as_one(told):
+            yield Text.assemble((f"{severity:8}", COLOURS[severity]), line)
     yield Text(_verdict(report.problems), style="bold green" if report.ok else "bold red")
 
 

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
 from metro.batch.check import CheckReport, check
-from metro.batch.findings import Finding
 from metro.batch.show import render
-from metro.commands.alike import alike_as_one
 from metro.commands.calls import CallError
 from metro.commands.output import print_json
-from metro.commands.which import RAW_FILE, raw_folder
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
+from metro.commands.which import raw_folder
 
 
 def check_batches(given: Sequence[str], cells: Path, as_json: bool) -> int:
@@ -56,30 +50,8 @@ def _content(report: CheckReport) -> dict[str, object]:
 
 
 def _print(reports: Sequence[CheckReport]) -> None:
-    from rich.console import Console, Group
+    from rich.console import Console
 
     console = Console(highlight=False)
     for report in reports:
-        console.print(Group(*_parts(report)))
-
-
-def _parts(report: CheckReport) -> Iterator[RenderableType]:
-    """Yield what the check shows, findings that are alike as one, and counted one by one."""
-    from rich.table import Table
-
-    *parts, counts = *render(_shortened(report)).renderables[:-1], render(report).renderables[-1]
-    unread = any(
-        one.file == RAW_FILE and one.severity == "error" and not one.column for one in report.problems
-    )
-    # Of a batch whose description cannot be read nothing can be computed: the table would say so of each.
-    yield from (part for part in parts if not (unread and isinstance(part, Table)))
-    yield counts
-
-
-def _shortened(report: CheckReport) -> CheckReport:
-    problems = [
-        Finding(severity, "", line)
-        for severity in ("note", "warning", "error")
-        for line in alike_as_one(str(one) for one in report.problems if one.severity == severity)
-    ]
-    return replace(report, problems=tuple(problems))
+        console.print(render(report))

@@ -36,20 +36,47 @@ def told_of(problem: Problem, known: Mapping[str, Mapping[str, Any]]) -> Problem
     all entries of a list.
     """
     declared = tuple(effect for effect in library(problem.observable) if effect.name in known)
-    effects, unable = fitted_to(declared, problem)
+    effects, unable = fitted_to(declared, problem, moot=True)
     base, notes = problem.base, []
     for name, values in known.items():
-        matching = [
-            e
-            for e in effects
-            if e.name == name
-            and set(e.names) | set(e.where) == set(values)
-            and all(values[key] == value for key, value in e.where.items())
-        ]
+        forms = [effect for effect in effects if effect.name == name]
+        matching = next((effect for effect in forms if _is_told_by(effect, values)), None)
+        words = name.replace("_", " ")
         if matching:
-            given = {key: value for key, value in values.items() if key not in matching[0].where}
-            base = matching[0].apply(base, matching[0].spread(given))
-            notes.append(f"The base model is told of {name.replace('_', ' ')} (batch.yaml, known).")
+            given = {key: value for key, value in values.items() if key not in matching.where}
+            base = matching.apply(base, matching.spread(given))
+            notes.append(f"The base model is told of {words} (batch.yaml, known).")
+        elif forms:
+            said = ", ".join(f"{key} {value}" for key, value in values.items()) or "no parameter"
+            expected = " or ".join(dict.fromkeys(map(_expected, forms)))
+            notes.append(
+                f"The base model is not told of {words}: batch.yaml, known, has {said}; expected {expected}."
+            )
         elif name in unable:
-            notes.append(f"batch.yaml declares {name.replace('_', ' ')}, but {unable[name]}.")
+            notes.append(f"batch.yaml declares {words}, but {unable[name]}.")
     return replace(problem, base=base, notes=(*problem.notes, *notes))
+
+
+def _is_told_by(effect: Effect, values: Mapping[str, Any]) -> bool:
+    """Tell whether values are all that a form of an effect asks for: by name, place and number."""
+    return (
+        {*effect.names, *effect.where} == set(values)
+        and all(values[key] == value for key, value in effect.where.items())
+        and all(
+            len(values[name]) == _entries(effect, name)
+            for name in effect.names
+            if isinstance(values[name], list)
+        )
+    )
+
+
+def _expected(effect: Effect) -> str:
+    """Name the parameters of a form of an effect, and how many values those have that are lists."""
+    counts = {name: _entries(effect, name) for name in effect.names}
+    own = [name if count == 1 else f"{name} ({count} values, or one)" for name, count in counts.items()]
+    return ", ".join([*effect.where, *own])
+
+
+def _entries(effect: Effect, name: str) -> int:
+    """Count the values that a parameter has."""
+    return sum(parameter.name == name for parameter in effect.reported)

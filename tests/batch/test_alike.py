@@ -1,6 +1,6 @@
 """Findings that differ only in their row are told as one."""
 
-from metro.commands.alike import alike_as_one
+from metro.batch.alike import alike_as_one
 
 
 def missing(row, file="r"):
