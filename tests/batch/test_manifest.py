@@ -123,6 +123,7 @@ def test_a_scanner_pose_printed_to_five_digits_is_a_rigid_motion(batch):
         ("  dynamometer:", "  robot: {maker: a}\n  dynamometer:", "instruments.robot"),
         ("  dynamometer:", "  microphone: {rate_hz: 5}\n  dynamometer:", "instruments.microphone"),
         ("teeth: 4", "teeth: 4, coating: none", "tool.coating"),
+        ("cell: bench", "cell: bench\nknown: {helix_error: {angle_deg: 1}}", "known.helix_error"),
     ],
 )
 def test_a_field_that_may_have_been_added_is_a_warning(batch, old, new, column):

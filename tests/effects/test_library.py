@@ -10,7 +10,7 @@ from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import Cut
 from metro.cutting.law import EdgeLaw
-from metro.effects import library, told_of
+from metro.effects import library, told_of, untold
 from metro.effects.effect import fitted_to
 from metro.observables.dynamometer import Recording
 from metro.observables.force_model import ForceModel, ForceSetting
@@ -87,3 +87,9 @@ def test_what_changes_nothing_in_a_batch_is_not_missed_unless_it_is_asked_for():
     problem = SimpleNamespace(base=object())
     assert fitted_to((moot, lacking), problem) == ((), {"lacking": "no second feed"})
     assert fitted_to((moot,), problem, moot=True)[1] == {"moot": "no run is helical"}
+
+
+def test_what_is_declared_of_stability_but_not_in_its_model_is_said():
+    known = {"process_damping": {}, "tool_runout": {}, "stiffness_scale": {}}
+    (note,) = untold("lobes", known)  # runout is in the tool, and the scale is nothing of stability
+    assert "process damping" in note

@@ -67,6 +67,11 @@ def test_coefficients_of_the_batchs_own_forces_serve_where_none_are_declared():
     assert "krc, kac, kte, kre, kae" in refused.reason
 
 
+def test_half_of_a_runout_is_none():
+    tool = cutting_force.cutter(batch({"tool": TOOL, "known": {"tool_runout": {"radius_um": 7.35}}}))
+    assert (tool.runout_radius, tool.runout_angle) == (0.0, 0.0)
+
+
 def test_the_tool_is_in_si_with_the_runout_that_is_known():
     known = {"tool_runout": {"radius_um": 7.35, "angle_deg": 40.0}}
     tool = cutting_force.cutter(batch({"tool": TOOL | {"pitch_deg": [80, 100, 80, 100]}, "known": known}))

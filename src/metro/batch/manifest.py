@@ -98,9 +98,10 @@ INSTRUMENT_DEFAULTS: dict[str, JSON] = {
 def _unknown_key(path: tuple[str, ...], like: Likeness) -> Severity:
     """Say how bad an unknown key is: the contract lets fields be added, but a misspelt one must not pass.
 
-    Other programs add keys at the top and of instruments: there a likeness alone is none of a misspelt one.
+    Other programs add keys at the top and of instruments, other packages effects: there a likeness alone is
+    none of a misspelt one.
     """
-    may_be_added = not path or (path[0] == "instruments" and path[-1] != "axes")
+    may_be_added = path in ((), ("known",)) or (path[0] == "instruments" and path[-1] != "axes")
     return "error" if like == "slip" or (like and not may_be_added) else "warning"
 
 

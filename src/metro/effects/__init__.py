@@ -57,6 +57,15 @@ def told_of(problem: Problem, known: Mapping[str, Mapping[str, Any]]) -> Problem
     return replace(problem, base=base, notes=(*problem.notes, *notes))
 
 
+def untold(observable: str, known: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Say which declared effects the base model of stability is not told of: all but the tool's runout."""
+    names = {effect.name for effect in library(observable)} & set(known) - {"tool_runout"}
+    return [
+        f"batch.yaml declares {name.replace('_', ' ')}, but the model of stability is not told of it."
+        for name in sorted(names)
+    ]
+
+
 def _is_told_by(effect: Effect, values: Mapping[str, Any]) -> bool:
     """Tell whether values are all that a form of an effect asks for: by name, place and number."""
     return (

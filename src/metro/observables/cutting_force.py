@@ -23,7 +23,7 @@ TO_SI = np.array([N_MM2] * 3 + [N_MM] * 3)
 
 
 def cutter(batch: Batch) -> Cutter | Refusal:
-    """Return the tool of the batch, with the runout that the manifest declares."""
+    """Return the tool of the batch, with the runout that the manifest declares: half of it is none."""
     tool = batch.manifest.get("tool") or {}
     missing = [key for key in ("diameter_mm", "teeth") if key not in tool]
     if missing:
@@ -31,6 +31,7 @@ def cutter(batch: Batch) -> Cutter | Refusal:
     pitch = tool.get("pitch_deg")
     angles = tuple(np.cumsum([0.0, *pitch[:-1]]) * DEG) if pitch else evenly_pitched(tool["teeth"])
     runout = (batch.manifest.get("known") or {}).get("tool_runout", {})
+    runout = runout if {"radius_um", "angle_deg"} <= set(runout) else {}
     return Cutter(
         radius=tool["diameter_mm"] * MM / 2,
         helix=tool.get("helix_deg", 0.0) * DEG,

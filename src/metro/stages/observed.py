@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -11,7 +12,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.layout import OBSERVED
-from metro.effects import told_of
+from metro.effects import told_of, untold
 from metro.observables import deformation, flatness, force, joint_force, lobes, published, waviness
 from metro.observables.lobes import LabelProblem
 from metro.observables.problem import Problem, Refusal
@@ -48,6 +49,8 @@ def task_of(module: ModuleType, batch: Batch, observed: Mapping[str, pd.DataFram
     """Return the problem of an observable, its base model told of what the manifest declares as known."""
     task: Task = module.problem(batch, observed, identified)
     known = batch.manifest.get("known") or {}
+    if isinstance(task, LabelProblem):
+        return replace(task, notes=(*task.notes, *untold(task.observable, known)))
     return told_of(task, known) if known and isinstance(task, Problem) else task
 
 
