@@ -4,8 +4,9 @@ import sys
 from pathlib import Path
 
 import pypdfium2  # type: ignore[import-untyped]
+from PIL.Image import Quantize
 
-WIDTH, COLOURS = 900, 32  # pixels; of the palette: print, with a few accents
+WIDTH, COLOURS = 900, 128  # pixels; of the palette: print, with a few accents
 MOST = 150_000  # bytes
 
 
@@ -20,7 +21,7 @@ def picture(report: Path, target: Path) -> int:
     with pypdfium2.PdfDocument(report) as document:
         page = document[0]
         image = page.render(scale=WIDTH / page.get_width()).to_pil()
-    image.convert("RGB").quantize(COLOURS).save(target, optimize=True)
+    image.convert("RGB").quantize(COLOURS, method=Quantize.FASTOCTREE).save(target, optimize=True)
     size = target.stat().st_size
     if size > MOST:
         raise ValueError(f"{target}: {size} bytes, at most {MOST} are wanted")
