@@ -56,12 +56,29 @@ def test_of_many_records_those_that_failed_a_check_are_shown():
     assert shown == [*names[: MOST_RUNS - 1], names[-1]]
 
 
+def hits(time, force, reference="1x", response="1x"):
+    place = {"test": "h", "position": "1", "reference": reference, "response": response, "replicate": 1}
+    return pd.DataFrame({"t_s": time, "force_n": force, **place})
+
+
+def test_hits_along_other_axes_are_hits_of_their_own_and_responses_to_one_are_not():
+    time = np.arange(2_000) / 50_000.0
+    force = np.where(np.abs(time - 0.02) < 2e-4, 100.0, 0.0)
+    both = pd.concat(
+        [hits(time, force), hits(time, force, response="2x"), hits(time, 3.0 * force, "1z", "1z")]
+    )
+    found = record_tables(batch([]), tables(None, both), None)["hit_records"]
+    pulses = found[found["part"] == "pulse"].groupby("hit")["value"]
+    assert pulses.max().to_list() == [100.0, 300.0]
+    assert pulses.size().nunique() == 1
+
+
 def test_a_hit_has_the_spectrum_of_its_pulse():
     """Half a sine of 1 ms: |cos(π f T) / (1 − 4 f² T²)|, the Fourier transform in closed form."""
     lasting, time = 1e-3, np.arange(20_000) / 50_000.0
     inside = (time > 0.1) & (time < 0.1 + lasting)
     force = np.where(inside, 300.0 * np.sin(np.pi * (time - 0.1) / lasting), 0.0)
-    hit = pd.DataFrame({"t_s": time, "force_n": force, "test": "h", "replicate": 1})
+    hit = hits(time, force)
     found = record_tables(batch([]), tables(None, hit), None)["hit_records"]
     pulse, spectrum = (found[found["part"] == part] for part in ("pulse", "spectrum"))
     assert pulse["value"].max() == pytest.approx(300.0, rel=1e-3)

@@ -38,3 +38,15 @@ def test_effects_that_cannot_be_seen_for_one_reason_share_a_line():
     items = loop(replace(synthetic.results(), loop=told)).items
     lines = [line for item in items if isinstance(item, Bullets) for line in item.items]
     assert "cubic form and spindle tilt: no setup" in lines
+
+
+def test_what_several_batches_are_to_measure_is_told_once_and_what_verdicts_need_first():
+    def verdict(status, told):
+        return {"observables": {"force": synthetic.observable(status, next_experiment=told)}}
+
+    same = verdict("clean", "a slot")
+    verdicts = {"a": same, "b": same, "c": verdict("unexplained", "x")}
+    (section,) = [one for one in campaign_sections(verdicts, {}) if one.title == "What to measure next"]
+    (told,) = section.items
+    needless = "a and b, cutting force: a slot (the verdict does not need it)"
+    assert list(told.items) == ["c, cutting force: x", needless]

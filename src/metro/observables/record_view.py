@@ -17,6 +17,7 @@ from metro.units import Array
 
 STRETCHES = 160  # of a record
 MOST_RUNS, MOST_HITS = 24, 24
+HIT = ["test", "position", "reference", "replicate"]
 LOW = 0.02  # share of the band over which a hit's force is taken as one
 
 
@@ -65,9 +66,10 @@ def _hits(table: pd.DataFrame) -> pd.DataFrame:
     ``part``: ``pulse`` (x in ms from the peak, value in N) or ``spectrum`` (x in Hz, value in dB).
     """
     parts = []
-    for name, hit in list(table.groupby(["test", "replicate"], sort=False))[:MOST_HITS]:
+    for name, responses in list(table.groupby(HIT, sort=False))[:MOST_HITS]:
+        hit = responses[responses["response"] == responses["response"].iloc[0]]  # each has the same force
         time, force = hit["t_s"].to_numpy(float), hit["force_n"].to_numpy(float)
-        told = f"{name[0]}, {name[1]}"
+        told = ", ".join(map(str, name))
         peak = int(np.argmax(np.abs(force)))
         near = slice(*_about(force, peak))
         pulse = pd.DataFrame({"x": 1e3 * (time[near] - time[peak]), "value": force[near], "part": "pulse"})

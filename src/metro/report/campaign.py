@@ -18,6 +18,7 @@ from metro.report.results import OBSERVABLES, title
 from metro.report.sections import findings
 from metro.report.sections.memory import memory_section
 from metro.report.sections.standings import largest_rests, rankings
+from metro.report.sections.trust import HOLDS
 from metro.report.sections.verdict import STATUS, change, error_text, known_interval, next_words
 from metro.units import JSON, printed
 
@@ -83,7 +84,7 @@ def campaign_sections(
 ) -> list[Section]:
     """Return what the summary says, for whatever it is set in."""
     entries = _entries(verdicts)
-    nexts = [f"{b}, {title(n)}: {told}" for b, n, e in entries if (told := next_words(e))]
+    nexts = _nexts(entries)
     return [
         *_failed(failed or {}),
         Section(
@@ -95,6 +96,16 @@ def campaign_sections(
         *memory_section(memory or {}),
         Section("What could not be told", _untold(entries, identified)),
     ]
+
+
+def _nexts(entries: list[tuple[str, str, JSON]]) -> list[str]:
+    """Say what to measure next, what verdicts ask for first, and what several ask for once."""
+    alike: dict[tuple[bool, str, str], list[str]] = {}
+    for batch, name, entry in entries:
+        if told := next_words(entry):
+            alike.setdefault((entry.get("status") in HOLDS, title(name), told), []).append(batch)
+    ranked = sorted(alike.items(), key=lambda item: item[0][0])
+    return [f"{listing(batches)}, {name}: {told}" for (_, name, told), batches in ranked]
 
 
 def _failed(failed: Mapping[str, str]) -> list[Section]:
@@ -212,7 +223,7 @@ def _untold(entries: list[tuple[str, str, JSON]], identified: Mapping[str, JSON]
     items: list[Item] = [Bullets(told)] if told else [Paragraph("Every residual was told.")]
     if missing:
         caption = "What was not identified, and why."
-        items.append(Table(["reason", "not identified", "batches"], missing, caption, [2.4, 1, 3]))
+        items.append(Table(["reason", "not identified", "batches"], missing, caption, [2, 1.8, 2.6]))
     return items
 
 

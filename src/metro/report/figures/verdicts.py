@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 PATTERNS, LONGEST = 8, 30  # most bars, and characters of what stands beside one
 SMALLEST = 0.1  # end of the axis where nothing is left, % of the signal
-ABREAST = 1.55  # inches, of a figure that stands beside another
+ABREAST = 1.45  # inches, of a figure that stands beside another
 HATCHES = ("", "/////", "xxxxx", "....", "-----", "+++++")  # axes in grey print
 MOST_NAMED = 18  # runs along an axis of half the width
 LABEL_ROOM = 36  # characters that fit side by side under a figure of half the width
