@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-import pypdfium2  # type: ignore[import-untyped]
+import pypdfium2
 from PIL.Image import Quantize
 
 WIDTH, COLOURS = 900, 128  # pixels; of the palette: print, with a few accents

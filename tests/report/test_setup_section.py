@@ -30,7 +30,7 @@ def test_runs_of_one_condition_stand_together_and_what_all_share_is_told_once():
     (table,) = tables({}, role=roles, spindle_rpm=4000.0, axial_depth_mm=[0.5, 0.5, 2.0])
     assert table.header == ["axial depth (mm)", "identification", "held out"]
     assert table.rows == [["0.5", "r1", "r2"], ["2", "r3", "–"]]
-    assert "All runs: speed (rpm) 4000." in table.caption
+    assert "All runs: spindle speed (rpm) 4000." in table.caption
 
 
 def test_a_setting_that_a_run_does_not_have_is_a_dash():

@@ -14,7 +14,6 @@ from metro.observables.force_model import ForceModel
 from metro.observables.problem import Problem
 from metro.units import JSON
 
-SETTINGS = ("operation", "direction", "spindle_rpm", "axial_depth_mm", "radial_depth_mm")
 SET = "mean_all_runs"
 
 
@@ -43,5 +42,5 @@ def mean_forces(batch: Batch, observed: dict[str, pd.DataFrame], identified: JSO
         )
         for block in straight
     ]
-    settings = batch.runs[[name for name in ("feed_per_tooth_mm", *SETTINGS) if name in batch.runs]]
+    settings = batch.runs.drop(columns="role")
     return {"mean_forces": pd.concat(rows, ignore_index=True).join(settings, on="run")} if rows else {}

@@ -10,20 +10,14 @@ import numpy as np
 import pandas as pd
 
 from metro.report.content import Item, Picture, Table
+from metro.report.cuts import NUMBERS
 from metro.report.figures import force as figures
 from metro.report.numbers import number, percent, with_interval
 from metro.report.results import Results
 from metro.report.sections import findings
 
 LONGEST, MOST_GROUPS = 30, 8
-# settings of a cut by which its mean force differs but for the feed, and how their values are read
-SETTINGS = {
-    "operation": "",
-    "direction": "",
-    "spindle_rpm": "rpm",
-    "axial_depth_mm": "mm deep",
-    "radial_depth_mm": "mm wide",
-}
+FEED = "feed_per_tooth_mm"
 # metric, its title, and whether its share of the measured is told
 COLUMNS = (
     ("nrmse", "NRMSE (%)", False),
@@ -62,9 +56,10 @@ def force_items(results: Results) -> list[Item]:
 
 def mean_items(table: pd.DataFrame | None) -> list[Item]:
     """Draw the mean forces over the feed with the coefficients' lines; nothing where all have one feed."""
-    if table is None or table["feed_per_tooth_mm"].nunique() < 2:
+    if table is None or table[FEED].nunique() < 2:
         return []
-    differ = [name for name in SETTINGS if name in table and table[name].nunique(dropna=False) > 1]
+    columns = [name for name in ("operation", "direction", *NUMBERS) if name in table and name != FEED]
+    differ = [name for name in columns if table[name].nunique(dropna=False) > 1]
     group = [_cut({name: row[name] for name in differ}) for row in table.to_dict("records")]
     if len(set(group)) > MOST_GROUPS:
         return []
@@ -83,7 +78,7 @@ def mean_items(table: pd.DataFrame | None) -> list[Item]:
 def _cut(settings: Mapping[Hashable, Any]) -> str:
     """Name a cut by the settings that differ: slot; down, 4 mm wide."""
     told = [
-        f"{value:g} {SETTINGS[str(name)]}" if isinstance(value, float | int) else str(value)
+        f"{value:g} {NUMBERS[str(name)].of_cut}" if isinstance(value, float | int) else str(value)
         for name, value in settings.items()
         if not (name == "operation" and "direction" in settings) and pd.notna(value)
     ]

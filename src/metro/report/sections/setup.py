@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from metro.report.content import Heading, Item, Paragraph, Section, Table
+from metro.report.cuts import NAMES, NUMBERS
 from metro.report.numbers import listing, words
 from metro.report.results import Results
 from metro.report.sections.measured import count_of
@@ -32,14 +33,11 @@ ENDINGS = {
 }
 CONDITIONS = {
     "operation": "operation",
-    "spindle_rpm": "speed (rpm)",
-    "feed_per_tooth_mm": "feed per tooth (mm)",
-    "axial_depth_mm": "axial depth (mm)",
-    "radial_depth_mm": "radial depth (mm)",
+    **{column: setting.title for column, setting in NUMBERS.items()},
     "direction": "direction",
     "orbit_rpm": "orbit (rpm)",
     "feed_direction_deg": "feed direction (°)",
-    **{name: name for name in ("wrist", "location", "orientation", "pose")},
+    **{name: name for name in NAMES[2:]},
 }
 
 

@@ -6,20 +6,13 @@ import math
 
 import pandas as pd
 
+from metro.report.cuts import NAMES, NUMBERS
 from metro.report.numbers import listing, number, percent, probability, words
 from metro.report.results import Results, heading
 from metro.units import JSON, printed
 
 SURE = 0.95  # probability from which a cause is a finding
 HOLDS = ("clean", "explained")
-# settings of a cut: as one says them, and their unit
-NUMBERS = {
-    "feed_per_tooth_mm": ("feed per tooth", "mm"),
-    "axial_depth_mm": ("axial depth", "mm"),
-    "radial_depth_mm": ("radial depth", "mm"),
-    "spindle_rpm": ("spindle speed", "rpm"),
-}
-NAMES = ("operation", "direction", "wrist", "location", "orientation", "pose")
 NOTHING = (
     "What is identified holds within its intervals for the set-up as declared. No prediction was put to the "
     "test here: how well these values predict a cut is not known."
@@ -80,10 +73,10 @@ def _tested(results: Results, entry: JSON) -> str:
     if judged.empty:
         return ""
     names = [told for column in NAMES if column in judged and (told := _levels(column, judged[column]))]
-    known = [(*NUMBERS[c], sorted(judged[c].dropna().unique())) for c in NUMBERS if c in judged]
-    ranges = [f"{name} {_range(values)} {unit}" for name, unit, values in known if len(values) > 1]
+    known = [(one, sorted(judged[c].dropna().unique())) for c, one in NUMBERS.items() if c in judged]
+    ranges = [f"{one.name} {_range(values)} {one.unit}" for one, values in known if len(values) > 1]
     single = [told for column in NAMES[1:] if column in runs and (told := _but_one(column, runs, judged))]
-    single += [f"{name} ({values[0]:g} {unit})" for name, unit, values in known if len(values) == 1]
+    single += [f"{one.name} ({values[0]:g} {one.unit})" for one, values in known if len(values) == 1]
     tested = f"Tested on {listing([*names, *ranges])}" if names or ranges else "Tested"
     return f"{tested}{f', at one {listing(single)} only' if single else ''}."
 
