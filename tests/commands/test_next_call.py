@@ -4,6 +4,7 @@ import pytest
 from typer.testing import CliRunner
 
 from metro.cli import app
+from metro.commands.next_runs import at_work
 
 
 def call(*arguments):
@@ -38,3 +39,10 @@ def test_a_terminal_is_told_what_takes_so_long_and_the_answer_stands_alone(own_c
 def test_what_is_no_terminal_is_told_nothing(own_campaign, monkeypatch):
     monkeypatch.setattr("metro.stages.next_runs.next_runs", lambda *_, **__: print("answer"))
     assert CliRunner().invoke(app, ["next", "late"]).output == "answer\n"
+
+
+def test_what_was_said_before_an_error_is_not_lost(capsys):
+    with pytest.raises(ValueError, match="broken"), at_work("planning"):
+        print("half of the answer")
+        raise ValueError("broken")
+    assert capsys.readouterr().out == "half of the answer\n"

@@ -51,7 +51,10 @@ def at_work(what: str) -> Iterator[None]:
     shown = Progress(
         *columns, console=console, transient=True, redirect_stdout=False, disable=not console.is_terminal
     )
-    with redirect_stdout(io.StringIO()) as told, shown:
-        shown.add_task(what, total=None)
-        yield
-    sys.stdout.write(told.getvalue())
+    said = io.StringIO()
+    try:
+        with redirect_stdout(said), shown:
+            shown.add_task(what, total=None)
+            yield
+    finally:  # what was found before an error is not lost
+        sys.stdout.write(said.getvalue())
