@@ -42,7 +42,11 @@ def test_what_is_no_terminal_is_told_nothing(own_campaign, monkeypatch):
 
 
 def test_what_was_said_before_an_error_is_not_lost(capsys):
-    with pytest.raises(ValueError, match="broken"), at_work("planning"):
-        print("half of the answer")
-        raise ValueError("broken")
+    def breaks():
+        with at_work("planning"):
+            print("half of the answer")
+            raise ValueError("broken")
+
+    with pytest.raises(ValueError, match="broken"):
+        breaks()
     assert capsys.readouterr().out == "half of the answer\n"
