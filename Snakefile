@@ -1,5 +1,6 @@
 """What can be asked for: the report of every batch, and the summary of all of them."""
 
+import os
 import sys
 
 from snakemake.logging import logger
@@ -8,9 +9,10 @@ from snakemake.utils import min_version
 from metro.batch.alike import alike_as_one
 from metro.batch.at_work import only_one_at_work, remove_leftovers
 from metro.batch.findings import ContractError
-from metro.batch.layout import OBSERVED, PAGE
+from metro.batch.kept import FRESH
+from metro.observables.catalogue import drawn_tables, observed_tables
 from metro.progress import show_progress
-from metro.workflow import COMPLETE, Plan
+from metro.workflow import COMPLETE, Plan, files_of
 
 min_version("9.0")
 
@@ -30,6 +32,9 @@ wildcard_constraints:
 onstart:
     only_one_at_work(Path.cwd())
     remove_leftovers(Path("data/processed"), Path("reports"))
+    # Who forces a rule wants its results made anew, not put back.
+    if workflow.dag_settings.forceall or workflow.dag_settings.forcerun:
+        os.environ[FRESH] = "yes"
 
 
 onerror:
@@ -54,5 +59,6 @@ include: "workflow/rules/ingest.smk"
 include: "workflow/rules/identify.smk"
 include: "workflow/rules/predict.smk"
 include: "workflow/rules/loop.smk"
+include: "workflow/rules/verdict.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/campaign.smk"

@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
-from metro.observables import cutting_force
-from metro.observables.face_dynamics import TipDynamics
-from metro.observables.face_path import force_over_period, make_path, passages
-from metro.observables.face_ringing import make_ringing
+from metro.observables.cut import conditions as cutting_force
+from metro.observables.flatness.dynamics import TipDynamics
+from metro.observables.flatness.path import force_over_period, make_path, passages
+from metro.observables.flatness.ringing import make_ringing
 from metro.structure import Structure
 from metro.surface.tip_damping import Rayleigh
 from metro.surface.tip_field import field_in
@@ -60,7 +60,7 @@ def predicted(batch, table):
     ringing = make_ringing(batch, "r", path, dynamics, COEFFICIENTS, full=full)
     seen = passages(path, x, y, 8 * MM)
     soft = dynamics.compliance(seen.x.ravel(), seen.y.ravel()) @ full
-    cuts = soft[:, 2].reshape(seen.x.shape) + ringing.rest(Structure(), seen)
+    cuts = soft[:, 2].reshape(seen.x.shape) + ringing.heights(Structure(), seen)
     return np.where(seen.valid, cuts, np.inf).min(axis=1), ringing, seen
 
 
@@ -73,7 +73,7 @@ def test_a_face_of_2500_points(benchmark):
 
 def test_the_same_face_at_another_stiffness(benchmark):
     _, ringing, seen = predicted(*face())
-    benchmark.pedantic(ringing.rest, (Structure(0.8), seen), rounds=5, warmup_rounds=1)
+    benchmark.pedantic(ringing.heights, (Structure(0.8), seen), rounds=5, warmup_rounds=1)
     assert benchmark.stats["min"] < TARGET
 
 
@@ -82,7 +82,7 @@ def test_the_motion_against_solve_ivps(benchmark):
 
     batch, table = face()
     _, ringing, seen = predicted(batch, table)
-    benchmark.pedantic(ringing.rest, (Structure(), seen), rounds=3)
+    benchmark.pedantic(ringing.heights, (Structure(), seen), rounds=3)
     tool = cutting_force.cutter(batch)
     force, period, _ = force_over_period(batch, "r", COEFFICIENTS, make_path(table), tool)
     inverse, damping = np.linalg.inv(MASS), A0 * MASS + A1 * STIFFNESS

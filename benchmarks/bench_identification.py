@@ -16,10 +16,10 @@ from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.law import EdgeLaw
 from metro.cutting.time_signal import time_signal
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.observables import force
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
+from metro.observables.force import observable as force
 
 BETA = np.array([850e6, 320e6, 180e6, 15e3, 18e3, 4e3])
 TOOL = Cutter(6e-3, math.radians(40), evenly_pitched(4))

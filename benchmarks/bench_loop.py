@@ -11,10 +11,12 @@ from dataclasses import replace
 import pytest
 
 from metro.batch.processed import Processed, read_batch
-from metro.effects import library
-from metro.loop.search import Gates, search
-from metro.loop.verdict import comparison, held_out, judge
-from metro.observables import force
+from metro.effects.library import library
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.loop.verdict.verdict import judge
+from metro.observables.force import observable as force
 from metro.stages.ingest import ingest
 from virtual_cell.recipes import force as recipe
 

@@ -14,7 +14,7 @@ import pytest
 from metro.dynamics.hits import Hit, gate
 from metro.dynamics.modal import identify_modes
 from metro.dynamics.plscf import normal_equations, poles
-from metro.observables.modal_test import observe_modes
+from metro.observables.stability.modal_test import observe_modes
 from virtual_cell.recipes.trimule import MODES
 from virtual_cell.roving import blows, receptance, some_shapes
 

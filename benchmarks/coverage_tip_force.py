@@ -17,8 +17,9 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.processed import Processed, read_batch
-from metro.observables import joint_force
-from metro.observables.robot_tables import robot_tables
+from metro.loop.fitting.held_out import identified_fit
+from metro.observables.arm.robot_tables import robot_tables
+from metro.observables.joint_force import observable as joint_force
 from metro.stages.identify import base_fit
 from metro.stages.ingest import ingest
 from metro.units import DEG, MS
@@ -62,9 +63,9 @@ def judged(seed, style):
         means = robot_tables(batch, read, {}, None).get("robot_means", pd.DataFrame())
         observed = joint_force.observe(batch, read, {})
         task = joint_force.problem(batch, observed, {})
-        clocks = joint_force.report(batch, observed, {}, task, base_fit(task, BUDGET))["arm"][
-            "clock_offset_s"
-        ]
+        clocks = joint_force.report(batch, observed, {}, task, identified_fit(task, base_fit(task, BUDGET)))[
+            "arm"
+        ]["clock_offset_s"]
     rows = batch.runs.sort_values("order")
     true = {row.Index: in_work(row, force) for row, force in zip(rows.itertuples(), forces, strict=True)}
     means = means.assign(true_n=[true[r.run]["xyz".index(r.axis)] for r in means.itertuples()], seed=seed)

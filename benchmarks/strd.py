@@ -10,13 +10,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests/loop"))
 
 from importlib import import_module
 
-from metro.loop.least_squares import least_squares
+from metro.loop.fitting.least_squares import least_squares
 
 HEAD = """# Numbers
 
 What the fits of the loop reach on the statistical reference datasets of NIST (StRD), by the routines that
-the models use: for the linear sets the first estimate of the base parameters (`loop/least_squares.py`:
-columns of one length, QR, refined residuals), for the nonlinear ones the descent (`loop/descent.py`:
+the models use: for the linear sets the first estimate of the base parameters
+(`loop/fitting/least_squares.py`: columns of one length, QR, refined residuals), for the nonlinear ones the
+descent (`loop/fitting/descent.py`:
 Gauss–Newton, damped as Levenberg's where no share of a step leads down) from NIST's two starts, followed to
 its end (`polish`). Made by `python benchmarks/strd.py > docs/numerics.md`. Eleven digits are certified of the
 nonlinear sets, up to 15 of the linear ones; the count is of the parameter where fewest agree.
@@ -45,7 +46,7 @@ standard error; the table above follows it on.
 
 | fit | rank and condition | convergence |
 | --- | --- | --- |
-| `loop/fit.py` | infinite variance of what is not determined | `Fit.converged`; else no verdict |
+| `loop/fitting/fit.py` | infinite variance of what is not determined | `Fit.converged`; else no verdict |
 | `robot/stiffness.py` | `seen`; refused where no joint is told apart | refused at the limit of its steps |
 | `robot/friction.py` | NaN for a coefficient that the log does not determine | linear |
 | `surface/plane.py` | refused: fewer than three points, points on a line | linear |

@@ -125,8 +125,8 @@ def _coverage(options: argparse.Namespace) -> None:
     from proof.coverage import WAYS, coverage, table
     from proof.show import printed
 
-    found = coverage(options.batches, options.seed, options.style, options.jobs)
-    printed([table(found, way) for way in WAYS], Console())
+    intervals = coverage(options.batches, options.seed, options.style, options.jobs)
+    printed([table(intervals, way) for way in WAYS], Console())
 
 
 _COMMANDS = {

@@ -37,7 +37,7 @@ class Followed:
     Attributes
     ----------
     name : of the quantity. course : as it is called. changes : whether it truly does.
-    truth : its course at each batch that tells of it. track : low, middle, high of what is stated there.
+    truth : its course at each batch that measures it. track : low, middle, high of what is stated there.
     ahead : of each batch that was predicted: low and high, what it then measured, and the true course.
     """
 
@@ -49,7 +49,7 @@ class Followed:
     ahead: tuple[tuple[float, float, float, float], ...]
 
     @property
-    def told(self) -> bool:
+    def change_detected(self) -> bool:
         """Whether it is said to change."""
         return self.course not in {"steady", "too few"}
 
@@ -84,15 +84,15 @@ def followed(out: Layout, seed: int, jobs: int) -> list[Followed]:
     failed = run(out, jobs, keep=False, pdf=False)
     if failed:
         raise RuntimeError(f"failed, see failed.txt in {out.reports}: {', '.join(failed)}")
-    told = json.loads(out.truth.read_text())
-    return compared([_record(out, name) for name in told["batches"]], told["batches"])
+    hidden = json.loads(out.truth.read_text())
+    return compared([_record(out, name) for name in hidden["batches"]], hidden["batches"])
 
 
 def _record(out: Layout, name: str) -> Record:
     batch = read_batch(out.processed / name)
     verdict, identified = (_read(out.reports / name / f"{kind}.json") for kind in ("verdict", "identified"))
-    told = _read(out.processed / name / "loop.json")
-    return Record(name, batch.manifest, first_start(batch.runs), verdict, told, identified)
+    loop = _read(out.processed / name / "loop.json")
+    return Record(name, batch.manifest, first_start(batch.runs), verdict, loop, identified)
 
 
 def _read(path: Path) -> JSON:
@@ -101,7 +101,7 @@ def _read(path: Path) -> JSON:
 
 
 def compared(records: Sequence[Record], truth: JSON) -> list[Followed]:
-    """Return what a campaign's memory says of the parameters whose truth is known, by batch, in their order.
+    """Return a campaign's memory of the parameters whose truth is known, by batch, in their order.
 
     Parameters
     ----------
@@ -145,25 +145,25 @@ def _followed(series: JSON, memories: Sequence[dict[str, JSON]], truth: JSON) ->
     )
 
 
-def figures(found: Sequence[Followed]) -> list[Figure]:
+def figures(parameters: Sequence[Followed]) -> list[Figure]:
     """Return how often courses and predictions hold what they state, and what is demanded of it."""
-    changing, steady = ([one for one in found if one.changes is asked] for asked in (True, False))
+    changing, steady = ([one for one in parameters if one.changes is asked] for asked in (True, False))
     return [
-        share("what changes is said to change", [one.told for one in changing], CHANGES),
-        share("what does not is said to be steady", [not one.told for one in steady], STEADY),
-        share("courses: batches at which the interval holds the truth", _all("inside", found), INSIDE),
+        share("what changes is said to change", [one.change_detected for one in changing], CHANGES),
+        share("what does not is said to be steady", [not one.change_detected for one in steady], STEADY),
+        share("courses: batches at which the interval holds the truth", _all("inside", parameters), INSIDE),
         share("of these, of what changes", _all("inside", changing)),
-        share("predictions that hold what the next batch measured", _all("came", found), INSIDE),
+        share("predictions that hold what the next batch measured", _all("came", parameters), INSIDE),
         share("of these, of what changes", _all("came", changing)),
-        share("predictions that hold the true course at the next batch", _all("held", found), INSIDE),
+        share("predictions that hold the true course at the next batch", _all("held", parameters), INSIDE),
     ]
 
 
-def _all(name: str, found: Sequence[Followed]) -> list[bool]:
-    return [case for one in found for case in getattr(one, name)]
+def _all(name: str, parameters: Sequence[Followed]) -> list[bool]:
+    return [case for one in parameters for case in getattr(one, name)]
 
 
-def tables(found: Sequence[Followed]) -> list[Table]:
+def tables(parameters: Sequence[Followed]) -> list[Table]:
     """Return the figures, and the parameters one by one."""
     note = (
         f"{BATCHES} batches of one shift; predictions from {FIRST} batches on. The batches of one course are "
@@ -179,10 +179,10 @@ def tables(found: Sequence[Followed]) -> list[Table]:
             ),
             *(f"{sum(cases)} of {len(cases)}" for cases in (one.inside, one.came)),
         )
-        for one in found
+        for one in parameters
     ]
     header = (
         *("parameter", "truly", "said", "batches", "first", "last", "told of the first", "of the last"),
         *("course holds", "next holds"),
     )
-    return [tabulated("A campaign followed", figures(found), note), Table("Parameters", header, rows)]
+    return [tabulated("A campaign followed", figures(parameters), note), Table("Parameters", header, rows)]

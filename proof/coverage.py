@@ -69,14 +69,14 @@ def identified(seed: int, style: str) -> list[Interval]:
         plan = Plan.read(CHECKOUT, {"raw_roots": [place]})
         ingest(folder, Path(plan.cells), out, json.loads(plan.settings("ingest")), "")
         identify(out, json.loads(plan.settings("identify")), "")
-        found = json.loads((out / "identified.json").read_text())["force"]
-        return intervals(found, identifiable(read_batch(out), coefficients))
+        block = json.loads((out / "identified.json").read_text())["force"]
+        return intervals(block, identifiable(read_batch(out), coefficients))
 
 
 def identifiable(batch: Batch, coefficients: JSON) -> dict[str, float]:
-    """Return the truth of what a batch can tell, by the names of identified.json.
+    """Return the truth of the identifiable coefficients of a batch, by the names of identified.json.
 
-    Its helical identification runs have one axial feed, so kfae stands for the whole thrust of the bottom
+    Its helical identification runs have one axial feed, so kfae contains the whole thrust of the bottom
     edges at that feed: K_Fae + K_Fac × axial feed per tooth.
     """
     truth = {key.split("_")[0]: float(value) for key, value in coefficients.items()}
@@ -87,23 +87,23 @@ def identifiable(batch: Batch, coefficients: JSON) -> dict[str, float]:
     return {**truth, "kfae": thrust}
 
 
-def intervals(found: JSON, truth: dict[str, float]) -> list[Interval]:
+def intervals(block: JSON, truth: dict[str, float]) -> list[Interval]:
     """Compare the coefficients of identified.json's force block with the truth (N/mm², N/mm).
 
-    A coefficient without an interval (null: the batch does not tell it) is left out.
+    A coefficient without an interval (null: the batch does not identify it) is left out.
     """
     return [
         Interval(way, name, entry["value"] / truth[name] - 1.0, 0.5 * (high - low) / truth[name])
         for way in WAYS
-        for name, entry in found.get(way, {}).items()
+        for name, entry in block.get(way, {}).items()
         for low, high in [entry["ci95"]]
         if low is not None
     ]
 
 
-def table(found: Sequence[Interval], way: str) -> Table:
+def table(stated: Sequence[Interval], way: str) -> Table:
     """Share of the intervals that hold the truth, of all and by coefficient; and how wide they are."""
-    mine = [one for one in found if one.way == way]
+    mine = [one for one in stated if one.way == way]
     groups = {"all": mine}
     for one in mine:
         groups.setdefault(one.name, []).append(one)
@@ -120,8 +120,8 @@ def table(found: Sequence[Interval], way: str) -> Table:
     )
 
 
-def _sizes(found: Sequence[Interval]) -> tuple[str, str]:
+def _sizes(stated: Sequence[Interval]) -> tuple[str, str]:
     """Return error and half width, relative to the truth."""
-    error = np.sqrt(np.mean([one.error**2 for one in found]))
-    half = np.median([one.half for one in found])
+    error = np.sqrt(np.mean([one.error**2 for one in stated]))
+    half = np.median([one.half for one in stated])
     return f"{100 * error:.2f} %", f"{100 * half:.2f} %"

@@ -36,7 +36,7 @@ class Estimate:
     covered: bool | None
 
 
-def estimates(effect: str, truth: Mapping[str, Any], found: JSON, teeth: int) -> list[Estimate]:
+def estimates(effect: str, truth: Mapping[str, Any], estimated: JSON, teeth: int) -> list[Estimate]:
     """Compare the parameters that truth and finding both have.
 
     Which tooth is the first one cannot be observed: the angle of runout is compared modulo the pitch, and a
@@ -45,20 +45,20 @@ def estimates(effect: str, truth: Mapping[str, Any], found: JSON, teeth: int) ->
 
     Parameters
     ----------
-    truth, found : as in the contract's table of effects and in verdict.json: a value or a list of values by
-        name.
+    truth, estimated : as in the contract's table of effects and in verdict.json: a value or a list of values
+        by name.
     """
     largest = max(abs(value) for value in truth.values()) if effect in VECTORS else None
     return [
         one
         for name, value in truth.items()
-        if name in found and name != "joint" and not isinstance(value, str)
-        if len(_list(value)) == len(_list(found[name]))
+        if name in estimated and name != "joint" and not isinstance(value, str)
+        if len(_list(value)) == len(_list(estimated[name]))
         for one in _compared(
             effect,
             name,
             np.array(_list(value), dtype=float),
-            _list(found[name]),
+            _list(estimated[name]),
             teeth=teeth,
             largest=largest,
         )
@@ -70,9 +70,9 @@ def _list(value: Any) -> list[Any]:
 
 
 def _compared(
-    effect: str, name: str, true: np.ndarray, found: list[JSON], *, teeth: int, largest: float | None
+    effect: str, name: str, true: np.ndarray, estimated: list[JSON], *, teeth: int, largest: float | None
 ) -> Iterator[Estimate]:
-    value = np.array([entry["value"] for entry in found], dtype=float)
+    value = np.array([entry["value"] for entry in estimated], dtype=float)
     period = _period(effect, name, teeth)
     if period is not None:
         true = true + period * np.round((value - true) / period)
@@ -80,7 +80,7 @@ def _compared(
         turned = [np.roll(true, shift) for shift in range(len(true))]
         true = min(turned, key=lambda order: float(np.sum((order - value) ** 2)))
     scale = 1.0 if period is not None else largest or float(np.abs(true).max())
-    for right, error, entry in zip(true.tolist(), ((value - true) / scale).tolist(), found, strict=True):
+    for right, error, entry in zip(true.tolist(), ((value - true) / scale).tolist(), estimated, strict=True):
         low, high = entry["ci95"]
         covered = None if low is None or high is None else bool(low <= right <= high)
         yield Estimate(effect, name, error, covered)

@@ -1,7 +1,7 @@
 """All eight configurations of a milling arm, repeated: how predicted faces come up to the scanned ones.
 
 Not blind: the arm yields more in the cut than in its load tests and its spindle is tilted. Half of the
-configurations are held out; how much the X_m of their predicted faces resembles that of the scans is told
+configurations are held out; the similarity of the X_m of their predicted faces to that of the scans is given
 before and after the loop.
 """
 
@@ -41,7 +41,7 @@ class Likeness:
 
 
 def likenesses(comparison: pd.DataFrame, runs: pd.DataFrame) -> list[Likeness]:
-    """Return the likeness of every held-out face, as the report states it.
+    """Return the similarity of every held-out face, as the report states it.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def likenesses(comparison: pd.DataFrame, runs: pd.DataFrame) -> list[Likeness]:
 
 
 def eight_cases(out: Layout, seed: int, replicates: int) -> tuple[list[Likeness], JSON]:
-    """Make the batch, run the pipeline on it; return the likeness of the held-out faces, and the verdict.
+    """Make the batch, run the pipeline on it; return the similarity of the held-out faces, and the verdict.
 
     Raises
     ------
@@ -76,21 +76,21 @@ def eight_cases(out: Layout, seed: int, replicates: int) -> tuple[list[Likeness]
     return likenesses(comparison, runs), verdict
 
 
-def figures(found: Sequence[Likeness]) -> list[Figure]:
+def figures(held_out: Sequence[Likeness]) -> list[Figure]:
     """Return the median similarity before and after the loop, and what is demanded of it."""
     return [
-        median("similarity of X_m, base model", [one.before for one in found], unit="%"),
-        median("similarity of X_m, with what the loop found", [one.after for one in found], DEMAND, "%"),
+        median("similarity of X_m, base model", [one.before for one in held_out], unit="%"),
+        median("similarity of X_m, with what the loop found", [one.after for one in held_out], DEMAND, "%"),
     ]
 
 
-def tables(found: Sequence[Likeness], verdict: JSON) -> list[Table]:
+def tables(held_out: Sequence[Likeness], verdict: JSON) -> list[Table]:
     """Return the figures, and a table of the held-out faces."""
     named = ", ".join(str(one["effect"]) for one in verdict["effects"]) or "nothing"
     note = f"Hidden: {', '.join(HIDDEN)}. Verdict: {verdict['status']}; found: {named}."
     rows = [
         (one.run, one.case, f"{one.measured:.3f}", f"{100 * one.before:.1f} %", f"{100 * one.after:.1f} %")
-        for one in sorted(found, key=lambda one: one.case)
+        for one in sorted(held_out, key=lambda one: one.case)
     ]
     header = ("run", "case", "X_m measured, mm", "similar before", "similar after")
-    return [tabulated("Faces of eight cases", figures(found), note), Table("Held-out faces", header, rows)]
+    return [tabulated("Faces of eight cases", figures(held_out), note), Table("Held-out faces", header, rows)]

@@ -77,7 +77,7 @@ def further(scores: Sequence[Score]) -> list[Figure]:
 
 
 def undecided(scores: Sequence[Score]) -> list[Figure]:
-    """Return what became of batches whose tests cannot tell, where the measurement is a label."""
+    """Return the outcome of batches whose tests cannot decide, where the measurement is a label."""
     none, outside = kind(scores, "none"), [s for s in kind(scores, "outside") if s.seen]
     inside = [s for s in scores if s.kind in {"one", "two"}]
     seen, small = [s for s in inside if s.seen], [s for s in inside if s.enough and not s.seen]

@@ -1,9 +1,9 @@
-"""What do all observables say together? Joint batches, the causes named against those named by each alone.
+"""What do all observables show together? Joint batches, the causes named against those named by each alone.
 
 Each batch has force, torques, walls and faces of one arm, and hides nothing, one cause that shows in one or
 two of them, or a stiffness that is another one in the walls than in the faces, which is not one cause. The
-same run of the pipeline tells both: the verdict of an observable knows of no other, the causes of the batch
-are those of all. The truth of every force tells how much of a wall's or a face's error came with it.
+same run of the pipeline gives both: the verdict of an observable uses no other, the causes of the batch are
+those of all. The truth of every force gives the part of a wall's or a face's error that came with it.
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ def attributed(out: Layout, batches: int, seed: int, jobs: int) -> list[Attribut
         name, each = f"joint-{place:03d}", 100_000 * seed + place
         if not _truth(out, name).is_file():
             kind = KINDS[place % len(KINDS)]
-            told = make(out.raw / name, hidden_of(kind, each), each, STYLE)
-            _truth(out, name).write_text(json.dumps({"kind": kind, **told}, indent=1) + "\n")
+            truth = make(out.raw / name, hidden_of(kind, each), each, STYLE)
+            _truth(out, name).write_text(json.dumps({"kind": kind, **truth}, indent=1) + "\n")
     failed = run(out, jobs, keep=False, pdf=False)
     if failed:
         raise RuntimeError(f"failed, see failed.txt in {out.reports}: {', '.join(failed)}")
@@ -94,7 +94,7 @@ def attributed(out: Layout, batches: int, seed: int, jobs: int) -> list[Attribut
 
 
 def hidden_of(kind: str, seed: int) -> dict[str, Parameters | None]:
-    """Return what a batch of a kind hides; of a contradiction, the stiffness is off by other signs."""
+    """Return what a batch of a kind hides; of a contradiction, stiffness errors of opposite signs."""
     if kind != CONTRADICTION:
         return {} if kind == "none" else {kind: None}
     rng = np.random.default_rng([seed, 61])
@@ -135,24 +135,24 @@ def _key(cause: str, values: JSON) -> Key:
 def _held(truth: JSON, causes: Sequence[JSON]) -> tuple[bool, ...]:
     """Whether the intervals of the hidden cause's parameters, as all together give them, hold the truth.
 
-    An angle is told up to the pitch, and is left out.
+    An angle is identifiable only up to the pitch, and is left out.
     """
-    told = []
+    covered = []
     for cause in causes:
         values = truth.get(cause["cause"]) or {}
         if values and _key(cause["cause"], cause["where"]) == _key(cause["cause"], values):
             for name, quantity in cause["parameters"].items():
                 if name in values and "_deg" not in name and None not in (quantity["ci95"] or [None]):
                     low, high = quantity["ci95"]
-                    told.append(bool(low <= values[name] <= high))
-    return tuple(told)
+                    covered.append(bool(low <= values[name] <= high))
+    return tuple(covered)
 
 
-def figures(found: Sequence[Attributed]) -> list[Figure]:
+def figures(batches: Sequence[Attributed]) -> list[Figure]:
     """Return how often all together are right and how often each alone, and what is demanded."""
-    none = [one for one in found if one.kind == "none"]
-    torn = [one for one in found if one.kind == CONTRADICTION]
-    one_cause = [one for one in found if one not in none and one not in torn]
+    none = [one for one in batches if one.kind == "none"]
+    torn = [one for one in batches if one.kind == CONTRADICTION]
+    one_cause = [one for one in batches if one not in none and one not in torn]
     several = [one for one in one_cause if len(SHOWN[one.kind]) > 1]
     alone = [
         share(f"shows in {name}: named by it alone", [one.by(name) for one in shown])
@@ -175,14 +175,14 @@ def figures(found: Sequence[Attributed]) -> list[Figure]:
         ),
         *alone,
         share("a stiffness that differs: said to be a contradiction", [one.named for one in torn]),
-        share("parameters of all together that hold the truth", [h for o in found for h in o.held], INSIDE),
-        *split_figures([each for one in found for each in one.fed]),
+        share("parameters of all together that hold the truth", [h for o in batches for h in o.held], INSIDE),
+        *split_figures([each for one in batches for each in one.fed]),
     ]
 
 
-def tables(found: Sequence[Attributed]) -> list[Table]:
+def tables(batches: Sequence[Attributed]) -> list[Table]:
     """Return the figures, and the batches one by one."""
-    note = f"{len(found)} batches; the sizes of what is hidden reach below what can be seen."
+    note = f"{len(batches)} batches; the sizes of what is hidden reach below what can be seen."
     rows = [
         (
             *(one.name, one.kind, _words(one.hidden)),
@@ -190,11 +190,11 @@ def tables(found: Sequence[Attributed]) -> list[Table]:
             or "–",
             "; ".join(f"{_words(key)} ({status})" for key, status in one.together.items()) or "–",
         )
-        for one in found
+        for one in batches
     ]
     header = ("batch", "kind", "hidden", "named by each alone", "named by all together")
     return [
-        tabulated("All observables together", figures(found), note),
+        tabulated("All observables together", figures(batches), note),
         Table("Batch by batch", header, rows),
     ]
 

@@ -1,6 +1,6 @@
-"""The oracle where the measurement is a label: what a reader could tell who knows the true effects.
+"""The oracle where the measurement is a label: what a reader who knows the true effects could predict.
 
-As everywhere the oracle is told which effects act, and learns their parameters from the identification tests.
+As everywhere the oracle knows which effects act, and learns their parameters from the identification tests.
 How large the effects are is judged with their true parameters: boundaries are predicted with the batch's own
 modes and coefficients, and labels are drawn from them with the errors that the loop itself allows for.
 """
@@ -14,8 +14,7 @@ import numpy as np
 
 from metro.dynamics.stability_model import StabilityModel
 from metro.effects.effect import Effect, fitted_to
-from metro.loop.hypotheses import Evidence, hypothesis
-from metro.loop.label_evidence import (
+from metro.loop.labels.evidence import (
     FREQUENCY_SD,
     LINES,
     SHARED,
@@ -27,10 +26,11 @@ from metro.loop.label_evidence import (
     own_sd,
     unstable_probability,
 )
-from metro.loop.label_search import LEAST_SPEEDS, LEAST_TESTS, predicted
-from metro.loop.label_surprise import drawn as labels_drawn
-from metro.loop.labelled import every_test, tests_of
-from metro.observables.lobes import LabelProblem
+from metro.loop.labels.hypotheses import LabelEvidence, hypothesis
+from metro.loop.labels.problem import every_test, tests_of
+from metro.loop.labels.search import LEAST_SPEEDS, LEAST_TESTS, predicted
+from metro.loop.labels.surprise import drawn as labels_drawn
+from metro.observables.stability.problem import LabelProblem
 from metro.units import JSON, Array
 
 DEVIATIONS, DRAWS, ASSURED = 128, 100, 0.05
@@ -49,7 +49,7 @@ class _Boundary:
 def label_oracle(
     task: LabelProblem, hidden: Mapping[str, JSON], effects: Sequence[Effect], gain: float
 ) -> JSON:
-    """Say how large the hidden effects are, and how well held-out labels can be predicted.
+    """Compute how large the hidden effects are, and how well held-out labels can be predicted.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def label_oracle(
     Returns
     -------
     ``before`` and ``after`` (rms error of the probability of the held-out labels without the effects, and
-    with them as the identification tests tell their parameters), ``exact`` (with the true parameters),
+    with them, their parameters from the identification tests), ``exact`` (with the true parameters),
     ``floor`` (that of labels drawn from these), ``enough`` (whether there are tests enough for any verdict),
     and ``sizes``: the log-likelihood ratio, with the effect at its true parameters over without, that 95 % of
     identification labels drawn from the truth exceed, over ``gain``. Where the library lacks one of the
@@ -72,11 +72,11 @@ def label_oracle(
     mine, _ = tests_of(task, "identify")
     held, _ = tests_of(task, "validate")
     deviations = _deviations(task, SEED)
-    base = _told(task, known, {})
+    base = _boundary_of(task, known, {})
     counts = (len(mine.depth), len(held.depth))
-    found: JSON = {"enough": min(counts) >= LEAST_TESTS and len(mine.speeds) >= LEAST_SPEEDS}
+    result: JSON = {"enough": min(counts) >= LEAST_TESTS and len(mine.speeds) >= LEAST_SPEEDS}
     if not counts[0]:
-        return found | dict.fromkeys(("before", "after", "floor")) | {"sizes": dict.fromkeys(hidden, 0.0)}
+        return result | dict.fromkeys(("before", "after", "floor")) | {"sizes": dict.fromkeys(hidden, 0.0)}
     if set(hidden) - set(known):
         every = every_test(task)
         drawn = [_evidence(one, base, deviations) for one in _drawn(task, every, base, LONG)]
@@ -84,28 +84,28 @@ def label_oracle(
         size = (usual - _evidence(every, base, deviations)) / (usual - chance)
         before, floor = _errors(held, base, deviations)
         sizes = dict.fromkeys(hidden, max(0.0, size))
-        return found | {"before": before, "after": None, "floor": floor, "sizes": sizes}
-    truth = _told(task, known, hidden)
+        return result | {"before": before, "after": None, "floor": floor, "sizes": sizes}
+    truth = _boundary_of(task, known, hidden)
     drawn_labels = _drawn(task, mine, truth, DRAWS)
     full = np.array([_evidence(one, truth, deviations) for one in drawn_labels])
     sizes = {}
     for name in hidden:
-        without = _told(task, known, {other: hidden[other] for other in hidden if other != name})
+        without = _boundary_of(task, known, {other: hidden[other] for other in hidden if other != name})
         ratio = full - [_evidence(one, without, deviations) for one in drawn_labels]
         sizes[name] = max(0.0, float(np.quantile(ratio, ASSURED))) / gain
     before, _ = _errors(held, base, deviations)
     exact, floor = _errors(held, truth, deviations)
     after = _rms(held, _learnt(task, [known[name] for name in hidden], held, deviations))
-    return found | {"before": before, "after": after, "exact": exact, "floor": floor, "sizes": sizes}
+    return result | {"before": before, "after": after, "exact": exact, "floor": floor, "sizes": sizes}
 
 
 def _learnt(task: LabelProblem, effects: Sequence[Effect], held: Labels, deviations: Array) -> Array:
-    """Probability that held-out tests are unstable, parameters as the identification tests tell them."""
-    evidence = Evidence(task.boundaries, task.estimates, tests_of(task, "identify")[0], deviations, SEED)
-    found = hypothesis((effects[0],), evidence)
+    """Probability that held-out tests are unstable, with parameters learnt from the identification tests."""
+    evidence = LabelEvidence(task.boundaries, task.estimates, tests_of(task, "identify")[0], deviations, SEED)
+    learnt = hypothesis((effects[0],), evidence)
     for count in range(2, len(effects) + 1):
-        found = hypothesis(tuple(effects[:count]), evidence, found)
-    return predicted(found, held, deviations)
+        learnt = hypothesis(tuple(effects[:count]), evidence, learnt)
+    return predicted(learnt, held, deviations)
 
 
 def _deviations(task: LabelProblem, seed: int) -> Array:
@@ -114,7 +114,7 @@ def _deviations(task: LabelProblem, seed: int) -> Array:
     return np.asarray(task.deviations(DEVIATIONS, seed) + shared)
 
 
-def _told(task: LabelProblem, known: Mapping[str, Effect], hidden: Mapping[str, JSON]) -> _Boundary:
+def _boundary_of(task: LabelProblem, known: Mapping[str, Effect], hidden: Mapping[str, JSON]) -> _Boundary:
     """Boundary of the batch's model with effects at their true parameters."""
     changes = [_change(known[name], values) for name, values in hidden.items()]
 
@@ -127,18 +127,17 @@ def _told(task: LabelProblem, known: Mapping[str, Effect], hidden: Mapping[str, 
 
 
 def _change(effect: Effect, values: JSON) -> Callable[[StabilityModel], StabilityModel]:
-    choices = {parameter.name: parameter.choices for parameter in effect.parameters if parameter.choices}
-    numbers = {name: choices[name].index(v) if name in choices else v for name, v in values.items()}
+    numbers = effect.spread(values)
     return lambda model: effect.apply(model, numbers)
 
 
 def _evidence(tests: Labels, boundary: _Boundary, deviations: Array) -> float:
-    found = log_likelihood(tests, boundary.depth[None], boundary.chatter[None], deviations)
-    return log_evidence(found, np.ones(1))
+    likelihood = log_likelihood(tests, boundary.depth[None], boundary.chatter[None], deviations)
+    return log_evidence(likelihood, np.ones(1))
 
 
 def _drawn(task: LabelProblem, tests: Labels, truth: _Boundary, draws: int) -> list[Labels]:
-    """Return the tests with labels drawn from the truth; with frequencies where records told any."""
+    """Return the tests with labels drawn from the truth; with frequencies where records gave any."""
     rng = np.random.default_rng([SEED, 2])
     heard = bool(np.isfinite(task.chatter_hz).any())
     size = len(tests.depth)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from concurrent.futures import ProcessPoolExecutor
-from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -13,11 +12,11 @@ import yaml
 from rich.console import Console
 
 from metro.batch.config import load_config
-from metro.batch.processed import read_batch, write_json
-from metro.effects import library
-from metro.observables.lobes import LabelProblem
-from metro.observables.problem import Problem, Refusal
-from metro.stages.observed import read_json, read_observed
+from metro.batch.processed import write_json
+from metro.effects.library import library
+from metro.observables.problem import Problem
+from metro.observables.stability.problem import LabelProblem
+from metro.stages.problem_file import read_problems
 from metro.units import JSON
 from proof import seal
 from proof.figures import demanded
@@ -52,10 +51,10 @@ def opened(out: Layout, jobs: int) -> list[Figure]:
     about = truth.get("observable", DEFAULT)
     oracles = _oracles(out, truth["batches"], jobs, about)
     scores = [_score(out, name, entry, oracles.get(name), about) for name, entry in truth["batches"].items()]
-    found = tables(scores, about)
-    printed(found, Console())
+    results = tables(scores, about)
+    printed(results, Console())
     draw(scores, out.root / "figure.svg")
-    (out.root / "table.md").write_text(markdown(_heading(out, truth), found))
+    (out.root / "table.md").write_text(markdown(_heading(out, truth), results))
     return demanded(scores)
 
 
@@ -80,27 +79,25 @@ def _oracle(out: Layout, name: str, hidden: JSON, about: str) -> tuple[str, JSON
         gates = load_config(CHECKOUT / "config/config.yaml")["loop"]
         task = _problem(out.processed / name, about)
         if isinstance(task, LabelProblem):
-            found = label_oracle(task, hidden, library(about), gates["held_out_gain"])
+            result = label_oracle(task, hidden, library(about), gates["held_out_gain"])
         else:
-            found = oracle(task, hidden, library(about), gates["model_form_budget"])
-        write_json(file, found)
+            result = oracle(task, hidden, library(about), gates["model_form_budget"])
+        write_json(file, result)
     return name, _read(file) or {}
 
 
 def _problem(processed: Path, about: str) -> Problem | LabelProblem:
-    identified = read_json(processed / "identified.json")
-    pose = import_module(f"metro.observables.{about}").problem
-    task: Problem | LabelProblem | Refusal = pose(read_batch(processed), read_observed(processed), identified)
-    if isinstance(task, Refusal):
-        raise ValueError(f"{processed}: {task.reason}")
+    task = read_problems(processed)[about].task
+    if not isinstance(task, Problem | LabelProblem):
+        raise ValueError(f"{processed}: {about} has no problem")
     return task
 
 
-def _score(out: Layout, name: str, truth: JSON, told: JSON | None, about: str) -> Score:
+def _score(out: Layout, name: str, truth: JSON, oracle_figures: JSON | None, about: str) -> Score:
     run = _read(out.reports / name / "run.json")
     return score(
         truth,
-        told,
+        oracle_figures,
         _read(out.reports / name / "verdict.json") if run else None,
         _read(out.processed / name / "loop.json") if run else None,
         teeth=int(yaml.safe_load((out.raw / name / "batch.yaml").read_text())["tool"]["teeth"]),

@@ -1,4 +1,4 @@
-"""The oracle: what a fit reaches that is told the true effects, and how large each of them is."""
+"""The oracle: what a fit that knows the true effects reaches, and how large each of them is."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 import pandas as pd
 
 from metro.effects.effect import Effect, fitted_to
-from metro.loop.candidate import Candidate
-from metro.loop.fit import Fit, fit
-from metro.loop.noise import first_noise
-from metro.loop.verdict import comparison, held_out
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import Fit, fit
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.fitting.noise import first_noise
 from metro.observables.problem import Problem
 from metro.units import JSON
 from proof.score import joint
 
-UNTOLD = 2.0  # log-likelihood per effect: with less the runs of the fit tell nothing of it
+LEAST_GAIN = 2.0  # log-likelihood per effect: with less the runs of the fit do not identify it
 
 
 def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect], budget: float) -> JSON:
@@ -36,36 +36,36 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
     Returns
     -------
     ``before`` and ``after`` (rms error on the held-out runs without and with the effects), ``floor`` (rms of
-    the noise there; what no run tells of the base model is none) and ``sizes``: of each effect, how much the
+    the noise there, without the uncertainty of base parameters) and ``sizes``: of each effect, how much the
     prediction changes when it is left out and all else is refitted, over the floor. Where the library lacks
     one of them: ``after`` is None, the floor that of the declared noise (the fitted one has swallowed some of
-    the effect), and the size what of the error is neither noise nor untold, over the floor.
+    the effect), and the size the error beyond noise and uncertainty of base parameters, over the floor.
     """
     blocks = task.role("identify", "calibrate")
     prior = first_noise(budget, task.scatter, blocks)
     base = fit(Candidate(task.base), blocks, prior)
     able, _ = fitted_to(tuple(effects), task)
-    known = [_told(able, name, values) for name, values in hidden.items()]
-    told = [effect for effect in known if effect is not None]
-    if len(told) < len(hidden):
+    known = [_at_truth(able, name, values) for name, values in hidden.items()]
+    acting = [effect for effect in known if effect is not None]
+    if len(acting) < len(hidden):
         rows = _rows(task, base, replace(base, noise=prior))
         before, expected = _rms(rows["measured"] - rows["before"]), _rms(rows["sigma"])
-        floor = _rms(_rows(_all_told(task), base, replace(base, noise=prior))["sigma"])
+        floor = _rms(_rows(_all_identified(task), base, replace(base, noise=prior))["sigma"])
         size = float(np.sqrt(max(0.0, before**2 - expected**2))) / floor
         return {"before": before, "after": None, "floor": floor, "sizes": dict.fromkeys(hidden, size)}
 
     def fitted(chosen: list[Effect]) -> Fit:
         return fit(Candidate(task.base, tuple(chosen)), blocks, prior, base) if chosen else base
 
-    full = fitted(told)
-    if full.total - base.total < UNTOLD * len(told):
-        told = [_kept(effect) for effect in told]
-        full = fitted(told)
+    full = fitted(acting)
+    if full.total - base.total < LEAST_GAIN * len(acting):
+        acting = [_kept(effect) for effect in acting]
+        full = fitted(acting)
     rows = _rows(task, base, full)
-    floor = _rms(_rows(_all_told(task), base, full)["sigma"])
+    floor = _rms(_rows(_all_identified(task), base, full)["sigma"])
     sizes = {}
-    for effect in told:
-        without = _rows(task, fitted([other for other in told if other is not effect]), full)
+    for effect in acting:
+        without = _rows(task, fitted([other for other in acting if other is not effect]), full)
         sizes[effect.name] = _rms(without["after"] - without["before"]) / floor
     return {
         "before": _rms(rows["measured"] - rows["before"]),
@@ -76,26 +76,26 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
 
 
 def _kept(effect: Effect) -> Effect:
-    """Return an effect whose parameters are kept at what they start from: no run tells them."""
+    """Return an effect whose parameters are kept at their start values: no run identifies them."""
     kept = tuple(replace(p, lower=p.starts[0], upper=p.starts[0]) for p in effect.parameters)
     return replace(effect, parameters=kept)
 
 
-def _all_told(task: Problem) -> Problem:
-    """Take the parameters of the base model of the force as told by the runs: what is left is noise.
+def _all_identified(task: Problem) -> Problem:
+    """Take the parameters of the base model of the force as identified by the runs: the residual is noise.
 
-    What is untold of a wall is the error of its force, which is noise of an instrument.
+    What is not identified of a wall is the error of its force, which is noise of an instrument.
     """
     if task.observable != "force":
         return task
-    return replace(task, blocks=tuple(replace(block, untold=None) for block in task.blocks))
+    return replace(task, blocks=tuple(replace(block, unidentified=None) for block in task.blocks))
 
 
-def _told(able: Sequence[Effect], name: str, values: JSON) -> Effect | None:
+def _at_truth(able: Sequence[Effect], name: str, values: JSON) -> Effect | None:
     """Return an effect that starts from its true parameters; None where the library lacks it.
 
-    Of an effect of one joint it is the form of that joint. The truth may tell more than the effect has (a
-    phase that is another unknown of every run).
+    Of an effect of one joint it is the form of that joint. The truth may have more parameters than the effect
+    (a phase that is another unknown of every run).
     """
     for effect in able:
         if effect.name == name and set(effect.names) <= set(values) and joint(effect.where) == joint(values):

@@ -1,9 +1,9 @@
 """Do planned runs decide? Batches with too few conditions are asked about, and what is planned is cut.
 
 Each batch hides one effect of the library, so small that it can just be detected, and consists of three
-narrow side cuts, along which most effects look alike. Where the verdict is ``undetermined``, ``metro next``,
-told how deep the machine may cut, plans runs from what the stages wrote; the simulator cuts exactly these, by
-the same tool in the same metal, and the pipeline runs on all runs again.
+narrow side cuts, along which most effects are confounded. Where the verdict is ``undetermined``, ``metro
+next``, given how deep the machine may cut, plans runs from what the stages wrote; the simulator cuts exactly
+these, by the same tool in the same metal, and the pipeline runs on all runs again.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from virtual_cell.recipes.force import FEW, cut_more, make
 
 OBSERVABLE = "force"
 MOST = 12  # runs that may be planned
-LIMITS = ("axial_depth_mm=0.25:4",)  # as the owner of the machine says; the batches are 0.5 to 1 mm deep
+LIMITS = ("axial_depth_mm=0.25:4",)  # declared by the owner of the machine; the batches are 0.5 to 1 mm deep
 DEMAND = Demand(0.8)
 
 
@@ -70,9 +70,9 @@ def asked_and_cut(out: Layout, batches: int, seed: int, jobs: int) -> tuple[list
     for place in range(batches):
         folder, each = out.raw / f"few-{place:03d}", 100_000 * seed + place
         if not _truth(out, folder.name).is_file():
-            told = make(folder, _small(place, each), each, FEW)
+            truth = make(folder, _small(place, each), each, FEW)
             _truth(out, folder.name).parent.mkdir(exist_ok=True)
-            _truth(out, folder.name).write_text(json.dumps(told, indent=1) + "\n")
+            _truth(out, folder.name).write_text(json.dumps(truth, indent=1) + "\n")
     _run(out, jobs)
     later, names = Layout(out.root / "later"), [name for name in out.batches if _open(out, name)]
     plans = {name: _continued(out, later, name) for name in names}

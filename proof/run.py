@@ -18,7 +18,7 @@ from metro.workflow import Plan
 from proof.layout import Layout
 from proof.progress import tracked
 
-STAGES = ("ingest", "identify", "predict", "loop")
+STAGES = ("ingest", "identify", "predict", "loop", "verdict")
 CHECKOUT = Path(__file__).parents[1]
 
 
@@ -100,6 +100,7 @@ def _timed(job: Job, stage: str) -> float:
     folders: dict[str, dict[str, Path]] = {
         "ingest": {"folder": job.folder, "cells": job.cells, "out": job.processed},
         "loop": {"processed": job.processed, "reports": job.reports},
+        "verdict": {"processed": job.processed, "reports": job.reports},
         "report": {"processed": job.processed, "reports": job.reports},
     }
     function = getattr(import_module(f"metro.stages.{stage}"), stage)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
-from metro.effects import library
-from metro.loop.label_search import NOTHING
-from metro.loop.label_unknown import UNKNOWN
+from metro.effects.library import library
+from metro.loop.labels.search import NOTHING
+from metro.loop.labels.unknown import UNKNOWN
 from metro.units import JSON
 from proof.estimates import Estimate, estimates
 
@@ -34,15 +34,15 @@ class Score:
         all else is refitted.
     named : the effects of the verdict with their stated probabilities, in order; one that is hidden, but in
         another joint, is named so. claimed : whether they are added to the model, or only the first of
-        rivals. groups : sets that it cannot tell apart. rest : whether it says that something is unexplained.
-        advised : whether it says what to measure next.
+        rivals. groups : sets that it cannot distinguish. unexplained : whether it states an unexplained part.
+        advised : whether it recommends what to measure next.
     enough : whether the batch has tests enough for any verdict.
-    before, after : rms error on held-out runs. oracle, floor : that of the fit told which effects act, and
-        the noise. at_truth : that with their true parameters, where the measurement is a label.
-    expected : that the verdict states as its floor, with what no run tells of the base model.
+    before, after : rms error on held-out runs. oracle, floor : that of the fit that knows which effects act,
+        and the noise. at_truth : that with their true parameters, where the measurement is a label.
+    expected : that the verdict states as its floor, with the uncertainty of the base parameters.
     stated, rejected : probability of every effect named, or tried and not named, and whether it was there;
         those of effects too small to be seen left out.
-    cannot_be_seen : effects of which the verdict says that these data cannot speak.
+    cannot_be_seen : effects that these data cannot reveal, by the verdict.
     seconds : the stages took.
     """
 
@@ -54,7 +54,7 @@ class Score:
     named: dict[str, float]
     claimed: bool = False
     groups: tuple[frozenset[str], ...] = ()
-    rest: bool = False
+    unexplained: bool = False
     advised: bool = False
     enough: bool = True
     before: float | None = None
@@ -119,12 +119,12 @@ class Score:
 
     @property
     def detected(self) -> bool:
-        """Whether the verdict says that there is something."""
+        """Whether the verdict states that an effect is present."""
         return self.status not in {"clean", "insufficient", FAILED}
 
     @property
     def undecided(self) -> bool:
-        """Whether the verdict says that the data cannot tell."""
+        """Whether the verdict states that the data cannot decide."""
         return self.status in {"undetermined", "insufficient"}
 
     @property
@@ -134,15 +134,15 @@ class Score:
 
     @property
     def admitted(self) -> bool:
-        """Whether the verdict says that something is left that the library does not account for."""
+        """Whether the verdict states a remaining error that the library does not account for."""
         return self.status in {"unexplained", "partly_explained"} or (
-            self.status == "undetermined" and self.rest
+            self.status == "undetermined" and self.unexplained
         )
 
     @property
     def misattributed(self) -> bool:
-        """Of what is outside the library: said to be explained, or named for sure without a rest."""
-        return self.status == "explained" or (self.surely_wrong and not self.rest)
+        """Whether an outside effect is called explained, or a wrong one surely accounts for all of it."""
+        return self.status == "explained" or (self.surely_wrong and not self.unexplained)
 
     @property
     def share(self) -> float | None:
@@ -156,7 +156,7 @@ def score(
     truth: JSON,
     oracle: JSON | None,
     verdict: JSON | None,
-    told: JSON | None,
+    loop: JSON | None,
     *,
     teeth: int,
     seconds: float | None,
@@ -167,7 +167,7 @@ def score(
     Parameters
     ----------
     truth : of the batch. oracle : what :func:`proof.oracle.oracle` found; None where nothing is hidden.
-    verdict, told : content of verdict.json and loop.json; None where the pipeline failed.
+    verdict, loop : content of verdict.json and loop.json; None where the pipeline failed.
     """
     hidden: JSON = truth["effects"]
     oracle = oracle or {"after": None, "floor": None, "sizes": {}}
@@ -179,13 +179,13 @@ def score(
     effects = [
         one | {"effect": attributed(one["effect"], one["parameters"], hidden)} for one in entry["effects"]
     ]
-    named = {found["effect"]: found["probability"] for found in effects}
+    named = {effect["effect"]: effect["probability"] for effect in effects}
     if not named and entry["status"] == "undetermined":
         candidates = {c["effect"]: c["probability"] for c in entry["candidates"]}
         lacking = _lacking(observable)
         firsts = [group[0] for group in pairs if group[0] not in lacking]
         named = {first: candidates.get(first.split(",")[0], 0.0) for first in firsts}
-    unseen = (told or {"observables": {}})["observables"].get(observable, {}).get("cannot_be_seen", [])
+    unseen = (loop or {"observables": {}})["observables"].get(observable, {}).get("cannot_be_seen", [])
     return Score(
         batch=truth["batch"],
         kind=truth["kind"],
@@ -195,7 +195,7 @@ def score(
         named=named,
         claimed=bool(entry["effects"]),
         groups=groups,
-        rest=entry["unexplained"] is not None,
+        unexplained=entry["unexplained"] is not None,
         advised=bool(entry.get("next_experiment")),
         enough=oracle.get("enough", True),
         before=_rms(entry["before"]),
@@ -206,9 +206,9 @@ def score(
         expected=entry["noise_floor"],
         estimates=tuple(
             one
-            for found in effects
-            if found["effect"] in hidden
-            for one in estimates(found["effect"], hidden[found["effect"]], found["parameters"], teeth)
+            for effect in effects
+            if effect["effect"] in hidden
+            for one in estimates(effect["effect"], hidden[effect["effect"]], effect["parameters"], teeth)
         ),
         stated=_stated(effects, truth["effects"], oracle["sizes"]),
         rejected=_rejected(entry["candidates"], truth["effects"], oracle["sizes"], observable),
@@ -230,10 +230,10 @@ def attributed(effect: str, parameters: Mapping[str, Any], hidden: JSON) -> str:
 
 def _without_form(name: str, hidden: JSON) -> str:
     """Name an effect of which a verdict writes the joint behind its name."""
-    found = _FORM.fullmatch(name)
-    if not found:
+    match = _FORM.fullmatch(name)
+    if not match:
         return name
-    return attributed(found["name"], {"joint": int(found["joint"])} if found["joint"] else {}, hidden)
+    return attributed(match["name"], {"joint": int(match["joint"])} if match["joint"] else {}, hidden)
 
 
 @cache

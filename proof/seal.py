@@ -34,9 +34,9 @@ def unseal(file: Path, seal: Path) -> JSON:
     BrokenSealError
         Its SHA-256 is not the one in ``seal``.
     """
-    published, found = seal.read_text().strip(), _digest(file)
-    if found != published:
-        raise BrokenSealError(f"{file}: its SHA-256 is {found}, {seal} says {published}: it was changed")
+    published, actual = seal.read_text().strip(), _digest(file)
+    if actual != published:
+        raise BrokenSealError(f"{file}: its SHA-256 is {actual}, {seal} says {published}: it was changed")
     truth: JSON = json.loads(file.read_text())
     return truth
 

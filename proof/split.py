@@ -1,9 +1,9 @@
 """Is the split of an error right? What came with the predicted force, as stated and as it truly was.
 
-The simulator tells the true mean force of a run, and by how much more of it moves the wall or the face. What
-the predicted force adds to the error is that much of its distance from the true one. What is stated knows of
-the force only what the dynamometer reads: it can be close to what that makes of it, and can but say how far
-the true part may be from there.
+The simulator gives the true mean force of a run, and by how much more of it moves the wall or the face. What
+the predicted force adds to the error is that much of its distance from the true one. The stated part uses
+only the force that the dynamometer reads: it can be close to the part by that reading, and can only state how
+far the true part may be from there.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from metro.observables.upstream import mean_forces
+from metro.observables.cut.upstream import mean_forces
 from metro.units import JSON, Array
 from proof.statistics import NORMAL, Demand, Figure, median, share
 
@@ -70,8 +70,8 @@ def fed(processed: Path, truth: JSON) -> tuple[Fed, ...]:
             came(truth[part["run"]]["mm_per_n"], forces[part["run"]]["measured"], forces[part["run"]][WHEN]),
             part["doubt"],
         )
-        for observable, told in chain.items()
-        for part in told["runs"]
+        for observable, split in chain.items()
+        for part in split["runs"]
         if part["when"] == WHEN
     )
 
@@ -81,16 +81,16 @@ def came(mm_per_n: Sequence[float], force: ArrayLike, predicted: Array) -> float
     return abs(float(np.array(mm_per_n) @ (np.asarray(force) - predicted)))
 
 
-def split_figures(found: Sequence[Fed]) -> list[Figure]:
+def split_figures(parts: Sequence[Fed]) -> list[Figure]:
     """Return how far the stated parts are from those that were read and from the true ones, by observable."""
     figures = []
-    for name in sorted({one.observable for one in found}):
-        those = [one for one in found if one.observable == name]
+    for name in sorted({one.observable for one in parts}):
+        those = [one for one in parts if one.observable == name]
         read, true = [one.off(one.read) for one in those], [one.off(one.true) for one in those]
         words = f"{name}: stated part of the force less"
         figures += [
             median(f"{words} that of the force that is read, in parts of the error", read, CLOSE, "%"),
             median(f"{words} the true one, in parts of the error", true, unit="%"),
         ]
-    held = [one.held for one in found]
+    held = [one.held for one in parts]
     return [*figures, share("part of the force: its interval holds the true one", held, HELD)]

@@ -59,23 +59,22 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
     """95 % interval of a binomial share (Wilson, J. Am. Stat. Assoc. 22 (1927) 209)."""
     if count == 0:
         return 0.0, 1.0
-    p, z = hits / count, NORMAL
-    middle = (p + z * z / (2 * count)) / (1 + z * z / count)
-    half = z * math.sqrt(p * (1 - p) / count + z * z / (4 * count * count)) / (1 + z * z / count)
+    from statsmodels.stats.proportion import proportion_confint
+
+    low, high = proportion_confint(hits, count, method="wilson")
     # at 0 and 1 an end is the share itself, which rounding must not undo
-    return max(0.0, min(p, middle - half)), min(1.0, max(p, middle + half))
+    return min(float(low), hits / count), max(float(high), hits / count)
 
 
 def median(label: str, values: Sequence[float], demand: Demand | None = None, unit: str = "") -> Figure:
     """Median, with the distribution-free 95 % interval between two order statistics; six values give one."""
     if not values:
         return Figure(label, math.nan, math.nan, math.nan, 0, demand, unit)
-    from scipy.stats import binom
+    from scipy.stats import quantile_test
 
-    ordered, count = np.sort(values), len(values)
-    rank = int(binom.ppf(0.025, count, 0.5))
-    low, high = (float(ordered[rank - 1]), float(ordered[-rank])) if rank else (-math.inf, math.inf)
-    return Figure(label, float(np.median(ordered)), low, high, count, demand, unit)
+    low, high = quantile_test(values, q=0, p=0.5).confidence_interval(0.95)
+    low, high = -math.inf if math.isnan(low) else float(low), math.inf if math.isnan(high) else float(high)
+    return Figure(label, float(np.median(values)), low, high, len(values), demand, unit)
 
 
 @dataclass(frozen=True)

@@ -11,23 +11,23 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from metro.effects import library
+from metro.effects.library import library
 from metro.units import JSON
 from proof import seal
 from proof.layout import Layout
 from proof.progress import tracked
 from virtual_cell.blind import RECIPES
 
-DEFAULT = "force"  # what a suite is about that does not say
+DEFAULT = "force"  # the observable of a suite that names none
 # Share of the batches that hide nothing, one effect of the library, two, or one that the library lacks.
 SHARES = {"none": 0.25, "one": 0.35, "two": 0.2, "outside": 0.2}
-# The coefficients of the base model imitate it wholly: it can be proven neither alone nor beside another.
+# It is wholly confounded with the coefficients of the base model, and cannot be proven in any batch.
 ABSORBED = ("dynamometer_rotation",)
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A batch to be made: its name, its kind (a key of ``SHARES``), what it hides, the seed of the rest."""
+    """A batch to be made: its name, its kind (a key of ``SHARES``), what it hides, and its seed."""
 
     name: str
     kind: str
@@ -66,7 +66,7 @@ def draw(batches: int, seed: int, known: Sequence[str], unknown: Sequence[str]) 
 
 
 def sides(observable: str = DEFAULT) -> tuple[list[str], list[str]]:
-    """Name what the simulator can hide: what the library has; what it lacks or knows only by likeness."""
+    """Name what the simulator can hide: effects of the library; others that it lacks or only resembles."""
     inside = {effect.name for effect in library(observable) if not effect.resembled}
     names = RECIPES[observable].effects
     known, unknown = ([name for name in names if (name in inside) is asked] for asked in (True, False))

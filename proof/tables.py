@@ -14,7 +14,7 @@ from proof.score import STATUSES, Score
 from proof.statistics import Demand, Figure, binned, share
 from virtual_cell.arm_effects import SHOWN
 
-NOTHING, REST = "(clean)", "(unexplained)"
+NOTHING, UNEXPLAINED = "(clean)", "(unexplained)"
 KINDS = {
     "none": "nothing",
     "one": "one effect",
@@ -25,7 +25,7 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Table:
-    """A title, a header and rows of text; ``note`` says how it is meant."""
+    """A title, a header and rows of text; ``note`` explains how to read it."""
 
     title: str
     header: tuple[str, ...]
@@ -149,22 +149,27 @@ def confusion(scores: Sequence[Score]) -> Table:
     rows: dict[str, list[str]] = {}
     for s in hidden:
         label = (s.hidden[0] + ("" if s.seen else ", below the noise")) if s.hidden else "nothing"
-        rows.setdefault(label, []).extend(s.named or ([NOTHING] if s.status == "clean" else [REST]))
-    found = sorted({name for names in rows.values() for name in names if name not in {NOTHING, REST}})
-    columns = (*found, NOTHING, REST)
+        rows.setdefault(label, []).extend(s.named or ([NOTHING] if s.status == "clean" else [UNEXPLAINED]))
+    effects = sorted(
+        {name for names in rows.values() for name in names if name not in {NOTHING, UNEXPLAINED}}
+    )
+    columns = (*effects, NOTHING, UNEXPLAINED)
     counted = {label: Counter(names) for label, names in sorted(rows.items())}
     lines = [(label, *(str(count[name] or "·") for name in columns)) for label, count in counted.items()]
     return Table(
-        "Confusion", ("hidden", *columns), lines, f"{REST}: nothing is named, something is left or undecided."
+        "Confusion",
+        ("hidden", *columns),
+        lines,
+        f"{UNEXPLAINED}: nothing is named, something is left or undecided.",
     )
 
 
 def _pairs(scores: Sequence[Score]) -> Table:
     rows = []
     for s in sorted(kind(scores, "two"), key=lambda s: s.hidden):
-        found = ["yes" if name in s.named else "no" for name in s.hidden]
+        named = ["yes" if name in s.named else "no" for name in s.hidden]
         sizes = [f"{s.sizes[name]:.2g}" if name in s.sizes else "–" for name in s.hidden]
-        rows.append((s.batch, *s.hidden, *sizes, *found, ", ".join(sorted(s.extra)) or "–", s.status))
+        rows.append((s.batch, *s.hidden, *sizes, *named, ", ".join(sorted(s.extra)) or "–", s.status))
     header = ("batch", "first", "second", "size", "size", "named", "named", "named too", "status")
     return Table("Two effects", header, rows)
 
@@ -187,10 +192,10 @@ def _outside(scores: Sequence[Score]) -> Table:
 
 
 def _estimates(scores: Sequence[Score]) -> Table:
-    found = [one for name in ("one", "two") for s in kind(scores, name) if s.seen for one in s.estimates]
+    estimates = [one for name in ("one", "two") for s in kind(scores, name) if s.seen for one in s.estimates]
     rows = []
-    for key in sorted({(one.effect, one.parameter) for one in found}):
-        group = [one for one in found if (one.effect, one.parameter) == key]
+    for key in sorted({(one.effect, one.parameter) for one in estimates}):
+        group = [one for one in estimates if (one.effect, one.parameter) == key]
         covered = share("", [one.covered for one in group if one.covered is not None])
         error = float(np.median([abs(one.error) for one in group]))
         words = f"{error:.2g}°" if key in ANGLES else f"{100 * error:.2g} %"

@@ -1,5 +1,7 @@
 """Write the reference of every key, column and effect: ``python scripts/reference.py docs``.
 
+The same call writes what ``batch.yaml`` may declare of effects, which the check of a batch reads.
+
 What a key may be comes from the schema, what an effect is from its file, what each key, column and parameter
 means from ``reference.yaml`` beside this file; one without a meaning, and a meaning without one, are errors.
 """
@@ -7,18 +9,21 @@ means from ``reference.yaml`` beside this file; one without a meaning, and a mea
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 
 import yaml
 from reference_effects import effects_page, row
 
 from metro.batch.columns import TABLES, Column
+from metro.batch.known import REGISTRY, registry
+from metro.batch.ranges import KINDS, bounds, number_in_words, schema
+from metro.effects.library import library
 from metro.units import JSON
 
 ROOT = Path(__file__).parents[1]
+DECLARED = ROOT / "src/metro/batch" / REGISTRY
 MEANINGS = Path(__file__).with_suffix(".yaml")
-BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
+NAMED = {"files": "pattern", "columns": "column"}  # object with keys of one's own → what these are
 PARAMETERS = "[effects](reference-effects.md)"
 NOTE = "<!-- Made by `python scripts/reference.py docs`: change the schemas or scripts/reference.yaml. -->\n"
 
@@ -27,6 +32,14 @@ def main(folder: str) -> None:
     """Write the pages into a folder."""
     for name, text in pages().items():
         (Path(folder) / name).write_text(text, encoding="utf-8")
+    DECLARED.write_text(declared(), encoding="utf-8")
+
+
+def declared() -> str:
+    """Return what can be declared of the effects of this package, as JSON: one line each."""
+    own = [effect for effect in library() if effect.apply.__module__.startswith("metro.")]
+    lines = [f"  {json.dumps(name)}: {json.dumps(entry)}" for name, entry in registry(own).items()]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def pages() -> dict[str, str]:
@@ -39,6 +52,7 @@ def pages() -> dict[str, str]:
         *keys("batch.yaml", "batch", meanings["batch"]),
         *keys("cell.yaml", "cell", meanings["cell"]),
         *columns(TABLES, meanings["columns"]),
+        *reasons(),
     ]
     config = [
         "# Reference: config/config.yaml\n",
@@ -62,9 +76,7 @@ def keys(title: str, name: str, meanings: JSON, defaults: dict[str, str] | None 
     ValueError
         A key has no meaning, or a meaning has no key.
     """
-    schema = json.loads(files("metro.batch").joinpath(f"schemas/{name}.json").read_text(encoding="utf-8"))
-    every = {path: (inner, needed) for path, inner, needed in walk(schema)}
-    found = {path: each for path, each in every.items() if not path.startswith("known.")}
+    found = {path: (inner, needed) for path, inner, needed in walk(schema(name))}
     if set(found) != set(meanings):
         raise ValueError(f"{MEANINGS.name}, {name}: differ in {sorted(set(found) ^ set(meanings))}")
     head = ["key", "required", "value", *(["default"] if defaults else []), "meaning"]
@@ -72,33 +84,59 @@ def keys(title: str, name: str, meanings: JSON, defaults: dict[str, str] | None 
     for path, (inner, needed) in found.items():
         default = [f"`{defaults[path]}`" if path in defaults else ""] if defaults else []
         lines.append(row([f"`{path}`", "yes" if needed else "", allowed(inner), *default, meanings[path]]))
-    effects = ", ".join(f"`{path.removeprefix('known.')}`" for path in every if path not in found)
-    return [
-        *lines,
-        *(["", f"Keys of `known`: {effects}; their parameters: {PARAMETERS}."] * bool(effects)),
-        "",
-    ]
+    if "known" in found:
+        effects = ", ".join(f"`{effect}`" for effect in json.loads(declared()))
+        lines += ["", f"Keys of `known`: {effects}; their parameters: {PARAMETERS}."]
+    return [*lines, ""]
 
 
 def walk(schema: JSON, above: str = "") -> Iterator[tuple[str, JSON, bool]]:
-    """Yield (path of keys, schema, whether required) of every key; an object's own keys after it."""
+    """Yield (path of keys, schema, whether required) of every key; an object's own keys after it.
+
+    Keys that anybody may choose are in angle brackets.
+    """
     for key, inner in schema.get("properties", {}).items():
         yield f"{above}{key}", inner, key in schema.get("required", ())
         yield from walk(inner, f"{above}{key}.")
+        each = inner.get("additionalProperties")
+        if isinstance(each, dict) and "properties" in each:
+            entry = f"{above}{key}.<{NAMED[key]}>"
+            if isinstance(each["type"], list):  # the entry has a short form, too
+                yield entry, each, False
+            yield from walk(each, f"{entry}.")
 
 
-def allowed(schema: JSON) -> str:
-    """Say in words what a schema allows."""
-    if "const" in schema:
-        return f"`{schema['const']}`"
-    if "enum" in schema:
-        return ", ".join(f"`{value}`" for value in schema["enum"])
-    if schema["type"] == "array":
-        least, most = schema.get("minItems", 0), schema.get("maxItems")
-        return f"list of {least}{'' if least == most else ' or more'}, each {allowed(schema['items'])}"
-    bounds = " and".join(f" {sign} {schema[name]:g}" for name, sign in BOUNDS.items() if name in schema)
-    words = {"string": "text", "object": "keys"}.get(schema["type"], schema["type"])
-    return f"{schema.get('description', words)}{bounds}"
+def allowed(rule: JSON) -> str:
+    """Say in words what a rule allows."""
+    if "const" in rule:
+        return f"`{rule['const']}`"
+    if "enum" in rule:
+        return ", ".join(f"`{value}`" for value in rule["enum"])
+    if rule["type"] == "array":
+        least, most = rule.get("minItems", 0), rule.get("maxItems")
+        size = f"{least}" if least == most else f"{least} to {most}" if most else f"{least} or more"
+        return f"list of {size}, each {allowed(rule['items'])}"
+    if isinstance(rule["type"], list):
+        return str(rule["description"])
+    if rule["type"] in KINDS:
+        return number_in_words(rule)
+    longest = f", at most {rule['maxLength']} characters" if "maxLength" in rule else ""
+    words = {"string": f"text{longest}", "object": "keys"}.get(rule["type"], rule["type"])
+    return str(rule.get("description", words))
+
+
+def reasons() -> list[str]:
+    """Return the section that says why each number has the range that it has, line by line."""
+    rows = [
+        [f"`{name}`", bounds(rule), rule["description"]] for name, rule in schema("ranges")["$defs"].items()
+    ]
+    return [
+        "## Ranges, and why\n",
+        row(["quantity", "range", "reason"]),
+        row(["---"] * 3),
+        *map(row, rows),
+        "",
+    ]
 
 
 def columns(tables: Mapping[str, Sequence[Column]], meanings: Mapping[str, str]) -> list[str]:

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 
-from metro.effects import library
 from metro.effects.effect import Effect
+from metro.effects.library import library
 from metro.units import printed
 
 HEAD = """\
@@ -63,8 +63,14 @@ def _cause(forms: list[Effect], meanings: Mapping[str, str]) -> list[str]:
         lines += [row(["parameter", "unit", "sought between", "meaning"]), row(["---"] * 4)]
         lines += [_parameter(first, name, meanings[f"{first.name}.{name}"]) for name in first.names]
         lines += ["", f"- *Seen:* {first.signature}", f"- *Measure:* {first.experiment}."]
-        lines += [f"- *Source:* {first.literature}.", ""]
+        lines += [f"- *Belongs to:* {_owners(first)}.", f"- *Source:* {first.literature}.", ""]
     return lines
+
+
+def _owners(effect: Effect) -> str:
+    """Say what the parameters are a property of, and where a campaign does not follow them."""
+    named = " and ".join(f"the {owner}" for owner in effect.belongs_to)
+    return named if effect.comparable else f"{named}; batches cannot be compared by it"
 
 
 def _parameter(effect: Effect, name: str, meaning: str) -> str:

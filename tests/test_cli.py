@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from checkout import Checkout
 from typer.testing import CliRunner
 
 from metro import __version__, cli
@@ -11,7 +12,7 @@ from metro.codehash import code_hash
 from metro.formats import FormatError
 
 COMMANDS = ("check", "new-batch", "simulate", "status", "explain", "next", "query", "verify", "frf-export")
-STAGES = ("ingest", "identify", "predict", "loop", "report", "campaign")
+STAGES = ("ingest", "identify", "predict", "loop", "verdict", "report", "campaign")
 
 
 def call(*arguments):
@@ -70,11 +71,14 @@ def test_frfs_are_exported_of_a_batch_however_it_is_named(given, tmp_path, monke
     assert call("frf-export", given, "out.uff").output == "data/processed/late\n"
 
 
-def test_a_new_batch_passes_its_own_check(tmp_path):
+def test_a_new_batch_lacks_nothing_but_a_measurement(tmp_path):
     made = call("new-batch", "first-cut", "--root", tmp_path)
     assert made.exit_code == 0
     assert f"metro check {tmp_path}/first-cut" in made.output.replace("\n", "")
-    assert call("check", tmp_path / "first-cut").exit_code == 0
+    checked = call("check", tmp_path / "first-cut")
+    assert checked.exit_code == 1
+    assert "1 error" in checked.output
+    assert "it holds no measurement" in " ".join(checked.output.split())
 
 
 def test_a_new_batch_of_a_wrong_name_is_refused_in_one_line(tmp_path):
@@ -86,7 +90,7 @@ def test_a_new_batch_of_a_wrong_name_is_refused_in_one_line(tmp_path):
 
 def test_the_check_of_several_batches_fails_when_one_of_them_does(tmp_path):
     for name in ("good", "bad"):
-        call("new-batch", name, "--root", tmp_path)
+        Checkout(tmp_path).add_batch(name, root="")
     (tmp_path / "bad/batch.yaml").write_text("format: 2\n")
     assert call("check", tmp_path / "good", tmp_path / "bad").exit_code == 1
     assert call("check", tmp_path / "good").exit_code == 0
@@ -163,8 +167,8 @@ def test_checks_and_new_batches_can_be_read_by_programs(tmp_path):
     made = json.loads(call("new-batch", "first-cut", "--root", tmp_path, "--json").stdout)
     assert made == {"batch": "first-cut", "folder": str(tmp_path / "first-cut")}
     (found,) = json.loads(call("check", tmp_path / "first-cut", "--json").stdout)
-    assert found["ok"] is True
-    assert {"name", "source", "missing"} <= set(found["observables"][0])
+    assert found["ok"] is False
+    assert {"name", "source", "missing", "measured"} <= set(found["observables"][0])
     (tmp_path / "first-cut/batch.yaml").write_text("format: 2\n")
     result = call("check", tmp_path / "first-cut", "--json")
     assert result.exit_code == 1

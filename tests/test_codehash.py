@@ -22,6 +22,8 @@ FILES = {
     "scales/unused.py": "X = 1\n",
     "scales/templates/page.typ": "= Weight\n",
     "effects/__init__.py": "",
+    "effects/library.py": "X = 1\n",
+    "scales/joint.py": "from metro.effects.library import X\n",
     "effects/effect.py": "class Effect: ...\n",
     "effects/drift.py": "X = 1\n",
 }
@@ -100,10 +102,20 @@ def test_a_string_that_is_no_docstring_counts(package):
     assert changed(package, "stages/weigh.py", FILES["stages/weigh.py"] + 'X = "text"\n')
 
 
-def test_the_library_of_effects_counts_whole_where_anything_of_it_is_used(package):
-    assert changed(package, "effects/drift.py", "X = 2\n")
+def test_the_library_of_effects_counts_whole_where_it_is_asked_for_effects(package):
+    assert not changed(package, "effects/drift.py", "X = 2\n")  # one class of it was imported
+    with_library = FILES["stages/weigh.py"] + "import metro.scales.joint\n"
+    (package / "stages" / "weigh.py").write_text(with_library)
+    assert changed(package, "effects/drift.py", "X = 3\n")
     assert changed(package, "effects/brand_new.py", "X = 1\n")
     assert not changed(package, "effects/another.py", "X = 1\n", stage="rest")
+
+
+@pytest.mark.parametrize("stage", ["ingest", "predict", "verdict", "report", "campaign"])
+def test_a_change_of_an_effect_re_runs_by_itself_only_what_applies_effects(stage):
+    modules = codehash.imported_modules(f"metro.stages.{stage}")
+    assert "metro.effects.library" not in modules
+    assert "metro.effects.tool_runout" not in modules
 
 
 def test_files_that_are_not_python_count_with_the_package_that_holds_them(package):
@@ -140,7 +152,7 @@ def real_stages():
     folder = Path(codehash.__file__).parent / "stages"
     return [
         stage
-        for stage in ("ingest", "identify", "predict", "loop", "report", "campaign")
+        for stage in ("ingest", "identify", "predict", "loop", "verdict", "report", "campaign")
         if (folder / f"{stage}.py").exists()
     ]
 
@@ -207,3 +219,20 @@ def test_hashing_all_stages_costs_no_more_than_parsing_the_package_twice():
 
     # The least of three: what else the machine does can only add.
     assert min(spent(hashed) for _ in range(3)) < 2.0 * min(spent(parsed) for _ in range(3))
+
+
+def test_what_only_a_type_checker_imports_does_not_count(package):
+    typed = "from typing import TYPE_CHECKING\n\nif TYPE_CHECKING:\n    from metro.scales import unused\n"
+    (package / "units.py").write_text(typed)
+    forget()
+    assert not changed(package, "scales/unused.py", "X = 2\n")
+
+
+def test_what_a_module_finds_by_itself_counts_where_that_module_does(package):
+    (package / "stages/list.py").parent.mkdir(exist_ok=True)
+    (package / "stages/list.py").write_text("from metro.observables.catalogue import names\n")
+    for name in ("__init__", "catalogue", "force/__init__", "force/description", "force/observable"):
+        (package / "observables" / f"{name}.py").parent.mkdir(parents=True, exist_ok=True)
+        (package / "observables" / f"{name}.py").write_text("X = 1\n")
+    assert changed(package, "observables/force/description.py", "X = 2\n", stage="list")
+    assert not changed(package, "observables/force/observable.py", "X = 2\n", stage="list")

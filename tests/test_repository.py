@@ -14,7 +14,7 @@ PYTHON = [*SOURCES, *sorted([*ROOT.glob("tests/**/*.py"), *ROOT.glob("benchmarks
 
 # Which rooms a room may import (docs/architecture.md). A module at the top of the package is its own room.
 PHYSICS = {"cutting", "dynamics", "robot", "surface"}
-BASE = {"units", "__init__"}
+BASE = {"spelling", "units", "__init__"}
 ROOMS = {
     "units": set(),
     "__init__": set(),
@@ -30,16 +30,21 @@ ROOMS = {
     "surface": {"signals"},
     "observables": {"batch", "signals", "structure", *PHYSICS},
     "effects": {"signals", "structure", "observables", *PHYSICS},
+    "slips": {"batch", "signals", "cutting", "observables"},
     "loop": {"observables", "effects"},
+    "wording": set(),
     "memory": set(),
-    "report": {"batch"},
+    "report": {"batch", "observables"},
     "stages": {
         "batch",
+        "codehash",
         "formats",
         "signals",
         "observables",
         "effects",
         "loop",
+        "slips",
+        "wording",
         "memory",
         "report",
         "structure",
@@ -48,7 +53,9 @@ ROOMS = {
     "progress": set(),
     "workflow": {"batch", "codehash"},
     "dataset": {"batch"},
-    "commands": {"batch", "report", "dataset", "workflow", "codehash"},
+    "importing": {"batch", "formats"},
+    "spelling": set(),
+    "commands": {"importing", "batch", "report", "dataset", "workflow", "codehash", "observables"},
     "cli": {"stages", "commands", "batch", "formats", "codehash"},
 }
 
@@ -95,9 +102,15 @@ def test_a_room_imports_only_what_the_architecture_allows():
 
 
 def test_the_loop_knows_of_the_observables_nothing_but_what_a_problem_is():
-    names = {name for path in ROOT.glob("src/metro/loop/*.py") for name in imported(path)}
-    allowed = {"metro.observables.problem", "metro.observables.quantity"}
+    names = {name for path in ROOT.glob("src/metro/loop/**/*.py") for name in imported(path)}
+    allowed = {"metro.observables.problem", "metro.observables.labelled", "metro.observables.quantity"}
     assert {name for name in names if name.startswith("metro.observables")} <= allowed
+
+
+def test_who_shows_observables_knows_what_is_said_of_them_and_nothing_that_computes():
+    shown = [path for room in ("report", "commands") for path in ROOT.glob(f"src/metro/{room}/**/*.py")]
+    names = {name for path in shown for name in imported(path) if name.startswith("metro.observables")}
+    assert names == {"metro.observables.catalogue"}
 
 
 def test_the_simulator_and_the_package_share_no_code():

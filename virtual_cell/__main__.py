@@ -24,6 +24,9 @@ def main(arguments: list[str] | None = None) -> None:
     if options.command == "bundled":
         bundled(options.root)
         return
+    if options.command == "effects":
+        print(json.dumps({name: dict(recipe.effects) for name, recipe in RECIPES.items()}))
+        return
     recipe = RECIPES[options.command]
     hidden = dict(_effect(words, recipe.effects) for words in options.effect)
     truth = recipe.make(options.folder, hidden, options.seed, options.style)
@@ -36,6 +39,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
     every = commands.add_parser("bundled", help="remake the bundled batches")
     every.add_argument("root", type=Path)
+    commands.add_parser("effects", help="list as JSON what each kind of batch can hide, with its parameters")
     for name, recipe in RECIPES.items():
         hidden = ", ".join(recipe.effects)
         one = commands.add_parser(

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from virtual_cell.arm_cell import ArmCell
-from virtual_cell.hidden import Hidden, Parameters, drawn_angle, drawn_signed, drawn_size
+from virtual_cell.hidden import JOINT, Hidden, Parameters, drawn_angle, drawn_signed, drawn_size
 from virtual_cell.units import DEG, MM, MS, N_UM, UM
 
 _MDEG = 1e-3 * DEG
@@ -128,68 +128,83 @@ def _drift(rng: np.random.Generator, _: ArmCell) -> Parameters:
 
 INSIDE: Mapping[str, Hidden[ArmCell]] = {
     "clock_offset": Hidden(
+        "offset_ms",
         lambda r, _: {"offset_ms": drawn_signed(r, 5.0, 250.0)},
         lambda c, p: replace(c, clock_offset=p["offset_ms"] * MS),
     ),
     "friction_reversal": Hidden(
+        f"{JOINT} torque_nm",
         _friction(0.015, 0.4, "torque_nm", lambda _: 1.0),
         lambda c, p: replace(c, reversal=_on(c.reversal, p["joint"], p["torque_nm"])),
     ),
     "friction_warmup": Hidden(
+        f"{JOINT} slope_nm_s",
         _friction(0.02, 0.5, "slope_nm_s", lambda c: c.moves.seconds),
         lambda c, p: replace(c, warmup=_on(c.warmup, p["joint"], p["slope_nm_s"])),
     ),
-    "gear_ripple": Hidden(_ripple, _rippled),
+    "gear_ripple": Hidden(f"{JOINT} order torque_nm phase_deg?", _ripple, _rippled),
     "payload_error": Hidden(
+        "mass_kg com_mm[3]",
         _payload,
         lambda c, p: replace(c, payload=p["mass_kg"], payload_at=tuple(v * MM for v in p["com_mm"])),
     ),
     "tool_offset_error": Hidden(
-        _offset, lambda c, p: replace(c, tip_offset=tuple(p[f"d{axis}_mm"] * MM for axis in "xyz"))
+        "dx_mm dy_mm dz_mm",
+        _offset,
+        lambda c, p: replace(c, tip_offset=tuple(p[f"d{axis}_mm"] * MM for axis in "xyz")),
     ),
     "joint_backlash": Hidden(
+        f"{JOINT} angle_mdeg",
         lambda r, c: {"joint": _likely(r, c.moves.swaying), "angle_mdeg": drawn_size(r, 0.5, 30.0)},
         lambda c, p: replace(c, gap=_on(c.gap, p["joint"], p["angle_mdeg"] * _MDEG)),
     ),
-    "stiffness_scale": Hidden(_scale, _scaled),
+    "stiffness_scale": Hidden(f"factor {JOINT}|all?", _scale, _scaled),
     "stiffness_hardening": Hidden(
-        _hardening, lambda c, p: replace(c, cubic=_on(c.cubic, p["joint"], p["cubic"]))
+        f"{JOINT} cubic", _hardening, lambda c, p: replace(c, cubic=_on(c.cubic, p["joint"], p["cubic"]))
     ),
-    "path_vibration": Hidden(_vibration, _vibrating),
+    "path_vibration": Hidden("frequency_hz amplitude_um phase_deg?", _vibration, _vibrating),
 }
 OUTSIDE: Mapping[str, Hidden[ArmCell]] = {
     "viscous_change": Hidden(
+        f"{JOINT} change",
         lambda r, _: {"joint": _joint(r), "change": drawn_size(r, 0.3, 6.0)},
         lambda c, p: replace(c, viscous_change=_on(c.viscous_change, p["joint"], p["change"])),
     ),
     "torque_constant": Hidden(
+        f"{JOINT} error",
         lambda r, _: {"joint": _joint(r), "error": drawn_signed(r, 0.01, 0.3)},
         lambda c, p: replace(c, torque_gain=_on(c.torque_gain, p["joint"], p["error"])),
     ),
     "joint_delay": Hidden(
+        f"{JOINT} delay_ms",
         lambda r, _: {"joint": _joint(r), "delay_ms": drawn_size(r, 30.0, 500.0)},
         lambda c, p: replace(c, delay=_on(c.delay, p["joint"], p["delay_ms"] * MS)),
     ),
     "gain_drift": Hidden(
+        "share_per_s",
         lambda r, c: {"share_per_s": _digits(drawn_signed(r, 0.02, 0.5) / c.moves.seconds)},
         lambda c, p: replace(c, gain_drift=p["share_per_s"]),
     ),
     "link_flexibility": Hidden(
+        "link=1|2|3 compliance_rad_nm",
         lambda r, _: {"link": int(r.integers(1, 4)), "compliance_rad_nm": drawn_size(r, 1e-8, 2e-6)},
         lambda c, p: replace(c, link=p["link"], link_compliance=p["compliance_rad_nm"]),
     ),
     "tool_bending": Hidden(
+        "stiffness_n_um",
         lambda r, _: {"stiffness_n_um": drawn_size(r, 2.0, 80.0)},
         lambda c, p: replace(c, tool_compliance=1.0 / (p["stiffness_n_um"] * N_UM)),
     ),
     "thermal_drift": Hidden(
-        _drift, lambda c, p: replace(c, drift=tuple(v * UM / 60.0 for v in p["um_per_min"]))
+        "um_per_min[3]", _drift, lambda c, p: replace(c, drift=tuple(v * UM / 60.0 for v in p["um_per_min"]))
     ),
     "wall_tilt": Hidden(
+        "tilt_mrad",
         lambda r, _: {"tilt_mrad": drawn_signed(r, 0.05, 3.0)},
         lambda c, p: replace(c, tilt=p["tilt_mrad"] * 1e-3),
     ),
     "fixed_length_waves": Hidden(
+        "length_mm amplitude_um phase_deg",
         lambda r, _: {
             "length_mm": drawn_size(r, 1.2, 6.0),
             "amplitude_um": drawn_size(r, 0.1, 8.0),
@@ -198,6 +213,7 @@ OUTSIDE: Mapping[str, Hidden[ArmCell]] = {
         lambda c, p: replace(c, wave=(p["length_mm"] * MM, p["amplitude_um"] * UM, p["phase_deg"] * DEG)),
     ),
     "entry_ringing": Hidden(
+        "frequency_hz damping amplitude_um",
         lambda r, c: {
             "frequency_hz": _digits(c.moves.speed[0] / (drawn_size(r, 1.5, 4.0) * MM)),
             "damping": drawn_size(r, 0.01, 0.05),
@@ -206,6 +222,7 @@ OUTSIDE: Mapping[str, Hidden[ArmCell]] = {
         lambda c, p: replace(c, ringing=(p["frequency_hz"], p["damping"], p["amplitude_um"] * UM)),
     ),
     "drifting_vibration": Hidden(
+        "frequency_hz amplitude_um phase_deg? growth_per_s",
         lambda r, c: {**_vibration(r, c), "growth_per_s": _digits(drawn_size(r, 0.3, 1.0) / c.moves.seconds)},
         _vibrating,
     ),

@@ -12,7 +12,7 @@ from virtual_cell.arm import Arm
 from virtual_cell.arm_cell import ArmCell, hardened, payload_torque
 from virtual_cell.units import MM, Array
 
-_NODE = 10.0 * MM  # between nodes angles are off by (10 mm / reach)⁴ / 384: less than 1e-9 rad
+_NODE = 10.0 * MM  # between nodes angles have an error of (10 mm / reach)⁴ / 384: less than 1e-9 rad
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Line:
     def turns(self) -> tuple[Array, ...]:
         """Where (m) each of the six joints turns round."""
         slopes = self.spline.derivative()
-        found = slopes.roots(extrapolate=False)
-        return tuple(np.asarray(places)[np.isfinite(places)] for places in found)
+        roots = slopes.roots(extrapolate=False)
+        return tuple(np.asarray(places)[np.isfinite(places)] for places in roots)
 
     def rate(self, s: Array, speed: float) -> Array:
         """Joint speeds (n, 6), rad/s, at lengths ``s`` and a feed, m/s."""

@@ -63,7 +63,7 @@ def _log(
     *,
     late: float,
 ) -> dict[str, Array]:
-    """Log what ``torque(t)`` (n, 6), N m, tells at times by the log's clock, which is ``late``, s."""
+    """Log ``torque(t)`` (n, 6), N m, at times by the log's clock, which is ``late``, s."""
     t = np.arange(int(one.seconds(spare=abs(late)) / period)) * period
     s = one.begin + (t - late) * one.speed
     wanted = one.along.spline(s)

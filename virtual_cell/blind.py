@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from virtual_cell.arm_effects import SHOWN
+from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
 from virtual_cell.face_effects import FACE_EFFECTS
-from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Parameters
+from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Hidden, Parameters
 from virtual_cell.recipes import arm, boundary, faces, force
 from virtual_cell.write import Row
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """``make(folder, hidden, seed, style)`` a batch that hides some of the ``effects``; return the truth."""
+    """``make(folder, hidden, seed, style)`` a batch that hides some of the ``effects``; return the truth.
+
+    ``effects``: their parameters by their names, as :class:`virtual_cell.hidden.Hidden` has them.
+    """
 
     make: Callable[[Path, Mapping[str, Parameters | None], int, str], Row]
-    effects: tuple[str, ...]
+    effects: Mapping[str, str]
+
+
+def _named(effects: Mapping[str, Hidden[Any]], names: Iterable[str] = ()) -> dict[str, str]:
+    """Return the parameters of some effects, or of all."""
+    return {name: effects[name].parameters for name in names or effects}
 
 
 RECIPES = {
-    "force": Recipe(force.make, tuple(EFFECTS)),
-    "lobes": Recipe(boundary.make, tuple(BOUNDARY_EFFECTS)),
-    "flatness": Recipe(faces.make, tuple(FACE_EFFECTS)),
-    **{observable: Recipe(arm.make, effects) for observable, effects in SHOWN.items()},
+    "force": Recipe(force.make, _named(EFFECTS)),
+    **{observable: Recipe(arm.make, _named(ARM_EFFECTS, names)) for observable, names in SHOWN.items()},
+    "flatness": Recipe(faces.make, _named(FACE_EFFECTS)),
+    "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS)),
 }

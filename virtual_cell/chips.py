@@ -111,7 +111,7 @@ def chips(
 ) -> Chips:
     """Trace the chips of one tooth at times ``t`` (n,), s.
 
-    The axis is where the motion says, displaced by ``now`` (2, n), m; in earlier passes it was at ``past(t)``
+    The axis follows the motion, displaced by ``now`` (2, n), m; in earlier passes it was at ``past(t)``
     where that is given.
     """
     slices = engagement.slices

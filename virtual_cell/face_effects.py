@@ -61,44 +61,56 @@ def _settling(rng: np.random.Generator, cell: FaceCell) -> Parameters:
 
 INSIDE: Mapping[str, Hidden[FaceCell]] = {
     "spindle_tilt": Hidden(
+        "about_x_mrad about_y_mrad",
         lambda r, _: _towards(r, ("about_x_mrad", "about_y_mrad"), 0.2, 8.0),
         lambda c, p: _round(c, tilt=(p["about_x_mrad"] * _MRAD, p["about_y_mrad"] * _MRAD)),
     ),
     "thermal_growth": Hidden(
+        "um_per_min",
         lambda r, _: {"um_per_min": drawn_size(r, 2.0, 120.0)},
         lambda c, p: _round(c, growth=p["um_per_min"] * _UM_MIN),
     ),
     "fixture_bow": Hidden(
+        "xx_um xy_um yy_um",
         lambda r, _: _towards(r, ("xx_um", "xy_um", "yy_um"), 5.0, 250.0),
         lambda c, p: _round(c, bow=tuple(p[f"{name}_um"] * UM for name in ("xx", "xy", "yy"))),
     ),
     "path_vibration": Hidden(
-        _vibration, lambda c, p: _round(c, vibration=(p["frequency_hz"], p["amplitude_um"] * UM))
+        "frequency_hz amplitude_um",
+        _vibration,
+        lambda c, p: _round(c, vibration=(p["frequency_hz"], p["amplitude_um"] * UM)),
     ),
     "entry_transient": Hidden(
+        "amplitude_um length_mm",
         lambda r, _: {"amplitude_um": drawn_signed(r, 8.0, 300.0), "length_mm": drawn_size(r, 6.0, 40.0)},
         lambda c, p: _round(c, entry=(p["amplitude_um"] * UM, p["length_mm"] * MM)),
     ),
     "stiffness_scale": Hidden(
+        "factor",
         lambda r, _: {"factor": float(round(math.exp(drawn_signed(r, 0.02, 0.7)), 3))},
         lambda c, p: replace(c, factor=p["factor"]),
     ),
 }
 OUTSIDE: Mapping[str, Hidden[FaceCell]] = {
     "tool_step": Hidden(
+        "from_share height_um",
         lambda r, _: {"from_share": _share(r), "height_um": drawn_signed(r, 5.0, 120.0)},
         lambda c, p: replace(c, step=(p["from_share"], p["height_um"] * UM)),
     ),
     "hard_spot": Hidden(
+        "x_mm y_mm radius_mm height_um",
         _spot,
         lambda c, p: _round(
             c, spot=(p["x_mm"] * MM, p["y_mm"] * MM, p["radius_mm"] * MM, p["height_um"] * UM)
         ),
     ),
     "settling_growth": Hidden(
-        _settling, lambda c, p: _round(c, settling=(p["growth_um"] * UM, p["time_constant_s"]))
+        "growth_um time_constant_s",
+        _settling,
+        lambda c, p: _round(c, settling=(p["growth_um"] * UM, p["time_constant_s"])),
     ),
     "scanner_distortion": Hidden(
+        "uuu_um uuv_um uvv_um vvv_um",
         lambda r, _: _towards(r, ("uuu_um", "uuv_um", "uvv_um", "vvv_um"), 6.0, 250.0),
         lambda c, p: replace(
             c,
@@ -108,17 +120,22 @@ OUTSIDE: Mapping[str, Hidden[FaceCell]] = {
         ),
     ),
     "wear_within_face": Hidden(
-        lambda r, _: {"growth": drawn_size(r, 0.05, 1.5)}, lambda c, p: replace(c, wear=p["growth"])
+        "growth", lambda r, _: {"growth": drawn_size(r, 0.05, 1.5)}, lambda c, p: replace(c, wear=p["growth"])
     ),
     "missed_depth": Hidden(
+        "at_share depth_um",
         lambda r, _: {"at_share": _share(r), "depth_um": drawn_size(r, 8.0, 200.0)},
         lambda c, p: replace(c, missed=(p["at_share"], p["depth_um"] * UM)),
     ),
     "rail_sag": Hidden(
-        lambda r, _: {"sag_um": drawn_signed(r, 8.0, 250.0)}, lambda c, p: _round(c, sag=p["sag_um"] * UM)
+        "sag_um",
+        lambda r, _: {"sag_um": drawn_signed(r, 8.0, 250.0)},
+        lambda c, p: _round(c, sag=p["sag_um"] * UM),
     ),
     "walk_of_height": Hidden(
-        lambda r, _: {"step_um": drawn_size(r, 2.0, 40.0)}, lambda c, p: replace(c, walk=p["step_um"] * UM)
+        "step_um",
+        lambda r, _: {"step_um": drawn_size(r, 2.0, 40.0)},
+        lambda c, p: replace(c, walk=p["step_um"] * UM),
     ),
 }
 FACE_EFFECTS: Mapping[str, Hidden[FaceCell]] = {**INSIDE, **OUTSIDE}

@@ -60,8 +60,8 @@ class Machine:
     def repeats(self) -> int:
         """How often in a turn a cut without chatter repeats: with each tooth, if no tooth differs.
 
-        Chatter may be locked to the turns (at each second tooth, say, which cuts for two): who compares whole
-        turns does not see it.
+        Chatter may be locked to the turns (for example at each second tooth, which cuts for two): a
+        comparison of whole turns does not show it.
         """
         return 1 if self.runout or any(self.uneven) else self.teeth
 

@@ -18,13 +18,19 @@ from virtual_cell.session import Session
 from virtual_cell.units import DEG, MM, MS, N_MM, N_UM, UM
 
 Parameters = dict[str, Any]
+JOINT = "joint=1|2|3|4|5|6"
 Subject = TypeVar("Subject")
 
 
 @dataclass(frozen=True)
 class Hidden(Generic[Subject]):
-    """How to draw an effect's parameters, in the contract's units, and how to apply them to its subject."""
+    """How to draw an effect's parameters, in the contract's units, and how to apply them to its subject.
 
+    ``parameters`` names them, parted by blanks. Behind a name: ``[3]`` a list of three numbers, ``[]`` one
+    for each tooth, ``=x|y`` one of these words; ``?`` at its end: it may be left out.
+    """
+
+    parameters: str
     draw: Callable[[np.random.Generator, Subject], Parameters]
     apply: Callable[[Subject, Parameters], Subject]
 
@@ -95,31 +101,41 @@ def _speed(session: Session, p: Parameters) -> Session:
 
 EFFECTS: Mapping[str, Hidden[Session]] = {
     "tool_runout": Hidden(
-        lambda r, _: {"radius_um": drawn_size(r, 2.0, 25.0), "angle_deg": drawn_angle(r)}, _runout
+        "radius_um angle_deg",
+        lambda r, _: {"radius_um": drawn_size(r, 2.0, 25.0), "angle_deg": drawn_angle(r)},
+        _runout,
     ),
     "tool_wear": Hidden(
+        "edge_growth_per_m",
         lambda r, _: {"edge_growth_per_m": drawn_size(r, 0.02, 0.4)},
         lambda s, p: replace(s, coefficients=replace(s.coefficients, wear=p["edge_growth_per_m"])),
     ),
-    "chip_size_effect": Hidden(lambda r, _: {"exponent": drawn_size(r, 0.06, 0.35)}, _size_effect),
+    "chip_size_effect": Hidden(
+        "exponent", lambda r, _: {"exponent": drawn_size(r, 0.06, 0.35)}, _size_effect
+    ),
     "tool_deflection": Hidden(
+        "kx_n_um ky_n_um",
         lambda r, _: {"kx_n_um": drawn_size(r, 1.5, 12.0), "ky_n_um": drawn_size(r, 1.5, 12.0)},
         lambda s, p: replace(s, stiffness=(p["kx_n_um"] * N_UM, p["ky_n_um"] * N_UM)),
     ),
     "orbit_stiffness": Hidden(
+        "amplitude phase_deg",
         lambda r, _: {"amplitude": drawn_size(r, 0.03, 0.25), "phase_deg": drawn_angle(r)},
         lambda s, p: replace(s, orbit_stiffness=(p["amplitude"], p["phase_deg"] * DEG)),
     ),
-    "pitch_error": Hidden(_pitch, _angles),
+    "pitch_error": Hidden("pitch_deg[]", _pitch, _angles),
     "dynamometer_rotation": Hidden(
+        "angle_deg",
         lambda r, _: {"angle_deg": drawn_signed(r, 0.7, 8.0)},
         lambda s, p: _sensor(s, rotation=s.dynamometer.rotation + p["angle_deg"] * DEG),
     ),
     "dynamometer_resonance": Hidden(
+        "frequency_hz[3] damping[3]",
         _resonance,
         lambda s, p: _sensor(s, resonance=tuple(zip(p["frequency_hz"], p["damping"], strict=True))),
     ),
     "charge_drift": Hidden(
+        "slope_n_s[3]? time_constant_s[3]?",
         _drift,
         lambda s, p: _sensor(
             s,
@@ -129,26 +145,32 @@ EFFECTS: Mapping[str, Hidden[Session]] = {
     ),
     # outside of any library
     "chipped_tooth": Hidden(
-        lambda r, s: {"tooth": int(r.integers(s.tool.teeth)), "length_um": drawn_size(r, 8.0, 60.0)}, _chipped
+        "tooth length_um",
+        lambda r, s: {"tooth": int(r.integers(s.tool.teeth)), "length_um": drawn_size(r, 8.0, 60.0)},
+        _chipped,
     ),
     "hard_spot": Hidden(
+        "ktc_step from_share",
         lambda r, _: {
             "ktc_step": drawn_signed(r, 0.04, 0.15),
             "from_share": round(float(r.uniform(0.3, 0.7)), 2),
         },
         lambda s, p: replace(s, hard_spot=p["ktc_step"], hard_from=p["from_share"]),
     ),
-    "speed_dependence": Hidden(lambda r, _: {"exponent": drawn_size(r, 0.05, 0.3)}, _speed),
+    "speed_dependence": Hidden("exponent", lambda r, _: {"exponent": drawn_size(r, 0.05, 0.3)}, _speed),
     "sensor_lag": Hidden(
+        "time_constant_ms",
         lambda r, _: {"time_constant_ms": drawn_size(r, 0.03, 0.5)},
         lambda s, p: _sensor(s, lag=p["time_constant_ms"] * MS),
     ),
     "second_orbit_stiffness": Hidden(
+        "amplitude phase_deg",
         lambda r, _: {"amplitude": drawn_size(r, 0.03, 0.25), "phase_deg": drawn_angle(r)},
         lambda s, p: replace(s, orbit_stiffness=(p["amplitude"], p["phase_deg"] * DEG), orbit_harmonic=2),
     ),
-    "slow_growth": Hidden(lambda r, _: {"growth_um": drawn_size(r, 10.0, 120.0)}, _warm),
+    "slow_growth": Hidden("growth_um", lambda r, _: {"growth_um": drawn_size(r, 10.0, 120.0)}, _warm),
     "tilted_surface": Hidden(
+        "rise_um_mm",
         lambda r, _: {"rise_um_mm": drawn_signed(r, 1.0, 12.0)},
         lambda s, p: replace(s, tilt=p["rise_um_mm"] * UM / MM),
     ),
@@ -188,37 +210,46 @@ def _spacing(rng: np.random.Generator, machine: Machine) -> Parameters:
 
 
 BOUNDARY_EFFECTS: Mapping[str, Hidden[Machine]] = {
-    "missing_mode": Hidden(_missing, _with_mode),
+    "missing_mode": Hidden("frequency_hz damping stiffness_n_um axis=x|y", _missing, _with_mode),
     "process_damping": Hidden(
+        "coefficient_n_mm",
         lambda r, _: {"coefficient_n_mm": drawn_size(r, 15.0, 900.0)},
         lambda m, p: replace(m, ploughing=p["coefficient_n_mm"] * (N_MM / (0.5 * m.diameter))),
     ),
     "mode_coupling": Hidden(
+        "angle_deg",
         lambda r, _: {"angle_deg": drawn_signed(r, 4.0, 60.0)},
         lambda m, p: replace(m, turned=p["angle_deg"] * DEG),
     ),
     "spindle_speed_softening": Hidden(
+        "change_per_krpm",
         lambda r, m: {"change_per_krpm": drawn_signed(r, 20.0 / m.fast, 400.0 / m.fast)},
         lambda m, p: replace(m, softening=p["change_per_krpm"] / 1000.0),
     ),
     # outside of any library
     "speed_dependence": Hidden(
+        "exponent reference_rpm",
         lambda r, m: {"exponent": drawn_signed(r, 0.1, 1.5), "reference_rpm": round(0.7 * m.fast)},
         lambda m, p: replace(m, speed_exponent=p["exponent"], speed_reference=p["reference_rpm"]),
     ),
     "speed_damping": Hidden(
+        "growth_per_krpm",
         lambda r, m: {"growth_per_krpm": drawn_size(r, 100.0 / m.fast, 3000.0 / m.fast)},
         lambda m, p: replace(m, damping_growth=p["growth_per_krpm"] / 1000.0),
     ),
     "yielding_with_depth": Hidden(
+        "loss_per_mm",
         lambda r, m: {"loss_per_mm": drawn_size(r, 0.03 / (m.level / MM), 0.8 / (m.level / MM))},
         lambda m, p: replace(m, yielding=p["loss_per_mm"] / MM),
     ),
     "wrong_labels": Hidden(
-        lambda r, _: {"share": drawn_size(r, 0.03, 0.3)}, lambda m, p: replace(m, mislabelled=p["share"])
+        "share",
+        lambda r, _: {"share": drawn_size(r, 0.03, 0.3)},
+        lambda m, p: replace(m, mislabelled=p["share"]),
     ),
-    "uneven_pitch": Hidden(_spacing, _uneven),
+    "uneven_pitch": Hidden("pitch_deg[]", _spacing, _uneven),
     "tool_runout": Hidden(
+        "radius_um angle_deg",
         lambda r, m: {
             "radius_um": drawn_size(r, 0.15 * m.feed / UM, 1.5 * m.feed / UM),
             "angle_deg": drawn_angle(r),

@@ -1,7 +1,7 @@
 """Chatter tests by brute force: modes of the tip marched through a slot, straight or along a whole orbit.
 
 All tests march together. Each keeps the surface that the teeth left, direction by direction, in a frame that
-moves with the tool: a tooth cuts what stands beyond the surface, and none where it has jumped clear of it.
+moves with the tool: a tooth cuts what lies beyond the surface, and nothing where it has jumped clear of it.
 """
 
 from __future__ import annotations

@@ -152,7 +152,7 @@ def _helical(cut: Cut, orbit: Orbit, t: Array, force: Array) -> Array:
 
 
 def scattered(coefficients: Coefficients, relative: float, rng: np.random.Generator) -> Coefficients:
-    """Return coefficients as they are in one run: each is off by a relative standard deviation."""
+    """Return coefficients as they are in one run: each scatters by a relative standard deviation."""
     names = ("ktc", "krc", "kac", "kte", "kre", "kae", "kfac", "kfae")
     factors = 1.0 + relative * rng.standard_normal(len(names))
     changed = {name: getattr(coefficients, name) * f for name, f in zip(names, factors.tolist(), strict=True)}

@@ -1,7 +1,7 @@
 """Cutting tests of a tool on a flexible structure, marched in time: chatter grows until teeth leave the cut.
 
 All tests march together. Each keeps the surface that all passes before left, direction by direction, in a
-frame that moves with the tool: a tooth cuts what stands beyond the surface, and none where it has jumped
+frame that moves with the tool: a tooth cuts what lies beyond the surface, and nothing where it has jumped
 clear of it. The modes move exactly under a force held over a step; the force held is that of the middle of
 the step, extrapolated from the two before, so that the march is of second order.
 """
@@ -37,7 +37,7 @@ class Trials:
     ploughing : process damping, its coefficient over the tool's radius, N/m²: a tooth that moves into the
         work at v is pushed back by this, times depth and v over the spindle's angular speed.
     strength : (n,) or one: how many times the force of the chip is that of the law.
-    uneven : (N,) how far teeth stand from their even pitch, rad, clockwise; to the next step of the march.
+    uneven : (N,) how far teeth are from their even pitch, rad, clockwise; to the next step of the march.
     """
 
     modes: tuple[Modes, Modes]
@@ -111,7 +111,7 @@ def march(trials: Trials, turns: int, per_turn: int, seed: int = 0) -> History:
 
 
 def _teeth(trials: Trials, per_turn: int) -> tuple[np.ndarray, Array]:
-    """Return where the teeth stand (N,), in steps, and the feed (N,), m, since the one before passed by."""
+    """Return the places of the teeth (N,), in steps, and the feed (N,), m, since the one before passed by."""
     tooth = np.arange(trials.teeth) * (per_turn // trials.teeth)
     if not trials.uneven:
         return tooth, np.full(trials.teeth, trials.feed)
@@ -139,7 +139,7 @@ def cleared(surface: Array, at: np.ndarray, reach: Array, advance: Array) -> Arr
     """Chip thickness (n, N), m, of teeth that reach so far in directions ``at``; leaves the new surface.
 
     ``surface`` (n, directions) is where all earlier passes left it, in a frame that has moved by ``advance``
-    since the last of them. Where the tool has passed by, nothing is left that it could meet.
+    since the last of them. Where the tool has passed by, there is no material that it could meet.
     """
     ahead = advance > 0.0
     old = surface[:, at] - advance

@@ -20,7 +20,8 @@ class Scanner:
     ----------
     spacing, sigma : m. to_work : (4, 4), mm.
     height_error, tilt_error : of registration, standard deviations, m and rad.
-    correlated : share of the noise's variance that is correlated over about 1 mm; the rest is white.
+    correlated : share of the noise's variance that is correlated over about 1 mm; the remaining noise is
+    white.
     distortion : m, how much too high a plane reads in u³, u²v, uv² and v³, u, v in −1…1 over the face.
     """
 

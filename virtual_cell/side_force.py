@@ -84,7 +84,7 @@ def full_cut(cut: SideCut) -> Array:
 def side_force(
     cut: SideCut, give: Callable[[Array], float], *, speed_error: float, phase: float
 ) -> SideForce:
-    """Force of a cut at the radial depth that is left where the wall stands proud by ``give(force)``, m.
+    """Force of a cut at the remaining radial depth where the wall stands proud by ``give(force)``, m.
 
     ``force`` (3,) is the mean in full cut, feed frame. ``speed_error`` relative, of the spindle.
     """

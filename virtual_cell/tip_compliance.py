@@ -37,11 +37,13 @@ def tip_compliance(
     from scipy.interpolate import RectBivariateSpline
 
     grid = [np.linspace(0.0, extent, n) for extent, n in zip(size, _GRID, strict=True)]
-    found, turned = np.empty((*_GRID, 3, 3)), np.eye(3) if turn is None else turn
+    compliance, turned = np.empty((*_GRID, 3, 3)), np.eye(3) if turn is None else turn
     q = near
     for i, x in enumerate(grid[0]):
         for j, y in enumerate(grid[1]):
             q = arm.reach(turned @ np.array([x, y, 0.0]) + origin, axes, q)
-            found[i, j] = turned.T @ np.column_stack([arm.yields(q, unit) for unit in turned.T])
-    splines = [RectBivariateSpline(*grid, found[:, :, i, j], kx=3, ky=3) for i in range(3) for j in range(3)]
+            compliance[i, j] = turned.T @ np.column_stack([arm.yields(q, unit) for unit in turned.T])
+    splines = [
+        RectBivariateSpline(*grid, compliance[:, :, i, j], kx=3, ky=3) for i in range(3) for j in range(3)
+    ]
     return lambda points: np.stack([s.ev(*points.T) for s in splines], axis=-1).reshape(-1, 3, 3)

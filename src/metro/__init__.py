@@ -1,3 +1,3 @@
-"""Closed-loop metrology for robotic machining: predict, compare, trace what is left to its cause."""
+"""Closed-loop metrology for robotic machining: predict, compare, trace the remaining error to its cause."""
 
 __version__ = "0.1.0"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +13,7 @@ from typer.core import TyperGroup
 from metro import __version__
 from metro.commands.completion import batches, effects, observables
 from metro.commands.hidden import Style
-from metro.commands.stage_calls import campaign, identify, ingest, loop, predict, report
+from metro.commands.stage_calls import campaign, identify, ingest, loop, predict, report, verdict
 
 STAGES = "Stages, in their order (called by snakemake)"
 
@@ -71,19 +72,26 @@ def main(
 def check(
     folders: Annotated[list[str], typer.Argument(help="Batches: their names, or folders of raw files.")],
     cells: Cells = Path("config/cells"),
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Look at the tables and the first rows of each file alone.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Check batches against the data contract, before anything is computed.
 
-    Prints what is there, what can be computed from it, what is missing for the rest, and every error with its
-    file, row and column; alike errors of many rows as one. Takes seconds and changes nothing. The exit code
-    is 1 when a batch has an error, 2 when a folder is none.
+    Prints what can be computed, what is missing for more, and every error with its file, row and column;
+    alike errors of many rows as one. Every file is read as the pipeline reads it, and nothing is changed: a
+    batch that passes ends with a report. The exit code is 1 when a batch has an error, 2 when a folder is
+    none.
 
     Example: `metro check data/raw/*`
     """
     from metro.commands.check import check_batches
+    from metro.stages.contradictions import contradictions
+    from metro.stages.whole import check_whole
 
-    raise typer.Exit(check_batches(folders, cells, as_json))
+    one = partial(check_whole, cells=cells, quick=quick, also=contradictions)
+    raise typer.Exit(check_batches(folders, one, as_json))
 
 
 @app.command("new-batch")
@@ -105,6 +113,35 @@ def new_batch(
         typer.echo(json.dumps({"batch": name, "folder": str(folder)}))
         return
     typer.echo(f"{folder} is there. Fill it in, then call: metro check {folder}")
+
+
+@app.command("import")
+def import_(
+    files: Annotated[
+        list[Path], typer.Argument(help="Files of any program: records, FRFs, scans, profiles.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="The batch's folder, which must not be there yet: data/raw/NAME.")
+    ] = None,
+    given: Annotated[
+        list[str] | None, typer.Option("--set", "--run-column", help="An answer: KEY=VALUE, unit.force=N.")
+    ] = None,
+    cells: Cells = Path("config/cells"),
+) -> None:
+    """Look at files that nobody has described, and make a batch of them.
+
+    Shows columns, units and courses; proposes how the files are read; asks what decides a number and no file
+    says, or lists these questions where nobody can answer. Writes the folder with a comment at all that was
+    guessed, and checks it.
+
+    Example: `metro import cuts.mat --set unit.force=N --run-column axial_depth_mm={record}`
+    """
+    from metro.commands.import_files import import_files
+    from metro.stages.contradictions import contradictions
+    from metro.stages.whole import check_whole
+
+    one = partial(check_whole, cells=cells, also=contradictions)
+    raise typer.Exit(import_files(files, out, given or [], one))
 
 
 @app.command()
@@ -277,9 +314,9 @@ def frf_export(
     from metro.commands.which import processed_folder
     from metro.stages.frf_export import frf_export as write
 
-    told = write(processed_folder(batch), out, position)
-    typer.echo(json.dumps({"file": str(out), "told": told}) if as_json else "\n".join(told))
+    summary = write(processed_folder(batch), out, position)
+    typer.echo(json.dumps({"file": str(out), "told": summary}) if as_json else "\n".join(summary))
 
 
-for stage in (ingest, identify, predict, loop, report, campaign):
+for stage in (ingest, identify, predict, loop, verdict, report, campaign):
     app.command(rich_help_panel=STAGES)(stage)

@@ -16,7 +16,17 @@ from metro import syntax
 
 ROOT = Path(__file__).parent
 PACKAGE = "metro"
-PLUGINS = "metro.effects"  # finds its modules by itself, so that no import statement names them
+PLUGINS = "metro.effects"
+# Modules that find others by themselves, so that no import statement names these: where they look.
+FINDERS = {
+    "metro.effects.library": "effects/**/*.py",
+    "metro.observables.registry": "observables/*/observable.py",
+    "metro.observables.catalogue": "observables/*/description.py",
+}
+LOADING = {
+    "metro.effects.library",
+    "metro.batch.known",
+}  # modules that load what other packages offer as effects
 
 
 class ChangedCodeError(RuntimeError):
@@ -42,11 +52,25 @@ def code_hash(stage: str) -> str:
     start = f"{PACKAGE}.stages.{stage}"
     if _file(start) is None:
         raise FileNotFoundError(f"no stage {stage!r}: {PACKAGE}/stages/{stage}.py is not there")
-    modules = imported_modules(start)
+    return hash_of(start)
+
+
+def hash_of(*starts: str) -> str:
+    """Return the hash of the code of some modules and of all that they use inside the package.
+
+    Parameters
+    ----------
+    starts : dotted names of modules of the package.
+
+    Returns
+    -------
+    64 hexadecimal digits.
+    """
+    modules = imported_modules(*starts)
     parts = [f"{name} {syntax.of_file(path).digest}" for name, path in sorted(modules.items())]
     folders = sorted({path.parent for path in modules.values()})
     parts += [f"{path.relative_to(ROOT)} {_sha256(path.read_bytes())}" for path in _data_files(folders)]
-    if PLUGINS in modules:
+    if not LOADING.isdisjoint(modules):
         parts += _installed_plugins()
     syntax.remember()
     return _sha256("\n".join(parts).encode())
@@ -64,26 +88,26 @@ def require_code(stage: str, planned: str) -> None:
         raise ChangedCodeError("the code changed since the workflow was planned: call snakemake again")
 
 
-def imported_modules(start: str) -> dict[str, Path]:
-    """Return the modules of the package that ``start`` needs, itself included: dotted name → file.
+def imported_modules(*starts: str) -> dict[str, Path]:
+    """Return the modules of the package that some modules need, themselves included: dotted name → file.
 
-    Imports inside functions count. Importing a module counts the packages that hold it, and ``metro.effects``
-    is counted whole as soon as anything of it is imported.
+    Imports inside functions count. Importing a module counts the packages that hold it, and what a module
+    finds by itself (``FINDERS``) counts as imported by it.
     """
-    found: dict[str, Path] = {}
+    modules: dict[str, Path] = {}
     seen: set[str] = set()  # most names are named often, and many are no module
-    waiting = [start]
+    waiting = list(starts)
     while waiting:
         name = waiting.pop()
         path = None if name in seen else _file(name)
         seen.add(name)
         if path is None:
             continue
-        found[name] = path
+        modules[name] = path
         waiting += [*_parents(name), *_imports(path, name)]
-        if name == PLUGINS:
-            waiting += [_dotted(module) for module in sorted(path.parent.rglob("*.py"))]
-    return found
+        if name in FINDERS:
+            waiting += [_dotted(module) for module in sorted(ROOT.glob(FINDERS[name]))]
+    return modules
 
 
 def _imports(path: Path, name: str) -> Iterator[str]:
@@ -103,10 +127,10 @@ def _parents(name: str) -> Iterator[str]:
 
 def _file(name: str) -> Path | None:
     """Return the file of a dotted name; None where it names no module of the package but, say, a function."""
-    package, *rest = name.split(".")
+    package, *parts = name.split(".")
     if package != PACKAGE:
         return None
-    base = ROOT.joinpath(*rest)
+    base = ROOT.joinpath(*parts)
     candidates = (base / "__init__.py", base.with_suffix(".py"))
     return next((path for path in candidates if path.is_file()), None)
 

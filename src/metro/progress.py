@@ -1,10 +1,10 @@
-"""What snakemake says while it works: a line for each finished step, a bar, and the causes of failures last.
+"""What snakemake shows while it works: a line for each finished step, a bar, the causes of failures last.
 
-The bar stands from the first step on, says which are at work, and counts steps by the time that they take:
-with each step as one it would stand still where nearly all of the time goes.
+The bar is shown from the first step on, names the steps at work, and counts steps by the time that they take:
+if each step counted as one, the bar would stand still where nearly all of the time goes.
 
-Its own log, with everything that it has to say, is in ``.snakemake/log`` all the same; a dry run says what it
-always does, and so does a call that asks for more (``--verbose``, ``--printshellcmds``).
+Snakemake's own complete log is in ``.snakemake/log`` all the same. A dry run shows what it always does, and
+so does a call that asks for more (``--verbose``, ``--printshellcmds``).
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 STREAM = "DefaultStreamHandler"  # the name of snakemake's handler that writes to the terminal
-# Parts of what is worth saying of what is said without an event: what one asked for, and where jobs went.
+# Parts of the messages without an event that are shown: what was asked for, and where jobs were submitted.
 SAID = ("Nothing to be done", "Congratulations", "has been submitted")
 SAID_LAST = (
     "Exiting because",
     "CalledProcessError",
-)  # beginnings of what the logs of failed steps say better
+)  # beginnings of messages whose cause the logs of failed steps show better
 # Typical seconds of a step, by its rule; what is not named takes none.
-SECONDS = {"ingest": 1, "identify": 4, "predict": 3, "loop": 34, "report": 4, "campaign": 5}
+SECONDS = {"ingest": 1, "identify": 4, "predict": 3, "loop": 34, "verdict": 1, "report": 4, "campaign": 5}
 MOST_SHOWN = 2  # steps at work that the bar names
-PACE = 3600.0  # s over which the speed is taken that tells what is left: a step may take minutes
+PACE = 3600.0  # s over which the speed is averaged for the remaining time: a step may take minutes
 
 
 def show_progress(
@@ -41,7 +41,7 @@ def show_progress(
     Parameters
     ----------
     settings : ``output_settings`` of the workflow.
-    shorten : what to say of the lines of a failed step's log.
+    shorten : selects the lines of a failed step's log that are shown.
     """
     if settings.dryrun or settings.verbose or settings.debug_dag or settings.printshellcmds:
         return
@@ -56,7 +56,7 @@ def show_progress(
 
 @dataclass(frozen=True)
 class Step:
-    """A step: what its message says of it, its name beside the bar, its rule, and when it began."""
+    """A step: its message, its name beside the bar, its rule, and when it began."""
 
     words: str
     name: str = ""
@@ -92,29 +92,29 @@ class ProgressHandler(logging.Handler):
         self._failures: dict[int, tuple[str, list[str]]] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show a record, or keep what it tells for a later one."""
-        told: Any = record
+        """Show a record, or keep its content for a later one."""
+        details: Any = record
         event = str(getattr(record, "event", None))
         if event == "run_info":
             self._planned = getattr(record, "stats", {})
         elif event == "job_info":
-            self._begin(told.jobid, _step(told))
+            self._begin(details.jobid, _step(details))
         elif event == "job_finished":
-            self._finished.append(told.job_id)
-            self._at_work.pop(told.job_id, None)
-            self._failures.pop(told.job_id, None)  # it was tried again
+            self._finished.append(details.job_id)
+            self._at_work.pop(details.job_id, None)
+            self._failures.pop(details.job_id, None)  # it was tried again
         elif event == "progress":
-            self._progress(told.done, told.total)
+            self._progress(details.done, details.total)
         elif event == "job_error":
-            words = self._steps.get(told.jobid, Step(told.rule_name)).words
-            self._at_work.pop(told.jobid, None)
-            self._failures[told.jobid] = (words, [str(log) for log in told.log])
+            words = self._steps.get(details.jobid, Step(details.rule_name)).words
+            self._at_work.pop(details.jobid, None)
+            self._failures[details.jobid] = (words, [str(log) for log in details.log])
             self._say(f"failed: {words}")
         elif self._is_worth_saying(record):
             self._say(self.format(record))
 
     def close(self) -> None:
-        """Say last what made steps fail: the last lines of a terminal are those that are read."""
+        """Show last what made steps fail: the last lines of a terminal are those that are read."""
         self._bar.stop()
         for words, logs in self._failures.values():
             self._say(f"\n{words}: failed")
@@ -166,9 +166,9 @@ class ProgressHandler(logging.Handler):
             self._console.print(escape(text))
 
 
-def _step(told: Any) -> Step:
+def _step(job: Any) -> Step:
     """Return the step that begins, named by its batch and stage."""
-    batch = (getattr(told, "wildcards", None) or {}).get("batch")
-    stage = "summary" if told.rule_name == "campaign" else told.rule_name
+    batch = (getattr(job, "wildcards", None) or {}).get("batch")
+    stage = "summary" if job.rule_name == "campaign" else job.rule_name
     name = f"{batch}: {stage}" if batch else stage
-    return Step(told.rule_msg or told.rule_name, name, told.rule_name)
+    return Step(job.rule_msg or job.rule_name, name, job.rule_name)

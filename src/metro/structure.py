@@ -1,4 +1,4 @@
-"""The machine's stiffness in the cut, relative to what static load tests say of it."""
+"""The machine's stiffness in the cut, relative to that of static load tests."""
 
 from __future__ import annotations
 

@@ -16,6 +16,7 @@ from functools import cache
 from pathlib import Path
 
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+FORM = 2  # of what is kept; another one where other things are made of a source
 MOST = 5000  # modules that are kept: more are left from versions of long ago
 
 Entry = tuple[str, list[tuple[int, str, list[str]]]]
@@ -43,7 +44,7 @@ def of_file(path: Path) -> Syntax:
     """
     content = path.read_bytes()
     # a syntax tree is that of a version of Python
-    key = f"{sys.version_info.major}.{sys.version_info.minor} {hashlib.sha256(content).hexdigest()}"
+    key = f"{FORM} {sys.version_info.major}.{sys.version_info.minor} {hashlib.sha256(content).hexdigest()}"
     if key not in _known():
         _known()[key] = _parsed(content, path)
     digest, imports = _known()[key]
@@ -69,6 +70,9 @@ def _parsed(content: bytes, path: Path) -> Entry:
     tree = ast.parse(content, filename=str(path))
     imports: list[tuple[int, str, list[str]]] = []
     for node in ast.walk(tree):
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            node.body = [ast.Pass()]  # what only a type checker reads never runs
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             imports += [(0, alias.name, []) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -86,13 +90,13 @@ def _known() -> dict[str, Entry]:
 @cache
 def _kept() -> dict[str, Entry]:
     try:
-        found: dict[str, Entry] = json.loads(_file().read_bytes())
+        entries: dict[str, Entry] = json.loads(_file().read_bytes())
         return {
             str(key): (
                 str(digest),
                 [(int(level), str(source), [*map(str, names)]) for level, source, names in imports],
             )
-            for key, (digest, imports) in found.items()
+            for key, (digest, imports) in entries.items()
         }
     except (OSError, ValueError, TypeError, AttributeError, RuntimeError):  # none yet, damaged, or no home
         return {}

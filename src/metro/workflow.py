@@ -29,17 +29,17 @@ LAST = {
     "ingest": "data/processed/{batch}/batch.json",
     "identify": "data/processed/{batch}/identified.json",
     "predict": "data/processed/{batch}/prediction.parquet",
-    "loop": "reports/{batch}/verdict.json",
+    "loop": "data/processed/{batch}/findings.json",
+    "verdict": "reports/{batch}/verdict.json",
     "report": "reports/{batch}/report.pdf",
 }
-# What says that the summary is of all batches: without it the next call writes the summary again.
+# The mark that the summary covers all batches: without it the next call writes the summary again.
 COMPLETE = Path("logs/campaign.complete")
 
-# What a stage reads of config.yaml besides the section of its own name: the setting's name → where it stands.
+# What a stage reads of config.yaml besides the section of its own name: the setting's name → its place there.
 SHARED: dict[str, dict[str, tuple[str, ...]]] = {
     "ingest": {"holdout": ("holdout",)},
     "identify": {"model_form_budget": ("loop", "model_form_budget")},
-    "predict": {"model_form_budget": ("loop", "model_form_budget")},
 }
 
 
@@ -61,6 +61,7 @@ NEEDS = {
     "identify": Need(1500, 50, 60, 1.0),
     "predict": Need(1000, 0, 20, 0.1),
     "loop": Need(1500, 0, 120, 1.0),
+    "verdict": Need(500, 0, 5, 0),
     "report": Need(1000, 2, 20, 0.1),
     "campaign": Need(1000, 1, 20, 0.02),
 }
@@ -78,12 +79,12 @@ class Plan:
 
     Attributes
     ----------
-    found : name of a batch → where it is and what it consists of, in alphabetical order.
+    discovered : name of a batch → where it is and what it consists of, in alphabetical order.
     config : config.yaml with the sections that the command line replaces.
     cells : folder of the cells' descriptions.
     """
 
-    found: Mapping[str, FoundBatch]
+    discovered: Mapping[str, FoundBatch]
     config: JSON
     cells: str
 
@@ -99,24 +100,24 @@ class Plan:
         config = load_config(settings if settings.exists() else checkout / settings, overrides)
         cells = shared_cells(Path(config["cells"]), checkout)
         roots = [Path(root) for root in config["raw_roots"]]
-        found = {batch.name: batch for batch in discover(roots, cells)}
-        problems = [*cells_findings(cells), *_unnameable(found.values())]
-        if not found:
+        discovered = {batch.name: batch for batch in discover(roots, cells)}
+        problems = [*cells_findings(cells), *_unnameable(discovered.values())]
+        if not discovered:
             where = ", ".join(map(str, roots))
             problems.append(Finding("error", where, "holds no batch: no folder with a batch.yaml"))
         if problems:
             raise BatchError(problems)
-        return cls(found, config, str(cells))
+        return cls(discovered, config, str(cells))
 
     @property
     def batches(self) -> list[str]:
         """Names of all batches."""
-        return list(self.found)
+        return list(self.discovered)
 
     @property
     def any_batch(self) -> str:
         """Regular expression that matches the known batches and nothing else."""
-        return _any_of(self.found)
+        return _any_of(self.discovered)
 
     @property
     def shell_prefix(self) -> str:
@@ -125,11 +126,11 @@ class Plan:
 
     def folder(self, wildcards: Wildcards) -> str:
         """Folder of a batch."""
-        return str(self.found[wildcards.batch].folder)
+        return str(self.discovered[wildcards.batch].folder)
 
     def raw_files(self, wildcards: Wildcards) -> list[str]:
         """Every file that a batch consists of, one by one: a changed file in a folder would not be seen."""
-        return [str(path) for path in self.found[wildcards.batch].inputs]
+        return [str(path) for path in self.discovered[wildcards.batch].inputs]
 
     def settings(self, stage: str) -> str:
         """Return the settings that a stage uses, as JSON, so that changing any of them re-runs it."""
@@ -154,13 +155,13 @@ class Plan:
         """Megabytes of the raw files of a job's batch; of the job that has none, the number of batches."""
         name = getattr(wildcards, "batch", None)
         if name is None:
-            return float(len(self.found))
-        return sum(path.stat().st_size for path in self.found[name].inputs) / 1e6
+            return float(len(self.discovered))
+        return sum(path.stat().st_size for path in self.discovered[name].inputs) / 1e6
 
     def unfinished(self) -> dict[str, str]:
         """Return the batches that lack a result, each with the log of the stage that it stopped at."""
         stopped: dict[str, str] = {}
-        for batch in self.found:
+        for batch in self.discovered:
             written = {stage: Path(last.format(batch=batch)) for stage, last in LAST.items()}
             stage = next((stage for stage, path in written.items() if not path.exists()), None)
             stopped |= {batch: f"logs/{stage}/{batch}.log"} if stage else {}
@@ -171,7 +172,7 @@ class Plan:
         logs = self.unfinished()
         if not logs:
             return ""
-        finished = [f"reports/{batch}" for batch in self.found if batch not in logs]
+        finished = [f"reports/{batch}" for batch in self.discovered if batch not in logs]
         failed = [word for batch, log in logs.items() for word in ("--unfinished", f"{batch}={log}")]
         fixed = ["--processed", "data/processed", "--out", "reports", "--settings", self.settings("campaign")]
         return shlex.join(["metro", "campaign", *finished, *failed, *fixed, "--code", self.code("campaign")])
@@ -179,6 +180,11 @@ class Plan:
     def code(self, stage: str) -> str:
         """Return the hash of the code that a stage runs."""
         return code_hash(stage)
+
+
+def files_of(takes: Iterable[str], gives: Iterable[str]) -> str:
+    """Return the files that a job takes and gives, as JSON."""
+    return json.dumps({"takes": sorted(takes), "gives": list(gives)})
 
 
 def _any_of(names: Iterable[str]) -> str:
@@ -189,12 +195,12 @@ def _any_of(names: Iterable[str]) -> str:
     tails: dict[str, list[str]] = {}
     for name in names:
         tails.setdefault(name[:1], []).append(name[1:])
-    longer = "|".join(re.escape(head) + _any_of(rest) for head, rest in tails.items() if head)
+    longer = "|".join(re.escape(head) + _any_of(endings) for head, endings in tails.items() if head)
     return f"(?:{longer}){'?' if '' in tails else ''}" if longer else ""
 
 
-def _unnameable(found: Iterable[FoundBatch]) -> Iterator[Finding]:
+def _unnameable(discovered: Iterable[FoundBatch]) -> Iterator[Finding]:
     """Find files that no rule can name, because snakemake reads braces in a path as wildcards."""
-    for path in (str(path) for batch in found for path in batch.inputs):
+    for path in (str(path) for batch in discovered for path in batch.inputs):
         if "{" in path or "}" in path:
             yield Finding("error", path, "has a brace in its name, which snakemake cannot handle: rename it")

@@ -44,16 +44,16 @@ def test_blanks_are_nan_or_empty_text(tmp_path):
         (
             "2.5",
             '"2,5"',
-            'column axial_depth_mm: found "2,5", expected a number > 0 (a decimal takes a point',
+            'column axial_depth_mm: found "2,5", expected a number, 1e-5 to 2000 mm (a decimal takes a point',
         ),
-        ("2.5", "0", 'column axial_depth_mm: found "0", expected a number > 0'),
-        ("2.5", "deep", 'column axial_depth_mm: found "deep", expected a number > 0'),
-        ("2.5", "1_0", 'found "1_0", expected a number > 0'),
-        ("2.5", "inf", 'found "inf", expected a number > 0'),
-        ("2.5", "1e999", 'found "1e999", expected a number > 0'),
-        ("6000", "-6000", 'column spindle_rpm: found "-6000", expected a number > 0'),
-        (",1,", ",1.5,", 'column replicate: found "1.5", expected an integer ≥ 1'),
-        (",1,", ",0,", 'column replicate: found "0", expected an integer ≥ 1'),
+        ("2.5", "0", 'column axial_depth_mm: found "0", expected 1e-5 to 2000 mm: from ultra'),
+        ("2.5", "deep", 'column axial_depth_mm: found "deep", expected a number, 1e-5'),
+        ("2.5", "1_0", 'found "1_0", expected a number, 1e-5'),
+        ("2.5", "inf", 'found "inf", expected a number, 1e-5'),
+        ("2.5", "1e999", 'found "1e999", expected a number, 1e-5'),
+        ("6000", "-6000", 'column spindle_rpm: found "-6000", expected 1 to 500000 rpm: from'),
+        (",1,", ",1.5,", 'column replicate: found "1.5", expected an integer, 1 to 1000000'),
+        (",1,", ",0,", 'column replicate: found "0", expected 1 to 1000000'),
         (
             "slot",
             "slott",
@@ -177,3 +177,17 @@ def test_a_parquet_table_whose_text_is_no_unicode_is_refused_by_name(tmp_path):
     found = [str(finding) for finding in read_table(tmp_path, "runs")[1]]
     assert len(found) == 1
     assert found[0].startswith("runs.parquet: cannot be read as Parquet")
+
+
+@pytest.mark.parametrize(
+    ("header", "says"),
+    [
+        ("run,feed_mm", ["feed_mm: is not a known column", 'did you mean "feed_per_tooth_mm"']),
+        ("runs,spindle_rpm", ["run: is missing", 'did you mean "runs"']),
+    ],
+)
+def test_a_column_under_another_spelling_is_proposed(tmp_path, header, says):
+    (tmp_path / "runs.csv").write_text(f"{header}\n1,2\n")
+    _, findings = read_table(tmp_path, "runs")
+    text = "\n".join(map(str, findings))
+    assert [part for part in says if part not in text] == []

@@ -8,12 +8,13 @@ from metro.batch.columns import RUNS
 from metro.batch.documents import schema
 from metro.batch.findings import BatchError
 from metro.batch.template import new_batch
+from metro.observables.catalogue import capabilities
 
 
-def test_the_template_passes_its_own_check_and_says_what_to_fill_in(tmp_path):
-    report = check(new_batch(tmp_path, "my-cut"), tmp_path)
-    assert report.ok
-    assert not any(problem.severity == "warning" for problem in report.problems)
+def test_the_template_lacks_nothing_but_a_measurement_and_says_what_to_fill_in(tmp_path):
+    report = check(new_batch(tmp_path, "my-cut"), tmp_path, able=capabilities)
+    (problem,) = [problem for problem in report.problems if problem.severity != "note"]
+    assert "it holds no measurement" in problem.message
     missing = [entry for can in report.capabilities for entry in can.missing]
     assert "dynamometer files in runs.csv" in missing
     assert "tool.diameter_mm in batch.yaml" in missing
@@ -24,13 +25,21 @@ def test_every_key_of_the_contract_stands_in_the_template_and_is_valid_when_unco
     text = (folder / "batch.yaml").read_text()
     for key in schema("batch")["properties"]:
         assert re.search(rf"^(# )?{key}:", text, re.MULTILINE), key
+    section = re.search(r"^# files:\n((?:#  .*\n)+)", text, re.MULTILINE)
     for key in schema("batch")["properties"]["instruments"]["properties"]:
         assert re.search(rf"^#   {key}:", text, re.MULTILINE), key
     options = re.findall(r"^# ((?:  (?:# )?)?[a-z_]+: ?.*)$", text, re.MULTILINE)
     plain = [line for line in text.splitlines() if line and not line.startswith("#")]
+    options = [line for line in options if line.strip() not in ("files:", *map(str.strip, _bare(section[1])))]
+    options += ["files:", *_bare(section[1])]
     (folder / "batch.yaml").write_text("\n".join([*plain, *options]))
     assert set(yaml.safe_load("\n".join([*plain, *options]))) == set(schema("batch")["properties"])
     assert [str(problem) for problem in check(folder, tmp_path).problems if problem.severity != "note"] == []
+
+
+def _bare(text):
+    """Return commented lines without their mark."""
+    return [line.removeprefix("# ") for line in text.splitlines()]
 
 
 def test_the_examples_of_the_other_files_follow_the_contract(tmp_path):
@@ -46,7 +55,7 @@ def test_the_examples_of_the_other_files_follow_the_contract(tmp_path):
         (folder / f"hammer/{record}.csv").write_text(f"t_s,force_n,response\n{rows}")
     rows = "".join(f"{i},1,0\n" for i in range(20))
     (folder / "hammer/tip-y.csv").write_text(f"frequency_hz,real,imag\n{rows}")
-    report = check(folder, tmp_path)
+    report = check(folder, tmp_path, able=capabilities)
     assert [str(problem) for problem in report.problems if problem.severity != "note"] == []
     assert {"3 rows in impacts.csv", "4 rows in loads.csv"} <= set(report.there)
 

@@ -35,9 +35,9 @@ def test_a_run_is_a_row_group_and_is_read_alone(tmp_path):
 
 
 def test_provenance_stands_in_the_schema_metadata(tmp_path):
-    write_parts(tmp_path / "t.parquet", "scan", [], {"code": "abc"})
+    write_parts(tmp_path / "t.parquet", "scan", [], {"sources": "abc"})
     metadata = pq.read_schema(tmp_path / "t.parquet").metadata
-    assert metadata[b"metro.code"] == b"abc"
+    assert metadata[b"metro.sources"] == b"abc"
     assert b"metro.version" in metadata
 
 

@@ -72,7 +72,7 @@ def test_the_batch_s_own_cell_goes_before_the_shared_one(tmp_path):
         ("cell: kr160\narm: {dh: [[0, 90, 500, 250]]}", "expected a list of 6 lists of 4 numbers"),
         (
             "cell: kr160\njoint_stiffness_nm_rad: [1, 2, 3, 4, 5, 0]",
-            "joint_stiffness_nm_rad.5: found 0, expected a num",
+            "joint_stiffness_nm_rad.5: found 0, expected 1 to 1e10 Nm/rad",
         ),
         ("cell: kr160\njoint_stifness_nm_rad: [1]", 'did you mean "joint_stiffness_nm_rad"?'),
         ("cell: [", "cell.yaml: line 1:"),

@@ -10,6 +10,7 @@ from metro.batch.check import check, load
 from metro.batch.findings import BatchError
 from metro.batch.processed import COLUMNS, read_batch, write_batch
 from metro.batch.show import render
+from metro.observables.catalogue import capabilities
 from metro.workflow import Plan
 
 ROOT = Path(__file__).parents[2]
@@ -110,12 +111,19 @@ def test_a_dynamometer_that_is_not_declared_is_assumed_and_said_to_be(batch):
     assert load(batch, batch).batch.instrument("dynamometer")["reads"] == "work"
 
 
-def test_a_batch_without_runs_is_one(batch):
+def test_a_batch_without_runs_is_read_but_nothing_can_be_computed(batch):
     (batch / "runs.csv").unlink()
-    report = check(batch, batch)
-    assert report.ok
-    assert any("nothing was measured" in problem.message for problem in report.problems)
     assert load(batch, batch).batch.runs.empty
+    problems = check(batch, batch, able=capabilities).problems
+    (problem,) = [each for each in problems if each.severity == "error"]
+    assert "nothing can be computed from this batch: it holds no measurement" in problem.message
+
+
+def test_what_is_measured_and_cannot_be_used_is_named_with_what_it_lacks(batch):
+    edit(batch / "batch.yaml", ", helix_deg: 30", "")
+    (problem,) = [each for each in check(batch, batch, able=capabilities).problems if each.severity != "note"]
+    assert "nothing can be computed from this batch: force lacks tool.helix_deg" in problem.message
+    assert "flatness" not in problem.message
 
 
 def test_the_stations_of_the_cell_are_read_from_beside_it(batch, tmp_path):
@@ -139,7 +147,7 @@ def test_check_and_the_workflow_take_the_same_cell_in_a_folder_without_cells(bat
     edit(batch / "batch.yaml", "cell: bench", "cell: kr160")
     monkeypatch.chdir(batch.parent)
     plan = Plan.read(ROOT, {"raw_roots": ["."]})
-    assert plan.found["trial"].cell_file == ROOT / "config/cells/kr160.yaml"
+    assert plan.discovered["trial"].cell_file == ROOT / "config/cells/kr160.yaml"
     assert not [problem for problem in check(batch).problems if problem.column == "cell"]
     assert load(batch).batch.cell == load(batch, Path(plan.cells)).batch.cell
     assert "arm" in load(batch).batch.cell
@@ -164,7 +172,9 @@ def test_a_folder_that_is_no_batch_is_an_error(tmp_path):
 def test_what_is_printed_holds_every_problem_and_the_verdict(batch):
     edit(batch / "runs.csv", "r2,slot,6000", "r2,slot,fast")
     text = printed(check(batch, batch))
-    assert 'runs.csv: row 3 (r2): column spindle_rpm: found "fast", expected a number > 0' in text
+    assert (
+        'runs.csv: row 3 (r2): column spindle_rpm: found "fast", expected a number, 1 to 500000 rpm' in text
+    )
     assert "1 error, 1 note: the batch cannot be run until the errors are mended" in text
     assert "4 rows in runs.csv" in text
 

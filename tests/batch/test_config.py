@@ -26,7 +26,9 @@ def test_an_override_replaces_its_section_whole():
 
 
 def test_a_section_that_an_override_leaves_incomplete_is_an_error():
-    assert "holdout.seed: is missing, expected an integer ≥ 0" in fault(CONFIG, {"holdout": {"share": 0.5}})
+    assert "holdout.seed: is missing, expected an integer, 0 to 4294967295" in fault(
+        CONFIG, {"holdout": {"share": 0.5}}
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 import pytest
 
-from metro.batch.findings import BatchError, Finding, misspelt, shown, suggestion
+from metro.batch.findings import BatchError, Finding, misspelt, shown
+from metro.spelling import suggestion
 
 
 def test_a_finding_in_a_table_names_file_row_run_and_column():

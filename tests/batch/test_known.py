@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 from conftest import edit
 
-from metro.batch.documents import schema
-from metro.batch.known import FORMS
+from metro.batch.known import declarable, registry
 from metro.batch.manifest import read_manifest
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.law import EdgeLaw
-from metro.effects import library, told_of
-from metro.observables.force_model import ForceModel
+from metro.effects.library import library, with_declared
+from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem
-
-EFFECTS = schema("batch")["properties"]["known"]["properties"]
 
 
 def found(batch, known):
@@ -24,12 +21,9 @@ def found(batch, known):
 
 
 def test_the_names_are_those_of_the_library():
-    forms = {name: {frozenset(form) for form in forms} for name, forms in FORMS.items()}
-    library_forms = {name: set() for name in EFFECTS}
-    for effect in library():
-        if effect.name in EFFECTS:
-            library_forms[effect.name].add(frozenset((*effect.names, *effect.where)))
-    assert forms == library_forms
+    assert declarable() == registry(library())  # else call: python scripts/reference.py docs
+    assert "tool_runout" in declarable()
+    assert "chipped_tooth" not in declarable()  # what a residual is only like cannot be known
 
 
 @pytest.mark.parametrize(
@@ -124,6 +118,6 @@ def test_the_report_says_which_effect_the_base_model_could_not_be_told_of(known,
         SimpleNamespace(role="identify", condition=str(i), setting=SimpleNamespace(helix=None, start=i))
         for i in range(2)
     )
-    told = told_of(Problem("force", "N", 1.0, base, runs, np.full(6, 0.01)), known)
+    told = with_declared(Problem("force", "N", 1.0, base, runs, np.full(6, 0.01)), known)
     assert told.base == base
     assert told.notes == (note,)

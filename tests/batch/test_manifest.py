@@ -1,8 +1,9 @@
 import pytest
 from conftest import edit
 
+from metro.batch.axes import signed_axes
 from metro.batch.findings import errors
-from metro.batch.manifest import read_manifest, signed_axes, with_defaults
+from metro.batch.manifest import read_manifest, with_defaults
 
 IDENTITY = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"
 
@@ -18,15 +19,19 @@ def test_a_manifest_that_follows_the_contract_has_no_findings(batch):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("teeth: 4", "teeth: four", 'batch.yaml: tool.teeth: found "four", expected an integer ≥ 1'),
-        ("teeth: 4", "teeth: 0", "tool.teeth: found 0, expected an integer ≥ 1"),
-        ("diameter_mm: 10", "diameter_mm: -1", "tool.diameter_mm: found -1, expected a number > 0"),
+        ("teeth: 4", "teeth: four", 'batch.yaml: tool.teeth: found "four", expected an integer, 1 to 120'),
+        ("teeth: 4", "teeth: 0", "tool.teeth: found 0, expected 1 to 120: from single"),
+        (
+            "diameter_mm: 10",
+            "diameter_mm: -1",
+            "tool.diameter_mm: found -1, expected 0.02 to 2000 mm: from the finest",
+        ),
         (
             "diameter_mm: 10",
             "diameter: 10",
             'tool.diameter: is not a known key (did you mean "diameter_mm"?)',
         ),
-        ("helix_deg: 30", "helix_deg: 90", "tool.helix_deg: found 90, expected a number ≥ 0 and < 90"),
+        ("helix_deg: 30", "helix_deg: 90", "tool.helix_deg: found 90, expected 0 to 80 deg"),
         ("format: 1", "format: 2", "format: found 2, expected 1"),
         ("format: 1\n", "", "format: is missing, expected 1"),
         (
@@ -59,7 +64,7 @@ def test_a_manifest_that_follows_the_contract_has_no_findings(batch):
         ),
         (
             "hole_diameter_mm: 16",
-            "tool_axes_in_flange: [[2,0,0],[0,1,0],[0,0,1]]",
+            "tool_axes_in_flange: [[0.5,0,0],[0,1,0],[0,0,1]]",
             "not perpendicular unit vectors",
         ),
         (
@@ -70,7 +75,7 @@ def test_a_manifest_that_follows_the_contract_has_no_findings(batch):
         (
             "hole_diameter_mm: 16",
             "work: {size_mm: [10, 10, 0]}",
-            "work.size_mm.2: found 0, expected a number > 0",
+            "work.size_mm.2: found 0, expected 0.001 to 100000 mm",
         ),
         (
             "hole_diameter_mm: 16",
@@ -161,8 +166,8 @@ def test_a_comma_in_a_number_is_an_error_that_says_how_to_write_it(batch, writte
     edit(batch / "batch.yaml", "rate_hz: 1000", f"rate_hz: {written}, range_n: 5,000")
     found = [fault.split(": expected")[0] for fault in faults(batch)]
     assert found[0].startswith("batch.yaml: instruments.dynamometer.rate_hz: found ")
-    assert found[0].endswith(f"expected a number > 0: {hint}")
-    assert found[1].endswith('range_n: found "5,000", expected a number > 0: write 5000 or 5.000')
+    assert found[0].endswith(f"expected a number, 0.01 to 1e8 Hz: {hint}")
+    assert found[1].endswith('range_n: found "5,000", expected a number, 0.001 to 1e7 N: write 5000 or 5.000')
 
 
 def test_a_comma_that_parts_two_keys_is_left_alone(batch):

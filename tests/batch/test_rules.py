@@ -65,14 +65,18 @@ def test_rows_that_follow_the_contract_pass(tmp_path, name, text):
         ("loads", LOADS + "p1,,,,,,,1,2,3,9,0,,0.1,,\n", "column fz_n: is blank, expected a number"),
         ("loads", LOADS + "p1,,,,,,,1,2,3,9,0,0,,,\n", "dx_mm, dy_mm, dz_mm are all blank"),
         ("mass", MASS + "p,1,2,0,1,0,1\n", "is not positive definite"),
-        ("mass", MASS + "p,-1,0,0,1,0,1\n", 'column mxx: found "-1", expected a number > 0'),
+        ("mass", MASS + "p,-1,0,0,1,0,1\n", 'column mxx: found "-1", expected 1e-6 to 1000000 kg'),
         (
             "published",
             PUBLISHED + "4,Ktc,force,coefficient,,,N/mm2\n",
             "measured and predicted are both blank",
         ),
         ("published", PUBLISHED + "4,Ktc,force,coefficient,1,,\n", "column unit: is blank"),
-        ("stations", STATIONS + "1,0,0,0,1,2,0\n", 'column kz_n_um: found "0", expected a number > 0'),
+        (
+            "stations",
+            STATIONS + "1,0,0,0,1,2,0\n",
+            'column kz_n_um: found "0", expected 0.001 to 100000 N/µm',
+        ),
         (
             "stations",
             STATIONS + "1,0,0,0,1,2,3\n1,0,0,9,1,2,3\n",

@@ -8,9 +8,8 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import write_batch, write_json, write_table
-from metro.batch.provenance import FILE, record
+from metro.batch.provenance import FILE, STAGES, record, write_made
 
-STAGE = {"code": "c0de", "settings": "{}"}
 CELL = {"cell": "bench"}
 
 
@@ -83,15 +82,17 @@ def write_small_batch(root, name, ktc, tables, *, effects=(), status="clean"):
         runs.set_index("run"),
         {"identify": [], "validate": ["r1", "r2"], "how": "given"},
     )
-    write_batch(processed, batch, {**STAGE, "sources": json.dumps(sources)})
+    write_batch(processed, batch, {"sources": json.dumps(sources)})
     needed = {
         "modes": pd.DataFrame(),
         "prediction": pd.DataFrame({"run": ["r1"]}),
         "comparison": pd.DataFrame({"run": ["r1"]}),
     }
     for table, frame in {**needed, **tables}.items():
-        write_table(processed / f"{table}.parquet", frame, STAGE)
+        write_table(processed / f"{table}.parquet", frame)
     write_json(processed / "loop.json", {"format": 1, "batch": name, "observables": {}})
+    for stage in STAGES:
+        write_made(processed, stage, {}, "c0de")
     write_json(
         reports / "identified.json",
         {"format": 1, "batch": name, "force": {"mean": {"ktc": q(ktc, 5.0, "N/mm2")}}},

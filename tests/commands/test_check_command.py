@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from checkout import Checkout
 from typer.testing import CliRunner
 
 from metro.batch.template import new_batch
@@ -18,7 +19,7 @@ def check(tmp_path, monkeypatch):
     """Return a function that checks; in a folder with a sound batch, the bundled cells and no more."""
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "config", "config")
-    new_batch(Path("data/raw"), "sound")
+    Checkout(tmp_path).add_batch("sound")
     return lambda *given: CliRunner(env={"COLUMNS": "200"}).invoke(app, ["check", *given])
 
 
@@ -55,17 +56,18 @@ def test_a_key_that_is_wrong_leaves_the_table(check):
 
 
 def test_files_that_were_not_copied_are_one_line_and_counted_one_by_one(check):
-    table = Path("data/raw/sound/runs.csv")
+    new_batch(Path("data/raw"), "uncopied")
+    table = Path("data/raw/uncopied/runs.csv")
     header, *rows = table.read_text().splitlines()
     place = header.split(",").index("dynamometer")
     cells = [row.split(",") for row in rows]
     for number, row in enumerate(cells, 1):
         row[place] = f"force/r{number:02d}.csv"
     table.write_text("\n".join([header, *(",".join(row) for row in cells)]) + "\n")
-    result = check("sound")
+    result = check("uncopied")
     assert result.exit_code == 1
     assert f'runs.csv: rows 2–{len(rows) + 1}: column dynamometer: "force/r01.csv" (and' in result.stdout
     assert result.stdout.count("is not there") == 1
     assert f"{len(rows)} errors" in result.stdout
-    (report,) = json.loads(check("sound", "--json").stdout)
+    (report,) = json.loads(check("uncopied", "--json").stdout)
     assert sum(problem["severity"] == "error" for problem in report["problems"]) == len(rows)

@@ -5,7 +5,7 @@ import json
 import pandas as pd
 import pytest
 from rich.console import Console, Group
-from small_campaign import STAGE, q
+from small_campaign import q
 from typer.testing import CliRunner
 
 from metro.batch.processed import write_json, write_table
@@ -89,7 +89,7 @@ def two_observables(own_campaign):
     failed = {"check": "clipping", "value": 9.0, "limit": 3.0, "ok": False, "message": "saturated"}
     sound = {**failed, "ok": True, "message": ""}
     rows = [{**row, "file": f"force/r{i}.csv", "run": f"r{i}"} for i, row in enumerate((failed, sound), 1)]
-    write_table(processed / "qc.parquet", pd.DataFrame(rows), STAGE)
+    write_table(processed / "qc.parquet", pd.DataFrame(rows))
 
     def explain(*arguments):
         return CliRunner(env={"COLUMNS": "400"}).invoke(app, ["explain", "late", *arguments]).stdout

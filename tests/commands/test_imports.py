@@ -24,9 +24,9 @@ MODULES = {
     ),
     ("numpy",): ("commands.query", "commands.status", "dataset.results", "dataset.views"),
     ("numpy", "yaml"): ("workflow", "commands.simulate", "commands.verify"),
-    ("numpy", "pandas", "pyarrow"): ("commands.bars", "commands.explain"),
+    ("numpy", "pandas", "pyarrow"): ("commands.bars", "commands.explain", "stages.verdict"),
     ("numpy", "pandas", "pyarrow", "yaml"): (
-        *("commands.check", "commands.next_runs"),
+        *("commands.check", "commands.import_files", "commands.next_runs"),
         *(f"stages.{name}" for name in ("ingest", "identify", "predict", "loop", "report", "campaign")),
         "stages.frf_export",
     ),

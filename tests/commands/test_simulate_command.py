@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from metro.cli import app
-from metro.commands.hidden import EFFECTS, Style, hidden, parameters
+from metro.commands.hidden import Style, hidden, parameters, simulated
 from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
 from virtual_cell.blind import RECIPES
 from virtual_cell.face_effects import FACE_EFFECTS
@@ -22,6 +22,7 @@ from virtual_cell.recipes import arm_draws, boundary_draws, faces_draws, force
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
+    simulated()  # asks the simulator once, so that a test may replace it
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -48,7 +49,7 @@ class Simulator:
         self.there = [path.name for path in (self.folder / "data/raw").glob("[!.]*")]
         (self.folder / command[4] / "batch.yaml").write_text("format: 1\n")
         Path(command[command.index("--truth") + 1]).write_text("{}")
-        return SimpleNamespace(returncode=0, stderr="")
+        return SimpleNamespace(returncode=0, stdout="", stderr="")
 
 
 def test_the_truth_stands_outside_the_batch_and_the_raw_root(folder, monkeypatch):
@@ -140,10 +141,8 @@ def test_the_effects_and_their_parameters_are_those_of_the_simulator():
         "flatness": {effect: (one, faces_draws.drawn(rng, "a")) for effect, one in FACE_EFFECTS.items()},
         **dict.fromkeys(SHOWN, arm),
     }
-    assert {kind: set(effects) for kind, effects in EFFECTS.items()} == {
-        kind: set(recipe.effects) for kind, recipe in RECIPES.items()
-    }
-    for kind, effects in EFFECTS.items():
+    assert simulated() == {kind: recipe.effects for kind, recipe in RECIPES.items()}
+    for kind, effects in simulated().items():
         for effect in effects:
             one, subject = known[kind][effect]
             drawn, declared = one.draw(rng, subject), dict(parameters(effect, kind))
@@ -179,7 +178,17 @@ def test_a_batch_that_is_there_is_not_overwritten(folder):
 
 
 def test_without_the_simulator_it_says_what_to_install(monkeypatch):
+    simulated.cache_clear()
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     result = simulate("try")
     assert result.exit_code == 1
     assert "metro-machining" in result.stderr
+
+
+def test_a_simulator_that_fails_is_quoted(monkeypatch):
+    simulated.cache_clear()
+    failed = SimpleNamespace(returncode=1, stderr="Traceback\nMemoryError: 3 GB")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: failed)
+    result = simulate("try")
+    assert result.exit_code == 1
+    assert "could not say what it can hide: MemoryError: 3 GB" in result.stderr

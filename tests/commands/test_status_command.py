@@ -7,10 +7,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from checkout import Checkout
 from typer.testing import CliRunner
 
 from metro.batch.findings import ContractError
-from metro.batch.template import new_batch
 from metro.cli import app
 from metro.commands.status import planned
 
@@ -111,7 +111,7 @@ def unread(snakemake, own_campaign):
         shutil.rmtree(own_campaign / "data/raw" / name)
     shutil.copytree(ROOT / "config", own_campaign / "config")
     for name in ("late", "early"):
-        new_batch(own_campaign / "data/raw", name)
+        Checkout(own_campaign).add_batch(name)
     snakemake.stdout += "\ndata/processed/late/qc.parquet\t-\tingest\t\tmissing\tupdate pending"
     return own_campaign / "data/raw"
 

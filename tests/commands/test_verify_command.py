@@ -3,12 +3,11 @@
 import json
 import shutil
 
-import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
 from metro.batch.processed import COLUMNS, write_json, write_table
-from metro.batch.provenance import compare, record
+from metro.batch.provenance import STAGES, compare, record, write_made
 from metro.batch.tables import read_table
 from metro.cli import app
 from metro.codehash import code_hash
@@ -113,7 +112,7 @@ def test_other_settings_are_told(own_campaign):
     )
     (own_campaign / "config/config.yaml").write_text(text)
     found = json.loads(verify("--json").stdout)["differences"]
-    assert {d["name"] for d in found if d["kind"] == "settings"} >= {"ingest", "identify", "predict", "loop"}
+    assert {d["name"] for d in found if d["kind"] == "settings"} == {"ingest", "identify", "loop"}
 
 
 def test_the_digest_of_the_provenance_is_printed_to_be_kept_elsewhere(own_campaign):
@@ -148,19 +147,27 @@ def test_a_damaged_provenance_says_what_to_do(own_campaign, content):
 
 def test_the_record_names_code_and_settings_of_every_stage(own_campaign):
     made = json.loads((own_campaign / "reports/late/provenance.json").read_text())
-    assert list(made["stages"]) == ["ingest", "identify", "predict", "loop", "report"]
+    assert list(made["stages"]) == ["ingest", "identify", "predict", "loop", "verdict", "report"]
     assert all(stage == {"code": "c0de", "settings": {}} for stage in made["stages"].values())
     assert made["packages"]["numpy"]
     assert len(made["raw"]["force/r1.csv"]) == 64
 
 
-def test_a_stage_whose_table_is_not_there_is_left_out(own_campaign):
+def test_a_stage_that_ran_again_to_the_same_results_is_no_difference(own_campaign, monkeypatch):
+    monkeypatch.setattr("metro.commands.verify.code_hash", lambda stage: f"new {stage}")
+    write_made(own_campaign / "data/processed/late", "ingest", {}, "new ingest")
+    differences = json.loads(verify("--json").stdout)["differences"]
+    assert {d["name"] for d in differences} == {*STAGES, "report"} - {"ingest"}
+
+
+def test_a_stage_that_has_not_run_is_left_out(own_campaign):
     folder = own_campaign / "data/processed/late"
-    (folder / "prediction.parquet").unlink()
-    write_table(folder / "modes.parquet", pd.DataFrame(), {})
+    for stage in ("predict", "identify"):
+        (folder / f"{stage}.made.json").unlink()
     assert list(record(folder, own_campaign / "reports/late", {}, "c")["stages"]) == [
         "ingest",
         "loop",
+        "verdict",
         "report",
     ]
 

@@ -61,10 +61,10 @@ RECORDING = {
 # Kind of input → the columns of runs.csv that its batch fills.
 RUN_FILES = {
     "dynamometer": ("dynamometer",),
-    "robot_log": ("robot_log",),
+    "robot_log": ("robot_log", "idle_log"),
     "idle_log": ("robot_log", "idle_log"),
     "path": ("path", "dynamometer"),
-    "profile": ("profile",),
+    "profile": ("profile", "robot_log"),
     "scan": ("scan",),
     "runs.csv": ("dynamometer",),
     "batch.yaml": ("dynamometer",),
@@ -93,6 +93,8 @@ def write(folder, kind, form=""):
         (folder / "cell.yaml").write_text(CELL + "stations: stations.csv\n")
     if kind in ("impacts.csv", "hammer record", "FRF"):
         _impacts(folder, kind, form)
+    if kind in ("loads.csv", "mass.csv", "stations.csv", "cell.yaml"):
+        _impacts(folder, "FRF", "")  # of which something can be computed
     if kind in RUN_FILES:
         _runs(folder, kind, form)
 

@@ -60,7 +60,8 @@ def _frf():
     other = replaced("impacts.csv", "tip,1,1x,1x,2", "tip,1,5y,5y,2")
     return [
         case("conjugated", lambda t: t.assign(imag=-t["imag"]), "flagged", "conjugated", "left out"),
-        case("mm/N", times(1e3), "refused", "real", "mm/N"),
+        case("mm/N", times(1e3), "flagged", "13.2 g", "response_unit"),
+        case("µm/N", times(1e6), "refused", "real", "mm/N"),
         case(
             "frequencies in kHz",
             lambda t: t.assign(frequency_hz=t["frequency_hz"] / 1e3),

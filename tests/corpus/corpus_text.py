@@ -88,6 +88,11 @@ def _faults(kind, form, column):
     table = kind in TABLES
     must = REQUIRED.get(kind, column)
     row = "row 3" if table else "line 3"
+    alone = kind in (
+        "runs.csv",
+        "impacts.csv",
+        "published.csv",
+    )  # all that this sound batch has of measurements
     at = (row, column)
 
     def case(fault, edit, how="refused", says=()):
@@ -152,8 +157,8 @@ def _faults(kind, form, column):
         case(
             "no rows",
             lambda t: t.split("\n", 1)[0] + "\n",
-            either("flagged", "refused"),
-            either(["no rows"], ["expected"]),
+            "refused" if alone else either("flagged", "refused"),
+            ["nothing can be computed"] if alone else either(["no rows"], ["expected"]),
         ),
         case("a footer", lambda t: t + "End of file\n", "flagged" if kind == "runs.csv" else "refused"),
     ]

@@ -88,7 +88,7 @@ MANIFEST = {
     ),
     "tool axes of other lengths": (
         TOOL_AXES,
-        "[[0, 0, -2], [0, -1, 0], [-1, 0, 0]]",
+        "[[0, 0, -0.5], [0, -1, 0], [-1, 0, 0]]",
         "perpendicular",
         "expected",
     ),
@@ -154,7 +154,7 @@ MANIFEST = {
         "instruments:",
         "coefficients: {ktc_n_mm2: 9.58e+8}\ninstruments:",
         "ktc_n_mm2",
-        "9.58e+08",
+        "958000000",
         "expected",
     ),
     "a key twice": ("teeth: 4", "teeth: 4, teeth: 3", "teeth", "twice"),

@@ -20,6 +20,7 @@ from metro.stages.ingest import ingest
 from metro.stages.loop import loop
 from metro.stages.predict import predict
 from metro.stages.report import report
+from metro.stages.verdict import verdict
 
 ROOT = Path(__file__).parents[2]
 CODE = "0" * 64
@@ -39,6 +40,7 @@ STAGES = {
     "identify": lambda at: identify(at / PROCESSED, BUDGET, CODE),
     "predict": lambda at: predict(at / PROCESSED, BUDGET, CODE),
     "loop": lambda at: loop(at / PROCESSED, at / REPORTS, GATES, CODE),
+    "verdict": lambda at: verdict(at / PROCESSED, at / REPORTS, {}, CODE),
     "report": lambda at: report(at / PROCESSED, at / REPORTS, {}, CODE),
     "campaign": lambda at: campaign([at / REPORTS], at / "data/processed", at / "reports", {}, CODE),
 }

@@ -15,15 +15,17 @@ from metro.batch.processed import Processed, read_batch
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.law import EdgeLaw
 from metro.dynamics.stability_model import StabilityModel
-from metro.effects import library
-from metro.loop.search import Gates, search
-from metro.loop.verdict import comparison, held_out, judge
-from metro.observables import force
-from metro.observables.deformation_model import DeformationModel
-from metro.observables.flatness_model import FlatnessModel
-from metro.observables.force_model import ForceModel
-from metro.observables.joint_force_model import JointForceModel
-from metro.observables.waviness_model import WavinessModel
+from metro.effects.library import library
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.loop.verdict.verdict import judge
+from metro.observables.deformation.model import DeformationModel
+from metro.observables.flatness.model import FlatnessModel
+from metro.observables.force import observable as force
+from metro.observables.force.model import ForceModel
+from metro.observables.joint_force.model import JointForceModel
+from metro.observables.waviness.model import WavinessModel
 from metro.stages.ingest import ingest
 from virtual_cell.recipes.force import make
 
@@ -155,7 +157,7 @@ def test_pip_installs_it_as_the_page_says(package, tmp_path):
         [*command, "--target", tmp_path / "there", package], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    seen = "from metro.effects import library; print([e.name for e in library('force')])"
+    seen = "from metro.effects.library import library; print([e.name for e in library('force')])"
     assert seen in PAGE
     names = subprocess.run(
         [sys.executable, "-c", seen],

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from metro.batch.columns import TABLES
-from metro.effects import library
+from metro.effects.library import library
 
 ROOT = Path(__file__).parents[2]
 reference = runpy.run_path(str(ROOT / "scripts/reference.py"))
@@ -80,11 +80,11 @@ def test_a_key_without_a_meaning_is_an_error():
 @pytest.mark.parametrize(
     ("schema", "words"),
     [
-        ({"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}, "number > 0 and < 1"),
+        ({"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}, "a number > 0 and < 1"),
         ({"enum": ["yes", "no"]}, "`yes`, `no`"),
         (
             {"type": "array", "minItems": 3, "maxItems": 3, "items": {"type": "number"}},
-            "list of 3, each number",
+            "list of 3, each a number",
         ),
         ({"type": "array", "minItems": 1, "items": {"type": "string"}}, "list of 1 or more, each text"),
     ],

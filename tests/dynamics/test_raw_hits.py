@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from metro.observables.modal_test import observe_modes
+from metro.observables.stability.modal_test import observe_modes
 from virtual_cell.recipes.trimule import MODES
 from virtual_cell.roving import blows, receptance, some_shapes
 

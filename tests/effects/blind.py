@@ -4,11 +4,15 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from worded import in_words
+
 from metro.batch.processed import Processed, read_batch
-from metro.effects import library
-from metro.loop.search import Gates, search
-from metro.loop.verdict import comparison, held_out, judge
-from metro.observables import force
+from metro.effects.library import library
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.loop.verdict.verdict import judge
+from metro.observables.force import observable as force
 from metro.stages.ingest import ingest
 from virtual_cell.recipes.force import make
 
@@ -31,4 +35,4 @@ def closed(folder, effects, seed):
     task = force.problem(batch, observed, {})
     outcome = search(task, library("force"), GATES)
     rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
-    return outcome, judge(task, outcome, rows, GATES), batch.manifest["tool"]["teeth"]
+    return outcome, in_words(judge(task, outcome, rows, GATES)), batch.manifest["tool"]["teeth"]

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 from scipy.optimize import brentq
 
-from metro.observables.deformation_model import CutWall, DeformationModel, LoadTest
+from metro.observables.deformation.model import CutWall, DeformationModel, LoadTest
 from metro.observables.problem import Block, Problem
 from metro.robot.kinematics import Arm, arm_of_cell
 
@@ -107,7 +107,7 @@ def cut(order, role, place, size, *, truth, rng):
         zeros=np.ones((len(kept), 1)),
         zero_sd=np.array([2e-6]),
         coordinates={},
-        untold=0.01 * np.linalg.norm(known) * softness,
+        unidentified=0.01 * np.linalg.norm(known) * softness,
     )
 
 

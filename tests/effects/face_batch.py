@@ -12,8 +12,9 @@ from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
 from metro.batch.processed import COLUMNS
-from metro.loop.search import Gates
-from metro.observables import cutting_force, flatness
+from metro.loop.search.trial import Gates
+from metro.observables.cut import conditions as cutting_force
+from metro.observables.flatness import observable as flatness
 from metro.observables.problem import Problem
 
 GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)

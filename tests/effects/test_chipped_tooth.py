@@ -14,7 +14,7 @@ from metro.cutting.engagement import Engagement
 from metro.cutting.force import force_basis
 from metro.cutting.law import EdgeLaw
 from metro.effects.chipped_tooth import apply
-from metro.observables.force_model import ForceModel
+from metro.observables.force.model import ForceModel
 
 TOOL = Cutter(5e-3, math.radians(35), evenly_pitched(4))
 CUT = Cut(0.08e-3, 3e-3, Engagement(0.0, math.pi))
@@ -61,8 +61,8 @@ def test_force_of_a_chipped_tooth_is_that_of_slices(height, length):
 def test_applying_breaks_one_tooth_of_the_force_model_and_touches_nothing_else():
     model = ForceModel(TOOL, EdgeLaw())
     changed = apply(model, {"length_um": 30.0, "tooth": 2.2, "height_mm": 1.5})
-    assert changed.chipped == Chipped(2, pytest.approx(30e-6), pytest.approx(1.5e-3))
-    assert replace(changed, chipped=None) == model
+    assert changed.chipped == (Chipped(2, pytest.approx(30e-6), pytest.approx(1.5e-3)),)
+    assert replace(changed, chipped=()) == model
 
 
 def test_a_chipped_tooth_is_taken_for_nothing_of_the_library(tmp_path):

@@ -6,18 +6,19 @@ import numpy as np
 import pytest
 from face_batch import GATES, problem
 from scipy.stats import f
+from worded import in_words
 
-from metro.effects import library
 from metro.effects.effect import fitted_to
-from metro.loop import noise
-from metro.loop.candidate import Candidate
-from metro.loop.evidence import compare, dimmed, leave_out
-from metro.loop.fit import fit, score
-from metro.loop.noise import first_noise
-from metro.loop.search import search
-from metro.loop.signature import in_words, signature
-from metro.loop.verdict import parameters
-from metro.observables.face_setup import Setup
+from metro.effects.library import library, with_declared
+from metro.loop.checks.evidence import compare, dimmed, leave_out
+from metro.loop.checks.signature import places, signature
+from metro.loop.fitting import noise
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit, score
+from metro.loop.fitting.noise import first_noise
+from metro.loop.search.search import search
+from metro.loop.verdict.verdict import parameters
+from metro.observables.flatness.setup import Setup
 
 
 def tilted(dx, dy, **_cut):
@@ -89,6 +90,22 @@ def test_an_effect_comes_back_with_its_size_inside_its_interval(name, made, trut
         low, high = parameters(found, name)[parameter]["ci95"]
         assert low < value < high
         assert high - low < 1.5 * abs(value)
+
+
+def test_a_second_vibration_is_found_beside_the_declared_one_each_with_its_own_phases():
+    def twice(time, phase, **cut):
+        return swung(time, phase, **cut) + 12e-3 * np.sin(2 * np.pi * 0.7 * time + 2.0 - 3.0 * phase)
+
+    declared = {"path_vibration": {"frequency_hz": 1.7, "amplitude_um": 8.0}}
+    task = with_declared(problem(hidden=twice), declared)
+    base, prior = base_fit(task)
+    found = fit(Candidate(task.base, (effect_of(task, "path_vibration"),)), base.blocks, prior, base)
+    assert found.total > base.total + 8.0
+    assert {len(found.nuisance[block.run]) for block in task.role("identify")} == {2}
+    for parameter, value in {"frequency_hz": 0.7, "amplitude_um": 12.0}.items():
+        low, high = parameters(found, "path_vibration")[parameter]["ci95"]
+        assert low < value < high
+        assert high - low < 0.2 * value
 
 
 @pytest.mark.slow
@@ -211,4 +228,4 @@ def test_what_is_outside_the_library_is_described(made, words):
     base, _ = base_fit(problem(**made))
     lines = signature(base, 0.04)
     assert any(line.significant for line in lines)
-    assert words in in_words(lines)
+    assert words in in_words(places(lines))

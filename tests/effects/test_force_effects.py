@@ -19,13 +19,13 @@ from metro.effects import (
     chip_size_effect,
     dynamometer_resonance,
     dynamometer_rotation,
-    library,
     orbit_stiffness,
     pitch_error,
     tool_wear,
 )
-from metro.observables.dynamometer import Dynamometer, Recording, read
-from metro.observables.force_model import ForceModel
+from metro.effects.library import library
+from metro.observables.force.dynamometer import Dynamometer, Recording, read
+from metro.observables.force.model import ForceModel
 
 MODEL = ForceModel(Cutter(6e-3, 0.5, evenly_pitched(3)), EdgeLaw())
 HIDDEN = {

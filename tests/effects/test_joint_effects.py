@@ -12,16 +12,16 @@ from metro.effects import (
     flange_rotation,
     friction_reversal,
     joint_backlash,
-    library,
     stiffness_hardening,
     stiffness_scale,
-    told_of,
 )
 from metro.effects.effect import fitted_to
-from metro.loop.search import Gates, search
-from metro.loop.verdict import parameters
-from metro.observables.deformation_model import CutWall, DeformationModel
-from metro.observables.deformation_proposals import feasible
+from metro.effects.library import library, with_declared
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.loop.verdict.verdict import parameters
+from metro.observables.deformation.model import CutWall, DeformationModel
+from metro.observables.deformation.proposals import feasible
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import Arm
 
@@ -73,7 +73,7 @@ def test_joints_that_cuts_load_alike_are_not_told_apart_and_the_next_cuts_would(
 
 
 def test_proposed_walls_part_joints_that_the_cuts_do_not():
-    from metro.loop.experiment import prospects
+    from metro.loop.planning.experiment import prospects
 
     task = elastic_arm.problem({"gap": {1: 8.0}}, 3, ways=elastic_arm.ONE_WAY, sizes=(0.4, 0.8, 1.2, 1.6))
     softness = 1 / elastic_arm.STIFFNESS
@@ -174,11 +174,11 @@ def test_a_model_without_the_rotation_of_the_flange_is_told_of_it_by_cuts_and_lo
 
 def test_the_manifest_may_declare_what_a_joint_does():
     task = elastic_arm.problem({}, 0, ways=WAYS[:1])
-    told = told_of(task, {"joint_backlash": {"joint": 3, "angle_mdeg": 4.0}})
+    told = with_declared(task, {"joint_backlash": {"joint": 3, "angle_mdeg": 4.0}})
     assert told.base.torsion.gap[2] == pytest.approx(np.radians(4e-3))
-    every = told_of(task, {"stiffness_scale": {"joint": "all", "factor": 0.9}})
+    every = with_declared(task, {"stiffness_scale": {"joint": "all", "factor": 0.9}})
     assert every.base.structure.stiffness_factor == pytest.approx(0.9)
-    one = told_of(task, {"stiffness_scale": {"joint": 2, "factor": 0.9}})
+    one = with_declared(task, {"stiffness_scale": {"joint": 2, "factor": 0.9}})
     assert one.base.torsion.factor[1] == pytest.approx(0.9)
 
 

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from metro.batch.processed import Processed, read_batch
-from metro.effects import library
-from metro.loop.search import Gates, search
-from metro.observables import joint_force
-from metro.observables.joint_force import RATE
-from metro.observables.tip_force import ACTUAL, FORCE, TORQUE
+from metro.effects.library import library
+from metro.loop.fitting.held_out import identified_fit
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.observables.arm.tip_force import ACTUAL, FORCE, TORQUE
+from metro.observables.joint_force import observable as joint_force
+from metro.observables.joint_force.observable import RATE
 from metro.robot.kinematics import arm_of_cell, forward
 from metro.stages.identify import base_fit
 from metro.stages.ingest import ingest
@@ -86,7 +88,7 @@ def test_instruments_that_are_a_percent_off_are_no_effect_and_their_gains_are_to
     assert found(cell, torque, force=force) == []
     observed = cell[1] | {"joint_torque": torque, "tool_force": force}
     task = joint_force.problem(cell[0], observed, {})
-    told = base_fit(task, 0.007)
+    told = identified_fit(task, base_fit(task, 0.007))
     # What joints and axes share is one factor: only how they differ from each other can be told.
     apart = told.beta[1:7] - told.beta[1:7].mean() - (joints - joints.mean())
     sd = np.sqrt(np.diag(told.covariance))[1:7]

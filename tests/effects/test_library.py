@@ -10,10 +10,10 @@ from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import Cut
 from metro.cutting.law import EdgeLaw
-from metro.effects import library, told_of, untold
 from metro.effects.effect import fitted_to
-from metro.observables.dynamometer import Recording
-from metro.observables.force_model import ForceModel, ForceSetting
+from metro.effects.library import library, not_modelled, with_declared
+from metro.observables.force.dynamometer import Recording, Resonance
+from metro.observables.force.model import ForceModel, ForceSetting
 from metro.observables.problem import Problem, Refusal
 
 RECORDING = Recording((0.5,), 1.0, 50.0)
@@ -62,9 +62,8 @@ def test_the_base_model_is_told_of_what_the_manifest_declares():
         "orbit_stiffness": {"amplitude": 0.1, "phase_deg": 20.0},
         "stiffness_scale": {"factor": 0.9},
     }
-    told = told_of(task, known)
-    assert told.base.sensor.frequency == (900, 800, 1500)
-    assert told.base.sensor.damping == (0.03, 0.03, 0.03)
+    told = with_declared(task, known)
+    assert told.base.sensor.resonances == (Resonance((900, 800, 1500), (0.03, 0.03, 0.03)),)
     assert told.base.sensor.discharge == (0.25, 0.25, 0.25)
     assert told.base.law.edge(2.0) == pytest.approx(1.4)
     assert told.base.structure == base.structure
@@ -91,5 +90,5 @@ def test_what_changes_nothing_in_a_batch_is_not_missed_unless_it_is_asked_for():
 
 def test_what_is_declared_of_stability_but_not_in_its_model_is_said():
     known = {"process_damping": {}, "tool_runout": {}, "stiffness_scale": {}}
-    (note,) = untold("lobes", known)  # runout is in the tool, and the scale is nothing of stability
+    (note,) = not_modelled("lobes", known)  # runout is in the tool, and the scale is nothing of stability
     assert "process damping" in note

@@ -8,8 +8,9 @@ import pytest
 
 from metro.dynamics.stability_model import StabilityModel
 from metro.dynamics.system import Cut, Structure
-from metro.effects import library, missing_mode, mode_coupling, process_damping, spindle_speed_softening
+from metro.effects import missing_mode, mode_coupling, process_damping, spindle_speed_softening
 from metro.effects.effect import fitted_to
+from metro.effects.library import library
 
 STRUCTURE = Structure(
     np.array([0, 1]), 2 * np.pi * np.array([310.0, 390.0]), np.array([0.03, 0.04]), np.array([9e6, 7e6])

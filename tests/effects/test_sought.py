@@ -7,12 +7,12 @@ import pytest
 
 from metro.effects import gear_ripple, path_vibration
 from metro.observables.problem import Block, Parameter, Problem, Refusal
-from metro.observables.waviness_model import Vibration
+from metro.observables.waviness.model import Vibration
 from metro.robot.drive_torques import DriveTorques
 
 RATE, SECONDS, FREQUENCY, SIZE = 100.0, (8.0, 6.0), 7.3, 4e-6
 
-STILL, NO_TORQUE = Vibration(), DriveTorques()
+NO_TORQUE = DriveTorques()
 TURN_RATE, MICROMETRE_PER_NM = 0.3, 1e-6
 
 
@@ -30,7 +30,7 @@ class Setting:
 class Wall:
     """A constant, the tip's vibration in time, and what the torque of a joint does."""
 
-    vibration: Vibration = STILL
+    vibration: tuple[Vibration, ...] = ()
     drives: DriveTorques = NO_TORQUE
     parameters: tuple = (Parameter("level", "um", 1e-6),)
 
@@ -40,7 +40,8 @@ class Wall:
     def design(self, block, _nuisance, _beta=None):
         setting = block.setting
         torque = self.drives.at(setting.q, 0.0 * setting.q, setting.t)[:, 1]
-        return np.ones((len(setting.t), 1)), self.vibration.at(setting.t) + MICROMETRE_PER_NM * torque
+        swings = sum(swing.at(setting.t) for swing in self.vibration)
+        return np.ones((len(setting.t), 1)), swings + MICROMETRE_PER_NM * torque
 
 
 def wall(run, seconds):

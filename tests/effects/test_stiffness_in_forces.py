@@ -12,8 +12,8 @@ from metro.cutting.force import Cut
 from metro.cutting.law import EdgeLaw
 from metro.effects.effect import fitted_to
 from metro.effects.stiffness_scale import OF_SIDE_CUTS
-from metro.observables.dynamometer import Recording
-from metro.observables.force_model import ForceModel, ForceSetting
+from metro.observables.force.dynamometer import Recording
+from metro.observables.force.model import ForceModel, ForceSetting
 from virtual_cell.chips import Tool
 from virtual_cell.milling import Coefficients
 from virtual_cell.side_force import SideCut, side_force

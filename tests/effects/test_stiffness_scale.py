@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 
 from metro.batch.processed import Processed, read_batch
-from metro.effects import library
+from metro.effects.library import library
 from metro.effects.stiffness_scale import OF_ARM, apply
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.search import Gates, search
-from metro.loop.verdict import identified_fit, parameters
-from metro.observables import deformation, force
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.held_out import identified_fit
+from metro.loop.fitting.noise import first_noise
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.loop.verdict.verdict import parameters
+from metro.observables.deformation import observable as deformation
+from metro.observables.force import observable as force
 from metro.observables.problem import Block, Parameter, Problem
 from metro.stages.ingest import ingest
 from metro.structure import Structure

@@ -5,11 +5,13 @@ from dataclasses import replace
 import elastic_arm
 import numpy as np
 import pytest
+from worded import in_words
 
 from metro.effects import joint_backlash, stiffness_scale, tip_give
-from metro.loop.advice import left_over
-from metro.loop.search import Gates, search
-from metro.observables.deformation_model import CutWall
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.loop.verdict.residual import remaining
+from metro.observables.deformation.model import CutWall
 
 GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
 EFFECTS = (*joint_backlash.EFFECT, *stiffness_scale.EFFECT[2:], tip_give.EFFECT)
@@ -60,4 +62,4 @@ def test_where_the_poses_do_not_tell_a_bent_tool_is_said_to_be_possible():
     task = bent(GIVE, ways=elastic_arm.ONE_WAY, repeats=3)
     outcome = search(task, EFFECTS, GATES)
     assert outcome.names == ("stiffness_scale",)
-    assert "may be no stiffness scale but a tip give" in left_over(outcome)
+    assert "may be no stiffness scale but a tip give" in "; ".join(in_words(remaining(outcome)))

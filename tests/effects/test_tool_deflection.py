@@ -17,13 +17,13 @@ from metro.cutting.law import EdgeLaw
 from metro.cutting.yielding_steady import yielding_basis
 from metro.effects import tool_runout
 from metro.effects.tool_deflection import EFFECT, apply
-from metro.loop.candidate import Candidate
-from metro.loop.evidence import compare
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.observables import force
-from metro.observables.dynamometer import Recording
-from metro.observables.force_model import ForceModel, ForceSetting, Structure
+from metro.loop.checks.evidence import compare
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
+from metro.observables.force import observable as force
+from metro.observables.force.dynamometer import Recording
+from metro.observables.force.model import ForceModel, ForceSetting, Structure
 from metro.signals.orders import advance, to_orders
 from metro.stages.ingest import ingest
 from virtual_cell.recipes import force as recipe

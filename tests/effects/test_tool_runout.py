@@ -9,7 +9,7 @@ from blind import clean, closed
 from metro.cutting.cutter import Cutter
 from metro.cutting.law import EdgeLaw
 from metro.effects.tool_runout import EFFECT, apply
-from metro.observables.force_model import ForceModel
+from metro.observables.force.model import ForceModel
 
 RADIUS_UM, ANGLE_DEG = 9.0, 40.0
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from wavy import GATES, problem
 
-from metro.effects import library
+from metro.effects.library import library
 from metro.effects.path_vibration import ON_WALLS as VIBRATION
-from metro.loop.search import search
-from metro.loop.verdict import parameters
-from metro.observables.waviness_model import Vibration, WavinessModel
+from metro.loop.search.search import search
+from metro.loop.verdict.verdict import parameters
+from metro.observables.waviness.model import Vibration, WavinessModel
 from metro.robot.drive_torques import DriveTorques
 from metro.robot.torsion import Torsion
 
@@ -57,7 +57,7 @@ def test_a_gap_is_found_where_the_torque_of_its_joint_changes_sign():
 
 def test_a_vibration_is_found_by_its_frequency_in_time():
     frequency, amplitude = 8.7, 0.8
-    truth = WavinessModel(vibration=Vibration(frequency, amplitude * 1e-6, 1.0))
+    truth = WavinessModel(vibration=(Vibration(frequency, amplitude * 1e-6, 1.0),))
     outcome = search(problem(truth, seed=3), LIBRARY, GATES)
     assert outcome.names == ("path_vibration",)
     found = parameters(outcome.final, "path_vibration")

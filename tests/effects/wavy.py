@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from metro.loop.search import Gates
+from metro.loop.search.trial import Gates
 from metro.observables.problem import Block, Problem
-from metro.observables.waviness_model import WavinessModel, WavyCut
+from metro.observables.waviness.model import WavinessModel, WavyCut
 from metro.surface.profile import part
 from metro.surface.waves import wave_basis
 

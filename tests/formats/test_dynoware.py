@@ -55,7 +55,7 @@ def test_other_channels_are_ignored_wherever_they_stand(tmp_path):
     ("change", "parts"),
     [
         ({"units": "s,N,mV,N"}, ["line 8, column fy_n", "'mV'", "N or kN"]),
-        ({"units": "min,N,N,N"}, ["line 8, column t_s", "'min'", "s or ms"]),
+        ({"units": "h,N,N,N"}, ["line 8, column t_s", "'h'", "s or ms"]),
         ({"units": "s,N,N"}, ["line 8, column fz_n", "''", "N or kN"]),
         ({"names": "Zeit,Fx,Fy,Fz"}, ["no line of channels"]),
         ({"names": "Time,Fx,Fy", "units": "s,N,N"}, ["lacks the column fz_n"]),

@@ -124,10 +124,11 @@ def test_a_binary_format_that_does_not_start_as_one_is_refused(tmp_path, suffix,
     assert f"does not start as a {title} file, expected a force record" in message
 
 
-def test_an_unknown_suffix_is_refused_with_those_that_are_known(tmp_path):
-    message = failure(written(tmp_path, "x", "file.dat"))
-    assert "'.dat'" in message
-    assert ".csv" in message
+def test_a_text_is_read_whatever_its_suffix_and_what_is_none_is_refused_with_what_can_be_read(tmp_path):
+    assert len(read(written(tmp_path, HEADER + force(), "file.dat"), "force")) == 10
+    message = failure(written(tmp_path, b"\x01\0\x07", "file.dat"))
+    assert "no text" in message
+    assert "Parquet" in message
 
 
 def test_content_goes_before_the_suffix(tmp_path):

@@ -78,9 +78,23 @@ def test_faults_of_an_x3p_file_are_named(tmp_path):
     assert "is not a readable X3P file" in failure(x3p(tmp_path / "sum.x3p", digest="0" * 32))
     assert "found a surface" in failure(x3p(tmp_path / "map.x3p", feature="SUR", shape=(5, 2, 1)))
     assert "2 layers, expected one" in failure(x3p(tmp_path / "two.x3p", shape=(5, 1, 2)))
-    assert "found a X3P file, expected a point cloud" in failure(tmp_path / "good.x3p", "cloud")
+    assert "found a profile of ISO 25178-72, expected a point cloud" in failure(
+        tmp_path / "good.x3p", "cloud"
+    )
 
 
 def test_an_archive_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("metro.formats.limits.LARGEST_ARCHIVE", 100)
     assert "expected at most 100" in failure(x3p(tmp_path / "bomb.x3p"))
+
+
+def test_a_surface_is_a_cloud_in_millimetres_without_the_points_that_were_not_measured(tmp_path):
+    heights = np.where(np.arange(10) == 3, np.nan, HEIGHTS)
+    path = x3p(tmp_path / "face.x3p", heights, feature="SUR", shape=(5, 2, 1))
+    sniff(path, "cloud")
+    table = read(path, "cloud")
+    assert len(table) == 9
+    assert table.attrs["dropped"] == 1
+    np.testing.assert_allclose(table["x_mm"][:4], np.array([0, 1, 2, 4]) * 5e-4, rtol=1e-12)
+    np.testing.assert_allclose(table["y_mm"].iloc[-1], 5e-4, rtol=1e-12)
+    np.testing.assert_allclose(table["z_mm"].iloc[-1], HEIGHTS[9] * 1e3, rtol=1e-15)

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from metro.effects.effect import Effect, EffectParameter
-from metro.loop.candidate import Candidate
-from metro.loop.evidence import compare, hold_out, leave_out
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
+from metro.loop.checks.evidence import compare, hold_out, leave_out
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
 from metro.observables.problem import Block, Parameter
 
 FEW = settings(max_examples=4, deadline=None, derandomize=True, database=None)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter
-from metro.loop.trial import Gates
+from metro.loop.search.trial import Gates
 
 GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
 RPM = np.arange(2000.0, 6000.0, 400.0)

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from metro.loop import descent
-from metro.loop.candidate import Candidate
-from metro.loop.descent import State, ahead, condition, linearised, normal_equations
-from metro.loop.fit import UNDECIDED, _first_beta
-from metro.loop.noise import Noise
+from metro.loop.fitting import descent
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.descent import State, ahead, condition, linearised, normal_equations
+from metro.loop.fitting.fit import UNDECIDED, _first_beta
+from metro.loop.fitting.noise import Noise
 from metro.observables.problem import Block, Parameter
 
 REAL = Path(os.environ.get("METRO_REAL_DATA", Path(__file__).parents[3] / "shared/real")) / "reference"

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from scipy import stats
 from toy import BEND, GATES, SCATTER, Wave, problem
+from worded import in_words
 
-from metro.loop.between import between_conditions
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.search import search
-from metro.loop.verdict import comparison, held_out, judge
+from metro.loop.checks.between import between_conditions
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.fitting.noise import first_noise
+from metro.loop.search.search import search
+from metro.loop.verdict.verdict import judge
 
 
 def fitted(task):
@@ -51,7 +53,7 @@ def test_one_run_of_each_condition_tells_nothing():
 def closed(task):
     outcome = search(task, (BEND,), GATES)
     rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
-    return judge(task, outcome, rows, GATES)
+    return in_words(judge(task, outcome, rows, GATES))
 
 
 def test_what_passes_for_scatter_is_unexplained_where_repeats_do_not_scatter():

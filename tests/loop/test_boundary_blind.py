@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
+from worded import in_words
 
 from metro.dynamics.stability_model import StabilityModel
 from metro.dynamics.system import Cut, Structure
-from metro.effects import library
-from metro.loop.labels import judge_labels
-from metro.loop.trial import Gates
-from metro.observables.lobe_cases import Case
-from metro.observables.lobes import LabelProblem, comparison
-from metro.observables.stability import MODEL_SD
+from metro.effects.library import library
+from metro.loop.labels.verdict import judge_labels
+from metro.loop.search.trial import Gates
+from metro.observables.stability.boundary import MODEL_SD
+from metro.observables.stability.cases import Case
+from metro.observables.stability.problem import LabelProblem
 from virtual_cell.recipes import boundary
 
 GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
@@ -44,7 +45,7 @@ def problem(hidden, seed):
 
 def judged(hidden, seed):
     task = problem(hidden, seed)
-    return judge_labels(task, comparison(task), [], library("lobes"), GATES)[1]
+    return in_words(judge_labels(task, task.comparison(), [], library("lobes"), GATES)[1])
 
 
 @pytest.mark.parametrize(

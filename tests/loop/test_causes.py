@@ -8,10 +8,10 @@ import pytest
 from scipy import stats
 from toy import ANGLE, BEND, GATES, TWIN, Wave, problem
 
-from metro.loop.batch_story import causes
-from metro.loop.causes import _updated, judged
-from metro.loop.search import search
-from metro.loop.witnesses import Closed, ask, key_of, material, weighed
+from metro.loop.causes.causes import _updated, judged
+from metro.loop.causes.witnesses import Closed, ask, key_of, material, weighed
+from metro.loop.search.search import search
+from metro.loop.verdict.batch_story import causes
 
 KEY = ("bend", "all")
 RUNS = 12
@@ -94,7 +94,7 @@ def test_who_found_a_cause_bears_witness_by_what_it_gains_over_the_model_without
     task = problem(1, truth=Wave(bend=0.2), phased=False)
     outcome = search(task, (BEND,), GATES)
     told = ask(Closed(task, outcome), KEY)
-    assert told.found
+    assert told.names_it
     assert told.statistic == pytest.approx(2.0 * (outcome.final.total - outcome.base.total), rel=0.05)
 
 

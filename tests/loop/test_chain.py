@@ -6,12 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from metro.loop.candidate import Candidate
-from metro.loop.chain import parts, split
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
+from metro.loop.causes.chain import parts, split
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
+from metro.observables.cut.upstream import mean_forces
 from metro.observables.problem import Block, Parameter, Problem
-from metro.observables.upstream import mean_forces
+from metro.wording.causes import split_in_words
 
 PLACES = 12
 COMPLIANCE, TRUE, OFF = 2e-3, 50.0, 0.1  # mm per N; N; of the predicted force
@@ -92,7 +93,7 @@ def test_what_the_measured_force_may_be_off_by_is_the_doubt_of_the_parts():
     told = split(problem, {"before": fitted, "after": fitted}, {"v": fed})
     for when in ("before", "after"):
         assert told[when]["doubt"] == pytest.approx(5.0 * COMPLIANCE, rel=1e-3)
-    assert f"{5.0 * COMPLIANCE:.2g} mm (one standard deviation)" in told["words"]
+    assert f"{5.0 * COMPLIANCE:.2g} mm (one standard deviation)" in split_in_words(told)
     without = split(problem, {"before": fitted, "after": fitted}, {"v": dict(list(fed.items())[:3])})
     assert without["before"]["doubt"] == 0.0
     assert without["before"]["upstream"] == told["before"]["upstream"]

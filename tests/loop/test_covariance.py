@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from metro.loop.covariance import between_runs
-from metro.loop.descent import System
+from metro.loop.fitting.covariance import between_runs
+from metro.loop.fitting.descent import System
 
 
 def system(designs, rests, weight=()):

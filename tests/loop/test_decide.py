@@ -7,11 +7,11 @@ import pytest
 from toy import BEND, GATES, block, problem
 from toy_knee import STOP, Knee
 
-from metro.loop.candidate import Candidate
-from metro.loop.decide import Pair, decided, plan
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.rivals import HOPELESS, RIVAL_WEIGHT
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
+from metro.loop.planning.decide import Pair, decided, plan
+from metro.loop.search.rivals import HOPELESS, RIVAL_WEIGHT
 from metro.observables.problem import Made, Proposal
 
 

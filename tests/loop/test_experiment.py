@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from toy import BEND, GATES, block, problem
 from toy_knee import STOP, Knee
+from worded import in_words
 
-from metro.loop.candidate import Candidate
-from metro.loop.descent import State, descend, linearised
-from metro.loop.experiment import probability, prospects
-from metro.loop.fit import fit, score
-from metro.loop.noise import first_noise
-from metro.loop.search import search
-from metro.loop.story import told
-from metro.loop.verdict import comparison, held_out, judge
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.descent import State, descend, linearised
+from metro.loop.fitting.fit import fit, score
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.fitting.noise import first_noise
+from metro.loop.planning.experiment import probability, prospects
+from metro.loop.search.search import search
+from metro.loop.verdict.story import story
+from metro.loop.verdict.verdict import judge
 from metro.observables.problem import Proposal
 
 
@@ -43,7 +45,7 @@ def judged(task, library):
     outcome = search(task, library, GATES)
     rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
     verdict = judge(task, outcome, rows, GATES)
-    return outcome, verdict, told(task, outcome, verdict, GATES)
+    return outcome, in_words(verdict), story(task, outcome, verdict, GATES)
 
 
 def test_two_effects_that_differ_at_large_feed_alone_are_told_to_go_there():
@@ -56,13 +58,13 @@ def test_two_effects_that_differ_at_large_feed_alone_are_told_to_go_there():
 
 def test_the_paragraph_names_the_run_its_probability_and_the_pair():
     task = replace(problem(2, truth=Knee(bend=0.2)), base=Knee(), feasible=PROPOSALS)
-    _, verdict, story = judged(task, (BEND, STOP))
+    _, verdict, tried = judged(task, (BEND, STOP))
     assert verdict["status"] == "undetermined"
     text = verdict["next_experiment"]
     assert text.startswith("feed 8: this tells")
     assert "more than 0.99" in text
     assert "an experiment" not in text
-    best = story["experiments"][0]
+    best = tried["experiments"][0]
     assert best["proposal"] == "feed 8"
     assert set(best["pair"]) == {"bend", "stop"}
     assert best["runs"] == 1

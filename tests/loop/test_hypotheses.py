@@ -5,14 +5,16 @@ import pytest
 from label_toy import GATES, SHIFT, SLOPE, Line, problem
 from scipy.special import logsumexp
 
-from metro.loop import hypotheses
-from metro.loop.hypotheses import Evidence, changed, hypothesis, quantile
-from metro.loop.label_evidence import log_likelihood
-from metro.loop.labelled import tests_of as told_by
+from metro.loop.labels import hypotheses
+from metro.loop.labels.evidence import log_likelihood
+from metro.loop.labels.hypotheses import LabelEvidence, changed, hypothesis, quantile
+from metro.loop.labels.problem import tests_of as told_by
 
 TASK = problem(Line(slope=0.8, shift=-0.4), 5)
 TESTS, _ = told_by(TASK, "identify")
-EVIDENCE = Evidence(TASK.boundaries, TASK.estimates, TESTS, np.zeros((1, len(TASK.point_rpm))), GATES.seed)
+EVIDENCE = LabelEvidence(
+    TASK.boundaries, TASK.estimates, TESTS, np.zeros((1, len(TASK.point_rpm))), GATES.seed
+)
 
 
 def grid(effects, count):
@@ -50,7 +52,7 @@ def test_enough_points_are_left_for_the_ends_of_an_interval(effects):
 def test_what_is_not_solved_is_learnt_and_its_error_is_as_told():
     found = hypothesis((SHIFT, SLOPE), EVIDENCE)
     exact = np.stack([TASK.boundaries(changed(found, i))[0] for i in range(len(found.theta))])
-    error = found.depth - EVIDENCE.told(exact)
+    error = found.depth - EVIDENCE.testable(exact)
     weight = found.weights[:, None] * np.ones_like(error)
     rough = np.stack([TASK.estimates([changed(found, i)])[0][0] for i in range(len(found.theta))]) - exact
     assert np.average(error**2, weights=weight) < 0.01 * np.average(rough**2, weights=weight)
@@ -72,7 +74,7 @@ def test_where_the_boundary_jumps_it_is_solved_until_the_interval_is_that_of_a_f
         jump = 0.8 * np.tanh((model.slope - step) / 0.02)
         return model.boundary(TASK.point_rpm) + jump, np.full(len(TASK.point_rpm), 300.0)
 
-    evidence = Evidence(solved, TASK.estimates, TESTS, np.zeros((1, len(TASK.point_rpm))), GATES.seed)
+    evidence = LabelEvidence(solved, TASK.estimates, TESTS, np.zeros((1, len(TASK.point_rpm))), GATES.seed)
     found = hypothesis((SLOPE,), evidence)
     theta = quantile(SLOPE.parameters[0], (np.arange(2000) + 0.5) / 2000)
     depth = np.stack([solved(lambda _, v=v: Line(slope=v))[0] for v in theta])

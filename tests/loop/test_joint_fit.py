@@ -7,13 +7,13 @@ import pytest
 from scipy import optimize, stats
 from toy import BEND, BETA, GATES, RIPPLE, Wave, problem
 
-from metro.loop import noise as noise_room
-from metro.loop.candidate import Candidate
-from metro.loop.descent import State, descend, inverse, linearised, normal_equations, own_step
-from metro.loop.evidence import compare, leave_out, surviving_share, weights
-from metro.loop.fit import fit, refit, score
-from metro.loop.noise import first_noise
-from metro.loop.predictive import predictive
+from metro.loop.checks.evidence import compare, hold_out, leave_out, surviving_share, weights
+from metro.loop.checks.predictive import predictive
+from metro.loop.fitting import noise as noise_room
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.descent import State, descend, inverse, linearised, normal_equations, own_step
+from metro.loop.fitting.fit import fit, refit, score
+from metro.loop.fitting.noise import first_noise
 
 
 def prior_of(task, blocks):
@@ -267,6 +267,19 @@ def test_evidence_of_a_parameter_more_is_its_f_probability():
     waves = [np.concatenate([f.predict(b) for b in blocks]) for f in (base, larger)]
     signal = np.concatenate([b.measured for b in blocks])
     assert evidence.size == pytest.approx(np.linalg.norm(waves[1] - waves[0]) / np.linalg.norm(signal))
+
+
+def test_of_one_run_nothing_is_gained_and_weights_are_those_before_the_data():
+    task = problem(4)
+    blocks = task.role("identify")[:1]
+    prior = prior_of(task, blocks)
+    alone = fit(Candidate(task.base), blocks, prior)
+    larger = fit(Candidate(task.base, (BEND,)), blocks, prior, alone)
+    out = leave_out(alone, prior)
+    assert hold_out(compare(alone, larger), out, larger, prior).held_out == {"r1": 0.0}
+    assert weights([out, leave_out(larger, prior)], seed=1, prior=[3.0, 1.0]) == pytest.approx([0.75, 0.25])
+    assert weights([{"a": -np.inf}, {"a": np.inf}], seed=1) == pytest.approx([0.5, 0.5])
+    assert weights([{"a": 0.0}, {"a": np.inf}], seed=1)[1] > 0.99
 
 
 def test_weights_follow_the_held_out_likelihoods():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from metro.loop.kriging import krige
+from metro.loop.labels.kriging import krige
 
 RNG = np.random.default_rng(3)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from metro.loop import label_evidence as room
-from metro.loop.label_evidence import Labels, left_out, log_evidence, log_likelihood, posterior
+from metro.loop.labels import evidence as room
+from metro.loop.labels.evidence import Labels, left_out, log_evidence, log_likelihood, posterior
 
 RPM = np.array([2000.0, 3000.0])
 TOOTH_HZ = np.array([80.0, 110.0])

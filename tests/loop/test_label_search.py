@@ -6,9 +6,9 @@ from label_toy import GATES, IDLE, LOUD, SHIFT, SLOPE, TWIN, Line, problem
 from scipy.stats import norm
 
 from metro.effects.effect import EffectParameter
-from metro.loop.hypotheses import quantile
-from metro.loop.label_advice import next_tests
-from metro.loop.label_search import NOTHING, search_labels
+from metro.loop.labels.hypotheses import quantile
+from metro.loop.labels.next_test import next_tests
+from metro.loop.labels.search import NOTHING, search_labels
 
 
 def searched(true, effects, seed=1, **more):

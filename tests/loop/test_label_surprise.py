@@ -6,10 +6,10 @@ import numpy as np
 from label_toy import GATES, Line, problem
 from scipy import stats
 
-from metro.loop.hypotheses import Evidence, hypothesis
-from metro.loop.label_evidence import SHARED
-from metro.loop.label_surprise import drawn, surprise
-from metro.loop.labelled import every_test
+from metro.loop.labels.evidence import SHARED
+from metro.loop.labels.hypotheses import LabelEvidence, hypothesis
+from metro.loop.labels.problem import every_test
+from metro.loop.labels.surprise import drawn, surprise
 
 SD = 0.15
 
@@ -17,7 +17,9 @@ SD = 0.15
 def surprised(task, seed=1):
     tests = every_test(task)
     shared = np.random.default_rng(seed).normal(size=(128, 1)) * SD * SHARED**0.5
-    evidence = Evidence(task.boundaries, task.estimates, tests, np.tile(shared, len(tests.rpm)), GATES.seed)
+    evidence = LabelEvidence(
+        task.boundaries, task.estimates, tests, np.tile(shared, len(tests.rpm)), GATES.seed
+    )
     return surprise(tests, hypothesis((), evidence), evidence.deviations, seed)
 
 

@@ -6,12 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from label_toy import GATES, RPM, SHIFT, SLOPE, Line, problem
+from worded import in_words
 
-from metro.loop.hypotheses import Evidence, hypothesis
-from metro.loop.label_search import search_labels
-from metro.loop.label_unknown import UNKNOWN, curves, unknown
-from metro.loop.labelled import tests_of as told_by
-from metro.loop.labels import judge_labels
+from metro.loop.labels.hypotheses import LabelEvidence, hypothesis
+from metro.loop.labels.problem import tests_of as told_by
+from metro.loop.labels.search import search_labels
+from metro.loop.labels.unknown import UNKNOWN, curves, unknown
+from metro.loop.labels.verdict import judge_labels
 
 
 @dataclass(frozen=True)
@@ -38,11 +39,12 @@ def judged(true, seed=4):
             "after": chance,
         }
     )
-    return judge_labels(task, rows, [], (SHIFT, SLOPE), GATES)
+    _, verdict, _, change = judge_labels(task, rows, [], (SHIFT, SLOPE), GATES)
+    return in_words(verdict), change
 
 
 def test_what_no_effect_does_is_laid_to_none_and_described():
-    _, verdict, _, change = judged(Arch(rise=0.8))
+    verdict, change = judged(Arch(rise=0.8))
     assert verdict["status"] == "unexplained"
     assert verdict["effects"] == []
     assert change is None
@@ -75,7 +77,7 @@ def test_the_curve_that_is_found_is_the_one_that_acts():
     task = problem(Arch(rise=0.5), 4)
     tests, _ = told_by(task, "identify")
     flat = np.zeros((1, len(RPM)))
-    evidence = Evidence(task.boundaries, task.estimates, tests, flat, GATES.seed)
+    evidence = LabelEvidence(task.boundaries, task.estimates, tests, flat, GATES.seed)
     found = unknown(hypothesis((), evidence), evidence)
     at = np.array([2400.0, 3800.0, 5200.0])
     tested = (tests.rpm, Line().boundary(tests.rpm))
@@ -98,7 +100,7 @@ def test_what_moves_deep_boundaries_most_is_found_as_such():
     task = replace(task, unstable=np.tile([False] * 3 + [True] * 3, len(RPM)), depth=np.exp(log_depth))
     tests, _ = told_by(task, "identify")
     boundary = lobes(tests.rpm)
-    evidence = Evidence(
+    evidence = LabelEvidence(
         lambda _: (boundary, np.full(len(boundary), 300.0)),
         lambda changes: (np.tile(boundary, (len(changes), 1)), np.full((len(changes), len(boundary)), 300.0)),
         tests,

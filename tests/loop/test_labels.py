@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 from label_toy import GATES, SHIFT, SLOPE, TWIN, Line, Made, problem
 from scipy.stats import norm
+from worded import in_words
 
-from metro.loop.labels import judge_labels, log_likelihood, surprise_alone
+from metro.loop.labels.verdict import judge_labels, log_likelihood, surprise_alone
 
 RNG = np.random.default_rng(1)
 PROBABILITY = RNG.uniform(0.02, 0.98, 40)
@@ -59,7 +60,7 @@ def judged(before, after, tests=12):
         tuple(rows["run"]), ("validate",) * 12, LABEL > 0, np.ones(12), np.full(12, -1), np.full(12, np.nan),
         np.zeros(0),
     )  # fmt: skip
-    return judge_labels(nowhere, rows.head(tests), CAUSE, (SHIFT,), GATES)[1]
+    return in_words(judge_labels(nowhere, rows.head(tests), CAUSE, (SHIFT,), GATES)[1])
 
 
 def closed(true, effects, seed=1, **more):
@@ -75,7 +76,8 @@ def closed(true, effects, seed=1, **more):
             "after": before,
         }
     )
-    return judge_labels(task, rows, [], effects, GATES)
+    judged_rows, verdict, story, change = judge_labels(task, rows, [], effects, GATES)
+    return judged_rows, in_words(verdict), in_words(story), change
 
 
 @pytest.mark.parametrize(

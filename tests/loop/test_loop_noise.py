@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy import BETA, POINTS, SIGMA, Wave, block
 
-from metro.loop import noise as noise_room
-from metro.loop.noise import Noise, block_sigma, diagonal, first_noise, shared, updated, whitener
+from metro.loop.fitting import noise as noise_room
+from metro.loop.fitting.noise import Noise, block_sigma, diagonal, first_noise, shared, updated, whitener
 
 
 @settings(max_examples=30, deadline=None)

@@ -14,8 +14,8 @@ from metro import cli
 from metro.batch.batch import Batch
 from metro.batch.columns import RUNS
 from metro.batch.runs import filled
-from metro.loop.search import search
-from metro.loop.witnesses import Closed
+from metro.loop.causes.witnesses import Closed
+from metro.loop.search.search import search
 from metro.observables.problem import Made, Proposal
 
 NAME = "toy-batch"

@@ -5,9 +5,10 @@ from dataclasses import replace
 import pytest
 from test_decide import PROPOSALS, STOP, Knee
 from toy import BEND, GAIN, GATES, RIPPLE, Wave, problem
+from worded import in_words
 
-from metro.loop.planner import aims
-from metro.loop.search import search
+from metro.loop.planning.planner import aims
+from metro.loop.search.search import search
 
 
 def planned(task, library, most=12):
@@ -18,8 +19,8 @@ def test_an_undecided_cause_is_decided_and_nothing_else_is_asked():
     task = replace(problem(2, truth=Knee(bend=0.2)), base=Knee(), feasible=PROPOSALS)
     (aim,) = planned(task, (BEND, STOP))
     assert aim.question == "decide"
-    assert "feed 8" in aim.words
-    assert "probability" in aim.words
+    assert "feed 8" in in_words(aim.states)
+    assert "probability" in in_words(aim.states)
     assert aim.chance >= 0.95
     assert 1 <= aim.runs <= 3
 
@@ -29,8 +30,8 @@ def test_where_no_feasible_run_decides_the_effects_own_experiments_are_named():
     (aim,) = planned(task, (BEND, STOP))
     assert aim.question == "decide"
     assert not aim.kinds
-    assert "no run" in aim.words
-    assert "an experiment for stop" in aim.words
+    assert "no run" in in_words(aim.states)
+    assert "an experiment for stop" in in_words(aim.states)
 
 
 def test_a_proposal_that_is_no_row_of_the_run_table_is_not_planned():
@@ -59,7 +60,7 @@ def test_a_hidden_effect_that_no_feasible_run_shows_is_told_without_a_run():
     task = replace(problem(5), feasible=PROPOSALS)
     (aim,) = planned(task, (GAIN,))
     assert (aim.question, aim.runs) == ("show", 0)
-    assert "an experiment for gain" in aim.words
+    assert "an experiment for gain" in in_words(aim.states)
 
 
 def test_a_batch_with_one_run_is_told_to_repeat_it_and_to_hold_one_out():

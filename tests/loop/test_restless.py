@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from scipy import stats
 from toy import BEND, GATES, SCATTER, problem
+from worded import in_words
 
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.restless import restless
-from metro.loop.search import search
-from metro.loop.verdict import comparison, held_out, judge
+from metro.loop.checks.restless import restless
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.fitting.noise import first_noise
+from metro.loop.search.search import search
+from metro.loop.verdict.verdict import judge
 
 
 def seen(task):
@@ -24,7 +26,7 @@ def seen(task):
 def closed(task):
     outcome = search(task, (BEND,), GATES)
     rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
-    return judge(task, outcome, rows, GATES)
+    return in_words(judge(task, outcome, rows, GATES))
 
 
 def drifting(task, per_run):

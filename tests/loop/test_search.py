@@ -5,22 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, effect, problem
+from worded import in_words
 
-from metro.loop import search as search_room
-from metro.loop import trial as trial_room
-from metro.loop.candidate import Candidate
-from metro.loop.evidence import Evidence
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.search import search
-from metro.loop.signature import in_words, q_values
-from metro.loop.verdict import BEATEN, RESEMBLED, comparison, held_out, judge, parameters, why_not
+from metro.loop.checks.evidence import Evidence
+from metro.loop.checks.signature import places, q_values
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.fitting.noise import first_noise
+from metro.loop.search import forward as forward_room
+from metro.loop.search import trial as trial_room
+from metro.loop.search.search import search
+from metro.loop.search.strategy import SearchSpace
+from metro.loop.statement import Statement
+from metro.loop.verdict.verdict import judge, parameters, why_not
 
 
 def judged(task, library, gates=GATES):
     outcome = search(task, library, gates)
     rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
-    return outcome, judge(task, outcome, rows, gates)
+    return outcome, in_words(judge(task, outcome, rows, gates))
 
 
 def test_an_effect_that_is_there_is_found_and_the_held_out_error_falls():
@@ -49,18 +53,18 @@ def test_nothing_is_added_to_a_clean_batch(seed):
 def test_an_immaterial_effect_is_not_added_however_certain():
     outcome, _ = judged(problem(3, truth=Wave(bend=0.2)), (BEND,), replace(GATES, materiality=0.5))
     assert outcome.names == ()
-    assert "immaterial" in outcome.trials[0].why_not
+    assert outcome.trials[0].why_not.code == "immaterial"
 
 
 def test_the_systematic_error_of_the_inputs_raises_the_bar():
     task = replace(problem(3, truth=Wave(bend=0.2)), systematic=0.3)
-    assert "immaterial" in search(task, (BEND,), GATES).trials[0].why_not
+    assert search(task, (BEND,), GATES).trials[0].why_not.code == "immaterial"
 
 
 def test_an_effect_must_predict_conditions_left_out():
     outcome = search(problem(4, truth=Wave(bend=0.2)), (BEND,), replace(GATES, held_out_gain=1e9))
     assert outcome.names == ()
-    assert "left-out" in outcome.trials[0].why_not
+    assert outcome.trials[0].why_not.code == "no_gain"
 
 
 def test_an_effect_that_the_base_absorbs_is_said_to_be_invisible():
@@ -85,7 +89,7 @@ def test_two_effects_that_are_the_same_leave_the_cause_undetermined():
 def test_what_passes_every_gate_and_is_not_added_says_why():
     outcome, _ = judged(problem(1, truth=Wave(bend=0.2)), (BEND,))
     lost = replace(outcome, final=outcome.base)
-    assert why_not(lost, outcome.trials[0]) == BEATEN
+    assert why_not(lost, outcome.trials[0]) == Statement("beaten")
 
 
 def test_a_structure_outside_the_library_is_left_unexplained():
@@ -130,14 +134,15 @@ def test_an_effect_that_a_later_one_makes_idle_is_dropped():
     prior = first_noise(GATES.model_form_budget, task.scatter, blocks)
     both = fit(Candidate(task.base, (RIPPLE,)), blocks, prior)
     both = fit(Candidate(task.base, (RIPPLE, BEND)), blocks, prior, both)
-    kept, dropped = search_room._pruned(both, prior, GATES, GATES.materiality)
+    space = SearchSpace(both, (), prior, GATES, GATES.materiality)
+    kept, dropped = forward_room._pruned(both, space)
     assert dropped == {"ripple"}
     assert [effect.name for effect in kept.candidate.effects] == ["bend"]
     needed = problem(12, truth=Wave(bend=0.3, ripple=0.2))
     blocks = needed.role("identify")
     both = fit(Candidate(needed.base, (RIPPLE,)), blocks, prior)
     both = fit(Candidate(needed.base, (RIPPLE, BEND)), blocks, prior, both)
-    assert search_room._pruned(both, prior, GATES, GATES.materiality)[1] == set()
+    assert forward_room._pruned(both, space)[1] == set()
 
 
 def test_false_discoveries_are_controlled_as_benjamini_and_hochberg_do():
@@ -156,9 +161,8 @@ def test_the_rest_of_a_clean_fit_is_nowhere_significant_and_named_in_order_of_si
     lines = list(search(problem(14, truth=Wave(spike=0.3)), (), GATES).lines)
     found = sorted((line for line in lines if line.significant), key=lambda line: -line.excess)
     assert len(found) == 4
-    words = in_words(lines, 2)
-    assert words.index(found[0].label) < words.index(found[1].label)
-    assert "2 more places" in words
+    stated = [place["label"] for place in places(lines).values["places"]]
+    assert stated == [line.label for line in found]
 
 
 def test_an_effect_that_helps_one_condition_alone_is_not_added():
@@ -170,21 +174,21 @@ def test_an_effect_that_helps_one_condition_alone_is_not_added():
         missed=0.0,
     )
     assert evidence.gain > GATES.held_out_gain
-    assert "25 %" in trial_room._not_held_out(evidence, GATES)
+    assert trial_room._not_held_out(evidence, GATES) == Statement("better_in_few", {"share": 0.25})
     even = replace(evidence, held_out=dict.fromkeys("abcd", 1.5))
-    assert trial_room._not_held_out(even, GATES) == ""
+    assert trial_room._not_held_out(even, GATES) is None
 
 
 def test_an_effect_smaller_than_half_of_what_stays_unexplained_is_not_added():
     evidence = Evidence(statistic=50.0, p_value=1e-6, held_out={}, size=0.02, missed=0.05)
-    assert "5 % stay unexplained" in trial_room._why_not(evidence, 0.0, GATES, 0.004)
-    assert trial_room._why_not(replace(evidence, missed=0.03), 0.0, GATES, 0.004) == ""
+    assert "5 % stay unexplained" in in_words(trial_room._why_not(evidence, 0.0, GATES, 0.004))
+    assert trial_room._why_not(replace(evidence, missed=0.03), 0.0, GATES, 0.004) is None
 
 
 def test_a_small_p_value_among_many_candidates_is_told_with_what_it_is_among_so_many():
     evidence = Evidence(statistic=9.0, p_value=0.006, held_out={}, size=0.02, missed=0.0)
-    assert "(q = 0.06)" in trial_room._why_not(evidence, 0.06, GATES, 0.004)
-    weak = trial_room._why_not(replace(evidence, p_value=0.4), 0.9, GATES, 0.004)
+    assert "(q = 0.06)" in in_words(trial_room._why_not(evidence, 0.06, GATES, 0.004))
+    weak = in_words(trial_room._why_not(replace(evidence, p_value=0.4), 0.9, GATES, 0.004))
     assert weak == "no evidence: p = 0.4 over the runs of the fit"
 
 
@@ -196,7 +200,9 @@ def test_what_is_not_of_the_library_is_told_as_a_likeness_and_not_added():
     assert outcome.final is outcome.base
     assert outcome.likeness.theta[0] == pytest.approx(0.1, rel=0.1)
     assert verdict["status"] == "unexplained"
-    assert [c["why_not"] for c in verdict["candidates"] if c["effect"] == "ripple"] == [RESEMBLED]
+    assert [c["why_not"] for c in verdict["candidates"] if c["effect"] == "ripple"] == [
+        in_words(Statement("resembled"))
+    ]
     assert "like a ripple (ripple 0.0997)" in verdict["unexplained"]["signature"]
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from toy import Wave, problem
 
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.signature import signature
+from metro.loop.checks.signature import signature
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
 
 
 @pytest.mark.parametrize(("spike", "counts"), [(0.009, False), (0.016, True)])

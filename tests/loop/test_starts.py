@@ -6,11 +6,11 @@ from dataclasses import replace
 import pytest
 from toy import BEND, GATES, RIPPLE, Wave, problem
 
-from metro.loop import fit as fit_room
-from metro.loop.candidate import Candidate
-from metro.loop.descent import ITERATIONS
-from metro.loop.fit import FIRST_STEPS, HOPELESS, fit
-from metro.loop.noise import first_noise
+from metro.loop.fitting import fit as fit_room
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.descent import ITERATIONS
+from metro.loop.fitting.fit import FIRST_STEPS, HOPELESS, fit
+from metro.loop.fitting.noise import first_noise
 
 
 def fitted(effect, truth, seed=1):

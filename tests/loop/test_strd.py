@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import strd
 
-from metro.loop.least_squares import least_squares
+from metro.loop.fitting.least_squares import least_squares
 
 EVERY = [
     *("Bennett5", "BoxBOD", "Chwirut1", "Chwirut2", "DanWood", "ENSO", "Eckerle4"),

@@ -5,7 +5,7 @@ import pytest
 import strd
 from strd_exact import exact_least_squares
 
-from metro.loop.least_squares import least_squares
+from metro.loop.fitting.least_squares import least_squares
 
 there = pytest.mark.skipif(
     not (strd.REAL / "strd-nonlinear").is_dir(), reason="real data (METRO_REAL_DATA) are not there"

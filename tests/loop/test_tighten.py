@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from toy import BETA, GATES, block, problem
 
-from metro.loop.candidate import Candidate
-from metro.loop.experiment import information
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.tighten import tighter
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
+from metro.loop.planning.experiment import information
+from metro.loop.planning.tighten import tighter
 from metro.observables.problem import Made, Proposal
 
 NOISY = 0.6  # sd of an element: the parameters are known badly

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 from toy import BEND, GATES, RIPPLE, Wave, effect, problem
 
-from metro.loop.search import search
-from metro.loop.story import told
-from metro.loop.verdict import comparison, estimates, held_out, judge, parameters
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.search.search import search
+from metro.loop.verdict.story import story as story_of
+from metro.loop.verdict.verdict import estimates, judge, parameters
 
 
 def story(task, library):
     outcome = search(task, library, GATES)
     rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
     verdict = judge(task, outcome, rows, GATES)
-    tried = told(task, outcome, verdict, GATES)["candidates"]
+    tried = story_of(task, outcome, verdict, GATES)["candidates"]
     return outcome, {entry["effect"]: entry for entry in tried}
 
 

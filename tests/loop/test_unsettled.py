@@ -5,13 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from toy import BEND, GAIN, GATES, Wave, problem
+from worded import in_words
 
-from metro.loop import trial, verdict
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.search import search
-from metro.loop.trial import tried, unsettled
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
+from metro.loop.search import trial
+from metro.loop.search.search import search
+from metro.loop.search.trial import tried, unsettled
+from metro.loop.statement import Statement
+from metro.loop.verdict import verdict
 
 
 def fitted(task, *effects):
@@ -22,16 +25,18 @@ def fitted(task, *effects):
 
 def test_a_fit_is_settled_and_one_that_is_not_is_told():
     found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
-    assert unsettled(found) == ""
-    assert unsettled(replace(found, step=0.4)) == ""  # nothing that its interval would show
-    assert "did not converge: a step more would move a parameter by 3" in unsettled(replace(found, step=3.0))
+    assert unsettled(found) is None
+    assert unsettled(replace(found, step=0.4)) is None  # nothing that its interval would show
+    assert "did not converge: a step more would move a parameter by 3" in in_words(
+        unsettled(replace(found, step=3.0))
+    )
 
 
 def test_an_effect_that_the_base_imitates_is_not_determined():
     blind = replace(GAIN, parameters=tuple(replace(p, plausible=None) for p in GAIN.parameters))
     found = fitted(problem(2, phased=False), blind)
     assert found.rank == 1  # not told apart: the effect and the base parameter that imitates it
-    assert unsettled(found) == "these runs do not determine its parameters"
+    assert unsettled(found) == Statement("undetermined")
 
 
 def test_an_effect_of_which_the_runs_leave_everything_open_is_not_determined():
@@ -41,7 +46,7 @@ def test_an_effect_of_which_the_runs_leave_everything_open_is_not_determined():
         ends = {"lower": found.theta[0] - width, "upper": found.theta[0] + width}
         narrow = replace(BEND, parameters=tuple(replace(p, **ends) for p in BEND.parameters))
         bounded = replace(found, candidate=Candidate(found.candidate.base, (narrow,)))
-        assert (unsettled(bounded) == "") is settled
+        assert (unsettled(bounded) is None) is settled
 
 
 def test_an_effect_that_may_not_be_negative_and_is_nothing_is_at_no_end():
@@ -49,7 +54,7 @@ def test_an_effect_that_may_not_be_negative_and_is_nothing_is_at_no_end():
     one_sided = replace(BEND, parameters=tuple(replace(p, lower=0.0) for p in BEND.parameters))
     assert one_sided.parameters[0].neutral == 0.0
     candidate = Candidate(found.candidate.base, (one_sided,))
-    assert unsettled(replace(found, candidate=candidate, theta=np.zeros(1))) == ""
+    assert unsettled(replace(found, candidate=candidate, theta=np.zeros(1))) is None
 
 
 def test_an_effect_at_its_bound_has_converged_and_is_no_result():
@@ -58,16 +63,16 @@ def test_an_effect_at_its_bound_has_converged_and_is_no_result():
     assert found.theta == pytest.approx([0.05])
     assert found.converged
     (name,) = [parameter.name for parameter in low.parameters]
-    assert unsettled(found) == f"its {name} would be beyond 0.05, which is not plausible"
+    assert unsettled(found) == Statement("implausible", {"parameter": name, "bound": 0.05})
 
 
 def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):
     task = problem(1, truth=Wave(bend=0.1), phased=False)
     base = fitted(task)
-    assert [t.why_not for t in tried(base, [BEND], base.noise, GATES, 0.004)] == [""]
+    assert [t.why_not for t in tried(base, [BEND], base.noise, GATES, 0.004)] == [None]
     halted = trial.fit
     monkeypatch.setattr(trial, "fit", lambda *given: replace(halted(*given), step=2.0))
-    assert "did not converge" in tried(base, [BEND], base.noise, GATES, 0.004)[0].why_not
+    assert tried(base, [BEND], base.noise, GATES, 0.004)[0].why_not.code == "not_converged"
 
 
 @dataclass(frozen=True)
@@ -89,24 +94,25 @@ def brittle(last, *roles):
 
 def test_where_the_model_does_not_hold_a_fit_is_no_result():
     sound, broken = brittle(7), brittle(7, "identify")
-    assert unsettled(fitted(sound, BEND)) == ""
+    assert unsettled(fitted(sound, BEND)) is None
     first = broken.role("identify")[0].run
-    assert unsettled(fitted(broken, BEND)) == f"in {first} it breaks"
+    assert in_words(unsettled(fitted(broken, BEND))) == f"in {first} it breaks"
     assert search(sound, (BEND,), GATES).names == ("bend",)
     outcome = search(broken, (BEND,), GATES)
     assert outcome.names == ()
-    assert [trial.why_not for trial in outcome.trials] == [f"in {first} it breaks"]
+    assert [in_words(trial.why_not) for trial in outcome.trials] == [f"in {first} it breaks"]
 
 
 def test_a_makeshift_prediction_of_a_held_out_run_is_told():
     for task, status in ((brittle(7), "explained"), (brittle(7, "validate"), "partly_explained")):
-        outcome = verdict.stands(task, search(task, (BEND,), GATES))
+        outcome = verdict.validated(task, search(task, (BEND,), GATES))
         assert outcome.names == ("bend",)  # the fit knows nothing of these runs
         rows = verdict.comparison(task, *(verdict.held_out(task, f) for f in (outcome.base, outcome.final)))
-        told = verdict.judge(task, outcome, rows, GATES)
+        told = in_words(verdict.judge(task, outcome, rows, GATES))
         assert told["status"] == status
     first = task.role("validate")[0].run
-    assert told["unexplained"]["signature"] == f"{verdict.MAKESHIFT} in {first} it breaks"
+    makeshift = Statement("makeshift", {"why": f"in {first} it breaks"})
+    assert told["unexplained"]["signature"] == in_words(makeshift)
 
 
 def test_of_a_base_that_did_not_converge_nothing_is_called_clean():
@@ -115,7 +121,7 @@ def test_of_a_base_that_did_not_converge_nothing_is_called_clean():
     rows = verdict.comparison(task, *[verdict.held_out(task, outcome.base)] * 2)
     assert verdict.judge(task, outcome, rows, GATES)["status"] == "clean"
     astray = replace(outcome, base=replace(outcome.base, step=6.0), final=replace(outcome.final, step=6.0))
-    told = verdict.judge(task, astray, rows, GATES)
+    told = in_words(verdict.judge(task, astray, rows, GATES))
     assert told["status"] == "unexplained"
     assert "did not converge" in told["unexplained"]["signature"]
     assert np.isfinite(outcome.final.step)

@@ -9,25 +9,18 @@ import pandas as pd
 import pytest
 from scipy import stats
 from toy import ANGLE, BEND, BETA, GATES, POINTS, RIPPLE, SIGMA, TWIN, Wave, problem
+from worded import in_words
 
 from metro.effects.effect import EffectParameter
-from metro.loop import verdict as verdicts
-from metro.loop.search import search
-from metro.loop.signature import Line, share_left
-from metro.loop.story import SENTENCES, in_words, told
-from metro.loop.verdict import (
-    COMPARISON,
-    REFUTED,
-    UNTESTED,
-    bounded,
-    comparison,
-    error,
-    held_out,
-    identified_fit,
-    judge,
-    run_dof,
-    stands,
-)
+from metro.loop.checks.signature import Line, share_left
+from metro.loop.fitting.held_out import COMPARISON, comparison, held_out, identified_fit, run_dof
+from metro.loop.search.search import search
+from metro.loop.statement import Statement
+from metro.loop.verdict import verdict as verdicts
+from metro.loop.verdict.story import story
+from metro.loop.verdict.verdict import bounded, error, judge, validated
+from metro.wording.batch import STATUSES as SENTENCES
+from metro.wording.batch import verdict_in_words
 
 STATUSES = {"clean", "explained", "partly_explained", "undetermined", "unexplained", "insufficient"}
 
@@ -70,7 +63,7 @@ def check_entry(entry):
 def closed(task, library):
     outcome = search(task, library, GATES)
     rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
-    return outcome, rows, judge(task, outcome, rows, GATES)
+    return outcome, rows, in_words(judge(task, outcome, rows, GATES))
 
 
 CASES = {
@@ -90,8 +83,8 @@ def test_every_status_has_an_entry_by_the_contract_and_a_sentence(status):
     assert verdict["status"] == status
     check_entry(verdict)
     assert verdict["held_out_runs"] == [block.run for block in task.role("validate")]
-    assert in_words(verdict).startswith(SENTENCES[status].split("{")[0])
-    json.dumps(told(task, outcome, verdict, GATES), allow_nan=False)
+    assert verdict_in_words(verdict).startswith(SENTENCES[status].split("{")[0])
+    json.dumps(in_words(story(task, outcome, verdict, GATES)), allow_nan=False)
 
 
 def with_spike_where_unseen(task):
@@ -137,8 +130,8 @@ def test_insufficient_runs_claim_no_effect_and_the_one_found_is_a_candidate_that
     assert verdict["effects"] == []
     found = {entry["effect"]: entry for entry in verdict["candidates"]}
     assert set(found) == {"bend", "ripple"}
-    assert found["bend"]["why_not"] == UNTESTED
-    assert found["ripple"]["why_not"] not in ("", UNTESTED)
+    assert found["bend"]["why_not"] == in_words(Statement("untested"))
+    assert found["ripple"]["why_not"] not in ("", in_words(Statement("untested")))
     assert all(entry["held_out_rms"] is None for entry in found.values())
 
 
@@ -254,13 +247,13 @@ def test_an_effect_that_held_out_runs_speak_against_is_withdrawn():
     mixed = replace(bent, blocks=(*bent.role("identify"), *straight.role("validate")))
     found = search(mixed, (BEND,), GATES)
     assert found.names == ("bend",)
-    assert stands(bent, search(bent, (BEND,), GATES)).names == ("bend",)
-    refuted = stands(mixed, found)
+    assert validated(bent, search(bent, (BEND,), GATES)).names == ("bend",)
+    refuted = validated(mixed, found)
     assert refuted.names == ()
     rows = comparison(mixed, held_out(mixed, refuted.base), held_out(mixed, refuted.final))
-    verdict = judge(mixed, refuted, rows, GATES)
+    verdict = in_words(judge(mixed, refuted, rows, GATES))
     assert verdict["status"] == "unexplained"
-    assert verdict["candidates"][0]["why_not"] == REFUTED
+    assert verdict["candidates"][0]["why_not"] == in_words(Statement("refuted"))
 
 
 def test_what_is_unlikelier_but_no_worse_predicted_is_not_withdrawn(monkeypatch):
@@ -269,7 +262,7 @@ def test_what_is_unlikelier_but_no_worse_predicted_is_not_withdrawn(monkeypatch)
     mixed = replace(bent, blocks=(*bent.role("identify"), *straight.role("validate")))
     found = search(mixed, (BEND,), GATES)
     monkeypatch.setattr(verdicts, "held_out_rms", lambda _problem, fit: 1.0 if fit is found.final else 2.0)
-    assert stands(mixed, found).names == ("bend",)
+    assert validated(mixed, found).names == ("bend",)
 
 
 def test_a_rival_that_is_no_effect_of_the_library_leaves_words_and_no_error():

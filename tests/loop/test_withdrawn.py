@@ -5,10 +5,12 @@ from dataclasses import replace
 import pytest
 from toy import BEND, GATES, RIPPLE, SCATTER, Wave, problem
 
-from metro.loop.between import Between
-from metro.loop.restless import Restless
-from metro.loop.search import _unsteady, search, withdrawn
-from metro.loop.signature import Line
+from metro.loop.checks.between import Between
+from metro.loop.checks.restless import Restless
+from metro.loop.checks.signature import Line
+from metro.loop.search.outcome import withdrawn
+from metro.loop.search.search import _unsteady, search
+from metro.loop.statement import Statement
 
 
 @pytest.fixture(scope="module")
@@ -24,10 +26,10 @@ def test_without_its_effects_an_outcome_is_the_base_model_with_the_rest_of_that(
     unrest = Restless(0.05, 4.0, 1e-6)
     apart = Between(0.1, "c", 0.0)
     full = replace(bent, base_restless=unrest, base_between=apart, restless=None, between=None)
-    none = withdrawn(full, "because")
+    none = withdrawn(full, Statement("refuted"))
     assert bent.names == ("bend",)
     assert (none.names, none.steps, none.weight, none.final) == ((), (), {}, bent.base)
-    assert {trial.effect.name: trial.why_not == "because" for trial in none.trials} == {
+    assert {trial.effect.name: trial.why_not == Statement("refuted") for trial in none.trials} == {
         "bend": True,
         "ripple": False,
     }
@@ -38,7 +40,7 @@ def test_without_its_effects_an_outcome_is_the_base_model_with_the_rest_of_that(
 
 def test_what_only_an_effect_laid_bare_is_there_all_the_same(bent):
     later = replace(bent, base_lines=(), lines=(line(0.1),), restless=Restless(0.02, 3.0, 1e-6))
-    none = withdrawn(later, "because")
+    none = withdrawn(later, Statement("refuted"))
     assert none.lines == later.lines
     assert none.restless is later.restless
 

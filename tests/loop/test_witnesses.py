@@ -7,16 +7,20 @@ import numpy as np
 import pytest
 from scipy import optimize
 from toy import BEND, GATES, POINTS, RIPPLE, SIGMA, Wave, problem
+from worded import in_words
 
-from metro.loop.batch_story import brief, causes
-from metro.loop.candidate import Candidate
-from metro.loop.causes import judged
-from metro.loop.descent import State, descend
-from metro.loop.evidence import change, leave_out
-from metro.loop.fit import fit
-from metro.loop.search import search
-from metro.loop.verdict import comparison, held_out, judge
-from metro.loop.witnesses import Closed, Witness, agreement, ask, weighed
+from metro.loop.causes.causes import judged
+from metro.loop.causes.witnesses import Closed, Witness, agreement, ask, weighed
+from metro.loop.checks.evidence import change, leave_out
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.descent import State, descend
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.search.search import search
+from metro.loop.verdict.batch_story import causes
+from metro.loop.verdict.verdict import judge
+from metro.wording.batch import BRIEF
+from metro.wording.causes import cause_in_words
 
 
 def noisy(task, sd, seed):
@@ -87,8 +91,8 @@ def test_two_that_see_one_cause_confirm_it_with_a_narrower_interval():
     assert low < 0.2 < high
     widths = [np.ptp(told["parameters"]["bend"]["ci95"]) for told in cause["witnesses"]]
     assert high - low == pytest.approx(np.mean(widths) / np.sqrt(2), rel=0.1)
-    json.dumps(cause, allow_nan=False)
-    assert set(brief(cause)) <= set(cause)
+    json.dumps(in_words(cause), allow_nan=False)
+    assert set(BRIEF) <= set(cause)
 
 
 @pytest.mark.parametrize("other", [0.0, 0.1])
@@ -96,8 +100,9 @@ def test_sizes_that_differ_are_a_contradiction_in_words(other):
     (cause,) = story(one=bent(1, 0.2), two=bent(1001, other))
     assert cause["status"] == "contradiction"
     assert cause["parameters"] == {}
-    assert "bend 0.2 ±" in cause["words"]
-    assert "not one cause of one size" in cause["words"]
+    words = cause_in_words(in_words(cause))
+    assert "bend 0.2 ±" in words
+    assert "not one cause of one size" in words
 
 
 def test_an_error_that_all_runs_of_one_share_is_no_contradiction():
@@ -110,7 +115,7 @@ def test_an_error_that_all_runs_of_one_share_is_no_contradiction():
 def test_one_that_cannot_tell_neither_confirms_nor_contradicts():
     (cause,) = story(one=bent(1, 0.05), two=noisy(bent(1001, 0.0, repeats=1), 6.0, 1))
     assert cause["status"] == "alone"
-    assert [told["says"] for told in cause["witnesses"]] == ["found it", "cannot tell"]
+    assert [told["says"] for told in in_words(cause["witnesses"])] == ["found it", "cannot tell"]
     assert cause["seen_in"] == ["one"]
 
 

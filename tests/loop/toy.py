@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter
-from metro.loop.search import Gates
+from metro.loop.search.trial import Gates
 from metro.observables.problem import Block, Parameter, Problem
 
 POINTS = 24

@@ -142,7 +142,7 @@ def test_what_all_batches_may_get_wrong_alike_is_in_the_course_of_a_coefficient(
     records, _ = drawn(np.random.default_rng(4), 20)
     plain = {row["quantity"]: np.array(row["track"]) for row in remember(records)["series"]}
     for one in records:
-        one.told.setdefault("observables", {}).setdefault("force", {})["noise"] = {"budget": 0.01}
+        one.loop.setdefault("observables", {}).setdefault("force", {})["noise"] = {"budget": 0.01}
     for row in remember(records)["series"]:
         low, middle, high = np.array(row["track"]).T
         own = plain[row["quantity"]].T

@@ -9,17 +9,19 @@ import pandas as pd
 import pytest
 
 from metro.batch.processed import Processed, read_batch
-from metro.effects import library, told_of
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.search import Gates, search
-from metro.observables import cutting_force, force
-from metro.observables.arm_give import GivingArm, give_of
-from metro.observables.deformation_model import DeformationModel
+from metro.effects.library import library, with_declared
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.observables.arm.give import GivingArm, give_of
+from metro.observables.arm.tip_force import Log
+from metro.observables.arm.wall import Wall
+from metro.observables.cut import conditions as cutting_force
+from metro.observables.deformation.model import DeformationModel
+from metro.observables.force import observable as force
 from metro.observables.problem import Refusal
-from metro.observables.tip_force import Log
-from metro.observables.wall import Wall
 from metro.robot.kinematics import arm_of_cell
 from metro.robot.statics import tip_compliance
 from metro.stages.ingest import ingest
@@ -71,7 +73,8 @@ def test_the_forces_of_an_arm_that_gives_way_leave_no_misfit(cell):
     observed = force.observe(batch, read, {})
 
     def misfit(spindle):
-        task = force.problem(batch, observed | {"spindle": spindle}, {})
+        posed = force.problem(batch, observed | {"spindle": spindle}, {})
+        task = with_declared(posed, batch.manifest["known"])
         blocks = task.role("identify")
         return fit(Candidate(task.base), blocks, first_noise(0.007, task.scatter, blocks)).noise.misfit
 
@@ -97,4 +100,4 @@ def test_an_arm_of_unknown_stiffness_is_said_to_be_one(cell):
 def test_nothing_is_added_to_the_forces_of_an_arm_that_gives_way(cell):
     batch, read = cell
     task = force.problem(batch, force.observe(batch, read, {}), {})
-    assert search(told_of(task, batch.manifest["known"]), library("force"), GATES).names == ()
+    assert search(with_declared(task, batch.manifest["known"]), library("force"), GATES).names == ()

@@ -9,11 +9,11 @@ from metro.batch.batch import Batch
 from metro.batch.processed import COLUMNS
 from metro.cutting.cutter import Cutter
 from metro.dynamics.system import Structure
-from metro.observables import lobes
-from metro.observables.chatter_runs import measured, observe_chatter, observe_records
-from metro.observables.lobe_positions import Tip
 from metro.observables.problem import Refusal
-from metro.observables.stability import Cutting, run_probabilities, solve
+from metro.observables.stability import observable as lobes
+from metro.observables.stability.boundary import Cutting, run_probabilities, solve
+from metro.observables.stability.chatter import measured, observe_chatter, observe_records
+from metro.observables.stability.positions import Tip
 
 RATE, TEETH, RPM = 2000.0, 4, 1200.0
 MODES = pd.DataFrame({"used": [True], "frequency_hz": [52.0], "damping": [0.05]})

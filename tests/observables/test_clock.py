@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from metro.observables.clock import clock
-from metro.observables.joint_force_model import TorqueRun, in_waves, running
+from metro.observables.arm.clock import clock
+from metro.observables.joint_force.model import TorqueRun, in_waves, running
 from metro.robot.kinematics import Arm, jacobian
 
 DH = np.array(

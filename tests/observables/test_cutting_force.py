@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from metro.batch.batch import Batch
-from metro.observables import cutting_force
+from metro.observables.cut import conditions as cutting_force
 from metro.observables.problem import Refusal
 
 TOOL = {"diameter_mm": 12.0, "teeth": 4, "helix_deg": 40.0}
@@ -98,3 +98,27 @@ def test_a_side_cut_keeps_its_radial_depth_and_a_slot_needs_none():
 
 def test_a_turn_about_z_is_counter_clockwise():
     assert cutting_force.turn_about_z(math.pi / 2) @ [1.0, 0.0, 0.0] == pytest.approx([0.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("setting", "blank"),
+    [
+        ("feed_per_tooth_mm", np.nan),
+        ("axial_depth_mm", np.nan),
+        ("direction", ""),
+        ("radial_depth_mm", np.nan),
+    ],
+)
+def test_a_side_cut_that_is_not_described_has_no_force_and_says_which_setting_is_blank(setting, blank):
+    settings = {
+        "operation": "side",
+        "feed_per_tooth_mm": 0.05,
+        "axial_depth_mm": 2.0,
+        "radial_depth_mm": 3.0,
+        "direction": "up",
+        "spindle_rpm": 3000.0,
+    }
+    runs = pd.DataFrame([settings | {setting: blank}], index=["r1"])
+    bare = Batch("b", {"tool": {"diameter_mm": 10, "teeth": 2}}, {"cell": "c"}, runs, {})
+    with pytest.raises(ValueError, match=f"^runs.csv: {setting} of run r1 is blank$"):
+        cutting_force.cut(bare, "r1", 5e-3)

@@ -15,10 +15,11 @@ import pytest
 from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
-from metro.observables import deformation, tip_force
-from metro.observables.deformation_model import CutWall
+from metro.observables.arm import tip_force
+from metro.observables.arm.wall import wall
+from metro.observables.deformation import observable as deformation
+from metro.observables.deformation.model import CutWall
 from metro.observables.problem import BaseFit, Problem, Refusal
-from metro.observables.wall import wall
 from metro.robot.kinematics import arm_of_cell
 from metro.structure import Structure
 from metro.units import DEG, MM

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from metro.observables.end_stiffness import STIFFNESS, end_stiffness
+from metro.observables.arm.end_stiffness import STIFFNESS, end_stiffness
 
 PLACES = np.array([[0, 0, 0], [0, 0, -320], [0, 200, -320], [-200, 0, -320], [-400, 0, -320], [-200, 0, 50]])
 GRADIENT = 1e-3 * np.array([[0.4, 0.1, 0.0], [0.0, -0.6, 0.2], [0.5, 0.0, 0.8]])

@@ -12,11 +12,13 @@ from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
 from metro.batch.processed import COLUMNS, Processed, read_batch
-from metro.observables import cutting_force, flatness
-from metro.observables.face_advice import after_loop, planned_points, planned_runs
-from metro.observables.face_repeats import cloud_of
-from metro.observables.face_scan import measured_run
-from metro.observables.face_study import study
+from metro.loop.fitting.held_out import identified_fit
+from metro.observables.cut import conditions as cutting_force
+from metro.observables.flatness import observable as flatness
+from metro.observables.flatness.advice import after_loop, planned_points, planned_runs
+from metro.observables.flatness.repeats import cloud_of
+from metro.observables.flatness.scan import measured_run
+from metro.observables.flatness.study import study
 from metro.observables.problem import Refusal
 from metro.stages.identify import base_fit
 from metro.surface.ranking import agreement, posterior_draws
@@ -83,7 +85,7 @@ def reader(tests):
 def advised(batch, tests, systematic=flatness.SYSTEMATIC):
     observed = flatness.observe(batch, reader(tests), {})
     task = flatness.problem(batch, observed, {})
-    fit = None if isinstance(task, Refusal) else base_fit(task, 0.007)
+    fit = None if isinstance(task, Refusal) else identified_fit(task, base_fit(task, 0.007))
     task = task if isinstance(task, Refusal) else replace(task, systematic=systematic)
     return flatness.report(batch, observed, {}, task, fit)["study"]
 
@@ -161,7 +163,7 @@ def test_the_compliance_of_loads_alone_is_as_sure_as_least_squares_makes_it():
     batch = make_batch()
     observed = flatness.observe(batch, reader(loads(0.002)), {})
     task = flatness.problem(batch, observed, {})
-    fit = base_fit(task, 0.0)
+    fit = identified_fit(task, base_fit(task, 0.0))
     (block,) = task.blocks
     design, _ = task.base.design(block, np.zeros(0))
     values = np.linalg.lstsq(design, block.measured, rcond=None)[0]
@@ -196,7 +198,9 @@ def test_errors_of_identified_coefficients_go_into_the_interval():
         identified = {"force": {"waveform": block}}
         observed = flatness.observe(batch, reader(loads()), {})
         task = flatness.problem(batch, observed, identified)
-        told = flatness.report(batch, observed, identified, task, base_fit(task, 0.007))["study"]["advice"]
+        told = flatness.report(
+            batch, observed, identified, task, identified_fit(task, base_fit(task, 0.007))
+        )["study"]["advice"]
         low, high = told["configurations"][0]["xm_predicted"]["ci95"]
         return high - low
 
@@ -226,9 +230,9 @@ def test_faces_that_were_not_cut_rank_as_they_do_when_they_are(tmp_path):
     assert not (batch.runs["role"] != "").any()
     observed = flatness.observe(batch, Processed(tmp_path / "plan"), {})
     task = flatness.problem(batch, observed, {})
-    rows = flatness.report(batch, observed, {}, task, base_fit(task, 0.007))["study"]["advice"][
-        "configurations"
-    ]
+    rows = flatness.report(batch, observed, {}, task, identified_fit(task, base_fit(task, 0.007)))["study"][
+        "advice"
+    ]["configurations"]
 
     cut, none = read_batch(tmp_path / "cut"), pd.DataFrame(columns=list(COLUMNS["path"]))
     tables = [

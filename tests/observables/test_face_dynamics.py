@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from metro.observables.face_dynamics import TipDynamics, tip_block, tip_dynamics
+from metro.observables.flatness.dynamics import TipDynamics, tip_block, tip_dynamics
 from metro.surface.tip_stiffness import basis_over
 from metro.units import MM
 

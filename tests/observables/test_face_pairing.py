@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from metro.observables.face_pairing import paired
+from metro.observables.flatness.pairing import paired
 from metro.observables.problem import BaseFit, Block, Problem
 from metro.report.sections.face_pairing import by_face, pairing_items
 from metro.units import MM, UM

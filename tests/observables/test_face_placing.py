@@ -6,8 +6,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from metro.batch.batch import Batch
-from metro.observables.face_placing import place
-from metro.observables.face_scan import measured_run
+from metro.observables.flatness.placing import place
+from metro.observables.flatness.scan import measured_run
 
 SIZE_MM = (100.0, 60.0, 30.0)
 SIZE = np.array(SIZE_MM) * 1e-3

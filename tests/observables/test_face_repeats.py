@@ -12,7 +12,7 @@ import yaml
 
 from metro.batch.batch import Batch
 from metro.batch.processed import read_batch, read_table
-from metro.observables.face_repeats import repeat_scans, scanned_again
+from metro.observables.flatness.repeats import repeat_scans, scanned_again
 
 ROOT = Path(__file__).resolve().parents[2]
 GRANITE = Path(os.environ.get("METRO_REAL_DATA", ROOT / "../shared/real")) / "reference/granite"
@@ -44,6 +44,7 @@ def plate(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from metro.stages.loop import loop
     from metro.stages.predict import predict
     from metro.stages.report import report
+    from metro.stages.verdict import verdict
     from metro.workflow import Plan
 
     out = tmp_path_factory.mktemp("plate")
@@ -59,12 +60,14 @@ def plate(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / f"{run}.xyz").write_text("\n".join(" ".join(row[1:4]) for row in rows))
     plan = Plan.read(ROOT, {})
     stages = {
-        name: json.loads(plan.settings(name)) for name in ("ingest", "identify", "predict", "loop", "report")
+        name: json.loads(plan.settings(name))
+        for name in ("ingest", "identify", "predict", "loop", "verdict", "report")
     }
     ingest(folder, ROOT / "config/cells", processed, stages["ingest"], "c0de")
     identify(processed, stages["identify"], "c0de")
     predict(processed, stages["predict"], "c0de")
     loop(processed, reports, stages["loop"], "c0de")
+    verdict(processed, reports, stages["verdict"], "c0de")
     report(processed, reports, stages["report"], "c0de")
     return out
 

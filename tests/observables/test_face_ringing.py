@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 
 from metro.batch.batch import Batch
-from metro.observables import cutting_force
-from metro.observables.face_doubt import damping_doubt
-from metro.observables.face_dynamics import TipDynamics
-from metro.observables.face_path import Pace, force_over_period, make_path, passages
-from metro.observables.face_ringing import Ringing, make_ringing
-from metro.observables.flatness_model import FaceSetting, FlatnessModel, PoseField
+from metro.observables.cut import conditions as cutting_force
+from metro.observables.flatness.doubt import damping_doubt
+from metro.observables.flatness.dynamics import TipDynamics
+from metro.observables.flatness.model import FaceSetting, FlatnessModel, PoseField
+from metro.observables.flatness.path import Pace, force_over_period, make_path, passages
+from metro.observables.flatness.ringing import Ringing, make_ringing
 from metro.structure import Structure
 from metro.surface.tip_damping import Rayleigh, SharedRatio
 from metro.surface.tip_field import field_in
@@ -125,7 +125,7 @@ def test_the_face_is_that_of_a_cutter_swept_over_it_step_by_step_under_the_disc(
     )
     seen = passages(make_path(path()), at_x, at_y, RADIUS)
     soft = known.compliance(seen.x.ravel(), seen.y.ravel()) @ full
-    cuts = soft[:, 2].reshape(seen.x.shape) + rung.rest(Structure(), seen)
+    cuts = soft[:, 2].reshape(seen.x.shape) + rung.heights(Structure(), seen)
     found = np.where(seen.valid, cuts, np.inf).min(axis=1)
     grid_x, grid_y = np.meshgrid(x, y, indexing="ij")
     truth = np.array(
@@ -143,7 +143,7 @@ def test_the_face_is_that_of_a_cutter_swept_over_it_step_by_step_under_the_disc(
 def test_a_softer_arm_in_the_cut_rings_slower_and_farther() -> None:
     rung, _ = ringing(make_batch(), dynamics())
     seen = passages(make_path(path()), np.arange(0.02, 0.06, 1e-3), np.full(40, 0.022), RADIUS)
-    stiff, soft = (rung.rest(Structure(f), seen)[:, 0] for f in (1.0, 0.5))
+    stiff, soft = (rung.heights(Structure(f), seen)[:, 0] for f in (1.0, 0.5))
     assert np.ptp(soft) > 1.3 * np.ptp(stiff)
 
 
@@ -152,7 +152,7 @@ def test_teeth_count_only_where_they_are_slower_than_ten_times_the_highest_mode(
     fast, slow = (ringing(make_batch(rpm), dynamics())[0] for rpm in (12000.0, 1500.0))
     assert fast.teeth is None
     assert slow.teeth is not None
-    apart = slow.rest(Structure(), seen) - replace(slow, teeth=None).rest(Structure(), seen)
+    apart = slow.heights(Structure(), seen) - replace(slow, teeth=None).heights(Structure(), seen)
     assert 0.1 * UM < np.abs(apart).max() < 20 * UM
 
 
@@ -190,7 +190,7 @@ def test_a_damping_that_nothing_tells_is_in_doubt_by_as_much_as_faces_of_arms_di
     rng = np.random.default_rng(3)
 
     def height(ratio: float) -> np.ndarray:
-        moved = replace(rung, damping=SharedRatio(ratio)).rest(Structure(), setting.middle)
+        moved = replace(rung, damping=SharedRatio(ratio)).heights(Structure(), setting.middle)
         return setting.mean(moved[lowest])
 
     drawn = [height(0.05 * 2.0 ** rng.standard_normal()) - height(0.05) for _ in range(300)]

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from metro.batch.batch import Batch
-from metro.observables.face_study import study
-from metro.observables.printed_study import printed_study
+from metro.observables.flatness.study import study
+from metro.observables.published.study import printed_study
 
 # [F] table 7: X_m simulated | measured, mm, cases 1 … 8
 SIMULATED = [0.391, 0.426, 0.471, 0.501, 0.398, 0.472, 0.402, 0.465]

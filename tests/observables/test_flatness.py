@@ -15,9 +15,10 @@ from fake_tables import FakeTables
 from metro.batch.batch import Batch
 from metro.batch.findings import ContractError
 from metro.batch.processed import COLUMNS, Processed, read_batch
-from metro.observables import cutting_force, flatness
-from metro.observables.face_path import force_over_period, make_path, passages
-from metro.observables.flatness_model import FaceSetting
+from metro.observables.cut import conditions as cutting_force
+from metro.observables.flatness import observable as flatness
+from metro.observables.flatness.model import FaceSetting
+from metro.observables.flatness.path import force_over_period, make_path, passages
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.structure import Structure
 from metro.surface.tip_damping import Rayleigh, SharedRatio

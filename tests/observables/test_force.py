@@ -13,17 +13,19 @@ from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import COEFFICIENTS, Cut
 from metro.cutting.law import EdgeLaw
-from metro.effects import library
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.search import Gates, search
-from metro.loop.verdict import comparison, held_out, identified_fit, judge
-from metro.observables import force
-from metro.observables.dynamometer import Recording
-from metro.observables.force_coefficients import correlation
-from metro.observables.force_model import ForceModel, ForceSetting
-from metro.observables.mean_forces import mean_forces
+from metro.effects.library import library, with_declared
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.held_out import comparison, held_out, identified_fit
+from metro.loop.fitting.noise import first_noise
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.loop.verdict.verdict import judge
+from metro.observables.force import observable as force
+from metro.observables.force.coefficients import correlation
+from metro.observables.force.dynamometer import Recording
+from metro.observables.force.mean_forces import mean_forces
+from metro.observables.force.model import ForceModel, ForceSetting
 from metro.observables.problem import BaseFit, Block, Problem
 from metro.observables.quantity import quantity
 from metro.signals.orders import order_matrix
@@ -79,7 +81,9 @@ def test_mean_forces_of_all_five_feeds_give_the_published_coefficients(slotting)
 def test_mean_forces_lie_on_the_lines_of_the_coefficients_that_made_them(clean):
     """The simulator's coefficients put the measured means where they are, but for noise and gain."""
     found = clean.identified()
-    table = mean_forces(clean.batch, clean.observed, {"force": found})["mean_forces"]
+    identified = {"force": found}
+    task = force.problem(clean.batch, clean.observed, identified)
+    table = mean_forces(clean.batch, clean.observed["spindle"], identified, task)["mean_forces"]
     assert sorted(table["run"].unique()) == sorted(clean.batch.runs.index)
     rest = table["measured_n"] - table["fitted_n"]
     assert np.sqrt(np.mean(rest**2) / np.mean(table["measured_n"] ** 2)) < 0.02
@@ -92,7 +96,9 @@ def test_mean_forces_lie_on_the_lines_of_the_coefficients_that_made_them(clean):
 
 
 def test_without_coefficients_there_are_no_lines(clean):
-    assert mean_forces(clean.batch, clean.observed, {}) == {}
+    task = force.problem(clean.batch, clean.observed, {})
+    assert mean_forces(clean.batch, clean.observed["spindle"], {}, task) == {}
+    assert mean_forces(clean.batch, clean.observed["spindle"], {"force": clean.identified()}, None) == {}
 
 
 @real
@@ -158,9 +164,9 @@ def test_helical_runs_give_their_coefficients_once_the_runout_is_known(tmp_path)
     out = tmp_path / "out"
     helical = Observed(ROOT / "data" / "raw" / "trimule-helical", out)
     radius, angle = search(helical.task, library("force"), GATES).final.theta
-    manifest = helical.batch.manifest | {"known": {"tool_runout": {"radius_um": radius, "angle_deg": angle}}}
-    batch = replace(helical.batch, manifest=manifest)
-    task = force.problem(batch, helical.observed, {})
+    known = {"tool_runout": {"radius_um": radius, "angle_deg": angle}}
+    batch = replace(helical.batch, manifest=helical.batch.manifest | {"known": known})
+    task = with_declared(force.problem(batch, helical.observed, {}), known)
     blocks = task.role("identify")
     found = fit(Candidate(task.base), blocks, first_noise(0.007, task.scatter, blocks))
     truth = np.array([10145.0, 11036.5, 5000.0, 591.92, 100.03, 214.32])

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import t
 
-from metro.observables.force_metrics import metrics, order_spectrum, phase_shift, tooth_sectors
+from metro.observables.force.metrics import metrics, order_spectrum, phase_shift, tooth_sectors
 
 ANGLE = np.arange(120) * 3.0
 TEETH = 4

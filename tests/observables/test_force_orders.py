@@ -8,7 +8,7 @@ import pytest
 from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
-from metro.observables.force_orders import observe
+from metro.observables.force.orders import observe
 
 NOMINAL, TRUE, RATE = 6000.0, 6021.0, 10_000.0
 MANIFEST = {"tool": {"diameter_mm": 12, "teeth": 2, "helix_deg": 30}}

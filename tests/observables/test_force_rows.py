@@ -9,9 +9,9 @@ import pytest
 from metro.cutting.cutter import Cutter
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import Cut
-from metro.observables.dynamometer import Recording
-from metro.observables.force_model import ForceSetting
-from metro.observables.force_proposals import feasible
+from metro.observables.force.dynamometer import Recording
+from metro.observables.force.model import ForceSetting
+from metro.observables.force.proposals import feasible
 from metro.observables.problem import Block
 
 RPM, DEPTH = 5000.0, 1.5e-3

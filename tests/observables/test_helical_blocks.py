@@ -11,13 +11,13 @@ from metro.cutting.engagement import Engagement
 from metro.cutting.force import Cut
 from metro.cutting.helical import Helix
 from metro.cutting.law import EdgeLaw
-from metro.loop.candidate import Candidate
-from metro.loop.fit import Fit, score
-from metro.loop.noise import Noise
-from metro.observables.dynamometer import Recording
-from metro.observables.force import UNTOLD_KFAC, _at_other_feeds
-from metro.observables.force_blocks import _scale, zeros
-from metro.observables.force_model import ForceModel, ForceSetting
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import Fit, score
+from metro.loop.fitting.noise import Noise
+from metro.observables.force.blocks import _scale, zeros
+from metro.observables.force.dynamometer import Recording
+from metro.observables.force.model import ForceModel, ForceSetting
+from metro.observables.force.observable import UNIDENTIFIED_KFAC, _at_other_feeds
 from metro.observables.problem import Block
 
 HIGHEST, BLOCKS = 8, 4
@@ -98,11 +98,11 @@ def test_at_an_axial_feed_that_no_run_tells_the_thrust_is_uncertain():
         block(0.3, feed, role)
         for feed, role in ((4e-6, "identify"), (4.2e-6, "validate"), (7e-6, "validate"))
     )
-    assert _at_other_feeds((told, same), TOOL)[0].untold is None
-    assert _at_other_feeds((told, same), TOOL)[1].untold is None
-    untold = _at_other_feeds((told, other), TOOL)[1].untold
+    assert _at_other_feeds((told, same), TOOL)[0].unidentified is None
+    assert _at_other_feeds((told, same), TOOL)[1].unidentified is None
+    unidentified = _at_other_feeds((told, other), TOOL)[1].unidentified
     # N R K (s − s told) along z, in the mean alone
-    thrust = 4 * 6e-3 * UNTOLD_KFAC * 3e-6
-    by_axis = untold.reshape(BLOCKS, 3, -1)
+    thrust = 4 * 6e-3 * UNIDENTIFIED_KFAC * 3e-6
+    by_axis = unidentified.reshape(BLOCKS, 3, -1)
     assert by_axis[:, 2, 0] == pytest.approx(np.full(BLOCKS, thrust))
-    assert np.count_nonzero(untold) == BLOCKS
+    assert np.count_nonzero(unidentified) == BLOCKS

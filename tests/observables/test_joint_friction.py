@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from metro.batch.batch import Batch
-from metro.observables.joint_friction import observe, report
+from metro.observables.joint_force.friction import observe, report
 from metro.observables.problem import Refusal
 
 DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]

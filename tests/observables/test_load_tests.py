@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from metro.batch.batch import Batch
-from metro.observables.deformation_model import DeformationModel, LoadTest
-from metro.observables.load_tests import calibration, fitted_loads, in_words, joint_observability, usable
+from metro.observables.arm.load_tests import calibration, fitted_loads, in_words, joint_observability, usable
+from metro.observables.deformation.model import DeformationModel, LoadTest
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import arm_of_cell
 from metro.units import DEG, MM

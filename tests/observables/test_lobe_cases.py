@@ -9,10 +9,10 @@ import pytest
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.dynamics.lobes import stability_boundary
 from metro.dynamics.system import Cut, Structure
-from metro.observables import lobes
-from metro.observables.lobe_cases import NOWHERE, boundaries, cases_of
-from metro.observables.lobe_positions import Tip
-from metro.observables.stability import Cutting
+from metro.observables.stability.boundary import Cutting
+from metro.observables.stability.cases import NOWHERE, boundaries, cases_of
+from metro.observables.stability.positions import Tip
+from metro.observables.stability.problem import LabelProblem
 
 STRUCTURE = Structure(
     np.array([0, 1]), np.array([260.0, 390.0]), np.array([0.04, 0.03]), np.array([4e6, 6e6])
@@ -31,7 +31,7 @@ RUNS = pd.DataFrame(
 )
 PLACES = dict.fromkeys("abcd", "1") | {"e": "elsewhere"}
 CASES, POINT = cases_of(RUNS, PLACES, [TIP], CUTTING)
-PROBLEM = lobes.LabelProblem(
+PROBLEM = LabelProblem(
     "lobes", tuple("abcde"), tuple("abcde"), ("identify",) * 5, np.ones(5, bool),
     RUNS["spindle_rpm"].to_numpy(), np.full(5, 1e-4), np.full(5, 0.5), (), CASES, POINT, np.full(5, np.nan),
 )  # fmt: skip
@@ -77,6 +77,6 @@ def test_the_diagram_after_a_change_is_the_boundary_of_the_changed_model():
         {"position": ["1", "1", "9"], "rpm": [*rpm, 700.0], "depth_mm": [*depth, 1.0], "chatter_hz": 50.0}
     )
     softer = replace(STRUCTURE, stiffness=STRUCTURE.stiffness / 2)
-    after = lobes.redrawn(PROBLEM, diagram, lambda model: replace(model, structure=softer))
+    after = PROBLEM.redrawn({"lobes": diagram}, lambda model: replace(model, structure=softer))["lobes"]
     np.testing.assert_allclose(after["depth_mm"], [*depth / 2, 1.0], rtol=1e-3)
     assert after["chatter_hz"].iloc[2] == pytest.approx(50.0)

@@ -9,8 +9,9 @@ import pytest
 from metro.cutting.cutter import Cutter
 from metro.dynamics.lobes import spectral_radius, stability_boundary
 from metro.dynamics.system import Cut, Structure
-from metro.observables import lobe_methods, stability
-from metro.observables.lobe_positions import Tip
+from metro.observables.stability import boundary as stability
+from metro.observables.stability import methods as lobe_methods
+from metro.observables.stability.positions import Tip
 
 TOOL = Cutter(6e-3, 0.0, tuple(np.arange(4) * np.pi / 2), 0.0, 0.0)
 STRUCTURE = Structure(

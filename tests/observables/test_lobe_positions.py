@@ -6,7 +6,7 @@ import pytest
 
 from metro.batch.batch import Batch
 from metro.dynamics.system import Structure
-from metro.observables.lobe_positions import Tip, from_others, pairs, places, tips
+from metro.observables.stability.positions import Tip, from_others, pairs, places, tips
 
 WHERE = {
     "1": np.array([0.0, 0.0, 0.0]),

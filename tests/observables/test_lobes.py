@@ -9,8 +9,9 @@ import pytest
 from metro.batch.batch import Batch
 from metro.dynamics.lobes import stability_boundary
 from metro.dynamics.system import Cut, Structure
-from metro.observables import lobes, stability
 from metro.observables.problem import Refusal
+from metro.observables.stability import boundary as stability
+from metro.observables.stability import observable as lobes
 
 HZ, ZETA, K = np.array([40.0, 70.0]), np.array([0.05, 0.04]), np.array([4e6, 6e6])
 BATCH = {
@@ -108,7 +109,7 @@ def test_shallow_cuts_are_predicted_stable_and_deep_ones_not(observed):
 
 
 def test_the_comparison_holds_the_validation_runs_with_labels(observed):
-    table = lobes.comparison(lobes.problem(batch(), observed, {}))
+    table = lobes.problem(batch(), observed, {}).comparison()
     assert list(table["run"]) == ["stable", "chatter"]
     assert list(table["measured"]) == [0.0, 1.0]
     assert (table["before"] == table["after"]).all()

@@ -10,8 +10,10 @@ from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Processed, read_batch
-from metro.observables import deformation, force_orders, joint_force
-from metro.observables.long_record import LongRecord
+from metro.observables.cut.long_record import LongRecord
+from metro.observables.deformation import observable as deformation
+from metro.observables.force import orders as force_orders
+from metro.observables.joint_force import observable as joint_force
 from metro.stages.ingest import ingest
 
 ROOT = Path(__file__).parents[2]
@@ -40,7 +42,7 @@ def record(seconds=8.0, wander=0.0, tacho=False):
 
 
 def observed(table, stretch, monkeypatch):
-    monkeypatch.setattr("metro.observables.long_record.STRETCH", stretch)
+    monkeypatch.setattr("metro.observables.cut.long_record.STRETCH", stretch)
     runs = pd.DataFrame([ROW], index=["r1"])
     batch = Batch("small", MANIFEST, {"cell": "c"}, runs, {})
     return force_orders.observe(batch, FakeTables(lambda *_: table), {})
@@ -49,7 +51,7 @@ def observed(table, stretch, monkeypatch):
 @pytest.mark.parametrize("stretch", [100_000, 20_000, 7_777, 5_000])
 def test_stretches_are_the_record_and_parts_of_it(stretch, monkeypatch):
     table = record()
-    monkeypatch.setattr("metro.observables.long_record.STRETCH", stretch)
+    monkeypatch.setattr("metro.observables.cut.long_record.STRETCH", stretch)
     found = LongRecord(FakeTables(lambda *_: table), "r1")
     assert (found.samples, found.start) == (len(table), 10.0)
     assert found.rate == pytest.approx(RATE)
@@ -105,7 +107,7 @@ def test_the_force_on_a_robots_tool_is_the_same_in_stretches(tmp_path, monkeypat
     ingest(ROOT / "data" / "raw" / "kr160-side", ROOT / "config" / "cells", tmp_path / "out", {}, "test")
     batch, found = read_batch(tmp_path / "out"), []
     for size in (10**6, 3_000):
-        monkeypatch.setattr("metro.observables.long_record.STRETCH", size)
+        monkeypatch.setattr("metro.observables.cut.long_record.STRETCH", size)
         read = Processed(tmp_path / "out")
         tables = joint_force.observe(batch, read, {}), deformation.observe(batch, read, {})
         found.append((tables[0]["tool_force"], tables[1]["tip_force"]))

@@ -9,8 +9,8 @@ from metro.batch.processed import read_table
 from metro.dynamics.hits import Hit, gate
 from metro.formats.uff import FRF, Function
 from metro.formats.uff_writer import universal_file
-from metro.observables.modal_test import clear_of_drift, clear_of_noise, observe_modes
-from metro.observables.receptance import arranged, from_files
+from metro.observables.stability.modal_test import clear_of_drift, clear_of_noise, observe_modes
+from metro.observables.stability.receptance import arranged, from_files
 from metro.stages.ingest import ingest
 
 NATURAL, ZETA, STIFFNESS = np.array([30.0, 62.0]), np.array([0.03, 0.02]), np.array([4e6, 9e6])
@@ -284,3 +284,10 @@ def test_one_line_that_stands_out_of_the_noise_by_chance_does_not_open_the_band(
     clear = np.flatnonzero(clear_of_noise(hits.mean(axis=0)[:, None], variance))
     assert 5.0 < frequency[clear[0]] < 60.0
     assert frequency[clear[-1]] > 75.0
+
+
+def test_a_free_mass_has_no_mode_and_the_note_says_so():
+    test = observed(frf_rows(-1e-5 / FREQUENCY**2 + 0j, "2x"))
+    assert test.modes.empty
+    assert test.alike.empty
+    assert test.notes[-1].endswith("no mode is seen in these hits: no pole recurs over the model orders")

@@ -6,8 +6,8 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.dynamics.lobes import stability_boundary
 from metro.dynamics.system import Cut, Structure
-from metro.observables import lobes
-from metro.observables.printed_modes import printed_coefficients, printed_modes
+from metro.observables.published.modes import printed_coefficients, printed_modes
+from metro.observables.stability import observable as lobes
 
 # table 6, position 1: damped frequency, damping (%), stiffness, mass
 TABLE_6 = {

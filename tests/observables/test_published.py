@@ -10,7 +10,7 @@ import yaml
 
 from metro.batch.batch import Batch
 from metro.observables.problem import Problem, Refusal
-from metro.observables.published import errors, loads, modes, observe, problems
+from metro.observables.published.observable import errors, loads, modes, observe, problems
 from metro.structure import Structure
 
 RAW = Path(__file__).parents[2] / "data" / "raw"

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from metro.batch.batch import Batch
-from metro.observables.published_forces import forces, printed_coefficients
+from metro.observables.published.forces import forces, printed_coefficients
 
 FOLDER = Path(__file__).parents[2] / "data" / "raw" / "trimule-published"
 N, A, FEED, RADIUS, HELIX = 4, 0.2, 0.06, 6.0, math.radians(40)  # mm

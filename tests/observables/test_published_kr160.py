@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from metro.observables.published import errors
+from metro.observables.published.observable import errors
 
 FILE = Path(__file__).parents[2] / "data" / "raw" / "kr160-published" / "published.csv"
 FORCES = {

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from metro.observables.published_matrices import matrices
+from metro.observables.published.matrices import matrices
 
 TABLE = Path(__file__).parents[2] / "data/raw/irb6640-published/published.csv"
 

@@ -7,7 +7,7 @@ from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
 from metro.batch.processed import COLUMNS
-from metro.observables.record_view import MOST_RUNS, STRETCHES, record_tables
+from metro.observables.cut.record_view import MOST_RUNS, STRETCHES, record_tables
 
 RATE = 10_000.0
 
@@ -34,7 +34,7 @@ def tables(force, hit=None):
 
 @pytest.mark.parametrize("stretch", [1 << 19, 1_000, 77])
 def test_the_span_of_a_record_holds_every_sample_however_it_is_read(stretch, monkeypatch):
-    monkeypatch.setattr("metro.observables.long_record.STRETCH", stretch)
+    monkeypatch.setattr("metro.observables.cut.long_record.STRETCH", stretch)
     force = record(10_007)
     found = record_tables(batch(["r1"]), tables(force), None)["force_records"]
     along = found[found["axis"] == "y"]

@@ -8,8 +8,8 @@ import pytest
 from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
-from metro.observables.robot_tables import SPACING, _waves, robot_tables
-from metro.observables.waviness_points import IDLE, STRAYED
+from metro.observables.arm.robot_tables import SPACING, _waves, robot_tables
+from metro.observables.waviness.points import IDLE, STRAYED
 from metro.robot.kinematics import arm_of_cell
 from metro.robot.workspace import reach
 from metro.units import DEG, MM

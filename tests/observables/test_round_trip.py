@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from metro.batch.processed import Processed, read_batch
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.verdict import identified_fit
-from metro.observables import force
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.held_out import identified_fit
+from metro.loop.fitting.noise import first_noise
+from metro.observables.force import observable as force
 from metro.stages.ingest import ingest
 from virtual_cell.chips import Tool
 from virtual_cell.dynamometer import Dynamometer

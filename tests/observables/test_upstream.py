@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from metro.observables.deformation_model import CutWall
-from metro.observables.flatness_model import FaceSetting
+from metro.observables.arm.tip_force import SYSTEMATIC
+from metro.observables.cut.upstream import OFF, mean_forces, with_forces
+from metro.observables.deformation.model import CutWall
+from metro.observables.flatness.model import FaceSetting
 from metro.observables.problem import Block
-from metro.observables.tip_force import SYSTEMATIC
-from metro.observables.upstream import OFF, mean_forces, with_forces
 
 FORCES = {name: np.array([10.0, 20.0, 30.0]) * share for name, share in (("measured", 1.0), ("before", 1.2))}
 ALONG = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])  # of the wall: rises and falls about its mean

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from test_deformation import Cell, moves
 
-from metro.observables import waviness
+from metro.observables.arm.wall import wall
 from metro.observables.problem import BaseFit, Problem
-from metro.observables.wall import wall
-from metro.observables.waviness_points import ENCODER
-from metro.observables.waviness_report import joint_share
+from metro.observables.waviness import observable as waviness
+from metro.observables.waviness.points import ENCODER
+from metro.observables.waviness.report import joint_share
 from metro.units import DEG, MM
 
 JOINTS = range(1, 7)

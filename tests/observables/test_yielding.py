@@ -11,9 +11,9 @@ from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement, engagement
 from metro.cutting.force import Cut, mean_force
 from metro.cutting.law import EdgeLaw
+from metro.observables.force.yielding import ANGLES, LIMIT, NotConvergedError, ratios, yielding_force
+from metro.observables.force.yielding_table import yielding_table
 from metro.observables.problem import Refusal
-from metro.observables.yielding import ANGLES, LIMIT, NotConvergedError, ratios, yielding_force
-from metro.observables.yielding_table import yielding_table
 
 # [T] table 4, N/m² and N/m
 TITANIUM = np.array([10145e6, 11036.5e6, 5000e6, 591.92e3, 100.03e3, 214.32e3])

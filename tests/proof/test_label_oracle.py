@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from metro.effects.effect import Effect, EffectParameter
-from metro.observables.lobes import LabelProblem
+from metro.observables.stability.problem import LabelProblem
 from proof import label_oracle as room
 from proof.label_oracle import label_oracle
 

@@ -114,8 +114,8 @@ def test_what_the_library_lacks_has_no_oracle_but_a_size():
 @pytest.mark.parametrize(("name", "library"), [("bump", LIBRARY), ("chip", LIBRARY[:1])])
 def test_what_no_run_tells_of_the_base_model_is_no_noise(name, library):
     task = problem(Wave(bump=0.6))
-    untold = 3.0 * SIGMA * np.full((POINTS, 1), 1.0)
-    blocks = [replace(b, untold=untold) if b.role == "validate" else b for b in task.blocks]
+    unidentified = 3.0 * SIGMA * np.full((POINTS, 1), 1.0)
+    blocks = [replace(b, unidentified=unidentified) if b.role == "validate" else b for b in task.blocks]
     values = {name: {"bump": 0.6}}
     force = replace(task, observable="force")
     able = [replace(effect, observables=("force",)) for effect in library]
@@ -125,7 +125,7 @@ def test_what_no_run_tells_of_the_base_model_is_no_noise(name, library):
     assert unsure["floor"] == pytest.approx(sure["floor"], rel=1e-9)
     instrument = oracle(replace(task, blocks=tuple(blocks)), values, library, BUDGET)
     assert instrument["floor"] == pytest.approx(np.sqrt(10.0) * sure["floor"], rel=0.01)
-    # of what the library lacks, the size is what is beyond noise and untold together
+    # of what the library lacks, the size is what is beyond the noise and the unidentified directions together
     beyond = np.sqrt(max(0.0, sure["before"] ** 2 - 10.0 * SIGMA**2)) / SIGMA
     assert unsure["sizes"][name] == pytest.approx(beyond if name == "chip" else sure["sizes"][name], rel=0.05)
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from metro.loop.label_search import NOTHING
-from metro.loop.label_unknown import UNKNOWN
+from metro.loop.labels.search import NOTHING
+from metro.loop.labels.unknown import UNKNOWN
 from proof.figures import over_floor, over_stated
 from proof.score import FAILED, score
 

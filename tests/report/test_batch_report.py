@@ -93,6 +93,27 @@ def test_a_batch_with_nothing_in_it_still_has_a_report_that_says_so():
     assert "nothing to compare" in text
 
 
+def test_nothing_could_be_identified_is_not_said_of_faces_that_were():
+    faces = {"r1": {"xm": {"value": 20.0, "ci95": [19.0, 21.0], "unit": "um"}}}
+    some = replace(
+        synthetic.results(), tables={}, identified={"format": 1, "faces": faces}, verdict={}, loop={}
+    )
+    text = " ".join(text_of(batch_report(some)))
+    assert "Nothing could be identified" not in text
+    assert "in sections of its own: flatness of faces" in text
+
+
+def test_modes_without_a_driving_point_have_no_stiffness_and_the_first_page_shows_a_response():
+    modes = [
+        {**mode, "stiffness": {"value": None, "unit": "N/m"}} for mode in synthetic.identified()["modes"]
+    ]
+    tables = {"frf_used": synthetic.responses().assign(response="9x")}
+    some = replace(synthetic.results(), tables=tables, identified={"modes": modes}, verdict={}, loop={})
+    first = text_of(batch_report(some))[0]
+    assert "mode that yields most" not in first
+    assert "The highest response" in first
+
+
 @pytest.mark.parametrize(
     ("status", "words"),
     [

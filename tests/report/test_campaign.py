@@ -12,7 +12,7 @@ import synthetic_results as synthetic
 from metro.batch.batch import Batch
 from metro.batch.processed import write_batch
 from metro.report.campaign import campaign_report, campaign_table
-from metro.report.sections.standings import largest_rests, rankings
+from metro.report.sections.standings import largest_residuals, rankings
 from metro.stages.campaign import campaign, first_start
 
 EMPTY = {"format": 1, "batch": "modes-only", "metro": "0", "observables": {}}
@@ -100,16 +100,16 @@ def test_the_flattest_configurations_and_the_least_flat_are_ranked():
     assert rankings({"force-only": {}}) == []
 
 
-def test_the_largest_rests_come_first_in_units_of_the_noise():
+def test_the_largest_residuals_come_first_in_units_of_the_noise():
     small, large = synthetic.observable(after=2.0), synthetic.observable(after=8.0, noise_floor=2.0)
-    (section,) = largest_rests([("b1", "force", small), ("b2", "force", large), ("b3", "lobes", {})])
+    (section,) = largest_residuals([("b1", "force", small), ("b2", "force", large), ("b3", "lobes", {})])
     told, table = section.items
     assert "2 of 2" in told.text
     assert [(row[0], row[2], row[4]) for row in table.rows] == [
         ("b2", "8.00 N", "4.0"),
         ("b1", "2.00 N", "1.1"),
     ]
-    assert largest_rests([("b3", "lobes", {})]) == []
+    assert largest_residuals([("b3", "lobes", {})]) == []
 
 
 def test_the_name_of_a_batch_leads_to_its_report(verdicts):

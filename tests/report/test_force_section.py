@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import synthetic_results as synthetic
 
-from metro.observables.force_metrics import metrics, order_spectrum
+from metro.observables.force.metrics import metrics, order_spectrum
 from metro.report.content import Facts, Picture, Table
 from metro.report.figures import force as figures
 from metro.report.sections.force import force_items, mean_items

@@ -92,6 +92,16 @@ def test_the_response_on_the_first_page_is_that_of_a_driving_point():
     assert "of a driving point" not in other.caption
 
 
+def test_where_hits_rove_and_several_responses_are_read_a_shape_is_seen_from_one_of_them():
+    both = shapes()
+    other = both["mode_shapes"].assign(response="2x", real=9.0)
+    both["mode_shapes"] = pd.concat([both["mode_shapes"], other])
+    picture = next(item for item in modes(synthetic.identified()["modes"], both) if isinstance(item, Picture))
+    assert "at the 3 points" in picture.caption
+    (first, *_) = [axes for axes in picture.figure.axes if axes.get_title(loc="left")]
+    np.testing.assert_allclose(first.get_lines()[1].get_ydata(), [1.0, 0.5, 0.2])
+
+
 def test_two_points_make_no_shape():
     few = shapes()
     few["mode_shapes"] = few["mode_shapes"][few["mode_shapes"]["reference"] != "3x"]

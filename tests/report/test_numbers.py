@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from metro.observables import modal_test
+from metro.observables.stability import modal_test
 from metro.report.numbers import listing, number, percent, probability, quantity, with_interval
 from metro.report.parameters import parameter_name
 

@@ -1,6 +1,6 @@
 """Parameters of effects in words: what is not told is not printed as a number."""
 
-from metro.report.parameters import NOT_TOLD, effect_words, parameter_value
+from metro.report.parameters import NOT_IDENTIFIED, effect_words, parameter_value
 
 
 def entry(value, low, high, unit="Hz", **more):
@@ -11,18 +11,18 @@ OPEN = entry(20000.0, 100.0, 20000.0, told=False)
 
 
 def test_a_number_of_which_nothing_is_told_is_not_printed():
-    assert parameter_value("tool_runout", entry(170.0, -10.0, 350.0, "deg", told=False)) == NOT_TOLD
-    assert parameter_value("tool_runout", entry(170.0, 160.0, 180.0, "deg")) == "170 ± 10°"
-    assert parameter_value("spindle_growth", entry(3.0, 1.0, 5.0, "um")) == "3.0 ± 2.0 µm"
-    assert parameter_value("stiffness_scale", 4) == "4"
+    assert parameter_value({}, entry(170.0, -10.0, 350.0, "deg", told=False)) == NOT_IDENTIFIED
+    assert parameter_value({}, entry(170.0, 160.0, 180.0, "deg")) == "170 ± 10°"
+    assert parameter_value({}, entry(3.0, 1.0, 5.0, "um")) == "3.0 ± 2.0 µm"
+    assert parameter_value({}, 4) == "4"
 
 
 def test_lists_name_the_axes_and_the_unit_once():
     found = [entry(750.0, 700.0, 800.0), entry(990.0, 900.0, 1080.0), OPEN]
-    assert parameter_value("dynamometer_resonance", found) == "x 750 ± 50, y 990 ± 90 Hz, z not told"
-    assert parameter_value("dynamometer_resonance", [OPEN] * 3) == NOT_TOLD
+    assert parameter_value({"per": ["axis"]}, found) == "x 750 ± 50, y 990 ± 90 Hz, z not told"
+    assert parameter_value({"per": ["axis"]}, [OPEN] * 3) == NOT_IDENTIFIED
     pitch = [entry(0.2, 0.1, 0.3, "deg"), entry(-0.2, -0.3, -0.1, "deg")]
-    assert parameter_value("pitch_error", pitch) == "0.20 ± 0.10, −0.20 ± 0.10°"
+    assert parameter_value({"per": ["tooth"]}, pitch) == "0.20 ± 0.10, −0.20 ± 0.10°"
 
 
 def test_an_effect_is_named_with_its_joint_and_its_parameters():

@@ -2,7 +2,7 @@
 
 import pytest
 
-from metro.report.phrases import plain, rest_words, sentence
+from metro.report.phrases import plain, residual_words, sentence
 
 
 def place(axis, label, relative, excess=None, significant=True):
@@ -20,7 +20,7 @@ def test_orders_are_told_by_what_makes_them():
         place("z", "mean", 0.02),
         place("z", "order 4", 0.01),
     ]
-    assert rest_words(entries, 3) == (
+    assert residual_words(entries, 3) == (
         "at the tooth passing and its harmonics (orders 3, 6; most along y, 20 % of the signal at order 3); "
         "once per revolution (x 5.0 % of the signal); a constant offset (z 2.0 % of the signal); "
         "between the harmonics of the tooth passing (z 1.0 % of the signal)"
@@ -28,7 +28,7 @@ def test_orders_are_told_by_what_makes_them():
 
 
 def test_what_changes_along_a_run_is_no_constant_offset():
-    told = rest_words(
+    told = residual_words(
         [place("z", "mean, along the run", 0.02), place("x", "order 1, once per orbit", 0.01)], 3
     )
     assert told == (
@@ -38,12 +38,12 @@ def test_what_changes_along_a_run_is_no_constant_offset():
 
 
 def test_what_is_not_significant_is_not_told():
-    assert rest_words([place("x", "order 1", 0.5, significant=False)], 3) == ""
+    assert residual_words([place("x", "order 1", 0.5, significant=False)], 3) == ""
 
 
 def test_axes_stand_in_the_order_of_their_size():
     entries = [place("x", "all", 0.1, 2.0), place("z", "all", 0.7, 9.0)]
-    assert rest_words(entries, 0) == "throughout (z 70 % and x 10 % of the signal)"
+    assert residual_words(entries, 0) == "throughout (z 70 % and x 10 % of the signal)"
 
 
 def test_sentences_of_the_verdict_lose_their_jargon():

@@ -34,7 +34,7 @@ def test_the_relative_deviation_is_that_of_repeated_noisy_tests():
     fits = [
         joint_compliances(rows, rows @ TRUE + SIGMA * rng.normal(size=measured.shape)) for _ in range(400)
     ]
-    found = identifiability.told(identifiability.information(rows, measured, SIGMA, TRUE))
+    found = identifiability.assess(identifiability.information(rows, measured, SIGMA, TRUE))
     spread = np.std([fit.value for fit in fits], axis=0) / TRUE
     np.testing.assert_allclose(found.relative, spread, rtol=0.12)
     assert found.worst == int(np.argmax(spread))
@@ -44,7 +44,7 @@ def test_the_relative_deviation_is_that_of_repeated_noisy_tests():
 def test_a_joint_whose_axis_every_force_passes_is_the_unseen_direction():
     no_lever = arm_with_tool(tool_in_flange_mm=[0.0, 0.0, 279.91])
     rows, measured = loads_of(some_poses(3), arm=no_lever)
-    found = identifiability.told(identifiability.information(rows, measured, SIGMA, TRUE))
+    found = identifiability.assess(identifiability.information(rows, measured, SIGMA, TRUE))
     np.testing.assert_allclose(np.abs(found.unseen), [[0, 0, 0, 0, 0, 1]], atol=1e-5)
     assert np.isinf(found.relative[5])
     assert np.isfinite(found.relative[:5]).all()
@@ -54,7 +54,7 @@ def test_a_joint_whose_axis_every_force_passes_is_the_unseen_direction():
 
 def test_one_force_in_one_pose_tells_three_combinations_and_no_joint():
     rows, measured = loads_of(some_poses(1), force=np.array([[300.0, -100.0, 50.0]]))
-    found = identifiability.told(identifiability.information(rows, measured, SIGMA, TRUE))
+    found = identifiability.assess(identifiability.information(rows, measured, SIGMA, TRUE))
     assert len(found.unseen) == 3
     assert np.isinf(found.relative).all()
     # a change of the compliances along an unseen direction moves no reading
@@ -77,7 +77,7 @@ def test_repeats_halve_the_variance():
     rows, measured = loads_of(some_poses(3))
     once = identifiability.information(rows, measured, SIGMA, TRUE)
     twice = identifiability.information(np.vstack([rows, rows]), np.vstack([measured, measured]), SIGMA, TRUE)
-    one, two = identifiability.told(once), identifiability.told(twice)
+    one, two = identifiability.assess(once), identifiability.assess(twice)
     np.testing.assert_allclose(two.relative, one.relative / np.sqrt(2))
 
 
@@ -111,7 +111,7 @@ def test_a_joint_that_was_not_seen_is_seen_by_the_load_that_is_proposed():
     through = np.cross(tip_jacobian(ARM, q)[..., axis], [0.3, 0.5, -0.8])
     rows = joint_contributions(ARM, q, 300 * through / np.linalg.norm(through, axis=1)[:, None])
     matrix = identifiability.information(rows, np.ones((4, 3), dtype=bool), SIGMA, TRUE)
-    assert np.isinf(identifiability.told(matrix).relative[axis])
+    assert np.isinf(identifiability.assess(matrix).relative[axis])
     found = identifiability.next_load(
         ARM, matrix, identifiability.around(q[:1]), newton=300.0, sigma=SIGMA, size=TRUE
     )

@@ -5,26 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kr160_arm import DH
-from scipy.spatial.transform import Rotation
 
 from metro.robot.kinematics import Arm, forward, jacobian, rotation, transform
-from metro.robot.tracking import rotation_vector, tracking_error
+from metro.robot.tracking import tracking_error
 
 ARM = Arm(DH, np.array([0.2125, 0.0, 0.27991]), transform(np.array([1.2, -0.1, 0.5]), rotation(0.1, -0.3, 2)))
 angles = st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6).map(np.array)
 vectors = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3).map(np.array)
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-7, 1e-3, 1.0, 3.0, np.pi - 1e-7, np.pi])
-def test_the_rotation_vector_is_axis_times_angle_from_nothing_to_half_a_turn(angle):
-    axes = np.random.default_rng(3).normal(size=(50, 3))
-    axes /= np.linalg.norm(axes, axis=1)[:, None]
-    found = rotation_vector(Rotation.from_rotvec(angle * axes).as_matrix())
-    np.testing.assert_allclose(np.linalg.norm(found, axis=1), angle, rtol=1e-9, atol=1e-15)
-    sign = (
-        np.sign(np.sum(found * axes, axis=1)) if angle == np.pi else np.ones(50)
-    )  # both axes turn half round
-    np.testing.assert_allclose(found * sign[:, None], angle * axes, rtol=0, atol=1e-9 * angle + 1e-16)
 
 
 def test_a_joint_that_lags_moves_flange_and_tip_on_their_circles_about_its_axis():

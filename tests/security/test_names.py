@@ -75,6 +75,8 @@ def test_nothing_of_the_package_runs_a_shell():
         if not (
             path.name == "documents.py" and match[0] == "yaml.load("
         )  # with the loader that is tested here
+        # by an unpickler that is restricted; tests/stages/test_problem_file.py gives it harmful files
+        and not (path.name == "problem_file.py" and match[0] == "pickle")
         and not (
             path.name == "signals.py" and "allow_pickle=False" in path.read_text() and match[0] == "pickle"
         )

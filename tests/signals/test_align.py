@@ -94,3 +94,17 @@ def test_the_distance_from_a_path_is_that_of_its_chords():
     reference = np.column_stack([np.linspace(0, 1, 11), np.zeros(11), np.zeros(11)])
     _, away = projected(np.array([[0.55, 0.3, 0.4], [1.2, 0.0, 0.0]]), reference)
     np.testing.assert_allclose(away, [0.5, 0.2])
+
+
+def test_where_samples_were_lost_a_bin_with_less_than_half_of_its_samples_is_left_out():
+    s = np.arange(0.1e-3, 40e-3, 0.2e-3)
+    noisy = np.random.default_rng(3).normal(size=(len(s), 1))
+    # five samples a bin of a millimetre: one is left of the bin from 10 mm, four of that from 20 mm
+    kept = ~((s > 10.2e-3) & (s < 14e-3) | (s > 20.0e-3) & (s < 20.2e-3))
+    whole = align(s, noisy, s, noisy, 1e-3)
+    for first, second in ((s[kept], s), (s, s[kept])):
+        values = noisy[kept] if first is not s else noisy, noisy[kept] if second is not s else noisy
+        found = align(first, values[0], second, values[1], 1e-3, gaps=True)
+        lost = np.setdiff1d(whole.s.round(6), found.s.round(6))
+        np.testing.assert_allclose(lost, whole.s[10:14], atol=1e-6)
+        assert len(align(first, values[0], second, values[1], 1e-3).s) == len(found.s) + 1

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from metro.batch.manifest import signed_axes
+from metro.batch.axes import signed_axes
 from metro.signals.conversion import driving_point_sign, moved, receptance, response_si, sensor_to_tool
 
 AXES = [

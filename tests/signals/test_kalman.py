@@ -178,3 +178,23 @@ def test_the_long_run_variance_of_coloured_noise_on_a_slow_channel(persistence):
         found.append(long_run_variance(noise + slow))
     # spectral density of the autoregression at zero frequency
     np.testing.assert_allclose(np.mean(found, axis=0), (2.0 / (1 - persistence)) ** 2, rtol=0.08)
+
+
+def test_gaps_and_jitter_are_no_noise():
+    """A slow channel jumps from one side of a gap to the other: that is no noise."""
+    rng = np.random.default_rng(11)
+    interval = rng.uniform(0.6, 1.4, 1999)
+    interval[rng.choice(1999, 25, replace=False)] = 60.0
+    interval /= np.median(interval)
+    time = np.concatenate([[0.0], np.cumsum(interval)])
+    slow = np.array([2000.0, 30.0]) * np.sin(2.0 * time / time[-1])[:, None]
+    noisy = slow + rng.normal(0, [3.0, 0.5], (2000, 2))
+    np.testing.assert_allclose(noise_variance(noisy, interval), [9.0, 0.25], rtol=0.1)
+    np.testing.assert_allclose(long_run_variance(noisy, interval=interval), [9.0, 0.25], rtol=0.15)
+    assert noise_variance(noisy)[0] > 1.3 * 9.0
+    assert long_run_variance(noisy)[0] > 3.0 * 9.0
+
+
+def test_at_even_intervals_the_noise_is_that_of_the_second_differences():
+    z = np.random.default_rng(12).normal(size=(100, 2))
+    np.testing.assert_allclose(noise_variance(z, np.ones(99)), noise_variance(z), rtol=1e-12)

@@ -112,3 +112,14 @@ def test_a_receptance_in_another_unit_and_a_band_in_kilohertz_are_told():
     assert plausible.frf(frequency, receptance) == ""
     assert "in kHz" in plausible.frf(1e-3 * frequency, receptance)
     assert "µm/N" in plausible.frf(frequency, 1e3 * receptance)
+
+
+@pytest.mark.parametrize("stiffness_n_mm", [0.1, 2.0, 40.0])
+def test_a_soft_structure_is_not_taken_for_another_unit(stiffness_n_mm):
+    """A mass of 2.5 kg on so soft a spring; the same numbers as of a hard one in mm/N, but for the mass."""
+    frequency, stiffness = np.linspace(1.0, 100.0, 400), 1e3 * stiffness_n_mm
+    natural = np.sqrt(stiffness / 2.5) / (2.0 * np.pi)
+    receptance = 1 / (stiffness * (1 - (frequency / natural) ** 2 + 0.06j * frequency / natural))
+    assert plausible.frf(frequency, receptance) == ""
+    assert "µm/N" in plausible.frf(frequency, 1e6 * receptance)
+    assert plausible.softness(frequency, receptance)[1] == pytest.approx(2.5, rel=0.2)

@@ -66,3 +66,11 @@ def test_the_longest_of_two_cuts_is_taken():
     found = segments(turns([signal], TURN), settling=0)
     assert found.steady.start == pytest.approx(45 * TURN, abs=TURN)
     assert found.steady.stop == pytest.approx(95 * TURN, abs=TURN)
+
+
+def test_a_record_shorter_than_a_revolution_has_none():
+    """A spindle speed in the table that is far too low: the record is refused for that reason."""
+    found = turns([np.ones((50, 3))], 60_000.0)
+    assert (found.samples, found.mean.shape, found.square.shape) == (50, (0, 3), (0, 3))
+    with pytest.raises(ValueError, match="50 samples, fewer than the 60000 of one revolution"):
+        segments(found, 0)

@@ -118,7 +118,8 @@ def test_a_batch_without_impacts_says_so(tmp_path):
     folder.mkdir()
     manifest = {"format": 1, "batch": "bare", "source": "measured", "cell": "none"}
     (folder / "batch.yaml").write_text(yaml.safe_dump(manifest))
-    (folder / "runs.csv").write_text("run\na\n")
+    header = "table,row,quantity,measured,predicted,unit"
+    (folder / "published.csv").write_text(f"{header}\n1,1,mean force,100,90,N\n")
     ingest(folder, tmp_path, tmp_path / "processed", {}, "c0de")
     result = export(tmp_path / "processed", tmp_path / "out.uff")
     assert result.exit_code == 1

@@ -13,6 +13,7 @@ import yaml
 
 from metro.batch.findings import BatchError
 from metro.batch.processed import COLUMNS, read_batch, read_table
+from metro.batch.provenance import made_by
 from metro.formats.kinds import KINDS
 from metro.stages.ingest import ingest
 
@@ -34,7 +35,7 @@ MANIFEST = {
         "hammer": {"rate_hz": 1000},
     },
 }
-CLOUD = np.random.default_rng(0).uniform(0.0, [60.0, 100.0, 30.0], size=(50, 3))
+CLOUD = np.random.default_rng(0).uniform([0.0, 0.0, 29.9], [60.0, 100.0, 30.0], size=(50, 3))
 
 
 def batch(root):
@@ -177,7 +178,7 @@ def test_provenance_names_each_source_with_its_hash(folder, tmp_path):
     metadata = pq.read_schema(tmp_path / "processed/small/force.parquet").metadata
     digest = hashlib.sha256((folder / "force.csv").read_bytes()).hexdigest()
     assert json.loads(metadata[b"metro.sources"]) == {"force.csv": digest}
-    assert metadata[b"metro.code"] == b"c0de"
+    assert made_by(tmp_path / "processed/small", "ingest")["code"] == "c0de"
     everything = json.loads(
         pq.read_schema(tmp_path / "processed/small/runs.parquet").metadata[b"metro.sources"]
     )

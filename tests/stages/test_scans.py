@@ -82,6 +82,32 @@ def test_the_margin_is_declared(tmp_path):
     assert "expected 50 × 30 to 200 × 120 mm" in problem(tmp_path, raster(45, 30), batch(extent_margin=1.0))
 
 
+def noisy(points):
+    return points + np.random.default_rng(1).normal(0, 0.02, points.shape)
+
+
+@pytest.mark.parametrize("placed", [True, False])
+def test_a_scan_of_the_part_on_its_table_is_told_what_planes_there_are(tmp_path, placed):
+    table = raster(300, 200, 2.0) - np.array([100, 70, 30])
+    scene = noisy(np.vstack([table, raster(100, 60)]))
+    message = problem(tmp_path, scene, batch(to_work=EYE) if placed else batch())
+    assert message.endswith(
+        "(instruments.scanner.extent_margin)?; the points lie on 2 planes: 298 × 198 mm "
+        "(70 % of the points), 99.1 × 59.1 mm (30 % of the points); "
+        "plane 2 has the size of the face: keep its points alone"
+    )
+
+
+def test_a_scan_of_two_parts_is_told_of_two_groups(tmp_path):
+    scene = noisy(np.vstack([raster(100, 60), raster(100, 60) + np.array([300, 0, 0])]))
+    assert problem(tmp_path, scene, batch()).endswith("; the points lie in 2 groups apart")
+
+
+def test_one_plane_in_one_piece_needs_no_more_words(tmp_path):
+    for points in (noisy(raster(100, 30)), np.tile([[1.0, 2.0, 3.0]], (50, 1)), raster(300, 1)):
+        assert problem(tmp_path, points, batch(to_work=EYE)).endswith("(instruments.scanner.extent_margin)?")
+
+
 def test_without_a_size_the_path_tells_the_unit(tmp_path):
     nothing = batch(size=None)
     assert scanned(tmp_path, raster(100, 60), nothing)[1].problems == []
@@ -121,3 +147,28 @@ def test_the_memory_a_scan_takes_does_not_grow_with_its_points(tmp_path):
         assert count == pieces * scans.PIECE
     assert peaks[1] < 1.1 * peaks[0]
     assert peaks[1] < 40e6
+
+
+def scene(share_on_the_face):
+    """Return a face of 100 mm by 60 mm with holes, through which one sees 10 mm to 30 mm deep."""
+    points = raster(100, 60)
+    off = np.arange(len(points)) % 100 >= 100 * share_on_the_face
+    depth = 10.0 + 20.0 * np.random.default_rng(3).random(len(points))
+    return np.where(off[:, None] * [False, False, True], depth[:, None], points)
+
+
+@pytest.mark.parametrize("described", [batch(), batch(size=None)])
+def test_a_scene_that_holds_a_face_and_more_is_not_taken_for_a_face(tmp_path, described):
+    said = problem(tmp_path, scene(0.6), described)
+    assert (
+        "of one plane, expected 90 % or more of a scan of one face: keep the points of the face" in said
+        or ("is scanner.to_work in batch.yaml that of this scan?" in said)
+    )
+
+
+def test_a_face_with_some_points_beside_it_and_a_rough_or_bowed_one_are_faces(tmp_path):
+    face = raster(100, 60)
+    bowed = face + [0, 0, 1] * (1e-3 * (face[:, :1] - 50.0) ** 2)  # by 2.5 mm
+    rough = face + [0, 0, 1] * np.random.default_rng(4).normal(0.0, 0.5, (len(face), 1))
+    for points in (scene(0.95), bowed, rough):
+        assert scanned(tmp_path, points, batch(size=None))[1].problems == []

@@ -1,11 +1,14 @@
 """The areal filter and the rejection of points."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
 from metro.surface.areal import (
     CellSums,
+    Grid,
     Readings,
     gaussian_s_filter,
     interior,
@@ -33,17 +36,20 @@ def lattice(
 
 def summed(points: np.ndarray, values: np.ndarray, cell: float = 0.75) -> tuple[CellSums, np.ndarray]:
     """Sums per cell, and the cell of each point."""
-    grid = make_grid(points.min(axis=0), points.max(axis=0), cell)
+    middle = points.mean(axis=0)
+    grid = make_grid(points.min(axis=0) - middle, points.max(axis=0) - middle, cell)
+    grid = replace(grid, corner=grid.corner + middle)
     cells = grid.cells(*points.T)
     return CellSums(grid, grid.sums(cells), grid.sums(cells, values)), cells
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.5, 2.0, 4.0])
 @pytest.mark.parametrize("axis", [0, 1])
-def test_a_wave_passes_by_the_transmission_of_iso_16610(factor: float, axis: int) -> None:
-    points = lattice()
+@pytest.mark.parametrize("cells", [3.0, 10 / 3, 4.5, 6.0])
+def test_a_wave_passes_by_the_transmission_of_iso_16610(factor: float, axis: int, cells: float) -> None:
+    points = lattice(NESTING / cells / 2, seed=3)  # two pitches a cell, the least, and not in step with them
     wave = np.cos(2 * np.pi * points[:, axis] / (factor * NESTING))
-    sums, _ = summed(points, wave)
+    sums, _ = summed(points, wave, NESTING / cells)
     smooth = gaussian_s_filter(sums, NESTING)
     inside = interior(sums, 2 * NESTING)
     kept = smooth[inside] @ (
@@ -110,3 +116,10 @@ def test_a_single_spike_is_rejected_alone_and_sound_points_are_kept() -> None:
     assert set(np.flatnonzero(rejected)) == {77, 4000}
     assert kept.count.sum() == len(values) - 2
     assert sigma == pytest.approx(0.0175, rel=0.05)
+
+
+def test_rounding_moves_no_point_across_a_border_of_cells() -> None:
+    grid = Grid(0.5, np.zeros(2), (4, 4))
+    along = np.array([1.0 - 1e-13, 1.0, 1.0 + 1e-13])
+    assert grid.cells(along, np.zeros(3)).tolist() == [8, 8, 8]
+    assert grid.cells(np.zeros(3), along).tolist() == [2, 2, 2]

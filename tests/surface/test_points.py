@@ -8,6 +8,7 @@ import pytest
 from metro.surface import points as room
 from metro.surface.face import measure_face
 from metro.surface.footprint import sample
+from metro.surface.plane import fit_plane
 from metro.surface.points import Spool, box, changed, drawn
 
 CLOUD = np.random.default_rng(3).normal(size=(1000, 3))
@@ -62,6 +63,43 @@ def test_a_face_and_its_footprints_do_not_depend_on_the_slices(monkeypatch):
     np.testing.assert_array_equal(found.coverage, seen.coverage)
     np.testing.assert_allclose(found.height, seen.height, rtol=1e-14)
     np.testing.assert_allclose(found.sd, seen.sd, rtol=1e-6)
+
+
+def lattice(across, along, tilt, random):
+    """A scan on a lattice of 0.2 mm: every 25th row lies on the border of two cells of the filter's grid."""
+    heights = random.normal(0, 1e-5, (along, across))
+    if not tilt:  # heights that leave the plane level to the last digit, whatever the noise
+        heights = heights + heights[::-1] + heights[:, ::-1] + heights[::-1, ::-1]
+    x, y = np.meshgrid(2e-4 * np.arange(across), 2e-4 * np.arange(along))
+    return np.column_stack([x.ravel(), y.ravel(), (heights + tilt * x).ravel()])
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.3])
+@pytest.mark.parametrize("tilt", [0.0, 0.01])
+@pytest.mark.parametrize("sides", [(300, 200), (301, 201), (251, 251), (200, 300)])
+def test_rounding_moves_no_index_of_a_face(sides, tilt, shift):
+    random = np.random.default_rng(11)
+    cloud = lattice(*sides, tilt, random) + np.array([shift, shift, 5 * shift])
+    whole = measure_face(cloud, uncertainty=False)
+    rounded = [cloud * (1 + 2.3e-16 * random.integers(-1, 2, cloud.shape)) for _ in range(3)]
+    for other in (*rounded, cloud[random.permutation(len(cloud))], cloud[::-1]):
+        again = measure_face(other, uncertainty=False)
+        assert again.points == whole.points
+        for name, index in again.indices.items():
+            assert index.value == pytest.approx(whole.indices[name].value, rel=1e-7), name
+
+
+def test_the_axes_of_a_plane_do_not_turn_with_rounding():
+    random = np.random.default_rng(12)
+    face = random.uniform(-1, 1, (400, 3)) * [0.05, 0.03, 1e-5]
+    for turn in (np.eye(3), np.roll(np.eye(3), 1, axis=0), np.roll(np.eye(3), 2, axis=0)):
+        for points in (face @ turn, (face * [1.0, 5 / 3, 1.0]) @ turn):
+            plane, again = fit_plane(points), fit_plane(points[random.permutation(len(points))])
+            np.testing.assert_allclose(again.axes, plane.axes, atol=1e-9)
+            frame = np.vstack([plane.axes, plane.normal])
+            np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+            assert np.linalg.det(frame) == pytest.approx(1.0)
+            assert np.ptp(plane.coordinates(points)[:, 0]) > 0.99 * np.ptp(plane.coordinates(points)[:, 1])
 
 
 class Made:

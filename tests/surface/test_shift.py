@@ -47,7 +47,7 @@ def test_the_error_is_that_of_repeats():
 def test_profiles_that_are_not_alike_tell_no_shift():
     for seed in range(2, 12):
         found = shift_between(wall(X, seed), wall(X, seed + 50), KEPT, SPACING, NONE)
-        assert not found.told or found.alike > 0.6
+        assert not found.detected or found.alike > 0.6
 
 
 def test_a_step_that_may_be_there_besides_is_not_taken_for_a_shift():

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from metro.effects import library
+from metro.effects.library import library
 from metro.signals.chatter import detect
 from virtual_cell.hidden import BOUNDARY_EFFECTS
 from virtual_cell.recipes import boundary

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from metro.batch.processed import Processed, read_batch
-from metro.observables import lobes
+from metro.observables.stability import observable as lobes
 from metro.stages.ingest import ingest
 from virtual_cell.recipes import chatter
 

@@ -1,14 +1,13 @@
 """What a change re-runs: the jobs that depend on it, and no others."""
 
 import os
-import re
 
 import pytest
 import yaml
 
 pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
 
-STAGES = ("ingest", "identify", "predict", "loop", "report")
+STAGES = ("ingest", "identify", "predict", "loop", "verdict", "report")
 BOTH = {"alpha", "beta"}
 
 
@@ -110,6 +109,11 @@ def test_edited_code_re_runs_the_stages_that_use_it(checkout):
     assert checkout.planned() == from_stage("loop", BOTH)
 
 
+def test_an_edited_sentence_of_a_verdict_re_runs_no_fit(checkout):
+    checkout.edit("src/metro/wording/candidates.py", "passed every gate, but", "passed all gates, but")
+    assert checkout.planned() == from_stage("verdict", BOTH)
+
+
 def test_an_effect_of_ones_own_re_runs_what_searches_the_library(checkout):
     (checkout / "src/metro/effects/brand_new.py").write_text("X = 1\n")
     planned = checkout.planned()
@@ -117,12 +121,13 @@ def test_an_effect_of_ones_own_re_runs_what_searches_the_library(checkout):
     assert "ingest" not in planned
 
 
-def test_outputs_that_come_out_the_same_re_run_nothing_more(checkout):
-    with (checkout / "src/metro/stages/predict.py").open("a") as stream:
+# Stage → a module that it alone runs
+OWN = {"ingest": "formats/ply.py", "predict": "stages/predict.py", "verdict": "wording/candidates.py"}
+
+
+@pytest.mark.parametrize("stage", OWN)
+def test_a_stage_that_came_to_the_same_results_re_runs_nothing_after_it(checkout, stage):
+    with (checkout / "src/metro" / OWN[stage]).open("a") as stream:
         stream.write("\n\ndef added() -> int:\n    return 1\n")
-    printed = checkout.call()
-    ran = set(re.findall(r"\d steps  (?:\w+: )?(.+)  \(\d+ s\)", printed))
-    assert "predicting the held-out runs" in ran
-    assert "checking and reading the raw files" not in ran
-    assert "identifying the models" not in ran
+    checkout.call("--until", stage)
     assert checkout.planned() == {}

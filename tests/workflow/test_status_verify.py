@@ -37,7 +37,14 @@ def test_a_changed_raw_file_is_told_by_both(checkout):
     with (checkout / "data/raw/alpha/published.csv").open("a") as stream:
         stream.write("\n")
     _, status = metro(checkout, "status")
-    assert list(status["batches"]["alpha"]["needs"]) == ["ingest", "identify", "predict", "loop", "report"]
+    assert list(status["batches"]["alpha"]["needs"]) == [
+        "ingest",
+        "identify",
+        "predict",
+        "loop",
+        "verdict",
+        "report",
+    ]
     assert status["batches"]["beta"]["up_to_date"]
     code, verified = metro(checkout, "verify", "reports/alpha")
     assert code == 1

@@ -93,7 +93,7 @@ def cut_all(
     """Cut and record every run of a bench into ``folder``; return the rows of the run table, and the truth.
 
     The truth, by run: ``force_n``, the mean on the tool in full cut (3,), work frame, and ``mm_per_n`` (3,),
-    by how much the wall stands higher for more of it.
+    by how much the wall is higher for more of it.
     """
     loads = {wall: statics(cell, along) for wall, along in bench.lines.items()}
     rows, truth = [], {}

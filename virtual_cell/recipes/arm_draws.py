@@ -1,4 +1,4 @@
-"""A cutting arm, where it stands and what it cuts, drawn: what differs between batches of an arm."""
+"""A cutting arm, its place and its cuts, drawn at random: what differs between batches of an arm."""
 
 from __future__ import annotations
 
@@ -98,9 +98,9 @@ def drawn(rng: np.random.Generator, style: str) -> tuple[ArmCell, Bench]:
             lines = _lines(arm, bench, plans, origin, turn)
         except (RuntimeError, np.linalg.LinAlgError):
             continue
-        found = {role: _turning(bench, plans, lines, role) for role in ("identify", "validate")}
-        turning = found["identify"] & found["validate"]
-        if attempt > _TRIES or (turning if wanted else not (found["identify"] | found["validate"])):
+        by_role = {role: _turning(bench, plans, lines, role) for role in ("identify", "validate")}
+        turning = by_role["identify"] & by_role["validate"]
+        if attempt > _TRIES or (turning if wanted else not (by_role["identify"] | by_role["validate"])):
             break
     swaying = _swaying(arm, bench, plans, lines, turn)
     moves = _moves(arm, bench, plans, lines, (tuple(sorted(turning)), swaying))
@@ -238,7 +238,7 @@ class Side:
 
     @property
     def normal(self) -> Array:
-        """Direction (3,) out of the material that is left."""
+        """Direction (3,) out of the remaining material."""
         return -self.inward * self.across
 
 
@@ -285,28 +285,30 @@ def _lines(arm: Arm, bench: Bench, plans: Sequence[Plan], origin: Array, turn: A
 
 def _turning(bench: Bench, plans: Sequence[Plan], lines: Mapping[Way, Line], role: str) -> set[int]:
     """Joints that turn round where the tool is over the block, in a run of a role."""
-    found = set()
+    joints = set()
     for plan in plans:
         if plan.role == role:
             along = lines[way(plan)]
             first, last = entry(bench), along.length - entry(bench)
-            found |= {j for j, places in enumerate(along.turns) if ((places > first) & (places < last)).any()}
-    return found
+            joints |= {
+                j for j, places in enumerate(along.turns) if ((places > first) & (places < last)).any()
+            }
+    return joints
 
 
 def _swaying(
     arm: Arm, bench: Bench, plans: Sequence[Plan], lines: Mapping[Way, Line], turn: Array
 ) -> tuple[int, ...]:
     """Joints on which the torque of the cut changes its sign within a run."""
-    found = set()
+    joints = set()
     for plan in plans:
         wall, along = side(bench, way(plan)), lines[way(plan)]
         feed = np.stack([wall.along, wall.across, [0.0, 0.0, 1.0]])
         force = full_cut(side_cut(bench, plan, bench.metal)) @ feed @ turn.T
         over = (along.s > entry(bench)) & (along.s < along.length - entry(bench))
         torque = np.array([arm.jacobian(q)[:3].T @ force for q in along.q[over]])
-        found |= set(np.flatnonzero((torque.min(axis=0) < 0.0) & (torque.max(axis=0) > 0.0)).tolist())
-    return tuple(sorted(found))
+        joints |= set(np.flatnonzero((torque.min(axis=0) < 0.0) & (torque.max(axis=0) > 0.0)).tolist())
+    return tuple(sorted(joints))
 
 
 def _moves(

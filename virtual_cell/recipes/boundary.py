@@ -1,4 +1,4 @@
-"""Tests on either side of the stability boundary, of a machine that hides what its impact test does not tell.
+"""Tests on either side of the stability boundary, of a machine that hides what its impact test does not show.
 
 The receptances are those of the machine at rest, struck along x and y, without the mode that is missing; the
 tests are made on the machine as it is. Whole spindle speeds are held out. Without a seed, machine and tests
@@ -84,16 +84,16 @@ class Tested:
         return np.asarray(self.trials.depth[self.kept])
 
     def chatter_hz(self) -> Array:
-        """Strongest frequency (n,), Hz, of the tip, off what repeats anyway; NaN where it is stable."""
-        found = np.full(len(self.kept), np.nan)
+        """Strongest frequency (n,), Hz, of the tip beside what repeats anyway; NaN where it is stable."""
+        frequency = np.full(len(self.kept), np.nan)
         for i in np.flatnonzero(self.unstable):
             tip = self.history.tip[self.kept[i], -_LAST * self.per_turn :]
             spectrum = np.abs(np.fft.rfft(tip * np.hanning(len(tip))[:, None], axis=0)).sum(axis=1)
             order = np.arange(len(spectrum)) / _LAST
             kept = self.repeats * np.round(order / self.repeats)
             spectrum[np.abs(order - kept) < 2.5 / _LAST] = 0.0
-            found[i] = order[spectrum.argmax()] * self.rpm[i] / 60.0
-        return found
+            frequency[i] = order[spectrum.argmax()] * self.rpm[i] / 60.0
+        return frequency
 
 
 def cut_tests(
@@ -147,7 +147,7 @@ def make(
     hidden : effects by name, with their parameters; None: drawn by the seed.
     seed : of machine and tests. None: those that are always the same.
     style : in which the tests are drawn.
-    records : write the record of every test, whatever is drawn. Nobody errs in labels that a record tells:
+    records : write the record of every test, whatever is drawn. A label that a record shows cannot be wrong:
         where labels are wrong, none is drawn.
 
     Raises
@@ -173,8 +173,8 @@ def make(
     write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
     write_csv(folder / "impacts.csv", _impacts(folder, machine, programme, rng))
     write_yaml(folder / "batch.yaml", _manifest(folder.name, machine, programme))
-    told: Row = {} if seed is None else {"seed": seed, "style": style}
-    return {"batch": folder.name, **told, "effects": effects}
+    drawing: Row = {} if seed is None else {"seed": seed, "style": style}
+    return {"batch": folder.name, **drawing, "effects": effects}
 
 
 def _drawn(

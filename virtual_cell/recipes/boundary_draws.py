@@ -14,7 +14,7 @@ from virtual_cell.units import DEG, MM
 STYLES = ("a", "b")
 _PER_TURN, _CELL_DEG = 180, 2.0  # steps of the march: cuts begin and end between two of them
 _METALS = ((800.0, 320.0, 100.0), (1150.0, 520.0, 200.0), (1900.0, 850.0, 300.0))  # N/mm²
-_TOLD = 0.03  # error of the declared coefficients, standard deviation of the logarithm
+_DECLARED_ERROR = 0.03  # error of the declared coefficients, standard deviation of the logarithm
 
 
 def drawn_machine(rng: np.random.Generator) -> Machine:
@@ -63,7 +63,7 @@ def drawn_programme(rng: np.random.Generator, machine: Machine, style: str, seed
     ratio = float(rng.uniform(1.15, 1.3)) if varied else 1.25
     shallow = machine.level * float(rng.uniform(0.5, 0.8))
     depths = shallow * ratio ** np.arange(math.ceil(math.log(14.0) / math.log(ratio)))
-    error = np.exp(_TOLD * rng.standard_normal(2))
+    error = np.exp(_DECLARED_ERROR * rng.standard_normal(2))
     return Programme(
         rpm,
         tuple(rpm[i] for i in sorted(held)),

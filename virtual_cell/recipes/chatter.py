@@ -101,7 +101,7 @@ def _row(folder: Path, tested: _Tested, test: int, rng: np.random.Generator) -> 
 def _trace(tested: _Tested, test: int, rng: np.random.Generator) -> tuple[Array, Array]:
     """Stylus trace (x, z) along the side of the slot: each tooth leaves its reach as it passes that side.
 
-    The lowest of the arcs that overlap stands: towards the axis, the wall is what no tooth reached.
+    The lowest of the arcs that overlap remains: towards the axis, the wall is what no tooth reached.
     """
     trials, steps = tested.trials, _PER_TURN // _TEETH
     tip = tested.history.tip[test, _ENTRY * _PER_TURN :: steps, 1]

@@ -78,8 +78,8 @@ def mill_all(
 ) -> list[Row]:
     """Mill and scan every face of a cell into ``folder``; return the rows of the run table.
 
-    ``after`` so many runs, and so many ``metres`` of cut of the same tool. ``listen(run, case, force)``, told
-    of every face and the force along its passes, returns what else its row has.
+    ``after`` so many runs, and so many ``metres`` of cut of the same tool. ``listen(run, case, force)`` is
+    called for every face with the force along its passes, and returns the further columns of its row.
     """
     rows = []
     for place, (case, replicate) in enumerate(spread(cell.cases, rng), start=after + 1):

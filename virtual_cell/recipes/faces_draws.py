@@ -72,7 +72,7 @@ class LoadTests:
 
 @dataclass(frozen=True)
 class Milling:
-    """Tool, metal, and the settings that all faces share: spindle in rpm, the rest in m.
+    """Tool, metal, and the settings that all faces share: spindle in rpm, all others in m.
 
     ``declared``: the coefficients as the manifest has them, in the contract's units.
     """
@@ -146,7 +146,7 @@ def drawn(rng: np.random.Generator, style: str, cases: tuple[Case, ...] | None =
 
 
 def _milling(rng: np.random.Generator, varied: bool) -> Milling:
-    """Draw tool and metal; what is declared of the metal is one per cent off."""
+    """Draw tool and metal; what is declared of the metal has an error of one per cent."""
     diameter, width, teeth, rpm, feed = 16.0, 10.0, 4, 12000.0, 0.05
     if varied:
         diameter, width = _CUTTERS_MM[rng.integers(len(_CUTTERS_MM))]
@@ -235,7 +235,7 @@ def load_tests(rng: np.random.Generator, varied: bool, size: tuple[float, float]
 
 
 def scanner_of(rng: np.random.Generator, varied: bool, size: tuple[float, float]) -> Scanner:
-    """Draw a scanner; it stands somewhere about the plate, looking down, and where it stands is known."""
+    """Draw a scanner at a known place somewhere about the plate, looking down."""
     if not varied:
         spacing, sigma, correlated, off, turn = 1.0 * MM, 15.0 * UM, 0.5, 8.0 * UM, (90.0, 0.0, 0.0)
         at = (260.0, -35.0, -120.0)

@@ -31,7 +31,7 @@ _AXES = (
     {"x": "-x", "y": "y", "z": "-z"},
 )
 STYLES = ("a", "b")
-FEW = "few"  # a style beside these: too few runs to tell small effects from one another
+FEW = "few"  # a style beside these: too few runs to distinguish small effects
 FULL_S, CUT_MM = 0.4, 120.0  # length of a straight cut as recorded, and as made
 AIR_S = 0.1  # of a record before the cut begins
 
@@ -44,7 +44,7 @@ class Style:
     ``tacho``; ``scatter`` relative, of the coefficients from run to run; ``feeds`` of the slots of the
     identification, in parts of the largest; ``speeds`` of the spindle, in parts of the nominal one, taken in
     turn by the conditions; ``replicates`` of those of the identification; ``narrow``: nothing is cut but
-    strips of a tenth of the diameter and half the depth, along which most effects look alike.
+    strips of a tenth of the diameter and half the depth, along which most effects are confounded.
     """
 
     rate: float = 8192.0
@@ -80,7 +80,7 @@ def _drawn_style(name: str, seed: int) -> Style:
 
 @dataclass(frozen=True)
 class _Drawn:
-    """What a seed draws: the truth, the plan, the metal without any effect, and what the manifest says."""
+    """What a seed draws: truth, plan, the metal without any effect, and what the manifest declares."""
 
     session: Session
     plans: tuple[Plan, ...]

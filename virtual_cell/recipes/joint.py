@@ -78,8 +78,8 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
     write_csv(folder / "loads.csv", loads, list(dict.fromkeys(name for row in loads for name in row)))
     write_yaml(folder / "cell.yaml", arm.CELL)
     write_yaml(folder / "batch.yaml", _manifest(folder.name, cell, bench, plates))
-    told = {"batch": folder.name, "seed": seed, "style": style, "effects": causes}
-    return told | {"runs": truth | listening.truth}
+    truth_of_batch = {"batch": folder.name, "seed": seed, "style": style, "effects": causes}
+    return truth_of_batch | {"runs": truth | listening.truth}
 
 
 def _draw(name: str, rng: np.random.Generator, cell: ArmCell) -> Parameters:
@@ -131,7 +131,7 @@ def _pose(cell: ArmCell, bench: Bench, near: Array, wrist: str) -> Pose:
 
 
 def _gauged(plates: FaceCell, bench: Bench) -> FaceCell:
-    """Return the plates as the load tests see them, whose gauge is a little off."""
+    """Return the plates as the load tests see them, whose gauge has a small error."""
     gain = 1.0 + float(bench.calibration[3])
 
     def seen(pose: Pose) -> Pose:
@@ -167,5 +167,8 @@ class _Listener:
 
 
 def _manifest(name: str, cell: ArmCell, bench: Bench, plates: FaceCell) -> Row:
-    told, scanning = arm.manifest(name, cell, bench), faces.manifest(name, plates)["instruments"]
-    return told | {"title": "Side cuts and faces of one arm", "instruments": told["instruments"] | scanning}
+    content, scanning = arm.manifest(name, cell, bench), faces.manifest(name, plates)["instruments"]
+    return content | {
+        "title": "Side cuts and faces of one arm",
+        "instruments": content["instruments"] | scanning,
+    }

@@ -72,7 +72,7 @@ def make(folder: Path, batches: int, seed: int) -> Row:
     cold, tau = float(rng.uniform(40.0, 70.0)), float(rng.uniform(90.0, 150.0))
     day = Day(round(float(rng.uniform(0.002, 0.004)), 5), (round(cold, 2), 4.0), round(tau, 1))
     cell = _metal(cell, replace(cell.milling.metal, wear=day.wear))
-    metres, told = 0.0, {}
+    metres, truth = 0.0, {}
     for number in range(batches):
         minutes = round(number * _EVERY + (rng.uniform(-_LATE, _LATE) if number else 0.0), 1)
         growth = day.growing(minutes) * (1.0 + _BETWEEN * rng.standard_normal())
@@ -80,7 +80,7 @@ def make(folder: Path, batches: int, seed: int) -> Row:
         warm = replace(own, around=replace(own.around, growth=growth * UM / 60.0))
         slots, cut = _batch(folder / name, warm, minutes, metres, rng)
         middle = cell.milling.metal.after(metres + 0.5 * slots)
-        told[name] = {
+        truth[name] = {
             "minutes": minutes,
             "metres_before": round(metres, 6),
             "coefficients": _in_words(middle),
@@ -88,7 +88,7 @@ def make(folder: Path, batches: int, seed: int) -> Row:
             "growth_here": growth,
         }
         metres += cut
-    return {"seed": seed, "day": asdict(day), "batches": told}
+    return {"seed": seed, "day": asdict(day), "batches": truth}
 
 
 def _metal(cell: FaceCell, metal: Coefficients) -> FaceCell:
@@ -148,9 +148,9 @@ def _plans(cell: FaceCell) -> tuple[Plan, ...]:
 
 def _manifest(name: str, cell: FaceCell) -> Row:
     """Return batch.yaml: the coefficients are not declared, but identified from the batch's own forces."""
-    told = {key: value for key, value in faces.manifest(name, cell).items() if key != "coefficients"}
+    content = {key: value for key, value in faces.manifest(name, cell).items() if key != "coefficients"}
     sensor = {"rate_hz": _SENSOR.rate, "reads": "work", "range_n": _SENSOR.capacity, "noise_n": _SENSOR.noise}
     title = "Slots and faces of one shift, by one tool"
-    return told | {
-        "title": title, "cell": "shift-mill", "instruments": told["instruments"] | {"dynamometer": sensor},
+    return content | {
+        "title": title, "cell": "shift-mill", "instruments": content["instruments"] | {"dynamometer": sensor},
     }  # fmt: skip

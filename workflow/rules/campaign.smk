@@ -5,7 +5,9 @@ rule campaign:
         manifests=expand("data/processed/{batch}/batch.json", batch=plan.batches),
         runs=expand("data/processed/{batch}/runs.parquet", batch=plan.batches),
         tables=expand(
-            "data/processed/{batch}/{table}.parquet", batch=plan.batches, table=PAGE
+            "data/processed/{batch}/{table}.parquet",
+            batch=plan.batches,
+            table=["comparison", "lobes_final", *drawn_tables()],
         ),
         loops=expand("data/processed/{batch}/loop.json", batch=plan.batches),
     output:

@@ -1,9 +1,14 @@
 rule identify:
     input:
-        rules.ingest.output,
+        rules.ingest.output.tables,
+        rules.ingest.output.batch,
     output:
-        expand("data/processed/{{batch}}/{table}.parquet", table=OBSERVED),
-        "data/processed/{batch}/identified.json",
+        tables=expand(
+            "data/processed/{{batch}}/{table}.parquet", table=observed_tables()
+        ),
+        problems="data/processed/{batch}/problems.pickle",
+        identified="data/processed/{batch}/identified.json",
+        made="data/processed/{batch}/identify.made.json",
     log:
         "logs/identify/{batch}.log",
     conda:
@@ -16,7 +21,8 @@ rule identify:
         processed=subpath(input[0], parent=True),
         settings=plan.settings("identify"),
         code=plan.code("identify"),
+        files=lambda wildcards, input, output: files_of(input, output),
     message:
         "{wildcards.batch}: identifying the models"
     shell:
-        "metro identify --processed {params.processed:q} --settings {params.settings:q} --code {params.code:q} > {log:q} 2>&1"
+        "metro identify --processed {params.processed:q} --settings {params.settings:q} --code {params.code:q} --files {params.files:q} > {log:q} 2>&1"

@@ -2,7 +2,7 @@ rule ingest:
     input:
         local(plan.raw_files),
     output:
-        expand(
+        tables=expand(
             "data/processed/{{batch}}/{table}.parquet",
             table=[
                 "force",
@@ -20,7 +20,8 @@ rule ingest:
                 "runs",
             ],
         ),
-        "data/processed/{batch}/batch.json",
+        batch="data/processed/{batch}/batch.json",
+        made="data/processed/{batch}/ingest.made.json",
     log:
         "logs/ingest/{batch}.log",
     conda:

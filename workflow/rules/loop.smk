@@ -1,14 +1,17 @@
 rule loop:
     input:
-        rules.ingest.output,
-        rules.identify.output,
-        rules.predict.output,
+        rules.ingest.output.tables,
+        rules.ingest.output.batch,
+        rules.identify.output.tables,
+        rules.identify.output.problems,
+        rules.identify.output.identified,
+        rules.predict.output.prediction,
     output:
-        "data/processed/{batch}/comparison.parquet",
-        "data/processed/{batch}/lobes_final.parquet",
-        "data/processed/{batch}/loop.json",
-        "reports/{batch}/identified.json",
-        "reports/{batch}/verdict.json",
+        comparison="data/processed/{batch}/comparison.parquet",
+        lobes="data/processed/{batch}/lobes_final.parquet",
+        findings="data/processed/{batch}/findings.json",
+        made="data/processed/{batch}/loop.made.json",
+        identified="reports/{batch}/identified.json",
     log:
         "logs/loop/{batch}.log",
     conda:
@@ -22,7 +25,8 @@ rule loop:
         reports=subpath(output[-1], parent=True),
         settings=plan.settings("loop"),
         code=plan.code("loop"),
+        files=lambda wildcards, input, output: files_of(input, output),
     message:
         "{wildcards.batch}: tracing what the prediction leaves over"
     shell:
-        "metro loop --processed {params.processed:q} --reports {params.reports:q} --settings {params.settings:q} --code {params.code:q} > {log:q} 2>&1"
+        "metro loop --processed {params.processed:q} --reports {params.reports:q} --settings {params.settings:q} --code {params.code:q} --files {params.files:q} > {log:q} 2>&1"

@@ -1,9 +1,9 @@
 rule predict:
     input:
-        rules.ingest.output,
-        rules.identify.output,
+        rules.identify.output.problems,
     output:
-        "data/processed/{batch}/prediction.parquet",
+        prediction="data/processed/{batch}/prediction.parquet",
+        made="data/processed/{batch}/predict.made.json",
     log:
         "logs/predict/{batch}.log",
     conda:
@@ -16,7 +16,8 @@ rule predict:
         processed=subpath(input[0], parent=True),
         settings=plan.settings("predict"),
         code=plan.code("predict"),
+        files=lambda wildcards, input, output: files_of(input, output),
     message:
         "{wildcards.batch}: predicting the held-out runs"
     shell:
-        "metro predict --processed {params.processed:q} --settings {params.settings:q} --code {params.code:q} > {log:q} 2>&1"
+        "metro predict --processed {params.processed:q} --settings {params.settings:q} --code {params.code:q} --files {params.files:q} > {log:q} 2>&1"

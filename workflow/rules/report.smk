@@ -1,9 +1,14 @@
 rule report:
     input:
-        rules.ingest.output,
-        rules.identify.output,
-        rules.predict.output,
-        rules.loop.output,
+        rules.ingest.output.tables,
+        rules.ingest.output.batch,
+        rules.identify.output.tables,
+        rules.identify.output.problems,
+        rules.loop.output.comparison,
+        rules.loop.output.lobes,
+        rules.loop.output.identified,
+        rules.verdict.output.loop,
+        rules.verdict.output.verdict,
     output:
         "reports/{batch}/report.pdf",
         "reports/{batch}/provenance.json",
@@ -20,7 +25,8 @@ rule report:
         reports=subpath(output[0], parent=True),
         settings=plan.settings("report"),
         code=plan.code("report"),
+        files=lambda wildcards, input, output: files_of(input, output),
     message:
         "{wildcards.batch}: writing the report"
     shell:
-        "metro report --processed {params.processed:q} --reports {params.reports:q} --settings {params.settings:q} --code {params.code:q} > {log:q} 2>&1"
+        "metro report --processed {params.processed:q} --reports {params.reports:q} --settings {params.settings:q} --code {params.code:q} --files {params.files:q} > {log:q} 2>&1"

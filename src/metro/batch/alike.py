@@ -1,4 +1,4 @@
-"""Findings that differ only in their row are told as one: a folder that was not copied is one mistake."""
+"""Findings that differ only in their row are reported as one: a folder that was not copied is one mistake."""
 
 from __future__ import annotations
 
@@ -6,30 +6,30 @@ import re
 from collections.abc import Iterable
 
 FEW = 3  # so many are written out
-ROW = re.compile(r"(?P<file>[^:\s]+): row (?P<row>\d+)(?: \([^)]*\))?: (?P<told>.+)")
+ROW = re.compile(r"(?P<file>[^:\s]+): row (?P<row>\d+)(?: \([^)]*\))?: (?P<message>.+)")
 QUOTED = re.compile(r'"[^"]*"')
 
 
 def alike_as_one(lines: Iterable[str]) -> list[str]:
-    """Return lines with those of many rows put together where the first of them stands.
+    """Return lines, those about many rows put together at the place of the first of them.
 
-    Lines are alike that say the same of rows of one file, whatever they quote: the first one's quotation
-    stands for all.
+    Lines are alike that report the same fault in rows of one file, whatever they quote: the first quotation
+    represents all.
     """
     groups: dict[tuple[str, ...], list[str]] = {}
     for place, line in enumerate(lines):
-        found = ROW.fullmatch(line)
-        key = (found["file"], QUOTED.sub('""', found["told"])) if found else (str(place),)
+        match = ROW.fullmatch(line)
+        key = (match["file"], QUOTED.sub('""', match["message"])) if match else (str(place),)
         groups.setdefault(key, []).append(line)
     return [line for group in groups.values() for line in (group if len(group) <= FEW else [_as_one(group)])]
 
 
 def _as_one(group: list[str]) -> str:
-    found = [match for match in map(ROW.fullmatch, group) if match]
-    told = found[0]["told"]
-    if len({match["told"] for match in found}) > 1:
-        told = QUOTED.sub(lambda quoted: f"{quoted[0]} (and {len(group) - 1} more)", told, count=1)
-    return f"{found[0]['file']}: rows {_ranges([int(match['row']) for match in found])}: {told}"
+    matches = [match for match in map(ROW.fullmatch, group) if match]
+    message = matches[0]["message"]
+    if len({match["message"] for match in matches}) > 1:
+        message = QUOTED.sub(lambda quoted: f"{quoted[0]} (and {len(group) - 1} more)", message, count=1)
+    return f"{matches[0]['file']}: rows {_ranges([int(match['row']) for match in matches])}: {message}"
 
 
 def _ranges(rows: list[int]) -> str:

@@ -48,7 +48,7 @@ def only_one_at_work(folder: Path) -> None:
 
 @contextmanager
 def job_at_work(folder: Path) -> Iterator[None]:
-    """Say for as long as this block lasts that a job is at work in a folder, where workflows run there."""
+    """Mark a folder as one that a job works in while this block runs, where workflows run there."""
     if not (folder / JOBS).exists():
         yield
         return

@@ -13,7 +13,7 @@ from metro import __version__
 from metro.batch.processed import COLUMNS
 from metro.batch.writing import write_atomically
 
-# Rows that belong together (a run's record): arrays of one length, and values that stand for all of its rows.
+# Rows that belong together (a run's record): arrays of one length, and values that hold for all of its rows.
 Part = Mapping[str, np.ndarray | pd.Series | str | int]
 
 _TEXT = {

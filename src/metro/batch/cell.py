@@ -16,14 +16,14 @@ SHORTEST_ARM_MM = 10.0
 
 
 def shared_cells(cells: Path, checkout: Path = CHECKOUT) -> Path:
-    """Return where the folder of shared cells is: as named, else, if relative, the same of the checkout."""
+    """Return the folder of shared cells: as named, else, if relative, the one in the checkout."""
     return next((folder for folder in (cells, checkout / cells) if folder.is_dir()), cells)
 
 
 def cells_findings(cells: Path) -> list[Finding]:
     """Report a folder of shared cells, as `shared_cells` has it, that was asked for and is not there.
 
-    The one that nobody asked for need not be: where there is no checkout, no cells are shared.
+    The default folder may be missing: where there is no checkout, no cells are shared.
     """
     if cells == CELLS or cells.is_dir():
         return []
@@ -81,14 +81,14 @@ def _arm(rows: list[list[float]], file: str) -> list[Finding]:
     """Check the units of an arm's rows: theta_deg, alpha_deg, d_mm, a_mm."""
     twist = max(abs(value) for row in rows for value in row[:2])
     length = max(abs(value) for row in rows for value in row[2:])
-    found = []
+    findings = []
     if 0 < twist <= 2 * math.pi:
         message = f"found no angle beyond {twist:g}, expected degrees: theta and alpha seem to be in radians"
-        found.append(Finding("error", file, message, column="arm.dh"))
+        findings.append(Finding("error", file, message, column="arm.dh"))
     if length < SHORTEST_ARM_MM:
         message = f"found no length beyond {length:g}, expected mm: d and a seem to be in metres"
-        found.append(Finding("error", file, message, column="arm.dh"))
-    return found
+        findings.append(Finding("error", file, message, column="arm.dh"))
+    return findings
 
 
 def stations_path(cell: JSON, source: Path | None) -> Path | None:
@@ -98,5 +98,5 @@ def stations_path(cell: JSON, source: Path | None) -> Path | None:
 
 
 def _unknown_key(_path: tuple[str, ...], like: Likeness) -> Severity:
-    """Say how bad an unknown key is: the contract lets fields be added, but a misspelt one must not pass."""
+    """Return how severe an unknown key is: fields may be added, but a misspelt one must not pass."""
     return "error" if like else "warning"

@@ -1,8 +1,11 @@
-"""The check of a batch against the contract, and the batch that comes out of it."""
+"""The look at a batch's tables and the heads of its files, and the batch that comes out of it.
+
+:mod:`metro.stages.whole` goes on from here and reads the files wholly, for ``metro check`` and for ingest.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,14 +14,16 @@ import pandas as pd
 
 from metro.batch import rules
 from metro.batch.batch import Batch
-from metro.batch.capabilities import Capability, capabilities
+from metro.batch.capabilities import Capability, Stock, nothing_computed
 from metro.batch.cell import CELLS, cells_findings, read_cell, shared_cells, stations_path
 from metro.batch.discover import NAME, NAME_IN_WORDS
+from metro.batch.entries import FILE
 from metro.batch.files import file_findings
 from metro.batch.findings import BatchError, Finding, errors, linked_outside
 from metro.batch.holdout import plan
-from metro.batch.manifest import FILE, read_manifest, with_defaults
+from metro.batch.manifest import read_manifest, with_defaults
 from metro.batch.runs import HOLE, design_findings, filled, recorded, run_findings
+from metro.batch.sources import SECTION
 from metro.batch.tables import Table, read_table
 from metro.units import JSON
 
@@ -40,7 +45,7 @@ class Loaded:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """What a check says: what is there, what can be computed, and what is wrong."""
+    """The result of a check: what is there, what can be computed, and what is wrong."""
 
     folder: Path
     there: tuple[str, ...]
@@ -55,9 +60,10 @@ class CheckReport:
 
 
 @dataclass(frozen=True)
-class _Read:
-    """All that was read of a batch, sound or not."""
+class Examined:
+    """All that was read of a batch's tables, sound or not."""
 
+    folder: Path
     manifest: JSON
     cell: JSON
     tables: Mapping[str, Table]
@@ -65,8 +71,49 @@ class _Read:
     plan: JSON
     findings: tuple[Finding, ...]
 
+    @property
+    def stock(self) -> Stock:
+        """What the tables say that the batch holds."""
+        frames = {name: table.frame for name, table in self.tables.items()}
+        return Stock(self.manifest, self.cell, self.runs, frames)
 
-def check(folder: Path, cells: Path = CELLS, holdout: JSON = HOLDOUT) -> CheckReport:
+    def report(self, able: Callable[[Stock], tuple[Capability, ...]]) -> CheckReport:
+        """Return what is to be shown; ``able`` says what can be computed from what there is."""
+        counts = [f"{len(table.frame)} rows in {table.file}" for table in self.tables.values() if table.file]
+        declared = self.manifest.get("instruments")
+        instruments = sorted(declared) if isinstance(declared, dict) else []  # an error says where it is none
+        there = [f"cell {self.cell.get('cell', '')}", *counts]
+        there += [f"instruments: {', '.join(instruments)}"] if instruments else []
+        can = able(self.stock)
+        nothing = [] if errors(self.findings) else nothing_computed(can)
+        return CheckReport(self.folder, tuple(there), self.plan, can, (*self.findings, *nothing))
+
+    def loaded(self) -> Loaded:
+        """Return the batch, defaults filled in and every recorded run with a role.
+
+        Raises
+        ------
+        BatchError
+            With every error that was found.
+        """
+        if errors(self.findings):
+            raise BatchError(errors(self.findings))
+        name, runs = self.folder.resolve().name, self.runs.set_index("run")
+        batch = Batch(name, self.manifest, self.cell, runs, self.plan)
+        frames: dict[str, Any] = {name: table.frame for name, table in self.tables.items() if name != "runs"}
+        return Loaded(batch, findings=self.findings, **frames)
+
+
+def _nothing(_stock: Stock) -> tuple[Capability, ...]:
+    return ()
+
+
+def check(
+    folder: Path,
+    cells: Path = CELLS,
+    holdout: JSON = HOLDOUT,
+    able: Callable[[Stock], tuple[Capability, ...]] = _nothing,
+) -> CheckReport:
     """Check a batch in seconds: manifest, cell, every table, and the first rows of every file that they name.
 
     Parameters
@@ -74,15 +121,9 @@ def check(folder: Path, cells: Path = CELLS, holdout: JSON = HOLDOUT) -> CheckRe
     folder : the batch.
     cells : folder of the shared cells.
     holdout : share and seed of the hold-out plan, as in config.yaml.
+    able : says what can be computed from what there is (:func:`metro.observables.catalogue.capabilities`).
     """
-    found = _read(folder, cells, holdout)
-    frames = {name: table.frame for name, table in found.tables.items()}
-    can = capabilities(found.manifest, found.cell, found.runs, frames)
-    counts = [f"{len(table.frame)} rows in {table.file}" for table in found.tables.values() if table.file]
-    instruments = sorted(found.manifest.get("instruments") or {})
-    there = [f"cell {found.cell.get('cell', '')}", *counts]
-    there += [f"instruments: {', '.join(instruments)}"] if instruments else []
-    return CheckReport(folder, tuple(there), found.plan, can, found.findings)
+    return examine(folder, cells, holdout).report(able)
 
 
 def load(folder: Path, cells: Path = CELLS, holdout: JSON = HOLDOUT) -> Loaded:
@@ -93,15 +134,10 @@ def load(folder: Path, cells: Path = CELLS, holdout: JSON = HOLDOUT) -> Loaded:
     BatchError
         With every error that the check found.
     """
-    found = _read(folder, cells, holdout)
-    if errors(found.findings):
-        raise BatchError(errors(found.findings))
-    batch = Batch(folder.resolve().name, found.manifest, found.cell, found.runs.set_index("run"), found.plan)
-    frames: dict[str, Any] = {name: table.frame for name, table in found.tables.items() if name != "runs"}
-    return Loaded(batch, findings=found.findings, **frames)
+    return examine(folder, cells, holdout).loaded()
 
 
-def _read(folder: Path, cells: Path, holdout: JSON) -> _Read:
+def examine(folder: Path, cells: Path, holdout: JSON) -> Examined:
     """Read and check all of a batch; go on after an error as far as makes sense."""
     manifest, findings = read_manifest(folder)
     if not NAME.fullmatch(folder.resolve().name):
@@ -120,7 +156,7 @@ def _read(folder: Path, cells: Path, holdout: JSON) -> _Read:
     findings += [*run_findings(tables["runs"], sound, unread), *rules.impact_findings(tables["impacts"])]
     findings += [*rules.load_findings(tables["loads"]), *rules.mass_findings(tables["mass"])]
     findings += [*rules.published_findings(tables["published"]), *rules.station_findings(tables["stations"])]
-    findings += file_findings(folder, tables["runs"], tables["impacts"])
+    findings += file_findings(folder, tables["runs"], tables["impacts"], sound.get(SECTION) or {})
     runs = filled(tables["runs"].frame, sound)
     findings += [*design_findings(runs, tables["runs"].file), *_about_the_whole(manifest, tables, runs)]
     roles = plan(runs, holdout["share"], holdout["seed"])
@@ -130,7 +166,7 @@ def _read(folder: Path, cells: Path, holdout: JSON) -> _Read:
         manifest = with_defaults(_with_dynamometer(manifest, runs))
         impacts = tables["impacts"].frame
         impacts["response_unit"] = impacts["response_unit"].mask(impacts["response_unit"] == "", "m")
-    return _Read(manifest, cell, tables, runs, roles, tuple(findings))
+    return Examined(folder, manifest, cell, tables, runs, roles, tuple(findings))
 
 
 def _cell(folder: Path, cells: Path, manifest: JSON) -> tuple[JSON, Path | None, list[Finding]]:
@@ -156,23 +192,19 @@ def _stations(cell: JSON, source: Path | None) -> tuple[Table, list[Finding]]:
 
 
 def _about_the_whole(manifest: JSON, tables: Mapping[str, Table], runs: pd.DataFrame) -> list[Finding]:
-    """Say what the batch as a whole leaves open."""
-    found = []
-    if not any(table.file for name, table in tables.items() if name != "stations"):
-        found.append(
-            Finding("warning", "", "no table is there: nothing was measured (runs.csv, impacts.csv, …)")
-        )
+    """Report what the batch as a whole leaves open."""
+    findings = []
     silent = int((~recorded(runs)).sum())
     if silent:
         message = (
             f"{silent} of {len(runs)} rows have neither role nor files: cuts that were made but not recorded"
         )
-        found.append(Finding("note", tables["runs"].file, message))
+        findings.append(Finding("note", tables["runs"].file, message))
     declared = manifest.get("instruments") or {}
     if (runs["dynamometer"] != "").any() and "dynamometer" not in declared and manifest:
         message = "is missing: taken to read the force on the work, its axes those of the work"
-        found.append(Finding("warning", FILE, message, column="instruments.dynamometer"))
-    return found
+        findings.append(Finding("warning", FILE, message, column="instruments.dynamometer"))
+    return findings
 
 
 def _with_dynamometer(manifest: JSON, runs: pd.DataFrame) -> JSON:

@@ -1,9 +1,12 @@
-"""The columns of the contract's tables: what may stand in each."""
+"""The columns of the contract's tables, and the values that each may hold."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+from metro.batch.ranges import number_in_words, range_of
 
 Kind = Literal["text", "number", "integer", "file", "time"]
 
@@ -17,36 +20,34 @@ class Column:
     name : as in the header.
     kind : what a cell holds; a file is a path relative to the batch folder, a time is ISO 8601.
     required : the column must be there, and filled in every row.
-    above, at_least : bounds of a number.
+    quantity : of a number, the name of its range (``schemas/ranges.json``).
     choices : the values that are allowed, where there are few.
     pattern, words : regular expression of a text, and what it asks for.
+    longest : most characters of a text.
     """
 
     name: str
     kind: Kind = "text"
     required: bool = False
-    above: float | None = None
-    at_least: float | None = None
+    quantity: str = ""
     choices: tuple[str, ...] = ()
     pattern: str = ""
     words: str = ""
+    longest: int = 200
+
+    @property
+    def rule(self) -> Mapping[str, Any]:
+        """Range of a number, as JSON Schema; empty for other cells."""
+        return range_of(self.quantity) if self.quantity else {}
 
     @property
     def expected(self) -> str:
         """What a cell should hold, in words."""
         if self.choices:
             return " or ".join(self.choices) + ("" if self.required else ", or blank")
-        words = self.words or {
-            "number": "a number",
-            "integer": "an integer",
-            "time": "a time as ISO 8601",
-        }.get(self.kind, self.kind)
-        bounds = [
-            f" {sign} {bound:g}"
-            for sign, bound in ((">", self.above), ("≥", self.at_least))
-            if bound is not None
-        ]
-        return words + "".join(bounds)
+        if self.quantity:
+            return number_in_words(self.rule)
+        return self.words or {"time": "a time as ISO 8601"}.get(self.kind, self.kind)
 
     @property
     def numeric(self) -> bool:
@@ -54,17 +55,12 @@ class Column:
         return self.kind in {"number", "integer"}
 
 
-def _numbers(*names: str, required: bool = False) -> tuple[Column, ...]:
-    """Return columns of numbers without bounds."""
-    return tuple(Column(name, "number", required) for name in names)
+def _numbers(quantity: str, *names: str, required: bool = False) -> tuple[Column, ...]:
+    """Return columns of numbers of one range."""
+    return tuple(Column(name, "number", required, quantity) for name in names)
 
 
-def _positive(*names: str, required: bool = False) -> tuple[Column, ...]:
-    """Return columns of numbers above zero."""
-    return tuple(Column(name, "number", required, above=0) for name in names)
-
-
-_REPLICATE = Column("replicate", "integer", at_least=1)
+_REPLICATE = Column("replicate", "integer", quantity="replicate")
 _POINT_AXIS = r"[A-Za-z0-9_.]+[+-]?[xyz]"
 
 RUNS = (
@@ -72,12 +68,15 @@ RUNS = (
     Column("role", choices=("identify", "validate")),
     Column("condition"),
     _REPLICATE,
-    Column("order", "integer", at_least=0),
+    Column("order", "integer", quantity="order"),
     Column("operation", choices=("slot", "side", "face", "helical")),
-    *_positive("spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm"),
+    *_numbers("spindle_rpm", "spindle_rpm"),
+    *_numbers("feed_per_tooth_mm", "feed_per_tooth_mm"),
+    *_numbers("depth_mm", "axial_depth_mm", "radial_depth_mm"),
     Column("direction", choices=("up", "down", "slot")),
-    *_numbers("orbit_rpm", "feed_direction_deg"),
-    Column("cut_length_mm", "number", at_least=0),
+    *_numbers("orbit_rpm", "orbit_rpm"),
+    *_numbers("orientation_deg", "feed_direction_deg"),
+    *_numbers("cut_length_mm", "cut_length_mm"),
     Column("wrist"),
     Column("location"),
     Column("orientation"),
@@ -90,7 +89,7 @@ RUNS = (
     Column("profile", "file"),
     Column("stable", choices=("yes", "no")),
     Column("started_at", "time"),
-    Column("return_s", "number", at_least=0),
+    *_numbers("return_s", "return_s"),
     Column("plate"),
 )
 
@@ -108,22 +107,23 @@ IMPACTS = (
 LOADS = (
     Column("pose"),
     Column("point"),
-    *_numbers(*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"),
-    *_numbers("fx_n", "fy_n", "fz_n", required=True),
-    *_numbers("dx_mm", "dy_mm", "dz_mm"),
+    *_numbers("joint_deg", *(f"q{i}_deg" for i in range(1, 7))),
+    *_numbers("place_mm", "x_mm", "y_mm", "z_mm"),
+    *_numbers("force_n", "fx_n", "fy_n", "fz_n", required=True),
+    *_numbers("displacement_mm", "dx_mm", "dy_mm", "dz_mm"),
     _REPLICATE,
-    *_positive("sigma_mm"),
+    *_numbers("sigma_mm", "sigma_mm"),
 )
 
 MASS = (
     Column("pose"),
     Column("point"),
-    *_numbers("x_mm", "y_mm", "z_mm"),
-    *_positive("mxx", required=True),
-    *_numbers("mxy", "mxz", required=True),
-    *_positive("myy", required=True),
-    *_numbers("myz", required=True),
-    *_positive("mzz", required=True),
+    *_numbers("place_mm", "x_mm", "y_mm", "z_mm"),
+    *_numbers("mass_kg", "mxx", required=True),
+    *_numbers("mass_between_kg", "mxy", "mxz", required=True),
+    *_numbers("mass_kg", "myy", required=True),
+    *_numbers("mass_between_kg", "myz", required=True),
+    *_numbers("mass_kg", "mzz", required=True),
 )
 
 PUBLISHED = (
@@ -132,16 +132,16 @@ PUBLISHED = (
     Column("observable"),
     Column("quantity", required=True),
     Column("axis"),
-    *_numbers("measured", "predicted"),
+    *_numbers("printed", "measured", "predicted"),
     Column("unit", required=True),
-    Column("printed_error_percent", "number"),
-    Column("note"),
+    *_numbers("printed_error_percent", "printed_error_percent"),
+    Column("note", longest=5000),
 )
 
 STATIONS = (
     Column("position", required=True),
-    *_numbers("x_mm", "y_mm", "z_mm", required=True),
-    *_positive("kx_n_um", "ky_n_um", "kz_n_um", required=True),
+    *_numbers("place_mm", "x_mm", "y_mm", "z_mm", required=True),
+    *_numbers("stiffness_n_um", "kx_n_um", "ky_n_um", "kz_n_um", required=True),
 )
 
 # Table → its columns; the first one or two label a row in messages.

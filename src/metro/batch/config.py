@@ -18,7 +18,7 @@ def load_config(path: Path, overrides: Mapping[str, Any] | None = None) -> JSON:
     ----------
     path : the YAML file.
     overrides : sections that replace those of the file. A section is replaced whole: what it does not name is
-        missing, not taken from the file, so that nobody has to guess what a mixture came to.
+        missing, not taken from the file, so that no mixture of the two can arise.
 
     Raises
     ------

@@ -74,16 +74,16 @@ def discover(roots: Iterable[str | Path], cells: str | Path = "config/cells") ->
                 problems.append(Finding("error", str(folder), message))
     if problems:
         raise BatchError(problems)
-    return [_found(folders[name], Path(cells)) for name in sorted(folders)]
+    return [_described(folders[name], Path(cells)) for name in sorted(folders)]
 
 
 def batch_files(folder: Path) -> tuple[Path, ...]:
     """Return every file under ``folder``, recursively and sorted; dotfiles and dangling links left out."""
-    found = []
+    files = []
     for parent, folders, names in os.walk(folder):
         folders[:] = [name for name in folders if not name.startswith(".")]
-        found += [Path(parent, name) for name in names if not name.startswith(".")]
-    return tuple(sorted(path for path in found if path.exists()))
+        files += [Path(parent, name) for name in names if not name.startswith(".")]
+    return tuple(sorted(path for path in files if path.exists()))
 
 
 def _batch_folders(root: Path) -> list[Path]:
@@ -92,7 +92,7 @@ def _batch_folders(root: Path) -> list[Path]:
     return sorted(entry for entry in visible if (entry / "batch.yaml").is_file())
 
 
-def _found(folder: Path, cells: Path) -> FoundBatch:
+def _described(folder: Path, cells: Path) -> FoundBatch:
     """List a batch's files and the shared files that describe its cell."""
     cell_file = None
     if not (folder / "cell.yaml").is_file():
@@ -105,12 +105,12 @@ def _found(folder: Path, cells: Path) -> FoundBatch:
 def _existing(folder: Path, name: str) -> Path | None:
     """Return the file ``name`` of a folder if it is there, and in it."""
     if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
-        return None  # `check` says why; the name comes from a file of somebody else
+        return None  # `check` reports why; the name comes from a file that somebody else wrote
     path = folder / name
     return path if path.is_file() else None
 
 
 def _entry(path: Path, key: str) -> str | None:
-    """Return a text entry of a YAML file; None where it has none or cannot be read (`check` says why)."""
+    """Return a text entry of a YAML file; None where it has none or cannot be read (`check` reports why)."""
     value = read_yaml(path, path.name)[0].get(key)
     return value if isinstance(value, str) else None

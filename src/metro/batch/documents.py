@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import importlib.resources
-import json
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -13,7 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import yaml
 
-from metro.batch.findings import Finding, Severity, misspelt, resembling, shown, suggestion
+from metro.batch.findings import Finding, Severity, misspelt, shown
+from metro.batch.ranges import KINDS, bounds, expected_for, number_in_words, schema, too_small
+from metro.batch.texts import strange_character
+from metro.spelling import resembling, suggestion
 
 if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # What an unknown key is to the known ones: like none, like one, or a slip of the pen for one that is absent.
 Likeness = Literal["", "like", "slip"]
-# How bad an unknown key is: called with the keys that lead to it, and with that.
+# The severity of an unknown key: called with the path of keys to it, and with its resemblance to known ones.
 UnknownKey = Callable[[tuple[str, ...], Likeness], Severity]
 
 LARGEST = 1 << 20  # bytes: a description that people write has some thousands
@@ -59,7 +59,7 @@ class _Loader(yaml.SafeLoader):
 
 
 def _mapping(loader: _Loader, node: yaml.MappingNode) -> JSON:
-    """Construct a mapping whose keys are text and stand once.
+    """Construct a mapping whose keys are text and appear once.
 
     In braces a comma ends a value: of ``{diameter_mm: 12,5}`` the 5 would be a key without one. It is put
     back, and the value is what was written, a text.
@@ -68,7 +68,7 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> JSON:
     content: JSON = {}
     before, number = "", ""  # the last key, and what was written as its value where that is a number
     for key_node, value_node in node.value:
-        key = str(key_node.value)
+        key = _text(loader, key_node)
         written = value_node.value if isinstance(value_node, yaml.ScalarNode) else None
         if number and key.isdecimal() and written == "":
             number = content[before] = f"{number},{key}"
@@ -98,8 +98,9 @@ def _finite(loader: _Loader, node: yaml.ScalarNode) -> float:
         value = math.nan if re.search("[:_]", node.value) else loader.construct_yaml_float(node)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
-        message = f"found {shown(node.value)}, expected a finite number"
+    expected = too_small(value) if math.isfinite(value) else "a finite number"
+    if expected:
+        message = f"found {shown(node.value)}, expected {expected}"
         raise yaml.constructor.ConstructorError(None, None, message, node.start_mark)
     return value
 
@@ -112,9 +113,12 @@ def _truth(_loader: _Loader, node: yaml.ScalarNode) -> bool:
     return _TRUTH[node.value.lower()]
 
 
-def _text(loader: _Loader, node: yaml.ScalarNode) -> str:
+def _text(_loader: _Loader, node: yaml.Node) -> str:
     """Construct the text as written."""
-    return str(loader.construct_scalar(node))
+    text = str(node.value)
+    if fault := strange_character(text):
+        raise yaml.constructor.ConstructorError(None, None, f"{fault}, expected text", node.start_mark)
+    return text
 
 
 _Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
@@ -122,6 +126,7 @@ _Loader.add_constructor("tag:yaml.org,2002:int", _whole)
 _Loader.add_constructor("tag:yaml.org,2002:float", _finite)
 _Loader.add_constructor("tag:yaml.org,2002:bool", _truth)
 _Loader.add_constructor("tag:yaml.org,2002:timestamp", _text)
+_Loader.add_constructor("tag:yaml.org,2002:str", _text)
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+"), list("-+.0123456789")
 )
@@ -160,51 +165,40 @@ def read_yaml(path: Path, file: str) -> tuple[JSON, list[Finding]]:
     return content, []
 
 
-@functools.cache
-def schema(name: str) -> JSON:
-    """Return the JSON Schema (draft 2020-12) ``name`` of this package: batch, cell or config."""
-    text = importlib.resources.files("metro.batch").joinpath("schemas", f"{name}.json").read_text()
-    content: JSON = json.loads(text)
-    return content
-
-
 def schema_findings(content: JSON, name: str, file: str, unknown: UnknownKey) -> list[Finding]:
     """Check a document against a schema of this package; one finding a fault, each once."""
     from jsonschema import Draft202012Validator
 
     faults = Draft202012Validator(schema(name)).iter_errors(content)
-    found = (finding for fault in faults for finding in _in_words(fault, file, unknown))
-    return list(dict.fromkeys(found))
+    findings = (finding for fault in faults for finding in _in_words(fault, file, unknown))
+    return list(dict.fromkeys(findings))
 
 
 def expectation(rule: Mapping[str, Any]) -> str:
-    """Say in words what a schema asks for, e.g. "an integer ≥ 1", "a list of 3 numbers"."""
+    """Describe in words what a schema asks for, e.g. "an integer, 1 to 120", "a list of 3 numbers"."""
     if "const" in rule or "enum" in rule:
         return " or ".join(shown(choice) for choice in rule.get("enum", [rule.get("const")]))
+    kind = rule.get("type", "value")
+    if isinstance(kind, str) and kind in KINDS:
+        return number_in_words(rule)
     if "description" in rule:
         return str(rule["description"])
-    kind = rule.get("type", "value")
     if kind == "array":
         return f"a {_plural(rule).replace('lists', 'list', 1)}"
     if kind == "object":
         return "keys with values"
-    words = "text" if kind == "string" else f"an {kind}" if kind == "integer" else f"a {kind}"
-    return words + _bounds(rule)
+    most = f" of at most {rule['maxLength']} characters" if "maxLength" in rule else ""
+    return f"text{most}" if kind == "string" else f"a {kind}"
 
 
 def _plural(rule: Mapping[str, Any]) -> str:
-    """Say in words what several of a schema's values are."""
+    """Describe in words what several of a schema's values are."""
     if rule.get("type") == "array":
-        size = f"{rule['minItems']} " if rule.get("minItems") == rule.get("maxItems", -1) else ""
+        least, most = rule.get("minItems"), rule.get("maxItems", math.inf)
+        size = f"{least} " if least == most else f"at most {most} " if most < math.inf else ""
         return f"lists of {size}{_plural(rule.get('items', {}))}"
-    kind = str(rule.get("type", "value")).replace("string", "text")
-    return f"{kind}s{_bounds(rule)}"
-
-
-def _bounds(rule: Mapping[str, Any]) -> str:
-    """Say in words in what range a schema's numbers lie."""
-    signs = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
-    return " and".join(f" {sign} {rule[key]}" for key, sign in signs.items() if key in rule)
+    kind, limits = str(rule.get("type", "value")).replace("string", "text"), bounds(rule)
+    return f"{kind}s, each {limits}" if limits else f"{kind}s"
 
 
 def _in_words(fault: ValidationError, file: str, unknown: UnknownKey) -> Iterator[Finding]:
@@ -217,7 +211,7 @@ def _in_words(fault: ValidationError, file: str, unknown: UnknownKey) -> Iterato
         for key in given:
             if key not in known:
                 message = f"is not a known key{suggestion(key, known)}"
-                severity = unknown(path, _likeness(key, known, given))
+                severity = unknown(path, likeness(key, known, given))
                 yield Finding(severity, file, message, column=".".join((*path, key)))
     elif fault.validator == "required":
         for key in rule["required"]:
@@ -227,23 +221,24 @@ def _in_words(fault: ValidationError, file: str, unknown: UnknownKey) -> Iterato
                     "error", file, f"is missing, expected {expected}", column=".".join((*path, key))
                 )
     else:
-        hint = without_comma(given) if rule.get("type") in {"number", "integer"} else ""
-        message = f"found {shown(given)}, expected {expectation(rule)}{hint}"
+        number = rule.get("type") in [*KINDS]  # which a rule of several types is not
+        expected = expected_for(rule, given) if number else expectation(rule)
+        message = f"found {shown(given)}, expected {expected}{without_comma(given) if number else ''}"
         yield Finding("error", file, message, column=".".join(path))
 
 
-def _likeness(key: str, known: list[str], given: Mapping[str, Any]) -> Likeness:
-    """Say what an unknown key of a mapping is to the known ones."""
+def likeness(key: str, known: list[str], given: Mapping[str, Any]) -> Likeness:
+    """Return how an unknown key of a mapping resembles the known ones."""
     if misspelt(key, [name for name in known if name not in given]):
         return "slip"
     return "like" if resembling(key, known) else ""
 
 
 def without_comma(given: Any) -> str:
-    """Say, to follow a message, how a number written with a comma is to be written; "" of anything else."""
+    """Return the end of a message: how to write a number that has a comma; "" for anything else."""
     if not isinstance(given, str) or not re.fullmatch(r"[-+]?[0-9]+(,[0-9]+)+", given):
         return ""
-    whole, *rest = given.split(",")
-    numbers = ["".join((whole, *rest))] if all(len(group) == THOUSAND for group in rest) else []
-    numbers += [] if rest[1:] else [f"{whole}.{rest[0]}"]
+    whole, *groups = given.split(",")
+    numbers = ["".join((whole, *groups))] if all(len(group) == THOUSAND for group in groups) else []
+    numbers += [] if groups[1:] else [f"{whole}.{groups[0]}"]
     return f": write {' or '.join(numbers)}" if numbers else ""

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from metro.batch.findings import Finding, shown
+from metro.batch.sources import Files, files_of, parted, source
 from metro.batch.tables import Table
 
 # Column of runs.csv → what kind of file it names, in the words of metro.formats.registry.
@@ -21,12 +22,16 @@ LONGEST_NAME = 255  # bytes, of every file system
 OWN_TO_A_RUN = ("dynamometer", "robot_log", "scan", "profile")
 
 
-def file_findings(folder: Path, runs: Table, impacts: Table) -> Iterator[Finding]:
-    """Check every file that ``runs.csv`` and ``impacts.csv`` name; the head of each is read once."""
+def file_findings(folder: Path, runs: Table, impacts: Table, files: Files) -> Iterator[Finding]:
+    """Check every file that ``runs.csv`` and ``impacts.csv`` name; the head of each is read once.
+
+    ``files``: the mappings of ``batch.yaml``.
+    """
     opened: dict[tuple[str, str], str | None] = {}
     for table, position, column, name, kind in _named(runs, impacts):
         if (name, kind) not in opened:
-            opened[name, kind] = _path_fault(folder, name) or _content_fault(folder / name, kind)
+            file, _ = parted(folder, name)
+            opened[name, kind] = _path_fault(folder, file) or _content_fault(folder, name, kind, files)
         fault = opened[name, kind]
         if fault:
             yield table.finding(position, column, f"{shown(name)} {fault}")
@@ -45,7 +50,7 @@ def _named(runs: Table, impacts: Table) -> Iterator[tuple[Table, int, str, str, 
 
 
 def _path_fault(folder: Path, name: str) -> str | None:
-    """Say what is wrong with a path that a table names; None where it is a file of the batch, not empty."""
+    """Describe the fault of a path that a table names; None where it is a file of the batch, not empty."""
     inside = "expected a path relative to the batch folder, inside it"
     too_long = max(len(part.encode()) for part in Path(name).parts) > LONGEST_NAME
     if "\\" in name or "\0" in name or too_long:
@@ -63,15 +68,19 @@ def _path_fault(folder: Path, name: str) -> str | None:
     return None if path.stat().st_size else "is empty, expected data"
 
 
-def _content_fault(path: Path, kind: str) -> str | None:
-    """Say what is wrong with the head of a data file, by the reader of its format."""
+def _content_fault(folder: Path, name: str, kind: str, files: Files) -> str | None:
+    """Describe what is wrong with the head of a data file, by the reader of its format."""
     from metro.formats import FormatError
     from metro.formats.registry import sniff
 
+    for file in files_of(folder, name, files):
+        fault = _path_fault(folder, file)
+        if fault:
+            return f"is read with {shown(file)}, which {fault}"
     try:
-        sniff(path, kind)
-    except FormatError as fault:
-        return f"cannot be read: {fault.message}"
+        sniff(source(folder, name, files), kind)
+    except FormatError as error:
+        return f"cannot be read: {error.message}"
     return None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ SHORTEST_WORD = 4  # letters: of shorter ones, one letter makes another word
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that a check has to say.
+    """One statement of a check.
 
     Attributes
     ----------
@@ -84,14 +83,6 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:56]} …"
 
 
-def resembling(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that ``name`` is most likely a misspelling of; None where it resembles none."""
-    by_lower = {entry.lower(): entry for entry in known}
-    without_unit = [entry for entry in by_lower if entry.startswith(f"{name.lower()}_")]
-    matches = without_unit or difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)
-    return by_lower[matches[0]] if matches else None
-
-
 def misspelt(name: str, known: Iterable[str]) -> str | None:
     """Return the known name that ``name`` is a slip of the pen for: its unit left out, or one letter.
 
@@ -106,7 +97,7 @@ def misspelt(name: str, known: Iterable[str]) -> str | None:
 
 
 def _one_slip(one: str, other: str) -> bool:
-    """Tell whether two words are the same but for a letter, or for two that have changed places."""
+    """Return whether two words are the same but for a letter, or for two that have changed places."""
     if min(len(one), len(other)) < SHORTEST_WORD:
         return False
     head = _shared_length(one, other)
@@ -119,9 +110,3 @@ def _one_slip(one: str, other: str) -> bool:
 def _shared_length(one: str, other: str) -> int:
     """Count the letters with which two words begin alike."""
     return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(one, other, strict=False)))
-
-
-def suggestion(name: str, known: Iterable[str]) -> str:
-    """Return the words that name the nearest known name; "" where ``name`` resembles none."""
-    near = resembling(name, known)
-    return f' (did you mean "{near}"?)' if near else ""

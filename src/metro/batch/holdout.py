@@ -23,7 +23,7 @@ Rank = tuple[bool, int, str]
 def plan(runs: pd.DataFrame, share: float, seed: int) -> JSON:
     """Give every recorded run one role.
 
-    The roles of the table stand. Where they are blank, whole conditions are held out, for each kind of
+    The roles of the table are kept. Where they are blank, whole conditions are held out, for each kind of
     measurement in turn, so that each keeps both roles where it can; conditions inside the range of feeds go
     before those at its ends, since a model is held to interpolate before it is asked to extrapolate. Tests
     that were judged stable or not, at :data:`FEWEST_SPEEDS` speeds or more, are held out by whole spindle
@@ -70,7 +70,7 @@ def _declared(runs: pd.DataFrame) -> dict[str, str]:
 
 
 def _kinds(runs: pd.DataFrame) -> dict[str, pd.Series]:
-    """Tell for each kind of measurement which runs have it."""
+    """Return for each kind of measurement which runs have it."""
     force, arm = runs["dynamometer"] != "", (runs["robot_log"] != "") & (runs["idle_log"] != "")
     kinds = {
         "dynamometer": force,
@@ -83,7 +83,7 @@ def _kinds(runs: pd.DataFrame) -> dict[str, pd.Series]:
 
 
 def _hold_out_speeds(tests: pd.DataFrame, roles: dict[str, str], share: float, seed: int) -> list[str]:
-    """Fill in the roles of the tests' conditions by whole speeds, where these are enough; say so.
+    """Fill in the roles of the tests' conditions by whole speeds, where these are enough; describe how.
 
     A speed at which the table gives a condition to identification stays there.
     """

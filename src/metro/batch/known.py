@@ -1,89 +1,165 @@
-"""known: the parameters of the effects that a manifest declares, by the names that their models go by."""
+"""known: the parameters of the effects that a manifest declares, by the names that their models go by.
+
+This package does not import the library of effects, so that a change of an effect does not make the raw files
+be read again. What it needs to know of each effect is in ``schemas/known.json``, which
+``scripts/reference.py`` writes from the library; effects of other packages are loaded by their entry points.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+import functools
+import importlib.resources
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib.metadata import entry_points
+from typing import Any, Protocol
 
-from metro.batch.documents import without_comma
-from metro.batch.findings import Finding, Severity, shown, suggestion
+from metro.batch.documents import Likeness, likeness, without_comma
+from metro.batch.findings import Finding, Severity, shown
+from metro.batch.ranges import expected_for, range_of, within
+from metro.spelling import suggestion
 from metro.units import JSON
 
-# Effect → its forms, each with all the parameters that it needs: those of the library of effects, which this
-# package does not import.
-FORMS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "charge_drift": (("slope_n_s",), ("time_constant_s",)),
-    "chip_size_effect": (("exponent",),),
-    "clock_offset": (("offset_ms",),),
-    "dynamometer_resonance": (("frequency_hz", "damping"),),
-    "dynamometer_rotation": (("angle_deg",),),
-    "entry_transient": (("amplitude_um", "length_mm"),),
-    "fixture_bow": (("xx_um", "xy_um", "yy_um"),),
-    "flange_rotation": (("share",),),
-    "friction_reversal": (("joint", "torque_nm"),),
-    "friction_warmup": (("joint", "slope_nm_s"),),
-    "gear_ripple": (("joint", "order", "torque_nm", "phase_deg"),),
-    "joint_backlash": (("joint", "angle_mdeg"),),
-    "missing_mode": (("frequency_hz", "damping", "stiffness_n_um", "axis"),),
-    "mode_coupling": (("angle_deg",),),
-    "orbit_stiffness": (("amplitude", "phase_deg"),),
-    "path_vibration": (("frequency_hz", "amplitude_um"), ("frequency_hz", "amplitude_um", "phase_deg")),
-    "payload_error": (("mass_kg", "com_mm"),),
-    "pitch_error": (("pitch_deg",),),
-    "process_damping": (("coefficient_n_mm",),),
-    "spindle_speed_softening": (("change_per_krpm",),),
-    "spindle_tilt": (("about_x_mrad", "about_y_mrad"),),
-    "stiffness_hardening": (("joint", "cubic"),),
-    "stiffness_scale": (("factor",), ("factor", "joint")),
-    "thermal_growth": (("um_per_min",),),
-    "tool_deflection": (("kx_n_um", "ky_n_um"),),
-    "tool_offset_error": (("dx_mm", "dy_mm", "dz_mm"),),
-    "tool_runout": (("radius_um", "angle_deg"),),
-    "tool_wear": (("edge_growth_per_m",),),
-}
-# The contract says in words what these are told by: a name of another program's is not a misspelt one.
+REGISTRY = "schemas/known.json"
+# The contract describes the parameters of these in words: a name of another program is no misspelt one.
 UNNAMED = {"entry_transient", "flange_rotation", "spindle_speed_softening"}
 JOINTS = (1, 2, 3, 4, 5, 6, "all")
 
 
-def known_findings(known: JSON, file: str) -> Iterator[Finding]:
-    """Check what is declared of each effect: the names of its parameters, and their values.
+class Parameter(Protocol):
+    """What is asked of a parameter of an effect."""
 
-    A name too many is a warning, since fields may be added; one that stands where a parameter is missing is
-    an error.
+    @property
+    def name(self) -> str:
+        """Name, as the manifest has it."""
+        ...
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """Values, where it is a choice among words."""
+        ...
+
+
+class Declarable(Protocol):
+    """What is asked of an effect that a manifest may declare."""
+
+    @property
+    def name(self) -> str:
+        """Name, as the manifest has it."""
+        ...
+
+    @property
+    def reported(self) -> tuple[Parameter, ...]:
+        """Its parameters, one for each value."""
+        ...
+
+    @property
+    def where(self) -> Mapping[str, int | str]:
+        """What else says which form of the effect is meant: a joint."""
+        ...
+
+    @property
+    def resembled(self) -> bool:
+        """Whether it is no cause that can be known, but only what a residual may look like."""
+        ...
+
+
+def registry(effects: Iterable[Declarable]) -> JSON:
+    """Return what can be declared of effects, by their names.
+
+    ``forms``: for each form the names of all its parameters; ``choices``: the words that a parameter which is
+    no number may be.
+    """
+    entries: JSON = {}
+    for effect in effects:
+        if effect.resembled:
+            continue
+        entry = entries.setdefault(effect.name, {"forms": [], "choices": {}})
+        form = list(dict.fromkeys([*effect.where, *(parameter.name for parameter in effect.reported)]))
+        entry["forms"] += [form] if form not in entry["forms"] else []
+        entry["choices"] |= {each.name: list(each.choices) for each in effect.reported if each.choices}
+    for entry in entries.values():
+        entry["forms"].sort(key=lambda form: (len(form), form))
+    return dict(sorted(entries.items()))
+
+
+def declarable() -> JSON:
+    """Return what can be declared of this package's effects and of those that other packages offer."""
+    known: JSON = {name: dict(entry) for name, entry in _own().items()}
+    loaded = [entry.load() for entry in entry_points(group="metro.effects")]
+    offered = [effect for one in loaded for effect in (one if isinstance(one, tuple | list) else [one])]
+    for name, entry in registry(offered).items():
+        before = known.get(name, {"forms": [], "choices": {}})
+        forms = [*before["forms"], *(form for form in entry["forms"] if form not in before["forms"])]
+        known[name] = {"forms": forms, "choices": {**before["choices"], **entry["choices"]}}
+    return known
+
+
+@functools.cache
+def _own() -> JSON:
+    text = importlib.resources.files("metro.batch").joinpath(REGISTRY).read_text(encoding="utf-8")
+    content: JSON = json.loads(text)
+    return content
+
+
+def known_findings(
+    known: JSON, file: str, severity: Callable[[tuple[str, ...], Likeness], Severity]
+) -> Iterator[Finding]:
+    """Check what is declared: the names of the effects, those of their parameters, and the values.
+
+    A name of a parameter too many is a warning, since fields may be added; one that stands where a parameter
+    is missing is an error.
 
     Parameters
     ----------
     known : effect → parameter → value.
     file : the manifest's name in messages.
+    severity : how bad an unknown key is, by the keys that lead to it and what it is to the known ones.
     """
+    if not known:
+        return
+    can = declarable()
+    strange = [name for name in known if name not in can]
+    for name in strange:
+        message = f"is not a known key{suggestion(name, can)}"
+        how = severity(("known",), likeness(name, list(can), known))
+        yield Finding(how, file, message, column=f"known.{name}")
     for effect, values in known.items():
-        forms = FORMS.get(effect, ())
-        names = list(dict.fromkeys(name for form in forms for name in form))
-        whole = any(set(form) <= set(values) for form in forms)
-        strange = [name for name in values if name not in names] if forms else []
-        expected = f"expected {' or '.join(', '.join(form) for form in forms)}"
-        for name in strange:
-            severity: Severity = "warning" if whole or effect in UNNAMED else "error"
-            message = f"is not a parameter of {effect}{suggestion(name, names)}, {expected}"
-            yield Finding(severity, file, message, column=f"known.{effect}.{name}")
-        if forms and not whole and (not strange or effect in UNNAMED):
-            missing = ", ".join(name for name in forms[0] if name not in values)
-            message = f"lacks {missing}, {expected}: else the base model is not told of it"
-            yield Finding("warning", file, message, column=f"known.{effect}")
-        for name in (name for name in names if name in values):
-            if fault := _fault(name, values[name]):
-                yield Finding("error", file, fault, column=f"known.{effect}.{name}")
+        if effect not in strange:
+            yield from _of_effect(effect, values, can[effect], file)
 
 
-def _fault(name: str, value: Any) -> str | None:
+def _of_effect(effect: str, values: JSON, can: JSON, file: str) -> Iterator[Finding]:
+    """Check what is declared of one effect, which the library has."""
+    forms: list[list[str]] = can["forms"]
+    names = list(dict.fromkeys(name for form in forms for name in form))
+    whole = any(set(form) <= set(values) for form in forms)
+    strange = [name for name in values if name not in names]
+    expected = f"expected {' or '.join(', '.join(form) for form in forms)}"
+    for name in strange:
+        severity: Severity = "warning" if whole or effect in UNNAMED else "error"
+        message = f"is not a parameter of {effect}{suggestion(name, names)}, {expected}"
+        yield Finding(severity, file, message, column=f"known.{effect}.{name}")
+    if not whole and (not strange or effect in UNNAMED):
+        missing = ", ".join(name for name in forms[0] if name not in values)
+        message = f"lacks {missing}, {expected}: else the base model is not told of it"
+        yield Finding("warning", file, message, column=f"known.{effect}")
+    for name in (name for name in names if name in values):
+        if fault := _fault(name, values[name], can["choices"].get(name, [])):
+            yield Finding("error", file, fault, column=f"known.{effect}.{name}")
+
+
+def _fault(name: str, value: Any, choices: list[str]) -> str | None:
     """Say what is wrong with the value of a parameter."""
     if name == "joint":
         expected = "" if value in JOINTS and not isinstance(value, bool) else "a joint, 1 to 6, or all"
-    elif name == "axis":
-        expected = "" if value in ("x", "y") else "x or y"
+    elif choices:
+        expected = "" if value in choices else " or ".join(choices)
     else:
         entries = value if isinstance(value, list) else [value]
         sound = entries and all(isinstance(e, int | float) and not isinstance(e, bool) for e in entries)
         expected = "" if sound else f"a number, or a list of them{without_comma(value)}"
+        rule = range_of("known_parameter")
+        outside = [each for each in entries if sound and not within(rule, each)]
+        expected = expected_for(rule, outside[0]) if outside else expected
     return f"found {shown(value)}, expected {expected}" if expected else None

@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from metro.batch.axes import AXES, signed_axes
 from metro.batch.documents import Likeness, read_yaml, schema_findings
-from metro.batch.findings import Finding, Severity, linked_outside, resembling, shown, suggestion
+from metro.batch.entries import FILE, entry
+from metro.batch.findings import Finding, Severity, linked_outside, shown
 from metro.batch.known import known_findings
 from metro.batch.planned import NUMBERS
+from metro.batch.sources import mapping_findings
+from metro.spelling import resembling, suggestion
 from metro.units import JSON, Array
 
-FILE = "batch.yaml"
-AXES = ("x", "y", "z")
 CLOSED_DEG = 0.1  # printed pitch angles are rounded
-HARDEST = 1e5  # N/mm2, a hundred times aluminium
 ORTHONORMAL = 1e-3  # printed direction cosines are rounded
 
 
@@ -41,16 +42,8 @@ def read_manifest(folder: Path) -> tuple[JSON, list[Finding]]:
             findings += [Finding("error", FILE, message, column=path)] if message else []
     for section, check in SECTIONS.items():
         if section in content and not any(_overlap(section, column) for column in faulty):
-            findings += check(content[section], FILE)
+            findings += check(content[section])
     return content, findings + _about_the_folder(content, folder)
-
-
-def entry(content: JSON, path: str) -> Any:
-    """Return the value under a dotted path of keys; None where any of them is absent."""
-    value: Any = content
-    for key in path.split("."):
-        value = value.get(key) if isinstance(value, dict) else None
-    return value
 
 
 def with_defaults(manifest: JSON) -> JSON:
@@ -68,7 +61,9 @@ def with_defaults(manifest: JSON) -> JSON:
         filled["tool"].setdefault("pitch_deg", [360 / teeth] * teeth)
     if filled["coefficients"]:
         filled["coefficients"] = {"edge_length": "axial", **filled["coefficients"]}
-    instruments = {name: dict(value or {}) for name, value in (manifest.get("instruments") or {}).items()}
+    declared = {name: value or {} for name, value in (manifest.get("instruments") or {}).items()}
+    # An unknown one, which a warning names, may hold anything.
+    instruments = {name: dict(value) for name, value in declared.items() if isinstance(value, dict)}
     for name, defaults in INSTRUMENT_DEFAULTS.items():
         if name in instruments:
             instruments[name] = {**defaults, **instruments[name]}
@@ -79,15 +74,6 @@ def with_defaults(manifest: JSON) -> JSON:
     return filled
 
 
-def signed_axes(axes: JSON) -> Array:
-    """Return the (3, 3) matrix whose column k is the direction of sensor axis k in the work frame."""
-    columns = np.zeros((3, 3))
-    for k, axis in enumerate(AXES):
-        direction = str(axes.get(axis, axis))
-        columns[AXES.index(direction[-1]), k] = -1.0 if direction.startswith("-") else 1.0
-    return columns
-
-
 INSTRUMENT_DEFAULTS: dict[str, JSON] = {
     "dynamometer": {"reads": "work", "rotation_deg": 0},
     "profiler": {"cutoff_mm": 8},
@@ -96,35 +82,35 @@ INSTRUMENT_DEFAULTS: dict[str, JSON] = {
 
 
 def _unknown_key(path: tuple[str, ...], like: Likeness) -> Severity:
-    """Say how bad an unknown key is: the contract lets fields be added, but a misspelt one must not pass.
+    """Return how severe an unknown key is: fields may be added, but a misspelt one must not pass.
 
-    Other programs add keys at the top and of instruments, other packages effects: there a likeness alone is
-    none of a misspelt one.
+    Other programs add keys at the top and of instruments, other packages effects: there a resemblance alone
+    is not a sign of a misspelt key.
     """
     may_be_added = path in ((), ("known",)) or (path[0] == "instruments" and path[-1] != "axes")
     return "error" if like == "slip" or (like and not may_be_added) else "warning"
 
 
 def _overlap(path: str, column: str) -> bool:
-    """Tell whether one of two dotted paths contains the other."""
+    """Return whether one of two dotted paths contains the other."""
     return f"{path}.".startswith(f"{column}.") or f"{column}.".startswith(f"{path}.")
 
 
 def _about_the_folder(content: JSON, folder: Path) -> list[Finding]:
-    """Check what the manifest says against the folder it lies in."""
-    found = []
+    """Check the manifest against the folder it lies in."""
+    findings = []
     name = content.get("batch")
     if isinstance(name, str) and name != folder.resolve().name and name != folder.name:
         message = f'found "{name}", expected the folder\'s name, "{folder.name}"'
-        found.append(Finding("error", FILE, message, column="batch"))
+        findings.append(Finding("error", FILE, message, column="batch"))
     if content.get("source") == "published":
         if not content.get("citation"):
             message = "is missing, expected where the published values are printed"
-            found.append(Finding("error", FILE, message, column="citation"))
+            findings.append(Finding("error", FILE, message, column="citation"))
         if not any((folder / f"published{suffix}").is_file() for suffix in (".csv", ".parquet")):
             message = "is not there: a batch with source: published needs its table of printed values"
-            found.append(Finding("error", "published.csv", message))
-    return found
+            findings.append(Finding("error", "published.csv", message))
+    return findings
 
 
 def _tool(tool: JSON) -> str | None:
@@ -150,20 +136,25 @@ def _axes(axes: JSON) -> str | None:
     return None
 
 
-def _limits(limits: JSON, file: str) -> Iterator[Finding]:
+def _known(known: JSON) -> Iterator[Finding]:
+    """Check what is declared of effects."""
+    return known_findings(known, FILE, _unknown_key)
+
+
+def _limits(limits: JSON) -> Iterator[Finding]:
     """Check that limits are of columns that ``metro next`` sets, the least before the greatest."""
     for name, (low, high) in limits.items():
         column = f"limits.{name}"
         if name not in NUMBERS:
             like = resembling(name, NUMBERS)
             message = f"is no column of runs.csv that can be limited{suggestion(name, NUMBERS)}"
-            yield Finding("error" if like else "warning", file, message, column=column)
+            yield Finding("error" if like else "warning", FILE, message, column=column)
         elif low > high:
-            yield Finding("error", file, f"found {[low, high]}, expected the least first", column=column)
+            yield Finding("error", FILE, f"found {[low, high]}, expected the least first", column=column)
 
 
 def _rotation_fault(matrix: Array) -> str | None:
-    """Say what keeps a (3, 3) matrix from being a rotation."""
+    """Describe what keeps a (3, 3) matrix from being a rotation."""
     if np.abs(matrix.T @ matrix - np.eye(3)).max() > ORTHONORMAL:
         return "its columns are not perpendicular unit vectors"
     return "it is left-handed (a mirror)" if np.linalg.det(matrix) < 0 else None
@@ -184,16 +175,8 @@ def _motion(rows: list[list[float]]) -> str | None:
     return f"expected a rigid motion (rotation and translation in mm): {fault}" if fault else None
 
 
-def _coefficients(given: JSON) -> str | None:
-    """Check that cutting coefficients are in N/mm2 and N/mm."""
-    for name, value in given.items():
-        if isinstance(value, int | float) and value > HARDEST:
-            return f"found {name}: {value:g}, expected at most {HARDEST:g}: is it in N/m2 (Pa) or N/m?"
-    return None
-
-
 def _not_metres(least: float) -> Callable[[Any], str | None]:
-    """Return the check that a length, or the longest of several, is so many mm, or nought."""
+    """Return the check that the longest of several lengths is so many mm, or nought."""
 
     def rule(value: Any) -> str | None:
         longest = float(np.abs(np.array(value, dtype=float)).max())
@@ -204,18 +187,18 @@ def _not_metres(least: float) -> Callable[[Any], str | None]:
     return rule
 
 
-# Section of the manifest → check(section, file) of what a schema cannot say of its keys.
-SECTIONS: dict[str, Callable[[JSON, str], Iterable[Finding]]] = {"known": known_findings, "limits": _limits}
-# Semantic checks of what a schema cannot say: path of keys → rule(value) → message or None.
+# Section of the manifest → check(section) of what a schema cannot express about its keys.
+SECTIONS: dict[str, Callable[[JSON], Iterable[Finding]]] = {
+    "known": _known,
+    "limits": _limits,
+    "files": mapping_findings,
+}
+# Semantic checks of what a schema cannot express: path of keys → rule(value) → message or None.
 RULES: dict[str, Callable[[Any], str | None]] = {
     "tool": _tool,
-    "tool.diameter_mm": _not_metres(0.1),
-    "tool.overhang_mm": _not_metres(1.0),
     "tool_in_flange_mm": _not_metres(1.5),
     "work.size_mm": _not_metres(1.5),
     "work_in_base.xyz_mm": _not_metres(5.0),
-    "hole_diameter_mm": _not_metres(0.1),
-    "coefficients": _coefficients,
     "tool_axes_in_flange": _directions,
     "instruments.dynamometer.axes": _axes,
     "instruments.scanner.to_work": _motion,

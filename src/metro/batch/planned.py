@@ -41,7 +41,7 @@ def row_like(runs: pd.DataFrame, like: str, times: Mapping[str, float], given: M
 
 
 def rounded(value: float) -> float:
-    """Round to as many digits as a machine is told; what is not known stays so."""
+    """Round to the digits of a machine's setting; a value that is not known stays so."""
     return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else value
 
 
@@ -54,7 +54,7 @@ def _condition(runs: pd.DataFrame, row: Row) -> str:
 
 
 def within(row: Row, limits: Limits) -> bool:
-    """Tell whether the settings of a row are within limits; what is blank is."""
+    """Return whether the settings of a row are within limits; a blank one is."""
     return all(not (row[column] < low or row[column] > high) for column, (low, high) in limits.items())
 
 

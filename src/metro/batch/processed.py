@@ -74,14 +74,20 @@ def write_json(path: Path, content: JSON) -> None:
     write_atomically(path, lambda stream: stream.write(text.encode()))
 
 
-def write_table(path: Path, table: pd.DataFrame, provenance: Mapping[str, str]) -> None:
+def read_json(path: Path) -> JSON:
+    """Read a JSON file that a stage wrote."""
+    content: JSON = json.loads(path.read_text(encoding="utf-8"))
+    return content
+
+
+def write_table(path: Path, table: pd.DataFrame, provenance: Mapping[str, str] | None = None) -> None:
     """Write a Parquet table atomically, with ``provenance`` and the code's version in its schema metadata."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     content = pa.Table.from_pandas(table, preserve_index=False)
     metadata = {**(content.schema.metadata or {}), b"metro.version": __version__.encode()}
-    metadata |= {f"metro.{key}".encode(): value.encode() for key, value in provenance.items()}
+    metadata |= {f"metro.{key}".encode(): value.encode() for key, value in (provenance or {}).items()}
     content = content.replace_schema_metadata(metadata)
     write_atomically(path, lambda stream: pq.write_table(content, stream, compression="zstd"))
 

@@ -18,12 +18,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 from metro import __version__
+from metro.batch.writing import write_atomically
 from metro.units import JSON
 
 FILE = "provenance.json"
 DISTRIBUTION = "metro-machining"
-# Stage → a table that it always writes, whose metadata hold the stage's code and settings.
-WRITTEN_BY = {"ingest": "runs", "identify": "modes", "predict": "prediction", "loop": "comparison"}
+# The stages whose code and settings have a file of their own. In their results these would change with every
+# edit, and re-run all that comes after a stage even where its results come out the same.
+STAGES = ("ingest", "identify", "predict", "loop", "verdict")
+MADE = ".made.json"
 RESULTS = ("identified.json", "verdict.json", "report.pdf")
 
 Change = Literal["changed", "missing", "added"]
@@ -58,7 +61,7 @@ def record(processed: Path, reports: Path, settings: JSON, code: str) -> JSON:
     Parameters
     ----------
     processed, reports : the batch's folders.
-    settings, code : those of the report's own stage; the others' stand in the metadata of their tables.
+    settings, code : those of the report's own stage; the other stages wrote theirs beside their results.
     """
     return {
         "format": 1,
@@ -68,22 +71,42 @@ def record(processed: Path, reports: Path, settings: JSON, code: str) -> JSON:
         "packages": packages(),
         "stages": stages(processed, settings, code),
         "raw": sources(processed),
-        "processed": hashes(processed, (path.name for path in processed.iterdir())),
+        "processed": processed_hashes(processed),
         "results": hashes(reports, RESULTS),
     }
 
 
 def stages(processed: Path, settings: JSON, code: str) -> dict[str, JSON]:
     """Return ``code`` and ``settings`` by stage, in their order; the report's own are given."""
-    made = {stage: _stage(processed / f"{table}.parquet") for stage, table in WRITTEN_BY.items()}
+    made = {stage: made_by(processed, stage) for stage in STAGES}
     made["report"] = {"code": code, "settings": settings}
     return {stage: one for stage, one in made.items() if one}
 
 
 def sources(processed: Path) -> dict[str, str]:
     """Return SHA-256 by raw file, from the metadata of the table of runs, which names all of them."""
-    found: dict[str, str] = json.loads(_metadata(processed / "runs.parquet").get("metro.sources", "{}"))
-    return dict(sorted(found.items()))
+    hash_by_file: dict[str, str] = json.loads(
+        _metadata(processed / "runs.parquet").get("metro.sources", "{}")
+    )
+    return dict(sorted(hash_by_file.items()))
+
+
+def write_made(processed: Path, stage: str, settings: JSON, code: str) -> None:
+    """Write which code and settings a stage ran with, once its results are there."""
+    text = json.dumps({"code": code, "settings": settings}, sort_keys=True) + "\n"
+    write_atomically(processed / f"{stage}{MADE}", lambda stream: stream.write(text.encode()))
+
+
+def made_by(processed: Path, stage: str) -> JSON:
+    """Return the ``code`` and ``settings`` that a stage last ran with; nothing where it has not run."""
+    file = processed / f"{stage}{MADE}"
+    made: JSON = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    return made
+
+
+def processed_hashes(processed: Path) -> dict[str, str]:
+    """Return SHA-256 by name of a batch's processed files, those left out that say what code they are of."""
+    return hashes(processed, (path.name for path in processed.glob("*") if not path.name.endswith(MADE)))
 
 
 def hashes(folder: Path, names: Iterable[str]) -> dict[str, str]:
@@ -105,25 +128,17 @@ def packages() -> dict[str, str]:
     except PackageNotFoundError:
         return {}
     names = sorted(match[0] for text in asked if (match := re.match(r"[\w.-]+", text)))
-    return {name: found for name in names if (found := _version(name))}
+    return {name: version for name in names if (version := _version(name))}
 
 
 def compare(kind: str, was: Mapping[str, str], now: Mapping[str, str]) -> list[Difference]:
     """Return what differs between two sets of named hashes, versions or settings."""
-    found = []
+    differences = []
     for name in sorted({*was, *now}):
         if was.get(name) != now.get(name):
             change: Change = "added" if name not in was else "missing" if name not in now else "changed"
-            found.append(Difference(kind, name, change, was.get(name, ""), now.get(name, "")))
-    return found
-
-
-def _stage(path: Path) -> JSON:
-    """Return the code and settings that a table was written with; nothing where it is not there."""
-    metadata = _metadata(path)
-    if "metro.code" not in metadata:
-        return {}
-    return {"code": metadata["metro.code"], "settings": json.loads(metadata.get("metro.settings", "null"))}
+            differences.append(Difference(kind, name, change, was.get(name, ""), now.get(name, "")))
+    return differences
 
 
 def _metadata(path: Path) -> dict[str, str]:

@@ -14,12 +14,11 @@ from metro.batch.tables import Table
 STIFFNESS_N_MM = (10.0, 2e5)  # softer than any arm … stiffer than any machine tool
 CLOSEST_MM = 1.0
 MASSES_KG = (1.0, 2e4)
-STIFFEST_N_UM = 1e5
 SELF_DESCRIBING = (".uff", ".unv", ".uf")  # universal files carry points, axes, kind and unit themselves
 
 
 def impact_findings(table: Table) -> Iterator[Finding]:
-    """Check that a hammer record or FRF says where, and in what unit, it was taken."""
+    """Check that a hammer record or FRF states where, and in what unit, it was taken."""
     for position, row in table.sound():
         if str(row["file"]).lower().endswith(SELF_DESCRIBING):
             continue
@@ -62,8 +61,8 @@ def _load_units(table: Table) -> Iterator[Finding]:
     angles = np.array([[row[f"q{i}_deg"] for i in range(1, 7)] for row in rows]).reshape(-1, 6)
     known = angles[np.isfinite(angles).all(axis=1)]
     if known.size and 0 < np.abs(known).max() <= 2 * math.pi:
-        found = f"no angle is beyond {np.abs(known).max():g}: they seem to be in radians, expected degrees"
-        yield Finding("error", table.file, found, column="q1_deg")
+        fault = f"no angle is beyond {np.abs(known).max():g}: they seem to be in radians, expected degrees"
+        yield Finding("error", table.file, fault, column="q1_deg")
     stiffness = [
         abs(row[f"f{axis}_n"] / row[f"d{axis}_mm"])
         for row in rows
@@ -81,16 +80,16 @@ def _load_units(table: Table) -> Iterator[Finding]:
     known = places[np.isfinite(places).all(axis=1)]
     span = float(np.ptp(known, axis=0).max()) if len(known) else 0.0
     if 0 < span < CLOSEST_MM:
-        found = (
+        fault = (
             f"all places lie within {span:g}, expected {CLOSEST_MM:g} mm or more: they seem to be in metres"
         )
-        yield Finding("error", table.file, found, column="x_mm")
+        yield Finding("error", table.file, fault, column="x_mm")
 
 
 def _odd(table: Table, column: str, typical: float, hint: str) -> Finding:
     low, high = STIFFNESS_N_MM
-    found = f"load over displacement is {typical:.3g} N/mm (median), expected {low:g} to {high:g}: {hint}"
-    return Finding("error", table.file, found, column=column)
+    fault = f"load over displacement is {typical:.3g} N/mm (median), expected {low:g} to {high:g}: {hint}"
+    return Finding("error", table.file, fault, column=column)
 
 
 def mass_findings(table: Table) -> Iterator[Finding]:
@@ -104,8 +103,8 @@ def mass_findings(table: Table) -> Iterator[Finding]:
         mean = (xx + yy + zz) / 3
         if not MASSES_KG[0] <= mean <= MASSES_KG[1]:
             unit = "tonnes" if mean < MASSES_KG[0] else "grams"
-            found = f"found {mean:g} (mean of the diagonal), expected {MASSES_KG[0]:g} to {MASSES_KG[1]:g} kg"
-            yield table.finding(position, "mxx", f"{found}: it seems to be in {unit}")
+            fault = f"found {mean:g} (mean of the diagonal), expected {MASSES_KG[0]:g} to {MASSES_KG[1]:g} kg"
+            yield table.finding(position, "mxx", f"{fault}: it seems to be in {unit}")
     yield from _twice(table, ("pose", "point"))
 
 
@@ -119,13 +118,7 @@ def published_findings(table: Table) -> Iterator[Finding]:
 
 
 def station_findings(table: Table) -> Iterator[Finding]:
-    """Check that no station is tabulated twice, and that its stiffness is in N/µm."""
-    for position, row in table.sound():
-        if row["kx_n_um"] > STIFFEST_N_UM:
-            found = (
-                f"found {row['kx_n_um']:g}, expected at most {STIFFEST_N_UM:g} N/µm: it seems to be in N/m"
-            )
-            yield table.finding(position, "kx_n_um", found)
+    """Check that no station is tabulated twice."""
     for position, name in enumerate(table.frame["position"]):
         if name in list(table.frame["position"][:position]):
             yield table.finding(position, "position", f'position "{name}" stands twice')

@@ -93,12 +93,12 @@ def settings_name(row: Mapping[Any, Any]) -> str:
 
 
 def recorded(runs: pd.DataFrame) -> pd.Series:
-    """Tell which rows were recorded: those with a role, a file other than the path, or a judgement."""
+    """Return which rows were recorded: those with a role, a file other than the path, or a judgement."""
     return (runs[["role", "stable", *(name for name in RUN_FILES if name != "path")]] != "").any(axis=1)
 
 
 def design_findings(runs: pd.DataFrame, file: str) -> Iterator[Finding]:
-    """Say where the design of the session limits what can be learned from it; ``runs`` as filled in."""
+    """Report where the design of the session limits what can be learned from it; ``runs`` as filled in."""
     yield from _conditions(runs, file)
     repeats = runs["condition"].map(runs["condition"].value_counts()) > 1
     changes = (runs["condition"] != runs["condition"].shift()).sum()
@@ -154,10 +154,15 @@ def _twice(table: Table, column: str, values: pd.Series) -> Iterator[Finding]:
 
 
 def _sizes(row: Mapping[str, Any], diameter: float | None) -> Iterator[tuple[str, str]]:
-    """Check lengths by what a mill can do: a wrong unit is a factor of a thousand."""
+    """Check lengths by what a mill can do: a wrong unit is a factor of a thousand.
+
+    A cut is not much thinner than the rounding of its edge, some µm; of a tool of less than 1 mm the least
+    depth and the least feed are smaller in proportion to its diameter.
+    """
+    small = 1.0 if diameter is None else min(diameter, 1.0)
     limits = {
-        "feed_per_tooth_mm": (1e-4, 5.0 if diameter is None else diameter / 2),
-        "axial_depth_mm": (5e-3, 500.0 if diameter is None else 20 * diameter),
+        "feed_per_tooth_mm": (1e-4 * small, 5.0 if diameter is None else diameter / 2),
+        "axial_depth_mm": (5e-3 * small, 500.0 if diameter is None else 20 * diameter),
         "radial_depth_mm": (1e-2 if diameter is None else 1e-3 * diameter, math.inf),
         "cut_length_mm": (0.1, 1e7),
     }

@@ -15,13 +15,17 @@ from typing import Any
 import pandas as pd
 
 from metro.batch.columns import TABLES, Column
-from metro.batch.findings import Finding, Severity, linked_outside, shown, suggestion
+from metro.batch.findings import Finding, Severity, linked_outside, shown
+from metro.batch.ranges import expected_for, too_small, within
+from metro.batch.texts import strange_character
+from metro.spelling import suggestion
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 BLANK_NUMBERS = {"nan", "na", "null", "none"}  # what other programs write for "does not apply"
 DECIMAL = "a decimal takes a point, not a comma"
 LARGEST = 1 << 26  # bytes of a table file: runs, loads and printed values are rows that people write
 MOST_CELLS = 10_000_000
+MOST_COLUMNS = 1000  # the contract's widest table has 29; every unknown one is named in a message
 Row = tuple[int, dict[str, str]]
 
 
@@ -84,7 +88,7 @@ def read_table(folder: Path, name: str, stem: str | None = None) -> tuple[Table,
 
 
 def _file_faults(folder: Path, there: list[Path]) -> list[Finding]:
-    """Say what keeps a table's file from being read at all."""
+    """Report what keeps a table's file from being read at all."""
     file = there[0].name
     if not there[0].is_file():
         return [Finding("error", file, "is a folder, expected a table")]
@@ -147,7 +151,7 @@ def _read_parquet(path: Path) -> tuple[list[str], list[Row], list[Finding]]:
         if count > MOST_CELLS:
             message = f"has {count} cells, expected at most {MOST_CELLS}"
             return [], [], [Finding("error", path.name, message)]
-        # what pandas notes of its own in the file is left unread: names and types are those of the columns
+        # Pandas' own metadata in the file are ignored: names and types are those of the columns.
         frame = stored.read().to_pandas(ignore_metadata=True)
         header = [str(name) for name in frame.columns]
         columns = [[_as_text(value) for value in frame.iloc[:, place]] for place in range(len(header))]
@@ -169,8 +173,14 @@ def _as_text(value: Any) -> str:
 
 
 def _header_findings(file: str, header: list[str], columns: tuple[Column, ...]) -> Iterator[Finding]:
-    """Check the header: separators, columns that stand twice, are unknown, or are missing."""
+    """Check the header: separators, columns that appear twice, are unknown, or are missing."""
     known = [column.name for column in columns]
+    if len(header) > MOST_COLUMNS:
+        message = (
+            f"has {len(header)} columns, expected at most {MOST_COLUMNS}: is it the table that is meant?"
+        )
+        yield Finding("error", file, message)
+        return
     for mark, word in ((";", "semicolons"), ("\t", "tabs")):
         if len(header) == 1 and mark in header[0]:
             message = f"its columns are separated by {word}, expected commas (and decimals with a point)"
@@ -184,7 +194,8 @@ def _header_findings(file: str, header: list[str], columns: tuple[Column, ...]) 
             yield Finding("warning", file, message, column=name)
     for column in columns:
         if column.required and column.name not in header:
-            yield Finding("error", file, f"is missing, expected {column.expected}", column=column.name)
+            hint = suggestion(column.name, [name for name in header if name and name not in known])
+            yield Finding("error", file, f"is missing{hint}, expected {column.expected}", column=column.name)
 
 
 def _typed(
@@ -221,12 +232,23 @@ def _value(text: str, column: Column) -> tuple[Any, str | None]:
     blank: Any = math.nan if column.numeric else ""
     if not text or (column.numeric and text.lower() in BLANK_NUMBERS):
         return blank, f"is blank, expected {column.expected}" if column.required else None
+    if fault := strange_character(text):
+        return blank, f"{fault}, expected {column.expected}"
     value = _number(text) if column.numeric else text
     if value is not None and _allowed(value, column):
         return value, None
-    comma = NUMBER.fullmatch(text.replace(",", ".", 1)) if column.numeric and "," in text else None
-    hint = f" ({DECIMAL})" if comma else suggestion(text, column.choices)
-    return blank, f"found {shown(text)}, expected {column.expected}{hint}"
+    return blank, f"found {shown(text)}, expected {_expected(text, value, column)}"
+
+
+def _expected(text: str, value: Any, column: Column) -> str:
+    """Say what a column expects in place of a cell that it does not allow; ``value``: None for no number."""
+    if not column.numeric:
+        long = "" if column.choices or len(text) <= column.longest else f"at most {column.longest} characters"
+        return long or f"{column.expected}{suggestion(text, column.choices)}"
+    if value is not None:
+        return too_small(value) or expected_for(column.rule, value)
+    comma = NUMBER.fullmatch(text.replace(",", ".", 1)) if "," in text else None
+    return column.expected + (f" ({DECIMAL})" if comma else "")
 
 
 def _number(text: str) -> float | None:
@@ -236,13 +258,14 @@ def _number(text: str) -> float | None:
 
 
 def _allowed(value: Any, column: Column) -> bool:
-    """Tell whether a value is one that the column may hold."""
+    """Return whether a value is one that the column may hold."""
     if column.choices:
         return value in column.choices
     if column.numeric:
-        low = column.above is not None and value <= column.above
-        low = low or (column.at_least is not None and value < column.at_least)
-        return not low and (column.kind == "number" or float(value).is_integer())
+        usable = within(column.rule, value) and not too_small(value)
+        return usable and (column.kind == "number" or float(value).is_integer())
+    if len(value) > column.longest:
+        return False
     if column.kind == "time":
         try:
             datetime.fromisoformat(value)

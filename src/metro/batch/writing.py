@@ -30,7 +30,7 @@ REMEDIES = {
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn what the file system says while ``path`` is written into one line that says what to do.
+    """Turn an error of the file system while ``path`` is written into one line that names the remedy.
 
     Errors about other files, such as those that are read meanwhile, are left as they are.
 
@@ -66,7 +66,7 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
 
 
 def _is_about(path: Path, error: OSError) -> bool:
-    """Tell whether an error names a file where ``path`` is to be, or none: a stream does not know its own."""
+    """Return whether an error names a file where ``path`` is to be, or none: a stream has no file name."""
     if error.filename is None:
         return True
     named, path = Path(os.fsdecode(error.filename)).absolute(), path.absolute()

@@ -1,4 +1,4 @@
-"""Errors on held-out runs as bars of characters, beside what they are in numbers."""
+"""Errors on held-out runs as bars of characters, with their numbers beside them."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 LABELS, COLOURS = ("base model", "with effects"), ("yellow", "cyan")
-WIDEST, NARROWEST = 40, 13  # characters of a bar; the words on the floor have room in the narrowest
+WIDEST, NARROWEST = 40, 13  # characters of a bar; the label of the noise floor fits into the narrowest
 
 
 def error_bars(entry: JSON, width: int) -> Iterator[RenderableType]:
-    """Yield the errors of a verdict as bars over one scale, the floor that noise sets as a mark.
+    """Yield the errors of a verdict as bars on one scale; a mark shows the noise floor.
 
     Parameters
     ----------
-    entry : verdict on an observable. width : of the terminal, in characters: bars take what their numbers
-        leave of it.
+    entry : verdict on an observable. width : of the terminal, in characters; the bars use the part of it that
+        their numbers do not need.
     """
     from rich.table import Table
     from rich.text import Text
@@ -34,13 +34,13 @@ def error_bars(entry: JSON, width: int) -> Iterator[RenderableType]:
     top = max((size for size in [*sizes, floor or 0.0] if math.isfinite(size)), default=0.0)
     if top <= 0 or len(sizes) < len(errors):
         return
-    told = _captions(entry, errors)
-    left = width - max(map(len, LABELS)) - max(map(len, told)) - 2
+    captions = _captions(entry, errors)
+    left = width - max(map(len, LABELS)) - max(map(len, captions)) - 2
     room = min(max(left, NARROWEST), WIDEST)
     table = Table.grid(padding=(0, 1))
     table.add_column(no_wrap=True)
-    table.add_column(no_wrap=True, width=room)  # else rich takes from the bars what a caption lacks
-    for label, size, colour, caption in zip(LABELS, sizes, COLOURS, told, strict=True):
+    table.add_column(no_wrap=True, width=room)  # otherwise rich shortens the bars for a long caption
+    for label, size, colour, caption in zip(LABELS, sizes, COLOURS, captions, strict=True):
         table.add_row(Text(label), Text(bar(size, top, room, floor), style=colour), Text(caption))
     if floor is not None:
         table.add_row(
@@ -50,9 +50,9 @@ def error_bars(entry: JSON, width: int) -> Iterator[RenderableType]:
 
 
 def bar(size: float, top: float, width: int, mark: float | None = None) -> str:
-    """Return a bar of ``size`` in ``width`` characters that stand for ``top``, to an eighth of a character.
+    """Return a bar of ``size``, to an eighth of a character; ``width`` characters represent ``top``.
 
-    ``mark`` is a value at which a line stands, over the bar or behind its end.
+    ``mark`` is a value at which a line is drawn, over the bar or behind its end.
     """
     eighths = round(8 * width * min(max(size / top, 0.0), 1.0))
     text = ("█" * (eighths // 8) + " ▏▎▍▌▋▊▉"[eighths % 8]).ljust(width)[:width]
@@ -63,12 +63,12 @@ def bar(size: float, top: float, width: int, mark: float | None = None) -> str:
 
 
 def _captions(entry: JSON, errors: list[JSON]) -> list[str]:
-    """Write each error with its interval and, where that is known, its share of the signal."""
+    """Write each error with its interval and, where it is known, its share of the signal."""
     texts = [error_text(error, entry.get("unit")) for error in errors]
-    told = change("", entry)
-    if told is None:
+    relative = change("", entry)
+    if relative is None:
         return texts
-    shares = (told.before, told.after)
+    shares = (relative.before, relative.after)
     return [
         f"{text} ({percent(share / 100)} of the signal)" for text, share in zip(texts, shares, strict=True)
     ]

@@ -1,26 +1,26 @@
-"""Calls that are wrong in themselves: what was asked for is not there, or cannot be asked for."""
+"""Errors of a command's call: what it asks for does not exist, or cannot be asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-from metro.batch.findings import ContractError, Finding, suggestion
-from metro.commands.completion import OBSERVABLES
+from metro.batch.findings import ContractError, Finding
+from metro.spelling import suggestion
 
 
 class CallError(ContractError):
-    """The call is wrong, not the input: told in one line, exit code 2."""
+    """The call is wrong, not the input: the message takes one line, and the exit code is 2."""
 
 
 def wrong_call(what: str, message: str) -> CallError:
-    """Return the error that says what is wrong with a part of a call: an option, or what was given for it."""
+    """Return the error for a part of a call: an option, or the value that was given for it."""
     return CallError([Finding("error", what, message)])
 
 
 @contextmanager
 def part_of_the_call() -> Iterator[None]:
-    """Let what is wrong with the values read in this block be an error of the call."""
+    """Turn the contract errors of the values read in this block into errors of the call."""
     try:
         yield
     except ContractError as error:
@@ -33,7 +33,7 @@ def require_name(name: str) -> None:
     Raises
     ------
     CallError
-        It has other characters than those of a batch's folder.
+        The name has characters that the name of a batch's folder cannot have.
     """
     from metro.batch.discover import NAME, NAME_IN_WORDS
 
@@ -42,21 +42,23 @@ def require_name(name: str) -> None:
 
 
 def require_verdict(batch: str, observable: str, there: Iterable[str]) -> None:
-    """Refuse an observable on which a batch has no verdict; "" stands for all of them.
+    """Refuse an observable on which a batch has no verdict; "" means all of them.
 
     Raises
     ------
     CallError
         There is no such observable.
     ContractError
-        There is, but not in this batch.
+        There is such an observable, but this batch has no verdict on it.
     """
-    found = list(there)
-    if not observable or observable in found:
+    available = list(there)
+    if not observable or observable in available:
         return
-    if observable not in OBSERVABLES:
-        known = list(dict.fromkeys([*found, *OBSERVABLES]))
-        told = suggestion(observable, known) or f", expected one of: {', '.join(found or known)}"
-        raise wrong_call(observable, f"is no observable{told}")
-    words = f"found verdicts on {', '.join(found)}" if found else "found no verdict at all"
+    from metro.observables.catalogue import names
+
+    if observable not in names():
+        known = list(dict.fromkeys([*available, *names()]))
+        expected = suggestion(observable, known) or f", expected one of: {', '.join(available or known)}"
+        raise wrong_call(observable, f"is no observable{expected}")
+    words = f"found verdicts on {', '.join(available)}" if available else "found no verdict at all"
     raise ContractError([Finding("error", batch, f"{words}, expected one on {observable}")])

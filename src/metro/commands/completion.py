@@ -7,8 +7,6 @@ from pathlib import Path
 
 import typer
 
-OBSERVABLES = ("force", "joint_force", "deformation", "waviness", "flatness", "lobes")
-
 
 def with_results(reports: Path) -> list[str]:
     """Return the batches that have results in a folder."""
@@ -22,12 +20,18 @@ def batches(incomplete: str) -> Iterator[str]:
 
 def observables(incomplete: str) -> Iterator[str]:
     """Yield the observables of the contract."""
-    return (name for name in OBSERVABLES if name.startswith(incomplete))
+    from metro.observables.catalogue import names
+
+    return (name for name in names() if name.startswith(incomplete))
 
 
 def effects(context: typer.Context, incomplete: str) -> Iterator[str]:
     """Yield the effects that a simulated batch of the kind asked for may hide."""
-    from metro.commands.hidden import EFFECTS
+    from metro.batch.findings import ContractError
+    from metro.commands.hidden import simulated
 
-    known = EFFECTS.get(context.params.get("kind") or "force", {})
+    try:
+        known = simulated().get(context.params.get("kind") or "force", {})
+    except ContractError:  # a shell has no place for a message
+        return iter(())
     return (name for name in known if name.startswith(incomplete))

@@ -13,9 +13,10 @@ from metro.commands.bars import error_bars
 from metro.commands.calls import require_verdict
 from metro.commands.output import print_json
 from metro.commands.which import batch_name
+from metro.observables.catalogue import title
 from metro.report.content import Item, Paragraph, Section, Table
 from metro.report.numbers import number, probability, words
-from metro.report.results import Results, title
+from metro.report.results import Results
 from metro.report.sections.causes import with_causes
 from metro.report.sections.measured import measured_words
 from metro.report.sections.quality import with_flags
@@ -116,8 +117,8 @@ def _flags(results: Results) -> list[Item]:
 
 def _causes(results: Results, observable: str) -> list[Item]:
     """Return what the first page says of the causes behind several verdicts; those of one observable."""
-    told = results.loop.get("causes") or []
-    mine = [cause for cause in told if not observable or observable in cause["seen_in"]]
+    causes = results.loop.get("causes") or []
+    mine = [cause for cause in causes if not observable or observable in cause["seen_in"]]
     return list(with_causes(Section("", []), replace(results, loop={**results.loop, "causes": mine})).items)
 
 
@@ -135,14 +136,14 @@ def _parts(
         yield Text(f"\n{text}")
     for name, entry in chosen.items():
         status = str(entry.get("status"))
-        told = verdict_words(name, entry, left_words(results, name))
+        sentence = verdict_words(name, entry, left_words(results, name))
         yield Text(f"\n{title(name)}: {STATUS.get(status, status)}", f"bold {COLOURS.get(status, 'red')}")
-        yield Text(told)
+        yield Text(sentence)
         yield from error_bars(entry, width)
         yield from _candidates(results, name, entry, most)
         yield Text(f"To trust: {trust_in(results, name).partition(': ')[2]}")
-        if told_next := next_words(entry):
-            yield Text(f"Measure next: {told_next}.", style="bold")
+        if measurement := next_words(entry):
+            yield Text(f"Measure next: {measurement}.", style="bold")
     yield from _shown(_causes(results, "" if most else next(iter(chosen))))
 
 
@@ -171,20 +172,20 @@ def _grid(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Grid:
 
 def _candidates(results: Results, name: str, entry: JSON, most: int | None) -> Iterator[RenderableType]:
     """Yield the table of the effects that were tried, those that were added first."""
-    tried = results.told(name).get("candidates") or entry.get("candidates") or []
+    tried = results.loop_record(name).get("candidates") or entry.get("candidates") or []
     if not tried:
         return
     added = {str(effect["effect"]): effect for effect in entry.get("effects") or []}
-    rest = [one for one in sorted(tried, key=_rank) if str(one["effect"]) not in added]
+    others = [one for one in sorted(tried, key=_rank) if str(one["effect"]) not in added]
     rows = [
         [words(one), probability(effect.get("probability")), "", "", "added"] for one, effect in added.items()
     ]
-    for one in rest[:most]:
+    for one in others[:most]:
         shown = (probability(one.get("probability")), _gain(one), probability(one.get("p_value")))
         rows.append([words(str(one["effect"])), *shown, str(one.get("why_not") or one.get("verdict") or "–")])
-    if most is not None and len(rest) > most:
+    if most is not None and len(others) > most:
         more = f"metro explain {results.batch.name} {name}"
-        rows.append([f"… and {len(rest) - most} more", "", "", "", more])
+        rows.append([f"… and {len(others) - most} more", "", "", "", more])
     yield _grid(["effect tried", "probability", "held-out gain", "p", "outcome"], rows)
 
 

@@ -1,4 +1,4 @@
-"""``metro next``: the call is checked before the search, and a terminal is told that this takes its time."""
+"""``metro next``: checks the call before the search, and shows on a terminal that the search is at work."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def checked_call(
     Raises
     ------
     CallError
-        There is no such batch or observable, or a limit is not one.
+        There is no such batch or observable, or a limit is not valid.
     ContractError
         The batch has no results, or no verdict on the observable.
     """
@@ -39,9 +39,9 @@ def checked_call(
 
 @contextmanager
 def at_work(what: str) -> Iterator[None]:
-    """Say on a terminal, for as long as this block lasts, what is done and since when.
+    """Show on a terminal what is being done and for how long, until this block ends.
 
-    What the block prints comes after it, when the line of the terminal is free again.
+    The output of the block is printed after it, when the line of the terminal is free again.
     """
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -56,5 +56,5 @@ def at_work(what: str) -> Iterator[None]:
         with redirect_stdout(said), shown:
             shown.add_task(what, total=None)
             yield
-    finally:  # what was found before an error is not lost
+    finally:  # the output that came before an error is not lost
         sys.stdout.write(said.getvalue())

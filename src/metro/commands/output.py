@@ -11,12 +11,12 @@ from typing import Any
 
 
 def print_json(content: Any) -> None:
-    """Print JSON; numbers that JSON does not have are null, what it has no type for is text."""
+    """Print JSON: numbers that JSON cannot hold become null, and values without a JSON type become text."""
     sys.stdout.write(json.dumps(_plain(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def print_csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Print comma-separated values with a header, what is not known as an empty cell."""
+    """Print comma-separated values with a header; a value that is not known is an empty cell."""
     import csv
 
     writer = csv.writer(sys.stdout, lineterminator="\n")
@@ -25,7 +25,7 @@ def print_csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[Any]], title: str | None = None) -> None:
-    """Print a table for people; numbers with six digits, to the right."""
+    """Print a table for people; numbers have six digits and are aligned to the right."""
     from rich.console import Console
     from rich.table import Table
 
@@ -50,7 +50,7 @@ def _cell(value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON has it."""
+    """Return a value in the types that JSON has."""
     if isinstance(value, dict):
         return {str(key): _plain(part) for key, part in value.items()}
     if isinstance(value, list | tuple):

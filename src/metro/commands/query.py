@@ -20,12 +20,12 @@ CHUNK = 10_000
 
 
 def query(sql: str, processed: Path, reports: Path, as_json: bool, as_csv: bool) -> None:
-    """Print the answer to a query; without one, the views that there are, with their columns.
+    """Print the answer to a query; without a query, list the views with their columns.
 
     Raises
     ------
     CallError
-        Two forms are asked for.
+        Two forms of output are asked for.
     ContractError
         The SQL is not one statement that only reads, or DuckDB cannot carry it out.
     """
@@ -67,16 +67,16 @@ def _rows(connection: DuckDBPyConnection) -> Iterator[tuple[Any, ...]]:
 
 
 def _views(processed: Path, reports: Path) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
-    """Name every view with its rows and columns."""
+    """List every view with its number of rows and its columns."""
     connection = connect(processed, reports)
-    found = []
+    views = []
     for name in view_names(processed):
         columns = connection.table(name).columns
         (count,) = connection.sql(f'SELECT count(*) FROM "{name}"').fetchall()[0]
-        found.append((name, count, ", ".join(columns)))
-    return ["view", "rows", "columns"], iter(found)
+        views.append((name, count, ", ".join(columns)))
+    return ["view", "rows", "columns"], iter(views)
 
 
 def _unique(names: list[str]) -> list[str]:
-    """Give columns that share a name numbers: a record in JSON can hold each name once."""
+    """Give numbers to columns that share a name, because a JSON object can hold each name only once."""
     return [f"{name}_{names[:i].count(name)}" if name in names[:i] else name for i, name in enumerate(names)]

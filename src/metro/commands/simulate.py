@@ -1,25 +1,22 @@
 """``metro simulate``: a batch of the virtual cell, to try everything on.
 
-The simulator shares no code with the models that are to find what it hides: it is another program, and is
-called as one.
+The simulator shares no code with the models that are to identify the effects that it hides. It is another
+program, and it is called as one.
 """
 
 from __future__ import annotations
 
-import importlib.util
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from metro.batch.findings import BatchError, ContractError, Finding, suggestion
+from metro.batch.findings import BatchError, Finding
 from metro.batch.whole_folder import whole_folder
 from metro.batch.writing import write_atomically
 from metro.commands.calls import require_name, wrong_call
-from metro.commands.hidden import EFFECTS, Style, hidden
+from metro.commands.hidden import Style, hidden, simulated, simulator
 from metro.commands.output import print_json
-
-PROGRAM = "virtual_cell"
+from metro.spelling import suggestion
 
 
 def simulate(
@@ -33,36 +30,34 @@ def simulate(
     truth: Path,
     as_json: bool,
 ) -> None:
-    """Write a simulated batch, and beside the raw root what it hides.
+    """Write a simulated batch, and outside the raw data a file of the effects that it hides.
 
     Parameters
     ----------
     kind : what is measured in it: force, lobes, flatness, joint_force, deformation or waviness.
-    effects : ``NAME``, its parameters drawn, or ``NAME:PARAMETER=VALUE,…``, all of them given.
+    effects : ``NAME``, whose parameters are drawn, or ``NAME:PARAMETER=VALUE,…``, with all of them given.
 
     Raises
     ------
     CallError
-        The name is not one of a batch; there is no such kind, effect or parameter, or a value is not one.
+        The name is no name for a batch; there is no such kind, effect or parameter; or a value is not valid.
     ContractError
-        The folder is there already, or the simulator is not, or refuses.
+        The folder exists already, or the simulator is not installed, or the simulator refuses.
     """
     folder = root / name
     require_name(name)
-    if kind not in EFFECTS:
-        expected = suggestion(kind, EFFECTS) or f", expected one of: {', '.join(EFFECTS)}"
+    kinds = simulated()
+    if kind not in kinds:
+        expected = suggestion(kind, kinds) or f", expected one of: {', '.join(kinds)}"
         raise wrong_call("--kind", f"found {kind!r}{expected}")
     chosen = [word for effect in effects for word in ("--effect", *hidden(effect, kind))]
     if folder.exists():
         raise BatchError([Finding("error", str(folder), "is there already: choose another name")])
-    if importlib.util.find_spec(PROGRAM) is None:
-        message = "the simulator is not installed: it comes with metro-machining; install that package again"
-        raise ContractError([Finding("error", PROGRAM, message)])
     secret = truth / f"{name}.truth.json"
     with whole_folder(folder) as filled:
-        told = filled.with_suffix(".truth.json")
-        _call(kind, filled, ("--seed", str(seed), "--style", style, "--truth", str(told), *chosen))
-        write_atomically(secret, lambda stream: stream.write(told.read_bytes()))
+        hidden_file = filled.with_suffix(".truth.json")
+        _call(kind, filled, ("--seed", str(seed), "--style", style, "--truth", str(hidden_file), *chosen))
+        write_atomically(secret, lambda stream: stream.write(hidden_file.read_bytes()))
     if as_json:
         print_json({"batch": name, "folder": str(folder), "truth": str(secret)})
         return
@@ -71,10 +66,6 @@ def simulate(
 
 def _call(kind: str, folder: Path, options: Sequence[str]) -> None:
     """Let the simulator fill a folder."""
-    command = [sys.executable, "-m", PROGRAM, kind, str(folder), *options]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        said = (done.stderr.strip() or "it failed without a word").splitlines()[-1]
-        # The tool is drawn by the seed: how many teeth it has is not known before.
-        teeth = " (pitch_deg takes a number for each tooth)" if "pitch_deg" in " ".join(options) else ""
-        raise ContractError([Finding("error", PROGRAM, f"could not make the batch{teeth}: {said}")])
+    # The tool is drawn by the seed: how many teeth it has is not known before.
+    teeth = " (pitch_deg takes a number for each tooth)" if "pitch_deg" in " ".join(options) else ""
+    simulator(f"could not make the batch{teeth}", kind, str(folder), *options)

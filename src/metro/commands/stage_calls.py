@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,6 +16,9 @@ Processed = Annotated[
 Reports = Annotated[Path, typer.Option(help="Folder of the batch's results: reports/BATCH.")]
 Settings = Annotated[str, typer.Option(help="What config.yaml says to this stage, as JSON.")]
 Code = Annotated[str, typer.Option(help="Hash of the code that the workflow was planned with.")]
+Files = Annotated[
+    str, typer.Option(help='The files that the stage takes and gives, as JSON: {"takes": […], "gives": […]}.')
+]
 
 
 def ingest(
@@ -28,24 +32,31 @@ def ingest(
     _run("ingest", settings, code, folder=folder, cells=cells, out=out)
 
 
-def identify(processed: Processed, settings: Settings, code: Code) -> None:
+def identify(processed: Processed, settings: Settings, code: Code, files: Files = "") -> None:
     """Identify the models from the identification runs: force coefficients, modes, stiffness."""
-    _run("identify", settings, code, processed=processed)
+    _run("identify", settings, code, files, processed=processed)
 
 
-def predict(processed: Processed, settings: Settings, code: Code) -> None:
+def predict(processed: Processed, settings: Settings, code: Code, files: Files = "") -> None:
     """Predict with the base models what was measured on the held-out runs."""
-    _run("predict", settings, code, processed=processed)
+    _run("predict", settings, code, files, processed=processed)
 
 
-def loop(processed: Processed, reports: Reports, settings: Settings, code: Code) -> None:
+def loop(processed: Processed, reports: Reports, settings: Settings, code: Code, files: Files = "") -> None:
     """Trace what the prediction leaves over to its causes, and say how far each explains it."""
-    _run("loop", settings, code, processed=processed, reports=reports)
+    _run("loop", settings, code, files, processed=processed, reports=reports)
 
 
-def report(processed: Processed, reports: Reports, settings: Settings, code: Code) -> None:
+def verdict(
+    processed: Processed, reports: Reports, settings: Settings, code: Code, files: Files = ""
+) -> None:
+    """Put what the loop found into words: the verdicts, their reasons, and what to measure next."""
+    _run("verdict", settings, code, files, processed=processed, reports=reports)
+
+
+def report(processed: Processed, reports: Reports, settings: Settings, code: Code, files: Files = "") -> None:
     """Write the batch's report as PDF."""
-    _run("report", settings, code, processed=processed, reports=reports)
+    _run("report", settings, code, files, processed=processed, reports=reports)
 
 
 def campaign(
@@ -68,12 +79,24 @@ def campaign(
     _run("campaign", settings, code, reports=reports or [], processed=processed, out=out, unfinished=logs)
 
 
-def _run(stage: str, settings: str, code: str, **folders: Any) -> None:
-    """Run a stage with the code that the workflow was planned with, or not at all."""
+def _run(stage: str, settings: str, code: str, files: str = "", **folders: Any) -> None:
+    """Run a stage with the code that the workflow was planned with, or not at all.
+
+    Where its ``files`` are given and all that it takes is as it was, the results that it kept are put back.
+    """
     from metro.batch.at_work import job_at_work
+    from metro.batch.kept import FRESH, Job, keep, put_back
     from metro.codehash import require_code
 
     with job_at_work(Path.cwd()):
         require_code(stage, code)
+        chosen: dict[str, Any] = json.loads(settings)
+        job = Job.planned(stage, files, chosen, code, folders["processed"]) if files else None
+        digest = job.digest() if job else ""
+        if job and FRESH not in os.environ and put_back(job, digest):
+            typer.echo(f"{stage}: takes what it took before; its results are put back")
+            return
         function = getattr(import_module(f"metro.stages.{stage}"), stage)
-        function(**folders, settings=json.loads(settings), code=code)
+        function(**folders, settings=chosen, code=code)
+        if job:
+            keep(job, digest)

@@ -18,7 +18,7 @@ from metro.batch.findings import ContractError, Finding
 from metro.commands.calls import wrong_call
 from metro.commands.output import print_json, print_table
 
-STAGES = ("ingest", "identify", "predict", "loop", "report")
+STAGES = ("ingest", "identify", "predict", "loop", "verdict", "report")
 COLUMNS = ("output_file", "rule", "status", "plan")
 LAST_LINES = 20
 # The workflow of this folder, and that of the checkout metro is installed from.
@@ -45,30 +45,30 @@ def status_command(snakefile: Path | None, reports: Path, as_json: bool) -> None
     snakefile : the workflow; None: the one of this folder, else that of the checkout metro is installed from.
     """
     workflow = _workflow(snakefile)
-    found, summary = planned(_ask_snakemake(workflow))
-    for name, batch in found.items():
+    batches, summary = planned(_ask_snakemake(workflow))
+    for name, batch in batches.items():
         batch.verdicts = verdicts(reports / name)
-    _look_for_refused({name: batch for name, batch in found.items() if STAGES[0] in batch.needs}, workflow)
+    _look_for_refused({name: batch for name, batch in batches.items() if STAGES[0] in batch.needs}, workflow)
     if as_json:
-        batches = {
+        content = {
             name: {
                 "up_to_date": not batch.needs,
                 "needs": batch.needs,
                 "verdicts": batch.verdicts,
                 **({"refused": batch.refused} if batch.refused else {}),
             }
-            for name, batch in found.items()
+            for name, batch in batches.items()
         }
         print_json(
-            {"up_to_date": not summary and not any(b.needs for b in found.values()), "batches": batches}
+            {"up_to_date": not summary and not any(b.needs for b in batches.values()), "batches": content}
         )
         return
-    rows = [[name, _needs(batch), _verdicts(batch)] for name, batch in found.items()]
+    rows = [[name, _needs(batch), _verdicts(batch)] for name, batch in batches.items()]
     print_table(["batch", "needs", "verdicts"], rows)
-    refused = sum(bool(batch.refused) for batch in found.values())
-    waiting = sum(bool(batch.needs) for batch in found.values())
-    told = f"{waiting} of {len(found)} batches need snakemake" if waiting else "every batch is up to date"
-    sys.stdout.write(told + (", and so does the summary\n" if summary else "\n"))
+    refused = sum(bool(batch.refused) for batch in batches.values())
+    waiting = sum(bool(batch.needs) for batch in batches.values())
+    need = f"{waiting} of {len(batches)} batches need snakemake" if waiting else "every batch is up to date"
+    sys.stdout.write(need + (", and so does the summary\n" if summary else "\n"))
     if refused:
         sys.stdout.write(f"{refused} refused: metro check says all that is to be mended\n")
 
@@ -95,19 +95,19 @@ def planned(lines: Iterable[str]) -> tuple[dict[str, BatchStatus], bool]:
     if missing:
         message = f"its --summary lacks the columns {', '.join(sorted(missing))}: another version than 9?"
         raise ContractError([Finding("error", "snakemake", message)])
-    found: dict[str, BatchStatus] = {}
+    batches: dict[str, BatchStatus] = {}
     summary = False
     for row in table:
         pending = row["plan"] == "update pending"
         if row["rule"] in STAGES:
-            batch = found.setdefault(Path(row["output_file"]).parent.name, BatchStatus())
+            batch = batches.setdefault(Path(row["output_file"]).parent.name, BatchStatus())
             if pending:
                 batch.needs.setdefault(row["rule"], _reason(row["status"]))
         else:
             summary |= pending
-    for batch in found.values():
+    for batch in batches.values():
         batch.needs = {stage: batch.needs[stage] for stage in STAGES if stage in batch.needs}
-    return dict(sorted(found.items())), summary
+    return dict(sorted(batches.items())), summary
 
 
 def verdicts(reports: Path) -> dict[str, str]:
@@ -125,11 +125,11 @@ def _workflow(snakefile: Path | None) -> Path:
         if not snakefile.is_file():
             raise wrong_call("--snakefile", f"{snakefile} is not there")
         return snakefile
-    found = next((path for path in (HERE, INSTALLED) if path.is_file()), None)
-    if found is None:
+    present = next((path for path in (HERE, INSTALLED) if path.is_file()), None)
+    if present is None:
         message = "is not there: call metro where you call snakemake, or name the workflow with --snakefile"
         raise wrong_call(str(HERE), message)
-    return found
+    return present
 
 
 def _look_for_refused(unread: Mapping[str, BatchStatus], workflow: Path) -> None:
@@ -138,13 +138,16 @@ def _look_for_refused(unread: Mapping[str, BatchStatus], workflow: Path) -> None
         return
     from metro.batch.check import check
     from metro.batch.findings import errors
+    from metro.observables.catalogue import capabilities
     from metro.workflow import Plan
 
     plan = Plan.read(workflow.resolve().parent, {})
     for name, batch in unread.items():
-        if name in plan.found:
-            found = errors(check(plan.found[name].folder, Path(plan.cells), plan.config["holdout"]).problems)
-            batch.refused = str(found[0]) if found else ""
+        if name in plan.discovered:
+            folder = plan.discovered[name].folder
+            looked = check(folder, Path(plan.cells), plan.config["holdout"], capabilities)
+            faults = errors(looked.problems)
+            batch.refused = str(faults[0]) if faults else ""
 
 
 def _ask_snakemake(snakefile: Path) -> list[str]:

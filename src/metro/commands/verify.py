@@ -11,7 +11,7 @@ from metro.batch import provenance
 from metro.batch.cell import read_cell, stations_path
 from metro.batch.discover import batch_files
 from metro.batch.findings import ContractError, Finding
-from metro.batch.provenance import Difference, compare, hashes, sha256
+from metro.batch.provenance import Difference, compare, hashes, made_by, processed_hashes, sha256
 from metro.codehash import code_hash
 from metro.commands.calls import wrong_call
 from metro.commands.output import print_json
@@ -58,26 +58,26 @@ def verify_command(
         print_json(contents[0] if len(given) == 1 else contents)
     else:
         for folder, content in zip(folders, contents, strict=True):
-            typer.echo("\n".join(_told(folder, content)))
+            typer.echo("\n".join(_lines(folder, content)))
     return int(not all(content["unchanged"] for content in contents))
 
 
 def _compared(reports: Path, raw: Path | None, processed: Path | None, config: Path) -> JSON:
-    """Return what became of one report, as programs are told it."""
+    """Return what became of one report, in the form for programs."""
     name = reports.resolve().name
     raw = raw or next((root / name for root in raw_roots(config) if (root / name).is_dir()), RAW / name)
-    made, found = verify(reports, raw, processed or PROCESSED / name, config)
+    made, differences = verify(reports, raw, processed or PROCESSED / name, config)
     return {
         "batch": name,
-        "unchanged": not any(difference.in_files for difference in found),
+        "unchanged": not any(difference.in_files for difference in differences),
         "provenance_sha256": sha256(reports / provenance.FILE),
         "recorded": made,
-        "differences": [asdict(difference) for difference in found],
+        "differences": [asdict(difference) for difference in differences],
     }
 
 
-def _told(reports: Path, content: JSON) -> list[str]:
-    """Say for people what became of one report."""
+def _lines(reports: Path, content: JSON) -> list[str]:
+    """Return the lines that say what became of one report, for people."""
     if "error" in content:
         return [content["error"]]
     differences = [Difference(**one) for one in content["differences"]]
@@ -121,11 +121,9 @@ def verify(reports: Path, raw: Path, processed: Path, config: Path) -> tuple[JSO
     return made, [
         *_raw(made["raw"], raw),
         *_cell(raw, processed, Path(plan.cells)),
-        *compare(
-            "processed", made["processed"], hashes(processed, (path.name for path in processed.glob("*")))
-        ),
+        *compare("processed", made["processed"], processed_hashes(processed)),
         *compare("result", made["results"], hashes(reports, made["results"])),
-        *_stages(made["stages"], plan),
+        *_stages(made["stages"], processed, plan),
         *compare("package", _versions(made), _versions(_here())),
     ]
 
@@ -177,8 +175,13 @@ def _same_stations(now: Path, was: Path) -> bool:
     return bool(first == second)
 
 
-def _stages(made: JSON, plan: Plan) -> Iterator[Difference]:
-    """Compare the code of every stage, and its settings where there are some to compare with."""
+def _stages(recorded: JSON, processed: Path, plan: Plan) -> Iterator[Difference]:
+    """Compare the code of every stage, and its settings where there are some to compare with.
+
+    A stage may have run again since the report was made: where its results came out the same, the report is
+    of that run as well.
+    """
+    made = {stage: made_by(processed, stage) or one for stage, one in recorded.items()}
     yield from compare("code", {s: m["code"] for s, m in made.items()}, {s: code_hash(s) for s in made})
     if plan.config:
         was = {stage: json.dumps(m["settings"], sort_keys=True) for stage, m in made.items()}

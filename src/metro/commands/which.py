@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from metro.batch.findings import ContractError, Finding, suggestion
+from metro.batch.findings import ContractError, Finding
 from metro.commands.calls import CallError, wrong_call
+from metro.spelling import suggestion
 
 RAW, PROCESSED, REPORTS = Path("data/raw"), Path("data/processed"), Path("reports")
 CONFIG = Path("config/config.yaml")
@@ -56,9 +57,9 @@ def raw_folder(given: str) -> Path:
         return path
     if names([path], RAW_FILE):
         raise wrong_call(given, f"is a folder of batches (did you mean {path}/*?)")
-    found = _in(roots, RAW_FILE, _name(given, [*roots, PROCESSED, REPORTS]))
-    if found is not None:
-        return found
+    folder = _in(roots, RAW_FILE, _name(given, [*roots, PROCESSED, REPORTS]))
+    if folder is not None:
+        return folder
     if path.is_dir():
         raise wrong_call(
             given, f"holds no {RAW_FILE}: not the folder of a batch{suggestion(path.name, known)}"
@@ -78,8 +79,8 @@ def reports_folder(given: str) -> Path:
 
 def names(roots: Iterable[Path], file: str) -> list[str]:
     """Return the names of the folders under some roots that hold a file; hidden ones are being written."""
-    found = {path.parent.name for root in roots for path in root.glob(f"*/{file}")}
-    return sorted(name for name in found if not name.startswith("."))
+    folders = {path.parent.name for root in roots for path in root.glob(f"*/{file}")}
+    return sorted(name for name in folders if not name.startswith("."))
 
 
 def _folder(given: str, root: Path, file: str) -> Path:
@@ -87,9 +88,9 @@ def _folder(given: str, root: Path, file: str) -> Path:
         return Path(given)
     raw = raw_roots()
     name = _name(given, [*raw, PROCESSED, REPORTS])
-    found = _in([root], file, name)
-    if found is not None:
-        return found
+    folder = _in([root], file, name)
+    if folder is not None:
+        return folder
     if name in names(raw, RAW_FILE):
         raise ContractError([Finding("error", str(root / name), "is not there: call snakemake")])
     raise _no_such_batch(given, name, names([root], file))
@@ -100,9 +101,9 @@ def _in(roots: Sequence[Path], file: str, name: str) -> Path | None:
 
 
 def _name(given: str, roots: Sequence[Path]) -> str:
-    """Return the name of the batch that a name, or a folder in one of the roots, stands for.
+    """Return the name of the batch that a name, or a folder in one of the roots, refers to.
 
-    A folder elsewhere stands for itself: a batch of its name that is here is another one.
+    A folder elsewhere refers to itself: a batch of its name that is here is another one.
     """
     path = Path(given)
     home = path.absolute().parent.resolve()

@@ -20,7 +20,8 @@ class Chipped:
         """Return the tool broken all along, and the cut of the heights at which it is.
 
         Heights do not know of each other: the force changes by that of this tool in this cut less that of the
-        sound tool in the same.
+        whole tool in the same.
         """
-        reach = tuple(-self.length if tooth == self.tooth else 0.0 for tooth in range(cutter.teeth))
+        before = cutter.reach or (0.0,) * cutter.teeth
+        reach = tuple(was - self.length if j == self.tooth else was for j, was in enumerate(before))
         return replace(cutter, reach=reach), replace(cut, axial_depth=min(self.height, cut.axial_depth))

@@ -29,7 +29,7 @@ class Corner:
     Attributes
     ----------
     begins : whether it begins the arc, else ends it. outer : whether the outer part of the chip is there.
-    radius : m. line : y of the edge, m. off_sine, off_cosine : of how far the tooth is off the radius, m.
+    radius : m. line : y of the edge, m. off_sine, off_cosine : of the tooth's deviation from the radius, m.
     tip, foot : immersions at which the edge is where the tip is, and where what was cleared ends, rad.
     """
 
@@ -68,12 +68,12 @@ def corners(
     before: Passes, engagement: Engagement, near: Nearby, aside: Array | float = 0.0
 ) -> tuple[Corner, ...]:
     """Return the corners of a cut on true paths; ``aside`` (angles, 1) m displaces the tool along y."""
-    found = []
+    ends = []
     if engagement.entry > 0.0 and not engagement.entry_face:
-        found.append(_corner(before, engagement.entry, near, aside, begins=True))
+        ends.append(_corner(before, engagement.entry, near, aside, begins=True))
     if engagement.exit < math.pi and not engagement.exit_face:
-        found.append(_corner(before, engagement.exit, near, aside, begins=False))
-    return tuple(found)
+        ends.append(_corner(before, engagement.exit, near, aside, begins=False))
+    return tuple(ends)
 
 
 def _corner(before: Passes, immersion: float, near: Nearby, aside: Array | float, *, begins: bool) -> Corner:
@@ -102,4 +102,4 @@ def _foot(passed: Passes, corner: Corner, tip: Array) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):
             step = np.where(growth > 0.0, lacking / growth, LARGEST_STEP).min(axis=0)
         phi = phi + towards * np.clip(step, -LARGEST_STEP, LARGEST_STEP)
-    return np.where(towards * (phi - tip) > 0.0, phi, tip)  # where no chip is left at the tip: none
+    return np.where(towards * (phi - tip) > 0.0, phi, tip)  # where there is no chip at the tip: none

@@ -2,8 +2,8 @@
 
 The chip that an earlier pass leaves gains q(θ) − q(θ − pitch) towards the tooth, q the displacement over a
 revolution of a steady cut; and the tool is nearer to a raw edge of the work that begins or ends the arc, or
-farther. With equal teeth q repeats with every tooth: then only the raw edge tells, and that a tip which moves
-sweeps another path than one that does not.
+farther. With equal teeth q repeats with every tooth: then only the raw edge shows the displacement, and that
+a tip which moves sweeps another path than one that does not.
 """
 
 from __future__ import annotations
@@ -91,11 +91,11 @@ def displaced(cutter: Cutter, cut: Cut, compliance: Array, count: int, true_path
     """Return a tool on springs of a ``compliance`` (2, 2), m/N in the feed frame, at ``count`` even angles.
 
     On a curve the feed has turned since an earlier pass: a tooth met the same ray that much longer ago, and
-    the force has turned with the feed while the springs stand, so that the displacement was C R C⁻¹ q.
+    the force has turned with the feed while the springs have not, so that the displacement was C R C⁻¹ q.
     """
     angle = TURN * np.arange(count) / count
     cutter = placed(cutter, cut, true_path)
-    uneven = bool(np.ptp(cutter.pitch(1)) > ALIKE)  # then not the last tooth alone tells
+    uneven = bool(np.ptp(cutter.pitch(1)) > ALIKE)  # then earlier teeth than the last one matter, too
     before = passes(cutter, cut, true_path, angle, every=uneven)
     pitch = np.stack([cutter.pitch(m) for m in range(1, len(before.sine) + 1)])
     turned = (cut.curvature if true_path else 0.0) * before.feed * pitch

@@ -64,13 +64,13 @@ def pieces(before: Passes, bounds: Array, along: Edges, corners: tuple[Corner, .
     low, high = bounds[:-1], bounds[1:]
     start = low[0].min()
     leading = start + np.mod(along.top - start, TURN)
-    found = []
+    parts = []
     for turn in range(math.ceil((high.max() - start + along.span) / TURN)):
         upper = np.minimum(high, leading + TURN * turn)
         lower = np.maximum(low, leading + (TURN * turn - along.span))
         at = np.nonzero(upper > lower)
-        found.append((at[1], at[2], lower[at], upper[at]))
-    angle, tooth, lower, upper = (np.concatenate(part) for part in zip(*found, strict=True))
+        parts.append((at[1], at[2], lower[at], upper[at]))
+    angle, tooth, lower, upper = (np.concatenate(part) for part in zip(*parts, strict=True))
     passed = before.before(angle, tooth)
     middle = 0.5 * (lower + upper)
     bounding = passed.chip(np.sin(middle), np.cos(middle)).argmin(axis=0)

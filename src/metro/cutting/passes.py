@@ -1,8 +1,8 @@
 """The chip that each earlier pass leaves to a tooth, as a function of the immersion at one angle of the tool.
 
-Along a helical edge the immersion tells the height, κz = θ + α_j − φ, κ the lag per depth; so at one angle θ
-of the tool how far a tooth is off the radius, a sinusoid of κz, is one of the immersion, and the chip that
-pass m = 1…N leaves to a tooth is A sin φ + B cos φ on circular paths.
+Along a helical edge the immersion determines the height, κz = θ + α_j − φ, κ the lag per depth; so at one
+angle θ of the tool the deviation of a tooth from the radius, a sinusoid of κz, is one of the immersion, and
+the chip that pass m = 1…N leaves to a tooth is A sin φ + B cos φ on circular paths.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Passes:
     feed : m/rad. radius : m. true_path : whether the paths are trochoids, else circles.
     pitch : angle from the tooth to the one that made the pass, rad.
     sine, cosine : A and B of the chip, m.
-    off_sine, off_cosine : the same of how far the tooth that made the pass is off the radius, m.
+    off_sine, off_cosine : the same of the deviation from the radius of the tooth that made the pass, m.
     """
 
     feed: float
@@ -48,7 +48,7 @@ class Passes:
         return self._each(lambda part: part[index])
 
     def before(self, angle: npt.NDArray[np.intp], tooth: npt.NDArray[np.intp]) -> Passes:
-        """Return the passes (passes, n) before teeth (n,) at angles (n,), where the alike stand for all."""
+        """Return the passes (passes, n) before teeth (n,) at angles (n,); equal ones are stored once."""
         count, angles, teeth = self.sine.shape
         place = (angle % angles) * teeth + tooth % teeth
         return self._each(lambda part: part.reshape(count, -1).take(place, axis=1))
@@ -86,7 +86,7 @@ def passes(cutter: Cutter, cut: Cut, true_path: bool, angle: Array, *, every: bo
     curvature = cut.curvature if true_path else 0.0
     steps = range(1, cutter.teeth + 1 if off or curvature or every else 2)
     pitch = np.stack([cutter.pitch(m) for m in steps])
-    # At the height where tooth j has immersion φ tooth j+m is off by the real part of earlier × exp i(θ − φ).
+    # Where tooth j has immersion φ, tooth j+m deviates by the real part of earlier × exp i(θ − φ).
     here = np.exp(1j * np.asarray(cutter.tooth_angles))
     earlier = here * np.stack([np.roll(deviation, -m) for m in steps])
     apart = max(np.ptp(pitch, axis=1).max(), np.abs(earlier.T - earlier[:, 0]).max() / cutter.radius)
@@ -103,7 +103,7 @@ def passes(cutter: Cutter, cut: Cut, true_path: bool, angle: Array, *, every: bo
 
 
 def _deviation(cutter: Cutter, cut: Cut) -> npt.NDArray[np.complex128]:
-    """Complex amplitude (N,) m of how far each tooth is off the radius: the real part of it × exp iκz.
+    """Complex amplitude (N,) m of the deviation of each tooth from the radius: the real part of it × exp iκz.
 
     How far a tooth reaches is the same at all heights: it is taken as such a wave with its crest at half the
     depth, too little by 1 − cos(κ × depth / 2) at both ends.

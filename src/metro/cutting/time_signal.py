@@ -26,7 +26,7 @@ def time_signal(
 ) -> Array:
     """Force on the tool at given times, (n, 3) N, feed frame.
 
-    A periodic cubic spline through the table: at spindle order k it is off by (2πk/ANGLES)⁴/380 of that
+    A periodic cubic spline through the table: at spindle order k it has an error of (2πk/ANGLES)⁴/380 of that
     order's amplitude (4e-9 at order 4, 1e-4 at order 50). Where an edge without helix enters or leaves at
     once, it swings beyond the step by up to a ninth of it, within 1.5°.
 

@@ -28,7 +28,7 @@ NO_CHIP, FLATTEST = 1e-6, 1e-2  # of the feed per radian
 
 
 class NotBalancedError(RuntimeError):
-    """Force and deflection found no balance: ``error`` m is left between q and C F."""
+    """Force and deflection did not reach a balance: q and C F differ by ``error`` m."""
 
     def __init__(self, error: float) -> None:
         super().__init__(f"the deflection is {error:.3g} m off the balance after {STEPS} steps")
@@ -41,8 +41,8 @@ def yielding_basis(
     """Force on a tool that yields per unit of each coefficient, (ANGLES, 3, 6), else as of ``force_basis``.
 
     The tool is displaced as it is with ``coefficients`` (6,): times these the basis is the force in balance.
-    What the tip's movement changes in the path that it sweeps (on true paths) is left out of the balance
-    itself: it is less than some hundredths of the force.
+    The change of the swept path by the tip's movement (on true paths) is neglected in the balance itself: it
+    is less than some hundredths of the force.
 
     Parameters
     ----------
@@ -86,15 +86,15 @@ def deflection(
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """A deflection ``bent`` and the ``rest`` C F − q, (n, 2) m, with what is cut: its pieces, raw edges."""
+    """A deflection ``bent`` and its ``residual`` C F − q, (n, 2) m, with the cut's pieces and raw edges."""
 
     bent: Array
-    rest: Array
+    residual: Array
     pieces: Pieces
     raw: Array
 
     def within(self, share: float) -> bool:
-        return bool(np.abs(self.rest).max() <= share * np.abs(self.bent + self.rest).max())
+        return bool(np.abs(self.residual).max() <= share * np.abs(self.bent + self.residual).max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ class _Spring:
 
 
 def _balanced(spring: _Spring) -> Array:
-    """Follow Newton's steps from the undeflected tool, each shortened until less rest is left."""
+    """Follow Newton's steps from the undeflected tool, each shortened until the residual falls."""
     balance = spring.balance(np.zeros((len(spring.tool.angle), 2)))
     for _ in range(STEPS):
         if balance.within(TOLERANCE):
@@ -121,16 +121,16 @@ def _balanced(spring: _Spring) -> Array:
         step = _step(spring, balance)
         for share in SHARES:
             tried = spring.balance(balance.bent + share * step)
-            if np.sum(tried.rest**2) < np.sum(balance.rest**2):
+            if np.sum(tried.residual**2) < np.sum(balance.residual**2):
                 break
         balance = tried
     if balance.within(ACCEPTED):
         return balance.bent
-    raise NotBalancedError(float(np.abs(balance.rest).max()))
+    raise NotBalancedError(float(np.abs(balance.residual).max()))
 
 
 def _step(spring: _Spring, balance: _Balance) -> Array:
-    """Newton step (n, 2) of the deflection: solve (1 − C ∂F/∂q) step = rest.
+    """Newton step (n, 2) of the deflection: solve (1 − C ∂F/∂q) step = residual.
 
     Earlier passes count as whole mean pitches earlier: angles that are a pitch apart are a system of their
     own.
@@ -142,11 +142,11 @@ def _step(spring: _Spring, balance: _Balance) -> Array:
     def by_pitch(values: Array) -> Array:
         return np.asarray(values.reshape(teeth, -1, *values.shape[1:]).swapaxes(0, 1))
 
-    matrix = np.zeros((len(balance.rest) // teeth, teeth, teeth, 2, 2))
+    matrix = np.zeros((len(balance.residual) // teeth, teeth, teeth, 2, 2))
     matrix[:, tooth, tooth] = np.eye(2) - by_pitch(by_pass.sum(axis=1) + by_edge)
     for back in range(1, teeth + 1):
         matrix[:, tooth, (tooth - back) % teeth] += by_pitch(by_pass[:, back - 1])
-    right = by_pitch(balance.rest).reshape(-1, size, 1)
+    right = by_pitch(balance.residual).reshape(-1, size, 1)
     step = np.linalg.solve(matrix.swapaxes(2, 3).reshape(-1, size, size), right)
     return np.asarray(step.reshape(-1, teeth, 2).swapaxes(0, 1).reshape(-1, 2))
 

@@ -74,11 +74,11 @@ def rows(view: str, processed: Path, reports: Path) -> list[Row]:
         return [_description(path) for path in _of_all(processed, "batch.json")]
     if view == "identified":
         return [
-            (path.parent.name, *found)
+            (path.parent.name, *quantity)
             for path in _of_all(reports, "identified.json")
             for key, block in _read(path).items()
             if key != "format"
-            for found in quantities(block, key)
+            for quantity in quantities(block, key)
         ]
     make = {"verdicts": _verdict, "effects": _effects, "candidates": _candidates}[view]
     return [
@@ -107,8 +107,8 @@ def _effects(batch: str, observable: str, entry: JSON) -> Iterator[Row]:
     """Yield a row for each parameter of each effect; one without parameters has one row."""
     for effect in entry.get("effects") or []:
         known = (batch, observable, effect["effect"], effect.get("probability"))
-        found: list[Row] = list(quantities(effect.get("parameters") or {}))
-        yield from ((*known, *parameter) for parameter in found or [(None,) * 5])
+        parameters: list[Row] = list(quantities(effect.get("parameters") or {}))
+        yield from ((*known, *parameter) for parameter in parameters or [(None,) * 5])
 
 
 def _candidates(batch: str, observable: str, entry: JSON) -> Iterator[Row]:

@@ -75,8 +75,8 @@ def table_files(processed: str | Path, table: str) -> list[Path]:
 
 def _files(processed: Path, table: str) -> list[Path]:
     """Return files by table name; folders and files that are being written begin with a dot."""
-    found = processed.glob(f"*/{table}.parquet")
-    return sorted(path for path in found if not path.name.startswith(".") and path.parent.name[0] != ".")
+    paths = processed.glob(f"*/{table}.parquet")
+    return sorted(path for path in paths if not path.name.startswith(".") and path.parent.name[0] != ".")
 
 
 def _create(connection: DuckDBPyConnection, name: str, files: list[Path]) -> None:

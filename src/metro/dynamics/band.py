@@ -18,7 +18,7 @@ from metro.dynamics.system import Cut, Structure
 from metro.units import Array
 
 _STEP = 1e-4
-_LIMIT = 0.5  # of a shift in log depth: beyond it, and near a fold, first order says nothing
+_LIMIT = 0.5  # of a shift in log depth: beyond it, and near a fold, first order does not hold
 
 
 def depth_samples(structure: Structure, cut: Cut, boundary: Boundary, deviations: Array) -> Array:
@@ -69,8 +69,8 @@ def _log_slopes(structure: Structure, cut: Cut, rpm: Array, at: Candidates) -> A
 
 
 def _followed(structure: Structure, cut: Cut, rpm: Array, at: Candidates) -> Array:
-    found = crossings.refine(fine_kernel(structure, cut, rpm), at, 2)
-    return np.where(found.converged, found.at.inverse, np.nan)
+    refined = crossings.refine(fine_kernel(structure, cut, rpm), at, 2)
+    return np.where(refined.converged, refined.at.inverse, np.nan)
 
 
 def _perturbed(structure: Structure, cut: Cut) -> Iterator[tuple[Structure, Cut]]:

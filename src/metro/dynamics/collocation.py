@@ -26,7 +26,7 @@ from metro.dynamics.system import Cut, Structure, chip_direction
 from metro.units import Array, ComplexArray
 
 _NO_MOTION = 1e-12  # share of a mode's direction along an axis
-_SQUARINGS = 18  # the norm of a map's 2^17-th power tells its largest multiplier to some 1e-4
+_SQUARINGS = 18  # the norm of a map's 2^17-th power gives its largest multiplier to some 1e-4
 _NEGLIGIBLE = 0.03  # share of the free vibrations below which one is left out of the reduced equation
 
 
@@ -92,8 +92,8 @@ def panels_of(cut: Cut) -> list[tuple[float, float, int]]:
     """Panels (start, end, teeth cutting) of a tooth period, in fractions of it."""
     arc = (cut.exit - cut.entry) / cut.pitch
     whole = math.floor(arc + 1e-9)
-    rest = max(arc - whole, 0.0)
-    panels = [(0.0, rest, whole + 1), (rest, 1.0, whole)] if rest > 1e-9 else [(0.0, 1.0, whole)]
+    fraction = max(arc - whole, 0.0)
+    panels = [(0.0, fraction, whole + 1), (fraction, 1.0, whole)] if fraction > 1e-9 else [(0.0, 1.0, whole)]
     return [panel for panel in panels if panel[2] > 0]
 
 

@@ -55,7 +55,7 @@ def estimate_frf(hits: Sequence[Hit], unit: str, decay: float = 0.0) -> Frf:
     hits : repeats of the same test, of one rate and length.
     unit : of the response: m/s2, m/s or m.
     decay : 1/s, of an exponential window that the records went through, force and response alike. The FRF is
-        that of poles moved left by it (:func:`metro.dynamics.modal.identify_modes` takes it off again).
+        that of poles moved left by it (:func:`metro.dynamics.modal.identify_modes` subtracts it again).
 
     Raises
     ------
@@ -107,11 +107,11 @@ def _scatter(force: ComplexArray, response: ComplexArray) -> tuple[Array, Comple
         return unknown, np.zeros((0, lines), dtype=np.complex128), unknown
     sff, sxx = np.sum(np.abs(force) ** 2, axis=0), np.sum(np.abs(response) ** 2, axis=0)
     sfx = np.sum(force.conj() * response, axis=0)
-    rest = response - sfx / sff * force
-    left = np.sum(np.abs(rest) ** 2, axis=0) / (hits - 1)
-    # a hit pulls the mean towards itself by its share of the force's power: its own rest is so much smaller
+    residual = response - sfx / sff * force
+    left = np.sum(np.abs(residual) ** 2, axis=0) / (hits - 1)
+    # A hit pulls the mean towards itself by its share of the force's power, which makes its residual smaller.
     share = np.abs(force) ** 2 / sff
-    deviation = rest * force.conj() / sff / np.sqrt(1.0 - share)
+    deviation = residual * force.conj() / sff / np.sqrt(1.0 - share)
     return pooled(left / sff), deviation, np.abs(sfx) ** 2 / (sff * sxx)
 
 

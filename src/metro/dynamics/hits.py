@@ -24,7 +24,7 @@ class Hit:
 
 
 def faults(hits: Sequence[Hit]) -> list[str]:
-    """Say for each hit why it cannot be used; empty when it can.
+    """Explain for each hit why it cannot be used; empty when it can.
 
     Beside the faults of a hit by itself (:func:`fault`): a record that is there twice, which would make the
     scatter of the hits too small, and a blow whose force stays 20 dB below the strongest of the good ones.
@@ -42,7 +42,7 @@ def faults(hits: Sequence[Hit]) -> list[str]:
 
 
 def fault(hit: Hit) -> str:
-    """Say why a hit by itself cannot be used: overload, no pulse, a double hit, one channel twice."""
+    """Explain why a hit by itself cannot be used: overload, no pulse, a double hit, one channel twice."""
     for name, signal in (("force", hit.force), ("response", hit.response)):
         if not np.all(np.isfinite(signal)):
             return f"{name} has values that are not finite"
@@ -53,8 +53,8 @@ def fault(hit: Hit) -> str:
         return "response is the force channel over again"
     start, end = pulse(hit.force)
     peak = np.abs(hit.force).max()
-    rest = np.concatenate([hit.force[:start], hit.force[end:]])
-    noise = 1.4826 * np.median(np.abs(rest - np.median(rest)))
+    outside = np.concatenate([hit.force[:start], hit.force[end:]])
+    noise = 1.4826 * np.median(np.abs(outside - np.median(outside)))
     if peak < 10.0 * noise:
         return "no force pulse above the noise"
     ringing = max(_DOUBLE_HIT * peak, 6.0 * noise)
@@ -97,7 +97,7 @@ def _same(a: Hit, b: Hit) -> bool:
 
 
 def _proportional(a: Array, b: Array) -> bool:
-    """Tell whether b is a times a constant, to the rounding of the numbers."""
+    """Return whether b is a times a constant, to the rounding of the numbers."""
     factor = float(a @ b) / float(a @ a) if a.any() else 0.0
     return factor != 0.0 and float(np.abs(b - factor * a).max()) < 1e-9 * float(np.abs(b).max())
 

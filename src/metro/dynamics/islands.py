@@ -52,14 +52,21 @@ def all_crossings(structure: Structure, cut: Cut, rpm: Array, deepest: float) ->
     for members in groups(structure, cut, rpm):
         group = members
         for angles in _ANGLES:
-            found = _of_group(structure, cut, rpm[group], deepest, angles)
+            crossings_of_group = _of_group(structure, cut, rpm[group], deepest, angles)
             last = angles == _ANGLES[-1]
-            kept = found.complete[found.speed] | last
+            kept = crossings_of_group.complete[crossings_of_group.speed] | last
             parts.append(
-                (group[found.speed], found.depth, found.chatter_hz, found.kind, found.multipliers, kept)
+                (
+                    group[crossings_of_group.speed],
+                    crossings_of_group.depth,
+                    crossings_of_group.chatter_hz,
+                    crossings_of_group.kind,
+                    crossings_of_group.multipliers,
+                    kept,
+                )
             )
-            complete[group] = found.complete
-            group = group[~found.complete]
+            complete[group] = crossings_of_group.complete
+            group = group[~crossings_of_group.complete]
             if not len(group):
                 break
     speed, depth, frequency, label, count, kept = (np.concatenate(c) for c in zip(*parts, strict=True))
@@ -74,17 +81,17 @@ def _of_group(structure: Structure, cut: Cut, rpm: Array, deepest: float, count:
     start = crossings.scan(structure, collocation.reduced(equation), count, np.inf)
     near = start.take(start.distinct())
     near = near.take(near.inverse > 0.7 / deepest)  # refined, it may turn out less deep
-    found = crossings.refine(equation, near, 6)
-    inside = np.flatnonzero(found.converged & (found.at.inverse * deepest >= 1.0))
-    once = inside[found.at.take(inside).distinct()]
-    at = found.at.take(once)
-    frequency = chatter_hz(structure, arc, equation.period[at.speed], at.theta, found.shape[once])
+    refined = crossings.refine(equation, near, 6)
+    inside = np.flatnonzero(refined.converged & (refined.at.inverse * deepest >= 1.0))
+    once = inside[refined.at.take(inside).distinct()]
+    at = refined.at.take(once)
+    frequency = chatter_hz(structure, arc, equation.period[at.speed], at.theta, refined.shape[once])
     label = kind(at.theta)
-    leave = np.where(found.leaves[once], 1, -1) * np.where(label == "flip", 1, 2)
-    all_found = np.ones(len(rpm), dtype=bool)
-    result = Crossings(at.speed, 1.0 / at.inverse, frequency, label, leave, all_found)
+    leave = np.where(refined.leaves[once], 1, -1) * np.where(label == "flip", 1, 2)
+    complete = np.ones(len(rpm), dtype=bool)
+    result = Crossings(at.speed, 1.0 / at.inverse, frequency, label, leave, complete)
     for depth in _CHECKED * deepest:
         outside = np.abs(collocation.multipliers(equation, np.full(len(rpm), depth))) > 1.0
-        told = [result.unstable(speed, depth) for speed in range(len(rpm))]
-        all_found &= outside.sum(axis=1) == told
+        counted = [result.unstable(speed, depth) for speed in range(len(rpm))]
+        complete &= outside.sum(axis=1) == counted
     return result

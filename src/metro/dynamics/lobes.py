@@ -136,15 +136,15 @@ def _solve(
         before = before.take(before.distinct())
         extra += _EXTRA_POINTS
         arc, equation = discretised(structure, cut, rpm[speeds], effort[0], extra)
-        found = crossings.refine(equation, before, 2)
-        part = _lowest(structure, (arc, equation), rpm[speeds], found, before)
+        refined = crossings.refine(equation, before, 2)
+        part = _lowest(structure, (arc, equation), rpm[speeds], refined, before)
         settled = (part.error <= _TOLERANCE * part.depth) | (resolution == _RESOLUTIONS - 1)
         missed[speeds], hints = _missed(equation, part, settled)
         _enter(result, speeds, part)
         done = part.crossings.take(settled[part.crossings.speed])
         near.append(replace(done, speed=speeds[done.speed]))
         outside.append(replace(hints, speed=speeds[hints.speed]))
-        before, speeds = found.at.among(np.flatnonzero(~settled)), speeds[~settled]
+        before, speeds = refined.at.among(np.flatnonzero(~settled)), speeds[~settled]
         if not len(speeds):
             break
     result = replace(result, crossings=Candidates.join(near))
@@ -165,20 +165,20 @@ def _roughly(structure: Structure, cut: Cut, rpm: Array, effort: _Effort, hints:
 
 
 def _lowest(
-    structure: Structure, discrete: tuple[Arc, Kernel], rpm: Array, found: Refined, before: Candidates
+    structure: Structure, discrete: tuple[Arc, Kernel], rpm: Array, refined: Refined, before: Candidates
 ) -> Boundary:
     """Boundary of the lowest crossing of each speed; its error is the change from ``before``."""
     arc, equation = discrete
-    rising = _rising(found)
+    rising = _rising(refined)
     winner = np.full(len(rpm), -1)
-    winner[found.at.speed[rising]] = rising  # the largest 1/depth of each speed is written last
+    winner[refined.at.speed[rising]] = rising  # the largest 1/depth of each speed is written last
     hit, best = winner >= 0, winner[winner >= 0]
-    result = replace(_nothing(rpm), crossings=found.at.take(rising))
-    theta = found.at.theta[best]
-    result.depth[hit] = 1.0 / found.at.inverse[best]
-    result.error[hit] = np.abs(found.at.inverse[best] / before.inverse[best] - 1.0) * result.depth[hit]
+    result = replace(_nothing(rpm), crossings=refined.at.take(rising))
+    theta = refined.at.theta[best]
+    result.depth[hit] = 1.0 / refined.at.inverse[best]
+    result.error[hit] = np.abs(refined.at.inverse[best] / before.inverse[best] - 1.0) * result.depth[hit]
     result.kind[hit] = kind(theta)
-    result.chatter_hz[hit] = chatter_hz(structure, arc, equation.period[hit], theta, found.shape[best])
+    result.chatter_hz[hit] = chatter_hz(structure, arc, equation.period[hit], theta, refined.shape[best])
     return result
 
 
@@ -188,10 +188,10 @@ def _enter(whole: Boundary, speeds: np.ndarray, part: Boundary) -> None:
         getattr(whole, name)[speeds] = getattr(part, name)
 
 
-def _rising(found: Refined) -> np.ndarray:
-    """Return the indices of the crossings that Newton's method found, by rising 1/depth."""
-    order = np.argsort(found.at.inverse)
-    rising: np.ndarray = order[found.converged[order]]
+def _rising(refined: Refined) -> np.ndarray:
+    """Return the indices of the crossings at which Newton's method converged, by rising 1/depth."""
+    order = np.argsort(refined.at.inverse)
+    rising: np.ndarray = order[refined.converged[order]]
     return rising
 
 
@@ -222,8 +222,8 @@ def chatter_hz(structure: Structure, arc: Arc, period: Array, theta: Array, shap
     return np.abs(strongest) / (2.0 * np.pi)
 
 
-def _missed(equation: Kernel, found: Boundary, asked: np.ndarray) -> tuple[np.ndarray, Candidates]:
-    """Tell where a crossing was missed: where there is none, or the cut is unstable below it.
+def _missed(equation: Kernel, boundary: Boundary, asked: np.ndarray) -> tuple[np.ndarray, Candidates]:
+    """Return where a crossing was missed: where there is none, or the cut is unstable below it.
 
     Only speeds under the mask ``asked`` are looked at.
 
@@ -231,12 +231,12 @@ def _missed(equation: Kernel, found: Boundary, asked: np.ndarray) -> tuple[np.nd
     -------
     (k,) whether, and the multipliers that are outside the unit circle: the crossing is not far from them.
     """
-    known = np.isfinite(found.depth)
+    known = np.isfinite(boundary.depth)
     missed = asked & ~known
     # where nothing was found, the cut may be unstable at the depths of other speeds
-    tried = np.where(known, found.depth, found.depth[known].max(initial=0.0))
+    tried = np.where(known, boundary.depth, boundary.depth[known].max(initial=0.0))
     speeds = np.flatnonzero(asked)
-    outside = [found.crossings.take(np.zeros(0, dtype=int))]
+    outside = [boundary.crossings.take(np.zeros(0, dtype=int))]
     for share in _BELOW:
         depth = share * tried[speeds]
         doubt = ~collocation.surely_stable(equation.take(speeds), depth)

@@ -34,8 +34,8 @@ class ModalModel:
     Attributes
     ----------
     modes : those inside the band.
-    fit : the fit they come from; its other modes stand for what is outside the band.
-    error : (c,) what it leaves of each FRF, rms over rms.
+    fit : the fit they come from; its other modes represent the modes outside the band.
+    error : (c,) its residual of each FRF, rms over rms.
     diagram : the stabilisation diagram that it started from.
     doubtful : a further mode that lowers chi² beyond chance, but by less than its unknowns are worth; None
         without such a trace.
@@ -68,7 +68,7 @@ def identify_modes(
     driving : column of the driving point (reference = response), which gives the stiffness.
     inputs : how many columns belong to one output.
     scatter : how the repeats differ, on the same lines and columns.
-    decay : 1/s, of an exponential window on force and response, which is taken off the damping.
+    decay : 1/s, of an exponential window on force and response, which is subtracted from the damping.
 
     Raises
     ------
@@ -90,8 +90,8 @@ def identify_modes(
     model_error = _MODEL_ERROR_UNKNOWN_SCATTER if variance is None else _MODEL_ERROR
     weight = np.sqrt(2.0 / (noise + (model_error * rms) ** 2))  # of the real and the imaginary part
     data = Data(2 * np.pi * frequency, frf, weight, inputs, scatter)
-    found, diagram = _search(data.thinned(_SEARCH_LINES))
-    fit = _converged(data, refine(data, found.omega, found.zeta, real=found.real))
+    start, diagram = _search(data.thinned(_SEARCH_LINES))
+    fit = _converged(data, refine(data, start.omega, start.zeta, real=start.real))
     change = np.linalg.norm(fit.evaluate(data.omega) - frf, axis=0) / np.linalg.norm(frf, axis=0)
     inside = (fit.omega > data.omega[0]) & (fit.omega < data.omega[-1]) & (fit.zeta < _LARGEST_DAMPING)
     free = residues(data.omega, frf, np.sqrt(np.mean(data.weight**2, axis=1)), fit.poles)
@@ -173,7 +173,7 @@ def _added(data: Data, fit: PoleFit) -> PoleFit:
 def _doubtful(data: Data, fit: PoleFit, driving: int | None, decay: float) -> Mode | None:
     """Return the mode at the residual's highest peak where it is no chance, though it was not kept.
 
-    Chi² must say so, and the damping's own error, which holds what the hits share.
+    Chi² must show it, and the damping's own error, which includes the errors that the hits share.
     """
     from scipy import stats
 

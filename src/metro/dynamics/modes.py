@@ -29,7 +29,7 @@ class Mode:
     viscous, viscous_sd : 2 damping stiffness / omega, N s/m.
     shape : (c,) complex residues over the responses, scaled to 1 at the driving point (else at the largest).
     collinearity : modal phase collinearity of the shape fitted without the demand that the mode be real.
-    resolved : whether the data tell the damping, and the stiffness at a driving point, to a third (95 %).
+    resolved : whether the data determine damping, and stiffness at a driving point, to a third (95 %).
     """
 
     frequency: float
@@ -61,7 +61,7 @@ def modal_constants(
     Raises
     ------
     ValueError
-        When the window decays faster than the mode: its damping cannot be told from the window's.
+        When the window decays faster than the mode: its damping is confounded with the window's.
     """
     m = len(fit.omega)
     measured = complex(fit.poles[r])

@@ -74,23 +74,23 @@ def spectral_radius(period_map: PeriodMap) -> Array:
             share = known @ vector[:, :, None]
             vector -= (share.transpose(0, 2, 1) @ known)[:, 0]
             hessenberg[:, : j + 1, j] += share[:, :, 0]
-        rest = np.linalg.norm(vector, axis=1)
-        hessenberg[:, j + 1, j] = rest
-        basis.append(vector / np.maximum(rest, 1e-300)[:, None])
+        remainder = np.linalg.norm(vector, axis=1)
+        hessenberg[:, j + 1, j] = remainder
+        basis.append(vector / np.maximum(remainder, 1e-300)[:, None])
         if (j + 1) % _CHECK_EVERY == 0 or j + 1 == most:
-            radius, residual = _largest(hessenberg[:, : j + 1, : j + 1], rest)
+            radius, residual = _largest(hessenberg[:, : j + 1, : j + 1], remainder)
             if np.all(residual < _RESIDUAL * radius):
                 return radius
     raise ArithmeticError(f"Arnoldi's method: residual {residual.max():.1e} after {most} steps")
 
 
-def _largest(hessenberg: Array, rest: Array) -> tuple[Array, Array]:
+def _largest(hessenberg: Array, remainder: Array) -> tuple[Array, Array]:
     values: ComplexArray
     vectors: ComplexArray
     values, vectors = np.linalg.eig(hessenberg)
     best = np.abs(values).argmax(axis=1)
     row = np.arange(len(best))
-    return np.abs(values[row, best]), rest * np.abs(vectors[row, -1, best])
+    return np.abs(values[row, best]), remainder * np.abs(vectors[row, -1, best])
 
 
 def unit_radius(radius: Callable[[Array], Array], start: Array) -> Array:

@@ -71,14 +71,14 @@ def _toeplitz(powers: ComplexArray, values: ComplexArray, size: int) -> Array:
     real, imaginary = powers.real @ flat.real, powers.imag @ flat.imag
     lag = np.concatenate([(real + imaginary)[:0:-1], real - imaginary])  # -order … order
     at = np.arange(size)
-    found: Array = lag[at - at[:, None] + size - 1].reshape(size, size, *values.shape[1:])
-    return found
+    blocks: Array = lag[at - at[:, None] + size - 1].reshape(size, size, *values.shape[1:])
+    return blocks
 
 
 def poles(equations: NormalEquations, order: int) -> ComplexArray:
     """Stable poles (rad/s, positive imaginary part) of the model of ``order``, lowest coefficient identity.
 
-    That constraint leaves the poles of the noise unstable, so that they can be told apart.
+    That constraint leaves the poles of the noise unstable, so that they can be recognised.
     """
     i, p = equations.inputs, order + 1
     reduced = equations.reduced[order][: p * i, : p * i]
@@ -89,7 +89,7 @@ def poles(equations: NormalEquations, order: int) -> ComplexArray:
     companion[:-i, i:] = np.eye((order - 1) * i)
     for k in range(order):
         companion[-i:, k * i : (k + 1) * i] = -alpha[order - k].T
-    inverse = np.linalg.eigvals(companion)
+    inverse = np.linalg.eigvals(companion).astype(complex)  # real ones alone would have no logarithm
     inverse = inverse[np.abs(inverse) > 1e-12]
-    found: ComplexArray = -np.log(inverse) / equations.sampling_s
-    return found[(found.real < 0.0) & (found.imag > 0.0)]
+    all_poles: ComplexArray = -np.log(inverse) / equations.sampling_s
+    return all_poles[(all_poles.real < 0.0) & (all_poles.imag > 0.0)]

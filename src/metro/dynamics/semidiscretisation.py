@@ -54,8 +54,8 @@ def lowest_boundary(
     radius = [spectral_radius(structure, engagement, rpm, share * around, steps) for share in shares]
     first = (np.stack(radius) > 1.0).argmax(axis=0)
     start = around * np.sqrt(shares[first] * shares[np.maximum(first - 1, 0)])
-    found = boundary_near(structure, engagement, rpm, start, steps)
-    return np.where(first > 0, found, np.nan)
+    depth = boundary_near(structure, engagement, rpm, start, steps)
+    return np.where(first > 0, depth, np.nan)
 
 
 def period_map(

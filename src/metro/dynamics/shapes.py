@@ -25,8 +25,8 @@ def residues(omega: Array, frf: ComplexArray, weight: Array, poles: ComplexArray
     q, r = np.linalg.qr(np.concatenate([basis.real, basis.imag]) / scale)
     x = np.linalg.pinv(r) @ (q.T @ np.concatenate([target.real, target.imag])) / scale[:, None]
     m = len(poles)
-    found: ComplexArray = x[:m] + 1j * x[m : 2 * m]
-    return found
+    shapes: ComplexArray = x[:m] + 1j * x[m : 2 * m]
+    return shapes
 
 
 def mac(a: ComplexArray, b: ComplexArray) -> Array:
@@ -35,14 +35,14 @@ def mac(a: ComplexArray, b: ComplexArray) -> Array:
     Allemang (2003).
     """
     power = np.sum(np.abs(a) ** 2, axis=1)[:, None] * np.sum(np.abs(b) ** 2, axis=1)
-    found: Array = np.abs(a.conj() @ b.T) ** 2 / power
-    return found
+    criterion: Array = np.abs(a.conj() @ b.T) ** 2 / power
+    return criterion
 
 
 def mpc(shape: ComplexArray) -> float:
     """Modal phase collinearity of a shape (c,): 1 where all its components have one phase or its opposite.
 
-    Pappa, Elliott, Schenk (1993), with the shape as it is, not less its mean: a component stands for a motion
+    Pappa, Elliott, Schenk (1993), with the shape as it is, not less its mean: a component represents a motion
     against the ground.
     """
     xx, yy = float(shape.real @ shape.real), float(shape.imag @ shape.imag)

@@ -81,14 +81,14 @@ def _of_order(
     data: Data, equations: NormalEquations, weight: Array, order: int
 ) -> tuple[int, ComplexArray, ComplexArray]:
     """Order, its poles near the band, and their shapes (k, c)."""
-    found = poles(equations, order)
-    inside = (np.abs(found) > 0.7 * data.omega[0]) & (np.abs(found) < 1.3 * data.omega[-1])
-    found = found[inside & (-found.real < _LARGEST_DAMPING * np.abs(found))]
-    return order, found, residues(data.omega, data.frf, weight, found)
+    near_band = poles(equations, order)
+    inside = (np.abs(near_band) > 0.7 * data.omega[0]) & (np.abs(near_band) < 1.3 * data.omega[-1])
+    near_band = near_band[inside & (-near_band.real < _LARGEST_DAMPING * np.abs(near_band))]
+    return order, near_band, residues(data.omega, data.frf, weight, near_band)
 
 
 def clustered(
-    found: Iterable[tuple[int, ComplexArray, ComplexArray]],
+    poles_by_order: Iterable[tuple[int, ComplexArray, ComplexArray]],
 ) -> list[list[tuple[int, complex]]]:
     """Put poles in clusters, by rising order: (order, pole) of each member.
 
@@ -97,11 +97,11 @@ def clustered(
 
     Parameters
     ----------
-    found : order, its poles (k,), rad/s, and their shapes (k, c).
+    poles_by_order : order, its poles (k,), rad/s, and their shapes (k, c).
     """
     members: list[list[tuple[int, complex]]] = []
     last: list[ComplexArray] = []
-    for order, all_poles, shapes in found:
+    for order, all_poles, shapes in poles_by_order:
         for pole, shape in zip(all_poles.tolist(), shapes, strict=True):
             near = [
                 i

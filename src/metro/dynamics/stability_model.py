@@ -49,7 +49,7 @@ class StabilityModel:
         Raises
         ------
         ValueError
-            When nothing is left of the stiffness at one of the speeds.
+            When the stiffness vanishes at one of the speeds.
         """
         factor = self._factor(rpm)
         if self.yielding:
@@ -61,10 +61,10 @@ class StabilityModel:
 
     def _at(self, rpm: Array, factor: Array) -> tuple[Array, Array]:
         """Return the boundary (k,) at speeds (k,) with ``factor`` (k,) times the stiffness."""
-        found = [stability_boundary(self.structure, cut, rpm / np.sqrt(factor)) for cut in self.cuts]
-        depth = np.stack([one.depth for one in found])
+        boundaries = [stability_boundary(self.structure, cut, rpm / np.sqrt(factor)) for cut in self.cuts]
+        depth = np.stack([one.depth for one in boundaries])
         least = (depth.argmin(axis=0), np.arange(depth.shape[1]))
-        chatter = np.stack([one.chatter_hz for one in found])[least]
+        chatter = np.stack([one.chatter_hz for one in boundaries])[least]
         return factor * depth[least], np.sqrt(factor) * chatter
 
     def _factor(self, rpm: Array) -> Array:
@@ -85,21 +85,21 @@ def estimated(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Arra
     softer = (factor[:, None] / COMPLIANCES[:, None]).reshape(len(models), -1)
     depth, hz = _estimated(models, np.tile(rpm, len(COMPLIANCES)), softer)
     shape = (len(models), len(COMPLIANCES), len(rpm))
-    found = [
+    boundaries = [
         _agreed(d, c, model.yielding)
         for d, c, model in zip(depth.reshape(shape), hz.reshape(shape), models, strict=True)
     ]
-    return np.stack([d for d, _ in found]), np.stack([c for _, c in found])
+    return np.stack([d for d, _ in boundaries]), np.stack([c for _, c in boundaries])
 
 
 def _estimated(models: Sequence[StabilityModel], rpm: Array, factor: Array) -> tuple[Array, Array]:
     """Estimate the boundaries (t, k) at speeds (k,) with ``factor`` (t, k) times the stiffness."""
     structures = [model.structure for model in models]
     slowed = rpm / np.sqrt(factor)
-    found = [
+    boundaries = [
         zero_order_boundary(structures, cuts, slowed) for cuts in zip(*(m.cuts for m in models), strict=True)
     ]
-    depth, chatter = (np.stack(part) for part in zip(*found, strict=True))
+    depth, chatter = (np.stack(part) for part in zip(*boundaries, strict=True))
     least = depth.argmin(axis=0)[None]
     lowest, hz = (np.take_along_axis(part, least, axis=0)[0] for part in (depth, chatter))
     return factor * lowest, np.sqrt(factor) * hz
@@ -121,7 +121,9 @@ def _agreed(depth: Array, hz: Array, yielding: float) -> tuple[Array, Array]:
     first = np.maximum(1, np.argmax(beyond >= 0.0, axis=0))
     below, above = (np.take_along_axis(beyond, (first - back)[None], axis=0)[0] for back in (1, 0))
     share = np.clip(below / np.minimum(below - above, -1e-12), 0.0, 1.0)
-    found = tried[first - 1] * (tried[first] / tried[first - 1]) ** share
-    found = np.where((beyond >= 0.0).any(axis=0), found, np.inf)
-    soft = np.log1p(yielding * np.minimum(found, tried[-1]))
-    return found, np.array([np.interp(c, compliance, column) for c, column in zip(soft, hz.T, strict=True)])
+    depth_agreed = tried[first - 1] * (tried[first] / tried[first - 1]) ** share
+    depth_agreed = np.where((beyond >= 0.0).any(axis=0), depth_agreed, np.inf)
+    soft = np.log1p(yielding * np.minimum(depth_agreed, tried[-1]))
+    return depth_agreed, np.array(
+        [np.interp(c, compliance, column) for c, column in zip(soft, hz.T, strict=True)]
+    )

@@ -1,7 +1,7 @@
 """Which tooth cuts where, and what it meets there: pitch, helix and runout as windows of engagement.
 
-A window says: a tooth at this angle on the tool cuts while its immersion lies between two angles, and meets
-what was left there a certain turn of the tool before. Equal teeth have one window each, all one pitch
+In a window, a tooth at this angle on the tool cuts while its immersion lies between two angles, and meets
+the surface made there a certain turn of the tool before. Equal teeth have one window each, all one pitch
 back; unequal pitch makes the turns differ; with runout a tooth may clear what several earlier ones left.
 """
 

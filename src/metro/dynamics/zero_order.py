@@ -127,6 +127,6 @@ def _lowest(omega: Array, values: ComplexArray) -> tuple[Array, Array]:
     at = omega[:, :-1] + share * np.diff(omega, axis=1)
     inverse, at = (np.concatenate(list(part), axis=1) for part in (inverse, at))
     winner = (np.arange(len(omega)), inverse.argmax(axis=1))
-    greatest, found = inverse[winner], inverse[winner] > 0.0
-    depth = np.where(found, 1.0 / np.where(found, greatest, 1.0), np.inf)
-    return depth, np.where(found, at[winner] / (2.0 * np.pi), np.nan)
+    greatest, unstable = inverse[winner], inverse[winner] > 0.0
+    depth = np.where(unstable, 1.0 / np.where(unstable, greatest, 1.0), np.inf)
+    return depth, np.where(unstable, at[winner] / (2.0 * np.pi), np.nan)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.force.model import ForceModel
 
 CHANNELS = 3
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: ForceModel, values: Values) -> ForceModel:
     """Let the zero of each channel drift by ``slope_n_s``, counted from where it was read."""
-    return replace(model, sensor=replace(model.sensor, slope=tuple(values["slope_n_s"])))
+    slope = tuple(was + more for was, more in zip(model.sensor.slope, values["slope_n_s"], strict=True))
+    return replace(model, sensor=replace(model.sensor, slope=slope))
 
 
 EFFECT = Effect(
@@ -23,6 +24,8 @@ EFFECT = Effect(
         for number in range(CHANNELS)
     ),
     apply=apply,
+    belongs_to=("instrument",),
+    per="axis",
     signature=(
         "A mean that moves along every record by the same newtons per second, in the air as in the cut. "
         "Wear within a run looks alike but needs the cut."

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.force.model import ForceModel
 
 CHANNELS = 3
 NEVER = 1e4  # s
 
 
-def apply(model: Any, values: Values) -> Any:
-    """Discharge each channel with its ``time_constant_s``."""
-    discharge = tuple(1.0 / value for value in values["time_constant_s"])
+def apply(model: ForceModel, values: Values) -> ForceModel:
+    """Discharge each channel with its ``time_constant_s``; the rates of several leaks add up."""
+    leaks = zip(model.sensor.discharge, values["time_constant_s"], strict=True)
+    discharge = tuple(was + 1.0 / constant for was, constant in leaks)
     return replace(model, sensor=replace(model.sensor, discharge=discharge))
 
 
@@ -27,6 +28,8 @@ EFFECT = Effect(
         for number in range(CHANNELS)
     ),
     apply=apply,
+    belongs_to=("instrument",),
+    per="axis",
     signature="A mean that fades along every record in proportion to itself, and undershoots after the cut.",
     literature="Kistler, Piezoelectric Measurement: time constant of a charge amplifier",
     experiment="a cut of at least half the time constant, with air before and after it",

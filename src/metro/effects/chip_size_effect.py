@@ -9,19 +9,21 @@ from typing import Any
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem
 
 
-def apply(model: Any, values: Values) -> Any:
-    """Make K_c of a force law proportional to (h/h₀)^−``exponent``."""
-    return replace(model, law=replace(model.law, size_exponent=values["exponent"]))
+def apply(model: ForceModel, values: Values) -> ForceModel:
+    """Make K_c of a force law fall with (h/h₀)^−``exponent``; the exponents of several powers add up."""
+    exponent = model.law.size_exponent + values["exponent"]
+    return replace(model, law=replace(model.law, size_exponent=exponent))
 
 
 def adapt(effect: Effect, problem: Problem) -> Effect:
     """Count the thickness from the mean chip of the identification runs (contract: signs and zeros)."""
     reference = float(np.mean([mean_chip(block.setting.cut) for block in problem.role("identify")]))
 
-    def apply_here(model: Any, values: Values) -> Any:
+    def apply_here(model: ForceModel, values: Values) -> ForceModel:
         return apply(replace(model, law=replace(model.law, reference_thickness=reference)), values)
 
     return replace(effect, apply=apply_here)
@@ -38,6 +40,7 @@ EFFECT = Effect(
     observables=("force",),
     parameters=(EffectParameter("exponent", "1", -0.3, 0.9, 0.05, starts=(0.1, 0.3)),),
     apply=apply,
+    belongs_to=("tool", "work"),
     adapt=adapt,
     signature=(
         "Force that grows less than in proportion to the feed, and a rounder waveform where the chip is "

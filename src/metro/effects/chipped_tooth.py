@@ -9,14 +9,15 @@ import numpy as np
 
 from metro.cutting.chipped import Chipped
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem, Refusal
 from metro.units import MM, UM
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: ForceModel, values: Values) -> ForceModel:
     """Break ``length_um`` off the ``tooth`` (its number; the nearest whole one), up to ``height_mm``."""
     chip = Chipped(round(values["tooth"]), values["length_um"] * UM, values["height_mm"] * MM)
-    return replace(model, chipped=chip)
+    return replace(model, chipped=(*model.chipped, chip))
 
 
 def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
@@ -47,6 +48,8 @@ EFFECT = Effect(
         EffectParameter("height_mm", "mm", 0.05, 50.0, 0.5, starts=(0.5, 2.0)),
     ),
     apply=apply,
+    belongs_to=("tool",),
+    comparable=False,  # which tooth is the first differs from batch to batch
     adapt=adapt,
     resembled=True,
     signature=(

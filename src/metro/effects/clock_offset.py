@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter
+from metro.observables.joint_force.model import JointForceModel
 from metro.units import MS
 
 STARTS = (-300.0, -60.0, -10.0, 10.0, 60.0, 300.0)
 
 
-def apply(model: Any, values: Mapping[str, float]) -> Any:
+def apply(model: JointForceModel, values: Mapping[str, float]) -> JointForceModel:
     """Let the log of the cut stamp an event ``offset_ms`` later than the dynamometer does."""
     return replace(model, offset=model.offset + values["offset_ms"] * MS)
 
@@ -22,6 +22,7 @@ EFFECT = Effect(
     observables=("joint_force",),
     parameters=(EffectParameter("offset_ms", "ms", -2000.0, 2000.0, 5.0, starts=STARTS),),
     apply=apply,
+    belongs_to=("instrument",),
     part="offset",
     signature=(
         "Torques that follow the force by a constant time: seen where the tool enters and leaves the work, "

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
 from metro.effects.fixture_bow import adapt
+from metro.observables.flatness.model import FlatnessModel
 from metro.units import UM
 
 NAMES = ("uuu_um", "uuv_um", "uvv_um", "vvv_um")
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: FlatnessModel, values: Values) -> FlatnessModel:
     """Add uuu u³ + uuv u² v + uvv u v² + vvv v³ to the height, with u, v from −1 to 1 over the work."""
     cubic = tuple(was + values[name] * UM for was, name in zip(model.setup.cubic, NAMES, strict=True))
     return replace(model, setup=replace(model.setup, cubic=cubic))
@@ -23,6 +23,7 @@ EFFECT = Effect(
     observables=("flatness",),
     parameters=tuple(EffectParameter(name, "um", -1000.0, 1000.0, 1.0, starts=(0.0,)) for name in NAMES),
     apply=apply,
+    belongs_to=("cell", "instrument"),
     part="setup",
     adapt=adapt,
     prior=0.5,

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.force.dynamometer import Resonance
+from metro.observables.force.model import ForceModel
 
 CHANNELS = 3
 LOWEST, RIGID = 100.0, 20000.0  # Hz
 STARTS = tuple(round(250.0 * 1.09**i, 1) for i in range(31))
 
 
-def apply(model: Any, values: Values) -> Any:
-    """Put a resonance of one degree of freedom on each channel of the sensor."""
-    sensor = replace(model.sensor, frequency=tuple(values["frequency_hz"]), damping=tuple(values["damping"]))
-    return replace(model, sensor=sensor)
+def apply(model: ForceModel, values: Values) -> ForceModel:
+    """Put one more resonance of one degree of freedom on each channel of the sensor, in series."""
+    resonance = Resonance(tuple(values["frequency_hz"]), tuple(values["damping"]))
+    resonances = (*model.sensor.resonances, resonance)
+    return replace(model, sensor=replace(model.sensor, resonances=resonances))
 
 
 def _channel(number: int) -> tuple[EffectParameter, EffectParameter]:
@@ -32,6 +34,8 @@ EFFECT = Effect(
     observables=("force",),
     parameters=tuple(parameter for number in range(CHANNELS) for parameter in _channel(number)),
     apply=apply,
+    belongs_to=("instrument",),
+    per="axis",
     signature=(
         "High orders magnified around one frequency, whatever the order that falls there: it stays where it "
         "is when the spindle speed changes. Per channel of the sensor."

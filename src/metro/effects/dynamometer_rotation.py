@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.force.model import ForceModel
 from metro.units import DEG
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: ForceModel, values: Values) -> ForceModel:
     """Turn the sensor by ``angle_deg`` about +z, in addition to what is declared."""
     sensor = replace(model.sensor, rotation=model.sensor.rotation + values["angle_deg"] * DEG)
     return replace(model, sensor=sensor)
@@ -20,6 +20,7 @@ EFFECT = Effect(
     observables=("force",),
     parameters=(EffectParameter("angle_deg", "deg", -30.0, 30.0, 1.0, starts=(-3.0, 3.0), plausible=5.0),),
     apply=apply,
+    belongs_to=("instrument",),
     signature=(
         "Forces in the plane turned by the same angle in every run. K_t and K_r, where they are to be found "
         "from the same forces, take the turn for a change of theirs whatever is cut."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from metro.observables.problem import Refusal
 from metro.units import Array
 
 Values = Mapping[str, Any]
+Owner = Literal["cell", "tool", "work", "instrument"]
+Per = Literal["", "axis", "joint", "tooth"]
 JOINTS = 6  # of an arm
 
 
@@ -61,7 +63,10 @@ class Effect:
     observables : names of the observables whose models have the part that it changes.
     parameters : its parameters, in the units of the contract.
     apply : ``apply(model, values) -> model``; ``values`` maps names to numbers in their own units, or to
-        lists.
+        lists. It composes: the model that it returns has the effect by ``values`` on top of what the model
+        had of it already. So what the loop finds is always what is missing beside that which the manifest
+        declares, and never the total. Where ``values`` say that there is nothing, the model predicts as
+        before; where the model had nothing of it, it has exactly ``values``.
     signature : one sentence: where it is seen, and what resembles it.
     literature : where the model of the effect comes from.
     experiment : the measurement that would show it best, for "measure this next".
@@ -80,6 +85,11 @@ class Effect:
         shared by its forms.
     own : number of unknowns that it gives every run for itself (a phase): each is fitted to the run, and
         gains by chance.
+    belongs_to : what its parameters are a property of. A campaign follows them over the batches of one cell
+        and, where they are of the tool or the work, of one tool and one material.
+    comparable : whether its parameters mean the same in every batch, so that a campaign may follow them.
+    per : what its values are given for one by one: a list has an entry for each ``axis`` x, y and z of an
+        instrument or for each ``tooth``; of an effect of a ``joint`` there is a form for each.
     sought : number of independent places (lines of a spectrum) among which ``adapt`` looked for it. The best
         of many is good by chance: the evidence is discounted by so many tries.
     """
@@ -100,6 +110,9 @@ class Effect:
     prior: float = 1.0
     own: int = 0
     sought: float = 1.0
+    belongs_to: tuple[Owner, ...] = ("cell",)
+    comparable: bool = True
+    per: Per = ""
 
     @property
     def odds(self) -> float:
@@ -127,11 +140,20 @@ class Effect:
         return tuple(dict.fromkeys(parameter.name for parameter in self.reported))
 
     def spread(self, values: Values) -> Values:
-        """Return values with every list as long as it must be: one number stands for all its entries."""
+        """Return values as ``apply`` takes them, of those that a person declares.
+
+        Every list is as long as it must be: one number stands for all its entries. A word is its place among
+        the choices.
+        """
         lengths = {name: sum(p.name == name for p in self.reported) for name in self.names}
+        choices = {parameter.name: parameter.choices for parameter in self.parameters}
+        numbers = {
+            name: choices[name].index(value) if value in choices[name] else value
+            for name, value in values.items()
+        }
         return {
             name: [value] * lengths[name] if lengths[name] > 1 and not isinstance(value, list) else value
-            for name, value in values.items()
+            for name, value in numbers.items()
         }
 
     def values(self, theta: Array) -> dict[str, Any]:
@@ -142,7 +164,13 @@ class Effect:
 def per_joint(of_joint: Callable[[int], Effect]) -> tuple[Effect, ...]:
     """Return the forms of an effect of one joint, for each joint (0 … 5) of an arm: ``of_joint(joint)``."""
     return tuple(
-        replace(of_joint(joint), form=f"joint {joint + 1}", where={"joint": joint + 1}, prior=1.0 / JOINTS)
+        replace(
+            of_joint(joint),
+            form=f"joint {joint + 1}",
+            where={"joint": joint + 1},
+            prior=1.0 / JOINTS,
+            per="joint",
+        )
         for joint in range(JOINTS)
     )
 
@@ -153,7 +181,7 @@ def by_name(parameters: tuple[EffectParameter, ...], entries: list[Any]) -> dict
     taken: dict[str, list[Any]] = {}
     for name, entry in zip(names, entries, strict=True):
         taken.setdefault(name, []).append(entry)
-    return {name: found if names.count(name) > 1 else found[0] for name, found in taken.items()}
+    return {name: values if names.count(name) > 1 else values[0] for name, values in taken.items()}
 
 
 def fitted_to(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from metro.effects.effect import Effect
-from metro.observables.problem import Refusal
+from metro.effects.parts import WithTorsion
+from metro.observables.problem import Problem, Refusal
 
 
-def with_joints(effect: Effect, problem: Any) -> Effect | Refusal:
+def with_joints(effect: Effect, problem: Problem) -> Effect | Refusal:
     """Return the effect as it is, where the model is one of elastic joints."""
-    if not hasattr(problem.base, "torsion"):
+    if not isinstance(problem.base, WithTorsion):
         return Refusal("this prediction is not one of elastic joints")
     return effect

@@ -8,18 +8,17 @@ from typing import Any
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.flatness.model import FlatnessModel
 from metro.observables.problem import Problem, Refusal
 from metro.units import MM, UM
 
 LONGEST = 0.5  # of the shortest pass: what fades more slowly is a tilt
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: FlatnessModel, values: Values) -> FlatnessModel:
     """Lift the tip by ``amplitude_um`` as the axis comes to the block's edge; fades over ``length_mm``."""
-    return replace(
-        model,
-        setup=replace(model.setup, entry=(values["amplitude_um"] * UM, values["length_mm"] * MM)),
-    )
+    transient = (values["amplitude_um"] * UM, values["length_mm"] * MM)
+    return replace(model, setup=replace(model.setup, entry=(*model.setup.entry, transient)))
 
 
 def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:

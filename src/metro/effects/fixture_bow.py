@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.flatness.model import FlatnessModel
 from metro.observables.problem import Problem, Refusal
 from metro.units import UM
 
 NAMES = ("xx_um", "xy_um", "yy_um")
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: FlatnessModel, values: Values) -> FlatnessModel:
     """Add xx u² + xy u v + yy v² to the height, with u, v from −1 to 1 over the work."""
     bow = tuple(was + values[name] * UM for was, name in zip(model.setup.bow, NAMES, strict=True))
     return replace(model, setup=replace(model.setup, bow=bow))

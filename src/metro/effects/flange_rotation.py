@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter
-from metro.observables.problem import Refusal
+from metro.observables.deformation.model import DeformationModel
+from metro.observables.problem import Problem, Refusal
 
 
-def apply(model: Any, values: Mapping[str, float]) -> Any:
-    """Let a ``share`` of what the flange turns move the tip; the whole of it is one."""
-    return replace(model, flange_rotation=values["share"])
+def apply(model: DeformationModel, values: Mapping[str, float]) -> DeformationModel:
+    """Let a ``share`` more of what the flange turns move the tip; the whole of it is one."""
+    return replace(model, flange_rotation=model.flange_rotation + values["share"])
 
 
-def _adapted(effect: Effect, problem: Any) -> Effect | Refusal:
-    counted = getattr(problem.base, "flange_rotation", None)
-    if counted is None:
+def _adapted(effect: Effect, problem: Problem) -> Effect | Refusal:
+    if not isinstance(problem.base, DeformationModel):
         return Refusal("this prediction is not one of elastic joints")
-    if counted == 1.0:
+    if problem.base.flange_rotation == 1.0:
         return Refusal("")  # the base model has it already
     return effect
 

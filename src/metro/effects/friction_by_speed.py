@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, per_joint
+from metro.effects.parts import WithDrives
 
 
 def _of(joint: int) -> Effect:
-    def apply(model: Any, values: Mapping[str, float]) -> Any:
+    def apply(model: WithDrives, values: Mapping[str, float]) -> WithDrives:
         return replace(model, drives=model.drives.with_friction(joint, viscous=values["torque_nm_s"]))
 
     return Effect(

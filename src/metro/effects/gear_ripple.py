@@ -31,17 +31,17 @@ def _of(joint: int) -> Effect:
         return added(model, values["order"], torque * math.cos(phase), torque * math.sin(phase))
 
     def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
-        """Start from the strongest lines, along the joint's angle, of what the base model leaves."""
+        """Start from the strongest lines, along the joint's angle, of the base model's residual."""
         angles = [block.setting.q[:, joint] for block in problem.role("identify")]
         orders = _resolved(angles)
         if not len(orders):
             return Refusal("no joint turns enough in these cuts to show a ripple of its gear")
-        found, size = peaks(
+        lines, size = peaks(
             problem, lambda m, order, quarter: added(m, order, 1 - quarter, quarter), orders, MOST
         )
         torque, order, phase = effect.parameters
         step = float(orders[1] - orders[0]) if len(orders) > 1 else order.scale
-        order = replace(order, upper=2.0 * HIGHEST, scale=step, starts=tuple(found.tolist()))
+        order = replace(order, upper=2.0 * HIGHEST, scale=step, starts=tuple(lines.tolist()))
         torque = replace(torque, starts=_apart(np.clip(size, torque.scale, torque.upper)))
         return replace(effect, parameters=(torque, order, phase), sought=max(1.0, len(orders) / STEPS))
 

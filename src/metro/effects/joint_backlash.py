@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, per_joint
 from metro.effects.elastic_joints import with_joints
+from metro.effects.parts import WithTorsion
 from metro.units import DEG
 
 MDEG = 1e-3 * DEG
 
 
 def _of(joint: int) -> Effect:
-    def apply(model: Any, values: Mapping[str, float]) -> Any:
+    def apply(model: WithTorsion, values: Mapping[str, float]) -> WithTorsion:
         return replace(model, torsion=model.torsion.with_joint(joint, gap=values["angle_mdeg"] * MDEG))
 
     return Effect(

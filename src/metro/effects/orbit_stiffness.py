@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.effects.phasor import phasor_sum
+from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem, Refusal
 from metro.units import DEG
 
 
-def apply(model: Any, values: Values) -> Any:
-    """Let the axial force of helical runs vary with the direction of feed."""
-    structure = replace(
-        model.structure, orbit_amplitude=values["amplitude"], orbit_phase=values["phase_deg"] * DEG
+def apply(model: ForceModel, values: Values) -> ForceModel:
+    """Let the axial force of helical runs vary with the direction of feed: waves over one orbit add up."""
+    structure = model.structure
+    amplitude, phase = phasor_sum(
+        structure.orbit_amplitude, structure.orbit_phase, values["amplitude"], values["phase_deg"] * DEG
     )
-    return replace(model, structure=structure)
+    return replace(model, structure=replace(structure, orbit_amplitude=amplitude, orbit_phase=phase))
 
 
 def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.flatness.model import FlatnessModel
 from metro.units import UM
 
 DEGREES = 5
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: FlatnessModel, values: Values) -> FlatnessModel:
     """Set each pass of a face higher by a polynomial over the order of the passes, the same in all faces."""
     was = model.setup.levels or (0.0,) * DEGREES
     levels = tuple(one + values[f"degree_{i}_um"] * UM for i, one in enumerate(was, start=1))

@@ -10,8 +10,9 @@ import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, Values
 from metro.effects.periodogram import TimeShares, middle_start, own_peaks, peaks
+from metro.observables.flatness.model import FlatnessModel
 from metro.observables.problem import Block, Problem, Refusal
-from metro.observables.waviness_model import Vibration
+from metro.observables.waviness.model import Vibration, WavinessModel
 from metro.units import DEG, MM, UM, Array
 
 LEAST_CYCLES, LEAST_POINTS = (
@@ -25,21 +26,21 @@ STEPS = 3.0  # per width of a line: the longest run's reciprocal
 MOST = 4  # lines that are followed
 
 
-def apply(model: Any, values: Values) -> Any:
-    """Let the tip swing along the wall's normal; time starts with the log of each cut."""
+def apply(model: WavinessModel, values: Values) -> WavinessModel:
+    """Let the tip swing along the wall's normal, too; time starts with the log of each cut."""
     swing = Vibration(values["frequency_hz"], values["amplitude_um"] * UM, values["phase_deg"] * DEG)
-    return replace(model, vibration=swing)
+    return replace(model, vibration=(*model.vibration, swing))
 
 
 def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
-    """Start from the strongest lines in time of what the base model leaves."""
+    """Start from the strongest lines in time of the base model's residual."""
     times = [block.setting.t for block in problem.role("identify")]
     if not times:
         return Refusal("no run is there to find its frequency in")
     frequencies = _resolved(times)
     if not len(frequencies):
         return Refusal("the cuts are too short to hold two cycles of anything")
-    found, size = peaks(problem, _unit, frequencies, MOST)
+    lines, size = peaks(problem, _unit, frequencies, MOST)
     frequency, amplitude, phase = effect.parameters
     step = float(frequencies[1] - frequencies[0]) if len(frequencies) > 1 else frequency.scale
     start = max(float(np.median(size)) / UM, amplitude.scale)
@@ -51,7 +52,7 @@ def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
                 lower=float(frequencies[0]) / 2,
                 upper=2 * float(frequencies[-1]),
                 scale=step,
-                starts=tuple(found.tolist()),
+                starts=tuple(lines.tolist()),
             ),
             replace(amplitude, starts=(start,)),
             phase,
@@ -69,22 +70,23 @@ def _resolved(times: list[Array]) -> Array:
 
 
 def _unit(model: Any, frequency: float, quarter: float) -> Any:
-    return replace(model, vibration=Vibration(frequency, 1.0, quarter * math.pi / 2))
+    return replace(model, vibration=(*model.vibration, Vibration(frequency, 1.0, quarter * math.pi / 2)))
 
 
-def on_faces(model: Any, values: Values) -> Any:
-    """Let the tip swing along z; time starts with the first pass, the phase is each face's own."""
-    return replace(model, vibration=Vibration(values["frequency_hz"], values["amplitude_um"] * UM))
+def on_faces(model: FlatnessModel, values: Values) -> FlatnessModel:
+    """Let the tip swing along z, too; time starts with the first pass, the phase is each face's own."""
+    swing = Vibration(values["frequency_hz"], values["amplitude_um"] * UM)
+    return replace(model, vibration=(*model.vibration, swing))
 
 
 def adapt_to_faces(effect: Effect, problem: Problem) -> Effect | Refusal:
-    """Start from the strongest lines in time of what the base model leaves, each face with its own phase."""
+    """Start from the strongest lines in time of the base model's residual, each face with its own phase."""
     blocks = problem.role("identify")
     frequencies = _seen_on_faces([block.setting for block in blocks])
     if len(frequencies) < 2:
         return Refusal("its passes are too short, or its points too far apart, to show a wave")
     ways = [_time_shares(problem.base, block) for block in blocks]
-    found, size = own_peaks(problem, ways, frequencies, MOST, least=OF_THE_STRONGEST)
+    lines, size = own_peaks(problem, ways, frequencies, MOST, least=OF_THE_STRONGEST)
     frequency, amplitude = effect.parameters
     step = float(frequencies[1] - frequencies[0])
     return replace(
@@ -95,7 +97,7 @@ def adapt_to_faces(effect: Effect, problem: Problem) -> Effect | Refusal:
                 lower=float(frequencies[0]),
                 upper=float(frequencies[-1]),
                 scale=step,
-                starts=tuple(found.tolist()),
+                starts=tuple(lines.tolist()),
             ),
             replace(amplitude, starts=(max(float(np.median(size)) / UM, amplitude.scale),)),
         ),
@@ -107,8 +109,9 @@ def adapt_to_faces(effect: Effect, problem: Problem) -> Effect | Refusal:
 def _seen_on_faces(settings: list[Any]) -> Array:
     """Frequencies, Hz, whose waves along a pass are no longer than it, and longer than a disc and a bin.
 
-    From pass to pass a wave is seen once per period, so that its frequency is told modulo the rate of the
-    passes; which of these it is, the waves along the passes tell, and faces with passes of another length.
+    From pass to pass a wave is seen once per period, so that its frequency is known modulo the rate of the
+    passes. The waves along the passes identify which of these it is, and so do faces whose passes have
+    another length.
     """
     low, high, spans = [], [], []
     for setting in settings:
@@ -124,8 +127,8 @@ def _seen_on_faces(settings: list[Any]) -> Array:
 def _time_shares(base: Any, block: Block) -> TimeShares:
     """When the rim may have finished the points of a face, and how these make its elements.
 
-    A vibration decides which of the passages that are nearly the lowest by the base model is: what is left is
-    lower than their mean, and goes up and down with it. They share each point evenly.
+    A vibration decides which passage is the lowest, of those that are nearly so by the base model. The
+    surface is lower than their mean, and goes up and down with it. They share each point evenly.
     """
     setting = block.setting
     height = base.heights(setting, middle_start(base, block))

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.joint_force.model import JointForceModel
 from metro.robot.payload import Payload
 from metro.units import MM
 
 
-def apply(model: Any, values: Values) -> Any:
-    """Hang a mass at a place in the flange frame."""
+def apply(model: JointForceModel, values: Values) -> JointForceModel:
+    """Hang one more mass at a place in the flange frame."""
     x, y, z = (coordinate * MM for coordinate in values["com_mm"])
-    return replace(model, payload=Payload(values["mass_kg"], (x, y, z)))
+    return replace(model, payload=(*model.payload, Payload(values["mass_kg"], (x, y, z))))
 
 
 EFFECT = Effect(

@@ -1,4 +1,4 @@
-"""Where the rest of a base model has a line: starts for effects that are waves of unknown phase."""
+"""Where the residual of a base model has a line: starts for effects that are waves of unknown phase."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from metro.units import Array
 def peaks(
     problem: Problem, wave: Callable[[Model, float, float], Model], frequencies: Array, most: int
 ) -> tuple[Array, Array]:
-    """Return the frequencies of the strongest waves in what the base model leaves, and their amplitudes.
+    """Return the frequencies of the strongest waves in the base model's residual, and their amplitudes.
 
     Least squares of a sine and a cosine that all runs of the identification share, frequency after frequency
     (a periodogram for uneven and filtered data: Lomb, Scargle), each element by its own error.
@@ -32,18 +32,18 @@ def peaks(
         Frequencies and amplitudes (k,), the strongest first, k at most ``most``.
     """
     blocks = problem.role("identify")
-    rests, known = _rests(problem.base, blocks)
+    residuals, known = _residuals(problem.base, blocks)
     power, amplitude = np.empty(len(frequencies)), np.empty(len(frequencies))
     for i, frequency in enumerate(frequencies):
         models = [wave(problem.base, float(frequency), quarter) for quarter in (0.0, 1.0)]
         normal, right = np.zeros((2, 2)), np.zeros(2)
-        for block, rest, offset in zip(blocks, rests, known, strict=True):
+        for block, residual, offset in zip(blocks, residuals, known, strict=True):
             columns = np.stack([_offset(model, block) - offset for model in models], axis=1)
             columns /= block.error[:, None]
             normal += columns.T @ columns
-            right += columns.T @ rest
-        found = np.linalg.lstsq(normal, right, rcond=1e-9)[0]
-        power[i], amplitude[i] = found @ right, np.linalg.norm(found)
+            right += columns.T @ residual
+        coefficients = np.linalg.lstsq(normal, right, rcond=1e-9)[0]
+        power[i], amplitude[i] = coefficients @ right, np.linalg.norm(coefficients)
     return _strongest(frequencies, power, amplitude, most)
 
 
@@ -74,19 +74,19 @@ def own_peaks(
     """
     blocks = problem.role("identify")
     power, square = np.zeros(len(frequencies)), np.zeros(len(frequencies))
-    for block, left, way in zip(blocks, _rests(problem.base, blocks)[0], ways, strict=True):
+    for block, left, way in zip(blocks, _residuals(problem.base, blocks)[0], ways, strict=True):
         zeros = np.linalg.qr(block.zeros / block.sigma[:, None])[0]
-        rest = left - zeros @ (zeros.T @ left)
+        residual = left - zeros @ (zeros.T @ left)
         wave = way.share * np.exp(2j * np.pi * frequencies[0] * way.time)
         on = np.exp(2j * np.pi * (frequencies[1] - frequencies[0]) * way.time)
         for i in range(len(frequencies)):
             seen = way.mean(wave.sum(axis=1)) / block.sigma
             waves = np.stack([seen.imag, seen.real], axis=1)
             waves -= zeros @ (zeros.T @ waves)
-            right = waves.T @ rest
-            found = np.linalg.lstsq(waves.T @ waves, right, rcond=1e-9)[0]
-            power[i] += found @ right
-            square[i] += found @ found
+            right = waves.T @ residual
+            coefficients = np.linalg.lstsq(waves.T @ waves, right, rcond=1e-9)[0]
+            power[i] += coefficients @ right
+            square[i] += coefficients @ coefficients
             wave *= on
     return _strongest(frequencies, power, np.sqrt(square / len(blocks)), most, least)
 
@@ -107,8 +107,8 @@ def middle_start(base: Model, block: Block) -> Array:
     return np.asarray(starts[len(starts) // 2], dtype=float)
 
 
-def _rests(base: Model, blocks: tuple[Block, ...]) -> tuple[list[Array], list[Array]]:
-    """Return what the base model leaves of each block, in units of its error, and its offset there."""
+def _residuals(base: Model, blocks: tuple[Block, ...]) -> tuple[list[Array], list[Array]]:
+    """Return the base model's residual of each block, in units of its error, and its offset there."""
     designs = [base.design(block, middle_start(base, block), None) for block in blocks]
     sigma = [block.error for block in blocks]
     scaled = np.vstack([matrix / s[:, None] for (matrix, _), s in zip(designs, sigma, strict=True)])

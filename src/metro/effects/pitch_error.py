@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem, Refusal
 from metro.units import DEG
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: ForceModel, values: Values) -> ForceModel:
     """Turn each tooth by its ``pitch_deg``, clockwise."""
     turned = np.array(model.cutter.tooth_angles) + np.array(values["pitch_deg"]) * DEG
     return replace(model, cutter=replace(model.cutter, tooth_angles=tuple(float(a) for a in turned)))
@@ -44,6 +45,9 @@ EFFECT = Effect(
     observables=("force",),
     parameters=(EffectParameter("pitch_deg", "deg", -15.0, 15.0, 0.5, starts=(-0.7, 0.7), plausible=2.0),),
     apply=apply,
+    belongs_to=("tool",),
+    comparable=False,  # which tooth is the first differs from batch to batch
+    per="tooth",
     adapt=adapt,
     signature=(
         "Force at spindle orders that are no multiple of the number of teeth, in proportion to the feed. "

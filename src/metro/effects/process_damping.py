@@ -24,6 +24,7 @@ EFFECT = Effect(
     observables=("lobes",),
     parameters=(EffectParameter("coefficient_n_mm", "N/mm", 5.0, 5000.0, 50.0, starts=(50.0, 500.0)),),
     apply=apply,
+    belongs_to=("tool", "work"),
     signature=(
         "Cuts stay stable above the predicted boundary, the more the slower the spindle; nothing changes at "
         "high speed. Modes that stiffen with speed the other way round look alike."

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.flatness.model import FlatnessModel
 from metro.units import MRAD
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: FlatnessModel, values: Values) -> FlatnessModel:
     """Turn the spindle about work x and y through the tool's tip, right-handed."""
     about_x, about_y = model.setup.tilt
     tilt = (about_x + values["about_x_mrad"] * MRAD, about_y + values["about_y_mrad"] * MRAD)

@@ -8,6 +8,7 @@ from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, per_joint
 from metro.effects.elastic_joints import with_joints
+from metro.effects.parts import WithTorsion
 from metro.observables.problem import Refusal
 
 # Share of the spring's torque that the cubic part has at the largest torsion of the batch.
@@ -16,7 +17,7 @@ NOTHING = 1e-6  # of the largest torsion: rounding
 
 
 def _of(joint: int) -> Effect:
-    def apply(model: Any, values: Mapping[str, float]) -> Any:
+    def apply(model: WithTorsion, values: Mapping[str, float]) -> WithTorsion:
         return replace(model, torsion=model.torsion.with_joint(joint, cubic=values["cubic"]))
 
     def adapt(effect: Effect, problem: Any) -> Effect | Refusal:

@@ -8,10 +8,11 @@ from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, per_joint
 from metro.effects.elastic_joints import with_joints
+from metro.effects.parts import WithStructure, WithTorsion
 from metro.observables.problem import Refusal
 
 
-def apply(model: Any, values: Mapping[str, float]) -> Any:
+def apply(model: WithStructure, values: Mapping[str, float]) -> WithStructure:
     """Multiply the stiffness that a model has in the cut by ``factor``; load tests are left as they are."""
     scaled = replace(model.structure, stiffness_factor=model.structure.stiffness_factor * values["factor"])
     return replace(model, structure=scaled)
@@ -53,7 +54,7 @@ OF_ARM = replace(OF_MACHINE, observables=("deformation",), form="all joints", wh
 
 
 def _of(joint: int) -> Effect:
-    def of_joint(model: Any, values: Mapping[str, float]) -> Any:
+    def of_joint(model: WithTorsion, values: Mapping[str, float]) -> WithTorsion:
         return replace(model, torsion=model.torsion.with_joint(joint, factor=values["factor"]))
 
     return replace(

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.flatness.model import FlatnessModel
 from metro.units import UM
 
 MINUTE = 60.0  # s
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: FlatnessModel, values: Values) -> FlatnessModel:
     """Let tool and spindle grow by ``um_per_min`` from the start of each face."""
     growth = model.setup.growth + values["um_per_min"] * UM / MINUTE
     return replace(model, setup=replace(model.setup, growth=growth))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.deformation.model import DeformationModel
 from metro.units import UM
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: DeformationModel, values: Values) -> DeformationModel:
     """Let the tip move by ``x_um_per_run`` and ``y_um_per_run`` (work frame) from each run to the next."""
     x, y = model.drift
     return replace(model, drift=(x + values["x_um_per_run"] * UM, y + values["y_um_per_run"] * UM))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.deformation.model import DeformationModel
 from metro.units import UM
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: DeformationModel, values: Values) -> DeformationModel:
     """Let the tip give way along the wall's normal by ``um_per_kn`` of the force that way."""
     return replace(model, give=model.give + values["um_per_kn"] * UM / 1e3)
 
@@ -19,6 +19,7 @@ EFFECT = Effect(
     observables=("deformation",),
     parameters=(EffectParameter("um_per_kn", "um", 0.0, 2000.0, 5.0, starts=(20.0,)),),
     apply=apply,
+    belongs_to=("cell", "tool"),
     part="give",
     resembled=True,  # of what is soft between flange and edge, the walls say nothing
     signature=(

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.force.model import ForceModel
 from metro.units import N_UM
 
 
-def apply(model: Any, values: Values) -> Any:
-    """Give a force model's tool the stiffness ``kx_n_um``, ``ky_n_um`` along work x and y."""
-    compliance = (1.0 / (values["kx_n_um"] * N_UM), 1.0 / (values["ky_n_um"] * N_UM))
+def apply(model: ForceModel, values: Values) -> ForceModel:
+    """Put a spring of ``kx_n_um``, ``ky_n_um`` along work x and y in series with what yields already."""
+    x, y = model.structure.compliance
+    compliance = (x + 1.0 / (values["kx_n_um"] * N_UM), y + 1.0 / (values["ky_n_um"] * N_UM))
     return replace(model, structure=replace(model.structure, compliance=compliance))
 
 
@@ -24,6 +25,7 @@ EFFECT = Effect(
     observables=("force",),
     parameters=(_stiffness("kx_n_um"), _stiffness("ky_n_um")),
     apply=apply,
+    belongs_to=("tool",),
     signature=(
         "What runout and pitch errors make of the force is smaller than their chips would make it, at every "
         "feed; side cuts change as the tool is pushed away from the free edge or pulled over it. A slot with "

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter
+from metro.effects.parts import WithArm
 from metro.units import MM
 
 AXES = ("dx_mm", "dy_mm", "dz_mm")
 
 
-def apply(model: Any, values: Mapping[str, float]) -> Any:
+def apply(model: WithArm, values: Mapping[str, float]) -> WithArm:
     """Put the tip of the tool elsewhere in the flange frame."""
     moved = model.arm.tool + np.array([values[name] for name in AXES]) * MM
     return replace(model, arm=replace(model.arm, tool=moved))

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter
+from metro.effects.phasor import phasor_sum
+from metro.observables.force.model import ForceModel
 from metro.units import DEG, UM
 
 
-def apply(model: Any, values: Mapping[str, float]) -> Any:
-    """Put the cutter of a force model off its axis: ``radius_um``, ``angle_deg`` clockwise from tooth 0."""
-    radius, angle = values["radius_um"] * UM, values["angle_deg"] * DEG
+def apply(model: ForceModel, values: Mapping[str, float]) -> ForceModel:
+    """Move the cutter of a force model by ``radius_um`` towards ``angle_deg``, clockwise from tooth 0."""
+    radius, angle = phasor_sum(
+        model.cutter.runout_radius,
+        model.cutter.runout_angle,
+        values["radius_um"] * UM,
+        values["angle_deg"] * DEG,
+    )
     return replace(model, cutter=replace(model.cutter, runout_radius=radius, runout_angle=angle))
 
 
@@ -32,6 +38,7 @@ EFFECT = Effect(
         ),
     ),
     apply=apply,
+    belongs_to=("tool",),
     signature=(
         "Force at spindle orders that are no multiple of the number of teeth; the first order does not "
         "depend on the feed, and the mean stays while every tooth cuts. A chipped tooth or unequal pitch "

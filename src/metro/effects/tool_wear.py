@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, Values
+from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem, Refusal
 
 
-def apply(model: Any, values: Values) -> Any:
+def apply(model: ForceModel, values: Values) -> ForceModel:
     """Let the edge terms of a force law grow by ``edge_growth_per_m`` with every metre cut."""
-    return replace(model, law=replace(model.law, edge_growth=values["edge_growth_per_m"]))
+    growth = model.law.edge_growth + values["edge_growth_per_m"]
+    return replace(model, law=replace(model.law, edge_growth=growth))
 
 
 def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
@@ -27,6 +28,7 @@ EFFECT = Effect(
     observables=("force",),
     parameters=(EffectParameter("edge_growth_per_m", "1/m", -0.3, 20.0, 0.02, starts=(0.05, 0.5, 3.0)),),
     apply=apply,
+    belongs_to=("tool", "work"),
     adapt=adapt,
     signature=(
         "Force that grows along the session at every feed by the same amount, most in the radial and axial "

@@ -62,8 +62,8 @@ def _unpacked(compression: str, data: bytes, size: int) -> bytes:
 
     packages: Any = storage_mcap  # it imports both, from where this version of Python has them
     made = import_module("lz4.frame").LZ4FrameDecompressor if compression == "lz4" else None
-    found: bytes = (made or packages.zstd.ZstdDecompressor)().decompress(data, max_length=size + 1)
-    return found
+    unpacked: bytes = (made or packages.zstd.ZstdDecompressor)().decompress(data, max_length=size + 1)
+    return unpacked
 
 
 def check_tables(path: Path) -> None:
@@ -97,6 +97,8 @@ def plain_types(path: Path, types: dict[str, Any]) -> dict[str, Any]:
     for kind, (_, fields) in types.items():
         names = [name for name, _ in fields if not _FIELD.fullmatch(name)]
         if names or not _TYPE.fullmatch(kind):
-            found = (names or [kind])[0]
-            raise FormatError(path, f"found the name {found[:40]!r} in a message definition of {kind[:40]}")
+            name_refused = (names or [kind])[0]
+            raise FormatError(
+                path, f"found the name {name_refused[:40]!r} in a message definition of {kind[:40]}"
+            )
     return {kind: ([], fields) for kind, (_, fields) in types.items()}

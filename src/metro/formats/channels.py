@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,22 +13,35 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from metro.formats import measures
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw, columns_to_read
 from metro.formats.limits import check_unpacked
+from metro.formats.measures import OF_COLUMN
 
-# Unit in a column's name → what a file may give instead, with the factor to it. Capitals matter: Nm is no nm.
+# Unit in a column's name → what a file may give instead, with the factor to it.
 UNITS: dict[str, dict[str, float]] = {
-    "s": {"s": 1.0, "ms": 1e-3},
-    "n": {"N": 1.0, "kN": 1e3},
-    "deg": {"deg": 1.0, "°": 1.0, "rad": math.degrees(1.0)},
-    "nm": {"Nm": 1.0, "N m": 1.0, "N*m": 1.0, "N·m": 1.0, "kNm": 1e3},
-    "mm": {"mm": 1.0, "m": 1e3, "um": 1e-3, "µm": 1e-3, "μm": 1e-3},
-    "hz": {"Hz": 1.0, "kHz": 1e3},
+    suffix: measures.UNITS[quantity] for suffix, quantity in OF_COLUMN.items()
 }
 # What a response may be in, as impacts.csv has it; its column names no unit.
 RESPONSES = {"m/s2": "m/s2", "m/s^2": "m/s2", "m/s²": "m/s2", "m/s": "m/s", "m": "m", "g": "g"}
 _ALIASES = {"time": "t", "freq": "frequency", "freq_hz": "frequency_hz"}
+_ALIASES |= {f"force_{axis}": f"f{axis}" for axis in "xyz"}
+_NAME_AND_UNIT = re.compile(r"(.*?)\s*[\[(](.*)[\])]")
+
+
+def parted(label: str) -> tuple[str, str]:
+    """Part a column's name from the unit that follows it: ``Fx [kN]``, ``force_x_kN``; "" if none does.
+
+    Behind an underline nm is the contract's newton metre as well as a nanometre: it is left in the name.
+    """
+    match = _NAME_AND_UNIT.fullmatch(label.strip())
+    if match and match[1]:
+        return match[1], match[2]
+    name, _, unit = label.strip().rpartition("_")
+    if name and unit != "nm" and any(unit in spellings for spellings in measures.UNITS.values()):
+        return name, unit
+    return label.strip(), ""
 
 
 class Clock(NamedTuple):
@@ -45,11 +59,12 @@ class Channel:
     Attributes
     ----------
     label : what messages call it.
-    name, unit : as the file has them; the unit is "" where the file says none.
+    name, unit : as the file has them; the unit is "" where the file names none.
     shape : of its values; a vector may have further dimensions of 1.
     numeric : whether its values are real numbers.
-    load : gives some of its values, an array of as many.
-    clock : what the file says of the times of its values, where there may be no channel of time.
+    load : gives some of its values, an array of as many; those of a matrix column by column.
+    pairs : whether its values are complex numbers.
+    clock : the times of its values as the file describes them, where there may be no channel of time.
     """
 
     label: str
@@ -59,6 +74,7 @@ class Channel:
     numeric: bool
     load: Callable[[slice], np.ndarray]
     clock: Clock | None = None
+    pairs: bool = False
 
 
 def channel_pieces(path: Path, kind: Kind, channels: Sequence[Channel], rows: int | None) -> Iterator[Raw]:
@@ -76,13 +92,13 @@ def channel_pieces(path: Path, kind: Kind, channels: Sequence[Channel], rows: in
         Naming the channel: a column missing or found twice, a unit missing, unknown or at odds with the name,
         values that are no vector of numbers, or not as many as in the first column.
     """
-    found = [(column_of(kind, each.name), each) for each in channels]
-    columns = [column for column, _ in found]
+    named = [(column_of(kind, each.name), each) for each in channels]
+    columns = [column for column, _ in named]
     if "t_s" in kind.required and "t_s" not in columns:
-        timed = [each for column, each in found if column in kind.required]
-        found += [("t_s", each) for each in _time(path, timed)]
-    use = columns_to_read(path, kind, [column for column, _ in found])
-    wanted = {column: next(each for name, each in found if name == column) for column in use}
+        timed = [each for column, each in named if column in kind.required]
+        named += [("t_s", each) for each in _time(path, timed)]
+    use = columns_to_read(path, kind, [column for column, _ in named])
+    wanted = {column: next(each for name, each in named if name == column) for column in use}
     factors = {
         column: factor(path, column, each.label, each.name, each.unit) for column, each in wanted.items()
     }
@@ -106,17 +122,70 @@ def _sample(start: int, row: int) -> str:
 
 
 def column_of(kind: Kind, name: str) -> str:
-    """Give the column that a channel's name stands for; the name in lower case where it is none."""
+    """Give the column that a channel's name denotes; the name in lower case where it is none."""
     key = name.strip().lower().replace(" ", "_")
     key = _ALIASES.get(key, key)
     columns = (*kind.required, *kind.optional)
-    bare = {column.rpartition("_")[0]: column for column in columns if _unit_of(column)}
+    bare = {column.rpartition("_")[0]: column for column in columns if unit_of(column)}
     return key if key in columns else bare.get(key, key)
 
 
-def _unit_of(column: str) -> str:
+def unit_of(column: str) -> str:
+    """Return the unit in a column's name; "" where it has none."""
     unit = column.rpartition("_")[2]
     return unit if "_" in column and unit in UNITS else ""
+
+
+def automatic(
+    path: Path, kind: Kind, own: Iterable[tuple[str, str, str]], wanted: Collection[str]
+) -> Iterator[tuple[int, str, float]]:
+    """Yield those ``wanted`` columns of a kind that a file has by name: position, column, factor to its unit.
+
+    Parameters
+    ----------
+    own : label, name and unit ("" where none is stated) of each column of the file.
+
+    A name is the contract's own (``fx_n``), which goes before others, or states its unit (``Fx [kN]``,
+    ``force_x_kN``).
+
+    Raises
+    ------
+    FormatError
+        Where a column that is required has a unit that is missing, unknown or not one of its quantity.
+    """
+    columns = list(own)
+    exact = {name.strip().lower() for _, name, _ in columns}
+    for at, (label, name, unit) in enumerate(columns):
+        plain = name.strip().lower()
+        if plain in wanted:
+            yield at, plain, factor(path, plain, label, name, unit) if unit else 1.0
+            continue
+        bare, stated = parted(name)
+        column = column_of(kind, bare)
+        if column not in wanted or column in exact:
+            continue
+        if unit or stated or (column in kind.required and unit_of(column)):
+            yield at, column, factor(path, column, label, bare, unit or stated)
+
+
+def translated(
+    path: Path, kind: Kind, labels: Sequence[str], names: Sequence[str]
+) -> tuple[list[str], pd.Series]:
+    """Give the columns of a table the contract's names, where they are those of a kind; others in lower case.
+
+    Returns
+    -------
+    The names, and the factor to the unit of each column of the kind.
+    """
+    own = [(label, name, "") for label, name in zip(labels, names, strict=True)]
+    found = {at: (column, size) for at, column, size in automatic(path, kind, own, kind.columns)}
+    new = [found[at][0] if at in found else name.strip().lower() for at, name in enumerate(names)]
+    return new, pd.Series(dict(found.values()), dtype=float)
+
+
+def unit_in_name(name: str, unit: str) -> bool:
+    """Return whether a name ends with a unit as the contract's names do: ``fx_n``."""
+    return name.strip().lower().endswith(f"_{unit}")
 
 
 def factor(path: Path, column: str, label: str, name: str, unit: str) -> float:
@@ -125,12 +194,12 @@ def factor(path: Path, column: str, label: str, name: str, unit: str) -> float:
     Raises
     ------
     FormatError
-        Where the unit is missing, unknown, or another than the channel's name says.
+        Where the unit is missing, unknown, or contradicts the channel's name.
     """
-    asked = _unit_of(column)
+    asked = unit_of(column)
     if not asked:
         return 1.0
-    named = name.strip().lower().endswith(f"_{asked}")
+    named = unit_in_name(name, asked)
     known, unit = UNITS[asked], unit.strip(" []()")
     spelt = {size: each for each, size in reversed(known.items())}  # the first spelling of each
     expected = f"expected {' or '.join(reversed(spelt.values()))}"

@@ -83,17 +83,17 @@ def record_pieces(
 
 
 def counted(path: Path, what: str, pieces: Iterable[Raw], rows: int | None, count: int) -> Iterator[Raw]:
-    """Pass the pieces of a file on that says how many points it has; one that ends early is an error.
+    """Pass on the pieces of a file that states how many points it has; one that ends early is an error.
 
     Raises
     ------
     FormatError
         With the piece that is shorter than asked for, not after it, so that a first look finds it, too.
     """
-    found = 0
+    points = 0
     for each in pieces:
-        due = count - found if rows is None else min(rows, count - found)
-        found += len(each.frame)
+        due = count - points if rows is None else min(rows, count - points)
+        points += len(each.frame)
         if len(each.frame) < due:
-            raise FormatError(path, f"ends early: found {found} {what}, expected {count}")
+            raise FormatError(path, f"ends early: found {points} {what}, expected {count}")
         yield each

@@ -1,7 +1,7 @@
 """Text exports of Kistler DynoWare: a preamble, a line of channel names, a line of units, and the samples.
 
 The preamble may have any number of lines up to 200; columns are parted by tabs, semicolons or commas; between
-tabs and semicolons numbers may have decimal commas; units stand in a line of their own or behind the names.
+tabs and semicolons numbers may have decimal commas; units are in a line of their own or behind the names.
 Times count from the trigger: those before it are negative.
 """
 
@@ -67,13 +67,13 @@ def _separator(text: str) -> str:
 
 
 def _decimal(path: Path, number: int, parted_by: str) -> str:
-    """Tell the decimal sign by the first samples: a comma, if it parts no columns and there is no point."""
+    """Return the decimal sign of the first samples: a comma, if it parts no columns and there is no point."""
     samples = "".join(text for _, text in islice(lines(path, number), _SAMPLES))
     return "," if parted_by != "," and "," in samples and "." not in samples else "."
 
 
-def _named(found: list[str]) -> tuple[list[str], list[str]]:
-    """Part names from units that stand behind them."""
-    parts = [_NAME_AND_UNIT.fullmatch(each) for each in found]
-    names = [part[1] if part else each for part, each in zip(parts, found, strict=True)]
+def _named(labels: list[str]) -> tuple[list[str], list[str]]:
+    """Part names from units that follow them."""
+    parts = [_NAME_AND_UNIT.fullmatch(each) for each in labels]
+    names = [part[1] if part else each for part, each in zip(parts, labels, strict=True)]
     return names, [part[2] if part else "" for part in parts]

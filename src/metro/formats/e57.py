@@ -34,7 +34,7 @@ _OWN = {"x_mm": "x", "y_mm": "y", "z_mm": "z"}
 def e57_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     """Read the points of all scans, moved by their poses into the frame of the file, in millimetres.
 
-    Points that a scan marks as invalid have no coordinates. A note of the first piece says what was joined.
+    Points that a scan marks as invalid have no coordinates. A note of the first piece lists what was joined.
 
     Raises
     ------
@@ -140,8 +140,8 @@ def _points(path: Path, file: Any, header: Any, rows: int | None) -> Iterator[Ar
     fields = set(header.point_fields)
     names = next((group for group in _STATE if fields.issuperset(group)), None)
     if names is None:
-        found = ", ".join(header.point_fields)
-        raise FormatError(path, f"found a scan with {found}, expected {', '.join(_CARTESIAN)}")
+        listed = ", ".join(header.point_fields)
+        raise FormatError(path, f"found a scan with {listed}, expected {', '.join(_CARTESIAN)}")
     state = _STATE[names]
     turn, shift = _pose(header)
     wanted = [*names, *([state] if state in fields else [])]

@@ -1,4 +1,4 @@
-"""What a reader says about a file it cannot read."""
+"""The error of a reader about a file that it cannot read."""
 
 from __future__ import annotations
 

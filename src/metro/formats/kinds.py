@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.formats.errors import FormatError
+from metro.spelling import resembling
 
 JOINTS = range(1, 7)
 
@@ -33,6 +34,11 @@ class Kind:
     rising: str = ""
     whole: tuple[str, ...] = ()
     least: int = 8
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All columns that it may have."""
+        return (*self.required, *self.optional)
 
 
 KINDS: dict[str, Kind] = {
@@ -68,17 +74,21 @@ class Raw:
 
 
 def columns_to_read(path: Path, kind: Kind, names: Sequence[str]) -> list[str]:
-    """Pick the kind's columns out of those a file has (lower case, stripped); the rest is ignored.
+    """Pick the kind's columns out of those a file has (lower case, stripped); the others are ignored.
 
     Raises
     ------
     FormatError
-        Where a required column is missing or a wanted one stands there twice.
+        Where a required column is missing or a wanted one appears twice.
     """
     missing = [name for name in kind.required if name not in names]
     if missing:
-        found = ", ".join(name for name in names if name) or "none"
-        message = f"lacks the column {', '.join(missing)} of {kind.title}: found the columns {found}"
+        present = ", ".join(name for name in names if name) or "none"
+        spare = [name for name in names if name not in kind.columns]
+        near = {name: resembling(name, spare) for name in missing}
+        meant = ", ".join(f'"{other}" for {name}' for name, other in near.items() if other)
+        hint = f" (did you mean {meant}? Name it so, or map it under files in batch.yaml)" if meant else ""
+        message = f"lacks the column {', '.join(missing)} of {kind.title}{hint}: found the columns {present}"
         raise FormatError(path, f"{message}, expected {', '.join(kind.required)}")
     wanted = [name for name in (*kind.required, *kind.optional) if name in names]
     for name in wanted:
@@ -98,7 +108,7 @@ def checked(path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf
     Raises
     ------
     FormatError
-        With the place of the first offending row, or where fewer than ``least`` rows are left.
+        With the place of the first offending row, or where fewer than ``least`` rows remain.
     """
     frame = raw.frame
     blank = [name for name in kind.optional if name in frame and frame[name].isna().all()]
@@ -118,10 +128,10 @@ def checked(path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf
     return frame.astype(dict.fromkeys(kind.whole, np.int64)) if kind.whole else frame
 
 
-def at_least(path: Path, kind: Kind, found: int, least: int) -> None:
+def at_least(path: Path, kind: Kind, rows: int, least: int) -> None:
     """Raise a FormatError where a table has fewer than ``least`` rows."""
-    if found < least:
-        raise FormatError(path, f"found {found} rows, expected at least {least} in {kind.title}")
+    if rows < least:
+        raise FormatError(path, f"found {rows} rows, expected at least {least} in {kind.title}")
 
 
 def _without_missing(frame: pd.DataFrame) -> pd.DataFrame:
@@ -142,8 +152,8 @@ def _check_finite(path: Path, frame: pd.DataFrame, place: Callable[[int], str]) 
         if wrong.any():
             row = int(np.argmax(wrong))
             value = frame[name].iloc[row]
-            found = "nothing or NaN" if np.isnan(value) else f"{value}"
-            raise FormatError(path, f"{place(row)}, column {name}: found {found}, expected a finite number")
+            text = "nothing or NaN" if np.isnan(value) else f"{value}"
+            raise FormatError(path, f"{place(row)}, column {name}: found {text}, expected a finite number")
 
 
 def _check_rising(
@@ -153,8 +163,8 @@ def _check_rising(
     falls = np.diff(values) <= 0.0
     if falls.any():
         row = int(np.argmax(falls))
-        found = f"found {values[row + 1]:.9g} after {values[row]:.9g}"
-        raise FormatError(path, f"{place(row)}, column {name}: {found}, expected a larger value in every row")
+        fault = f"found {values[row + 1]:.9g} after {values[row]:.9g}"
+        raise FormatError(path, f"{place(row)}, column {name}: {fault}, expected a larger value in every row")
 
 
 def _check_range(

@@ -1,4 +1,4 @@
-"""What a file may unpack to: a few kilobytes of an archive can stand for more than any memory."""
+"""What a file may unpack to: a few kilobytes of an archive can unpack to more than any memory."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LARGEST_XML = 1 << 26  # bytes of an XML part: a tree of it takes ten times as m
 
 
 def check_unpacked(path: Path, size: int, title: str, most: int = LARGEST) -> None:
-    """Raise a FormatError where a file unpacks to more than so many bytes, by what it says of itself."""
+    """Raise a FormatError where a file unpacks to more than so many bytes, by the sizes that it states."""
     if size > most:
         raise FormatError(path, f"unpacks to {size} bytes, expected at most {most} in {title}")
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from metro.formats import matlab_file, matlab_hdf5
 from metro.formats.channels import Channel, channel_pieces
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
-from metro.formats.matlab_file import Variable
+from metro.formats.matlab_file import COMPLEX, Variable
 
 STARTS = (matlab_file.START, *matlab_hdf5.STARTS)
 
@@ -17,7 +18,7 @@ STARTS = (matlab_file.START, *matlab_hdf5.STARTS)
 def mat_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     """Read the vectors that are columns of a kind in pieces; other variables are ignored.
 
-    Units that names do not tell stand in a structure ``units``, a text per channel: ``units.Fx = 'kN'``.
+    Units that names do not contain are in a structure ``units``, a text per channel: ``units.Fx = 'kN'``.
 
     Raises
     ------
@@ -25,20 +26,29 @@ def mat_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
         As :func:`metro.formats.channels.channel_pieces`, and where the file is damaged, cut off or unpacks to
         more than a recording can be, or points to other files.
     """
+    with mat_channels(path, kind.title) as channels:
+        yield from channel_pieces(path, kind, channels, rows)
+
+
+@contextmanager
+def mat_channels(path: Path, title: str) -> Iterator[list[Channel]]:
+    """Open a file and give all its variables that are no texts and no structures.
+
+    Raises
+    ------
+    FormatError
+        As :func:`mat_pieces`.
+    """
     with path.open("rb") as stream:
         head = stream.read(len(matlab_file.START))
     if head == matlab_file.START:
-        yield from _read(path, kind, list(matlab_file.variables_of(path, kind.title)), rows)
-    else:
-        yield from _read_hdf5(path, kind, rows)
-
-
-def _read_hdf5(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
+        yield _channels(list(matlab_file.variables_of(path, title)))
+        return
     import h5py
 
     try:
         with h5py.File(path, "r", locking=False) as file:
-            yield from _read(path, kind, list(matlab_hdf5.variables_of_hdf5(path, file)), rows)
+            yield _channels(list(matlab_hdf5.variables_of_hdf5(path, file)))
     except FormatError:
         raise
     except Exception as error:  # of a damaged file, HDF5 raises whatever the damage makes it stumble over
@@ -46,7 +56,7 @@ def _read_hdf5(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
         raise FormatError(path, message) from error
 
 
-def _read(path: Path, kind: Kind, variables: Sequence[Variable], rows: int | None) -> Iterator[Raw]:
+def _channels(variables: Sequence[Variable]) -> list[Channel]:
     units = {
         one.name.lower(): one.text
         for each, _ in _walk(variables)
@@ -54,16 +64,15 @@ def _read(path: Path, kind: Kind, variables: Sequence[Variable], rows: int | Non
         for one in each.fields
         if one.text is not None
     }
-    channels = [
+    return [
         _channel(each, prefix, units.get(each.name.lower(), ""))
         for each, prefix in _walk(variables)
         if not each.fields and each.text is None
     ]
-    return channel_pieces(path, kind, channels, rows)
 
 
 def _walk(variables: Sequence[Variable]) -> Iterator[tuple[Variable, str]]:
-    """Yield variables and the fields of structures among them, with what stands before their name."""
+    """Yield variables and the fields of structures among them, with the prefix of their name."""
     for each in variables:
         yield each, ""
         if each.name.lower() != "units":
@@ -73,4 +82,4 @@ def _walk(variables: Sequence[Variable]) -> Iterator[tuple[Variable, str]]:
 def _channel(one: Variable, prefix: str, unit: str) -> Channel:
     numeric = one.kind == "numbers"
     label = f"variable {prefix}{one.name}" + ("" if numeric else f" ({one.kind})")
-    return Channel(label, one.name, unit, one.shape, numeric, one.load)
+    return Channel(label, one.name, unit, one.shape, numeric, one.load, pairs=one.kind == COMPLEX)

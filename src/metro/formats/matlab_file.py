@@ -28,6 +28,9 @@ _CLASSES = {1: "cell array", 3: "object", 5: "sparse matrix", 16: "function", 17
 _DEEPEST = 4  # structures in structures
 
 
+COMPLEX = "complex numbers"  # kind of a variable
+
+
 @dataclass(frozen=True)
 class Variable:
     """A variable or a field of a structure.
@@ -66,8 +69,8 @@ class _Elements:
         self.path, self.data, (self.at, self.end), self.order = path, data, span, order
 
     def damaged(self, what: str) -> FormatError:
-        found = f"is damaged or ends early: {what} at byte {self.at} of {len(self.data)}"
-        return FormatError(self.path, f"{found}, expected whole variables; save it again with '-v7'")
+        fault = f"is damaged or ends early: {what} at byte {self.at} of {len(self.data)}"
+        return FormatError(self.path, f"{fault}, expected whole variables; save it again with '-v7'")
 
     def next(self) -> _Element:
         """Pass over the next element; it lies within the end."""
@@ -147,7 +150,7 @@ def _variable(elements: _Elements, name: str | None, depth: int) -> Variable:
     if len(flags) != 2:
         raise elements.damaged("found no array flags")
     kind, word = int(flags[0]) & 0xFF, int(flags[0])
-    if kind in (16, 17):  # these are laid out otherwise, and nobody but MATLAB can make anything of them
+    if kind in (16, 17):  # these are laid out otherwise, and only MATLAB can read them
         return Variable(name or elements.text(), kind=_CLASSES[kind])
     shape = tuple(int(size) for size in elements.numbers())
     own = elements.text()
@@ -158,17 +161,20 @@ def _variable(elements: _Elements, name: str | None, depth: int) -> Variable:
         return Variable(name, shape, "structure", fields=tuple(_fields(elements, depth)))
     if kind == _TEXT:
         return Variable(name, shape, "text", text=elements.text() if math.prod(shape) else "")
-    if kind in _NUMBERS and not word & _COMPLEX:
-        return _numbers(elements, name, shape)
-    other = "complex numbers" if kind in _NUMBERS else _CLASSES.get(kind, "array of structures")
-    return Variable(name, shape, other)
+    if kind in _NUMBERS:
+        real = _numbers(elements, name, shape)
+        if not word & _COMPLEX:
+            return Variable(name, shape, load=lambda some: real[some])
+        imaginary = _numbers(elements, name, shape)
+        return Variable(name, shape, COMPLEX, lambda some: real[some] + 1j * imaginary[some])
+    return Variable(name, shape, _CLASSES.get(kind, "array of structures"))
 
 
-def _numbers(elements: _Elements, name: str, shape: tuple[int, ...]) -> Variable:
+def _numbers(elements: _Elements, name: str, shape: tuple[int, ...]) -> np.ndarray:
     values = elements.numbers()
     if len(values) != math.prod(shape):
         raise elements.damaged(f"variable {name}: found {len(values)} numbers, expected {math.prod(shape)},")
-    return Variable(name, shape, load=lambda some: values[some])
+    return values
 
 
 def _fields(elements: _Elements, depth: int) -> Iterator[Variable]:

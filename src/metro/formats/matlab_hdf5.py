@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from metro.formats.errors import FormatError
-from metro.formats.matlab_file import Variable
+from metro.formats.matlab_file import COMPLEX, Variable
 
 if TYPE_CHECKING:
     import h5py
@@ -69,9 +69,14 @@ def _of_data(path: Path, name: str, item: h5py.Dataset, stated: str) -> Variable
     if stated == "char" and item.dtype.kind == "u" and math.prod(shape) <= _LONGEST:
         return Variable(name, shape, "text", text="".join(map(chr, np.ravel(item[()]).tolist())))
     if item.dtype.kind in "iuf" and stated != "char":
-        return Variable(name, shape, load=lambda some: _values(item, some))
-    pairs = item.dtype.names == ("real", "imag")
-    return Variable(name, shape, "complex numbers" if pairs else stated or "no numbers")
+        return Variable(name, shape[::-1], load=lambda some: _values(item, some))
+    if item.dtype.names == ("real", "imag"):
+        return Variable(name, shape[::-1], COMPLEX, lambda some: _complex(_values(item, some)))
+    return Variable(name, shape, stated or "no numbers")
+
+
+def _complex(pairs: np.ndarray) -> np.ndarray:
+    return np.asarray(pairs["real"] + 1j * pairs["imag"])
 
 
 def _values(item: Any, some: slice) -> np.ndarray:

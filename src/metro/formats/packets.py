@@ -16,7 +16,7 @@ LATEST_S = 1.0  # a network delivers within this; stamps that fall by more are t
 
 
 class Note(NamedTuple):
-    """What a reader has to say of a file that it could read, in the words of the quality table.
+    """What a reader notes about a file that it could read, in the words of the quality table.
 
     A table's notes are in its ``attrs["notes"]``.
     """
@@ -58,17 +58,17 @@ def in_order(
     lateness = (newest - ticks) * tick_s
     if lateness.max(initial=0.0) > LATEST_S:
         row = int(np.argmax(lateness > LATEST_S))
-        found = f"found {what} {ticks[row]} after {newest[row]}"
+        fault = f"found {what} {ticks[row]} after {newest[row]}"
         split = (
             f"expected it to rise, or to be late by {LATEST_S:g} s at most: split a recording of two starts"
         )
-        raise FormatError(path, f"{place(row)}: {found}, {split}")
+        raise FormatError(path, f"{place(row)}: {fault}, {split}")
     order = np.argsort(ticks, kind="stable")
     repeated = np.diff(ticks[order], prepend=ticks[order][:1] - 1) == 0
     for again in np.flatnonzero(repeated):
         if not np.array_equal(values[order[again]], values[order[again - 1]], equal_nan=True):
-            found = f"found {what} {ticks[order[again]]} a second time with other values"
-            raise FormatError(path, f"{place(int(order[again]))}: {found}, expected one packet per stamp")
+            fault = f"found {what} {ticks[order[again]]} a second time with other values"
+            raise FormatError(path, f"{place(int(order[again]))}: {fault}, expected one packet per stamp")
     twice = int(np.count_nonzero(repeated))
     delay = lateness[order][~repeated]
     late = int(np.count_nonzero(delay))

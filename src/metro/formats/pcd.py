@@ -49,8 +49,8 @@ def pcd_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
         raise FormatError(path, f"COUNT of {wide[0]}: found {header.record[wide[0]].shape[0]}, expected 1")
     if header.encoding == "ascii":
         layout = Layout(header.columns, SPACES, header.lines)
-        found = number_pieces(path, layout, list(own.values()), rows, header.points)
-        pieces: Iterator[Raw] = (piece(own, raw.frame, raw.place) for raw in found)
+        raw_pieces = number_pieces(path, layout, list(own.values()), rows, header.points)
+        pieces: Iterator[Raw] = (piece(own, raw.frame, raw.place) for raw in raw_pieces)
     elif header.encoding == "binary":
         pieces = record_pieces(path, own, header.record, rows, offset=header.size, count=header.points)
     else:
@@ -107,8 +107,8 @@ def _check_compressed(path: Path, header: Header) -> None:
     expected = header.points * header.record.itemsize
     there = path.stat().st_size - header.size - sizes.nbytes
     if len(sizes) < 2 or sizes[0] > there or sizes[1] != expected or expected > MOST_UNPACKED * there:
-        found = " and ".join(map(str, sizes)) or "none"
-        message = f"ends early or is damaged: found the sizes {found} of the points packed and unpacked"
+        present = " and ".join(map(str, sizes)) or "none"
+        message = f"ends early or is damaged: found the sizes {present} of the points packed and unpacked"
         raise FormatError(
             path, f"{message}, expected {header.points} points in {there} bytes, {expected} unpacked"
         )
@@ -119,8 +119,8 @@ def _decompressed(path: Path, own: Mapping[str, str], rows: int | None) -> Itera
     import open3d
 
     if strange := set(own.values()) - set("xyz"):
-        found = ", ".join(sorted(strange))
-        raise FormatError(path, f"DATA binary_compressed: found the columns {found}, expected x, y and z")
+        unknown = ", ".join(sorted(strange))
+        raise FormatError(path, f"DATA binary_compressed: found the columns {unknown}, expected x, y and z")
     coordinates = np.asarray(open3d.io.read_point_cloud(path, format="pcd").points)
     for part in slices(len(coordinates), rows):
         columns = {name: coordinates[part, "xyz".index(name)] for name in own.values()}

@@ -47,8 +47,8 @@ def ply_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     own = own_names(path, kind, names)
     if header.encoding == "ascii":
         layout = Layout(tuple(names), SPACES, header.lines)
-        found = number_pieces(path, layout, list(own.values()), rows, header.vertices)
-        pieces: Iterator[Raw] = (piece(own, raw.frame, raw.place) for raw in found)
+        raw_pieces = number_pieces(path, layout, list(own.values()), rows, header.vertices)
+        pieces: Iterator[Raw] = (piece(own, raw.frame, raw.place) for raw in raw_pieces)
     else:
         order = _BYTE_ORDERS[header.encoding]
         record = np.dtype([(name, order + code) for name, code in header.properties])
@@ -67,22 +67,22 @@ def read_header(path: Path) -> Header:
                     encoding = name
                 case ["element", name, count] if _is_count(count):
                     elements.append((name, point_count(count)))
-                case ["property", *rest] if len(elements) == 1:
-                    properties.append(_property(path, number, rest))
+                case ["property", *described] if len(elements) == 1:
+                    properties.append(_property(path, number, described))
                 case ["end_header"]:
                     break
                 case ["ply"] | ["comment", *_] | ["obj_info", *_] | ["property", *_]:
                     pass
                 case _:
-                    found = " ".join(words)[:60]
-                    raise FormatError(path, f"line {number}: found {found!r} in the header of a PLY file")
+                    text = " ".join(words)[:60]
+                    raise FormatError(path, f"line {number}: found {text!r} in the header of a PLY file")
         size = stream.tell()
     if encoding != "ascii" and encoding not in _BYTE_ORDERS:
         expected = ", ".join(("ascii", *_BYTE_ORDERS))
         raise FormatError(path, f"found the PLY format {encoding!r}, expected {expected} 1.0")
     if not elements or elements[0][0] != "vertex":
-        found = elements[0][0] if elements else "none"
-        raise FormatError(path, f"first element: found {found}, expected vertex before any other")
+        text = elements[0][0] if elements else "none"
+        raise FormatError(path, f"first element: found {text}, expected vertex before any other")
     names = [name for name, _ in properties]
     if not names or len(set(names)) < len(names):
         raise FormatError(path, f"found the vertex properties {names}, expected each once")
@@ -100,7 +100,7 @@ def _property(path: Path, number: int, words: list[str]) -> tuple[str, str]:
     match words:
         case [code, name] if code in _TYPES:
             return name, _TYPES[code]
-    found = " ".join(words)
+    text = " ".join(words)
     raise FormatError(
-        path, f"line {number}: found the vertex property {found!r}, expected a number type and a name"
+        path, f"line {number}: found the vertex property {text!r}, expected a number type and a name"
     )

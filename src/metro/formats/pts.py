@@ -28,13 +28,13 @@ def pts_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     """
     own = own_names(path, kind, COLUMNS)
     due = 0
-    for found in number_pieces(path, Layout(COLUMNS, SPACES, 0), list(own.values()), rows):
-        values = found.frame.to_numpy()
-        is_point, due = _points(path, values, due, found.place)
+    for raw in number_pieces(path, Layout(COLUMNS, SPACES, 0), list(own.values()), rows):
+        values = raw.frame.to_numpy()
+        is_point, due = _points(path, values, due, raw.place)
         if due and (rows is None or len(values) < rows):
             break
         kept = np.flatnonzero(is_point)
-        yield piece(own, found.frame[is_point], partial(_place, found.place, kept))
+        yield piece(own, raw.frame[is_point], partial(_place, raw.place, kept))
     if due:
         raise FormatError(path, f"ends early: its last block lacks {due} of its points")
 
@@ -44,7 +44,7 @@ def _place(place: Callable[[int], str], kept: np.ndarray, row: int) -> str:
 
 
 def _points(path: Path, values: Array, due: int, place: Callable[[int], str]) -> tuple[np.ndarray, int]:
-    """Tell points from count lines: a mask (n,) of the lines ``values`` (n, 3), and how many points are due.
+    """Separate points from count lines: a mask (n,) of the lines ``values`` (n, 3), and how many are due.
 
     ``due`` points of a block that began earlier come first.
     """
@@ -67,7 +67,9 @@ def _points(path: Path, values: Array, due: int, place: Callable[[int], str]) ->
 
 def _count(path: Path, line: Array, place: Callable[[], str]) -> int:
     if np.isnan(line[0]) or not np.isnan(line[1]) or line[0] < 0 or line[0] % 1:
-        found = " ".join(f"{value:g}" for value in line if not np.isnan(value)) or "no number"
+        numbers = " ".join(f"{value:g}" for value in line if not np.isnan(value)) or "no number"
         hint = "a list of points without their number is an .xyz file"
-        raise FormatError(path, f"{place()}: found {found}, expected the number of points of a block; {hint}")
+        raise FormatError(
+            path, f"{place()}: found {numbers}, expected the number of points of a block; {hint}"
+        )
     return int(line[0])

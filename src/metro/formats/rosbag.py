@@ -1,6 +1,6 @@
 """Robot logs in ROS 2 bags (a file .mcap or .db3): JointState for what was measured, and the set-points.
 
-Angles are in rad and efforts in N m, as the messages' definitions say; times are those of the headers.
+Angles are in rad and efforts in N m, by the messages' definitions; times are those of the headers.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ _CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 _SET = re.compile(r"set|command|cmd|reference|desired|target", re.IGNORECASE)
 _NS = 1e-9
 _IDL_RULE = "=" * 80 + "\nIDL: "
-_GAP = 1.5  # set-points further apart than so many of their steps do not say what was commanded between
+_GAP = 1.5  # between set-points further apart than so many of their steps the command is not known
 
 
 class _Series(NamedTuple):
-    """Messages of one topic, in order: stamps (n,) ns, values (n, k), and where each stands."""
+    """Messages of one topic, in order: stamps (n,) ns, values (n, k), and where each is in the file."""
 
     ns: npt.NDArray[np.int64]
     values: Array
@@ -49,7 +49,7 @@ def read_rosbag(path: Path, kind: Kind, rows: int | None) -> Raw:
     """Read measured angles and torques of a JointState topic, and set angles at the same times.
 
     Set-points come from a topic of JointTrajectoryControllerState (``reference``, before Humble ``desired``),
-    or else of JointState by a name that says set, command, reference, desired or target. They are
+    or else of JointState by a name that contains set, command, reference, desired or target. They are
     interpolated linearly to the times of the measured states; states without set-points around them are left
     out.
 
@@ -89,8 +89,8 @@ def _store(path: Path, connections: Sequence[Connection]) -> Typestore:
             types = get_types_from_msg(text, each.msgtype)
         else:
             parts = [part.partition("\n")[2] for part in text.split(_IDL_RULE)[1:]] or [text]
-            types = {name: found for part in parts for name, found in get_types_from_idl(part).items()}
-        new = {name: found for name, found in types.items() if name not in store.fielddefs}
+            types = {name: fields for part in parts for name, fields in get_types_from_idl(part).items()}
+        new = {name: fields for name, fields in types.items() if name not in store.fielddefs}
         store.register(plain_types(path, new))
     return store
 
@@ -143,13 +143,13 @@ def _series(
             try:
                 values.append(values_of(message, joints))
             except IndexError:
-                found = "found positions or efforts that are empty, expected one per joint (rad, N m)"
-                raise FormatError(path, f"message {len(stamps)} of {topic}: {found}") from None
+                fault = "found positions or efforts that are empty, expected one per joint (rad, N m)"
+                raise FormatError(path, f"message {len(stamps)} of {topic}: {fault}") from None
         if len(stamps) == rows:
             break
     if not stamps:
-        found = f"found the joints {', '.join(seen)}" if seen else "found no message"
-        raise FormatError(path, f"{topic}: {found}, expected six joints whose names end in 1 … 6")
+        fault = f"found the joints {', '.join(seen)}" if seen else "found no message"
+        raise FormatError(path, f"{topic}: {fault}, expected six joints whose names end in 1 … 6")
 
     def place(row: int) -> str:
         return f"message {row + 1} of {topic}"
@@ -200,7 +200,7 @@ def _joined(measured: _Series, commanded: _Series, kind: Kind, *, whole: bool) -
 
 
 def _covered(ns: npt.NDArray[np.int64], known: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Tell which times lie on a set-point, or between two that follow each other at their usual step."""
+    """Return which times lie on a set-point, or between two that follow each other at their usual step."""
     after = np.searchsorted(known, ns)
     exact = known[np.minimum(after, len(known) - 1)] == ns
     if len(known) == 1:

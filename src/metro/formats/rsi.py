@@ -2,7 +2,7 @@
 
 Each interpolation cycle sends one telegram, stamped IPOC in ms: AIPos and ASPos hold the actual and the
 commanded axis angles in degrees; GearTorque (or Torque) the joint torques in N m; MACur the motor currents.
-What stands between telegrams (a logger's time stamps, the ``<Sen …>`` answers) is passed over.
+Text between telegrams (a logger's time stamps, the ``<Sen …>`` answers) is passed over.
 """
 
 from __future__ import annotations
@@ -63,21 +63,21 @@ class _Recording:
         try:
             return float(text)
         except ValueError:
-            found = f"column {column}: found {text!r}, expected a number"
-            raise FormatError(self.path, f"{self.place(index)}, {found}") from None
+            fault = f"column {column}: found {text!r}, expected a number"
+            raise FormatError(self.path, f"{self.place(index)}, {fault}") from None
 
     def cycle(self, index: int) -> int:
         text = (self.telegrams[index].rob.findtext("IPOC") or "").strip()
         if not (text.isascii() and text.isdecimal() and len(text) <= _DIGITS):
-            found = f"found {text[:40]!r}" if text else "found none"
-            raise FormatError(self.path, f"{self.place(index)}, IPOC: {found}, expected whole milliseconds")
+            fault = f"found {text[:40]!r}" if text else "found none"
+            raise FormatError(self.path, f"{self.place(index)}, IPOC: {fault}, expected whole milliseconds")
         return int(text)
 
 
 def read_rsi(path: Path, kind: Kind, rows: int | None) -> Raw:
     """Read recorded telegrams; ``t_s`` is IPOC, so lost telegrams are gaps in it.
 
-    Late telegrams are put in order, repeated ones left out, torn ones are lost; the notes of the table say
+    Late telegrams are put in order, repeated ones left out, torn ones are lost; the notes of the table state
     how many of each, how many late answers the controller counted (Delay), and if torques are currents.
 
     Raises
@@ -96,15 +96,15 @@ def read_rsi(path: Path, kind: Kind, rows: int | None) -> Raw:
     late_answers = 0.0
     for index, (_, rob) in enumerate(recording.telegrams):
         cycles[index] = recording.cycle(index)
-        found = {child.tag: child.attrib for child in rob}
+        attributes = {child.tag: child.attrib for child in rob}
         try:
-            values[index] = [float(found[tag][axis]) for tag, axis, _ in columns]
+            values[index] = [float(attributes[tag][axis]) for tag, axis, _ in columns]
         except (KeyError, ValueError):
-            texts = [found.get(tag, {}).get(axis) for tag, axis, _ in columns]
+            texts = [attributes.get(tag, {}).get(axis) for tag, axis, _ in columns]
             values[index] = [
                 recording.number(index, name, text) for (_, _, name), text in zip(columns, texts, strict=True)
             ]
-        counter = recording.number(index, "Delay", found.get("Delay", {}).get("D", "0"))
+        counter = recording.number(index, "Delay", attributes.get("Delay", {}).get("D", "0"))
         late_answers = max(late_answers, counter)
     take, notes = in_order(path, "IPOC", (cycles, MS), values, recording.place)
     frame = pd.DataFrame(values[take], columns=[name for _, _, name in columns])
@@ -121,10 +121,10 @@ def _elements(recording: _Recording, kind: Kind) -> dict[str, str]:
     missing = [tag for tag in _ANGLES if tag not in present]
     if missing or torque is None:
         lacks = ", ".join([*missing, *([] if torque else [" or ".join(_TORQUES)])])
-        found = f"found {', '.join(present) or 'none'}"
+        listed = f"found {', '.join(present) or 'none'}"
         expected = f"expected the axis angles {', '.join(_ANGLES)} and a torque of {kind.title}"
         raise FormatError(
-            recording.path, f"{recording.place(0)}: lacks the element {lacks}: {found}, {expected}"
+            recording.path, f"{recording.place(0)}: lacks the element {lacks}: {listed}, {expected}"
         )
     return {**_ANGLES, torque: _TORQUE}
 

@@ -30,7 +30,7 @@ def stl_pieces(path: Path, _kind: Kind, rows: int | None) -> Iterator[Raw]:
     ------
     FormatError
         Where an ASCII file has a facet without three vertices or no ``endsolid``, where a binary one is not
-        as long as its number of facets says, or where it is neither.
+        as long as its number of facets requires, or where it is neither.
     """
     vertices = _unique(_ascii(path) if _is_ascii(path) else _binary(path))
     for part in slices(len(vertices), rows):
@@ -39,7 +39,7 @@ def stl_pieces(path: Path, _kind: Kind, rows: int | None) -> Iterator[Raw]:
 
 
 def _is_ascii(path: Path) -> bool:
-    """Tell the encodings apart; the header of a binary file may start with ``solid``, too."""
+    """Distinguish the encodings; the header of a binary file may start with ``solid``, too."""
     with path.open("rb") as stream:
         head = stream.read(1024)
     return head.lstrip().startswith(b"solid") and b"\0" not in head
@@ -60,7 +60,7 @@ def _binary(path: Path) -> Array:
 
 
 def _ascii(path: Path) -> Array:
-    found: list[list[float]] = []
+    vertices: list[list[float]] = []
     last, number = "", 0
     for number, text in lines(path):
         words = text.split()
@@ -68,14 +68,14 @@ def _ascii(path: Path) -> Array:
         if last == "vertex":
             if len(words) != 4 or not all(map(is_number, words[1:])):
                 raise FormatError(path, f"line {number}: found {text!r}, expected vertex x y z")
-            found.append([float(word) for word in words[1:]])
-        elif last == "endloop" and (len(found) % 3 or not found):
+            vertices.append([float(word) for word in words[1:]])
+        elif last == "endloop" and (len(vertices) % 3 or not vertices):
             raise FormatError(
                 path, f"line {number}: found a facet that has not three vertices, expected three"
             )
-    if last != "endsolid" or len(found) % 3:
+    if last != "endsolid" or len(vertices) % 3:
         raise FormatError(path, f"ends early: found {last!r} on its last line {number}, expected endsolid")
-    return np.array(found, dtype=np.float64).reshape(-1, 3)
+    return np.array(vertices, dtype=np.float64).reshape(-1, 3)
 
 
 def _unique(vertices: Array) -> Array:

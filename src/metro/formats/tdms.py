@@ -13,6 +13,7 @@ import mmap
 import re
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -40,7 +41,7 @@ _SAVE_AGAIN = "save it again as scaled values, or export it as CSV"
 
 @dataclass
 class _Object:
-    """The file, a group or a channel: its properties, how its values stand in a chunk, and the values."""
+    """The file, a group or a channel: its properties, how its values lie in a chunk, and the values."""
 
     path: str
     properties: dict[str, object] = field(default_factory=dict)
@@ -115,11 +116,22 @@ def tdms_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     """
     with path.open("rb") as stream:
         mapped = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-    objects = _objects(path, np.frombuffer(mapped, dtype=np.uint8))
-    channels = [one for each in objects.values() for one in _channels(each)]
-    for piece in channel_pieces(path, kind, channels, rows):
+    for piece in channel_pieces(path, kind, _channels_of(path, mapped), rows):
         yield piece
         mapped.madvise(mmap.MADV_DONTNEED)  # pages that were read would count as this process's memory
+
+
+@contextmanager
+def tdms_channels(path: Path) -> Iterator[list[Channel]]:
+    """Open a file and give the channels of all its groups."""
+    with path.open("rb") as stream:
+        mapped = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+    yield _channels_of(path, mapped)
+
+
+def _channels_of(path: Path, mapped: mmap.mmap) -> list[Channel]:
+    objects = _objects(path, np.frombuffer(mapped, dtype=np.uint8))
+    return [one for each in objects.values() for one in _channels(each)]
 
 
 def _channels(one: _Object) -> Iterator[Channel]:
@@ -192,7 +204,7 @@ def _segments(path: Path, data: np.ndarray) -> Iterator[tuple[int, int, int, int
 
 
 def _describe(cursor: _Cursor, objects: dict[str, _Object], listed: dict[str, _Object]) -> None:
-    """Read what a segment says of its objects; keep the list of those that have values in it."""
+    """Read a segment's description of its objects; keep the list of those that have values in it."""
     for _ in range(cursor.number("I")):
         path = cursor.text()
         one = objects.setdefault(path, _Object(path))

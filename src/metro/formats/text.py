@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import csv
+import gzip
+import io
 import re
+import zlib
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Raw
+from metro.formats.limits import check_unpacked
 
 SPACES = r"\s+"
 DECIMAL_COMMA = "numbers need a decimal point: export again with '.' as decimal sign"
 MIXED = "the first line of numbers has decimal commas: export again with '.' as decimal sign in all"
+_GZIP = b"\x1f\x8b"
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -28,18 +35,57 @@ def lines(path: Path, skip: int = 0) -> Iterator[tuple[int, str]]:
     Blank lines and lines that start with ``#`` hold nothing. Text is UTF-8, with or without byte order mark;
     what is not UTF-8 (a degree sign of another code page) is replaced, since no number is written with it.
     """
-    with path.open("rb") as stream:
-        if stream.read(2) in _UTF16:
+    with unpacked(path) as stream:
+        if stream.peek(2)[:2] in _UTF16:
             raise FormatError(path, "found text in UTF-16, expected UTF-8: save it again as UTF-8 or ASCII")
-    with path.open(encoding="utf-8-sig", errors="replace") as stream:
-        for number, line in enumerate(stream, start=1):
+        for number, line in enumerate(io.TextIOWrapper(stream, "utf-8-sig", "replace"), start=1):
             text = line.strip("\r\n ")
             if number > skip and text and not text.startswith("#"):
                 yield number, text
 
 
+@contextmanager
+def unpacked(path: Path) -> Iterator[io.BufferedReader]:
+    """Open a file for reading, unpacked where it is a gzip file by its content.
+
+    Raises
+    ------
+    FormatError
+        While it is read: where it is damaged, or unpacks to more than a recording can be.
+    """
+    with path.open("rb") as stream:
+        packed = stream.peek(len(_GZIP))[: len(_GZIP)] == _GZIP
+        if not packed:
+            yield stream
+            return
+        try:
+            yield io.BufferedReader(_Unpacked(path, gzip.GzipFile(fileobj=stream)))
+        except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+            raise FormatError(path, f"cannot be unpacked: {error}") from error
+
+
+class _Unpacked(io.RawIOBase):
+    """The content of a gzip file, up to as many bytes as a recording can be."""
+
+    def __init__(self, path: Path, content: gzip.GzipFile) -> None:
+        super().__init__()
+        self._path, self._content, self._size = path, content, 0
+
+    def readable(self) -> bool:
+        """Say that it can be read."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Read into a buffer."""
+        data = self._content.read(len(buffer))
+        buffer[: len(data)] = data
+        self._size += len(data)
+        check_unpacked(self._path, self._size, "a text file")
+        return len(data)
+
+
 def separator(path: Path, number: int, header: str) -> str:
-    """Tell what parts the columns of a header line: commas or tabs; semicolons are refused."""
+    """Return what separates the columns of a header line: commas or tabs; semicolons are refused."""
     if ";" in header:
         message = f"line {number}: found columns parted by semicolons, expected commas; {DECIMAL_COMMA}"
         raise FormatError(path, f"{message} and ',' between columns")
@@ -47,18 +93,18 @@ def separator(path: Path, number: int, header: str) -> str:
 
 
 def fields(text: str, parted_by: str) -> list[str]:
-    """Split a line into its fields, stripped, quotes taken off."""
+    """Split a line into its fields, stripped, without quotes."""
     if parted_by == SPACES:
         return text.split()
     try:
-        found = next(csv.reader([text], delimiter=parted_by, skipinitialspace=True))
+        parts = next(csv.reader([text], delimiter=parted_by, skipinitialspace=True))
     except csv.Error:  # a field longer than any name or number
-        found = text.split(parted_by)
-    return [field.strip() for field in found]
+        parts = text.split(parted_by)
+    return [field.strip() for field in parts]
 
 
 def is_number(text: str) -> bool:
-    """Tell whether a field is a number."""
+    """Return whether a field is a number."""
     try:
         float(text)
     except ValueError:
@@ -73,7 +119,7 @@ class Layout:
     Attributes
     ----------
     names : the file's columns in order.
-    parted_by : what stands between columns: a character, or ``SPACES``.
+    parted_by : the separator between columns: a character, or ``SPACES``.
     skip : how many lines of the file, comments included, come before the first row.
     decimal : the decimal sign, "." or ",".
     """
@@ -105,10 +151,10 @@ def number_pieces(
         raise FormatError(path, _ragged(str(error))) from error
     except ValueError as error:
         texts = _parse(path, layout, use, rows, limit=limit, dtype=str)
-        row, column, found = _first_fault(texts, layout.decimal)
-        hint = f"; {DECIMAL_COMMA}" if re.match(r"[-+]?\d+,\d", found) else ""
-        hint = f"; {MIXED}" if layout.decimal == "," and "." in found else hint
-        message = f"{_place(path, layout, 0, row)}, column {column}: found {found!r}, expected a number{hint}"
+        row, column, field = _first_fault(texts, layout.decimal)
+        hint = f"; {DECIMAL_COMMA}" if re.match(r"[-+]?\d+,\d", field) else ""
+        hint = f"; {MIXED}" if layout.decimal == "," and "." in field else hint
+        message = f"{_place(path, layout, 0, row)}, column {column}: found {field!r}, expected a number{hint}"
         raise FormatError(path, message) from error
 
 
@@ -120,23 +166,26 @@ def _place(path: Path, layout: Layout, start: int, row: int) -> str:
 def _parse(
     path: Path, layout: Layout, use: Sequence[str], rows: int | None, *, limit: int | None, dtype: type
 ) -> Iterator[pd.DataFrame]:
-    with pd.read_csv(
-        path,
-        sep=layout.parted_by,
-        decimal=layout.decimal,
-        header=None,
-        names=_labels(path, layout, use),
-        index_col=False,
-        dtype=dict.fromkeys(use, dtype),
-        skiprows=layout.skip,
-        nrows=limit,
-        iterator=True,
-        comment="#",
-        skipinitialspace=True,
-        low_memory=False,
-        encoding="utf-8-sig",
-        encoding_errors="replace",
-    ) as reader:
+    with (
+        unpacked(path) as stream,
+        pd.read_csv(
+            stream,
+            sep=layout.parted_by,
+            decimal=layout.decimal,
+            header=None,
+            names=_labels(path, layout, use),
+            index_col=False,
+            dtype=dict.fromkeys(use, dtype),
+            skiprows=layout.skip,
+            nrows=limit,
+            iterator=True,
+            comment="#",
+            skipinitialspace=True,
+            low_memory=False,
+            encoding="utf-8-sig",
+            encoding_errors="replace",
+        ) as reader,
+    ):
         if rows is None:
             yield reader.read(limit)[list(use)]
             return
@@ -161,8 +210,8 @@ def _labels(path: Path, layout: Layout, use: Sequence[str]) -> list[str]:
     names = layout.names
     spare = fields(first.split("#")[0], layout.parted_by)[len(names) :] if first else []
     if any(spare):
-        found = f"found {len(names) + len(spare)} fields, expected {len(names)} as in the header"
-        raise FormatError(path, f"line {number}: {found}; {DECIMAL_COMMA}")
+        fault = f"found {len(names) + len(spare)} fields, expected {len(names)} as in the header"
+        raise FormatError(path, f"line {number}: {fault}; {DECIMAL_COMMA}")
     padded = [*names, *spare]
     return [name if name in use else f"field {index}" for index, name in enumerate(padded)]
 

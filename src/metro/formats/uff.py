@@ -7,6 +7,7 @@ digits of it, and a file of several binary datasets must come back whole.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -22,6 +23,11 @@ from metro.units import Array, ComplexArray
 
 FRF, COHERENCE = 4, 6
 UNITS = {8: "m", 11: "m/s", 12: "m/s2"}
+DATASETS = {
+    "15": "nodes", "18": "coordinate systems", "55": "data at nodes, as mode shapes", "58": "functions",
+    "58b": "functions, binary", "82": "trace lines", "151": "header", "164": "units", "2411": "nodes",
+    "2412": "elements", "2414": "analysis data", "2420": "coordinate systems",
+}  # fmt: skip
 _COMPLEX = {2: False, 4: False, 5: True, 6: True}
 _BYTES = {2: 4, 4: 8, 5: 4, 6: 8}
 _HEADER, _LONGEST_HEADER = 11, 2048
@@ -37,7 +43,7 @@ class Function:
     ----------
     kind : function type of record 6: 4 frequency response, 6 coherence, …
     reference, response : point and axis, as 1x; a negative direction has turned the sign of ``values``.
-    unit : of the response, SI: m, m/s or m/s2; "" where the file does not say.
+    unit : of the response, SI: m, m/s or m/s2; "" where the file does not state it.
     frequency : (n,) Hz.
     values : (n,), per newton where ``kind`` is a frequency response.
     """
@@ -59,25 +65,25 @@ def read_functions(path: Path) -> list[Function]:
         With the number of the dataset and what was expected.
     """
     data = path.read_bytes()
-    found, length, force = [], 1.0, 1.0
-    for number, (name, start, end) in enumerate(_datasets(path, data), start=1):
+    functions, length, force = [], 1.0, 1.0
+    for number, (name, start, end) in enumerate(datasets(path, data), start=1):
         where = f"dataset {number} ({name})"
         try:
             if name == "164":
                 length, force = _unit_factors(data[start:end])
             elif name in ("58", "58b"):
-                found += _function(data[start:end], name == "58b")
+                functions += _function(data[start:end], name == "58b")
         except (ValueError, IndexError, KeyError, ArithmeticError, RecursionError) as error:
             raise FormatError(path, f"{where}: is not what universal file datasets hold: {error}") from error
     to_si = {FRF: force / length}
-    return [replace(each, values=each.values * to_si.get(each.kind, 1.0)) for each in found]
+    return [replace(each, values=each.values * to_si.get(each.kind, 1.0)) for each in functions]
 
 
 def read_uff(path: Path, kind: Kind, rows: int | None) -> Raw:
     """Read the one frequency response of a universal file; more than one: see :func:`read_functions`."""
     responses = [each for each in read_functions(path) if each.kind == FRF]
     if not responses:
-        raise FormatError(path, f"found no function of type {FRF}, expected {kind.title}")
+        raise FormatError(path, f"{without_frf(path)}, expected {kind.title}")
     first = responses[0]
     table = pd.DataFrame(
         {"frequency_hz": first.frequency, "real": first.values.real, "imag": first.values.imag}
@@ -85,7 +91,20 @@ def read_uff(path: Path, kind: Kind, rows: int | None) -> Raw:
     return Raw(table[:rows], lambda row: f"line {row + 1} of the first function")
 
 
-def _datasets(path: Path, data: bytes) -> Iterator[tuple[str, int, int]]:
+def without_frf(path: Path) -> str:
+    """Say of a universal file that it has no FRF, and what it has."""
+    counts = Counter(name for name, _, _ in datasets(path, path.read_bytes()))
+    listed = ", ".join(
+        f"{count} × {name}" + (f" ({DATASETS[name]})" if name in DATASETS else "")
+        for name, count in counts.items()
+    )
+    modes = ": metro import makes a table of published values of the modes" if "55" in counts else ""
+    return (
+        f"found no function of type {FRF} among the datasets {listed or 'of the file, which has none'}{modes}"
+    )
+
+
+def datasets(path: Path, data: bytes) -> Iterator[tuple[str, int, int]]:
     """Yield name, start and end of each dataset, its header line included; binary ones by their size."""
     at = 0
     while mark := _MARK.search(data, at):
@@ -128,7 +147,7 @@ def _form(line: str) -> tuple[int, int, bool]:
 
 
 def _lines(block: bytes, count: int) -> tuple[list[str], int]:
-    """Return the first lines of a block, and where the rest starts."""
+    """Return the first lines of a block, and where the remaining block starts."""
     at, lines = 0, []
     for _ in range(count):
         end = block.index(b"\n", at)
@@ -184,8 +203,8 @@ def _binary(header: str, body: bytes, shape: tuple[int, int], kind: int) -> Arra
     count, width = shape
     code = f"{'<' if order == 1 else '>'}f{_BYTES[kind]}"
     if len(body) >= count * width * _BYTES[kind]:
-        found: Array = np.frombuffer(body, dtype=code, count=count * width).astype(np.float64)
-        return found.reshape(shape)
+        numbers: Array = np.frombuffer(body, dtype=code, count=count * width).astype(np.float64)
+        return numbers.reshape(shape)
     rows = np.frombuffer(body, dtype=[("x", f"{code[0]}f4"), ("y", code, (width - 1,))], count=count)
     return np.column_stack([rows["x"], rows["y"]]).astype(np.float64)
 

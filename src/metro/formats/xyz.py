@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
+
+import numpy as np
 
 from metro.formats.cloud import own_names, piece
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
 from metro.formats.text import SPACES, Layout, fields, is_number, lines, number_pieces
+from metro.units import Array
 
 _HEADER_LINES = 100
+_FIRST = ("x", "y", "z")
+_LOOKED_AT = 32  # rows without names
+_FEWEST = 3  # rows that show what their columns are
+_ROUNDED = 0.01  # three components printed to two decimals: 3^½ · 0.005 at most
+_WHITE = 255
 
 
 def xyz_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
@@ -20,23 +29,25 @@ def xyz_pieces(path: Path, kind: Kind, rows: int | None) -> Iterator[Raw]:
     Without a header that names x, y and z these are the first three columns.
     """
     layout = _layout(path, kind)
+    if layout.names[:3] == _FIRST:
+        _check_unnamed(path, layout)
     own = own_names(path, kind, layout.names)
-    for found in number_pieces(path, layout, list(own.values()), rows):
-        yield piece(own, found.frame, found.place)
+    for raw in number_pieces(path, layout, list(own.values()), rows):
+        yield piece(own, raw.frame, raw.place)
 
 
 def _layout(path: Path, kind: Kind) -> Layout:
     header = ""
     for number, text in lines(path):
         parted_by = _separator(text)
-        found = fields(text, parted_by)
-        if len(found) >= 3 and all(is_number(field) for field in found[:3]):
-            return Layout(_names(header, len(found)), parted_by, number - 1)
+        parts = fields(text, parted_by)
+        if len(parts) >= 3 and all(is_number(field) for field in parts[:3]):
+            return Layout(_names(header, len(parts)), parted_by, number - 1)
         if number > _HEADER_LINES:
             break
         header = text
-    found_none = f"found no line of three numbers x y z in the first {_HEADER_LINES} lines"
-    raise FormatError(path, f"{found_none}, expected {kind.title} with decimal points")
+    fault = f"found no line of three numbers x y z in the first {_HEADER_LINES} lines"
+    raise FormatError(path, f"{fault}, expected {kind.title} with decimal points")
 
 
 def _separator(text: str) -> str:
@@ -49,4 +60,45 @@ def _names(header: str, count: int) -> tuple[str, ...]:
     names = tuple(field.lower() for field in fields(text, _separator(text)))
     if len(names) == count and {name[:1] for name in names} >= {"x", "y", "z"}:
         return names
-    return ("x", "y", "z", *(f"field {index}" for index in range(3, count)))
+    return (*_FIRST, *(f"field {index}" for index in range(3, count)))
+
+
+def _check_unnamed(path: Path, layout: Layout) -> None:
+    """Refuse columns without names whose first three need not be coordinates.
+
+    Those are: a first column that counts the points, a first three that are directions, and six columns of
+    which the last three are neither directions nor colours.
+
+    Raises
+    ------
+    FormatError
+        With what to write in ``batch.yaml``.
+    """
+    rows = [fields(text, layout.parted_by) for _, text in islice(lines(path, layout.skip), _LOOKED_AT)]
+    rows = [row for row in rows if len(row) == len(layout.names) and all(map(is_number, row))]
+    values = np.array(rows, dtype=float).reshape(-1, len(layout.names))
+    count = len(layout.names)
+    if len(values) < _FEWEST or count == len(_FIRST):
+        return
+    last = values[:, 3:6]
+    if (np.diff(values[:, 0]) == 1.0).all():
+        why, first = "its first column counts the rows: is it a number of the point or a coordinate?", 2
+    elif count >= 2 * len(_FIRST) and _directions(values[:, :3]):
+        why, first = "its first three columns are directions of length 1, as of normals", 4
+    elif count == 2 * len(_FIRST) and not (_directions(last) or _colours(last)):
+        why, first = "it has six columns without names, and the last three are neither normals nor colours", 1
+    else:
+        return
+    mapping = ", ".join(f"{axis}_mm: {{from: {first + k}, unit: mm}}" for k, axis in enumerate("xyz"))
+    files = f'files: {{"{path.name}": {{columns: {{{mapping}}}}}}}'
+    what = f"write in batch.yaml which columns are the coordinates, as {files}"
+    raise FormatError(path, f"line {layout.skip + 1}: {why}; {what}")
+
+
+def _directions(values: Array) -> bool:
+    return bool((np.abs(np.linalg.norm(values, axis=1) - 1.0) < _ROUNDED).all())
+
+
+def _colours(values: Array) -> bool:
+    whole = (values == np.round(values)).all() and values.max() <= _WHITE
+    return bool(values.min() >= 0.0 and (whole or values.max() <= 1.0))

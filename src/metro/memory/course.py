@@ -1,9 +1,9 @@
 """The course of a parameter over batches: constant, a trend, a step, a curve; and the next batch's value.
 
-Whether it changes at all is one test against the order of the batches drawn anew, the best of all shapes
-against the best of all shapes: exact, whatever the distribution. Which shape it has is weighed by Akaike's
-criterion for small samples (Burnham and Anderson, Model Selection, 2nd ed. (2002), 6.4); what is predicted is
-the mean of all shapes by these weights, not the best of them.
+Whether the parameter changes at all is one permutation test over the order of the batches. It compares the
+best of all shapes with the best of all shapes, so it is exact for every distribution. The shapes have weights
+by Akaike's criterion for small samples (Burnham and Anderson, Model Selection, 2nd ed. (2002), 6.4). The
+prediction is the mean of all shapes by these weights, not the best shape.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import numpy as np
 from metro.memory.regression import Mixture, Regression, mixture, regress
 from metro.units import Array
 
-ENOUGH = 5  # batches of which the course is asked
-DRAWS, SEED = 9999, 1  # of the order of batches
+ENOUGH = 5  # batches, from which on a change is tested for
+DRAWS, SEED = 9999, 1  # of the permutations of the batches
 _CURVES = 6  # time constants
-_ASIDE = 2  # batches on either side of a step, at least
+_ASIDE = 2  # least number of batches on either side of a step
 # Parameters of each shape: level, change, its place or time constant, and the scatter between batches.
 SIZES = {"constant": 2, "trend": 3, "step": 4, "levels off": 4, "accelerates": 4}
 
@@ -43,16 +43,16 @@ class Shape:
 
 @dataclass(frozen=True)
 class Course:
-    """What n batches say of a parameter.
+    """What n batches show of the course of a parameter.
 
     Attributes
     ----------
-    p_value : that no order would matter; None of fewer than ``ENOUGH`` batches.
+    p_value : of the hypothesis that the order does not matter; None for fewer than ``ENOUGH`` batches.
     weights : by kind of course, adding up to one.
-    change : rise of the likeliest course that changes, from its first batch to its last: low, middle, high;
-        and the last batch before a step (its index).
+    change : rise of the likeliest course that changes, from its first batch to its last: low, middle, high.
+    before_step : index of the last batch before a step.
     track : (n, 3) the parameter's course at each batch: low, middle, high.
-    after : (3,) the same of what the next batch will measure, at ``next_at``.
+    after : (3,) low, middle, high of what the next batch will measure, at ``next_at``.
     scatter : posterior mean of the deviation between batches, beyond the errors that they state.
     """
 
@@ -68,7 +68,7 @@ class Course:
 
 
 def shapes(u: Array) -> list[Shape]:
-    """Return every course that batches at rising places u (n,) could tell from the others."""
+    """Return every course that batches at rising places u (n,) could distinguish from the others."""
     if len(u) < ENOUGH:
         return [Shape("constant")]
     steps = [Shape("step", float(u[k])) for k in range(_ASIDE, len(u) - _ASIDE + 1) if u[k] > u[k - 1]]
@@ -78,7 +78,7 @@ def shapes(u: Array) -> list[Shape]:
 
 
 def course(t: Array, y: Array, s: Array) -> Course:
-    """Follow a parameter y ± s (n,) over batches at times t (n,), rising, not all the same.
+    """Follow a parameter y ± s (n,) over batches at times t (n,), which rise and are not all the same.
 
     ``s`` are standard deviations of the errors within the batches.
     """
@@ -126,7 +126,7 @@ def course(t: Array, y: Array, s: Array) -> Course:
 
 
 def _weights(asked: list[Shape], log_likelihood: Array, n: int) -> Array:
-    """Akaike weight (k,) of each course: those of a kind share the weight of the best of them."""
+    """Akaike weight (k,) of each course; the courses of a kind share the weight of the best of them."""
     kinds = np.array([shape.kind for shape in asked])
     weight = np.zeros(len(asked))
     for kind in dict.fromkeys(kinds.tolist()):
@@ -151,7 +151,7 @@ def _joined(
     scatter: bool = False,
     error: float = 0.0,
 ) -> Mixture:
-    """Return what all courses together say at ``places`` (q,)."""
+    """Return the mixture of all courses at ``places`` (q,)."""
     rise = np.array([shape(places) for shape in asked])[:, :, None]
     parts = []
     for first, each in zip((0, 1), fitted, strict=False):
@@ -168,17 +168,17 @@ def _joined(
 
 
 def _p_value(rise: Array, y: Array, s: Array, tau: float) -> float:
-    """Share of the orders of the batches in which the best of the courses (k, n) fits as well as in theirs.
+    """Share of the permutations in which the best of the courses (k, n) fits as well as in the real order.
 
-    A batch takes its error along, so that its value and weight stay together; the mean over all does not
+    A batch keeps its error, so that its value and weight stay together; the mean over all batches does not
     depend on the order.
     """
     rng = np.random.default_rng(SEED)
     weight = 1.0 / (s**2 + tau**2)
-    rest = weight * (y - weight @ y / weight.sum())
+    residual = weight * (y - weight @ y / weight.sum())
     order = rng.permuted(np.tile(np.arange(len(y)), (DRAWS, 1)), axis=1)
     order = np.concatenate([np.arange(len(y))[None], order])
     drawn, total = weight[order], weight.sum()
     spread = drawn @ (rise**2).T - (drawn @ rise.T) ** 2 / total
-    gain = ((rest[order] @ rise.T) ** 2 / spread).max(axis=1)
+    gain = ((residual[order] @ rise.T) ** 2 / spread).max(axis=1)
     return float(np.mean(gain >= gain[0] * (1.0 - 1e-9)))

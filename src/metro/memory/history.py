@@ -20,12 +20,7 @@ SETTLED = {"clean", "explained"}
 CLAIMED = {"explained", "partly_explained"}
 HOUR, DAY = 3600.0, 86400.0
 NORMAL = 1.959963984540054  # half width of a 95 % interval; by Student's t it is longer, so this is cautious
-# What a parameter belongs to; all others to the cell.
-_OF_TOOL = {"tool_runout", "tool_deflection"}
-_OF_TOOL_AND_WORK = {"tool_wear", "chip_size_effect", "process_damping"}
 _COEFFICIENT = "cutting coefficient "
-# Which tooth is the first is told by no batch: their deviations cannot be compared from batch to batch.
-_NOT_COMPARABLE = {"pitch_error"}
 
 
 @dataclass(frozen=True)
@@ -34,15 +29,16 @@ class Record:
 
     Attributes
     ----------
-    manifest : batch.yaml, validated. started : seconds since 1970 of its first run, None where not told.
-    verdict, told, identified : content of verdict.json, loop.json and identified.json.
+    manifest : batch.yaml, validated. started : seconds since 1970 of its first run, None where no run says.
+    verdict, loop, identified : content of verdict.json, loop.json and identified.json; ``effects`` of
+        loop.json says what each effect belongs to.
     """
 
     name: str
     manifest: JSON
     started: float | None
     verdict: JSON
-    told: JSON
+    loop: JSON
     identified: JSON
 
     @property
@@ -51,17 +47,20 @@ class Record:
         return str(self.manifest.get("cell") or "")
 
     def owner(self, *kinds: str) -> str:
-        """Name what a parameter belongs to: the cell, and of ``kinds`` the tool and the work."""
+        """Name what a parameter belongs to: the cell, and of ``kinds`` the tool and the work.
+
+        A batch has one machine and one set of instruments: both are named by its cell.
+        """
         tool, work = self.manifest.get("tool") or {}, self.manifest.get("work") or {}
         words = {"tool": _tool(tool), "work": str(work.get("material") or "work of unknown material")}
-        return ", ".join([self.cell, *(words[kind] for kind in kinds)])
+        return ", ".join([self.cell, *(name for kind, name in words.items() if kind in kinds)])
 
 
 @dataclass(frozen=True)
 class Entry:
     """A parameter in one batch.
 
-    ``less_neutral``: less the value at which the effect changes nothing. ``found``: claimed there.
+    ``less_neutral``: less the value at which the effect changes nothing. ``claimed``: by its verdict.
     ``sensitivity``: relative change of the prediction per sd. ``budget``: what a model may get wrong, as a
     part of what it predicts.
     """
@@ -70,7 +69,7 @@ class Entry:
     value: float
     sd: float
     less_neutral: float = math.nan
-    found: bool = False
+    claimed: bool = False
     sensitivity: float = math.nan
     budget: float = math.nan
 
@@ -98,9 +97,9 @@ class Series:
     clock: str
 
     @property
-    def found(self) -> list[str]:
+    def claimed_in(self) -> list[str]:
         """Batches in which the effect was claimed."""
-        return [entry.batch for entry in self.entries if entry.found]
+        return [entry.batch for entry in self.entries if entry.claimed]
 
     def column(self, name: str) -> Array:
         """Return one number of every entry (n,)."""
@@ -108,9 +107,9 @@ class Series:
 
 
 def histories(records: Sequence[Record]) -> list[Series]:
-    """Return every parameter that at least two batches tell of.
+    """Return every parameter that at least two batches estimate.
 
-    Batches are ordered by the time their first run started, where all of a series tell it and no two are the
+    Batches are ordered by the time their first run started, where all of a series state it and no two are the
     same; else by their names, numbers in them counted as numbers.
     """
     known = {record.name: record for record in records}
@@ -134,24 +133,25 @@ def natural(name: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
 
 
-Told = tuple[tuple[str, str, str, str], Entry, str, bool]
+Keyed = tuple[tuple[str, str, str, str], Entry, str, bool]
 
 
-def _effects(record: Record) -> Iterator[Told]:
+def _effects(record: Record) -> Iterator[Keyed]:
     """Yield the parameters of every effect that was tried, as far as they can be compared between batches."""
-    for observable, told in (record.told.get("observables") or {}).items():
+    for observable, outcome in (record.loop.get("observables") or {}).items():
         verdict = (record.verdict.get("observables") or {}).get(observable) or {}
         status = str(verdict.get("status"))
-        claimed = {str(effect["effect"]) for effect in verdict.get("effects") or []}
-        for tried in told.get("candidates") or []:
+        claims = {str(effect["effect"]) for effect in verdict.get("effects") or []}
+        for tried in outcome.get("candidates") or []:
             name = str(tried["effect"])
-            found = name in claimed and status in CLAIMED
-            if name in _NOT_COMPARABLE or not (found or _counts(tried, status)):
+            facts = (record.loop.get("effects") or {}).get(name) or {}
+            claimed = name in claims and status in CLAIMED
+            if not facts.get("comparable", True) or not (claimed or _counts(tried, status)):
                 continue
             length = math.sqrt(sum((e["less_neutral"] / e["sd"]) ** 2 for e in _known(tried)))
             where = "".join(f" ({k} {v})" for k, v in (tried.get("where") or {}).items())
             for one in _known(tried):
-                if not found and not one["signed"]:
+                if not claimed and not one["signed"]:
                     continue
                 alone = sum(each["parameter"] == one["parameter"] for each in tried["estimates"]) == 1
                 quantity = one["parameter"] + ("" if alone else f" {one['index'] + 1}") + where
@@ -160,11 +160,12 @@ def _effects(record: Record) -> Iterator[Told]:
                     value=one["value"],
                     sd=one["sd"],
                     less_neutral=one["less_neutral"],
-                    found=found,
+                    claimed=claimed,
                     sensitivity=float(tried["size"]) / length if length else math.nan,
                     budget=_budget(record, observable),
                 )
-                yield (_owner(record, name), observable, name, quantity), entry, one["unit"], one["signed"]
+                owner = record.owner(*(facts.get("belongs_to") or ()))
+                yield (owner, observable, name, quantity), entry, one["unit"], one["signed"]
 
 
 def _known(tried: JSON) -> list[JSON]:
@@ -173,17 +174,11 @@ def _known(tried: JSON) -> list[JSON]:
 
 
 def _counts(tried: JSON, status: str) -> bool:
-    """Tell whether the estimate of an effect that was not claimed counts: nothing left, no best of many."""
+    """Tell whether the estimate of an effect that was not claimed counts: no residual, no best of many."""
     return status in SETTLED and tried.get("verdict") == "rejected" and tried.get("chosen_among") == 1
 
 
-def _owner(record: Record, effect: str) -> str:
-    if effect in _OF_TOOL_AND_WORK:
-        return record.owner("tool", "work")
-    return record.owner("tool") if effect in _OF_TOOL else record.owner()
-
-
-def _quantities(record: Record) -> Iterator[Told]:
+def _quantities(record: Record) -> Iterator[Keyed]:
     """Yield the identified quantities that are of the machine, the tool or the metal, not of a run."""
     force = record.identified.get("force") or {}
     tables: list[tuple[str, str, Mapping[str, object]]] = [
@@ -214,9 +209,9 @@ def _quantities(record: Record) -> Iterator[Told]:
 
 
 def _budget(record: Record, observable: str) -> float:
-    """Return the declared model-form budget of an observable; NaN where its loop tells none."""
-    told = (record.told.get("observables") or {}).get(observable) or {}
-    return float((told.get("noise") or {}).get("budget") or math.nan)
+    """Return the declared model-form budget of an observable; NaN where its loop states none."""
+    outcome = (record.loop.get("observables") or {}).get(observable) or {}
+    return float((outcome.get("noise") or {}).get("budget") or math.nan)
 
 
 def _entry(batch: str, quantity: object) -> Entry | None:

@@ -1,9 +1,10 @@
-"""Weighted regression with scatter between batches: what was measured, y ± s, over a known course.
+"""Weighted regression of measured values y ± s over a known course, with scatter between batches.
 
-y = X b + scatter + error, with the error's deviation s known and that of the scatter, τ, not. The regression
-coefficients are integrated out, τ by its restricted likelihood with a prior flat in τ (Gelman, Bayesian Anal.
-1 (2006) 515): with few batches τ is hardly known, and an interval that takes its best estimate for the truth
-is too short. What is predicted is a mixture of normal distributions over τ, and over the courses.
+y = X b + scatter + error. The error's deviation s is known; that of the scatter, τ, is not. The regression
+coefficients are integrated out, and so is τ, by its restricted likelihood with a prior that is flat in τ
+(Gelman, Bayesian Anal. 1 (2006) 515). With few batches τ is hardly known, and an interval that takes its best
+estimate for the truth is too short. The prediction is a mixture of normal distributions over τ and over the
+courses.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from metro.units import Array
 
 _GRID = 60  # values of τ
 _MOST = 6.0  # times the deviation of y: the largest τ
-_NEGLIGIBLE = 1e-4  # weight of a part of a mixture that is left out
+_NEGLIGIBLE = 1e-4  # parts of a mixture with a smaller weight than this one are dropped
 _BISECTIONS = 40
 
 
@@ -71,15 +72,15 @@ class Mixture:
 def regress(designs: Array, y: Array, s: Array) -> Regression:
     """Fit y (n,) with errors s (n,) by each of the designs (k, n, p), at every τ of a grid.
 
-    The likelihood is marginal over the scatter; of the restricted one, what does not depend on τ is left out.
+    The likelihood is marginal over the scatter; the restricted one omits the terms that do not depend on τ.
     """
     tau = _MOST * max(float(np.std(y)), float(np.min(s))) * np.linspace(0.0, 1.0, _GRID) ** 2
     variance = s**2 + tau[:, None] ** 2  # (g, n)
     normal = np.einsum("knp,gn,knq->kgpq", designs, 1.0 / variance, designs)
     covariance = np.linalg.inv(normal)
     beta = np.einsum("kgpq,knq,gn->kgp", covariance, designs, y / variance)
-    rest = y - np.einsum("knp,kgp->kgn", designs, beta)
-    log_likelihood = -0.5 * np.sum(np.log(2.0 * np.pi * variance) + rest**2 / variance, axis=2)
+    residual = y - np.einsum("knp,kgp->kgn", designs, beta)
+    log_likelihood = -0.5 * np.sum(np.log(2.0 * np.pi * variance) + residual**2 / variance, axis=2)
     restricted = log_likelihood - 0.5 * np.linalg.slogdet(normal)[1]
     cell = np.gradient(tau)
     share = np.exp(restricted - restricted.max(axis=1, keepdims=True)) * cell
@@ -90,12 +91,13 @@ def regress(designs: Array, y: Array, s: Array) -> Regression:
 def mixture(
     fitted: Regression, rows: Array, weight: Array, *, scatter: bool = False, error: float = 0.0
 ) -> Mixture:
-    """Return what the courses, weighed by ``weight`` (k,), say at q places.
+    """Return the mixture of the courses at q places, with their weights ``weight`` (k,).
 
     Parameters
     ----------
     rows : (k, q, p) rows of the designs at these places.
-    scatter : of a single batch rather than of the course itself. error : deviation of its measurement.
+    scatter : whether the values are those of a single batch rather than of the course itself.
+    error : deviation of the measurement of a batch.
     """
     parts = (weight[:, None] * fitted.share).ravel()
     kept = parts > _NEGLIGIBLE * parts.max()

@@ -1,4 +1,4 @@
-"""What a campaign knows: how parameters went over the batches, what only all show, what comes back."""
+"""What a campaign shows: the courses of parameters, effects that only all batches show, recurring effects."""
 
 from __future__ import annotations
 
@@ -20,15 +20,17 @@ def remember(records: Sequence[Record]) -> JSON:
     """Return the content of ``memory.json``.
 
     ``series``: parameters of effects that were claimed at least once, and identified quantities. ``pooled``:
-    effects that no batch claims, their estimates taken together. ``recurring``: how often an effect was
-    claimed in a cell. ``undecided``: batches that cannot tell rivals apart, with what was claimed elsewhere.
-    Printed tables of others have no history and are left out.
+    effects that no batch claims, with their estimates combined. ``recurring``: how often an effect was
+    claimed in a cell. ``undecided``: batches that cannot distinguish rivals, with what was claimed elsewhere.
+    The printed tables of published works have no history and are not used.
     """
     records = [record for record in records if record.manifest.get("source") != "published"]
-    told = [one for one in histories(records) if len(one.entries) >= LEAST]
-    claimed = {(one.owner, one.observable, one.effect) for one in told if one.found}
-    followed = [one for one in told if not one.effect or (one.owner, one.observable, one.effect) in claimed]
-    pooled = [one for one in told if one not in followed and one.signed]
+    long_enough = [one for one in histories(records) if len(one.entries) >= LEAST]
+    claimed = {(one.owner, one.observable, one.effect) for one in long_enough if one.claimed_in}
+    followed = [
+        one for one in long_enough if not one.effect or (one.owner, one.observable, one.effect) in claimed
+    ]
+    pooled = [one for one in long_enough if one not in followed and one.signed]
     return {
         "format": 1,
         "batches": [record.name for record in sorted(records, key=lambda record: natural(record.name))],
@@ -54,7 +56,7 @@ def _series(one: Series, followed: Course, q_value: float | None) -> JSON:
         **_names(one),
         "clock": one.clock,
         "batches": [entry.batch for entry in one.entries],
-        "found": one.found,
+        "found": one.claimed_in,
         "t": one.t.tolist(),
         "value": one.column("value").tolist(),
         "sd": one.column("sd").tolist(),
@@ -72,9 +74,9 @@ def _series(one: Series, followed: Course, q_value: float | None) -> JSON:
 
 
 def _absolute(track: Array, alike: float) -> list[list[float]]:
-    """Widen a course (n, 3), low, middle, high, by what all batches may get wrong alike, as a part of it.
+    """Widen a course (n, 3), low, middle, high, by the relative error ``alike`` that all batches may share.
 
-    However many batches there are, that does not average out; what changes between them is known better.
+    A shared error does not average out over the batches; the changes between them are known better.
     """
     low, middle, high = track.T
     wrong = NORMAL * alike * np.abs(middle)
@@ -94,7 +96,7 @@ def _pooled(series: Sequence[Series]) -> list[JSON]:
 
 
 def _together(one: Series) -> JSON:
-    """Take the estimates of an effect together that no batch alone claims."""
+    """Combine the estimates of an effect that no batch claims alone."""
     value, sd = one.column("value"), one.column("sd")
     neutral = value - one.column("less_neutral")
     mean, p_value = level(value - neutral, sd)
@@ -121,21 +123,21 @@ def _typical(values: Array) -> float | None:
 
 
 def _recurring(records: Sequence[Record]) -> list[JSON]:
-    """Count how often each effect was claimed, among the batches of a cell that could have claimed it."""
+    """Count how often each effect was claimed by the batches of a cell that could have claimed it."""
     from scipy.stats import beta
 
     rows = []
-    for (cell, observable, effect), (tried, found) in sorted(_counted(records).items()):
-        if len(tried) < 2 or not found:
+    for (cell, observable, effect), (tried, claiming) in sorted(_counted(records).items()):
+        if len(tried) < 2 or not claiming:
             continue
-        k, n = len(found), len(tried)
+        k, n = len(claiming), len(tried)
         share = beta.ppf([0.025, 0.5, 0.975], k + 0.5, n - k + 0.5)
         rows.append(
             {
                 "cell": cell,
                 "observable": observable,
                 "effect": effect,
-                "found": found,
+                "found": claiming,
                 "tried": tried,
                 "share": _quantity([float(part) for part in share], "1"),
             }
@@ -144,7 +146,7 @@ def _recurring(records: Sequence[Record]) -> list[JSON]:
 
 
 def _counted(records: Sequence[Record]) -> dict[tuple[str, str, str], tuple[list[str], list[str]]]:
-    """Batches in which an effect could have been claimed, and was."""
+    """Batches that could have claimed an effect, and batches that did claim it."""
     counted: dict[tuple[str, str, str], tuple[list[str], list[str]]] = {}
     for record in sorted(records, key=lambda record: natural(record.name)):
         for observable, verdict in (record.verdict.get("observables") or {}).items():
@@ -154,23 +156,28 @@ def _counted(records: Sequence[Record]) -> dict[tuple[str, str, str], tuple[list
             if status not in {"clean", *CLAIMED}:
                 continue
             for effect in dict.fromkeys([*claimed, *rejected]):
-                tried, found = counted.setdefault((record.cell, observable, effect), ([], []))
+                tried, claiming = counted.setdefault((record.cell, observable, effect), ([], []))
                 tried.append(record.name)
                 if effect in claimed:
-                    found.append(record.name)
+                    claiming.append(record.name)
     return counted
 
 
 def _undecided(records: Sequence[Record]) -> list[JSON]:
-    """Count for rivals that a batch cannot tell apart what others of the cell claim; its verdict stays."""
+    """Count the claims of other batches of a cell for rivals that a batch cannot distinguish.
+
+    The verdict of the batch does not change.
+    """
     counted = _counted(records)
     rows = []
     for record in sorted(records, key=lambda record: natural(record.name)):
         for observable, verdict in (record.verdict.get("observables") or {}).items():
             for pair in verdict.get("indistinguishable") or []:
                 known = {name: counted.get((record.cell, observable, name), ([], [])) for name in pair}
-                if any(found for _, found in known.values()):
-                    elsewhere = {name: [len(found), len(tried)] for name, (tried, found) in known.items()}
+                if any(claiming for _, claiming in known.values()):
+                    elsewhere = {
+                        name: [len(claiming), len(tried)] for name, (tried, claiming) in known.items()
+                    }
                     rows.append({"batch": record.name, "observable": observable, "elsewhere": elsewhere})
     return rows
 
@@ -186,9 +193,9 @@ def _quantity(ends: Sequence[float], unit: str) -> JSON:
 
 
 def _q_values(p_values: Sequence[float | None]) -> list[float | None]:
-    """Least rate of false discoveries (Benjamini–Hochberg) at which each would be one; None stays None."""
+    """Least rate of false discoveries (Benjamini–Hochberg) at which each is a discovery; None stays None."""
     from scipy.stats import false_discovery_control
 
     known = [p for p in p_values if p is not None]
-    found = iter(false_discovery_control(known).tolist() if known else [])
-    return [None if p is None else float(next(found)) for p in p_values]
+    discoveries = iter(false_discovery_control(known).tolist() if known else [])
+    return [None if p is None else float(next(discoveries)) for p in p_values]

@@ -1,28 +1,32 @@
-"""What the loop needs to know of an observable: blocks of evidence, and a model that predicts them.
+"""The interface of an observable to the loop: blocks of evidence, and a model that predicts them.
 
-A **block** is what one run says about one observable. It is the unit of evidence: the 10^5 samples of one run
-share its coefficients, its phase and its zero, so they count once. A **model** predicts a block as ``offset +
-X @ beta``, linear in the base parameters, or made so about their values; everything else that is nonlinear
-is either a parameter of an effect (it made the model what it is) or a per-block nuisance (an unknown start
-phase).
+A **block** is the evidence of one run on one observable. It is the unit of evidence: the 10^5 samples of one
+run share its coefficients, its phase and its zero, so they count once. A **model** predicts a block as
+``offset + X @ beta``; it is linear in the base parameters, or linearised about their values. All other
+nonlinear quantities are either parameters of an effect, which changes the model, or nuisances of a block
+(such as an unknown start phase).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
 from metro.units import Array
 
+if TYPE_CHECKING:
+    from metro.observables.task import Handler
+
+Result = TypeVar("Result")
 Role = Literal["identify", "validate", "calibrate"]
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A quantity that a model has: its name in the outputs, its unit there, and that unit in SI."""
+    """A parameter of a model: its name and its unit in the outputs, and that unit in SI."""
 
     name: str
     unit: str
@@ -31,37 +35,36 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """What one run says about one observable.
+    """The evidence of one run on one observable.
 
     Attributes
     ----------
     run, condition, role, order
-        Identity of the run; ``calibrate`` marks evidence on the base parameters alone (a load test), which no
-        effect of the cut touches and which is never compared in the report.
-    measured : (n,) SI, in whatever basis makes the noise nearly white (orders, path points, …).
+        Identity of the run; ``calibrate`` marks evidence on the base parameters alone (a load test). No
+        effect of the cut changes it, and the report never compares it.
+    measured : (n,) SI, in a basis in which the noise is nearly white (orders, path points, …).
     sigma : (n,) standard error of ``measured`` from within the run.
     setting : what the model needs to predict the block; the observable's own frozen dataclass.
     axis : (n,) label of the axis that each element belongs to; materiality and the budget are judged per
         axis.
     zeros : (n, q) directions of run-level additive error (a zero offset per axis, a registration plane).
     zero_sd : (q,) prior standard deviations of the amplitudes of ``zeros``, SI.
-    untold : (n, u) directions in which the base model may be off here since no run of the fit tells a
-        parameter that matters only here, each of one standard deviation, SI; None: none.
-    alike : (n,) standard error of ``measured`` less predicted that may be the same in all repeats of a
-        condition, and then does not average out over them; ``Noise.alike`` of it is. None: none.
-    scale : (n,) size of the signal around each element, whose fraction the model-form budget is; None: rms of
-        its axis.
-    symmetries : (k, m) shifts of the nuisance that leave the base model as it is (which tooth is the first
-        one), but not a model with an effect; None: none.
-    labels : (n,) what each element is in the words of the report ("order 1"); the rest is tested per axis and
-        label.
-    repeats : how many times the block repeats one waveform (its time blocks): what a model gets wrong is the
-        same in each.
-    slow : how what repeats may change along the run, by its name in the report: (repeats, k) each.
-    patterns : shapes that the rest is tested for, by their name in the report: (n, k) each.
-    synthesis : (m, n) map from ``measured`` to the rows of the comparison table; None where they are the
-        same.
-    anchor : (m,) what ``synthesis`` is counted from in the rows of the comparison; None: zero.
+    unidentified : (n, u) directions of errors of the base model from parameters that matter only in this
+        block and that no run of the fit identifies, each of one standard deviation, SI; None: none.
+    alike : (n,) standard error of ``measured`` less predicted that all repeats of a condition may share, so
+        that it does not average out over them. ``Noise.alike`` is the shared share. None: none.
+    scale : (n,) size of the signal around each element; the model-form budget is a fraction of it. None: rms
+        of its axis.
+    symmetries : (k, m) shifts of the nuisance under which the base model does not change (which tooth is the
+        first one), but a model with an effect does; None: none.
+    labels : (n,) label of each element in the words of the report ("order 1"); the residual is tested per
+        axis and label.
+    repeats : how many times the block repeats one waveform (its time blocks); the model's error is the same
+        in each.
+    slow : slow changes along the run that are tested for, by their name in the report: (repeats, k) each.
+    patterns : shapes that the residual is tested for, by their name in the report: (n, k) each.
+    synthesis : (m, n) map from ``measured`` to the rows of the comparison table; None if they are the same.
+    anchor : (m,) origin of ``synthesis`` in the rows of the comparison; None: zero.
     coordinates : column of the comparison table (axis, t_s, angle_deg, s_mm, x_mm, y_mm) → its (m,) values.
     """
 
@@ -82,14 +85,14 @@ class Block:
     repeats: int = 1
     labels: np.ndarray | None = None
     symmetries: Array | None = None
-    untold: Array | None = None
+    unidentified: Array | None = None
     alike: Array | None = None
     slow: Mapping[str, Array] = field(default_factory=dict)
     patterns: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def error(self) -> Array:
-        """Standard error of ``measured`` less predicted, (n,), be it the run's own or shared by repeats."""
+        """Standard error of ``measured`` less predicted, (n,): the run's own and the one repeats share."""
         return self.sigma if self.alike is None else np.hypot(self.sigma, self.alike)
 
     def to_rows(self, values: Array) -> Array:
@@ -97,13 +100,13 @@ class Block:
         return values if self.synthesis is None else self.synthesis @ values
 
     def compared(self, values: Array) -> Array:
-        """Express a vector of the fit's basis, (n,), as rows of the comparison table, anchor and all."""
+        """Express a vector of the fit's basis, (n,), as rows of the comparison table, with the anchor."""
         rows = self.to_rows(values)
         return rows if self.anchor is None else self.anchor + rows
 
 
 class Model(Protocol):
-    """A frozen dataclass made of parts that predicts blocks; effects replace or wrap its parts."""
+    """A frozen dataclass of parts that predicts blocks; effects replace or wrap its parts."""
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -117,25 +120,25 @@ class Model(Protocol):
     def design(self, block: Block, nuisance: Array, beta: Array | None) -> tuple[Array, Array]:
         """Matrix ``X`` (n, p) and offset (n,), SI: the prediction is ``offset + X @ beta``.
 
-        A model that is not linear in the base parameters is so about ``beta`` (None: not known yet).
+        A model that is not linear in the base parameters is linearised about ``beta`` (None: not known yet).
         """
         ...
 
 
 @runtime_checkable
 class Limited(Protocol):
-    """A model that has no prediction for some values of its parameters, only something to search on by."""
+    """A model without a valid prediction for some values of its parameters, where only a search may go."""
 
     def beyond(self, block: Block, beta: Array) -> str:
-        """Why it has none for a block, in words that follow the run's name; empty: it has one."""
+        """Reason why the prediction of a block is not valid, in words after the run's name; or empty."""
         ...
 
 
 @dataclass(frozen=True)
 class Made:
-    """A row of the run table as it would be made: like that of run ``like``, but for some settings.
+    """A proposed row of the run table: the row of run ``like`` with some settings changed.
 
-    ``times``: columns whose number is so many times as large; ``given``: columns with another value.
+    ``times``: columns whose number is multiplied by a factor; ``given``: columns with another value.
     """
 
     like: str
@@ -147,9 +150,9 @@ class Made:
 class Proposal:
     """Runs that could be made next.
 
-    ``words``: what they are, for the report. ``blocks`` hold the setting of each run as it would be made;
-    their ``measured`` is that of a run like it, for the size of the signal alone. ``made``: the row of the
-    run table of each block; empty where they are no runs of the run table (a load test, a record in the air).
+    ``words`` describe them in the report. ``blocks`` hold the setting of each proposed run; their
+    ``measured`` is that of a similar run and only gives the size of the signal. ``made``: the row of the run
+    table of each block; empty if they are no runs of the run table (a load test, a record in the air).
     """
 
     words: str
@@ -165,15 +168,14 @@ class Problem:
     ----------
     observable : one of the contract's names (force, joint_force, deformation, waviness, flatness, lobes).
     unit : unit of the comparison table, with ``si`` its size in SI.
-    base : the base model, told of what the manifest declares and of nothing else.
+    base : the base model, which contains what the manifest declares and nothing else.
     blocks : all blocks, in the order of cutting.
-    scatter : (p,) relative run-to-run standard deviation of each base parameter: prior of what repeats tell.
+    scatter : (p,) relative run-to-run standard deviation of each base parameter: a prior for the repeats.
     systematic : relative error that all runs may share because the base model's inputs do (a force estimate,
-        a gauge); an effect must change the prediction by more than twice this to be told from it.
-    notes : sentences on what this problem had to leave out or assume, for the report.
-    feasible : runs that could be made next, among which the loop looks for the one that would tell most.
-    basis_unit : unit of what blocks measure, where it is not that of the comparison (torques, compared as
-        forces).
+        a gauge); an effect must change the prediction by more than twice this error to be identified.
+    notes : sentences for the report on what this problem had to omit or assume.
+    feasible : runs that could be made next, among which the loop searches for the most informative one.
+    basis_unit : unit of the blocks, if it differs from that of the comparison (torques, compared as forces).
     """
 
     observable: str
@@ -191,10 +193,14 @@ class Problem:
         """Return the blocks that have one of ``roles``."""
         return tuple(block for block in self.blocks if block.role in roles)
 
+    def handled_by(self, handler: Handler[Result]) -> Result:
+        """Let a handler do with the problem what it does with those whose measurements are samples."""
+        return handler.sampled(self)
+
 
 @dataclass(frozen=True)
 class BaseFit:
-    """The base model as identified, for an observable to write as identified quantities.
+    """The identified base model, from which an observable writes its identified quantities.
 
     ``beta`` (p,) in SI with its ``covariance`` (p, p); ``dof`` are run-level degrees of freedom (for
     Student's t); ``nuisance`` holds each block's nonlinear unknowns by run.
@@ -208,13 +214,17 @@ class BaseFit:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why an observable, or a quantity, cannot be had from this batch.
+    """Why an observable, or a quantity, cannot be identified from this batch.
 
     Attributes
     ----------
-    reason : which key, table or file it lacks. moot : whether nothing in the batch would be changed by it, so
-        that it is not missed.
+    reason : which key, table or file is missing. moot : whether it would change nothing in the batch, so that
+        the report need not mention it.
     """
 
     reason: str
     moot: bool = False
+
+    def handled_by(self, handler: Handler[Result]) -> Result:
+        """Let a handler do what it does where an observable cannot be had."""
+        return handler.refused(self)

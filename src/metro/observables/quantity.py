@@ -10,8 +10,8 @@ from metro.units import JSON
 def quantity(value: float, sd: float, unit: str, dof: float = math.inf) -> JSON:
     """Return ``{"value", "ci95", "unit"}``, the interval by Student's t with ``dof`` degrees of freedom.
 
-    ``value`` and ``sd`` are in ``unit``. A value or a deviation that is not finite is written as null: it is
-    not known.
+    ``value`` and ``sd`` are in ``unit``. A value or a deviation that is not finite is unknown, and is written
+    as null.
     """
     from scipy.stats import t
 

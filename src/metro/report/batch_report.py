@@ -9,6 +9,7 @@ from metro.report.document import Cover, compile_pdf
 from metro.report.results import Results
 from metro.report.sections.causes import upstream, with_causes
 from metro.report.sections.comparison import comparison
+from metro.report.sections.contradictions import with_contradictions
 from metro.report.sections.identification import identification
 from metro.report.sections.loop import loop
 from metro.report.sections.provenance import provenance
@@ -25,7 +26,7 @@ from metro.report.sections.terms import terms
 def batch_report(results: Results) -> bytes:
     """Return the report as a PDF; the same bytes for the same results."""
     sections = [
-        with_flags(with_causes(summary(results), results), results),
+        with_contradictions(with_flags(with_causes(summary(results), results), results), results),
         setup(results),
         quality(results),
         published(results),
@@ -40,5 +41,5 @@ def batch_report(results: Results) -> bytes:
         provenance(results),
     ]
     cover = Cover(results.title, results.batch.name, f"metro {__version__}")
-    first, second, *rest = (section for section in sections if section is not None)
-    return compile_pdf(cover, [first, replace(second, page=True), *rest])
+    first, second, *others = (section for section in sections if section is not None)
+    return compile_pdf(cover, [first, replace(second, page=True), *others])

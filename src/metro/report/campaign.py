@@ -8,16 +8,16 @@ from collections.abc import Mapping
 import pandas as pd
 
 from metro import __version__
+from metro.observables.catalogue import names, title
 from metro.report.content import Bullets, Item, Paragraph, Picture, Section, Table
 from metro.report.document import Cover, compile_pdf
 from metro.report.figures import verdicts as figures
 from metro.report.numbers import listing, number, words
 from metro.report.parameters import effect_words
 from metro.report.phrases import plain
-from metro.report.results import OBSERVABLES, title
 from metro.report.sections import findings
 from metro.report.sections.memory import memory_section
-from metro.report.sections.standings import largest_rests, rankings
+from metro.report.sections.standings import largest_residuals, rankings
 from metro.report.sections.trust import HOLDS
 from metro.report.sections.verdict import STATUS, change, error_text, known_interval, next_words
 from metro.units import JSON, printed
@@ -49,7 +49,7 @@ def campaign_table(verdicts: Mapping[str, JSON], failed: Mapping[str, str] | Non
     Parameters
     ----------
     verdicts : content of ``verdict.json`` by batch.
-    failed : batches without a result, and why: a row each, of status ``failed`` with the reason as its error.
+    failed : batches without a result, and why: each has a row of status ``failed`` with the reason as error.
     """
     rows = [_row(batch, name, entry) for batch, name, entry in _entries(verdicts)]
     blank = dict.fromkeys(TEXT, "")
@@ -69,8 +69,8 @@ def campaign_report(
 ) -> bytes:
     """Return the campaign's summary as a PDF; the same bytes for the same results.
 
-    ``memory``: content of ``memory.json``; ``failed``: batches without a result, and why; ``links``: where
-    the report of each batch is, as seen from the summary.
+    ``memory``: content of ``memory.json``; ``failed``: batches without a result, and why; ``links``: path to
+    the report of each batch, relative to the summary.
     """
     cover = Cover(TITLE, f"{len(verdicts)} batches", f"metro {__version__}")
     return compile_pdf(cover, campaign_sections(verdicts, identified, memory, failed), links or {})
@@ -82,7 +82,7 @@ def campaign_sections(
     memory: JSON | None = None,
     failed: Mapping[str, str] | None = None,
 ) -> list[Section]:
-    """Return what the summary says, for whatever it is set in."""
+    """Return the sections of the summary, for the PDF and for the page."""
     entries = _entries(verdicts)
     nexts = _nexts(entries)
     return [
@@ -91,35 +91,35 @@ def campaign_sections(
             "Verdicts", [Paragraph(_overview(verdicts), "verdict"), *_verdicts(entries), *_pictures(entries)]
         ),
         *([Section("What to measure next", [Bullets(nexts)])] if nexts else []),
-        *largest_rests(entries),
+        *largest_residuals(entries),
         *rankings(identified),
         *memory_section(memory or {}),
-        Section("What could not be told", _untold(entries, identified)),
+        Section("What could not be told", _undetermined(entries, identified)),
     ]
 
 
 def _nexts(entries: list[tuple[str, str, JSON]]) -> list[str]:
-    """Say what to measure next, what verdicts ask for first, and what several ask for once."""
+    """Say what to measure next: what verdicts need comes first, and what several ask for is said once."""
     alike: dict[tuple[bool, str, str], list[str]] = {}
     for batch, name, entry in entries:
-        if told := next_words(entry):
-            alike.setdefault((entry.get("status") in HOLDS, title(name), told), []).append(batch)
+        if text := next_words(entry):
+            alike.setdefault((entry.get("status") in HOLDS, title(name), text), []).append(batch)
     ranked = sorted(alike.items(), key=lambda item: item[0][0])
-    return [f"{listing(batches)}, {name}: {told}" for (_, name, told), batches in ranked]
+    return [f"{listing(batches)}, {name}: {text}" for (_, name, text), batches in ranked]
 
 
 def _failed(failed: Mapping[str, str]) -> list[Section]:
-    """List the batches that have no result, with what stopped each: nothing below is of them."""
+    """List the batches without a result, with the reason of each; the other sections omit them."""
     if not failed:
         return []
     lines = {batch: why.splitlines() for batch, why in failed.items()}
     rows = [
         [
             batch,
-            "; ".join(told[:MOST_LINES])
-            + (f"; and {len(told) - MOST_LINES} more" * (len(told) > MOST_LINES)),
+            "; ".join(reasons[:MOST_LINES])
+            + (f"; and {len(reasons) - MOST_LINES} more" * (len(reasons) > MOST_LINES)),
         ]
-        for batch, told in sorted(lines.items())
+        for batch, reasons in sorted(lines.items())
     ]
     one = len(failed) == 1
     text = f"{len(failed)} {'batch' if one else 'batches'} failed; the summary is of the others."
@@ -128,7 +128,7 @@ def _failed(failed: Mapping[str, str]) -> list[Section]:
 
 
 def _entries(verdicts: Mapping[str, JSON]) -> list[tuple[str, str, JSON]]:
-    order = {name: i for i, name in enumerate(OBSERVABLES)}
+    order = {name: i for i, name in enumerate(names())}
     return [
         (batch, name, entry)
         for batch, verdict in sorted(verdicts.items())
@@ -197,10 +197,10 @@ def _verdicts(entries: list[tuple[str, str, JSON]]) -> list[Item]:
 
 
 def _pictures(entries: list[tuple[str, str, JSON]]) -> list[Item]:
-    told = [c for b, n, e in entries if (c := change(f"{b}: {title(n)}", e)) is not None]
+    rows = [c for b, n, e in entries if (c := change(f"{b}: {title(n)}", e)) is not None]
     items: list[Item] = []
-    for start in range(0, len(told), PER_FIGURE):
-        part = told[start : start + PER_FIGURE]
+    for start in range(0, len(rows), PER_FIGURE):
+        part = rows[start : start + PER_FIGURE]
         alt = "; ".join(f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in part)
         figure = figures.changes(part, "error on held-out runs (% of the signal)")
         items.append(
@@ -209,18 +209,18 @@ def _pictures(entries: list[tuple[str, str, JSON]]) -> list[Item]:
     return items
 
 
-def _untold(entries: list[tuple[str, str, JSON]], identified: Mapping[str, JSON]) -> list[Item]:
-    told = []
+def _undetermined(entries: list[tuple[str, str, JSON]], identified: Mapping[str, JSON]) -> list[Item]:
+    sentences = []
     for batch, name, entry in entries:
         row = _row(batch, name, entry)
         if row["rivals"]:
-            told.append(f"{batch}, {title(name)}: {row['rivals']} cannot be told apart.")
+            sentences.append(f"{batch}, {title(name)}: {row['rivals']} cannot be told apart.")
         if row["unexplained"]:
-            told.append(f"{batch}, {title(name)}: unexplained rest, {plain(row['unexplained'])}.")
+            sentences.append(f"{batch}, {title(name)}: unexplained rest, {plain(row['unexplained'])}.")
         if row["status"] == "insufficient":
-            told.append(f"{batch}, {title(name)}: too few runs to tell.")
+            sentences.append(f"{batch}, {title(name)}: too few runs to tell.")
     missing = _missing(identified)
-    items: list[Item] = [Bullets(told)] if told else [Paragraph("Every residual was told.")]
+    items: list[Item] = [Bullets(sentences)] if sentences else [Paragraph("Every residual was told.")]
     if missing:
         caption = "What was not identified, and why."
         items.append(Table(["reason", "not identified", "batches"], missing, caption, [2, 1.8, 2.6]))
@@ -228,14 +228,14 @@ def _untold(entries: list[tuple[str, str, JSON]], identified: Mapping[str, JSON]
 
 
 def _missing(identified: Mapping[str, JSON]) -> list[list[str]]:
-    """Return a row for each reason, with the quantities and the batches that it holds for."""
+    """Return a row for each reason, with the quantities and the batches that it concerns."""
     batches: dict[tuple[str, str], list[str]] = {}
     for batch, content in sorted(identified.items()):
         for name, reason in (content.get("not_identified") or {}).items():
-            told = re.sub(r"^cell \S+: ", "", str(reason)).rstrip(".")
-            batches.setdefault((told, title(str(name))), []).append(batch)
+            text = re.sub(r"^cell \S+: ", "", str(reason)).rstrip(".")
+            batches.setdefault((text, title(str(name))), []).append(batch)
     alike: dict[tuple[str, str], list[str]] = {}
-    for (reason, name), found in batches.items():
-        alike.setdefault((reason, ", ".join(found)), []).append(name)
+    for (reason, name), quantities in batches.items():
+        alike.setdefault((reason, ", ".join(quantities)), []).append(name)
     ranked = sorted(alike.items(), key=lambda item: -len(item[0][1].split(", ")))
-    return [[reason, listing(names), found] for (reason, found), names in ranked]
+    return [[reason, listing(names), quantities] for (reason, quantities), names in ranked]

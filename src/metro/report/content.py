@@ -1,4 +1,4 @@
-"""What a report is made of: sections of paragraphs, tables and figures. The template knows how they look."""
+"""The parts of a report: sections of paragraphs, tables and figures. The template decides on their look."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Table:
     caption : one sentence.
     widths : relative widths of the columns; 0 for "as wide as the text".
     numeric : columns that are set flush right.
-    strong : rows that stand out.
+    strong : rows that are emphasised.
     faint : columns that are set in grey.
     small : set in small type (hashes, long lists).
     tall : with room to write in by hand.
@@ -56,7 +56,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure with its caption, and in words what it shows for those who do not see it."""
+    """A figure with its caption, and with a description for readers who cannot see it."""
 
     figure: Figure
     caption: str
@@ -89,13 +89,13 @@ Item = Simple | Abreast
 
 
 def abreast(items: Sequence[Table | Picture]) -> list[Item]:
-    """Put items in pairs side by side."""
+    """Arrange items in pairs, side by side."""
     return [Abreast(items[i : i + 2]) for i in range(0, len(items), 2)]
 
 
 @dataclass(frozen=True)
 class Section:
-    """A titled part of the report; ``page`` starts it on a page of its own."""
+    """A titled part of the report; ``page`` starts it on a new page."""
 
     title: str
     items: Sequence[Item]

@@ -1,4 +1,4 @@
-"""Settings of a cut: their columns in the table of runs, and what one calls them."""
+"""Settings of a cut: their columns in the table of runs, and their names."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Setting(NamedTuple):
-    """A setting that is a number: its name, its unit, and how a value is read as a property of the cut."""
+    """A numeric setting: its name, its unit, and the words after its value as a property of the cut."""
 
     name: str
     unit: str

@@ -1,9 +1,10 @@
-"""From sections to a PDF: content as JSON and SVG beside a Typst template, set as PDF/A-2a and PDF/UA-1."""
+"""From sections to a PDF: content as JSON and SVG for a Typst template, set as PDF/A-2a and PDF/UA-1."""
 
 from __future__ import annotations
 
 import json
 import re
+import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -12,19 +13,26 @@ from pathlib import Path
 from types import MappingProxyType
 
 from metro.batch.writing import writing
+from metro.report import glyphs
 from metro.report.content import Abreast, Item, Picture, Section
 from metro.report.style import to_svg
 from metro.units import JSON
 
 TEMPLATE = "report.typ"
-# the space between a number and its unit, at which no line is to end
+# The space between a number and its unit, at which no line may end.
 UNIT = re.compile(r"(?<=\d) (?=(?:%|[mµ]?m|[km]?N|k?Hz|rpm|m?s|kg|N/\w+)(?![^\W\d]))")
+HEADER = 90  # characters of a title that fit beside the subtitle at the head of a page
+# Sets each of some characters alone, as the report would.
+PROBE = """#set document(title: "probe")
+#set text(font: "Libertinus Serif", lang: "en")
+#for character in json("content.json") [#text(character) #parbreak()]
+"""
 NO_LINKS: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class Cover:
-    """What stands at the head and the foot of a report."""
+    """Texts at the head and the foot of a report."""
 
     title: str
     subtitle: str
@@ -32,32 +40,96 @@ class Cover:
 
 
 def compile_pdf(cover: Cover, sections: Sequence[Section], links: Mapping[str, str] = NO_LINKS) -> bytes:
-    """Set the sections in the report's template; ``links``: where a name in a column ``batch`` leads to.
+    """Set the sections in the report's template; ``links``: the targets of names in a column ``batch``.
 
-    The bytes depend on nothing but the arguments and the installed versions: fonts are those of the Typst
-    package, and the time stamp is fixed.
+    The bytes depend only on the arguments and the installed versions: fonts are those of the Typst package,
+    and the time stamp is fixed.
     """
     import typst
 
     with tempfile.TemporaryDirectory() as name, writing(Path(name) / TEMPLATE):
         folder = Path(name)
-        template = folder / TEMPLATE
-        template.write_bytes((files("metro.report") / "templates" / TEMPLATE).read_bytes())
         content = {
             "cover": asdict(cover),
+            "header": _cut(cover.title),
             "links": dict(links),
             "sections": [_section(s, i, folder) for i, s in enumerate(sections)],
         }
-        told = UNIT.sub("\u00a0", json.dumps(content, ensure_ascii=False))
-        (folder / "content.json").write_text(told, encoding="utf-8")
-        pdf: bytes = typst.compile(
-            str(template),
-            root=str(folder),
-            pdf_standards=["a-2a", "ua-1"],
-            timestamp=0,
-            ignore_system_fonts=True,
-        )
+        text = UNIT.sub("\u00a0", json.dumps(content, ensure_ascii=False))
+        (folder / "title.txt").write_text(cover.title, encoding="utf-8")
+        (folder / TEMPLATE).write_bytes((files("metro.report") / "templates" / TEMPLATE).read_bytes())
+        try:
+            return _compiled(folder, text)
+        except typst.TypstError:
+            fonts, missing = found_for(frozenset(text))
+            if not fonts and not missing:
+                raise
+            return _compiled(folder, glyphs.without(text, missing), fonts)
+
+
+def _compiled(folder: Path, content: str, fonts: Sequence[Path] = ()) -> bytes:
+    """Set the template in a folder with its content, a JSON text, and further fonts.
+
+    Raises
+    ------
+    typst.TypstError
+        Some characters are in no font, for example.
+    """
+    import typst
+
+    (folder / "content.json").write_text(content, encoding="utf-8")
+    further = folder / "fonts"
+    further.mkdir(exist_ok=True)
+    for place, font in enumerate(fonts):
+        shutil.copyfile(font, further / f"{place}{font.suffix}")
+    pdf: bytes = typst.compile(
+        str(folder / TEMPLATE),
+        root=str(folder),
+        font_paths=[str(further)],
+        pdf_standards=["a-2a", "ua-1"],
+        timestamp=0,
+        ignore_system_fonts=True,
+    )
     return pdf
+
+
+def found_for(characters: frozenset[str]) -> tuple[tuple[Path, ...], frozenset[str]]:
+    """Find fonts of this machine for characters that the report's own lack, and the characters that none has.
+
+    A font is used only where the report, set with it, is an archival PDF still.
+    """
+    lacked = _not_set(characters, ())
+    fonts: tuple[Path, ...] = ()
+    for font in glyphs.fonts_with(lacked):
+        if not _not_set(frozenset("metro"), (*fonts, font)):
+            fonts = (*fonts, font)
+    return fonts, _not_set(lacked, fonts)
+
+
+def _not_set(characters: frozenset[str], fonts: Sequence[Path]) -> frozenset[str]:
+    """Return those of some characters that cannot be set with the own and further fonts, by halving."""
+    import typst
+
+    if not characters:
+        return frozenset()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / TEMPLATE).write_text(PROBE, encoding="utf-8")
+        try:
+            _compiled(folder, json.dumps(sorted(characters)), fonts)
+        except typst.TypstError:
+            if len(characters) == 1:
+                return characters
+        else:
+            return frozenset()
+    some = sorted(characters)
+    halves = some[: len(some) // 2], some[len(some) // 2 :]
+    return frozenset[str]().union(*(_not_set(frozenset(half), fonts) for half in halves))
+
+
+def _cut(title: str) -> str:
+    """Return a title as it fits into one line at the head of a page."""
+    return title if len(title) <= HEADER else f"{title[:HEADER]} …"
 
 
 def _section(section: Section, place: int, folder: Path) -> JSON:

@@ -12,7 +12,7 @@ SKEW = 0.25
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Write a number of unknown uncertainty to ``digits`` significant digits; one that is not known as –."""
+    """Write a number of unknown uncertainty to ``digits`` significant digits; an unknown number is –."""
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0:
@@ -27,7 +27,7 @@ def with_interval(value: float | None, ci95: list[float | None] | None) -> str:
     """Write a value and its 95 % interval, both rounded to two digits of the interval's half width.
 
     A symmetric interval reads ``9.80 ± 0.30``, a skewed one ``9.80 (9.70 … 10.40)``; large and small numbers
-    share a power of ten. Without an interval the value stands alone, to three digits.
+    share a power of ten. Without an interval there is only the value, to three digits.
     """
     known = [x for x in ci95 or () if x is not None and math.isfinite(x)]
     if value is None or not math.isfinite(value) or len(known) != 2 or known[1] <= known[0]:
@@ -44,8 +44,8 @@ def with_interval(value: float | None, ci95: list[float | None] | None) -> str:
 def quantity(entry: Any, with_unit: bool = True) -> str:
     """Write a quantity of ``identified.json`` or ``verdict.json``: value ± half its 95 % interval, unit.
 
-    A list of them (per axis, per tooth) is written item by item, the unit last; what is no quantity
-    (``joint: 3``) as it is.
+    A list of them (per axis, per tooth) is written item by item, with the unit last. A value that is no
+    quantity (``joint: 3``) is written unchanged.
     """
     if isinstance(entry, list) and entry and all(isinstance(item, dict) for item in entry):
         first = [quantity(item, with_unit=False) for item in entry[:-1]]
@@ -71,7 +71,7 @@ def percent(share: float | None) -> str:
 
 
 def probability(p: float | None) -> str:
-    """Write a probability or p-value; next to 0 and 1 only that it is."""
+    """Write a probability or p-value; close to 0 and to 1 only the bound is written."""
     if p is None or not math.isfinite(p):
         return "–"
     return "< 0.001" if p < 0.001 else "> 0.999" if p > 0.999 else f"{p:.3f}"
@@ -83,18 +83,18 @@ def words(name: str) -> str:
 
 
 def listing(items: list[str]) -> str:
-    """Join as one would say it: a; a and b; a, b and c."""
+    """Join items as in a sentence: a; a and b; a, b and c."""
     return " and ".join(filter(None, [", ".join(items[:-1]), *items[-1:]]))
 
 
 def _power(size: float) -> int:
-    """Power of ten to take out of large and of small numbers."""
+    """Power of ten to factor out of large and of small numbers."""
     exponent = math.floor(math.log10(size))
     return 0 if -4 <= exponent < 6 else exponent
 
 
 def _fixed(value: float, place: int) -> str:
-    """Round to ``place`` decimals; to tens, hundreds, … where it is negative."""
+    """Round to ``place`` decimals; to tens, hundreds, … if it is negative."""
     return _minus(f"{round(value, place):.{max(0, place)}f}")
 
 

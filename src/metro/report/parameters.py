@@ -1,4 +1,4 @@
-"""The parameters of an effect in words: named without unit, axis by axis, none where nothing is told."""
+"""The parameters of an effect in words: named without unit, axis by axis, none where not identified."""
 
 from __future__ import annotations
 
@@ -7,24 +7,29 @@ from typing import Any
 from metro.report.numbers import quantity, words
 from metro.units import JSON, printed_name
 
-PER_AXIS = ("dynamometer_resonance", "charge_drift", "charge_leak")  # their lists are those of x, y and z
-NOT_TOLD = "not told"  # an interval that holds whatever the parameter may be
+AXES = "xyz"
+NOT_IDENTIFIED = "not told"  # an interval that holds whatever the parameter may be
 
 
 def effect_words(effect: JSON) -> str:
     """Name an effect with its parameters: tool runout (radius 9.80 ± 0.30 µm, angle 112.0 ± 3.0°)."""
     name = str(effect["effect"])
-    told = ", ".join(parameter_words(name, effect.get("parameters") or {}))
-    return f"{words(name)} ({told})" if told else words(name)
+    parameters = ", ".join(parameter_words(effect))
+    return f"{words(name)} ({parameters})" if parameters else words(name)
 
 
-def parameter_words(effect: str, parameters: JSON) -> list[str]:
-    """Return each parameter with its value and interval: radius 9.80 ± 0.30 µm."""
+def parameter_words(effect: JSON) -> list[str]:
+    """Return each parameter of an effect with its value and interval: radius 9.80 ± 0.30 µm.
+
+    Parameters
+    ----------
+    effect : ``parameters`` by name, and ``per``, what each entry of a list is of.
+    """
     return [
         "all joints"
         if (name, entry) == ("joint", "all")
         else f"{parameter_name(name, entry)} {parameter_value(effect, entry)}".strip()
-        for name, entry in parameters.items()
+        for name, entry in (effect.get("parameters") or {}).items()
     ]
 
 
@@ -37,20 +42,21 @@ def parameter_name(name: str, entry: Any) -> str:
     return printed_name(name, str(entry.get("unit") or ""))
 
 
-def parameter_value(effect: str, entry: Any) -> str:
-    """Return a value with its interval and unit; of a list, that of each axis or item."""
+def parameter_value(effect: JSON, entry: Any) -> str:
+    """Return a value of an effect with its interval and unit; of a list, that of each axis or item."""
     if not isinstance(entry, list):
-        return quantity(entry) if _told(entry) else NOT_TOLD
-    told = [_told(item) for item in entry]
-    if not any(told):
-        return NOT_TOLD
-    marks = [f"{axis} " for axis in "xyz"] if effect in PER_AXIS and len(entry) == 3 else [""] * len(entry)
-    last = max(i for i, one in enumerate(told) if one)
+        return quantity(entry) if _identified(entry) else NOT_IDENTIFIED
+    identified = [_identified(item) for item in entry]
+    if not any(identified):
+        return NOT_IDENTIFIED
+    of_axes = "axis" in (effect.get("per") or ()) and len(entry) == len(AXES)
+    marks = [f"{axis} " for axis in AXES] if of_axes else [""] * len(entry)
+    last = max(i for i, one in enumerate(identified) if one)
     return ", ".join(
-        mark + (quantity(item, with_unit=i == last) if one else NOT_TOLD)
-        for i, (mark, item, one) in enumerate(zip(marks, entry, told, strict=True))
+        mark + (quantity(item, with_unit=i == last) if one else NOT_IDENTIFIED)
+        for i, (mark, item, one) in enumerate(zip(marks, entry, identified, strict=True))
     )
 
 
-def _told(entry: Any) -> bool:
+def _identified(entry: Any) -> bool:
     return not isinstance(entry, dict) or entry.get("told", True)

@@ -1,4 +1,4 @@
-"""What is left over, in the words of an engineer: offsets, once per revolution, tooth passing."""
+"""The residual in an engineer's words: offsets, once per revolution, tooth passing."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from metro.units import JSON
 MOST_ORDERS = 6
 
 
-def rest_words(entries: Sequence[JSON], teeth: int) -> str:
-    """Describe the significant places of a signature, the largest kind first; empty where there are none.
+def residual_words(entries: Sequence[JSON], teeth: int) -> str:
+    """Describe the significant places of a signature, the largest kind first; empty if there are none.
 
     Parameters
     ----------
     entries : ``{"axis", "label", "excess", "relative", "significant"}`` of ``loop.json``; labels are ``all``,
-        ``mean`` and ``order <k>`` of the spindle. teeth : of the cutter; 0 where not known.
+        ``mean`` and ``order <k>`` of the spindle. teeth : of the cutter; 0 if not known.
     """
     kinds: dict[str, list[JSON]] = {}
     for entry in entries:
         if entry.get("significant"):
             kinds.setdefault(_kind(str(entry["label"]), teeth), []).append(entry)
     ranked = sorted(kinds.items(), key=lambda item: -max(_size(entry) for entry in item[1]))
-    return "; ".join(_kind_words(kind, found) for kind, found in ranked)
+    return "; ".join(_kind_words(kind, same_kind) for kind, same_kind in ranked)
 
 
 def sentence(text: str) -> str:
@@ -37,7 +37,7 @@ def sentence(text: str) -> str:
 def plain(text: str) -> str:
     """Return a sentence of ``verdict.json`` with the places of a signature in words.
 
-    What an experiment is to describe is left out: the report says it next to it.
+    The part on what an experiment is to describe is removed, because the report says it next to it.
     """
     text = re.sub(r"(, to describe what is left):.*$", r"\1", text)
     text = re.sub(r"(?<=\d )um\b", "µm", text)
@@ -53,10 +53,10 @@ def _kind(label: str, teeth: int) -> str:
     steady, slow, how = label.partition(", ")
     if slow:
         return f"{'the mean' if steady == 'mean' else _kind(steady, teeth)}, changing {how}"
-    found = re.fullmatch(r"order (\d+)", label)
-    if found is None:
+    match = re.fullmatch(r"order (\d+)", label)
+    if match is None:
         return {"all": "throughout", "mean": "a constant offset"}.get(label, label)
-    order = int(found[1])
+    order = int(match[1])
     if teeth > 1 and order % teeth == 0:
         return "at the tooth passing and its harmonics"
     if order == 1:

@@ -8,17 +8,8 @@ from dataclasses import dataclass, field
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.observables.catalogue import names, title
 from metro.units import JSON
-
-OBSERVABLES = ("force", "joint_force", "deformation", "waviness", "flatness", "lobes")
-TITLES = {
-    "force": "cutting force",
-    "joint_force": "tip force from joint torques",
-    "deformation": "deformation of the wall",
-    "waviness": "waviness of the wall",
-    "flatness": "flatness of the face",
-    "lobes": "stability",
-}
 
 
 @dataclass(frozen=True)
@@ -51,11 +42,11 @@ class Results:
 
     def verdicts(self) -> dict[str, JSON]:
         """Verdict by observable, in the contract's order; of one held-out condition without intervals."""
-        found = self.verdict.get("observables") or {}
+        entries = with_facts(self.verdict, self.loop).get("observables") or {}
         return {
-            name: self._honest(found[name])
-            for name in [*OBSERVABLES, *sorted(set(found) - set(OBSERVABLES))]
-            if name in found
+            name: self._honest(entries[name])
+            for name in [*names(), *sorted(set(entries) - set(names()))]
+            if name in entries
         }
 
     def _honest(self, entry: JSON) -> JSON:
@@ -66,8 +57,8 @@ class Results:
         errors = {when: {**error, "ci95": None} for when in ("before", "after") if (error := entry.get(when))}
         return {**entry, **errors}
 
-    def told(self, observable: str) -> JSON:
-        """Return what the loop tells of an observable; empty where it tells nothing."""
+    def loop_record(self, observable: str) -> JSON:
+        """Return what the loop recorded of an observable; empty where it recorded nothing."""
         entry: JSON = (self.loop.get("observables") or {}).get(observable) or {}
         return entry
 
@@ -82,9 +73,20 @@ class Results:
         return None if rows.empty else rows.fillna({"after": rows["before"]}).reset_index(drop=True)
 
 
-def title(observable: str) -> str:
-    """Name of an observable as an engineer says it."""
-    return TITLES.get(observable, observable.replace("_", " "))
+def with_facts(verdict: JSON, loop: JSON) -> JSON:
+    """Return the content of verdict.json, each effect with what ``effects`` of loop.json says of it."""
+    facts = loop.get("effects") or {}
+    entries = {
+        name: {**entry, "effects": [with_own(effect, "effect", facts) for effect in entry["effects"]]}
+        for name, entry in (verdict.get("observables") or {}).items()
+        if entry.get("effects")
+    }
+    return {**verdict, "observables": {**(verdict.get("observables") or {}), **entries}}
+
+
+def with_own(entry: JSON, key: str, facts: JSON) -> JSON:
+    """Return an entry with the facts about the effect that ``key`` of it names."""
+    return {**(facts.get(str(entry[key])) or {}), **entry}
 
 
 def heading(observable: str) -> str:

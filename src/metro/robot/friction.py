@@ -60,7 +60,7 @@ class Friction:
     Attributes
     ----------
     value : (n, 3) Coulomb, viscous, offset. sd : (n, 3) their standard errors. dof : of their t-intervals.
-    residual : (m, n) what is left of the torques, N m. noise : (n,) its rms where joints move.
+    residual : (m, n) of the torques, N m. noise : (n,) its rms where joints move.
     forward, backward : (n,) bool, whether a joint turns that way fast enough at all.
     """
 
@@ -86,8 +86,8 @@ class Curvature:
 
     Attributes
     ----------
-    size : (n,) rms over the log of the curve that no straight line takes up, N m. sd : (n,) its standard
-    error.
+    size : (n,) rms over the log of the curve beyond its best straight line, N m. sd : (n,) its standard
+        error.
     f : (n,) F statistic of the two further terms. p : (n,) its probability if they were zero.
     """
 
@@ -101,8 +101,8 @@ def of_idle_runs(dh: Array, runs: Sequence[tuple[Array, Array, Array]]) -> tuple
     """Identify the friction of idle runs, so slow that beside it the motors only carry the arm's weight.
 
     Joints that keep their direction throughout have no Coulomb friction of their own in such logs, since it
-    looks like weight: theirs is NaN. Where a joint has just turned round, its gear still winds up and the
-    filter still sees the step: these samples count as standstill.
+    is confounded with weight: theirs is NaN. Where a joint has just turned round, its gear still winds up and
+    the filter still sees the step: these samples count as standstill.
 
     Parameters
     ----------
@@ -163,15 +163,15 @@ def identify(log: Motion, others: Array) -> Friction:
     ValueError
         If no joint moves.
     """
-    found = _fit(log, _friction_columns(log), others)
+    fit = _fit(log, _friction_columns(log), others)
     n = log.rate.shape[1]
     own = slice(0, len(TERMS) * n)
-    sd = np.sqrt(np.diag(found.covariance(own)))
-    value, sd = (np.where(found.known[own], x, np.nan) for x in (found.value[own], sd))
+    sd = np.sqrt(np.diag(fit.covariance(own)))
+    value, sd = (np.where(fit.known[own], x, np.nan) for x in (fit.value[own], sd))
     shape = (len(TERMS), n)
-    dof = len(found.replicates) - 1
+    dof = len(fit.replicates) - 1
     ways = [np.asarray((log.moving & (sign * log.rate > 0)).any(axis=0)) for sign in (1, -1)]
-    return Friction(value.reshape(shape).T, sd.reshape(shape).T, dof, found.residual, found.noise, *ways)
+    return Friction(value.reshape(shape).T, sd.reshape(shape).T, dof, fit.residual, fit.noise, *ways)
 
 
 def curvature(log: Motion, others: Array) -> Curvature:
@@ -183,19 +183,19 @@ def curvature(log: Motion, others: Array) -> Curvature:
     from scipy.stats import f as f_distribution
 
     bends, n = _bends(log), log.rate.shape[1]
-    found = _fit(log, np.concatenate([bends, _friction_columns(log)], axis=-1), others)
-    stretches, rows = len(found.replicates), []
+    fit = _fit(log, np.concatenate([bends, _friction_columns(log)], axis=-1), others)
+    stretches, rows = len(fit.replicates), []
     for j in range(n):
         pair = slice(2 * j, 2 * j + 2)
         moving = log.moving[:, j]
-        if not (moving.any() and found.known[pair].all()):
+        if not (moving.any() and fit.known[pair].all()):
             rows.append((math.nan,) * 4)
             continue
         curve = bends[moving, j, pair]
         line = np.column_stack([log.direction[moving, j], log.rate[moving, j]])
         curve = curve - line @ np.linalg.lstsq(line, curve, rcond=None)[0]
         gram = curve.T @ curve / len(curve)
-        value, covariance = found.value[pair], found.covariance(pair)
+        value, covariance = fit.value[pair], fit.covariance(pair)
         size = math.sqrt(value @ gram @ value)
         slope = gram @ value / size
         statistic = float(value @ np.linalg.solve(covariance, value)) / 2 * (stretches - 2) / (stretches - 1)

@@ -1,4 +1,4 @@
-"""What load tests tell of the joints of an arm: which they do not see, and which test would tell most next.
+"""Which joint compliances the load tests of an arm identify, how well, and which test would add most.
 
 A design of experiments in the joints' compliances: with relative unknowns (each compliance in units of its
 own size) the information of tests is the sum of theirs, M = Σ Aᵀ A / σ², and what is known of a joint is the
@@ -15,21 +15,22 @@ from metro.robot.kinematics import Arm
 from metro.robot.statics import joint_contributions
 from metro.units import DEG, Array
 
-LEAST_SHARE = 1e-6  # smallest eigenvalue of the information, of the largest, that still tells something
+LEAST_SHARE = 1e-6  # eigenvalue of the information, over the largest, below which it counts as zero
 ANYTHING = 1.0  # relative standard deviation of a joint of which nothing is known
 STEPS = (-30.0 * DEG, 30.0 * DEG)  # of one joint at a time, around the poses that were measured
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """What tests tell of n joints.
+class Identifiability:
+    """How well tests identify the compliances of n joints.
 
     Attributes
     ----------
-    relative : (n,) standard deviation of each compliance over its size; infinite where nothing tells it.
-    singular : (n,) relative standard deviations of the combinations of joints that are told independently,
-        best first. directions : (n, n), rows are these combinations.
-    unseen : (k, n) those of them that the tests do not tell at all.
+    relative : (n,) standard deviation of each compliance over its size; infinite where it is not
+    identifiable.
+    singular : (n,) relative standard deviations of the combinations of joints that are estimated
+        independently, best first. directions : (n, n), rows are these combinations.
+    unseen : (k, n) those of them that the tests do not identify at all.
     """
 
     relative: Array
@@ -39,12 +40,12 @@ class Told:
 
     @property
     def worst(self) -> int:
-        """Index of the joint that is told least."""
+        """Index of the joint with the largest relative standard deviation."""
         return int(np.argmax(np.where(np.isfinite(self.relative), self.relative, np.inf)))
 
     @property
     def condition(self) -> float:
-        """Condition number of the design: worst over best told combination."""
+        """Condition number of the design: deviation of the worst over that of the best combination."""
         return float(self.singular[-1] / self.singular[0])
 
 
@@ -77,8 +78,8 @@ def information(contributions: Array, measured: np.ndarray, sigma: Array, size: 
     return np.asarray(rows.T @ rows)
 
 
-def told(matrix: Array) -> Told:
-    """Return what an information matrix (n, n) on relative compliances tells."""
+def assess(matrix: Array) -> Identifiability:
+    """Return how well tests of an information matrix (n, n) on relative compliances identify the joints."""
     eigenvalue, vector = np.linalg.eigh(matrix)
     eigenvalue, vector = np.maximum(eigenvalue[::-1], 0.0), vector[:, ::-1].T
     seen = eigenvalue > LEAST_SHARE * eigenvalue.max(initial=0.0)
@@ -86,7 +87,7 @@ def told(matrix: Array) -> Told:
     singular[seen] = 1.0 / np.sqrt(eigenvalue[seen])
     relative = np.sqrt((vector[seen] ** 2 / eigenvalue[seen, None]).sum(axis=0))
     relative[(vector[~seen] ** 2).sum(axis=0) > LEAST_SHARE] = np.inf
-    return Told(relative, singular, vector, vector[~seen])
+    return Identifiability(relative, singular, vector, vector[~seen])
 
 
 def around(poses: Array, steps: tuple[float, ...] = STEPS) -> Array:
@@ -103,11 +104,11 @@ def directions() -> Array:
 
 
 def next_load(arm: Arm, matrix: Array, poses: Array, *, newton: float, sigma: float, size: Array) -> NextLoad:
-    """Return the load test, among those of every direction in every pose, that tells the worst joint best.
+    """Return the load test, of every direction in every pose, that best identifies the worst joint.
 
     Joints of which nothing is known count as known to ±100 %: a joint's variance is then finite, and lower
     after a test that sees it. Of tests that are as good for that joint (within a tenth) the one with the
-    largest determinant is taken (D-optimal): it tells the others most.
+    largest determinant is taken (D-optimal): it adds most about the others.
 
     Parameters
     ----------

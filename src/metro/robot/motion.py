@@ -1,7 +1,7 @@
 """The motion and the torques of an arm from its log, filtered alike, for models that need speeds.
 
-A joint that stands still resists by anything between minus and plus its Coulomb friction: which samples
-tell a direction at all is said with them.
+A joint that stands still resists by anything between minus and plus its Coulomb friction. Therefore the
+samples whose direction is known are marked.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from metro.units import Array
 
-STEPS = 10.0  # encoder steps per sample that tell a speed, and with it its sign, to 10 %
+STEPS = 10.0  # encoder steps per sample that give a speed, and with it its sign, to 10 %
 BANDWIDTH = 0.1  # of the samples' rate, at most
 PER_PERIOD = 5  # samples that are kept per period of the cut-off
 EDGE = 2.0  # periods of the cut-off at both ends, where the filter has to guess what lies beyond
@@ -23,8 +23,8 @@ EDGE = 2.0  # periods of the cut-off at both ends, where the filter has to guess
 class Motion:
     """An arm's motion and torques, low-passed alike and thinned; (m, n) each, rad and N m.
 
-    ``direction`` is the sign of the speed, passed through the same filter as the torque; ``moving`` tells
-    where a joint moves fast enough for its encoder to say which way.
+    ``direction`` is the sign of the speed, passed through the same filter as the torque; ``moving`` marks
+    where a joint moves fast enough for its encoder to show which way.
     """
 
     angle: Array

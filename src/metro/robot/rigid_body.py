@@ -27,7 +27,7 @@ def torque_regressor(dh: Array, q: Array, rate: Array, acceleration: Array) -> A
     Returns
     -------
     Array
-        (m, n, 10 n), N m per unit of parameter. Not all of them can be told apart from torques.
+        (m, n, 10 n), N m per unit of parameter. Torques do not identify all of them.
     """
     frames = link_frames(dh, q)
     axis, origin, turn = frames[:, :-1, :3, 2], frames[:, :, :3, 3], frames[:, 1:, :3, :3]

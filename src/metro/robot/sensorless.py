@@ -7,7 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
-from metro.signals import kalman
+from metro.signals import kalman, kalman_uneven
+from metro.signals.intervals import uneven
 from metro.signals.waves import variance as variance_of_waves
 from metro.signals.waves import waves
 from metro.units import Array
@@ -28,7 +29,7 @@ class TipForce:
     ----------
     force : (m, 3) N, frame of the Jacobian that was given.
     covariance : (m, 3, 3) N².
-    condition : (m,) of the weighted system; the larger, the less one direction of the force rests on.
+    condition : (m,) of the weighted system; the larger, the less well one direction of the force is known.
     used : (n,) joints that the force was solved from.
     solve : (m, 3, n) N/(N m): force = solve @ torque.
     """
@@ -48,6 +49,7 @@ class Torques:
     ----------
     level, variance : (m, n) N m, N² m². noise, drift : (n,) R and Q.
     whiteness : (n,) probability of the innovations' autocorrelation in white noise.
+    interval : (m - 1,) between the bins, over the median; None where all are even.
     """
 
     level: Array
@@ -55,10 +57,15 @@ class Torques:
     noise: Array
     drift: Array
     whiteness: Array
+    interval: Array | None = None
 
 
 def noise_of_bins(
-    cut: Array, idle: Array, samples: tuple[float, float], turning: Array | None = None
+    cut: Array,
+    idle: Array,
+    samples: tuple[float, float],
+    turning: Array | None = None,
+    intervals: tuple[Array | None, Array | None] = (None, None),
 ) -> Array:
     """R (n,), N² m², of the difference of two logs averaged over bins.
 
@@ -69,13 +76,28 @@ def noise_of_bins(
     ----------
     cut, idle : (m, n), (m', n) torques sample by sample. samples : in a bin, of the cut and of the idle run.
     turning : (m', n) sign of the joints' speeds in the idle run: friction steps where a joint turns round.
+    intervals : of the two logs, where their clocks are not even.
     """
-    shaken = np.maximum(kalman.noise_variance(cut) / kalman.noise_variance(idle), 1.0)
-    return np.asarray(kalman.long_run_variance(idle, turning) * (shaken / samples[0] + 1.0 / samples[1]))
+    of_cut, of_idle = (
+        kalman.noise_variance(log, interval) for log, interval in zip((cut, idle), intervals, strict=True)
+    )
+    shaken = np.maximum(of_cut / of_idle, 1.0)
+    coloured = kalman.long_run_variance(idle, turning, interval=intervals[1])
+    return np.asarray(coloured * (shaken / samples[0] + 1.0 / samples[1]))
 
 
-def smoothed_torque(difference: Array, noise: Array) -> Torques:
-    """Smooth torques (m, n), N m, by the random walk whose drift is likeliest given their noise R (n,)."""
+def smoothed_torque(difference: Array, noise: Array, place: Array | None = None) -> Torques:
+    """Smooth torques (m, n), N m, by the random walk whose drift is likeliest given their noise R (n,).
+
+    ``place`` (m,) along the path, of logs whose clock is not even: where samples were lost, bins are missing,
+    and the walk goes on without them.
+    """
+    interval = None if place is None else uneven(place)
+    if interval is not None:
+        drift = kalman_uneven.likeliest_drift(difference, noise, interval)
+        probability = kalman.whiteness(kalman_uneven.innovations(difference, noise, drift, interval))
+        smoothed = kalman_uneven.smooth(difference, noise, drift, interval)
+        return Torques(*smoothed, noise, drift, probability, interval)
     drift = kalman.likeliest_drift(difference, noise)
     probability = kalman.whiteness(kalman.innovations(difference, noise, drift))
     return Torques(*kalman.smooth(difference, noise, drift), noise, drift, probability)
@@ -110,7 +132,7 @@ def choose_joints(
     Raises
     ------
     ValueError
-        If fewer than three joints pass, or no three of them tell the three axes apart, or only 30 times
+        If fewer than three joints pass, or no three of them determine the three axes, or only 30 times
         worse than all joints do.
     """
     passing = np.flatnonzero(index >= least)
@@ -155,7 +177,7 @@ def tip_force(
     Raises
     ------
     ValueError
-        If fewer than three joints pass, or those that do cannot tell the three axes apart.
+        If fewer than three joints pass, or those that do cannot determine the three axes.
     """
     use = choose_joints(jacobian_at_tip, variance, index, least)
     weighted = jacobian_at_tip * use / variance[:, None, :]
@@ -167,7 +189,7 @@ def tip_force(
 
 
 def mean_force(
-    found: TipForce,
+    tip_force: TipForce,
     torques: Torques,
     steady: np.ndarray,
     repeatability: Array | float = 0.0,
@@ -180,10 +202,15 @@ def mean_force(
     along; ``wander`` (n,) N² m² the level of the slow noise that changes along the path
     (:mod:`metro.signals.waves`), which the smoother takes for the cut's.
     """
-    weights = np.where(steady[:, None, None], found.solve, 0.0) / steady.sum()
-    covariance = kalman.combined_covariance(np.moveaxis(weights, 1, 0), torques.noise, torques.drift)
+    weights = np.where(steady[:, None, None], tip_force.solve, 0.0) / steady.sum()
+    levels = np.moveaxis(weights, 1, 0), torques.noise, torques.drift
+    covariance = (
+        kalman.combined_covariance(*levels)
+        if torques.interval is None
+        else kalman_uneven.combined_covariance(*levels, torques.interval)
+    )
     common = weights.sum(axis=0) * repeatability
     slow = waves(weights)
     spread = variance_of_waves(len(weights), np.zeros(1), np.broadcast_to(wander, weights.shape[2]))
     covariance = covariance + np.einsum("man,mn,mbn->ab", slow[1:], spread[1:], slow[1:])
-    return found.force[steady].mean(axis=0), covariance + common @ common.T
+    return tip_force.force[steady].mean(axis=0), covariance + common @ common.T

@@ -74,7 +74,7 @@ def stiffness_at(stations: Stations, place: Array) -> EndStiffness:
 
 
 def leave_one_out(stations: Stations) -> Array:
-    """Return the rms relative error, (3,), of each station's stiffness as told by all others.
+    """Return the rms relative error, (3,), of each station's stiffness predicted from all others.
 
     Stations on the hull are extrapolated to, so this is no less than the error between stations. NaN for a
     single station.
@@ -83,22 +83,22 @@ def leave_one_out(stations: Stations) -> Array:
 
 
 def left_out(stations: Stations) -> Array:
-    """Relative error (n, 3) of each station's stiffness as told by all others; NaN for a single station."""
+    """Relative error (n, 3) of each station's stiffness predicted from all others; NaN for a single one."""
     count = len(stations.place)
     if count < 2:
         return np.full((count, 3), np.nan)
     others = [np.arange(count) != i for i in range(count)]
-    told = [
+    predicted = [
         _interpolated(
-            Stations(stations.place[rest], stations.stiffness[rest]), stations.place[i], stations.method
+            Stations(stations.place[kept], stations.stiffness[kept]), stations.place[i], stations.method
         )
-        for i, rest in enumerate(others)
+        for i, kept in enumerate(others)
     ]
-    return np.asarray(np.stack(told) / stations.stiffness - 1.0)
+    return np.asarray(np.stack(predicted) / stations.stiffness - 1.0)
 
 
 def leave_one_out_interval(stations: Stations, level: float = 0.95) -> Array:
-    """Interval (2, 3) of the rms leave-one-out error: of the few stations that it rests on.
+    """Interval (2, 3) of the rms leave-one-out error, by the few stations that it is estimated from.
 
     χ² of normal errors, with the freedoms that the surface leaves: the stations less the four of a plane
     (less in the directions that they do not span), and no fewer than one.

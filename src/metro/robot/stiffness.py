@@ -11,13 +11,13 @@ from metro.units import Array
 
 @dataclass(frozen=True, eq=False)
 class Compliances:
-    """What load tests say of the joints.
+    """The compliances of the joints, estimated from load tests.
 
     Attributes
     ----------
     value : (n,) rad/(N m), none negative; 0 for a joint that the tests do not see.
     covariance : (n, n); infinite variance, no covariance, for a joint that the tests do not see.
-    seen : (n,) whether the tests tell this joint from the others at all.
+    seen : (n,) whether the tests distinguish this joint from the others at all.
     scatter : standard deviation of a displacement about the fit, m (where errors differ: of one of relative
         size one); ``dof`` its degrees of freedom.
     """
@@ -48,7 +48,7 @@ def joint_compliances(
     Raises
     ------
     ValueError
-        If the measured components are too few to tell any joint from the others, or none were found.
+        If the measured components are too few to identify any joint, or there are none.
     """
     from scipy.optimize import nnls
 
@@ -76,12 +76,11 @@ def joint_compliances(
 
 
 def distinguishable(design: Array, least: float = 1e-3) -> np.ndarray:
-    """Which columns (n,) of a design matrix (m, n) its rows can tell from all others.
+    """Which columns (n,) of a design matrix (m, n) its rows distinguish from all others.
 
-    A column is told apart when it is not zero (a joint whose axis passes every line of force) and when the
-    part of
-    it that no combination of the others makes is above ``least`` of it (a joint that always moves with
-    another).
+    A column is distinguishable when it is not zero (a joint whose axis passes every line of force) and when
+    the part of it that no combination of the others makes is above ``least`` of it (a joint that always moves
+    with another).
     """
     norms = np.linalg.norm(design, axis=0)
     present = norms > 1e-6 * norms.max(initial=0.0)

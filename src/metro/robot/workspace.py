@@ -76,9 +76,9 @@ def principal_sd(arm: Arm, q: Array, compliance: Array, covariance: Array) -> Ar
     ----------
     covariance : (n, n) of the compliances, (rad/(N m))².
     """
-    found = ellipsoid(arm, q, compliance)
-    gain = np.einsum("...ap,...ai->...pi", found.axes, tip_jacobian(arm, q)) ** 2
-    gain = gain * found.principal[..., None] ** 2
+    stiffness = ellipsoid(arm, q, compliance)
+    gain = np.einsum("...ap,...ai->...pi", stiffness.axes, tip_jacobian(arm, q)) ** 2
+    gain = gain * stiffness.principal[..., None] ** 2
     return np.asarray(np.sqrt(np.einsum("...pi,ij,...pj->...p", gain, covariance, gain)))
 
 
@@ -105,8 +105,8 @@ def reach(arm: Arm, start: Array, place: Array) -> Array:
         moved, turned = _error(arm, q, target, held)
         q = q + _newton(arm, q, np.concatenate([moved, turned], axis=1))
     moved, turned = _error(arm, q, place, held)
-    found = (np.linalg.norm(moved, axis=1) < REACHED) & (np.linalg.norm(turned, axis=1) < ALIGNED)
-    return np.where(found[:, None], q, np.nan)
+    reached = (np.linalg.norm(moved, axis=1) < REACHED) & (np.linalg.norm(turned, axis=1) < ALIGNED)
+    return np.where(reached[:, None], q, np.nan)
 
 
 def stiffness_map(arm: Arm, start: Array, place: Array, compliance: Array) -> Map:

@@ -73,18 +73,28 @@ def projected(points: Array, reference: Array) -> tuple[Array, Array]:
     return np.where(beyond, np.nan, place), away[pick]
 
 
-def align(s_first: Array, first: Array, s_second: Array, second: Array, width: float = 1 * MM) -> Aligned:
+def align(
+    s_first: Array,
+    first: Array,
+    s_second: Array,
+    second: Array,
+    width: float = 1 * MM,
+    *,
+    gaps: bool = False,
+) -> Aligned:
     """Average two logs over common bins along the path, and bring the means to the middles of the bins.
 
     The samples of a bin lie about its middle as the log happens to have been taken, up to half a sample's
-    step off: the slope between the neighbouring means takes them there. Channels that are linear in s come
-    out exact.
+    step from it: the slope between the neighbouring means takes them there. Channels that are linear in s
+    come out exact.
 
     Parameters
     ----------
     s_first, s_second : (n,), (n',) position of each sample along the path, m; NaN for those that do not
         count.
     first, second : (n, k), (n', k) channels. width : of a bin, m.
+    gaps : whether one of the logs lost samples. A bin at the end of a gap holds a few samples at one side of
+        it: bins with less than half of the usual number are left out then.
 
     Raises
     ------
@@ -108,8 +118,16 @@ def align(s_first: Array, first: Array, s_second: Array, second: Array, width: f
         for s, channels in ((s_first, first), (s_second, second))
     )
     full = np.isfinite(mean_1).all(axis=1) & np.isfinite(mean_2).all(axis=1)
+    if gaps:
+        full &= _filled(s_first, edges) & _filled(s_second, edges)
     middle = (edges[:-1] + width / 2)[full]
     return Aligned(middle, _at(middle, mean_1[full]), _at(middle, mean_2[full]))
+
+
+def _filled(s: Array, edges: Array) -> np.ndarray:
+    """Find the bins (m,) with at least half as many samples as is usual where there are any."""
+    count = np.histogram(s[np.isfinite(s)], edges)[0]
+    return np.asarray(count >= 0.5 * np.median(count[count > 0]))
 
 
 def _at(middle: Array, means: Array) -> Array:

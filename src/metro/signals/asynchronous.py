@@ -33,11 +33,11 @@ class Windows:
     revolutions : of a window.
     speed : mean, rev/s.
     order : (b,) of the spindle.
-    on_order : (b,) whether a bin cannot be told from an order of the spindle, or is not looked at.
-    rest, periodic, whole : (w, b) power of what does not repeat, of what does, and of both together, over all
-        channels, weighted like a displacement.
-    floor : (w, b) noise floor of ``rest``.
-    p_value : (w, b) probability that noise alone makes as much as ``rest``.
+    on_order : (b,) whether a bin is indistinguishable from an order of the spindle, or is not looked at.
+    residual, periodic, whole : (w, b) power of the part that does not repeat, of the part that does, and of
+        both together, over all channels, weighted like a displacement.
+    floor : (w, b) noise floor of ``residual``.
+    p_value : (w, b) probability that noise alone makes as much as ``residual``.
     asynchronous : (revolutions of the record, samples per revolution, channels) what does not repeat.
     time : (samples,) s, of these samples.
     """
@@ -46,7 +46,7 @@ class Windows:
     speed: float
     order: Array
     on_order: np.ndarray
-    rest: Array
+    residual: Array
     periodic: Array
     whole: Array
     floor: Array
@@ -56,22 +56,22 @@ class Windows:
 
     @property
     def peaks(self) -> np.ndarray:
-        """Return where (w, b) the rest stands out of the noise, off the orders and not beside one."""
+        """Return where (w, b) the residual is significant, at no order of the spindle and not beside one."""
         tests = max(int(np.count_nonzero(~self.on_order)), 1)
-        beside = _highest(np.where(self.on_order, self.rest, 0.0), 2 * _LEAK)
-        return np.asarray((self.p_value < SIGNIFICANCE / tests) & ~self.on_order & (self.rest > beside))
+        beside = _highest(np.where(self.on_order, self.residual, 0.0), 2 * _LEAK)
+        return np.asarray((self.p_value < SIGNIFICANCE / tests) & ~self.on_order & (self.residual > beside))
 
     @property
     def energy_ratio(self) -> Array:
         """Share (w,) of the peaks' energy in that of peaks and periodic part together."""
         around = (_highest(self.peaks.astype(float), _LEAK) > 0.0) & ~self.on_order
-        energy = np.where(around, np.maximum(self.rest - self.floor, 0.0), 0.0).sum(axis=1)
+        energy = np.where(around, np.maximum(self.residual - self.floor, 0.0), 0.0).sum(axis=1)
         total = energy + self.periodic[:, np.round(self.order) > 0.0].sum(axis=1)
         return np.asarray(energy / np.where(total > 0.0, total, 1.0))
 
 
 def windows(time: Array, angle: Array, signal: Array, *, differentiated: int = 0) -> Windows:
-    """Part the record of a steady cut into what repeats with the spindle and the rest, window by window.
+    """Part the record of a steady cut into what repeats with the spindle and the residual, window by window.
 
     Parameters
     ----------
@@ -88,22 +88,22 @@ def windows(time: Array, angle: Array, signal: Array, *, differentiated: int = 0
     length, starts = _cut(len(even))
     speed, order, looked_at, on_order = _axis(time, angle, even.shape[1], length)
     repeated = _repeated(even)
-    rest, periodic, whole = (
+    residual, periodic, whole = (
         np.stack([power_of(part[start : start + length], len(order)) for start in starts])
         for part in (even - repeated, repeated, even)
     )
-    floor = _floor(rest, on_order, length)
+    floor = _floor(residual, on_order, length)
     weight = looked_at * np.where(looked_at, order, 1.0) ** (-2.0 * differentiated)
     return Windows(
         length,
         speed,
         order,
         on_order,
-        rest=rest.sum(axis=2) * weight,
+        residual=residual.sum(axis=2) * weight,
         periodic=periodic.sum(axis=2) * weight,
         whole=whole.sum(axis=2) * weight,
         floor=floor.sum(axis=2) * weight,
-        p_value=_p_value(rest, floor),
+        p_value=_p_value(residual, floor),
         asynchronous=even - repeated,
         time=even_times(time, angle),
     )
@@ -145,7 +145,7 @@ def _per_turn(time: Array, angle: Array) -> int:
 def _axis(
     time: Array, angle: Array, per_turn: int, length: int
 ) -> tuple[float, Array, np.ndarray, np.ndarray]:
-    """Speed, rev/s; orders (b,) of a window's bins; which are looked at, and which are not off the orders."""
+    """Speed, rev/s; orders (b,) of a window's bins; which are looked at, and which lie on an order."""
     speed = float((angle[-1] - angle[0]) / (2.0 * math.pi * (time[-1] - time[0])))
     rate = (len(time) - 1) / (time[-1] - time[0])
     order = np.arange(int(min(_BAND * rate / speed, 0.5 * per_turn) * length) + 1) / length
@@ -184,8 +184,8 @@ def power_of(part: Array, bins: int) -> Array:
     return np.asarray(2.0 * np.abs(spectrum) ** 2 / (len(flat) * float(taper @ taper)))
 
 
-def _floor(rest: Array, on_order: np.ndarray, length: int) -> Array:
-    """Noise floor (w, b, channels): median of the neighbouring bins off the orders, as a mean of noise.
+def _floor(residual: Array, on_order: np.ndarray, length: int) -> Array:
+    """Noise floor (w, b, channels): median of the neighbouring bins between the orders, as a mean of noise.
 
     Sensors get noisier towards low frequencies: below the first order the floor is taken to rise as 1/f.
     """
@@ -194,19 +194,19 @@ def _floor(rest: Array, on_order: np.ndarray, length: int) -> Array:
     free = np.flatnonzero(~on_order)
     size = int(_NEIGHBOURS * length) | 1
     # one spectrum at a time: for one dimension SciPy has a median whose cost hardly grows with the size
-    each = np.moveaxis(rest[:, free], 1, 2).reshape(-1, len(free))
+    each = np.moveaxis(residual[:, free], 1, 2).reshape(-1, len(free))
     median = np.array([median_filter(one, size, mode="reflect") for one in each])
-    level = np.moveaxis(median.reshape(len(rest), -1, len(free)), 2, 1) / math.log(2.0)
+    level = np.moveaxis(median.reshape(len(residual), -1, len(free)), 2, 1) / math.log(2.0)
     place = np.clip(np.searchsorted(free, np.arange(len(on_order))), 0, len(free) - 1)
     rise = np.maximum(length / np.maximum(np.arange(len(on_order)), 1), 1.0)
-    return np.asarray(np.maximum(level[:, place] * rise[:, None], 1e-12 * rest.max()))
+    return np.asarray(np.maximum(level[:, place] * rise[:, None], 1e-12 * residual.max()))
 
 
-def _p_value(rest: Array, floor: Array) -> Array:
+def _p_value(residual: Array, floor: Array) -> Array:
     """Probability (w, b) of as much power in all channels together, each exponential about its floor."""
     from scipy.special import gammaincc
 
-    return np.asarray(gammaincc(rest.shape[2], (rest / floor).sum(axis=2)))
+    return np.asarray(gammaincc(residual.shape[2], (residual / floor).sum(axis=2)))
 
 
 def _highest(power: Array, reach: int) -> Array:

@@ -1,8 +1,8 @@
 """Chatter in the record of a cut: whether it is there, how sure that is, at what frequency, of what kind.
 
-The energy that stands out of the noise off the spindle's orders is compared with what repeats with the
-spindle, window by window (energy ratio of Caliskan, Kilic and Altintas, 2018, threshold 20 %). It is chatter
-only where it lasts, and where it looks like a vibration that feeds itself.
+The energy above the noise between the spindle's orders is compared with that of the part that repeats with
+the spindle, window by window (energy ratio of Caliskan, Kilic and Altintas, 2018, threshold 20 %). It is
+chatter only where it lasts, and where it has a sign of self-excitation.
 """
 
 from __future__ import annotations
@@ -20,15 +20,16 @@ BEGINS, ENDS = 0.2, 0.1  # energy ratio at which chatter begins, and below which
 # Log-odds of chatter. With a sign that the vibration feeds itself: those of the energy ratio that two windows
 # in a row reach, within LIMITS, the share of the line that keeps one frequency, and that of the windows with
 # side bands. Logistic regression on simulated tests about the boundary of many machines, tools and metals,
-# made and fitted by ``python benchmarks/calibrate_chatter.py``; benchmarks/bench_chatter.py tells others.
-# Without a sign, the odds of energy alone, of an earlier regression that is not part of the command: even at
-# an energy ratio of 46 %, which noise that shakes a mode does not reach. The least shares were chosen.
+# made and fitted by ``python benchmarks/calibrate_chatter.py``; benchmarks/bench_chatter.py tests it on
+# others. Without a sign, the odds of energy alone, of an earlier regression that is not part of the command:
+# even at an energy ratio of 46 %, which noise that shakes a mode does not reach. The least shares were
+# chosen.
 ALONE, PER_LOGIT, PER_KEPT, PER_SIDE_BANDS = 3.27, 1.52, 0.88, 2.68
 UNSEEN, PER_LOGIT_UNSEEN = 0.35, 2.3
 SEEN, SEEN_FAINT = 0.5, 0.7  # least share, of either sign, above and below the ratio at which chatter begins:
 # noise that shakes a mode reaches a tenth of the energy, and keeps to one frequency for two thirds
-LIMITS = (-7.0, -1.0)  # energy ratios of 0.1 % and 27 %: beyond, less or more energy says nothing new
-TINY = 1e-3  # energy ratio below which nothing more is told
+LIMITS = (-7.0, -1.0)  # energy ratios of 0.1 % and 27 %: beyond, the evidence does not change
+TINY = 1e-3  # energy ratio below which the evidence does not change
 ERROR = 0.02  # probability that the answer is wrong however clear the record: 5 of 274 in bench_chatter.py
 UNDECIDED = 0.5
 TOGETHER = 2  # windows in a row that count as evidence
@@ -36,15 +37,15 @@ TOGETHER = 2  # windows in a row that count as evidence
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """What the record of a cut says.
+    """The evidence of chatter in the record of a cut.
 
     Attributes
     ----------
-    probability : that the cut chattered; a half where that cannot be told.
+    probability : that the cut chattered; a half where the record cannot decide it.
     chatter_hz, chatter_sd_hz : frequency and its standard deviation; NaN where no chatter was held.
     kind : "hopf", "flip", "forced" (what vibrates is on the orders of the spindle: no chatter) or "unknown".
-    separable : False where something stands on orders of the spindle that may be chatter or runout.
-    energy_ratio : (w,) share of the energy off the orders, window by window.
+    separable : False where a vibration on orders of the spindle may be chatter or runout.
+    energy_ratio : (w,) share of the energy between the orders, window by window.
     chattering : (w,) windows in which it chattered.
     signs : of "side bands", "growth", "closed curve" those that were seen in three windows.
     """
@@ -74,11 +75,11 @@ def detect(time: Array, angle: Array, signal: Array, teeth: int, *, differentiat
     """
     seen = windows(time, angle, signal, differentiated=differentiated)
     ratio, order = seen.energy_ratio, signs.line(seen)
-    found = _signs(seen, order, teeth)
-    looks = np.any(list(found.values()), axis=0)
-    names = tuple(name for name, mask in found.items() if mask.sum() >= WINDOWS)
+    signs_seen = _signs(seen, order, teeth)
+    looks = np.any(list(signs_seen.values()), axis=0)
+    names = tuple(name for name, mask in signs_seen.items() if mask.sum() >= WINDOWS)
     kept_hz, share = signs.kept_frequency(seen, order)
-    probability = probability_of(evidence(ratio), share, float(found["side bands"].mean()))
+    probability = probability_of(evidence(ratio), share, float(signs_seen["side bands"].mean()))
     if probability > UNDECIDED:
         chattering = held(ratio, looks)
         # too late or too faint to be held: where the line is seen
@@ -89,9 +90,9 @@ def detect(time: Array, angle: Array, signal: Array, teeth: int, *, differentiat
         )
     separable = not signs.locked(seen, teeth)
     beginning = bool(ratio[-1] > BEGINS and looks[-1])  # at the record's end, too late to be sure
-    told = separable and not beginning
+    certain = separable and not beginning
     none = np.zeros(len(ratio), dtype=bool)
-    kind, probability = ("forced", probability) if told else ("unknown", UNDECIDED)
+    kind, probability = ("forced", probability) if certain else ("unknown", UNDECIDED)
     return Detection(probability, math.nan, math.nan, kind, separable, ratio, none, names)
 
 
@@ -127,7 +128,7 @@ def held(ratio: Array, looks: np.ndarray) -> np.ndarray:
 
 
 def evidence(ratio: Array) -> float:
-    """Log-odds of the energy off the orders that are reached in two windows in a row."""
+    """Log-odds of the energy between the orders that are reached in two windows in a row."""
     kept = np.clip(ratio, TINY, 1.0 - TINY)
     together = np.lib.stride_tricks.sliding_window_view(np.log(kept / (1.0 - kept)), TOGETHER)
     return float(together.min(axis=1).max())

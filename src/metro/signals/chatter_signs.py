@@ -1,4 +1,4 @@
-"""What tells chatter from other vibrations: its line, side bands, growth, Poincaré section, and its kind."""
+"""What distinguishes chatter from other vibrations: its line, side bands, growth, Poincaré section, kind."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ _MIXED = 0.03  # of that energy, at the orders that it makes with itself and the
 
 
 def line(seen: Windows) -> Array:
-    """Order (w,) of the strongest line off the orders of the spindle in each window; NaN where there is none.
+    """Order (w,) of the strongest line between the spindle's orders in each window; NaN where there is none.
 
     It is the one that is strongest over all windows, followed through them.
     """
-    energy = np.where(seen.peaks, seen.rest, 0.0)
-    found = np.full(len(energy), math.nan)
+    energy = np.where(seen.peaks, seen.residual, 0.0)
+    order = np.full(len(energy), math.nan)
     place = int(np.argmax(energy.sum(axis=0)))
     near = np.arange(max(place - _NEAR, 1), min(place + _NEAR + 1, energy.shape[1] - 1))
     for window in np.flatnonzero(energy[:, near].any(axis=1)):
         top = int(near[np.argmax(energy[window, near])])
-        found[window] = (top + _between(seen.rest[window, top - 1 : top + 2])) / seen.revolutions
-    return found
+        order[window] = (top + _between(seen.residual[window, top - 1 : top + 2])) / seen.revolutions
+    return order
 
 
 def _between(power: Array) -> float:
@@ -45,7 +45,7 @@ def _between(power: Array) -> float:
 
 
 def side_bands(seen: Windows, order: Array, teeth: int) -> np.ndarray:
-    """Whether peaks stand one and two tooth passings beside the line, in each window (w,)."""
+    """Whether there are peaks one and two tooth passings beside the line, in each window (w,)."""
     beside = np.zeros(len(order), dtype=int)
     for passings in (-2, -1, 1, 2):
         place = np.rint(np.abs(order + passings * teeth) * seen.revolutions)
@@ -58,7 +58,7 @@ def side_bands(seen: Windows, order: Array, teeth: int) -> np.ndarray:
 
 def growing(seen: Windows) -> bool:
     """Whether the energy of the peaks rises all along, by a factor of four at least."""
-    energy = np.where(seen.peaks, seen.rest, 0.0).sum(axis=1)
+    energy = np.where(seen.peaks, seen.residual, 0.0).sum(axis=1)
     return _rises(energy)
 
 
@@ -114,8 +114,8 @@ def locked(seen: Windows, teeth: int) -> bool:
     """Whether something other than runout may vibrate at orders of the spindle that are none of the teeth's.
 
     It does where the energy there has grown; or where one order carries half of all, is not the first, which
-    runout excites most, and mixes with itself and the teeth, as no ringing of an instrument does. Its
-    frequency does not tell it from runout or uneven teeth.
+    runout excites most, and mixes with itself and the teeth, as no ringing of an instrument does. By its
+    frequency alone it is confounded with runout or uneven teeth.
     """
     nearest = np.round(seen.order).astype(int)
     on = seen.on_order & (nearest > 0)
@@ -133,7 +133,7 @@ def locked(seen: Windows, teeth: int) -> bool:
 
 
 def kind_of(order: float, teeth: int, width: float) -> str:
-    """Bifurcation that a chatter frequency, as an order of the spindle, tells: "flip" or "hopf".
+    """Bifurcation that a chatter frequency, as an order of the spindle, indicates: "flip" or "hopf".
 
     A flip repeats after two tooth passings: it lies half-way between the orders of the teeth, to within
     ``width`` (orders).
@@ -144,15 +144,15 @@ def kind_of(order: float, teeth: int, width: float) -> str:
 def at_a_robot_mode(chatter_hz: Array, rpm: Array, mode_hz: Array, damping: Array) -> np.ndarray:
     """Whether runs (n,) chattered in a mode of the robot whatever the speed, as mode coupling does.
 
-    Regenerative chatter follows the speed of the spindle along each lobe. That takes several runs to tell:
-    three at least, their speeds a fifth apart, and all within a hundredth of one frequency, which lies within
-    the half-power band of a mode between 5 and 300 Hz.
+    Regenerative chatter follows the speed of the spindle along each lobe. To distinguish the two takes
+    several runs: three at least, their speeds a fifth apart, and all within a hundredth of one frequency,
+    which lies within the half-power band of a mode between 5 and 300 Hz.
 
     Parameters
     ----------
     chatter_hz : (n,) Hz; NaN where a run did not chatter. rpm : (n,) speeds. mode_hz, damping : (m,).
     """
-    found = np.zeros(len(chatter_hz), dtype=bool)
+    matches = np.zeros(len(chatter_hz), dtype=bool)
     for frequency, zeta in zip(mode_hz, damping, strict=True):
         if not LOW_HZ[0] <= frequency <= LOW_HZ[1]:
             continue
@@ -160,5 +160,5 @@ def at_a_robot_mode(chatter_hz: Array, rpm: Array, mode_hz: Array, damping: Arra
         if np.count_nonzero(near) < LOW_RUNS or rpm[near].max() < LOW_SPEEDS * rpm[near].min():
             continue
         if chatter_hz[near].std() <= LOW_SCATTER * frequency:
-            found |= near
-    return found
+            matches |= near
+    return matches

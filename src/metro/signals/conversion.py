@@ -41,10 +41,10 @@ def receptance(frequency_hz: Array, frf: ComplexArray, unit: str) -> ComplexArra
     factor, order = _RESPONSES[unit]
     if order == 0:
         return factor * frf
-    found = np.full(frf.shape, np.nan, np.complex128)
+    converted = np.full(frf.shape, np.nan, np.complex128)
     moving = frequency_hz != 0.0
-    found[moving] = factor * frf[moving] / (2.0j * np.pi * frequency_hz[moving]) ** order
-    return found
+    converted[moving] = factor * frf[moving] / (2.0j * np.pi * frequency_hz[moving]) ** order
+    return converted
 
 
 def driving_point_sign(frequency_hz: Array, frf: ComplexArray) -> float:

@@ -3,43 +3,62 @@
 x_{k+1} = x_k + w, z_k = x_k + v, per channel ([K] §3.1); R = var v is known, Q = var w comes from the signal.
 Cosines over the record are the eigenvectors of the walk's steps, D Dᵀ with l_j = 2 − 2 cos(π j / n), so that
 over a whole record the likelihood (parts j are independent, of variance R + Q / l_j), the smoothed level
-(part j times Q / (Q + R l_j)) and its covariance are closed forms: no loop over time.
+(part j times Q / (Q + R l_j)) and its covariance are closed forms: no loop over time. They hold for
+samples at even intervals; :mod:`metro.signals.kalman_uneven` has the others.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Iterator
+from itertools import repeat
 
 import numpy as np
 
+from metro.signals.intervals import places
+from metro.signals.quality import GAP
 from metro.units import Array
 
 RATIOS = (1e-8, 1e4)
 
 
-def noise_variance(signal: Array) -> Array:
-    """Variance (k,) of the white noise on smooth channels (n, k): a sixth of the second differences'."""
-    return np.asarray((np.diff(signal, n=2, axis=0) ** 2).mean(axis=0) / 6.0)
+def noise_variance(signal: Array, interval: Array | None = None) -> Array:
+    """Variance (k,) of the white noise on smooth channels (n, k): a sixth of the second differences'.
+
+    At uneven intervals (:func:`metro.signals.intervals.uneven`) the differences are those from the straight
+    line between the two neighbours, each over its own gain, and those beside a gap are left out: the channel
+    may do anything there.
+    """
+    if interval is None:
+        return np.asarray((np.diff(signal, n=2, axis=0) ** 2).mean(axis=0) / 6.0)
+    before, after = interval[:-1], interval[1:]
+    share = (before / (before + after))[:, None]
+    from_line = signal[1:-1] - (1.0 - share) * signal[:-2] - share * signal[2:]
+    near = np.maximum(before, after) <= GAP
+    return np.asarray((from_line**2 / (1.0 + share**2 + (1.0 - share) ** 2))[near].mean(axis=0))
 
 
-def long_run_variance(signal: Array, steps: Array | None = None, longest: int = 100) -> Array:
+def long_run_variance(
+    signal: Array, steps: Array | None = None, longest: int = 100, interval: Array | None = None
+) -> Array:
     """Return n times the variance (k,) of a mean of n samples of coloured noise on smooth channels (m, k).
 
     An autoregression of first order by Whittle's likelihood over the periods up to ``longest`` samples: what
     is slower is the channel itself (friction and gravity along a path), and so is what follows ``steps`` (m,
-    k) (friction that turns round). For white noise it is the variance.
+    k) (friction that turns round). For white noise it is the variance. ``interval`` (m - 1,) of samples that
+    are not even: the channel is slow over time, its noise goes on from sample to sample.
     """
     from scipy.fft import dct
 
     count = len(signal)
-    place = np.linspace(-1.0, 1.0, count)
+    place = places(count, interval)
     slow = np.vander(place, min(4, count))
-    rest = np.empty_like(signal, dtype=float)
+    residual = np.empty_like(signal, dtype=float)
     for k, channel in enumerate(signal.T):
         known = slow if steps is None else np.column_stack([slow, steps[:, k]])
-        rest[:, k] = channel - known @ np.linalg.lstsq(known, channel, rcond=1e-9)[0]
+        residual[:, k] = channel - known @ np.linalg.lstsq(known, channel, rcond=1e-9)[0]
     first = max(1, 2 * count // longest)
-    power = dct(rest, axis=0, norm="ortho")[first:] ** 2
+    power = dct(residual, axis=0, norm="ortho")[first:] ** 2
     cosine = np.cos(np.pi * np.arange(first, count) / count)
     persistence = np.linspace(-0.5, 0.98, 149)[:, None]
     # the band's mean of 1 − 2 ρ cos + ρ² times the power, and of its logarithm (smooth: on some of the band)
@@ -66,24 +85,26 @@ def log_likelihood(signal: Array, measurement: Array, drift: Array) -> Array:
     energy = step[1:, None] * part[1:] ** 2
     slow = step[1:, None] * measurement
     constant = 0.5 * (len(signal) - 1) * math.log(2 * math.pi)
-    found = np.empty(drift.shape)
+    likelihood = np.empty(drift.shape)
     for row, q in enumerate(drift):  # one at a time: all at once would not fit the cache
         spread = slow + q
-        found[row] = -0.5 * (np.log(spread) + energy / spread).sum(axis=0) - constant
-    return found
+        likelihood[row] = -0.5 * (np.log(spread) + energy / spread).sum(axis=0) - constant
+    return likelihood
 
 
-def likeliest_drift(signal: Array, measurement: Array) -> Array:
+def likeliest_drift(
+    signal: Array, measurement: Array, likelihood: Callable[[Array, Array, Array], Array] = log_likelihood
+) -> Array:
     """Q (k,) that makes the channels (n, k) likeliest, given R (k,): searched over Q/R from 1e-8 to 1e4."""
     lowest, highest = math.log(RATIOS[0]), math.log(RATIOS[1])
     grid = np.tile(np.linspace(lowest, highest, 29)[:, None], (1, signal.shape[1]))
     half = grid[1] - grid[0]
     for _ in range(3):
-        best = np.argmax(log_likelihood(signal, measurement, np.exp(grid) * measurement), axis=0)
+        best = np.argmax(likelihood(signal, measurement, np.exp(grid) * measurement), axis=0)
         centre = np.take_along_axis(grid, best[None], axis=0)
         grid = centre + np.linspace(-half, half, 15)
         half = half / 7.0
-    best = np.argmax(log_likelihood(signal, measurement, np.exp(grid) * measurement), axis=0)
+    best = np.argmax(likelihood(signal, measurement, np.exp(grid) * measurement), axis=0)
     return np.asarray(np.exp(np.take_along_axis(grid, best[None], axis=0)[0]) * measurement)
 
 
@@ -116,32 +137,48 @@ def combined_covariance(weights: Array, measurement: Array, drift: Array) -> Arr
 
 def innovations(signal: Array, measurement: Array, drift: Array) -> Array:
     """Return what each sample brings beyond the filter's forecast, (n - 1, k), in standard deviations."""
+    return standardised(signal, measurement, repeat(drift))
+
+
+def standardised(signal: Array, measurement: Array, drift: Iterable[Array]) -> Array:
+    """Return the innovations (n - 1, k) of :func:`forecasts` over their standard deviations."""
+    scaled = np.empty((len(signal) - 1, signal.shape[1]))
+    for row, (innovation, spread) in enumerate(forecasts(signal, measurement, drift)):
+        scaled[row] = innovation / np.sqrt(spread)
+    return scaled
+
+
+def forecasts(signal: Array, measurement: Array, drift: Iterable[Array]) -> Iterator[tuple[Array, Array]]:
+    """Yield each sample's innovation against the filter's forecast, and its variance, from the second on.
+
+    Parameters
+    ----------
+    signal : (n, k). measurement : (k,) R. drift : for each step Q (k,), or (g, k) of several trials at once.
+    """
     level, variance = signal[0], measurement
-    found = np.empty((len(signal) - 1, signal.shape[1]))
-    for row, z in enumerate(signal[1:]):
-        predicted = variance + drift
+    for z, wander in zip(signal[1:], drift, strict=False):
+        predicted = variance + wander
         spread = predicted + measurement
         innovation = z - level
         gain = predicted / spread
-        found[row] = innovation / np.sqrt(spread)
+        yield innovation, spread
         level = level + gain * innovation
         variance = gain * measurement
-    return found
 
 
-def whiteness(found: Array, lags: int = 10, fitted: int = 1) -> Array:
+def whiteness(values: Array, lags: int = 10, fitted: int = 1) -> Array:
     """Probability (k,) of autocorrelations at least as large in white noise (Ljung & Box 1978).
 
     Parameters
     ----------
-    found : (n, k) innovations. lags : how many, at most a fifth of the samples.
+    values : (n, k) innovations. lags : how many, at most a fifth of the samples.
     fitted : parameters that were fitted to the channel, here its drift.
     """
     from scipy.stats import chi2
 
-    count = len(found)
+    count = len(values)
     lags = max(fitted + 1, min(lags, count // 5))
-    centred = found - found.mean(axis=0)
+    centred = values - values.mean(axis=0)
     power = (centred**2).sum(axis=0)
     r = np.stack([(centred[h:] * centred[:-h]).sum(axis=0) / power for h in range(1, lags + 1)])
     statistic = count * (count + 2) * (r**2 / (count - np.arange(1, lags + 1))[:, None]).sum(axis=0)

@@ -109,8 +109,8 @@ def spindle_speed(time: Array, signal: Array, nominal: float, highest: int) -> t
 
     Parameters
     ----------
-    time : (n,) s. signal : (n, channels). nominal : revolutions per second, off by up to 0.6 %. highest :
-        order.
+    time : (n,) s. signal : (n, channels). nominal : revolutions per second, with an error of up to 0.6 %.
+    highest : order.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def _orders(spectra: ComplexArray) -> Array:
 
 
 def _roughly_gathered(spectra: ComplexArray, middle: Array, trial: Array) -> Array:
-    """Energy at the orders of each speed that is off by ``trial``, (trials,), from one Fourier transform.
+    """Energy at the orders of each speed that differs by ``trial``, (trials,), from one Fourier transform.
 
     It takes the segments as evenly spaced, so that its cost grows with the record as the record does.
     """
@@ -184,8 +184,8 @@ def _speed_deviation(spectra: ComplexArray, middle: Array, shift: float) -> floa
     phase = np.unwrap(np.angle(spectra[:, k, channel] * np.exp(-2j * math.pi * shift * middle * order)))
     centred = middle - middle.mean()
     slope = centred @ phase / (centred @ centred)
-    rest = phase - phase.mean() - slope * centred
-    sd = math.sqrt(rest @ rest / (len(middle) - 2) / (centred @ centred))
+    residual = phase - phase.mean() - slope * centred
+    sd = math.sqrt(residual @ residual / (len(middle) - 2) / (centred @ centred))
     return float(sd / (2.0 * math.pi * order))
 
 

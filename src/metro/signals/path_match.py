@@ -1,7 +1,7 @@
 """Whether two logs belong together: the same path, wholly, at the same speed, by clocks that agree.
 
-What the idle run was not run for it does not tell: every difference is stated with its figure, and logs of
-different places are refused.
+An idle run says nothing about conditions that it does not share with the cut. Every difference is stated
+with its figure, and logs of different places are refused.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from metro.signals.align import LEAST_SHARE, bin_means, projected
 from metro.units import MM, MS, Array
 
 NEAR = 0.5 * MM  # two runs of one programme lie closer than this
-FARTHEST = 10 * MM  # as far as an idle run is lifted off the work; beyond, the arm stands otherwise
+FARTHEST = 10 * MM  # as far as an idle run is lifted off the work; beyond, the arm has another posture
 SAME_SPEED = 0.01  # clocks that are wrong by more than this do not exist
 DRIFT = 1e-4
 WHOLE = 0.98
@@ -49,7 +49,7 @@ class Match:
 
     @property
     def refusal(self) -> str | None:
-        """Why the idle run tells nothing of the cut; None where it does."""
+        """Why the idle run cannot be compared with the cut; None where it can."""
         if self.covered < LEAST_SHARE:
             return (
                 f"the idle run covers {self.covered * self.length / MM:.1f} mm of the "
@@ -64,7 +64,7 @@ class Match:
         return None
 
     def remarks(self, rate: Array, viscous: Array | None = None) -> list[str]:
-        """Say what the two runs do not share, with the error that it implies.
+        """Describe what the two runs do not share, with the error that it implies.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ def _pace(
     first = first + np.gradient(first, s_first) * (s_second - s_first)
     design = np.column_stack([np.ones(len(second)), second])
     (offset, pace), *_ = np.linalg.lstsq(design, first, rcond=None)
-    rest = first - design @ (offset, pace)
-    jitter = float(np.sqrt(rest @ rest / (len(first) - 2)))
+    residual = first - design @ (offset, pace)
+    jitter = float(np.sqrt(residual @ residual / (len(first) - 2)))
     sd = jitter / float(np.sqrt(((second - second.mean()) ** 2).sum()))
     return float(pace), sd, float(offset), jitter

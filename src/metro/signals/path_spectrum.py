@@ -67,20 +67,20 @@ def spectrum(channel: Array, spacing: float) -> Spectrum:
     count = len(channel)
     if count < FEWEST:
         raise ValueError(f"{count} samples have no spectrum, expected at least {FEWEST}")
-    rest = _levelled(channel)
-    frequency, density, _ = _multitaper(rest, spacing)
-    found: list[float] = []
+    residual = _levelled(channel)
+    frequency, density, _ = _multitaper(residual, spacing)
+    frequencies: list[float] = []
     chances: list[float] = []
-    while len(found) < MOST:
-        place, chance = _strongest(rest, spacing)
-        # a rest of a line that was taken out a little beside its frequency is no line
-        if chance > CHANCE or any(abs(place - f) < 1 / (count * spacing) for f in found):
+    while len(frequencies) < MOST:
+        place, chance = _strongest(residual, spacing)
+        # The remainder of a line that was taken out a little beside its frequency is not another line.
+        if chance > CHANCE or any(abs(place - f) < 1 / (count * spacing) for f in frequencies):
             break
-        found.append(place)
+        frequencies.append(place)
         chances.append(chance)
-        found = _refined(channel, spacing, found)
-        rest = channel - _fit(channel, spacing, found)[0]
-    return Spectrum(frequency, density, _lines(channel, rest, spacing, found, chances))
+        frequencies = _refined(channel, spacing, frequencies)
+        residual = channel - _fit(channel, spacing, frequencies)[0]
+    return Spectrum(frequency, density, _lines(channel, residual, spacing, frequencies, chances))
 
 
 def even_samples(place: Array, values: Array) -> tuple[Array, float]:
@@ -137,14 +137,16 @@ def _refined(channel: Array, spacing: float, start: list[float]) -> list[float]:
 
     width = 1 / (len(channel) * spacing)
 
-    def left(change: Array) -> float:
-        rest = (
+    def residual_power(change: Array) -> float:
+        residual = (
             channel - _fit(channel, spacing, [f + width * c for f, c in zip(start, change, strict=True)])[0]
         )
-        return float(rest @ rest)
+        return float(residual @ residual)
 
-    size = left(np.zeros(len(start))) + 1e-300
-    best = minimize(lambda c: left(c) / size, np.zeros(len(start)), bounds=[(-1.0, 1.0)] * len(start))
+    size = residual_power(np.zeros(len(start))) + 1e-300
+    best = minimize(
+        lambda c: residual_power(c) / size, np.zeros(len(start)), bounds=[(-1.0, 1.0)] * len(start)
+    )
     return [f + width * float(c) for f, c in zip(start, best.x, strict=True)]
 
 
@@ -159,19 +161,19 @@ def _fit(channel: Array, spacing: float, frequencies: list[float]) -> tuple[Arra
 
 
 def _lines(
-    channel: Array, rest: Array, spacing: float, found: list[float], chances: list[float]
+    channel: Array, residual: Array, spacing: float, frequencies: list[float], chances: list[float]
 ) -> tuple[Line, ...]:
     """Amplitudes and errors of the lines: the Cramér–Rao bounds for the noise density at each.
 
     With the one-sided density S and the duration T, var f = 3 S / (π² A² T³) and var A = S / T.
     """
-    if not found:
+    if not frequencies:
         return ()
-    frequency, density, _ = _multitaper(_levelled(rest), spacing)
+    frequency, density, _ = _multitaper(_levelled(residual), spacing)
     duration = spacing * len(channel)
-    _, weights = _fit(channel, spacing, found)
+    _, weights = _fit(channel, spacing, frequencies)
     lines = []
-    for place, chance, amplitude in zip(found, chances, np.hypot(*weights.T), strict=True):
+    for place, chance, amplitude in zip(frequencies, chances, np.hypot(*weights.T), strict=True):
         near = np.abs(frequency - place) < 2 * _bandwidth(len(channel)) / duration
         # what was taken out leaves a hole one step wide: the noise is that on both sides
         noise = float(np.mean(density[near & (np.abs(frequency - place) > 1 / duration)]))

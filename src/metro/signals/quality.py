@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from metro.signals.clipping import FLAT_TOP_SAMPLES, flat_top, longest_run
 from metro.units import MS, Array
 
 RATE_TOLERANCE = 0.01
 JITTER_LIMIT = 0.1
 GAP = 1.5
-FLAT_TOP_SAMPLES = 5
 AIR_BLOCKS = 50
 AIR_ACTIVITY = 0.1
 OFFSET_LIMIT = 0.02
@@ -45,7 +45,7 @@ class Steps:
     longest: float
 
     def joined(self, other: Steps) -> Steps:
-        """Return the steps of this part of a record and of the next, whose gaps are told by this typical."""
+        """Return the steps of this part and the next of a record, whose gaps are judged by this typical."""
         count = self.count + other.count
         share = other.count / max(count, 1)
         apart = other.mean - self.mean
@@ -77,13 +77,13 @@ def sampling(time_s: Array, declared_hz: float | None = None) -> list[Finding]:
     return sampled(steps(time_s), declared_hz)
 
 
-def sampled(found: Steps, declared_hz: float | None = None) -> list[Finding]:
+def sampled(record: Steps, declared_hz: float | None = None) -> list[Finding]:
     """Check rate, jitter and gaps by the steps of a record.
 
     The rate is one over the mean step, gaps left out; a median would inherit the rounding of time stamps.
     """
-    rate = 1.0 / found.mean
-    return [_rate(rate, declared_hz), _jitter(float(np.sqrt(found.variance)) * rate), _gaps(found)]
+    rate = 1.0 / record.mean
+    return [_rate(rate, declared_hz), _jitter(float(np.sqrt(record.variance)) * rate), _gaps(record)]
 
 
 def _rate(rate: float, declared_hz: float | None) -> Finding:
@@ -91,9 +91,9 @@ def _rate(rate: float, declared_hz: float | None) -> Finding:
         message = f"sampled at {rate:.6g} Hz; batch.yaml declares no rate"
         return Finding("sampling rate", rate, np.nan, True, message)
     ok = abs(rate / declared_hz - 1.0) <= RATE_TOLERANCE
-    found = f"sampled at {rate:.6g} Hz, declared {declared_hz:.6g} Hz"
+    message = f"sampled at {rate:.6g} Hz, declared {declared_hz:.6g} Hz"
     hint = "" if ok else ": the time stamps are used; correct the rate in batch.yaml or the time column"
-    return Finding("sampling rate", rate, declared_hz, ok, found + hint)
+    return Finding("sampling rate", rate, declared_hz, ok, message + hint)
 
 
 def _jitter(jitter: float) -> Finding:
@@ -103,51 +103,32 @@ def _jitter(jitter: float) -> Finding:
     return Finding("jitter", jitter, JITTER_LIMIT, ok, message + hint)
 
 
-def _gaps(found: Steps) -> Finding:
-    if found.gaps == 0:
+def _gaps(record: Steps) -> Finding:
+    if record.gaps == 0:
         return Finding("gaps", 0.0, 0.0, True, "no samples are missing")
-    missing = f"{found.lost / found.typical:.0f} samples missing in all"
-    message = f"{found.gaps} gaps, the longest {found.longest / MS:.3g} ms, {missing}"
-    return Finding("gaps", float(found.gaps), 0.0, False, f"{message}: the logger lost data")
+    missing = f"{record.lost / record.typical:.0f} samples missing in all"
+    message = f"{record.gaps} gaps, the longest {record.longest / MS:.3g} ms, {missing}"
+    return Finding("gaps", float(record.gaps), 0.0, False, f"{message}: the logger lost data")
 
 
-def flat_tops(name: str, values: Array, full_scale: float | None = None) -> Finding:
-    """Check a channel (n,) for clipping: five or more samples in a row at full scale or at an extreme.
+def flat_tops(
+    name: str, values: Array, full_scale: float | None = None, ends: tuple[bool, bool] = (True, True)
+) -> Finding:
+    """Check a channel (n,) for clipping: five or more samples in a row at full scale, or cut off at an end.
 
-    An extreme of zero is a gate (a hammer's force window) and not a clip; nor is one that is reached in steps
-    of the converter's resolution: the top of a slow wave, sampled coarsely.
+    ``ends``: as of :func:`metro.signals.clipping.flat_top`.
     """
-    stands = [(_flat_at(values, level), level) for level in (float(np.min(values)), float(np.max(values)))]
+    extremes = float(np.min(values)), float(np.max(values))
+    stands = [(flat_top(values, level, ends), level) for level in extremes]
     if full_scale is not None:
-        start, stop = _longest_run(np.abs(values) >= full_scale)
-        stands.append((stop - start, full_scale))
+        stands.append((longest_run(np.abs(values) >= full_scale), full_scale))
     longest, level = max(stands)
     ok = longest < FLAT_TOP_SAMPLES
     message = f"{name} is not clipped"
     if not ok:
-        found = f"{name} stands at {level:.5g} for {longest} samples in a row"
-        message = f"{found}: the amplifier's range was exceeded; measure again with a larger range"
+        fault = f"{name} stands at {level:.5g} for {longest} samples in a row"
+        message = f"{fault}: the amplifier's range was exceeded; measure again with a larger range"
     return Finding("clipping", float(longest), float(FLAT_TOP_SAMPLES), ok, message)
-
-
-def _flat_at(values: Array, level: float) -> int:
-    """Return how many samples in a row stand at an extreme that the channel was cut off at, else 0."""
-    start, stop = _longest_run(values == level)
-    if level == 0.0 or stop - start < FLAT_TOP_SAMPLES:
-        return 0
-    neighbours = np.concatenate((values[max(start - 1, 0) : start], values[stop : stop + 1]))
-    resolution = float(np.min(np.diff(np.unique(values)), initial=np.inf))
-    jump = float(np.max(np.abs(neighbours - level), initial=0.0))
-    return stop - start if jump > 2.0 * resolution else 0
-
-
-def _longest_run(true: np.ndarray) -> tuple[int, int]:
-    """Return start and stop of the longest run of True; (0, 0) where there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], true.astype(np.int8), [0]))))
-    if edges.size == 0:
-        return 0, 0
-    longest = 2 * int(np.argmax(edges[1::2] - edges[::2]))
-    return int(edges[longest]), int(edges[longest + 1])
 
 
 def dead(name: str, values: Array) -> Finding:
@@ -158,8 +139,8 @@ def dead(name: str, values: Array) -> Finding:
 def moving(name: str, span: float, first: float) -> Finding:
     """Check that a channel moves at all, by the span of its values and the first of them."""
     ok = span > 0.0
-    found = f"{name} stands at {first:.5g} throughout: is the channel connected?"
-    message = f"{name} moves" if ok else found
+    fault = f"{name} stands at {first:.5g} throughout: is the channel connected?"
+    message = f"{name} moves" if ok else fault
     return Finding("dead channel", span, 0.0, ok, message)
 
 
@@ -188,7 +169,7 @@ def apart(names: tuple[str, ...], pairs: set[tuple[int, int, bool]], span: Array
 
 
 def motion(set_deg: Array) -> Finding:
-    """Check that an arm (n, 6) is told to move."""
+    """Check that an arm (n, 6) is commanded to move."""
     travel = float(np.ptp(set_deg, axis=0).max())
     message = (
         f"the joints move by up to {travel:.3g}°" if travel else "no joint moves: is it the log of a cut?"
@@ -208,7 +189,7 @@ def zero_in_air(names: tuple[str, ...], activity: Array, mean: Array, largest: f
     """Check the zero of force channels where the tool cuts air at the record's start or end.
 
     Air is the run of blocks at either end whose scatter is below a tenth of the cut's. A record that has no
-    such part tells nothing of its zero, and gives no finding.
+    such part does not show its zero, and gives no finding.
 
     Parameters
     ----------
@@ -245,6 +226,14 @@ def conjugated(sign: float) -> Finding:
     ok = sign <= 0.0
     message = "the driving point takes in power, as it must"
     if not ok:
-        found = "the driving point's imaginary part is positive: the FRF is conjugated (e^{-iωt})"
-        message = f"{found} or one sensor points the other way; export it with e^{{+iωt}}"
+        fault = "the driving point's imaginary part is positive: the FRF is conjugated (e^{-iωt})"
+        message = f"{fault} or one sensor points the other way; export it with e^{{+iωt}}"
     return Finding("FRF convention", sign, 0.0, ok, message)
+
+
+def light(mass_kg: float, limit_kg: float, *, soft: bool) -> Finding:
+    """Report an FRF of a structure that is soft and of little mass, by both of which its unit is in doubt."""
+    ok = not soft or mass_kg >= limit_kg
+    message = f"the FRF is that of a mass of {1e3 * mass_kg:.3g} g"
+    hint = "" if ok else " that is softer than any robot: is response_unit of impacts.csv right? It is used"
+    return Finding("FRF size", mass_kg, limit_kg, ok, f"{message}{hint}")

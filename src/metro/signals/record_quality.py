@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from metro.signals import quality
-from metro.signals.quality import FLAT_TOP_SAMPLES, Finding, Steps
+from metro.signals.clipping import FLAT_TOP_SAMPLES
+from metro.signals.quality import Finding, Steps
 from metro.units import Array
 
 
@@ -32,7 +33,9 @@ class RecordQuality:
     _low: Array | float = np.inf
     _high: Array | float = -np.inf
     _same: set[tuple[int, int, bool]] | None = None
-    _flat: list[Finding] = field(default_factory=list)
+    _near: Array | None = None  # the last piece, with the samples before it
+    _begins: bool = True  # whether that piece begins the record
+    _flat: list[Finding] = field(default_factory=list)  # of the pieces before it
     _blocks: list[tuple[Array, Array]] = field(default_factory=list)
 
     def add(self, time: Array, values: Array) -> None:
@@ -43,19 +46,29 @@ class RecordQuality:
         else:  # a step, or a flat top, may lie across two pieces
             stamps, near = (np.concatenate(parts) for parts in zip(self._end, (time, values), strict=True))
         if len(stamps) > 1:
-            found = quality.steps(stamps, self._steps.typical if self._steps else None)
-            self._steps = self._steps.joined(found) if self._steps else found
+            steps = quality.steps(stamps, self._steps.typical if self._steps else None)
+            self._steps = self._steps.joined(steps) if self._steps else steps
         self._end = time[-1:], near[1 - FLAT_TOP_SAMPLES :]
         self.largest = max(self.largest, float(np.linalg.norm(values, axis=1).max()))
         self._low = np.minimum(self._low, values.min(axis=0))
         self._high = np.maximum(self._high, values.max(axis=0))
         pairs = quality.same_pairs(values)
         self._same = pairs if self._same is None else self._same & pairs
-        channels = zip(self.names, near.T, strict=True)
-        flat = [quality.flat_tops(name, channel, self.full_scale) for name, channel in channels]
-        before = self._flat or flat
-        self._flat = [max(pair, key=lambda one: one.value) for pair in zip(before, flat, strict=True)]
+        if self._near is not None:  # that piece does not end the record
+            self._flat = self._flat_so_far(last=False)
+            self._begins = False
+        self._near = near
         self._blocks.append(quality.blocks_of(values))
+
+    def _flat_so_far(self, *, last: bool) -> list[Finding]:
+        """Return the longest flat top of each channel up to the piece that was taken last."""
+        if self._near is None:
+            raise ValueError("a record without samples has no channels to check")
+        ends = self._begins, last
+        channels = zip(self.names, self._near.T, strict=True)
+        flat = [quality.flat_tops(name, channel, self.full_scale, ends) for name, channel in channels]
+        before = self._flat or flat
+        return [max(pair, key=lambda one: one.value) for pair in zip(before, flat, strict=True)]
 
     @property
     def step(self) -> float:
@@ -81,6 +94,8 @@ class RecordQuality:
     def channels(self) -> list[Finding]:
         """Check each channel: it moves, is not clipped, and no two are the same."""
         span = np.asarray(self._high) - np.asarray(self._low)
-        first = zip(self.names, span.tolist(), self._first.tolist(), self._flat, strict=True)
+        first = zip(
+            self.names, span.tolist(), self._first.tolist(), self._flat_so_far(last=True), strict=True
+        )
         each = [one for name, size, value, flat in first for one in (quality.moving(name, size, value), flat)]
         return [*each, quality.apart(self.names, self._same or set(), span)]

@@ -54,19 +54,19 @@ def knees(place: Array, course: Array) -> Knees:
     best: tuple[float, Knees] | None = None
     for entry in (False, True):
         for leaving in (False, True):
-            found, left = _fitted(place, course, entry, leaving)
-            criterion = _criterion(course, left, 2 * (entry + leaving))
+            fit, residual = _fitted(place, course, entry, leaving)
+            criterion = _criterion(course, residual, 2 * (entry + leaving))
             if best is None or criterion < best[0]:
-                best = criterion, found
+                best = criterion, fit
     assert best is not None
     return best[1]
 
 
-def _criterion(course: Array, rest: Array, parameters: int) -> float:
-    """Schwarz's criterion, with as many independent samples as the rest's autocorrelation leaves."""
-    count = rest.size
-    power = float((rest**2).mean()) + 1e-12
-    alike = float((rest[1:] * rest[:-1]).mean()) / power
+def _criterion(course: Array, residual: Array, parameters: int) -> float:
+    """Schwarz's criterion, with the number of independent samples by the residual's autocorrelation."""
+    count = residual.size
+    power = float((residual**2).mean()) + 1e-12
+    alike = float((residual[1:] * residual[:-1]).mean()) / power
     alike = min(max(alike, 0.0), 0.95)
     independent = max(count * (1 - alike) / (1 + alike), 4.0)
     return float(independent * np.log(power) + (parameters + course.shape[1]) * np.log(independent))
@@ -95,8 +95,8 @@ def _fitted(place: Array, course: Array, entry: bool, leaving: bool) -> tuple[Kn
     shape = _shape(place, ends[None], entry, leaving)[0]
     level = shape @ course / max(float(shape @ shape), 1e-12)
     knee = [float(end) for end in ends]
-    found = Knees(*(knee[:2] if entry else (None, None)), *(knee[2:] if leaving else (None, None)))
-    return found, course - np.outer(shape, level)
+    fit = Knees(*(knee[:2] if entry else (None, None)), *(knee[2:] if leaving else (None, None)))
+    return fit, course - np.outer(shape, level)
 
 
 def _shape(place: Array, ends: Array, entry: bool, leaving: bool) -> Array:

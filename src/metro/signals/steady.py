@@ -14,7 +14,7 @@ IN_AIR, CUTTING = 0.12, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """A record by its revolutions, all that is left of it once it has been read.
+    """A record by its revolutions: all that is kept of it once it has been read.
 
     Attributes
     ----------
@@ -41,14 +41,17 @@ def turns(pieces: Iterable[Array], samples_per_revolution: float) -> Turns:
     """Read a record (n, channels), piece by piece, revolution by revolution of the spindle."""
     length, samples = max(2, round(samples_per_revolution)), 0
     left: Array | None = None
-    found: list[tuple[Array, Array]] = []
+    moments: list[tuple[Array, Array]] = []
     for piece in pieces:
         samples += len(piece)
         joined = piece if left is None else np.concatenate([left, piece])
         whole = len(joined) // length
-        each, left = joined[: whole * length].reshape(whole, length, -1), joined[whole * length :]
-        found.append((each.mean(axis=1), (each**2).mean(axis=1)))
-    mean, square = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        each, left = (
+            joined[: whole * length].reshape(whole, length, joined.shape[1]),
+            joined[whole * length :],
+        )
+        moments.append((each.mean(axis=1), (each**2).mean(axis=1)))
+    mean, square = (np.concatenate(parts) for parts in zip(*moments, strict=True))
     return Turns(length, samples, mean, square)
 
 
@@ -57,7 +60,7 @@ def segments(record: Turns, settling: int) -> Segments:
 
     The level is the rms of all channels about the air's zero. Revolutions below 12 % of the typical level are
     air; the cut is the longest run above half of it. Where the record shows an end of the cut, what the tool
-    needs to get wholly in or out is left off there: the force looks steady well before the engagement is.
+    needs to get wholly in or out is cut away there: the force looks steady well before the engagement is.
 
     Parameters
     ----------
@@ -66,9 +69,12 @@ def segments(record: Turns, settling: int) -> Segments:
     Raises
     ------
     ValueError
-        If less than six revolutions are left.
+        If less than six revolutions are left, or the record is shorter than one.
     """
     length, samples, count = record.length, record.samples, len(record.mean)
+    if count == 0:
+        fault = f"the record has {samples} samples, fewer than the {length} of one revolution"
+        raise ValueError(f"{fault} at the speed of runs.csv")
     if count < 6:
         return Segments(record, slice(0, samples), np.zeros(count, dtype=bool))
     level = _level(record, np.zeros(record.mean.shape[1]))

@@ -1,7 +1,7 @@
-"""The angle of a spindle whose speed wanders, followed in the record where no tacho tells it.
+"""The angle of a spindle whose speed wanders, followed in the record where no tacho measures it.
 
-A force repeats with the spindle. How far each few revolutions are turned against the mean of all is how far
-the angle is off there; what vibrates off the orders of the spindle has no part in it.
+A force repeats with the spindle. The turn of each few revolutions against the mean of all is the error of
+the angle there; vibrations between the orders of the spindle have no part in it.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ def followed(time: Array, angle: Array, signal: Array, teeth: int) -> Array:
     Parameters
     ----------
     time, angle : (n,) s; rad, with the mean speed of the record. signal : (n, channels).
-    teeth : number of teeth, whose passing stands out most.
+    teeth : number of teeth, whose passing is the strongest order.
 
     Returns
     -------
     ``angle`` itself where following it does not gather much more energy at the orders of the spindle.
     """
     highest = PASSINGS * teeth
-    found, gathered = angle, -math.inf
+    best, gathered = angle, -math.inf
     spectra = _spectra(over_angle(time, angle, signal), highest)
     if spectra is None:
         return angle
     first = gathered = _gathered(spectra)
-    trial = found
+    trial = best
     for turn in range(_ROUNDS):
         error = _steps(spectra) if turn == 0 else _against_mean(spectra)
         trial = _corrected(trial, error)
@@ -49,14 +49,14 @@ def followed(time: Array, angle: Array, signal: Array, teeth: int) -> Array:
         if again is None or (energy := _gathered(again)) <= gathered:
             if turn > 0:
                 break
-            trial = found
+            trial = best
             continue
-        found, gathered, spectra = trial, energy, again
-    # the mean speed is nearly known: chatter beside an order is no wander, though it gathers more. Wander may
-    # have driven what was found to one end of the search, and the truth be at the other
-    shift = (found[-1] - found[0]) / (angle[-1] - angle[0]) - 1.0
+        best, gathered, spectra = trial, energy, again
+    # The mean speed is nearly known: chatter beside an order is no wander, though it gathers more. Wander may
+    # have driven the estimate to one end of the search, while the truth is at the other.
+    shift = (best[-1] - best[0]) / (angle[-1] - angle[0]) - 1.0
     wanders = 1.0 - gathered < (1.0 - EXPLAINED) * (1.0 - first) and abs(shift) < 2.0 * SPEED_SEARCH
-    return found if wanders else angle
+    return best if wanders else angle
 
 
 def _spectra(even: Array, highest: int) -> ComplexArray | None:

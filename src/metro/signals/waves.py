@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from metro.signals.intervals import places
 from metro.units import Array
 
 SMOOTH = 5  # polynomial terms that a level may have: gravity and friction along one path
@@ -26,7 +27,7 @@ def variance(count: int, white: Array, wander: Array) -> Array:
     return np.asarray(white + np.outer(1.0 / number, wander))
 
 
-def wandering(series: Array, white: Array, steps: Array) -> Array:
+def wandering(series: Array, white: Array, steps: Array, interval: Array | None = None) -> Array:
     """Estimate the level (k,) of the noise whose variance goes with the length of the wave.
 
     Likeliest value, waves taken as independent and normal (Whittle); the longest waves are left to the
@@ -36,11 +37,13 @@ def wandering(series: Array, white: Array, steps: Array) -> Array:
     ----------
     series : (m, k) smooth levels in noise. white : (k,) variance of the white noise, known.
     steps : (m, j) shapes that the levels may have beside a polynomial (a friction that changes its sign).
+    interval : (m - 1,) of levels that are not even (:func:`metro.signals.intervals.uneven`): the smooth level
+        is one over the places, not over the count.
     """
     count, channels = series.shape
     if count < 4 * SMOOTH:
         return np.zeros(channels)
-    place = np.linspace(-1.0, 1.0, count)
+    place = places(count, interval)
     shapes = np.column_stack([np.polynomial.legendre.legvander(place, SMOOTH - 1), steps])
     level = shapes @ np.linalg.lstsq(shapes, series, rcond=None)[0]
     power = waves(series - level)[SMOOTH:] ** 2

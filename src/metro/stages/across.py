@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from metro.loop.batch_story import causes
-from metro.loop.chain import split
-from metro.loop.trial import Gates
-from metro.loop.witnesses import Closed
-from metro.observables.upstream import mean_forces, with_forces
+from metro.loop.causes.chain import split
+from metro.loop.causes.witnesses import Closed
+from metro.loop.search.trial import Gates
+from metro.loop.verdict.batch_story import causes
+from metro.observables.cut.upstream import mean_forces, with_forces
 from metro.units import JSON
 
 
@@ -21,7 +21,7 @@ def across(
     observed: Mapping[str, pd.DataFrame],
     gates: Gates,
 ) -> JSON:
-    """Return ``causes`` and ``chain`` of loop.json.
+    """Return ``causes`` and ``chain`` of findings.json.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def _chain(
     used = observed.get("tip_force", pd.DataFrame(columns=["run", "source"]))
     first = used.drop_duplicates("run")
     sources = dict(zip(first["run"].astype(str), first["source"].astype(str), strict=True))
-    told: JSON = {}
+    chain: JSON = {}
     for name, one in closed.items():
         held = [block for block in one.problem.role("validate") if block.run in forces]
         fed = {
@@ -48,5 +48,5 @@ def _chain(
             if (blocks := with_forces(block, forces[block.run], sources)) is not None
         }
         if fed:
-            told[name] = split(one.problem, {"before": one.outcome.base, "after": one.outcome.final}, fed)
-    return told
+            chain[name] = split(one.problem, {"before": one.outcome.base, "after": one.outcome.final}, fed)
+    return chain

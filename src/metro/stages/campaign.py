@@ -10,15 +10,18 @@ from urllib.parse import quote
 
 import pandas as pd
 
-from metro.batch.layout import PAGE
 from metro.batch.processed import read_batch, read_table, write_json, write_table
 from metro.batch.writing import write_atomically
 from metro.memory.history import Record
 from metro.memory.remember import remember
+from metro.observables.catalogue import drawn_tables
 from metro.report.campaign import campaign_report, campaign_sections, campaign_table
 from metro.report.page.build import campaign_page
-from metro.report.results import Results
+from metro.report.results import Results, with_facts
 from metro.units import JSON
+
+# What the page draws of the loop, beside the observed tables.
+PAGE = ("comparison", "lobes_final")
 
 
 def campaign(
@@ -37,10 +40,13 @@ def campaign(
     reports : the batches' result folders. processed : the folder that holds each batch's processed folder.
     unfinished : batches that failed, each with the log that says why.
     """
-    verdicts = {folder.name: _json(folder / "verdict.json") for folder in reports}
+    verdicts = {
+        folder.name: with_facts(_json(folder / "verdict.json"), _json(processed / folder.name / "loop.json"))
+        for folder in reports
+    }
     identified = {folder.name: _json(folder / "identified.json") for folder in reports}
     memory = remember([_record(processed / name, verdicts[name], identified[name]) for name in verdicts])
-    failed = {batch: _told(Path(log)) for batch, log in (unfinished or {}).items()}
+    failed = {batch: _reason(Path(log)) for batch, log in (unfinished or {}).items()}
     provenance = {"code": code, "settings": json.dumps(settings), "batches": json.dumps(sorted(verdicts))}
     links = {f.name: quote(os.path.relpath(f / "report.pdf", out)) for f in reports}
     pdf = campaign_report(verdicts, identified, memory, failed, links)
@@ -63,14 +69,14 @@ def _name(folder: Path) -> str:
 
 
 def _results(processed: Path, verdict: JSON, identified: JSON) -> Results:
-    """Read what the page tells of a batch; tables that are absent or empty are left out."""
-    read = {n: read_table(p) for n in PAGE if (p := processed / f"{n}.parquet").exists()}
+    """Read what the page shows of a batch; tables that are absent or empty are left out."""
+    read = {n: read_table(p) for n in (*PAGE, *drawn_tables()) if (p := processed / f"{n}.parquet").exists()}
     tables = {name: table for name, table in read.items() if len(table)}
-    told = _json(processed / "loop.json")
-    return Results(read_batch(processed), tables, identified, verdict, told)
+    loop = _json(processed / "loop.json")
+    return Results(read_batch(processed), tables, identified, verdict, loop)
 
 
-def _told(log: Path) -> str:
+def _reason(log: Path) -> str:
     """Return what a stage said before it stopped: all of a message, the last line of anything else."""
     text = log.read_text(encoding="utf-8", errors="replace").strip() if log.is_file() else ""
     if not text:
@@ -80,12 +86,12 @@ def _told(log: Path) -> str:
 
 def _record(processed: Path, verdict: JSON, identified: JSON) -> Record:
     batch = read_batch(processed)
-    told = _json(processed / "loop.json")
-    return Record(batch.name, batch.manifest, first_start(batch.runs), verdict, told, identified)
+    loop = _json(processed / "loop.json")
+    return Record(batch.name, batch.manifest, first_start(batch.runs), verdict, loop, identified)
 
 
 def first_start(runs: pd.DataFrame) -> float | None:
-    """Return when the first run began, s since 1970; None where no run tells. Without a zone it is UTC."""
+    """Return when the first run began, s since 1970; None where no run says. Without a zone it is UTC."""
     if "started_at" not in runs:
         return None
     at = pd.to_datetime(runs["started_at"], format="ISO8601", utc=True, errors="coerce").min()

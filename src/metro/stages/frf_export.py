@@ -9,7 +9,7 @@ from metro.batch.writing import write_atomically
 from metro.formats import FormatError
 from metro.formats.uff import FRF, Function
 from metro.formats.uff_writer import universal_file
-from metro.observables.modal_test import receptances
+from metro.observables.stability.modal_test import receptances
 
 
 def frf_export(processed: Path, out: Path, position: str) -> list[str]:
@@ -25,17 +25,17 @@ def frf_export(processed: Path, out: Path, position: str) -> list[str]:
         When there are no FRFs at the position, or none is named where there are several.
     """
     batch, notes = read_batch(processed), list[str]()
-    found = receptances(
+    measured = receptances(
         lambda name: read_table(processed / f"{name}.parquet"), batch.instrument("hammer"), notes
     )
-    there = list(dict.fromkeys(item.position for item in found))
+    there = list(dict.fromkeys(item.position for item in measured))
     if not there:
         raise FormatError(processed, "; ".join(["found no FRF and no usable hammer record", *notes]))
     if position not in there and (position or len(there) > 1):
         raise FormatError(
             processed, f"found FRFs at position {', '.join(there)}, expected one of them: --position"
         )
-    chosen = [item for item in found if item.position == (position or there[0])]
+    chosen = [item for item in measured if item.position == (position or there[0])]
     content = universal_file(
         [Function(FRF, one.reference, one.response, "m", one.frequency, one.frf) for one in chosen]
     )

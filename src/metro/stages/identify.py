@@ -1,74 +1,157 @@
-"""Identify: raw tables become compact observed tables, and those the base models with their intervals."""
+"""Identify: raw tables become compact observed tables, problems, and the base models with their intervals."""
 
 from __future__ import annotations
 
-import json
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from metro import __version__
 from metro.batch.batch import Batch
-from metro.batch.layout import OBSERVED
-from metro.batch.processed import Processed, read_batch, write_json, write_table
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.verdict import identified_fit
-from metro.observables import joint_friction, published
-from metro.observables.printed_study import printed_study
-from metro.observables.problem import BaseFit, Problem, Refusal
-from metro.observables.yielding_table import yielding_table
-from metro.stages.observed import MODULES, merged, task_of
+from metro.batch.processed import Processed, Tables, read_batch, write_json, write_table
+from metro.batch.provenance import write_made
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import Fit, fit
+from metro.loop.fitting.held_out import identified_fit
+from metro.loop.fitting.noise import first_noise
+from metro.observables.labelled import Labelled
+from metro.observables.observable import Observable
+from metro.observables.problem import Problem, Refusal
+from metro.observables.published import TABLES as PRINTED
+from metro.observables.published import observable as published
+from metro.observables.published.study import printed_study
+from metro.observables.registry import observables
+from metro.slips.find import find
+from metro.slips.slip import Slip
+from metro.stages.problem_file import Posed, write_problems
+from metro.stages.problems import merged, pose
 from metro.units import JSON
 
 
+@dataclass(frozen=True)
+class BaseModel:
+    """Handler: the fit of a base model on identification runs and load tests; None where there is none."""
+
+    budget: float
+
+    def sampled(self, problem: Problem) -> Fit | None:
+        """Fit the base parameters of a problem."""
+        return base_fit(problem, self.budget)
+
+    def labelled(self, _problem: Labelled) -> None:
+        """Nothing is fitted to labels."""
+
+    def refused(self, _refusal: Refusal) -> None:
+        """There is nothing to fit."""
+
+
+def base_fit(problem: Problem, budget: float) -> Fit | None:
+    """Fit a base model on identification runs and load tests; None where there are none."""
+    blocks = problem.role("identify", "calibrate")
+    if not blocks:
+        return None
+    return fit(Candidate(problem.base), blocks, first_noise(budget, problem.scatter, blocks))
+
+
+@dataclass
+class _State:
+    """The stage while one observable after another is identified."""
+
+    batch: Batch
+    read: Tables
+    base_model: BaseModel
+    identified: JSON
+    observed: dict[str, pd.DataFrame] = field(default_factory=dict)
+    posed: dict[str, Posed] = field(default_factory=dict)
+
+    def observe(self, observable: Observable[Any]) -> None:
+        """Make the observed tables of an observable."""
+        tables = observable.observe(self.batch, self.read, self.identified)
+        if isinstance(tables, Refusal):
+            self.posed[observable.name] = Posed(tables, unobserved=True)
+        else:
+            self.observed |= tables
+
+    def identify(self, observable: Observable[Any]) -> None:
+        """Pose the problem of an observable, fit its base model, and write what follows from the fit."""
+        task = pose(observable, self.batch, self.observed, self.identified)
+        base = task.handled_by(self.base_model)
+        self.posed[observable.name] = Posed(task, base)
+        fitted = identified_fit(task, base) if isinstance(task, Problem) and base else None
+        self.add(observable.report(self.batch, self.observed, self.identified, task, fitted))
+
+    def add(self, blocks: JSON) -> None:
+        """Put blocks into what is identified."""
+        self.identified = merged(self.identified, blocks)
+
+
 def identify(processed: Path, settings: JSON, code: str) -> None:
-    """Write the observed tables of a batch and ``identified.json``: the base models, without any effect.
+    """Write the observed tables of a batch, its problems, and ``identified.json``: no effect is in them.
+
+    All are observed before problems are posed, since a problem may need the tables of several; but some
+    tables need the cutting coefficients, which are identified first.
 
     ``settings``: ``model_form_budget``.
     """
     batch = read_batch(processed)
-    read = Processed(processed)
-    identified: JSON = {"format": 1, "batch": batch.name, "metro": __version__}
-    lacking: JSON = {}
-    observed: dict[str, pd.DataFrame] = {}
-    for module in MODULES:
-        found = module.observe(batch, read, identified)
-        if isinstance(found, Refusal):
-            lacking[module.OBSERVABLE] = found.reason
-            continue
-        observed |= found
-        task = task_of(module, batch, found, identified)
-        fitted = base_fit(task, settings["model_form_budget"]) if isinstance(task, Problem) else None
-        identified = merged(identified, module.report(batch, found, identified, task, fitted))
-        if isinstance(task, Refusal):
-            lacking[module.OBSERVABLE] = task.reason
-    friction = joint_friction.observe(batch, read)
-    observed |= {} if isinstance(friction, Refusal) else friction
-    identified = merged(identified, joint_friction.report(friction))
-    printed = published.observe(batch, read, identified)
-    observed |= {} if isinstance(printed, Refusal) else printed
-    identified = merged(identified, printed_study(batch, observed))
-    feedback = yielding_table(batch, read, identified)
-    observed |= {} if isinstance(feedback, Refusal) else {"yielding": feedback}
-    _write(processed, batch, observed, {"code": code, "settings": json.dumps(settings, sort_keys=True)})
-    write_json(processed / "identified.json", {**identified, "not_identified": lacking})
+    state = _identified(batch, Processed(processed), settings["model_form_budget"])
+    slips = [slip.row for slip in _slips(state)]
+    state.identified |= {"slips": slips} if slips else {}
+    for observable in observables():
+        if observable.beside:
+            tables, blocks = observable.beside(batch, state.read, state.identified)
+            state.observed |= tables
+            state.add(blocks)
+    posed = {each.name: state.posed[each.name] for each in observables()}
+    lacking = {name: each.task.reason for name, each in posed.items() if isinstance(each.task, Refusal)}
+    printed = published.observe(batch, state.read, state.identified)
+    if not isinstance(printed, Refusal):
+        state.observed |= printed
+        tasks = published.problems(batch, state.observed, state.identified)
+        posed = {task.observable: Posed(task, state.base_model.sampled(task), printed=True) for task in tasks}
+    state.add(printed_study(batch, state.observed))
+    _write(processed, batch, state.observed)
+    write_problems(processed, posed)
+    write_json(processed / "identified.json", {**state.identified, "not_identified": lacking})
+    write_made(processed, "identify", settings, code)
 
 
-def base_fit(task: Problem, budget: float) -> BaseFit | None:
-    """Fit the base model on the identification runs and the load tests; None where there are none."""
-    blocks = task.role("identify", "calibrate")
-    if not blocks:
-        return None
-    return identified_fit(task, fit(Candidate(task.base), blocks, first_noise(budget, task.scatter, blocks)))
+def slips_of(batch: Batch, read: Tables, budget: float) -> tuple[Slip, ...]:
+    """Return what the data of a batch contradict, as :func:`identify` finds it; nothing is written.
+
+    Parameters
+    ----------
+    read : the canonical tables. budget : the model-form budget.
+    """
+    return _slips(_identified(batch, read, budget))
 
 
-def _write(
-    processed: Path, batch: Batch, observed: dict[str, pd.DataFrame], provenance: dict[str, str]
-) -> None:
-    unknown = set(observed) - set(OBSERVED)
+def _slips(state: _State) -> tuple[Slip, ...]:
+    tasks = {name: each.task for name, each in state.posed.items()}
+    return find(state.batch, state.read, state.observed, tasks, state.identified)
+
+
+def _identified(batch: Batch, read: Tables, budget: float) -> _State:
+    """Observe all, pose the problems and fit their base models."""
+    head: JSON = {"format": 1, "batch": batch.name, "metro": __version__}
+    state = _State(batch, read, BaseModel(budget), head)
+    for observable in observables():
+        state.observe(observable)
+        if observable.gives_coefficients and observable.name not in state.posed:
+            state.identify(observable)
+    for observable in observables():
+        if observable.name not in state.posed:
+            state.identify(observable)
+    return state
+
+
+def _write(processed: Path, batch: Batch, observed: dict[str, pd.DataFrame]) -> None:
+    """Write every table that an observable may have, empty where it has not."""
+    names = [name for observable in observables() for name in observable.tables] + [*PRINTED]
+    unknown = set(observed) - set(names)
     if unknown:
-        raise KeyError(f"{batch.name}: observed tables that batch.layout does not name: {sorted(unknown)}")
-    for name in OBSERVED:
-        write_table(processed / f"{name}.parquet", observed.get(name, pd.DataFrame()), provenance)
+        raise KeyError(f"{batch.name}: observed tables that no observable names: {sorted(unknown)}")
+    for name in names:
+        write_table(processed / f"{name}.parquet", observed.get(name, pd.DataFrame()))

@@ -7,38 +7,38 @@ includes what was found upstream.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from metro import __version__
 from metro.batch.batch import Batch
-from metro.batch.processed import Processed, read_batch, read_table, write_json, write_table
-from metro.effects import library
-from metro.loop.batch_story import brief
-from metro.loop.fit import Fit
-from metro.loop.labels import judge_labels
-from metro.loop.search import Gates, Outcome, search
-from metro.loop.story import told
-from metro.loop.verdict import COMPARISON, comparison, held_out, identified_fit, judge, stands, typed
-from metro.loop.witnesses import Closed
-from metro.observables import flatness, lobes, published
-from metro.observables.face_advice import after_loop
-from metro.observables.lobes import LabelProblem
-from metro.observables.problem import Problem, Refusal
+from metro.batch.processed import Processed, read_batch, read_json, read_table, write_json, write_table
+from metro.batch.provenance import write_made
+from metro.effects.effect import Effect
+from metro.effects.library import described, library
+from metro.loop.causes.witnesses import Closed
+from metro.loop.fitting.fit import Fit
+from metro.loop.fitting.held_out import COMPARISON, comparison, held_out, identified_fit, typed
+from metro.loop.labels.verdict import judge_labels
+from metro.loop.search.outcome import Outcome
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.loop.statement import to_json
+from metro.loop.verdict.believable import believable, contradicted, with_share
+from metro.loop.verdict.story import story
+from metro.loop.verdict.verdict import judge, validated
+from metro.observables.labelled import Labelled
+from metro.observables.observable import Observable
+from metro.observables.problem import BaseFit, Problem, Refusal
+from metro.observables.published import TABLES as PRINTED
+from metro.observables.registry import by_name, observables
 from metro.stages.across import across
-from metro.stages.observed import (
-    MODULES,
-    OBSERVED_WITH_COEFFICIENTS,
-    Task,
-    merged,
-    read_json,
-    read_observed,
-    task_of,
-)
+from metro.stages.problem_file import Posed, read_problems
+from metro.stages.problems import merged, pose
 from metro.units import JSON
 
 
@@ -58,19 +58,91 @@ class Closing:
     closed: dict[str, Closed] = field(default_factory=dict)
 
     @property
-    def found(self) -> list[JSON]:
+    def upstream(self) -> list[JSON]:
         """Effects that changed the cutting coefficients."""
-        entry: JSON = self.verdicts.get("force") or {}
-        return list(entry.get("effects") or [])
+        names = [each.name for each in observables() if each.gives_coefficients]
+        return [effect for name in names for effect in (self.verdicts.get(name) or {}).get("effects") or []]
+
+    def spoiled(self, observable: str) -> bool:
+        """Whether the data contradict what the batch declares for an observable: then it has no causes."""
+        return any(observable in slip["observables"] for slip in self.identified.get("slips") or [])
+
+    def effects(self, observable: str) -> tuple[Effect, ...]:
+        """Return the effects that the residual of an observable may be traced to."""
+        return () if self.spoiled(observable) else library(observable)
+
+    def without_causes(self, observable: str, verdict: JSON) -> JSON:
+        """Return a verdict, without any cause where the data contradict what the batch declares."""
+        return contradicted(verdict) if self.spoiled(observable) else with_share(verdict)
+
+    def before(self, observable: str) -> pd.DataFrame:
+        """Return the rows of the prediction that are of an observable."""
+        rows = self.prediction[self.prediction["observable"] == observable]
+        return rows.reset_index(drop=True)
+
+
+@dataclass(frozen=True)
+class Closure:
+    """What closing the loop of one observable changed.
+
+    ``outcome`` of the search, where a model was fitted; ``redrawn``: observed tables that effects changed.
+    """
+
+    outcome: Outcome | None = None
+    redrawn: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Handler: close the loop of an observable; the held-out runs are read once, for the figures.
+
+    ``base``: the fit of the base model, None where the problem was posed anew.
+    """
+
+    state: Closing
+    base: Fit | None
+
+    def sampled(self, problem: Problem) -> Closure:
+        """Search the library for the effects that the base model lacks."""
+        state = self.state
+        if not problem.role("identify"):
+            return Closure()
+        outcome = search(problem, state.effects(problem.observable), state.gates, base=self.base)
+        outcome = believable(problem, validated(problem, outcome))
+        final = comparison(problem, held_out(problem, outcome.final))
+        rows = final.assign(after=final["before"], before=state.before(problem.observable)["before"])
+        verdict = state.without_causes(problem.observable, judge(problem, outcome, rows, state.gates))
+        self._keep(problem.observable, rows, verdict, story(problem, outcome, verdict, state.gates))
+        return Closure(outcome)
+
+    def labelled(self, problem: Labelled) -> Closure:
+        """Weigh the effects of the boundary by the labels."""
+        state = self.state
+        effects = state.effects(problem.observable)
+        rows = state.before(problem.observable).assign(after=problem.comparison()["before"])
+        rows, verdict, record, change = judge_labels(problem, rows, state.upstream, effects, state.gates)
+        verdict = state.without_causes(problem.observable, verdict)
+        self._keep(problem.observable, rows, verdict, record)
+        return Closure(redrawn=problem.redrawn(state.observed, change) if change else {})
+
+    def refused(self, _refusal: Refusal) -> Closure:
+        """There is nothing to close."""
+        return Closure()
+
+    def _keep(self, observable: str, rows: pd.DataFrame, verdict: JSON, story: JSON) -> None:
+        self.state.tables.append(rows)
+        self.state.verdicts[observable] = verdict
+        self.state.stories[observable] = story
 
 
 def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
-    """Write ``comparison``, ``lobes_final``, ``loop.json``, and the ``verdict.json`` and ``identified.json``.
+    """Write ``comparison``, ``lobes_final``, ``findings.json``, and the ``identified.json`` of the reports.
 
     ``settings``: ``model_form_budget``, ``materiality``, ``false_additions``, ``held_out_gain``, ``seed``.
     """
     state = closed(processed, Gates(**settings))
-    _write(state, reports, {"code": code, "settings": json.dumps(settings, sort_keys=True)})
+    _write(state, reports)
+    write_made(processed, "loop", settings, code)
 
 
 def closed(
@@ -87,76 +159,80 @@ def closed(
         gates=gates,
         prediction=read_table(processed / "prediction.parquet"),
         identified=read_json(processed / "identified.json"),
-        observed=read_observed(processed),
+        observed=_read_observed(processed),
     )
-    if "published_errors" in state.observed:
-        for printed in published.problems(state.batch, state.observed, state.identified):
-            _close(state, printed)
-    else:
-        for module in MODULES:
-            if only is not None and module.OBSERVABLE not in only:
-                continue
-            if state.found and module in OBSERVED_WITH_COEFFICIENTS:
-                again = module.observe(state.batch, Processed(processed), state.identified)
-                state.observed |= {} if isinstance(again, Refusal) else again
-            task = task_of(module, state.batch, state.observed, state.identified)
-            outcome = _close(state, task)
-            if outcome and isinstance(task, Problem):
-                state.closed[task.observable] = Closed(task, outcome)
-            fitted = identified_fit(task, outcome.final) if outcome and isinstance(task, Problem) else None
-            mended = state.found or (module is lobes and state.verdicts.get("lobes", {}).get("effects"))
-            if mended and (fitted or (module is lobes and "modes" in state.observed)):
-                blocks = module.report(state.batch, state.observed, state.identified, task, fitted)
-                state.identified = merged(state.identified, blocks)
-            if module is flatness and isinstance(task, Problem) and outcome:
-                _rank_again(state, task, outcome.final)
+    for name, posed in read_problems(processed).items():
+        if only is not None and name not in only:
+            continue
+        if posed.printed:
+            posed.task.handled_by(Loop(state, posed.base))
+        else:
+            _close(state, by_name(name), posed, anew=bool(limits))
     return state
 
 
-def _rank_again(state: Closing, task: Problem, final: Fit) -> None:
-    """Rank the configurations of faces as predicted with the effects found, where there are any."""
-    if final.candidate.effects:
-        with_effects = replace(task, base=final.candidate.model(final.theta))
-        fitted = identified_fit(task, final)
-        told = flatness.report(state.batch, state.observed, state.identified, with_effects, fitted)
-        state.identified = merged(state.identified, after_loop(told))
+def _close(state: Closing, observable: Observable[Any], posed: Posed, *, anew: bool) -> None:
+    """Close the loop of an observable, and write again what follows from what was found.
+
+    Where effects changed the cutting coefficients, the problem is posed ``anew`` with these.
+    """
+    if state.upstream or anew:
+        posed = _posed_anew(state, observable, posed)
+    closure = posed.task.handled_by(Loop(state, posed.base))
+    state.observed |= closure.redrawn
+    fitted = None
+    if closure.outcome and isinstance(posed.task, Problem):
+        state.closed[observable.name] = Closed(posed.task, closure.outcome)
+        fitted = identified_fit(posed.task, closure.outcome.final)
+    tells = bool(fitted) or (observable.reported_without_fit and not posed.unobserved)
+    if (state.upstream or closure.redrawn) and tells:
+        blocks = observable.report(state.batch, state.observed, state.identified, posed.task, fitted)
+        state.identified = merged(state.identified, blocks)
+    if observable.after_loop and closure.outcome and fitted:
+        _follow(state, observable, state.closed[observable.name], fitted)
 
 
-def _close(state: Closing, task: Task) -> Outcome | None:
-    """Close the loop of one observable; the held-out runs are read once, for the figures."""
-    if isinstance(task, LabelProblem):
-        before = state.prediction[state.prediction["observable"] == task.observable].reset_index(drop=True)
-        after = lobes.comparison(task)["before"]
-        rows, verdict, story, change = judge_labels(
-            task, before.assign(after=after), state.found, library(task.observable), state.gates
-        )
-        if change:
-            state.observed["lobes"] = lobes.redrawn(task, state.observed["lobes"], change)
-    elif isinstance(task, Problem) and task.role("identify"):
-        before = state.prediction[state.prediction["observable"] == task.observable].reset_index(drop=True)
-        outcome = stands(task, search(task, library(task.observable), state.gates))
-        rows = comparison(task, held_out(task, outcome.base), held_out(task, outcome.final))
-        rows["before"] = before["before"]
-        verdict = judge(task, outcome, rows, state.gates)
-        story = told(task, outcome, verdict, state.gates)
-    else:
-        return None
-    state.tables.append(rows)
-    state.verdicts[task.observable] = verdict
-    state.stories[task.observable] = story
-    return None if isinstance(task, LabelProblem) else outcome
+def _posed_anew(state: Closing, observable: Observable[Any], posed: Posed) -> Posed:
+    """Pose a problem with what is identified by now; what was not observed has none."""
+    if state.upstream and observable.observed_with_coefficients:
+        again = observable.observe(state.batch, Processed(state.processed), state.identified)
+        if isinstance(again, Refusal):
+            return Posed(again, unobserved=True)
+        state.observed |= again
+    elif posed.unobserved:
+        return posed
+    return Posed(pose(observable, state.batch, state.observed, state.identified))
 
 
-def _write(state: Closing, reports: Path, provenance: dict[str, str]) -> None:
+def _follow(state: Closing, observable: Observable[Any], closed: Closed, fitted: BaseFit) -> None:
+    """Write what follows from the model with the effects found, where there are any."""
+    final = closed.outcome.final
+    if observable.after_loop and final.candidate.effects:
+        with_effects = replace(closed.problem, base=final.candidate.model(final.theta))
+        blocks = observable.after_loop(state.batch, state.observed, state.identified, with_effects, fitted)
+        state.identified = merged(state.identified, blocks)
+
+
+def _read_observed(processed: Path) -> dict[str, pd.DataFrame]:
+    """Read the observed tables that the batch has."""
+    names = [name for observable in observables() for name in observable.tables] + [*PRINTED]
+    tables = {name: pd.read_parquet(processed / f"{name}.parquet") for name in names}
+    return {name: table for name, table in tables.items() if len(table.columns)}
+
+
+def _write(state: Closing, reports: Path) -> None:
     filled = [table for table in state.tables if len(table)]
     joined = pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(COMPARISON))
     name, processed = state.batch.name, state.processed
-    write_table(processed / "comparison.parquet", typed(joined), provenance)
+    write_table(processed / "comparison.parquet", typed(joined))
     diagram = state.observed.get("lobes", pd.DataFrame())
-    write_table(processed / "lobes_final.parquet", diagram, provenance)
-    said = across(state.closed, state.verdicts, joined, state.observed, state.gates)
-    write_json(processed / "loop.json", {"format": 1, "batch": name, "observables": state.stories, **said})
+    write_table(processed / "lobes_final.parquet", diagram)
+    observables = {
+        observable: {"verdict": verdict, "story": state.stories[observable]}
+        for observable, verdict in state.verdicts.items()
+    }
+    findings = {"format": 1, "batch": name, "metro": __version__, "observables": observables}
+    findings |= {"effects": described(), "slips": state.identified.get("slips") or []}
+    findings |= across(state.closed, state.verdicts, joined, state.observed, state.gates)
     write_json(reports / "identified.json", state.identified)
-    verdict = {"format": 1, "batch": name, "metro": __version__, "observables": state.verdicts}
-    verdict["causes"] = [brief(cause) for cause in said["causes"]]
-    write_json(reports / "verdict.json", verdict)
+    write_json(processed / "findings.json", to_json(findings))

@@ -17,13 +17,16 @@ import pandas as pd
 
 from metro.batch.findings import ContractError, Finding
 from metro.batch.planned import Limits, Row, in_random_order, limits_of, rounded, row_like, within
+from metro.batch.processed import read_json
+from metro.batch.provenance import made_by
 from metro.batch.writing import write_atomically
-from metro.loop.planner import Aim, aims
-from metro.loop.search import Gates
+from metro.loop.planning.planner import Aim, aims
+from metro.loop.search.trial import Gates
+from metro.loop.statement import to_json
 from metro.observables.problem import Made, Problem
 from metro.stages.loop import Closing, closed
-from metro.stages.observed import read_json
 from metro.units import JSON
+from metro.wording.statements import worded
 
 NOTHING = "nothing is open: no run is needed to decide anything, and none would make predictions much surer"
 TESTS = 3  # of stability that are proposed at once, at different speeds
@@ -36,6 +39,11 @@ class Asked:
     observable: str
     aim: Aim
     rows: tuple[tuple[Row, int], ...]
+
+    @property
+    def words(self) -> str:
+        """The question, and the runs that would answer it, in words."""
+        return str(worded(to_json(self.aim.states)))
 
 
 def next_runs(
@@ -71,7 +79,7 @@ def next_runs(
         message = f"found verdicts on {', '.join(there) or 'nothing'}, expected one on {observable}"
         raise ContractError([Finding("error", batch, message)])
     names = [observable] if observable else there
-    # What comes before it may have found effects that it is to be told of.
+    # The observables before it may have identified effects that its model has to include.
     only = there[: there.index(names[-1]) + 1] if names else []
     ends: JSON = {column: list(each) for column, each in allowed.items()}
     state = closed(processed / batch, gates, only, ends)
@@ -87,7 +95,7 @@ def next_runs(
     if as_json:
         sys.stdout.write(json.dumps(_content(batch, asked, table), indent=1, ensure_ascii=False) + "\n")
     else:
-        sys.stdout.write("\n".join(_told(batch, names, asked, table, out)) + "\n")
+        sys.stdout.write("\n".join(_in_words(batch, names, asked, table, out)) + "\n")
 
 
 def _known_limits(processed: Path) -> dict[str, tuple[float, float]]:
@@ -98,13 +106,10 @@ def _known_limits(processed: Path) -> dict[str, tuple[float, float]]:
 
 def _gates(processed: Path, reports: Path) -> Gates:
     """Return the settings that the loop stage ran with."""
-    import pyarrow.parquet as pq
-
     for file in (processed / "comparison.parquet", reports / "verdict.json"):
         if not file.is_file():
             raise ContractError([Finding("error", str(file), "is not there: call snakemake")])
-    metadata = pq.read_schema(processed / "comparison.parquet").metadata or {}
-    return Gates(**json.loads(metadata[b"metro.settings"]))
+    return Gates(**made_by(processed, "loop")["settings"])
 
 
 def _asked(state: Closing, name: str, limits: Limits, most: int) -> list[Asked]:
@@ -112,8 +117,8 @@ def _asked(state: Closing, name: str, limits: Limits, most: int) -> list[Asked]:
     if name not in state.closed:
         return _tests(state, name, limits, most)
     problem, outcome = state.closed[name].problem, state.closed[name].outcome
-    found = aims(_allowed(problem, state.batch.runs, limits), outcome, state.gates, most)
-    return [Asked(name, aim, tuple(_rows(state.batch.runs, aim))) for aim in found]
+    planned = aims(_allowed(problem, state.batch.runs, limits), outcome, state.gates, most)
+    return [Asked(name, aim, tuple(_rows(state.batch.runs, aim))) for aim in planned]
 
 
 def _allowed(problem: Problem, runs: pd.DataFrame, limits: Limits) -> Problem:
@@ -132,21 +137,21 @@ def _rows(runs: pd.DataFrame, aim: Aim) -> list[tuple[Row, int]]:
 
 def _tests(state: Closing, name: str, limits: Limits, most: int) -> list[Asked]:
     """Return the tests of stability that tell most about an undecided cause, at different speeds."""
-    told = state.stories[name].get("experiments") or []
-    words = state.verdicts[name].get("next_experiment")
-    if not words:
+    promised = state.stories[name].get("experiments") or []
+    states = state.verdicts[name].get("next_experiment")
+    if not states:
         return []
     runs = state.batch.runs
     labelled = runs[(runs["role"] != "") & (runs["spindle_rpm"] > 0)]
     rows: dict[float, Row] = {}
-    for test in told:
+    for test in promised:
         speed, depth = rounded(test.get("spindle_rpm", np.nan)), rounded(test.get("axial_depth_mm", np.nan))
         if np.isfinite(speed) and speed not in rows and len(rows) < min(TESTS, most) and len(labelled):
             like = str((labelled["spindle_rpm"] - speed).abs().idxmin())
             row = row_like(runs, like, {}, {"spindle_rpm": speed, "axial_depth_mm": depth})
             rows |= {speed: row} if within(row, limits) else {}
-    chance = float(told[0]["probability"]) if rows else None
-    return [Asked(name, Aim("decide", words, (), chance), tuple((row, 1) for row in rows.values()))]
+    chance = float(promised[0]["probability"]) if rows else None
+    return [Asked(name, Aim("decide", states, (), chance), tuple((row, 1) for row in rows.values()))]
 
 
 def _content(batch: str, asked: Sequence[Asked], table: pd.DataFrame) -> JSON:
@@ -154,7 +159,7 @@ def _content(batch: str, asked: Sequence[Asked], table: pd.DataFrame) -> JSON:
         {
             "observable": one.observable,
             "question": one.aim.question,
-            "words": one.aim.words,
+            "words": one.words,
             "chance": one.aim.chance,
             "runs": sum(repeats for _, repeats in one.rows),
         }
@@ -163,13 +168,13 @@ def _content(batch: str, asked: Sequence[Asked], table: pd.DataFrame) -> JSON:
     return {"batch": batch, "questions": questions, "runs": json.loads(table.to_json(orient="records"))}
 
 
-def _told(
+def _in_words(
     batch: str, names: Sequence[str], asked: Sequence[Asked], table: pd.DataFrame, out: Path | None
 ) -> list[str]:
     """Say what is open, observable by observable, and what is to be cut."""
     lines = []
     for name in names:
-        mine = [one.aim.words for one in asked if one.observable == name]
+        mine = [one.words for one in asked if one.observable == name]
         lines += [f"{name}: {words}." for words in mine] or [f"{name}: {NOTHING}."]
     if not names:
         lines.append(f"{batch}: no observable has a verdict; metro check says what the batch lacks.")

@@ -2,43 +2,47 @@
 
 from __future__ import annotations
 
-import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from metro.batch.processed import read_batch, write_table
-from metro.loop.candidate import Candidate
-from metro.loop.fit import fit
-from metro.loop.noise import first_noise
-from metro.loop.verdict import COMPARISON, comparison, held_out, typed
-from metro.observables.lobes import LabelProblem
-from metro.observables.lobes import comparison as label_comparison
-from metro.observables.problem import Problem
-from metro.stages.observed import Task, problems, read_json, read_observed
+from metro.batch.processed import write_table
+from metro.batch.provenance import write_made
+from metro.loop.fitting.fit import Fit
+from metro.loop.fitting.held_out import COMPARISON, comparison, held_out, typed
+from metro.observables.labelled import Labelled
+from metro.observables.problem import Problem, Refusal
+from metro.stages.problem_file import read_problems
 from metro.units import JSON
 
 
-def predict(processed: Path, settings: JSON, code: str) -> None:
-    """Write ``prediction.parquet``: comparison rows of the held-out runs, before any effect.
+@dataclass(frozen=True)
+class Predicted:
+    """Handler: comparison rows of the held-out runs, by the fit of the base model; none without one."""
 
-    ``settings``: ``model_form_budget``.
-    """
-    batch = read_batch(processed)
-    tasks = problems(batch, read_observed(processed), read_json(processed / "identified.json"))
-    tables = [_predicted(task, settings["model_form_budget"]) for task in tasks.values()]
+    base: Fit | None
+
+    def sampled(self, problem: Problem) -> pd.DataFrame:
+        """Predict the held-out runs of a problem."""
+        if self.base is None:
+            return pd.DataFrame(columns=list(COMPARISON))
+        return comparison(problem, held_out(problem, self.base))
+
+    def labelled(self, problem: Labelled) -> pd.DataFrame:
+        """Return the probability of each held-out label."""
+        return problem.comparison()
+
+    def refused(self, _refusal: Refusal) -> pd.DataFrame:
+        """Return no rows."""
+        return pd.DataFrame(columns=list(COMPARISON))
+
+
+def predict(processed: Path, settings: JSON, code: str) -> None:
+    """Write ``prediction.parquet``: comparison rows of the held-out runs, before any effect."""
+    posed = read_problems(processed).values()
+    tables = [each.task.handled_by(Predicted(each.base)) for each in posed]
     filled = [table for table in tables if len(table)]
     joined = pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(COMPARISON))
-    provenance = {"code": code, "settings": json.dumps(settings, sort_keys=True)}
-    write_table(processed / "prediction.parquet", typed(joined), provenance)
-
-
-def _predicted(task: Task, budget: float) -> pd.DataFrame:
-    """Comparison rows of one observable; none where nothing can be fitted."""
-    if isinstance(task, LabelProblem):
-        return label_comparison(task)
-    if not isinstance(task, Problem) or not task.role("identify", "calibrate"):
-        return pd.DataFrame(columns=list(COMPARISON))
-    blocks = task.role("identify", "calibrate")
-    base = fit(Candidate(task.base), blocks, first_noise(budget, task.scatter, blocks))
-    return comparison(task, held_out(task, base))
+    write_table(processed / "prediction.parquet", typed(joined))
+    write_made(processed, "predict", settings, code)

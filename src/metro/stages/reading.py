@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from metro.batch.findings import Finding as Problem
+from metro.batch.sources import Files, source
 from metro.formats import FormatError
 from metro.formats.registry import ReadFrf, read, read_frfs, read_pieces
 from metro.signals import quality
@@ -25,25 +26,29 @@ class Recordings:
     Attributes
     ----------
     advance : called when a file has been read.
+    files : the mappings of ``batch.yaml`` by which files are read.
     problems : files that could not be read; they give no part.
     findings : rows of the quality table.
     zeros : run → the dynamometer's first time stamp, s: the zero of all clocks of that run.
     paths : run → extents (2,) of its programmed path in x and y, mm.
     left_out : run and column of runs.csv of each recording that is not fit for use.
+    usable : files of impacts.csv with at least one hit or FRF that is fit for use.
     """
 
     folder: Path
     advance: Callable[[], None]
+    files: Files = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     findings: list[dict[str, object]] = field(default_factory=list)
     zeros: dict[str, float] = field(default_factory=dict)
     paths: dict[str, Array] = field(default_factory=dict)
     left_out: list[tuple[str, str]] = field(default_factory=list)
+    usable: set[str] = field(default_factory=set)
 
     def table(self, file: str, kind: str) -> pd.DataFrame | None:
         """Read a file; None, and a problem gathered, where that is impossible."""
         try:
-            return read(self.folder / file, kind)
+            return read(source(self.folder, file, self.files), kind)
         except FormatError as error:
             self.problems.append(Problem("error", file, error.message))
             return None
@@ -56,7 +61,7 @@ class Recordings:
         ``again``: it was read before, and is no step of the progress; it may have been changed since.
         """
         try:
-            yield from read_pieces(self.folder / file, kind, rows)
+            yield from read_pieces(source(self.folder, file, self.files), kind, rows)
         except FormatError as error:
             self.problems.append(Problem("error", file, error.message))
         finally:
@@ -66,7 +71,7 @@ class Recordings:
     def frfs(self, file: str) -> list[ReadFrf]:
         """Read every FRF of a file; none, and a problem gathered, where that is impossible."""
         try:
-            return read_frfs(self.folder / file)
+            return read_frfs(source(self.folder, file, self.files))
         except FormatError as error:
             self.problems.append(Problem("error", file, error.message))
             return []
@@ -85,10 +90,10 @@ class Recordings:
     def fit(self, file: str, run: str, column: str, findings: list[quality.Finding]) -> bool:
         """Note findings on a run's recording; tell whether it can be used, and leave it out otherwise."""
         failed = [each.check in MUST_PASS and not each.ok for each in findings]
-        told = [
+        noted = [
             each._replace(message=f"{each.message}; the recording is left out") if bad else each
             for each, bad in zip(findings, failed, strict=True)
         ]
-        self.note(file, run, told)
+        self.note(file, run, noted)
         self.left_out += [(run, column)] if any(failed) else []
         return not any(failed)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from metro.batch.axes import signed_axes
 from metro.batch.batch import Batch
 from metro.batch.canonical import Part
-from metro.batch.manifest import signed_axes
 from metro.dynamics.hits import Hit, fault
 from metro.signals import plausible, quality
 from metro.signals.conversion import driving_point_sign, receptance, response_si, sensor_to_tool
@@ -44,32 +44,32 @@ def force(batch: Batch, recordings: Recordings) -> Iterator[Part]:
     axes = signed_axes(sensor.get("axes") or {})
     to_tool = sensor_to_tool(axes, float(sensor.get("rotation_deg", 0.0)), sensor.get("reads", "work"))
     for run, file in files(batch, "dynamometer"):
-        found = RecordQuality(("Fx", "Fy", "Fz"), sensor.get("range_n"))
+        record = RecordQuality(("Fx", "Fy", "Fz"), sensor.get("range_n"))
         count, table = 0, pd.DataFrame()
         faults = len(recordings.problems)
         for table in recordings.pieces(file, "force", PIECE):
             if len(table):
-                found.add(table["t_s"].to_numpy(), table[list(FORCES)].to_numpy())
+                record.add(table["t_s"].to_numpy(), table[list(FORCES)].to_numpy())
                 count += 1
-        if len(recordings.problems) > faults or not _fit_force(batch, recordings, run, file, found):
+        if len(recordings.problems) > faults or not _fit_force(batch, recordings, run, file, record):
             continue
         again = [table] if count == 1 else recordings.pieces(file, "force", PIECE, again=True)
         for some in again:
             tool = to_tool @ some[list(FORCES)].to_numpy().T
-            part = {"run": run, "t_s": some["t_s"].to_numpy() - found.zero}
+            part = {"run": run, "t_s": some["t_s"].to_numpy() - record.zero}
             part |= dict(zip(FORCES, tool, strict=True))
             yield part | ({"spindle_deg": some["spindle_deg"]} if "spindle_deg" in some else {})
 
 
-def _fit_force(batch: Batch, recordings: Recordings, run: str, file: str, found: RecordQuality) -> bool:
+def _fit_force(batch: Batch, recordings: Recordings, run: str, file: str, record: RecordQuality) -> bool:
     """Gather what there is to say of a force record; tell whether it can be used."""
     rate = batch.instrument("dynamometer").get("rate_hz")
-    recordings.zeros[run] = found.zero
-    unit = plausible.clock_of(found.step, rate) or _force_unit(batch, run, found.largest)
+    recordings.zeros[run] = record.zero
+    unit = plausible.clock_of(record.step, rate) or _force_unit(batch, run, record.largest)
     if recordings.doubt(file, unit):
         return False
-    recordings.note(file, run, [_starts_at(found.zero), *found.sampling(rate), *found.air_offset()])
-    return recordings.fit(file, run, "dynamometer", found.channels())
+    recordings.note(file, run, [_starts_at(record.zero), *record.sampling(rate), *record.air_offset()])
+    return recordings.fit(file, run, "dynamometer", record.channels())
 
 
 def robot(batch: Batch, recordings: Recordings) -> Iterator[Part]:
@@ -95,7 +95,7 @@ def robot(batch: Batch, recordings: Recordings) -> Iterator[Part]:
             places |= {run: goes} if log == "cut" else {}
             zero = recordings.zeros.get(run, own) if log == "cut" else own
             recordings.note(file, run, [_starts_at(zero), *quality.sampling(time, rate)])
-            recordings.note(file, run, [quality.Finding(*found) for found in table.attrs.get("notes", ())])
+            recordings.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
             checks = [quality.motion(goes), *_channels(TORQUES, table[list(TORQUES)].to_numpy(), None)]
             if not recordings.fit(file, run, column, checks):
                 continue
@@ -144,7 +144,9 @@ def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator
         if recordings.doubt(file, plausible.clock(time, rate) or plausible.hammer_force(force_n)):
             continue
         response = response_si(table["response"].to_numpy(), unit)
-        recordings.note(file, "", [_hit(Hit(force_n, response, 1.0 / float(np.mean(np.diff(time)))))])
+        clean = _hit(Hit(force_n, response, 1.0 / float(np.mean(np.diff(time)))))
+        recordings.note(file, "", [clean])
+        recordings.usable |= {file} if clean.ok else set()
         for name, values in (("hammer force", force_n), ("response", response)):
             recordings.note(file, "", [quality.dead(name, values), quality.flat_tops(name, values)])
         si_unit = "m/s2" if unit == "g" else unit
@@ -155,8 +157,8 @@ def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator
 def _unit_at_odds(table: pd.DataFrame, unit: str) -> str:
     """Say that a record's own unit of the response is not that of impacts.csv; "" where they agree."""
     own = table.attrs.get("response_unit") or unit
-    found = f"column response: found the unit {own!r} in the file, expected {unit!r} as impacts.csv says"
-    return "" if own == unit else f"{found}: correct the one that is wrong"
+    mismatch = f"column response: found the unit {own!r} in the file, expected {unit!r} as impacts.csv says"
+    return "" if own == unit else f"{mismatch}: correct the one that is wrong"
 
 
 def frf(impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:
@@ -181,11 +183,12 @@ def frf(impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:
             driving = pair[0] == pair[1]
             part = _receptance(str(row["file"]), one.table, unit, recordings, driving=driving)
             if part is not None:
+                recordings.usable.add(str(row["file"]))
                 yield place | part
         if others and not repeats:
             asked = f"{row['reference'] or 'any'} to {row['response'] or 'any'}"
-            found = f"found FRFs of {', '.join(dict.fromkeys(others))}, expected {asked}"
-            recordings.doubt(str(row["file"]), f"{found} as impacts.csv says")
+            message = f"found FRFs of {', '.join(dict.fromkeys(others))}, expected {asked}"
+            recordings.doubt(str(row["file"]), f"{message} as impacts.csv says")
 
 
 def _asked(row: Mapping[Hashable, Any], pair: tuple[str, str]) -> bool:
@@ -204,7 +207,9 @@ def _receptance(
     keep = np.isfinite(values)
     if recordings.doubt(file, plausible.frf(frequency[keep], values[keep])):
         return None
-    checks = [quality.dead("the FRF", np.abs(values[keep]))]
+    typical, mass = plausible.softness(frequency[keep], values[keep])
+    size = quality.light(mass, plausible.LIGHT_KG, soft=typical > plausible.RECEPTANCE)
+    checks = [quality.dead("the FRF", np.abs(values[keep])), size]
     if driving:
         checks.append(quality.conjugated(driving_point_sign(frequency[keep], values[keep])))
     if not recordings.fit(file, "", "file", checks):

@@ -12,44 +12,19 @@ from metro.batch import provenance
 from metro.batch.batch import Batch
 from metro.batch.processed import Processed, read_batch, write_json
 from metro.batch.writing import write_atomically
-from metro.observables import force_metrics
-from metro.observables.end_stiffness import end_stiffness
-from metro.observables.mean_forces import mean_forces
-from metro.observables.record_view import record_tables
-from metro.observables.robot_tables import robot_tables
+from metro.observables.arm.end_stiffness import end_stiffness
+from metro.observables.arm.robot_tables import robot_tables
+from metro.observables.catalogue import shown_tables
+from metro.observables.cut.record_view import record_tables
+from metro.observables.force import metrics as force_metrics
+from metro.observables.force.mean_forces import mean_forces
 from metro.report.batch_report import batch_report
 from metro.report.results import Results
+from metro.stages.problem_file import read_problems
 from metro.units import JSON
 
-TABLES = (
-    "qc",
-    "spindle",
-    "comparison",
-    "face_indices",
-    "face_contacts",
-    "lobes_final",
-    "lobe_methods",
-    "lobe_islands",
-    "lobe_stations",
-    "chatter_runs",
-    "chatter_records",
-    "lobe_runs",
-    "yielding",
-    "frf_used",
-    "stabilisation",
-    "mode_shapes",
-    "mode_mac",
-    "waviness_points",
-    "joint_friction",
-    "joint_friction_curve",
-    "face_map",
-    "published_errors",
-    "published_modes",
-    "published_loads",
-    "published_forces",
-)
-
-FORCE_TABLES = ("orders", "spindle", "force_refused")
+# What the loop and the reading of the raw files left, beside the observed tables.
+TABLES = ("qc", "comparison", "lobes_final")
 
 
 def report(processed: Path, reports: Path, settings: JSON, code: str) -> None:
@@ -61,14 +36,14 @@ def report(processed: Path, reports: Path, settings: JSON, code: str) -> None:
 
 def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> Results:
     """Read what the stages before left; tables that are absent or empty are left out."""
-    tables = _tables(processed, TABLES)
+    tables = _tables(processed, (*TABLES, *shown_tables()))
     batch = read_batch(processed)
     tables = {name: table for name, table in tables.items() if len(table)}
     tables |= _force_figures(batch, tables.get("comparison"))
     identified = _json(reports / "identified.json")
     read = Processed(processed)
     tables |= robot_tables(batch, read, identified, tables.get("waviness_points"))
-    tables |= mean_forces(batch, _tables(processed, FORCE_TABLES), identified) | record_tables(
+    tables |= _mean_forces(batch, processed, tables, identified) | record_tables(
         batch, read, tables.get("qc")
     )
     return Results(
@@ -81,6 +56,15 @@ def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> R
         stages=provenance.stages(processed, settings, code),
         packages=provenance.packages(),
     )
+
+
+def _mean_forces(
+    batch: Batch, processed: Path, tables: dict[str, pd.DataFrame], identified: JSON
+) -> dict[str, pd.DataFrame]:
+    if "spindle" not in tables:
+        return {}
+    posed = read_problems(processed).get("force")
+    return mean_forces(batch, tables["spindle"], identified, posed.task if posed else None)
 
 
 def _tables(processed: Path, names: tuple[str, ...]) -> dict[str, pd.DataFrame]:
@@ -111,8 +95,8 @@ def _sources(processed: Path) -> dict[str, str]:
     """SHA-256 by source file, from the provenance in the metadata of all processed tables."""
     import pyarrow.parquet as pq
 
-    found: dict[str, Any] = {}
+    sources: dict[str, Any] = {}
     for path in sorted(processed.glob("*.parquet")):
         metadata = pq.read_schema(path).metadata or {}
-        found |= json.loads(metadata.get(b"metro.sources", b"{}"))
-    return {str(name): str(digest) for name, digest in found.items()}
+        sources |= json.loads(metadata.get(b"metro.sources", b"{}"))
+    return {str(name): str(digest) for name, digest in sources.items()}

@@ -14,11 +14,23 @@ from metro.signals.conversion import moved
 from metro.stages.reading import Recordings
 from metro.stages.recordings import POINT, files
 from metro.surface.extent import face_sides, misfit
+from metro.surface.points import drawn
+from metro.surface.scene import LEAST_GROUP, clusters_of, planes_of
 from metro.units import Array
 
 PIECE = 1 << 18  # points in memory at a time
 SAMPLE = 1 << 12  # points of a piece that are kept to tell the extents from
 MARGIN = 0.25  # of the work's sides; scanner.extent_margin of batch.yaml
+SEEN = 20_000  # points that a scan which is no face is looked at with
+PART = 0.1  # of them, on a plane or in a group of its own, that a message to the user names
+THICK, APART = (
+    0.01,
+    6.0,
+)  # of a plane, over the distance from the middle; of groups, over that to the tenth point
+# Of the points of one face, that lie on a plane, and their distance from it over that from the middle: a
+# machined face is flatter by far, and a scene of an open part with a face in it has half of them there.
+FACE, FLAT = 0.9, 0.05
+GROUPS = 5  # more are a cloud full of holes
 OF_A_PATH = 2.0  # a path runs past the face at both ends and stays within it across
 
 
@@ -35,14 +47,15 @@ def scan(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         for table in recordings.pieces(file, "cloud", PIECE):
             points = table[list(POINT)].to_numpy()
             points = points if to_work is None else moved(points, to_work)
-            recordings.note(file, run, [quality.Finding(*found) for found in table.attrs.get("notes", ())])
+            recordings.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
             kept, dropped = kept + len(points), dropped + table.attrs["dropped"]
             samples.append(_sample(points))
             if len(points):
                 yield {"run": run, **dict(zip(POINT, points.T, strict=True))}
         if kept:
             recordings.note(file, run, [quality.missing_points(dropped, kept)])
-            problem = _misfit(np.concatenate(samples), batch, recordings.paths.get(run))
+            sample = np.concatenate(samples)
+            problem = _misfit(sample, batch, recordings.paths.get(run)) or _no_face(sample)
             recordings.problems += [Problem("error", file, problem)] if problem else []
 
 
@@ -59,7 +72,7 @@ def _misfit(points: Array, batch: Batch, path: Array | None) -> str:
     placed = "to_work" in scanner
     size = (batch.manifest.get("work") or {}).get("size_mm")
     try:
-        found = face_sides(points, placed=placed)
+        sides = face_sides(points, placed=placed)
     except ValueError as error:
         return f"{error}, expected a scan of a face"
     if size is not None:
@@ -67,19 +80,70 @@ def _misfit(points: Array, batch: Batch, path: Array | None) -> str:
         margin = 1.0 + float(scanner.get("extent_margin", MARGIN))
         what = f"the work is {due[0]:g} × {due[1]:g} mm"
     elif path is not None:
-        found, due, margin = found.max(keepdims=True), path.max(keepdims=True), OF_A_PATH
+        sides, due, margin = sides.max(keepdims=True), path.max(keepdims=True), OF_A_PATH
         what = f"the path is {due[0]:g} mm long"
     else:
         return ""
-    unit = misfit(found, due / margin, due * margin)
+    unit = misfit(sides, due / margin, due * margin)
     if unit is None:
         apart = placed and size is not None
         hint = "is scanner.to_work in batch.yaml that of this scan?"
         return plausible.beside(points, np.array(size, float), hint) if apart else ""
-    spans = f"the points span {' × '.join(f'{side:.4g}' for side in found)}, {what}"
+    spans = f"the points span {' × '.join(f'{side:.4g}' for side in sides)}, {what}"
     if unit:
         return f"{spans}: coordinates seem to be in {unit}, expected millimetres"
     least = " × ".join(f"{side:.4g}" for side in due / margin)
     most = " × ".join(f"{side:.4g}" for side in due * margin)
     hint = "is it a scan of another part, or of a part of the face (instruments.scanner.extent_margin)?"
-    return f"{spans}, expected {least} to {most} mm: {hint}"
+    fits = np.sort(due / margin)[::-1], np.sort(due * margin)[::-1]
+    return f"{spans}, expected {least} to {most} mm: {hint}{_scene(points, *fits)}"
+
+
+def _no_face(points: Array) -> str:
+    """Say that a cloud is no scan of one face, or "": most of its points then lie on no common plane."""
+    some = np.unique(drawn(points, SAMPLE), axis=0)
+    size = float(np.median(np.linalg.norm(some - np.median(some, axis=0), axis=1)))
+    planes = planes_of(some, FLAT * size, least_share=PART) if size > 0.0 else []
+    share = len(planes[0].members) / len(some) if planes else 0.0
+    if share >= FACE or size == 0.0:
+        return ""
+    found = f"{100 * share:.0f} % of the points lie within {FLAT * size:.2g} mm of one plane"
+    sides = np.full(2, np.inf)
+    return (
+        f"{found}, expected {100 * FACE:.0f} % or more of a scan of one face: keep the points of the face "
+        f"alone{_scene(points, sides, sides)}"
+    )
+
+
+def _scene(points: Array, low: Array, high: Array) -> str:
+    """Say which planes and groups there are in a cloud that is not the face alone; "" where it is one plane.
+
+    ``low``, ``high`` (k,) mm: limits of the face's sides, the longer one first.
+    """
+    points = np.unique(drawn(points, SEEN), axis=0)
+    size = float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
+    planes = planes_of(points, THICK * size, least_share=PART) if size > 0.0 else []
+    said = ""
+    if len(planes) > 1:
+        each = [
+            f"{' × '.join(f'{side:.3g}' for side in seen.sides)} mm "
+            f"({100 * len(seen.members) / len(points):.0f} % of the points)"
+            for seen in planes
+        ]
+        said = f"; the points lie on {len(planes)} planes: {', '.join(each)}"
+        fitting = [i for i, seen in enumerate(planes, 1) if misfit(seen.sides[: len(low)], low, high) is None]
+        if fitting:
+            said = f"{said}; plane {fitting[0]} has the size of the face: keep its points alone"
+    count = _groups(points)
+    return f"{said}; the points lie in {count} groups apart" if 1 < count <= GROUPS else said
+
+
+def _groups(points: Array) -> int:
+    """Count the groups of points that are apart, each at least a ``PART`` of the cloud."""
+    from scipy.spatial import cKDTree
+
+    if len(points) <= LEAST_GROUP:
+        return 1
+    tenth = cKDTree(points).query(points, k=[LEAST_GROUP + 1])[0]
+    label = clusters_of(points, APART * float(np.median(tenth)))
+    return int((np.bincount(label[label >= 0], minlength=1) >= PART * len(points)).sum())

@@ -19,6 +19,7 @@ GAUSSIAN = (
 )
 TRUNCATE = 4.5
 MOST_REJECTED = 0.01
+BORDER = 1e-6  # of a cell: far above the rounding of coordinates, far below what moves an index
 FINEST = 6  # cells within a nesting index: more of them add nothing that passes the filter
 
 
@@ -31,9 +32,13 @@ class Grid:
     shape: tuple[int, int]
 
     def cells(self, u: Array, v: Array) -> np.ndarray:
-        """Return the number (n,) of the cell of each point in the flattened grid."""
+        """Return the number (n,) of the cell of each point in the flattened grid.
+
+        A point on the border of two cells belongs to the upper one, and so does a point that rounding has
+        put ``BORDER`` of a cell below it: whole rows of a lattice of points may lie on a border.
+        """
         row, column = (
-            np.floor((along - corner) * (1 / self.cell))
+            np.floor((along - corner) * (1 / self.cell) + BORDER)
             for along, corner in zip((u, v), self.corner, strict=True)
         )
         row *= self.shape[1]
@@ -68,9 +73,14 @@ class CellSums:
 
 
 def make_grid(low: Array, high: Array, cell: float) -> Grid:
-    """Lay a grid over the in-plane rectangle from ``low`` to ``high`` (2,)."""
-    rows, columns = (int(n) + 1 for n in (high - low) / cell)
-    return Grid(cell, low, (rows, columns))
+    """Lay a grid over the in-plane rectangle from ``low`` to ``high`` (2,), seen from a point within it.
+
+    That point, the centroid of a cloud, is the middle of a cell: seen from the other side or end of the face,
+    the same points share a cell, and the filtered surface is the same.
+    """
+    before, after = (np.ceil(np.abs(end) / cell - 0.5 + BORDER).astype(int) for end in (low, high))
+    rows, columns = (int(n) for n in before + after + 1)
+    return Grid(cell, -(before + 0.5) * cell, (rows, columns))
 
 
 def cell_size(spacing: float, nesting_index: float) -> float:
@@ -130,18 +140,39 @@ def residual_share(sums: CellSums, nesting_index: float, correlation: float) -> 
 
 
 def filter_width(cell: float, nesting_index: float) -> float:
-    """Deviation of the weighting function in cells; averaging over a cell has a variance of 1/12 itself."""
-    return float(np.sqrt((GAUSSIAN * nesting_index / cell) ** 2 - 1 / 12))
+    """Return the deviation, in cells, of the kernel with which half of a wave as long as the index passes.
+
+    The kernel is sampled at the cells, and the mean over a cell has weakened the wave before. Where a cell is
+    a third of the index, neither is a Gaussian any more, and variances that add up would pass 0.6 of it.
+
+    Parameters
+    ----------
+    cell : at most a third of ``nesting_index``, in its unit.
+    """
+    from scipy.optimize import brentq
+
+    wave = 2 * np.pi * cell / nesting_index  # per cell, rad
+    wanted = 0.5 / np.sinc(wave / (2 * np.pi))
+    widest = GAUSSIAN * nesting_index / cell + 1
+    steps = np.arange(-np.ceil(TRUNCATE * widest), np.ceil(TRUNCATE * widest) + 1)
+
+    def excess(width: float) -> float:
+        kernel = np.exp(-0.5 * (steps / width) ** 2)
+        return float(kernel @ np.cos(wave * steps) / kernel.sum()) - wanted
+
+    width: float = brentq(excess, 0.2, widest)
+    return width
 
 
 def interior(sums: CellSums, margin: float) -> np.ndarray:
     """Mask of the cells at least ``margin`` inside the outline of the points (holes of one cell closed)."""
     from scipy.ndimage import maximum_filter, minimum_filter
 
-    covered = maximum_filter(sums.count > 0, size=3)
+    # With a cell more on every side, so that closing holes widens the outline alike wherever the grid ends.
+    covered = maximum_filter(np.pad(sums.count > 0, 1), size=3)
     reach = 2 * (int(np.ceil(margin / sums.grid.cell)) + 1) + 1
     mask: np.ndarray = minimum_filter(covered, size=reach, mode="constant", cval=False)
-    return mask
+    return mask[1:-1, 1:-1]
 
 
 def crop_margin(spacing: float, nesting_index: float, least: float) -> float:
@@ -160,7 +191,7 @@ class Readings:
 def local_outliers(
     sums: CellSums, sample: Readings, suspects: Readings, points: int, nesting_index: float
 ) -> tuple[np.ndarray, float, CellSums]:
-    """Return which suspects (m,) stand out of their surroundings, the local noise, and the sums without them.
+    """Return which suspects (m,) are outliers, the local noise, and the sums without the outliers.
 
     A point is rejected when its residual from the filtered surface exceeds k robust standard deviations with
     ``2 n Φ(−k) = 0.05`` (at most one false rejection in twenty faces). The worst point of a cell goes first,
@@ -169,17 +200,19 @@ def local_outliers(
 
     Parameters
     ----------
-    sample : points that stand for all in the estimate of the noise. suspects : all that may be rejected.
+    sample : points from which the noise is estimated. suspects : all points that may be rejected.
     points : number of all points.
     """
     from scipy.special import ndtri
 
     rejected = np.zeros(len(suspects.cells), dtype=bool)
     limit, kept = -float(ndtri(0.025 / points)), sums
-    sigma = 0.0
-    for _ in range(20):
+    of_all = sigma = 0.0
+    for number in range(20):
         smooth = gaussian_s_filter(kept, nesting_index).ravel()
-        sigma = 1.4826 * float(np.median(np.abs(sample.deviations - smooth[sample.cells])))
+        # where all points of a neighbourhood are rejected there is no surface to compare with
+        sigma = 1.4826 * float(np.nanmedian(np.abs(sample.deviations - smooth[sample.cells])))
+        of_all = of_all if number else sigma
         residual = np.where(rejected, 0.0, np.abs(suspects.deviations - smooth[suspects.cells]))
         over = np.flatnonzero(residual > limit * sigma)
         if not len(over) or not sigma:
@@ -188,5 +221,5 @@ def local_outliers(
         rejected[worst_first[np.unique(suspects.cells[worst_first], return_index=True)[1]]] = True
         kept = sums.without(suspects.cells[rejected], suspects.deviations[rejected])
     if np.count_nonzero(rejected) > MOST_REJECTED * points:
-        return np.zeros_like(rejected), sigma, sums
+        return np.zeros_like(rejected), of_all, sums
     return rejected, sigma, kept

@@ -18,14 +18,14 @@ from metro.surface.plane import Moments, Plane, moments_of_columns
 from metro.surface.points import Points, slices
 from metro.units import Array
 
-SAMPLE = 60_000  # points that stand for all: the median of their residuals is known to half a per cent
+SAMPLE = 60_000  # points in the sample: the median of their residuals is known to half a per cent
 SUSPECT = 2.5  # robust deviations beyond which a point is looked at again
 TAIL = 1.0  # per cent of the points at either end that are kept for the percentiles
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What the first pass over a cloud tells: its moments, and the corners of its box (3,)."""
+    """The result of the first pass over a cloud: its moments, and the corners of its box (3,)."""
 
     moments: Moments
     low: Array
@@ -55,15 +55,15 @@ def survey(points: Points) -> Survey:
     ValueError
         Where there are no points.
     """
-    found: Moments | None = None
+    moments: Moments | None = None
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for _, xyz in slices(points):
         low, high = np.minimum(low, xyz.min(axis=1)), np.maximum(high, xyz.max(axis=1))
         here = moments_of_columns(xyz)
-        found = here if found is None else found.merge(here)
-    if found is None:
+        moments = here if moments is None else moments.merge(here)
+    if moments is None:
         raise ValueError("a plane needs three points or more, found none")
-    return Survey(found, low, high)
+    return Survey(moments, low, high)
 
 
 def box_in_plane(plane: Plane, seen: Survey) -> tuple[Array, Array]:
@@ -181,7 +181,7 @@ def raw_readings(
     places = grid.corner + (np.column_stack(np.divmod(sample.cells[kept], grid.shape[1])) + 0.5) * grid.cell
     used = places @ slope[:2] + slope[2] * sample.deviations[kept] + offset
     bounds = np.percentile(used, [TAIL, 100 - TAIL]) if len(used) else np.zeros(2)
-    # a point lies up to half a cell off its centre; of equal ones rounding must leave out none
+    # a point lies up to half a cell from its centre; of equal ones rounding must leave out none
     slack = grid.cell * float(np.abs(slope[:2]).sum()) / 2 + 1e-9 * float(np.ptp(used) if len(used) else 0.0)
     ends = _Ends((float(bounds[0]) + slack, float(bounds[1]) - slack), [], [])
     count, total, logs = 0, 0.0, 0.0

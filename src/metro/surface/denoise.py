@@ -1,8 +1,8 @@
-"""The surface under noise: the modes of a scan, what they say of the surface, and what it may have been.
+"""The surface under noise: the modes of a scan, the estimate of the surface from them, and its uncertainty.
 
 In cosine modes over the face noise is independent from mode to mode, whatever its correlation along the face.
-Where the power about a mode is more than noise gives, the excess is the surface's, and Wiener's filter tells
-how much of each mode is. A dome or a twist has no short sum of cosines, since its slope does not vanish at
+Where the power about a mode exceeds that of the noise, the excess is the surface's, and Wiener's filter gives
+its share of each mode. A dome or a twist has no short sum of cosines, since its slope does not vanish at
 the edges: polynomials over the face are taken out first (Eubank & Speckman 1990), each total degree shrunk
 as a whole (James & Stein 1961).
 """
@@ -27,7 +27,7 @@ FORM = 4  # degree up to which they are the face's form and kept as they are
 class Estimate:
     """Modes of a surface, and the standard deviation of what is not known of each, in the grid's shape.
 
-    ``unknown_form`` (d, d) is that of the polynomials, ``unknown`` that of the modes of the rest.
+    ``unknown_form`` (d, d) is that of the polynomials, ``unknown`` that of the modes of the residual.
     """
 
     modes: Array
@@ -67,19 +67,19 @@ class Modes:
         return np.asarray(np.outer(rows, columns), np.float32)
 
     def estimate(self, modes: Array) -> Estimate:
-        """Return what ``modes`` of a scan with this noise say of the surface."""
+        """Estimate the surface from the ``modes`` of a scan with this noise."""
         form = self.along.T @ modes @ self.across
         kept = _kept_form(form**2 / self.form_noise)
         form = self.along @ (kept * form) @ self.across.T
-        rest = modes - form
-        share = _kept(rest**2 / self.noise)
-        return Estimate(form + share * rest, np.sqrt(share * self.noise), np.sqrt(kept * self.form_noise))
+        residual = modes - form
+        share = _kept(residual**2 / self.noise)
+        return Estimate(form + share * residual, np.sqrt(share * self.noise), np.sqrt(kept * self.form_noise))
 
-    def drawn(self, found: Estimate, random: np.random.Generator) -> Array:
-        """Return modes of what may be off in an estimate."""
-        form = found.unknown_form * random.standard_normal(found.unknown_form.shape, dtype=np.float32)
-        rest = found.unknown * random.standard_normal(found.unknown.shape, dtype=np.float32)
-        return np.asarray(rest + self.along @ form @ self.across.T)
+    def drawn(self, estimate: Estimate, random: np.random.Generator) -> Array:
+        """Draw the modes of a possible error of an estimate."""
+        form = estimate.unknown_form * random.standard_normal(estimate.unknown_form.shape, dtype=np.float32)
+        error = estimate.unknown * random.standard_normal(estimate.unknown.shape, dtype=np.float32)
+        return np.asarray(error + self.along @ form @ self.across.T)
 
 
 def field(modes: Array) -> Array:
@@ -129,7 +129,7 @@ def _kept(power: Array) -> Array:
 def modes_of_scan(sums: CellSums, smooth: Array, noise: Spectrum) -> Modes:
     """Return the cosine modes of the cell means of a scan, and of its noise.
 
-    ``smooth``: a filtered surface that stands for the cells without points.
+    ``smooth``: a filtered surface that replaces the cells without points.
     """
     from scipy.fft import dct, dctn
 

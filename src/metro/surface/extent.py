@@ -1,4 +1,4 @@
-"""How large a scanned face is, and what that says of its unit of length and of the part it was taken from."""
+"""How large a scanned face is, and whether that size agrees with the declared unit of length and part."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ def face_sides(points: Array, *, placed: bool) -> Array:
     return np.sort(spans[np.argmin(spans.prod(axis=1))])[::-1]
 
 
-def misfit(found: Array, low: Array, high: Array) -> str | None:
-    """Say what is wrong with sides ``found`` (k,) in mm that should be within ``low`` and ``high`` (k,).
+def misfit(sides: Array, low: Array, high: Array) -> str | None:
+    """Explain why ``sides`` (k,) in mm are not within ``low`` and ``high`` (k,).
 
     Returns
     -------
     str or None
         The unit that the coordinates seem to be in, "" where no unit explains the size, None where it fits.
     """
-    if _within(found, low, high):
+    if _within(sides, low, high):
         return None
-    return next((unit for unit, size in UNITS.items() if _within(found * size, low, high)), "")
+    return next((unit for unit, size in UNITS.items() if _within(sides * size, low, high)), "")
 
 
-def _within(found: Array, low: Array, high: Array) -> bool:
-    return bool((found >= low).all() and (found <= high).all())
+def _within(sides: Array, low: Array, high: Array) -> bool:
+    return bool((sides >= low).all() and (sides <= high).all())

@@ -43,7 +43,7 @@ CROP_TOLERANCE = 0.05
 
 @dataclass(frozen=True)
 class Face:
-    """What a cloud says about a face; lengths in the unit of the cloud (SI).
+    """The measures of a face, from its cloud; lengths in the unit of the cloud (SI).
 
     Attributes
     ----------
@@ -56,8 +56,8 @@ class Face:
     noise : of one point, and where the figure comes from.
     local_sigma : robust residual of the points from the filtered surface; lower than the noise where that is
         correlated.
-    scanned, outliers : number of all points; places, ascending, of those that stand out of their
-        surroundings.
+    scanned, outliers : number of all points; places, ascending, of those that differ from their
+    surroundings.
     points, spacing, margin : number used within the crop; pitch; width of the rim cropped.
     xm_inner : X_m with one more millimetre cropped; ``crop_holds`` where it changes by less than 5 %.
     """
@@ -108,12 +108,12 @@ def measure_face(
     Parameters
     ----------
     sigma, source : noise of one point and where it comes from (the manifest); None: the local residual is
-        taken, a lower bound, since noise that is correlated over the filter's width cannot be told from the
+        taken, a lower bound, since noise that is correlated over the filter's width is confounded with the
         surface (of a face of a few touched points: their scatter, where it has no order).
     nesting_index : of the areal Gaussian filter, m; raised to six pitches where the cloud is too sparse for
         it.
     step : rounding step of the coordinates, m.
-    repeats : what scans of the same face say of the noise; goes before ``sigma``.
+    repeats : the noise estimated from repeat scans of the same face; it takes precedence over ``sigma``.
     uncertainty : False leaves bias and deviation of the indices of a filtered face NaN, and is faster.
 
     Raises
@@ -155,19 +155,19 @@ def _dense_face(
     if not inside.any():
         raise ValueError(f"the face is narrower than the rim of {margin / MM:.2f} mm that its edges disturb")
     smooth = gaussian_s_filter(sums, nesting_index)
-    rest = residuals(cloud, plane, sums.grid, smooth.ravel(), inside.ravel())
+    residual = residuals(cloud, plane, sums.grid, smooth.ravel(), inside.ravel())
     rejected, local_sigma, sums = local_outliers(
-        sums, rest.sample, rest.suspects, seen.moments.count, nesting_index
+        sums, residual.sample, residual.suspects, seen.moments.count, nesting_index
     )
     depth = inside.astype(np.uint8) + (inside & interior(sums, margin + MM))
-    gone = np.sort(rest.place[rejected])
-    exact = _plane_of_crop(plane, rest, rejected, inside)
+    gone = np.sort(residual.place[rejected])
+    exact = _plane_of_crop(plane, residual, rejected, inside)
     raw, xm_inner, points = raw_readings(
-        cloud, (plane, exact), sums.grid, depth.ravel(), rejected=gone, sample=rest.sample, step=step
+        cloud, (plane, exact), sums.grid, depth.ravel(), rejected=gone, sample=residual.sample, step=step
     )
     # the filtered surface follows each point a little, and noise that is correlated more
     white, blurred = (residual_share(sums, nesting_index, length) for length in (0.0, CORRELATION))
-    told, spectrum = dense_noise(noise, local_sigma, (white, blurred), spacing, points)
+    scan_noise, spectrum = dense_noise(noise, local_sigma, (white, blurred), spacing, points)
     smooth = gaussian_s_filter(sums, nesting_index)
     map_points = _in_space(sums.grid, plane, smooth, inside)
     smooth_plane = fit_plane(map_points)
@@ -185,7 +185,7 @@ def _dense_face(
         map_deviations=deviations,
         zone=zone,
         nesting_index=nesting_index,
-        noise=told,
+        noise=scan_noise,
         local_sigma=local_sigma / float(np.sqrt(white)),
         scanned=seen.moments.count,
         outliers=gone,
@@ -196,13 +196,13 @@ def _dense_face(
     )
 
 
-def _plane_of_crop(frame: Plane, rest: Residuals, rejected: np.ndarray, inside: np.ndarray) -> Plane:
+def _plane_of_crop(frame: Plane, residual: Residuals, rejected: np.ndarray, inside: np.ndarray) -> Plane:
     """Plane of all points within the crop but those rejected, in space."""
-    back = ~rejected & inside.ravel()[rest.suspects.cells]
-    found = rest.sound
+    back = ~rejected & inside.ravel()[residual.suspects.cells]
+    moments = residual.sound
     if back.any():
-        found = found.merge(moments_of_columns(rest.coordinates[:, back]))
-    local = plane_of_moments(found)
+        moments = moments.merge(moments_of_columns(residual.coordinates[:, back]))
+    local = plane_of_moments(moments)
     turn = np.vstack([frame.axes, frame.normal])
     return Plane(frame.point + local.point @ turn, local.normal @ turn, local.axes @ turn)
 
@@ -213,10 +213,10 @@ def _in_space(grid: Grid, plane: Plane, field: Array, inside: np.ndarray) -> Arr
     return np.asarray(points + field[inside][:, None] * plane.normal)
 
 
-def _sparse_face(cloud: Array, plane: Plane, spacing: float, told: Noise | None, step: float) -> Face:
+def _sparse_face(cloud: Array, plane: Plane, spacing: float, known: Noise | None, step: float) -> Face:
     """Measure a face of a few touched points: no filter, so no ISO index; noise taken out by shrinkage."""
     deviations, zone = plane.deviations(cloud), minimum_zone(cloud)
-    noise = sparse_noise(plane.coordinates(cloud), deviations, told)
+    noise = sparse_noise(plane.coordinates(cloud), deviations, known)
     readings = raw_indices(deviations, step)
 
     def bias(sigma: float) -> dict[str, tuple[float, float]]:

@@ -1,8 +1,8 @@
 """Where the noise of a face comes from: repeat scans, the manifest, or the scan itself.
 
-A scan alone tells the noise that differs from point to point; noise that is correlated over the filter's
-width looks like the surface. Two scans of one face tell both: what differs between their filtered surfaces is
-noise that the filter passes, whatever its correlation.
+A single scan identifies the noise that differs from point to point; noise that is correlated over the
+filter's width is confounded with the surface. Two scans of one face identify both: the difference of their
+filtered surfaces is noise that the filter passes, whatever its correlation.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def dense_noise(
 
     Parameters
     ----------
-    noise : as told. residual : robust deviation of the points from the filtered surface.
+    noise : as declared. residual : robust deviation of the points from the filtered surface.
     left : share that this holds of the variance of white noise, and of noise blurred by a millimetre.
     spacing : pitch of the points. points : number of them.
     """
@@ -67,13 +67,13 @@ def dense_noise(
         return Noise(alone, "local residual, a lower bound"), assumed(alone, 0.0, density)
     if noise.spectrum is not None:
         return noise, noise.spectrum
-    # what the declared noise has beyond the residual is correlated: how far is not told
+    # The excess of the declared noise over the residual is correlated; its length is not declared.
     beyond, error = left[0] * noise.sigma**2 - residual**2, off * residual**2
     if beyond < 2 * error:
         return noise, assumed(noise.sigma, 0.0, density)
-    told = noise.sigma**2
-    correlated = min(told, beyond / (left[0] - min(left[1], 0.9 * left[0])))
-    white = float(np.sqrt(told - correlated))
+    variance = noise.sigma**2
+    correlated = min(variance, beyond / (left[0] - min(left[1], 0.9 * left[0])))
+    white = float(np.sqrt(variance - correlated))
     return noise, assumed(white, float(np.sqrt(correlated)), density, float(error / beyond))
 
 
@@ -118,9 +118,9 @@ def filterable(spacing: float, nesting_index: float) -> bool:
 def sparse_noise(coordinates: Array, deviations: Array, noise: Noise | None) -> Noise:
     """Return the noise of a few touched points ``coordinates`` (n, 2), ``deviations`` (n,).
 
-    Where neighbours are no more alike than points far apart, no shape is told from noise, and all of the
-    scatter counts as noise: an error that both of two scans have at the same points looks like a shape to
-    their difference, not to this.
+    Where neighbours are no more correlated than points far apart, no shape is distinguishable from noise, and
+    all of the scatter counts as noise. An error that both of two scans have at the same points is a shape for
+    their difference, but not for this test.
     """
     if noise is not None and not noise.repeated:
         return noise
@@ -136,7 +136,7 @@ def sparse_noise(coordinates: Array, deviations: Array, noise: Noise | None) -> 
 
 
 def spatial_order(coordinates: Array, deviations: Array) -> float:
-    """Return the chance that noise shows as much likeness of neighbours: Moran's I, four nearest neighbours.
+    """Return the chance that noise correlates neighbours as much: Moran's I, four nearest neighbours.
 
     Normal approximation of I under independence (Cliff & Ord 1981), one-sided.
     """

@@ -34,7 +34,7 @@ class Fitted:
     covariance: Array
     scatter: float
     dof: Mapping[Term, int]
-    dof_rest: int
+    residual_dof: int
     block_sd: float | None = None
 
 
@@ -74,11 +74,11 @@ def t_quantile(dof: float) -> float:
     return float(stdtrit(dof, 0.975)) if dof > 0 else math.nan
 
 
-def p_of_f(f: float, dof: float, rest: float) -> float:
+def p_of_f(f: float, dof: float, residual_dof: float) -> float:
     """Upper tail of the F distribution; NaN without degrees of freedom."""
     from scipy.special import fdtrc
 
-    return float(fdtrc(dof, rest, f)) if rest > 0 else math.nan
+    return float(fdtrc(dof, residual_dof, f)) if residual_dof > 0 else math.nan
 
 
 def fit_design(design: Design, values: Array, block: np.ndarray | None = None) -> Fitted:
@@ -95,13 +95,13 @@ def fit_design(design: Design, values: Array, block: np.ndarray | None = None) -
     if not (np.asarray(values) > 0).all():
         raise ValueError("a factorial study on a log scale needs positive values")
     y, x = np.log(values), design.matrix
-    rest = len(y) - x.shape[1]
+    residual_dof = len(y) - x.shape[1]
     if block is None or not 1 < len(np.unique(block)) < len(block):
         inverse = np.linalg.inv(x.T @ x)
         beta = inverse @ x.T @ y
-        variance = float(np.sum((y - x @ beta) ** 2)) / rest
-        dof = dict.fromkeys(design.terms, rest)
-        return Fitted(design, beta, variance * inverse, math.sqrt(variance), dof, rest)
+        variance = float(np.sum((y - x @ beta) ** 2)) / residual_dof
+        dof = dict.fromkeys(design.terms, residual_dof)
+        return Fitted(design, beta, variance * inverse, math.sqrt(variance), dof, residual_dof)
     return _mixed(design, y, block)
 
 
@@ -112,8 +112,8 @@ def _mixed(design: Design, y: Array, block: np.ndarray) -> Fitted:
     x, p = design.matrix, design.matrix.shape[1]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a variance between plates of zero is an answer, not a failure
-        found = MixedLM(y, x, groups=block).fit(reml=True)
-    between, scale = float(found.cov_re[0, 0]), float(found.scale)
+        model = MixedLM(y, x, groups=block).fit(reml=True)
+    between, scale = float(model.cov_re[0, 0]), float(model.scale)
     if not (math.isfinite(between) and math.isfinite(scale) and scale > 0):
         raise ValueError("the scatter between plates cannot be told from that within them")
     labels = np.unique(block, return_inverse=True)[1]
@@ -139,7 +139,7 @@ def f_test(fitted: Fitted, term: Term) -> tuple[float, int, int, float]:
 
 
 def level_effects(fitted: Fitted, term: Term) -> list[Effect]:
-    """Return how each (combination of) level(s) of a term lies over what the terms within it say.
+    """Return how each (combination of) level(s) of a term lies over the prediction of the terms within it.
 
     For a main effect that is the geometric mean over the design, each level of every factor counting once.
     """
@@ -196,10 +196,10 @@ def cell_means(fitted: Fitted) -> tuple[np.ndarray, Array, Array]:
 
 def holm(p_values: Array) -> Array:
     """Adjust p-values for their number so that the chance of any false one stays at the level (Holm)."""
-    p = np.asarray(p_values, dtype=float)
-    known = np.flatnonzero(np.isfinite(p))
-    order = known[np.argsort(p[known], kind="stable")]
-    weight = len(order) - np.arange(len(order))
-    result = p.copy()
-    result[order] = np.minimum(np.maximum.accumulate(weight * p[order]), 1.0)
+    from statsmodels.stats.multitest import multipletests
+
+    result = np.array(p_values, dtype=float)
+    known = np.isfinite(result)
+    if known.any():
+        result[known] = multipletests(result[known], method="holm")[1]
     return result

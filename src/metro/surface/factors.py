@@ -1,8 +1,8 @@
-"""The design of a factorial study: its factors, its terms, and what its runs cannot tell apart.
+"""The design of a factorial study: its factors, its terms, and which terms its runs confound.
 
 Factors are Sum coded: a main effect is that over all levels of the others, whatever the order of the terms
-and however uneven the repeats. Whole designs are rare in workshops: what the runs cannot tell apart is found
-from the rank of the design matrix, and is named instead of being fitted.
+and however uneven the repeats. Whole designs are rare in workshops: confounded terms are detected by the
+rank of the design matrix, and are named instead of being fitted.
 
 Reference: Montgomery, Design and Analysis of Experiments, ch. 5, 6 and 8.
 """
@@ -56,8 +56,8 @@ class Design:
     ----------
     factors : of the design; ``terms``: names of the factors of each term, main effects first.
     matrix : (n, p), the first column ones; ``columns``: term → its columns.
-    aliases : what the runs cannot tell apart.
-    pooled : terms that the runs could tell but that are counted as scatter, for want of repeats.
+    aliases : the terms that the runs confound.
+    pooled : terms that are identifiable but are counted as scatter, because there are no repeats.
     """
 
     factors: tuple[Factor, ...]
@@ -85,24 +85,24 @@ def find_factors(settings: Mapping[str, Sequence[str] | Sequence[float] | np.nda
     ----------
     settings : name → a value per run; text, or numbers. Numbers of more than three levels become a line.
     """
-    found: list[Factor] = []
+    factors: list[Factor] = []
     for name, column in settings.items():
         values = np.asarray(column)
         numeric = np.issubdtype(values.dtype, np.number)
         levels, code = np.unique(values if numeric else values.astype(str), return_inverse=True)
         if len(levels) < 2:
             continue
-        twin = next((i for i, other in enumerate(found) if _same_partition(other.code, code)), None)
+        twin = next((i for i, other in enumerate(factors) if _same_partition(other.code, code)), None)
         if twin is not None:
-            known = found[twin]
+            known = factors[twin]
             aliases = (*known.aliases, name)
-            found[twin] = Factor(known.name, known.levels, known.code, known.coding, aliases)
+            factors[twin] = Factor(known.name, known.levels, known.code, known.coding, aliases)
             continue
         line = numeric and len(levels) > MOST_LEVELS
         coding = _line(levels.astype(float)) if line else _sum_coding(len(levels))
         shown = tuple(f"{level:g}" if numeric else str(level) for level in levels)
-        found.append(Factor(name, shown, code, coding))
-    return tuple(found)
+        factors.append(Factor(name, shown, code, coding))
+    return tuple(factors)
 
 
 def _same_partition(first: np.ndarray, second: np.ndarray) -> bool:
@@ -121,7 +121,7 @@ def _line(levels: Array) -> Array:
 
 
 def make_design(factors: Sequence[Factor]) -> Design:
-    """Return the main effects and all interactions that the runs can tell apart and afford.
+    """Return the main effects and all interactions that the runs identify and can afford.
 
     Interactions of the highest order that leaves :data:`LEAST_DOF` degrees of freedom for the scatter are
     fitted; higher ones are counted as scatter.
@@ -129,7 +129,7 @@ def make_design(factors: Sequence[Factor]) -> Design:
     Raises
     ------
     ValueError
-        Where no factor varies, or the main effects leave nothing to tell the scatter from.
+        Where no factor varies, or the main effects leave no degree of freedom to estimate the scatter.
     """
     if not factors:
         raise ValueError("no factor varies between the runs")
@@ -196,11 +196,11 @@ def _alias(term: Term, kept: Sequence[Term], factors: Sequence[Factor]) -> Alias
     own = _term_columns(term, factors)
     design = np.hstack([np.ones((len(own), 1)), *blocks])
     values = np.linalg.lstsq(design, own, rcond=None)[0]
-    rest = own - design @ values
+    residual = own - design @ values
     ends = np.cumsum([1, *(block.shape[1] for block in blocks)])
     shared = [
         other
         for other, first, last in zip(kept, ends[:-1], ends[1:], strict=True)
         if np.abs(values[first:last]).max() > TOLERANCE
     ]
-    return Alias(term, tuple(shared), bool(np.abs(rest).max() > TOLERANCE))
+    return Alias(term, tuple(shared), bool(np.abs(residual).max() > TOLERANCE))

@@ -103,8 +103,8 @@ def _of_slice(points: Array, x: Array, y: Array, radius: float) -> _Discs:
 
     count = np.bincount(disc, minlength=n).astype(np.float64)
     mean = np.stack([total(each) for each in coordinates], axis=1) / np.maximum(count, 1.0)[:, None]
-    rest = coordinates - mean[disc].T
-    scatter = np.stack([[total(a * b) for b in rest] for a in rest]).transpose(2, 0, 1)
+    centred = coordinates - mean[disc].T
+    scatter = np.stack([[total(a * b) for b in centred] for a in centred]).transpose(2, 0, 1)
     angle = np.arctan2(coordinates[1], coordinates[0])
     sector = np.zeros((n, 8), dtype=bool)
     sector[disc, ((angle + np.pi) * (4 / np.pi)).astype(np.intp) % 8] = True

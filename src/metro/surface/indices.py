@@ -47,7 +47,7 @@ def symmetric(value: float, bias: float, sd: float) -> Index:
 
 
 def log_mean_floor(step: float) -> float:
-    """Value that stands for |d| < step/2 in X_g: exp(mean ln) of a deviation uniform within the step."""
+    """Value that replaces |d| < step/2 in X_g: exp(mean ln) of a deviation uniform within the step."""
     return step / (2 * np.e)
 
 

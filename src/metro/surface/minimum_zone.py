@@ -114,7 +114,7 @@ def _vertical_zone(points: Array, working: np.ndarray) -> tuple[Array, float, fl
         outside = np.flatnonzero((heights > high) | (heights < low))
         added = np.union1d(working, _worst_per_quadrant(points, heights, outside))
         if len(added) == len(working):
-            break  # what is left is rounding, far below the scale of the data
+            break  # the remaining change is rounding, far below the scale of the data
         working = added
     return slopes, gap, bound, working, used
 

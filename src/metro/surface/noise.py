@@ -38,13 +38,13 @@ def repeat_sigma(*scans: Array) -> float:
     """
     first, sizes = scans[0], [len(scan) for scan in scans]
     if len(set(sizes)) > 1 or len(first) <= 3:
-        found = " and ".join(map(str, sizes))
-        raise ValueError(f"repeat scans need the same points, more than three: found {found}")
+        counts = " and ".join(map(str, sizes))
+        raise ValueError(f"repeat scans need the same points, more than three: found {counts}")
     plane = fit_plane(first)
     basis = np.column_stack([np.ones(len(first)), plane.coordinates(first)])
     differ = contrasts(len(scans)) @ np.array([(scan - first) @ plane.normal for scan in scans])
-    rest = differ.T - basis @ np.linalg.lstsq(basis, differ.T, rcond=None)[0]
-    return float(np.sqrt(np.sum(rest**2) / (len(rest) - 3) / rest.shape[1]))
+    residual = differ.T - basis @ np.linalg.lstsq(basis, differ.T, rcond=None)[0]
+    return float(np.sqrt(np.sum(residual**2) / (len(residual) - 3) / residual.shape[1]))
 
 
 def shrink(deviations: Array, sigma: float) -> Array:

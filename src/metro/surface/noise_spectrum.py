@@ -1,4 +1,4 @@
-"""Noise of a scanned face by wavenumber: what is assumed of it, and what two scans tell."""
+"""Noise of a scanned face by wavenumber: the assumed spectrum, and the estimate from two scans."""
 
 from __future__ import annotations
 

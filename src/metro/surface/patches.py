@@ -1,7 +1,7 @@
 """A cloud of a block as small flat patches, each with its normal, and the faces that they make up.
 
 A patch is a cubic cell whose points lie in a plane; cells over an edge do not and are left out, so that an
-edge, rounded or with a burr, says nothing about where a face is.
+edge, rounded or with a burr, has no influence on the place of a face.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ def find_patches(points: Array, pitch: float) -> Patches:
         return np.bincount(home, weights=values) / count
 
     centres = np.stack([means(each) for each in points.T], axis=1)
-    rest = points - centres[home]
+    centred = points - centres[home]
     scatter = np.empty((len(count), 3, 3))
     for i in range(3):
         for j in range(i, 3):
-            scatter[:, i, j] = scatter[:, j, i] = means(rest[:, i] * rest[:, j])
+            scatter[:, i, j] = scatter[:, j, i] = means(centred[:, i] * centred[:, j])
     enough = count >= LEAST_POINTS
     spread, vectors = np.linalg.eigh(scatter[enough])
     shaped = spread[:, 1] > NARROW * spread[:, 2]
@@ -95,8 +95,8 @@ def _largest_plane(patches: Patches, axis: int) -> Patches:
     first = ordered[np.argmax(begins)]
     kept = patches[(offsets >= first) & (offsets <= first + patches.cell)]
     for _ in range(10):
-        rest = _from_own_plane(kept)
-        near = np.abs(rest) <= FAR * 1.4826 * max(float(np.median(np.abs(rest))), np.finfo(float).eps)
+        distance = _from_own_plane(kept)
+        near = np.abs(distance) <= FAR * 1.4826 * max(float(np.median(np.abs(distance))), np.finfo(float).eps)
         if near.all() or near.sum() < 3:
             break
         kept = kept[near]
@@ -104,5 +104,5 @@ def _largest_plane(patches: Patches, axis: int) -> Patches:
 
 
 def _from_own_plane(patches: Patches) -> Array:
-    rest = patches.centres - patches.centres.mean(axis=0)
-    return np.asarray(rest @ np.linalg.eigh(rest.T @ rest)[1][:, 0])
+    centred = patches.centres - patches.centres.mean(axis=0)
+    return np.asarray(centred @ np.linalg.eigh(centred.T @ centred)[1][:, 0])

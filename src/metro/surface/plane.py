@@ -18,6 +18,10 @@ import numpy.typing as npt
 from metro.units import Array
 
 CHUNK = 1 << 16  # rows whose float64 copy stays in the second-level cache
+# Any figures will do for these that no drawing has: a face must not lie on the edge between two choices.
+ELONGATED = 1.37  # variance along the longest extent over that across it, above which it is the first axis
+AHEAD = np.array([1.0, 0.6180339887, 0.2360679775])  # the side that the longest extent points to
+STEEP = 0.83  # component of the normal along x above which a plane faces x
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,11 @@ class Moments:
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane: ``point`` (3,), unit ``normal`` (3,), and ``axes`` (2, 3) in it, longest extent first."""
+    """A plane: ``point`` (3,), unit ``normal`` (3,), and ``axes`` (2, 3) in it.
+
+    The longest extent comes first where there is one (:func:`plane_of_moments`); axes and normal are
+    right-handed.
+    """
 
     point: Array
     normal: Array
@@ -84,7 +92,24 @@ def plane_of_moments(gathered: Moments) -> Plane:
         raise ValueError("the points lie on a line: no plane is defined by them")
     normal = vectors[:, 0]
     normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
-    return Plane(gathered.mean, normal, vectors[:, :0:-1].T)
+    return Plane(gathered.mean, normal, _axes(normal, vectors[:, 2], spread[2] / spread[1]))
+
+
+def _axes(normal: Array, longest: Array, elongation: float) -> Array:
+    """Return two axes (2, 3) across the unit ``normal`` that rounding cannot turn or reverse.
+
+    An eigenvector's sign is arbitrary, and of a square face so is its direction: a grid laid along it would
+    fall differently on the points from one processor to the next. The first axis is therefore the
+    ``longest`` extent, towards ``AHEAD``, only where that extent is longer by ``ELONGATED``, and the x axis
+    of the coordinates as seen in the plane (the y axis for a plane that faces x) elsewhere.
+    """
+    if elongation > ELONGATED:
+        first = longest * np.sign(longest @ AHEAD)
+    else:
+        across = np.eye(3)[0 if abs(normal[0]) < STEEP else 1]
+        first = across - (across @ normal) * normal
+        first /= np.linalg.norm(first)
+    return np.vstack([first, np.cross(normal, first)])
 
 
 def fit_plane(points: npt.NDArray[np.floating] | Iterable[npt.NDArray[np.floating]]) -> Plane:

@@ -2,7 +2,7 @@
 
 The means of configurations on a log scale, with the scatter of a run pooled over all, have a multivariate t
 distribution given the runs (flat prior; Box & Tiao, Bayesian Inference in Statistical Analysis, ch. 2); draws
-from it say how often each is the least.
+from it show how often each is the least.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def agreement(
     Parameters
     ----------
     predicted, measured : (k,). ``measured_draws``, ``predicted_draws``: (draws, k) from what is known of
-        them: the interval then says what the scatter of the runs (and the error of the prediction) leaves
+        them: the interval then is what the scatter of the runs (and the error of the prediction) leaves
         open. Without draws it is that of Bonett & Wright (Psychometrika 65 (2000) 23), for configurations
         like these.
     """
@@ -78,8 +78,8 @@ def agreement(
         other = (
             np.broadcast_to(predicted, measured_draws.shape) if predicted_draws is None else predicted_draws
         )
-        found = [spearman(p, m) for p, m in zip(other, measured_draws, strict=True)]
-        low, high = np.quantile(found, [0.025, 0.975])
+        correlations = [spearman(p, m) for p, m in zip(other, measured_draws, strict=True)]
+        low, high = np.quantile(correlations, [0.025, 0.975])
         interval, sure = (float(low), float(high)), _sure_pairs(measured_draws)
     score = _alike(predicted, measured)
     upper = np.triu_indices(len(measured), 1)

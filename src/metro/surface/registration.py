@@ -1,11 +1,11 @@
 """Where a scanned block lies: 3-2-1 from its top and two sides, else all its faces against a box at once.
 
-Only faces tell: on a lone face any shift within its plane fits as well as any other, and the edge of the
-points lies half a pitch inside the edge of the face. What the patches of the faces do not determine is
-refused, by the condition of the normal equations and by the uncertainty of the place.
+Only faces determine the place: on a lone face every shift within its plane fits equally well, and the edge
+of the points lies half a pitch inside the edge of the face. What the patches of the faces do not determine
+is refused, by the condition of the normal equations and by the uncertainty of the place.
 
 The work frame has its origin in a corner of the block, z = 0 on its top. Since a box looks the same after
-half a turn, a scan is taken to lie as its own axes say: x, y, z within 35 degrees of the work's.
+half a turn, a scan is taken to lie as its own axes show: x, y, z within 35 degrees of the work's.
 """
 
 from __future__ import annotations
@@ -110,12 +110,12 @@ def register(block: Block, size: Array) -> Registration:
         axis: max((n for n in sides if n[0] == axis), key=sides.__getitem__, default="") for axis in "xy"
     }
     if all(sides.get(name, 0) >= ENOUGH for name in datum.values()):
-        found = _three_two_one(faces, datum, size)
+        registration = _three_two_one(faces, datum, size)
     else:
-        found = _against_box(faces, _from_box(block.low, block.high, size), size)
-    if found.condition < CONDITION or found.sd.max() > WORST:
-        raise ValueError(_wanted(block, found.condition))
-    top = found.apply(faces["z+"].centres)[:, :2]
+        registration = _against_box(faces, _from_box(block.low, block.high, size), size)
+    if registration.condition < CONDITION or registration.sd.max() > WORST:
+        raise ValueError(_wanted(block, registration.condition))
+    top = registration.apply(faces["z+"].centres)[:, :2]
     outside = (top < -BEYOND * size[:2]) | (top > (1 + BEYOND) * size[:2])
     if outside.any(axis=1).mean() > BEYOND:
         spans = " × ".join(f"{span / MM:.4g}" for span in np.ptp(top, axis=0))
@@ -124,7 +124,7 @@ def register(block: Block, size: Array) -> Registration:
             f"the top spans {spans} mm along the scan's x and y and runs over the block of {expected} mm: "
             "turn the scan so that its axes lie about along the work's, or give instruments.scanner.to_work"
         )
-    return found
+    return registration
 
 
 def _wanted(block: Block, condition: float) -> str:
@@ -188,10 +188,10 @@ def _offset_sd(face: Patches, normal: Array) -> float:
 def _slope_sd(face: Patches, normal: Array, along: Array) -> float:
     u = face.centres @ along
     u = u - u.mean()
-    rest = face.centres @ normal
-    rest = rest - rest.mean()
-    rest = rest - (u @ rest) / (u @ u) * u
-    return float(np.sqrt(rest @ rest / (len(face) - 2) / (u @ u)))
+    residual = face.centres @ normal
+    residual = residual - residual.mean()
+    residual = residual - (u @ residual) / (u @ u) * u
+    return float(np.sqrt(residual @ residual / (len(face) - 2) / (u @ u)))
 
 
 def _rows(faces: dict[str, Patches], rotation: Array, shift: Array, size: Array) -> tuple[Array, Array]:
@@ -223,17 +223,17 @@ def _against_box(faces: dict[str, Patches], start: Array, size: Array) -> Regist
     middle, half = np.array([size[0] / 2, size[1] / 2, 0.0]), float(np.hypot(size[0], size[1])) / 2
     rotation, shift = np.eye(3), start
     for _ in range(STEPS):
-        rest, design = _rows(faces, rotation, shift, size)
-        step = -np.linalg.lstsq(design, rest, rcond=CONDITION)[0]
+        residual, design = _rows(faces, rotation, shift, size)
+        step = -np.linalg.lstsq(design, residual, rcond=CONDITION)[0]
         turn = _turn(np.asarray(step[3:] / half, np.float64))
         rotation, shift = turn @ rotation, turn @ (shift - middle) + middle + step[:3]
         if np.abs(step).max() < ROUNDED:
             break
-    rest, design = _rows(faces, rotation, shift, size)
+    residual, design = _rows(faces, rotation, shift, size)
     condition = _condition(faces, rotation, shift, size)
     sd = np.full(2, np.inf)
     if condition >= CONDITION:
-        covariance = np.linalg.inv(design.T @ design) * (rest @ rest) / max(len(rest) - 6, 1)
+        covariance = np.linalg.inv(design.T @ design) * (residual @ residual) / max(len(residual) - 6, 1)
         arm = size[:2][::-1] / 2 / half  # a turn about z moves x by half the width in y
         sd = np.sqrt(np.diag(covariance)[:2] + arm**2 * covariance[5, 5])
     counts = {name: len(face) for name, face in sorted(faces.items())}

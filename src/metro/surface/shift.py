@@ -25,8 +25,8 @@ class Shift:
     alike: float
 
     @property
-    def told(self) -> bool:
-        """Whether the shift is told from zero (three of its errors)."""
+    def detected(self) -> bool:
+        """Whether the shift is significant: more than three of its errors from zero."""
         return abs(self.value) > 3.0 * self.sd
 
 
@@ -34,7 +34,7 @@ def shift_between(profile: Array, other: Array, kept: np.ndarray, spacing: float
     """Shift s for which ``profile(x)`` is most like ``gain × other(x − s)``, to a fraction of a sample.
 
     Least squares in gain, shift and the amplitudes of ``besides`` (shapes that the profile may have besides,
-    at places that could be mistaken for a shift). The error allows for a rest that is correlated along the
+    at places where they are confounded with a shift). The error allows for a residual correlated along the
     profile.
 
     Parameters
@@ -62,13 +62,13 @@ def shift_between(profile: Array, other: Array, kept: np.ndarray, spacing: float
         s += float(np.clip(slope / gain if gain > 0.0 else 0.0, -STEP, STEP))
     columns = np.stack([freed(along(place - s)), -freed(along(place - s, 1))], axis=1)
     solution, *_ = np.linalg.lstsq(columns, target, rcond=None)
-    rest = target - columns @ solution
-    found = _correlation(target, columns[:, 0])
-    if found < LEAST_ALIKE or abs(s) >= REACH:
+    residual = target - columns @ solution
+    correlation = _correlation(target, columns[:, 0])
+    if correlation < LEAST_ALIKE or abs(s) >= REACH:
         return Shift(0.0, np.inf, max(alike))
-    variance = rest @ rest / len(rest) * _correlation_length(rest)
+    variance = residual @ residual / len(residual) * _correlation_length(residual)
     covariance = variance * np.linalg.inv(columns.T @ columns)
-    return Shift(s, float(np.sqrt(covariance[1, 1]) / solution[0]), found)
+    return Shift(s, float(np.sqrt(covariance[1, 1]) / solution[0]), correlation)
 
 
 def _basis(columns: Array) -> Array:
@@ -82,10 +82,10 @@ def _correlation(first: Array, second: Array) -> float:
     return float(first @ second) / size if size > 0.0 else 0.0
 
 
-def _correlation_length(rest: Array) -> float:
-    """How many neighbouring points say the same: sum of the autocorrelation up to where it crosses zero."""
-    spectrum = np.abs(np.fft.rfft(rest, 2 * len(rest))) ** 2
-    along = np.fft.irfft(spectrum)[: len(rest)]
-    along = along / along[0] if along[0] > 0.0 else np.eye(1, len(rest))[0]
+def _correlation_length(residual: Array) -> float:
+    """How many neighbouring points are correlated: sum of the autocorrelation up to its first zero."""
+    spectrum = np.abs(np.fft.rfft(residual, 2 * len(residual))) ** 2
+    along = np.fft.irfft(spectrum)[: len(residual)]
+    along = along / along[0] if along[0] > 0.0 else np.eye(1, len(residual))[0]
     end = int(np.argmax(along <= 0.0)) or len(along)
     return float(1.0 + 2.0 * along[1:end].sum())

@@ -96,8 +96,8 @@ def fit_rayleigh(frequency: Array, ratio: Array, sd: Array) -> Rayleigh:
     inverse = np.linalg.pinv(rows / size) / size[:, None]
     values = inverse @ (ratio / sd)
     dof = len(ratio) - 2
-    rest = ratio / sd - rows @ values
-    misfit = float(np.sqrt(rest @ rest / dof)) if dof > 0 else float("nan")
+    residual = ratio / sd - rows @ values
+    misfit = float(np.sqrt(residual @ residual / dof)) if dof > 0 else float("nan")
     return Rayleigh(values, inverse @ inverse.T * max(1.0, np.nan_to_num(misfit)) ** 2, misfit)
 
 
@@ -106,5 +106,5 @@ def rayleigh_of_matrices(mass: Array, stiffness: Array, damping: Array) -> tuple
     rows = np.column_stack([mass.ravel(), stiffness.ravel()])
     size = np.linalg.norm(rows, axis=0)
     values = np.linalg.lstsq(rows / size, damping.ravel(), rcond=None)[0] / size
-    rest = damping.ravel() - rows @ values
-    return values, float(np.linalg.norm(rest) / np.linalg.norm(damping))
+    residual = damping.ravel() - rows @ values
+    return values, float(np.linalg.norm(residual) / np.linalg.norm(damping))

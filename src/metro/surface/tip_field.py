@@ -15,7 +15,7 @@ class MatrixField:
     """Matrices over (x, y): ``terms`` (terms of the basis, 9).
 
     ``error``: relative rms error (Frobenius) of predicting each point from all others; NaN where there are
-    too few points to tell.
+    too few points to compare.
     """
 
     basis: Basis
@@ -38,12 +38,12 @@ def choose_field(x: Array, y: Array, matrices: Array) -> MatrixField:
 
     A higher degree must be better by 5 %: a tie goes to the simpler field. One point gives a constant.
     """
-    found = field_in(basis_over(x, y, TERMS[0]), x, y, matrices)
+    best = field_in(basis_over(x, y, TERMS[0]), x, y, matrices)
     for terms in TERMS[1:]:
         other = field_in(basis_over(x, y, terms), x, y, matrices)
-        if other.error < 0.95 * found.error:
-            found = other
-    return found
+        if other.error < 0.95 * best.error:
+            best = other
+    return best
 
 
 def left_out(basis: Basis, x: Array, y: Array, flat: Array) -> float:

@@ -1,6 +1,6 @@
 """What the teeth add to the mean force: the tip's motion at their rhythm, as the rim leaves it in the face.
 
-A tooth comes to a place on the rim always at the same turn of the spindle, so that the tip stands there at
+A tooth comes to a place on the rim always at the same turn of the spindle, so that the tip is there at
 the same height each time: what is fast in time is fixed along the rim.
 """
 

@@ -2,7 +2,7 @@
 
 At a point, displacement = C F with C a symmetric 3×3 matrix (reciprocity). Between points C varies with the
 arm's posture; over a face that is small against the arm, a polynomial in (x, y) of low degree follows it, and
-leaving out one load point at a time says which degree predicts the points that were not loaded. Linearity is
+leaving out one load point at a time shows which degree predicts the points that were not loaded. Linearity is
 checked, not assumed.
 """
 
@@ -72,7 +72,7 @@ class Rows:
     """Evidence on the z row of C: displacements (n,) in m at ``x``, ``y`` by the effective ``force`` (n, 3).
 
     A displacement dz under F has the row F; a dx or dy under a pure z force shows C_xz = C_zx or C_yz = C_zy.
-    ``axis`` says which displacement it was.
+    ``axis`` names which displacement it was.
     """
 
     x: Array
@@ -108,11 +108,11 @@ def point_compliance(force: Array, displacement: Array) -> PointCompliance:
         if i != j:
             design[axis == j, column] += force[load[axis == j], i]
     values, covariance, seen = _solve(design, measured)
-    rest = measured - design @ values
+    residual = measured - design @ values
     dof = len(measured) - np.linalg.matrix_rank(design)
-    residual = float(np.sqrt(rest @ rest / dof)) if dof > 0 else float("nan")
+    residual_sd = float(np.sqrt(residual @ residual / dof)) if dof > 0 else float("nan")
     values, sd = np.where(seen, values, np.nan), np.where(seen, np.sqrt(np.diag(covariance)), np.nan)
-    return PointCompliance(_symmetric(values), residual * _symmetric(sd), residual)
+    return PointCompliance(_symmetric(values), residual_sd * _symmetric(sd), residual_sd)
 
 
 def _solve(design: Array, measured: Array) -> tuple[Array, Array, np.ndarray]:
@@ -221,7 +221,7 @@ def fit_z_row(rows: Rows, basis: Basis, entries: np.ndarray) -> tuple[Array, flo
     used = np.repeat(entries, basis.terms)
     design = rows.design(basis)[:, used]
     values, _, _ = _solve(design, rows.displacement)
-    rest = rows.displacement - design @ values
+    residual = rows.displacement - design @ values
     coefficients = np.zeros(len(used))
     coefficients[used] = values
-    return coefficients, float(np.sqrt(rest @ rest / max(1, len(rest) - design.shape[1])))
+    return coefficients, float(np.sqrt(residual @ residual / max(1, len(residual) - design.shape[1])))

@@ -23,7 +23,7 @@ from metro.surface.minimum_zone import vertical_zone
 from metro.units import Array
 
 PAIRS = 16
-FIRST = 8  # disturbances that tell how far they reach
+FIRST = 8  # disturbances from which their reach is estimated
 ZONES = 12  # disturbances of which the minimum zone is read
 MEANS = ("xa", "xg", "fltq")
 
@@ -39,12 +39,12 @@ def corrected(
     """
     passes = modes.through(nesting_index)
     level, level_finer = _Levelled(inside), _Levelled(inside.repeat(2, axis=0).repeat(2, axis=1))
-    found = modes.estimate(modes.scanned)
+    surface_estimate = modes.estimate(modes.scanned)
 
     def fields(each: Array) -> tuple[Array, Array]:
         return level(field(each)), level(field(each * passes))
 
-    middle = fields(found.modes)
+    middle = fields(surface_estimate.modes)
     disturbed = (fields(each) for each in _errors(modes))
     first = list(islice(disturbed, FIRST))
     reach = [np.mean([np.abs(each[part]).max() for each in first]) for part in (0, 1)]
@@ -57,7 +57,7 @@ def corrected(
             moved = tuple(part + off for part, off in zip(surface, error, strict=True))
             draws.append(_read(moved, zone if number < ZONES else None))
     per_cell = float(sums.count[inside].mean())
-    estimate = start[0] | raw_indices(level_finer(finer(found.modes, per_cell)), 0.0)
+    estimate = start[0] | raw_indices(level_finer(finer(surface_estimate.modes, per_cell)), 0.0)
     indices = {}
     for name, value in readings.items():
         plain, level_draws = (np.array([draw[name] for draw in each if name in draw]) for each in drawn)
@@ -101,16 +101,16 @@ def _tied(surface: Array, reach: float) -> Array:
 
 
 def _errors(modes: Modes) -> Iterator[Array]:
-    """Give modes of what an estimate is off by, in pairs, were the surface what it may be by the scan."""
-    # other faces, other draws: what few draws are off by is then in no case off for all faces alike
+    """Yield the modes of possible errors of the estimate, in mirrored pairs."""
+    # The seed depends on the face, so that the error of few draws is not the same for all faces.
     random = np.random.default_rng(np.signbit(modes.scanned[:8, :8]).ravel().astype(int))
-    found, sd = modes.estimate(modes.scanned), np.sqrt(modes.noise)
+    estimate, sd = modes.estimate(modes.scanned), np.sqrt(modes.noise)
     for _ in range(PAIRS):
-        off = modes.drawn(found, random)
+        off = modes.drawn(estimate, random)
         noise = sd * random.standard_normal(sd.shape, dtype=np.float32)
         louder = modes.doubt * np.float32(random.standard_normal())
         for sign in (1, -1):
-            surface = found.modes + sign * off
+            surface = estimate.modes + sign * off
             scale = np.sqrt(np.maximum(1 + sign * louder, np.float32(0.05)))
             yield modes.estimate(surface + sign * scale * noise).modes - surface
 
@@ -118,8 +118,8 @@ def _errors(modes: Modes) -> Iterator[Array]:
 def _read(surface: tuple[Array, ...], zone: _Zone | None) -> dict[str, float]:
     """Read the indices of a surface, unfiltered and filtered, about their planes."""
     raw, filtered = surface
-    found = raw_indices(raw, 0.0) | iso_indices(filtered)
-    return found | {"minimum_zone": zone(filtered)} if zone is not None else found
+    indices = raw_indices(raw, 0.0) | iso_indices(filtered)
+    return indices | {"minimum_zone": zone(filtered)} if zone is not None else indices
 
 
 class _Levelled:

@@ -56,11 +56,11 @@ def white_noise(series: Array) -> float:
 def signal_share(
     readings: Array, noise: Array, whole: Array, whole_noise: float = 0.0
 ) -> tuple[Array, Array, Array]:
-    """Share w (n, k) of each wave of several readings that is signal, Wiener's S/(S + N), and what is left.
+    """Share w (n, k) of each wave of several readings that is signal, Wiener's S/(S + N), and its error.
 
     S is the mean power of the neighbouring waves less that of the noise, where it is more than chance gives
-    to one of as many waves, and none elsewhere: noise that passed would be off the signal by all of itself,
-    and a regression on it would be pulled to zero. What passes is off by a variance of w² N, what does not
+    to one of as many waves, and none elsewhere: noise that passed would be an error by all of itself,
+    and a regression on it would be pulled to zero. What passes has an error of variance w² N, what does not
     by (1 − w)² S with as much S as is seen and one standard error more. All readings together leave no more
     than ``whole`` has, whose waves are the sum of the signals: its power less what passed, and its noise.
 
@@ -72,7 +72,7 @@ def signal_share(
     Returns
     -------
     tuple
-        w (n, k), and by what the sum of w times the readings is off the sum of the signals: the variance (n,)
+        w (n, k), and the error of the sum of w times the readings as a sum of the signals: the variance (n,)
         of the signal that does not pass, and that of the noise which does.
     """
     from scipy.stats import chi2

@@ -1,4 +1,4 @@
-"""What the records of the test cuts say, drawn on the lobes, and the roughness of what they left."""
+"""Chatter detected in the records of the test cuts, drawn on the lobes, and the roughness of the surfaces."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ KINDS = {
     "unknown": ("*", style.MEASURED, "unknown kind, or cannot be told"),
 }
 STABLE = ((0, style.GREEN, "stable"), (1, style.BEFORE, "chatter"))
-NUMBERED = 25  # tests, up to which each has its probability beside it
+NUMBERED = 25  # most tests of which each has its probability next to it
 SPECTRUM_TO = 6.5  # tooth passings, of a spectrum that is drawn; at least this much of the chatter frequency:
 BEYOND_CHATTER = 1.3
 ROUGHNESS = (("ra_um", "Ra (µm)"), ("rz_um", "Rz (µm)"))
 
 
 def tests_chart(boundary: pd.DataFrame, tests: pd.DataFrame) -> Figure:
-    """Draw every test on the lobes of its position, with what its record says; wrong labels are circled.
+    """Draw every test on the lobes of its position, by the detection in its record; circle wrong labels.
 
     Parameters
     ----------
-    boundary : as for :func:`metro.report.figures.lobes.lobes_chart`.
+    boundary : see :func:`metro.report.figures.lobes.lobes_chart`.
     tests : ``position, rpm, depth_mm, kind, probability, wrong_label``.
     """
     with style.style():
@@ -133,7 +133,7 @@ def _spectrum(axes: Axes, lines: pd.DataFrame, test: pd.Series, teeth: int) -> N
 
 
 def roughness_chart(tests: pd.DataFrame) -> Figure:
-    """Draw Ra and Rz over the depth of cut, stable tests beside unstable ones, with their medians.
+    """Draw Ra and Rz over the depth of cut, for stable and for unstable tests, with their medians.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ RUNS_OF_AXES, RUNS_ALONE = 3, 6
 
 @dataclass(frozen=True)
 class Prediction:
-    """A column of predictions and how it is drawn, in every figure alike."""
+    """A column of predictions, and its look, which is the same in every figure."""
 
     column: str
     colour: str
@@ -44,15 +44,16 @@ ONLY = Prediction("before", style.BEFORE, "--", "x", "base model (nothing added)
 
 
 def predictions(frame: pd.DataFrame) -> tuple[Prediction, ...]:
-    """Return before and after, or the one of them where nothing was added."""
+    """Return before and after, or only one of them if nothing was added."""
     return (ONLY,) if np.allclose(frame["before"], frame["after"], rtol=1e-12, atol=0) else (BEFORE, AFTER)
 
 
 def overlay(frame: pd.DataFrame, title: str, *, alone: bool = False) -> Figure:
     """Draw measured values with their 95 % band and the predictions: a panel per run and axis.
 
-    Of a quantity that repeats (force per revolution) the block in the middle of the record is drawn; of many
-    runs the first few, see :func:`shown_runs`; more where no other observable wants the place (``alone``).
+    Of a quantity that repeats (force per revolution) the block in the middle of the record is drawn. Of many
+    runs the first few are drawn, see :func:`shown_runs`; there are more if no other observable needs the
+    place (``alone``).
     """
     panels = [(run, axis) for run in shown_runs(frame, alone=alone) for axis in axes_of(frame)]
     columns = len(axes_of(frame)) if len(axes_of(frame)) > 1 else min(2, len(panels))
@@ -88,7 +89,7 @@ def _draw(axes: Axes, part: pd.DataFrame, column: str, drawn: tuple[Prediction, 
 
 
 def _broken(part: pd.DataFrame, column: str, drawn: tuple[Prediction, ...]) -> list[Array]:
-    """Return places, measured values, sigma and predictions, with NaN where nothing was measured between."""
+    """Return places, measured values, sigma and predictions, with NaN at gaps without measurements."""
     x = _places(part, column)
     step = np.diff(x)
     at = 1 + np.flatnonzero(step > GAP * np.median(step) if len(step) else step)
@@ -110,7 +111,7 @@ def residuals(frame: pd.DataFrame, title: str) -> Figure:
 
 
 def judged(frame: pd.DataFrame, title: str) -> Figure:
-    """Draw side by side what :func:`residuals` and :func:`parity` do, of an observable of one axis."""
+    """Draw :func:`residuals` and :func:`parity` side by side, for an observable with one axis."""
     drawn = predictions(frame)
     with style.style():
         figure, ((left, middle, right),) = style.new_figure(1.5, 1, 3)
@@ -186,12 +187,12 @@ def _legend(figure: Figure, points: Axes, bars: Axes) -> None:
 
 
 def _histogram(axes: Axes, frame: pd.DataFrame) -> None:
-    """Histograms of the residuals, and what the noise alone would give."""
+    """Histograms of the residuals, and the distribution of the noise alone."""
     drawn = predictions(frame)
-    rest = [(frame["measured"] - frame[kind.column]).to_numpy(float) for kind in drawn]
-    edge = max(float(np.quantile(np.abs(r), 0.995)) for r in rest) or 1.0
+    differences = [(frame["measured"] - frame[kind.column]).to_numpy(float) for kind in drawn]
+    edge = max(float(np.quantile(np.abs(r), 0.995)) for r in differences) or 1.0
     bins = np.linspace(-edge, edge, 1 + min(40, max(8, 2 * round(len(frame) ** 0.5))))
-    shares = [np.histogram(r, bins)[0] / len(frame) for r in rest]
+    shares = [np.histogram(r, bins)[0] / len(frame) for r in differences]
     for kind, share in zip(drawn, shares, strict=True):
         axes.stairs(share, bins, color=kind.colour, ls=kind.line, lw=1.1, label=kind.label)
     top = max(float(share.max()) for share in shares)
@@ -224,17 +225,17 @@ def shown_runs(frame: pd.DataFrame, *, alone: bool = False) -> list[str]:
 
 
 def axes_of(frame: pd.DataFrame) -> list[str]:
-    """Return the axes that occur, in alphabetical order; one empty name where the observable has none."""
+    """Return the axes that occur, in alphabetical order; one empty name if the observable has no axes."""
     return sorted(axis_labels(frame).unique())
 
 
 def axis_labels(frame: pd.DataFrame) -> pd.Series:
-    """Return the axis of each row as text, empty where it has none."""
+    """Return the axis of each row as text, empty if it has none."""
     return frame["axis"].fillna("").astype(str)
 
 
 def coordinate(frame: pd.DataFrame) -> str:
-    """Return the column that the rows are drawn over: the first that is given and varies; none: empty."""
+    """Return the column over which the rows are drawn: the first that is given and varies; else empty."""
     for column in COORDINATES:
         if frame[column].notna().all() and frame[column].nunique() > 1:
             return column
@@ -250,7 +251,7 @@ def _middle_block(part: pd.DataFrame) -> pd.DataFrame:
 
 
 def _bands(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
-    """Place and quantiles 0.1, 0.5, 0.9 of y in bins of x that hold anything."""
+    """Place and quantiles 0.1, 0.5, 0.9 of y in the bins of x that are not empty."""
     place = np.minimum((BINS * (x - x.min()) / (np.ptp(x) or 1.0)).astype(int), BINS - 1)
     filled = np.unique(place)
     at = np.array([x[place == p].mean() for p in filled])

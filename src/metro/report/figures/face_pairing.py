@@ -1,4 +1,4 @@
-"""Parity of predicted faces: X_m of each, before and after the loop, over that of the scan."""
+"""Parity of predicted faces: X_m of each face, before and after the loop, over that of its scan."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def parity(faces: pd.DataFrame, unit: str) -> Figure:
-    """Draw predicted over measured X_m of held-out faces, beside the similarity of each.
+    """Draw predicted over measured X_m of held-out faces, and the similarity of each face.
 
     Parameters
     ----------

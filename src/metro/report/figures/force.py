@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 HARMONICS = 6
 RUNS = 4
-LEGEND_ROOM = 108  # characters, of which each entry takes six for its line
+LEGEND_ROOM = 108  # characters; each entry needs six of them for its line
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 REVOLUTIONS = 2.0
 
@@ -27,7 +27,7 @@ def spectrum(orders: pd.DataFrame, teeth: int) -> Figure:
 
     Parameters
     ----------
-    orders : ``axis, order, measured, before, after``, N. teeth : ticks stand at the tooth passing.
+    orders : ``axis, order, measured, before, after``, N. teeth : ticks are at the tooth passing.
     """
     names = sorted(orders["axis"].unique())
     drawn = predictions(orders)
@@ -90,7 +90,7 @@ def tooth_peaks(metrics: pd.DataFrame) -> Figure:
 
 
 def _as_columns(metrics: pd.DataFrame) -> pd.DataFrame:
-    """Put what was predicted before and after side by side."""
+    """Return the predictions before and after as columns."""
     columns = {model: part["predicted"].to_numpy(float) for model, part in metrics.groupby("model")}
     return pd.DataFrame(columns)
 
@@ -157,8 +157,8 @@ def means(table: pd.DataFrame, group: list[str]) -> Figure:
 
     Parameters
     ----------
-    table : ``axis, role, feed_per_tooth_mm, measured_n, fitted_n``. group : of each row, the settings that
-        its cut shares with others but for the feed.
+    table : ``axis, role, feed_per_tooth_mm, measured_n, fitted_n``. group : for each row, the settings of its
+        cut without the feed, by which the lines are drawn.
     """
     names = sorted(table["axis"].unique())
     labels = list(dict.fromkeys(group))
@@ -178,7 +178,7 @@ def means(table: pd.DataFrame, group: list[str]) -> Figure:
             axes.set_title(name, loc="left")
             axes.set_xlabel("feed per tooth (mm)")
         row[0].set_ylabel("mean force (N)")
-        handles, told = row[0].get_legend_handles_labels()
-        abreast = max(1, min(len(told), LEGEND_ROOM // (max(map(len, told)) + 6)))
-        figure.legend(handles, told, loc="outside upper center", ncols=abreast, fontsize=8)
+        handles, shown = row[0].get_legend_handles_labels()
+        abreast = max(1, min(len(shown), LEGEND_ROOM // (max(map(len, shown)) + 6)))
+        figure.legend(handles, shown, loc="outside upper center", ncols=abreast, fontsize=8)
     return figure

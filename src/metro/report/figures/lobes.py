@@ -51,7 +51,7 @@ def lobes_chart(boundary: pd.DataFrame, tests: pd.DataFrame, islands: pd.DataFra
 def drawn_with_tests(
     axes: Axes, position: object, boundary: pd.DataFrame, tests: pd.DataFrame
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Draw the boundary of a position, high enough for its tests; return it by speed, and these tests."""
+    """Draw the boundary of a position, with room for its tests; return it by speed, and these tests."""
     line = boundary[boundary["position"] == position].sort_values("rpm")
     here = tests[tests["position"].astype(str) == str(position)]
     draw_boundary(axes, line)
@@ -75,12 +75,12 @@ def panels_of(table: pd.DataFrame) -> tuple[Figure, dict[Any, Axes]]:
 
 
 def entries(axes: Axes) -> int:
-    """Count what a legend of the panel names."""
+    """Count the entries of the panel's legend."""
     return len(axes.get_legend_handles_labels()[1])
 
 
 def draw_boundary(axes: Axes, line: pd.DataFrame) -> None:
-    """Draw both bands, and the boundary, dotted where it is a flip."""
+    """Draw both bands and the boundary, which is dotted where it is a flip."""
     rpm, depth = line["rpm"], line["depth_mm"]
     for low, high, alpha, label in BANDS:
         axes.fill_between(rpm, line[low], line[high], color=style.SKY, lw=0, alpha=alpha, label=label)
@@ -122,7 +122,7 @@ def _cuts(axes: Axes, tests: pd.DataFrame) -> None:
 
 
 def top_of(depth: pd.Series, tests: pd.DataFrame) -> float:
-    """Return the upper end of the depth axis: what tests and lobes reach, not the peaks between."""
+    """Return the upper end of the depth axis: it includes tests and lobes, but not the peaks between."""
     depths = [2.5 * float(depth.min()), float(depth.quantile(0.8))]
     return max([*depths, float(tests["depth_mm"].max())] if len(tests) else depths)
 
@@ -148,7 +148,7 @@ def methods_chart(methods: pd.DataFrame) -> Figure:
 
 
 def governing_modes(methods: pd.DataFrame) -> Figure:
-    """Draw which mode, solved alone, chatters first, over spindle speed; a row per position.
+    """Draw the mode that, solved alone, chatters first, over spindle speed; a row per position.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def governing_modes(methods: pd.DataFrame) -> Figure:
 
 
 def _colours(count: int) -> list[str]:
-    """Return as many colours, all different: of a scale where there are more than a series has."""
+    """Return ``count`` different colours; they are from a continuous scale if the series has too few."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 

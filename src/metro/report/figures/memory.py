@@ -20,7 +20,7 @@ _WIDE = 1.96
 
 
 def courses(rows: Sequence[JSON], titles: Sequence[str]) -> Figure:
-    """Draw each series with its errors, the course through it with a 95 % band, and the value to come.
+    """Draw each series with its errors, its course with a 95 % band, and the predicted next value.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Modal identification: measured and reconstructed responses, and the diagram the modes were found in."""
+"""Modal identification: measured and reconstructed responses, stabilisation diagram, and mode shapes."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def stabilisation(diagram: pd.DataFrame, frf: pd.DataFrame) -> Figure:
 
 
 def shapes(residues: pd.DataFrame, alike: pd.DataFrame) -> Figure:
-    """Draw the shape of each mode over the points of one direction, and how alike every two are.
+    """Draw the shape of each mode over the points of one direction, and the MAC of every two modes.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Printed pairs: what was measured over what was predicted, and the gain that the pairs have in common."""
+"""Printed pairs: measured over predicted values, and the gain that the pairs have in common."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ ABREAST = 3
 
 @dataclass(frozen=True, eq=False)
 class Common:
-    """Pairs of one quantity, and what they have in common.
+    """Pairs of one quantity, and their common gain.
 
     ``predicted``, ``measured`` (n,); ``gain`` of the second over the first, with the ends of its interval;
-    ``offset`` of the line through the pairs, zero where the gain is a plain ratio.
+    ``offset`` of the line through the pairs, zero if the gain is a plain ratio.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Common:
 
 
 def pairs(quantities: Sequence[Common]) -> Figure:
-    """Draw the pairs of each quantity, the line where they would be equal, and that of the common gain."""
+    """Draw the pairs of each quantity, the line of equal values, and the line of the common gain."""
     rows = -(-len(quantities) // ABREAST)
     with style.style():
         figure, grid = style.new_figure(0.45 + 1.75 * rows, rows, ABREAST)

@@ -1,4 +1,4 @@
-"""Raw records at a glance: where a force record is in the air and where it was used, and a hammer's hits."""
+"""Raw records at a glance: force records with the parts in the air and in use, and a hammer's hits."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from metro.report import style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FEW = 8  # records that stand in four columns; more stand in six
+FEW = 8  # most records that are drawn in four columns; more are drawn in six
 FAINTEST = -40.0  # dB, end of the axis
 
 
 def strongest(records: pd.DataFrame) -> str:
-    """Return the axis along which the records span most."""
+    """Return the axis along which the records have the largest span."""
     span = records.groupby("axis")["high_n"].max() - records.groupby("axis")["low_n"].min()
     return str(span.idxmax())
 
@@ -27,7 +27,7 @@ def force(records: pd.DataFrame, spindle: pd.DataFrame | None) -> Figure:
     Parameters
     ----------
     records : ``run, t_s, axis, low_n, high_n``.
-    spindle : ``run, steady_from_s, steady_to_s, zero_at_s, air_s`` of the runs that were used; None without.
+    spindle : ``run, steady_from_s, steady_to_s, zero_at_s, air_s`` of the runs that were used; or None.
     """
     axis = strongest(records)
     panels = list(records[records["axis"] == axis].groupby("run", sort=False))
@@ -66,18 +66,20 @@ def force(records: pd.DataFrame, spindle: pd.DataFrame | None) -> Figure:
         for axes in flat[max(0, len(panels) - columns) : len(panels)]:
             axes.set_xlabel("time (s)", fontsize=8)
         figure.supylabel(f"force along {axis} (N)", fontsize=9)
-        told = next((axes for axes, (run, _) in zip(flat, panels, strict=False) if run in used), flat[0])
-        style.legend_above(figure, told)
+        first_used = next(
+            (axes for axes, (run, _) in zip(flat, panels, strict=False) if run in used), flat[0]
+        )
+        style.legend_above(figure, first_used)
     return figure
 
 
 def hits(records: pd.DataFrame, band: tuple[float, float] | None) -> Figure:
-    """Draw the force of every hit over time, and its spectrum with the band that the modes were fitted in.
+    """Draw the force of every hit over time, and its spectrum with the band of the modal fit.
 
     Parameters
     ----------
     records : ``hit, part, x, value``: ``pulse`` in ms and N, ``spectrum`` in Hz and dB.
-    band : Hz; None where nothing was fitted.
+    band : Hz; None if nothing was fitted.
     """
     with style.style():
         figure, ((left, right),) = style.new_figure(1.8, 1, 2)

@@ -112,12 +112,12 @@ def _map(figure: Figure, axes: Axes, chart: pd.DataFrame) -> None:
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
 
 
-def stations(surface: pd.DataFrame, told: pd.DataFrame) -> Figure:
+def stations(surface: pd.DataFrame, dots: pd.DataFrame) -> Figure:
     """Draw the end stiffness of a tabulated machine over its workspace, a panel per axis; dots are stations.
 
     Parameters
     ----------
-    surface : rows of ``end_surface``. told : of ``end_stations``.
+    surface : rows of ``end_surface``. dots : of ``end_stations``.
     """
     first, second = (f"{surface[name].iloc[0]}_mm" for name in ("first", "second"))
     x, y = np.unique(surface[first]), np.unique(surface[second])
@@ -130,7 +130,7 @@ def stations(surface: pd.DataFrame, told: pd.DataFrame) -> Figure:
             bar = figure.colorbar(filled, ax=axes, location="bottom", shrink=0.9, pad=0.02)
             bar.set_label(f"k {name} (N/µm)")
             bar.ax.locator_params(nbins=4)
-            axes.plot(told[first], told[second], "o", color=style.MEASURED, mfc="white", ms=4, clip_on=False)
+            axes.plot(dots[first], dots[second], "o", color=style.MEASURED, mfc="white", ms=4, clip_on=False)
             axes.grid(visible=False)
             axes.set_xlabel(f"{first[0]} (mm)")
         row[0].set_ylabel(f"{second[0]} (mm)")
@@ -138,7 +138,7 @@ def stations(surface: pd.DataFrame, told: pd.DataFrame) -> Figure:
 
 
 def _outline(axes: Axes, pose: pd.DataFrame, seen: tuple[int, int]) -> None:
-    """Outline of the ellipsoid as it is seen along the axis that is left out: a unit circle through P K."""
+    """Outline of the ellipsoid in a view along the omitted axis: the image of a unit circle through P K."""
     vectors = pose[["axis_x", "axis_y", "axis_z"]].to_numpy(float).T
     matrix = (vectors * pose["stiffness_n_um"].to_numpy(float)) @ vectors.T
     left, size, _ = np.linalg.svd(matrix[list(seen)])
@@ -155,7 +155,7 @@ def _outline(axes: Axes, pose: pd.DataFrame, seen: tuple[int, int]) -> None:
 
 
 def friction(curve: pd.DataFrame, table: pd.DataFrame) -> Figure:
-    """Draw the friction torque of each joint over its speed, and the identified line where there is one.
+    """Draw the friction torque of each joint over its speed, and the identified line, if there is one.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def friction(curve: pd.DataFrame, table: pd.DataFrame) -> Figure:
 
 
 def waviness(waves: pd.DataFrame, runs: Sequence[str]) -> Figure:
-    """Draw the waves of walls, of the tip's tracking error in the cut, and of that in the idle run.
+    """Draw the waves of walls, and those of the tip's tracking error in the cut and in the idle run.
 
     Parameters
     ----------
@@ -224,11 +224,11 @@ def waviness(waves: pd.DataFrame, runs: Sequence[str]) -> Figure:
 
 
 def spectra(table: pd.DataFrame, lines: pd.DataFrame | None) -> Figure:
-    """Draw the spectra of the tip's path error over time and along the path, all runs; lines are marked.
+    """Draw the spectra of the tip's path error over time and along the path, all runs; mark the lines.
 
     Parameters
     ----------
-    table : rows of ``robot_spectra``. lines : of ``robot_lines``; None where there are none.
+    table : rows of ``robot_spectra``. lines : of ``robot_lines``; None if there are none.
     """
     domains = [domain for domain in DOMAINS if (table["domain"] == domain[0]).any()]
     with style.style():
@@ -246,9 +246,9 @@ def spectra(table: pd.DataFrame, lines: pd.DataFrame | None) -> Figure:
                         label=name if i == 0 else None,
                     )
                 if lines is not None:
-                    found = lines[(lines["domain"] == domain) & (lines["axis"] == name)]
-                    height = np.full(len(found), 2.0 * float(part["density_um2"].max()))
-                    axes.plot(found["frequency"], height, "v", color=colour, ms=4)
+                    marked = lines[(lines["domain"] == domain) & (lines["axis"] == name)]
+                    height = np.full(len(marked), 2.0 * float(part["density_um2"].max()))
+                    axes.plot(marked["frequency"], height, "v", color=colour, ms=4)
             axes.set(xlabel=label, ylabel=f"density ({unit})")
         style.legend_above(figure, row[0])
     return figure

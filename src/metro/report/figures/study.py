@@ -67,7 +67,7 @@ def _level(factor: str, level: str) -> str:
 
 
 def ticks(axes: Axes, values: Sequence[float]) -> None:
-    """Put plain numbers on a logarithmic axis of less than a decade, where it has no ticks of its own."""
+    """Put plain numbers on a logarithmic axis of less than a decade, which has no ticks by default."""
     from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator, StrMethodFormatter
 
     low, high = min(values), max(values)
@@ -81,13 +81,13 @@ def ticks(axes: Axes, values: Sequence[float]) -> None:
 
 
 def ranking(rows: Sequence[JSON], after: Sequence[JSON] = (), model: str = "base model") -> Figure:
-    """Draw the configurations from best to worst with 95 % intervals, and how they were predicted to rank.
+    """Draw the configurations from best to worst with 95 % intervals, and their predicted ranks.
 
     Parameters
     ----------
     rows : of ``identified.json``: ``configuration``, ``xm``, ``xm_predicted`` (um, or None),
-        ``probability_best``. after : the same, predicted with the effects found. model : what the others are
-        predicted with.
+        ``probability_best``. after : such rows, predicted with the identified effects. model : name of the
+        model that predicted the others.
     """
     shown = list(rows)[:MOST_RANKED]
     known = [row for row in rows if row.get("xm_predicted") is not None]
@@ -137,7 +137,7 @@ def _parity(axes: Axes, count: int) -> None:
 
 
 def _list(axes: Axes, rows: Sequence[JSON], key: str, label: str) -> None:
-    """Values with their intervals from the top down, the probability of being best beside them."""
+    """Values with their intervals from the top down, each with its probability of being best."""
     height = np.arange(len(rows))
     value = np.array([float(row[key]["value"]) for row in rows])
     bounds = np.array([[np.nan if b is None else b for b in row[key]["ci95"]] for row in rows], dtype=float)
@@ -165,7 +165,7 @@ def _list(axes: Axes, rows: Sequence[JSON], key: str, label: str) -> None:
 
 
 def advice(rows: Sequence[JSON]) -> Figure:
-    """Draw the configurations that are planned, from best to worst as predicted, with 95 % intervals.
+    """Draw the planned configurations, from best to worst by prediction, with 95 % intervals.
 
     Parameters
     ----------

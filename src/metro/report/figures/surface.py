@@ -20,7 +20,7 @@ MAPS = 16
 
 
 def face_points(frame: pd.DataFrame) -> Figure:
-    """Draw deviations at path points: measured, and what is left by each prediction, one row per run.
+    """Draw deviations at path points: measured, and the residual of each prediction, one row per run.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def face_points(frame: pd.DataFrame) -> Figure:
 
 
 def face_maps(frame: pd.DataFrame, contacts: pd.DataFrame | None = None) -> Figure:
-    """Draw the deviation of whole faces from their least-squares planes, small where there are many.
+    """Draw the deviation of whole faces from their least-squares planes, smaller if there are many faces.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def face_maps(frame: pd.DataFrame, contacts: pd.DataFrame | None = None) -> Figu
 
 
 def _mark(axes: Axes, contacts: pd.DataFrame | None, run: str) -> None:
-    """Mark where the planes of the minimum zone touch: the upper with triangles up, the lower down."""
+    """Mark the contacts of the minimum zone's planes: triangles up for the upper, down for the lower."""
     if contacts is None:
         return
     for side, marker in (("upper", "^"), ("lower", "v")):

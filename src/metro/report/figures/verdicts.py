@@ -1,4 +1,4 @@
-"""Before and after: of observables and batches, of runs; and what is left, by its signature."""
+"""Errors before and after, of observables, batches and runs; and the signature of the residual."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PATTERNS, LONGEST = 8, 30  # most bars, and characters of what stands beside one
-SMALLEST = 0.1  # end of the axis where nothing is left, % of the signal
-ABREAST = 1.45  # inches, of a figure that stands beside another
+PATTERNS, LONGEST = 8, 30  # most bars, and most characters of a bar's label
+SMALLEST = 0.1  # end of the axis if the residual is zero, % of the signal
+ABREAST = 1.45  # inches, of one of two figures side by side
 HATCHES = ("", "/////", "xxxxx", "....", "-----", "+++++")  # axes in grey print
 MOST_NAMED = 18  # runs along an axis of half the width
 LABEL_ROOM = 36  # characters that fit side by side under a figure of half the width
@@ -71,7 +71,7 @@ def _whisker(axes: Axes, at: float, ci95: tuple[float, float] | None, colour: st
 
 
 def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
-    """Draw each run's residual before and after: held-out runs full, identification runs hollow.
+    """Draw each run's residual before and after: held-out runs are filled, identification runs hollow.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
                 value = [float(v) if (v := rows[i].get(key)) is not None else np.nan for i in at]
                 face, label = (colour if filled else "white"), f"{name}, {words}"
                 drawn = axes.scatter(x[at], value, marker=mark, s=size, fc=face, ec=colour, label=label)
-                drawn.set_clip_on(False)  # a run without residual stands on the axis
+                drawn.set_clip_on(False)  # the mark of a run without residual is on the axis
         if floor is not None:
             axes.axhline(floor, color=style.MEASURED, lw=0.8, ls=":", label="noise floor")
         axes.margins(y=0.12)
@@ -129,10 +129,10 @@ def _share(entry: JSON) -> float:
 
 
 def signature(entries: Sequence[JSON]) -> Figure:
-    """Draw what is left beyond the noise after the effects, by pattern and axis; full bars are significant.
+    """Draw the residual beyond the noise after the effects, by pattern and axis; full bars are significant.
 
-    As a share of the axis's signal: amplitudes of patterns that sum over different numbers of values are not
-    to be compared.
+    It is drawn as a share of the axis's signal, because the amplitudes of patterns that sum over different
+    numbers of values cannot be compared.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""The campaign as one web page without a network: verdicts, and plots on which values can be read."""
+"""The campaign as one web page that needs no network: verdicts, and plots with readable values."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from urllib.parse import quote
 
+from metro.observables.catalogue import title
 from metro.report.content import Item, Section, Table
 from metro.report.numbers import number, percent, probability, words
 from metro.report.page.boundary import boundary_curves
@@ -13,13 +14,13 @@ from metro.report.page.faces import face_maps, point_maps
 from metro.report.page.markup import Html, badge, embedded, items_of, joined, tag
 from metro.report.page.responses import response_curves
 from metro.report.parameters import parameter_words
-from metro.report.results import Results, title
+from metro.report.results import Results
 from metro.report.sections.causes import with_causes
 from metro.report.sections.summary import first_words
 from metro.report.sections.verdict import STATUS, error_text
 from metro.units import JSON, printed
 
-FILES = ("verdict.json", "identified.json", "provenance.json")  # that the stages write beside the report
+FILES = ("verdict.json", "identified.json", "provenance.json")  # written by the stages next to the report
 
 
 def anchor(batch: str) -> str:
@@ -32,7 +33,7 @@ def batch_section(results: Results, link: str, budget: int) -> Html:
 
     Parameters
     ----------
-    link : where its report is, as seen from the page. budget : bytes that the data of its plots may take.
+    link : path to its report, relative to the page. budget : bytes that the data of its plots may take.
     """
     verdicts, name = results.verdicts(), results.batch.name
     badges = [
@@ -53,7 +54,7 @@ def batch_section(results: Results, link: str, budget: int) -> Html:
 
 
 def _files(name: str, link: str) -> Html:
-    """Link what the stages wrote of a batch: its report, and the files beside it."""
+    """Link the report of a batch, and the files next to it."""
     folder = link[: link.rfind("/") + 1]
     beside = [joined([" · ", tag("a", file, href=folder + quote(file))]) for file in FILES]
     return tag("p", tag("a", f"Report of {name} (PDF)", href=link), *beside, class_="files")
@@ -90,7 +91,7 @@ def _effects(verdicts: Mapping[str, JSON]) -> list[Item]:
         [
             words(str(effect["effect"])),
             title(name),
-            "; ".join(parameter_words(str(effect["effect"]), effect.get("parameters") or {})) or "–",
+            "; ".join(parameter_words(effect)) or "–",
             probability(effect.get("probability")),
         ]
         for name, entry in verdicts.items()
@@ -101,7 +102,7 @@ def _effects(verdicts: Mapping[str, JSON]) -> list[Item]:
 
 
 def _plots(results: Results, budget: int) -> list[JSON]:
-    """Return what is drawn of a batch in ``budget`` bytes; what a plot leaves is shared by those after."""
+    """Return the plots of a batch in ``budget`` bytes; later plots share the bytes that one did not need."""
     makers: list[Callable[[int], JSON | None]] = [
         lambda share: boundary_curves(results, share),
         lambda share: response_curves(results, share),

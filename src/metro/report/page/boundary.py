@@ -1,4 +1,4 @@
-"""Stability boundaries with their test cuts, as a page draws them."""
+"""Stability boundaries with their test cuts, as data for the page."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _boundary(
         "key": [str(position)],
         "x": packed(line["rpm"].to_numpy(float)),
         "lines": lines,
-        "told": [_told(row, base, i if changed else None) for i, row in line.iterrows()],
+        "told": [_reading(row, base, i if changed else None) for i, row in line.iterrows()],
         "marks": [] if here is None else [_mark(row) for _, row in here.iterrows()],
         "spans": [[float(s["rpm"]), float(s["from_mm"]), float(s["to_mm"])] for s in spans],
         "range": [0.0, top],
@@ -83,14 +83,14 @@ def _depths(line: pd.DataFrame, name: str, look: str) -> JSON:
 
 
 def _at_speeds(base: pd.DataFrame, rpm: pd.Series) -> pd.DataFrame | None:
-    """Return the base model's boundary at the speeds of the other; None where it was solved elsewhere."""
+    """Return the base model's boundary at the speeds of the other; None if it has no unique speeds."""
     rows = base.set_index("rpm")
     known = rows.index.is_unique and len(rows) > 0
     return rows.reindex(rpm).reset_index() if known else None
 
 
-def _told(row: pd.Series, base: pd.DataFrame | None, place: object) -> str:
-    """Say what the boundary is at one speed, in the report's numbers."""
+def _reading(row: pd.Series, base: pd.DataFrame | None, place: object) -> str:
+    """Describe the boundary at one speed, in the report's numbers."""
     text = f"{number(row['rpm'], 4)} rpm: {_depth(row)} mm"
     if np.isfinite(row["chatter_hz"]):
         doubling = " (the period doubles)" if row["kind"] == "flip" else ""

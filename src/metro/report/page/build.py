@@ -1,4 +1,4 @@
-"""The page: what the campaign's PDF says, then each batch in a section that unfolds, with its plots."""
+"""The page: the content of the campaign's PDF, then each batch in a section that unfolds, with its plots."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ WHOLE, PER_BATCH = 4_000_000, 400_000  # bytes that the data of all plots, and t
 
 
 def campaign_page(sections: Sequence[Section], batches: Iterable[Results], links: Mapping[str, str]) -> str:
-    """Return the campaign as one HTML file that needs no other; the same text for the same results.
+    """Return the campaign as one HTML file that needs no other file; the same text for the same results.
 
     Parameters
     ----------
     sections : of the summary, see :func:`metro.report.campaign.campaign_sections`.
-    batches : with the tables of :data:`metro.batch.layout.PAGE`; read one by one, none is kept once written.
-    links : name of every batch → where its report is, as seen from the page.
+    batches : with the tables of the campaign stage; read one by one, none is kept once written.
+    links : name of every batch → path to its report, relative to the page.
     """
     budget = min(PER_BATCH, WHOLE // max(1, len(links)))
     anchors = {name: f"#{quote(anchor(name))}" for name in links}
-    told = [_section(s.title, items_of(s.items, anchors)) for s in sections]
+    summary = [_section(s.title, items_of(s.items, anchors)) for s in sections]
     unfolding = [batch_section(results, links[results.batch.name], budget) for results in batches]
     buttons = [
         tag("button", "Unfold all", type="button", data_fold="open"),
@@ -39,7 +39,7 @@ def campaign_page(sections: Sequence[Section], batches: Iterable[Results], links
     ]
     without = tag("noscript", tag("p", "The plots need JavaScript; all else is here without it."))
     head = tag("p", *buttons, class_="tools")
-    parts = [*told, _section(BATCHES, head, without, *unfolding)]
+    parts = [*summary, _section(BATCHES, head, without, *unfolding)]
     below = f"{len(links)} batches · metro {__version__} · "
     header = tag(
         "header",
@@ -66,7 +66,7 @@ def _contents(titles: Sequence[str]) -> Html:
 
 
 def _document(title: str, header: Html, parts: Sequence[Html]) -> str:
-    """Put the parts into a page that may load nothing and run nothing but its own script and style."""
+    """Put the parts into a page that may load nothing, and run only its own script and style."""
     assets = files("metro.report.page") / "assets"
     script = "".join((assets / name).read_text(encoding="utf-8") for name in SCRIPTS)
     style = (assets / "page.css").read_text(encoding="utf-8")

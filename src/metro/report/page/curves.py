@@ -1,4 +1,4 @@
-"""Curves of held-out runs, measured and predicted, as a page draws them."""
+"""Curves of held-out runs, measured and predicted, as data for the page."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pandas as pd
 
+from metro.observables.catalogue import title
 from metro.report.figures.comparison import (
     COORDINATES,
     Prediction,
@@ -27,7 +28,7 @@ from metro.report.page.packing import (
     packed,
     rms_by_run,
 )
-from metro.report.results import Results, title
+from metro.report.results import Results
 from metro.units import JSON, Array, printed
 
 HELP = (
@@ -39,14 +40,14 @@ HELP = (
 
 
 def run_curves(results: Results, observable: str, budget: int) -> JSON | None:
-    """Return the held-out runs of an observable measured and predicted, axis by axis; None where none is."""
+    """Return the held-out runs of an observable, measured and predicted, axis by axis; None without any."""
     frame = results.compared(observable)
     if frame is None or observable == "lobes":
         return None
     column, drawn = coordinate(frame), predictions(frame)
     frame = frame.assign(run=frame["run"].astype(str), axis=axis_labels(frame))
     if not column and not frame.duplicated(["run", "axis"]).any():
-        # one value per axis: the axes are the places
+        # With one value per axis, the axes are the places.
         frame, keys = frame.assign(label=frame["axis"], axis=""), ["run"]
     else:
         keys = ["run", "axis", "part"]
@@ -83,17 +84,17 @@ def run_curves(results: Results, observable: str, budget: int) -> JSON | None:
 
 
 def _missed(rows: pd.DataFrame, kind: Prediction) -> dict[str, float]:
-    rest = (rows["measured"] - rows[kind.column]).to_numpy(float)
-    return rms_by_run(rest, rows["run"].to_numpy(str))
+    residual = (rows["measured"] - rows[kind.column]).to_numpy(float)
+    return rms_by_run(residual, rows["run"].to_numpy(str))
 
 
 def run_option(run: str, errors: list[float], unit: str) -> str:
-    """Name a run with its error before, and after where anything was added."""
+    """Name a run with its error before, and after if anything was added."""
     return f"{run}: rms {' → '.join(number(error) for error in errors)} {unit}".rstrip()
 
 
 def _first(frame: pd.DataFrame, keys: list[str], run: str) -> list[str]:
-    """Return the key of the curve of a run that the base model misses most."""
+    """Return the key of a run's curve with the largest error of the base model."""
 
     def missed(part: tuple[list[str], pd.DataFrame]) -> float:
         return float(((part[1]["measured"] - part[1]["before"]) ** 2).mean())
@@ -103,17 +104,17 @@ def _first(frame: pd.DataFrame, keys: list[str], run: str) -> list[str]:
 
 
 def _parts(rows: pd.DataFrame) -> list[tuple[list[str], pd.DataFrame]]:
-    """Part a run by axis, and what repeats over the revolution by its time in the record."""
-    found = []
+    """Split a run by axis, and a signal that repeats over the revolution by its time in the record."""
+    parts = []
     for axis in axes_of(rows):
         mine = rows[rows["axis"] == axis]
         times = np.unique(mine["t_s"].dropna())
         if mine["angle_deg"].isna().any() or times.size < 2:
-            found.append(([axis, "all"], mine))
+            parts.append(([axis, "all"], mine))
         else:
-            told = (f"at {number(float(t))} s of the record" for t in times)
-            found += [([axis, text], mine[mine["t_s"] == t]) for text, t in zip(told, times, strict=True)]
-    return found
+            labels = (f"at {number(float(t))} s of the record" for t in times)
+            parts += [([axis, text], mine[mine["t_s"] == t]) for text, t in zip(labels, times, strict=True)]
+    return parts
 
 
 def _curve(part: pd.DataFrame, column: str, drawn: tuple[Prediction, ...]) -> tuple[JSON, bool]:
@@ -137,7 +138,7 @@ def _curve(part: pd.DataFrame, column: str, drawn: tuple[Prediction, ...]) -> tu
 
 
 def _rows(part: pd.DataFrame) -> list[str]:
-    """Name the places of a table: by axis, by the printed rows where a run is a span of them, or counted."""
+    """Name the places of a table: by axis, by the printed rows if a run is a span of them, or by counting."""
     if "label" in part:
         return [str(label) for label in part["label"]]
     span = re.search(r"(\d+)–(\d+)$", str(part["run"].iloc[0]))

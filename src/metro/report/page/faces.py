@@ -1,4 +1,4 @@
-"""Machined faces, as a page turns them round."""
+"""Machined faces, as data for the views that the page rotates."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from metro.units import JSON, Array, printed
 
 MOST = 100  # places of a face along either direction
 MM = {"µm": 1e-3, "mm": 1.0}  # of a unit of height
-SEEN = 0.98  # share of the heights that the scale of colours tells apart
+SEEN = 0.98  # share of the heights within the scale of colours
 HELP = (
     "Arrows: turn the face. Shift with an arrow: move the ring from place to place. End: the ring to the "
     "highest place. + and −: heights. Home: as it was. T: from above. Mouse or finger: drag to turn, point "
@@ -31,7 +31,7 @@ HELP = (
 
 
 def face_maps(results: Results, budget: int) -> JSON | None:
-    """Return the deviation of whole faces from their least-squares planes; None where none was scanned."""
+    """Return the deviation of whole faces from their least-squares planes; None if none was scanned."""
     frame = results.tables.get("face_map")
     if frame is None:
         return None
@@ -62,7 +62,7 @@ def face_maps(results: Results, budget: int) -> JSON | None:
 
 
 def point_maps(results: Results, budget: int) -> JSON | None:
-    """Return held-out faces at the points of their paths: measured, predicted, and what is left over."""
+    """Return held-out faces at the points of their paths: measured, predicted, and the residual."""
     frame = results.compared("flatness")
     if frame is None or frame[["x_mm", "y_mm"]].isna().any(axis=None):
         return None
@@ -79,20 +79,20 @@ def point_maps(results: Results, budget: int) -> JSON | None:
         layers = [_layer("measured", measured, measured, half, middle)]
         for kind in kinds:
             predicted = part[kind.column].to_numpy(float)
-            rest = measured - predicted
+            residual = measured - predicted
             layers += [
                 _layer(f"predicted: {kind.label}", predicted, predicted, half, middle),
-                _layer(f"left by: {kind.label}", rest, rest, half),
+                _layer(f"left by: {kind.label}", residual, residual, half),
             ]
         places = {"x": packed(part["x_mm"].to_numpy(float)), "y": packed(part["y_mm"].to_numpy(float))}
         faces.append({"key": [run], "said": run, "columns": 0, **places, "layers": layers})
     names = frame["run"].to_numpy(str)
-    rests = [rms_by_run(height - frame[kind.column].to_numpy(float), names) for kind in kinds]
-    missed = rests[0]
+    rms = [rms_by_run(height - frame[kind.column].to_numpy(float), names) for kind in kinds]
+    missed = rms[0]
     shown = fitting(faces, budget, [missed[run] for run in runs])
     some = left_out(len(shown), len(runs), "held-out faces", "those that the base model misses most")
     unit = printed(str(frame["unit"].iloc[0]))
-    options = {run: run_option(run, [rest[run] for rest in rests], unit) for run in runs}
+    options = {run: run_option(run, [by_run[run] for by_run in rms], unit) for run in runs}
     drawn = _map("Held-out faces at the points of the path", unit, limit, shown)
     return {
         **drawn,
@@ -105,7 +105,7 @@ def point_maps(results: Results, budget: int) -> JSON | None:
 def coarse(part: pd.DataFrame) -> tuple[Array, Array, Array]:
     """Return places x (m,), y (n,) and heights (n, m) of a face, no more than 100 along either direction.
 
-    A height is the mean of those measured in its neighbourhood, NaN where there is none.
+    A height is the mean of those measured in its neighbourhood, NaN if there is none.
     """
     column, x = _grouped(part["x_mm"].to_numpy(float))
     row, y = _grouped(part["y_mm"].to_numpy(float))
@@ -117,7 +117,7 @@ def coarse(part: pd.DataFrame) -> tuple[Array, Array, Array]:
 
 
 def _grouped(places: Array) -> tuple[Indices, Array]:
-    """Return for each place the neighbourhood that it is in, and the middle of each neighbourhood."""
+    """Return the neighbourhood of each place, and the middle of each neighbourhood."""
     values, which = np.unique(places, return_inverse=True)
     if len(values) <= MOST:
         return which, values
@@ -127,20 +127,27 @@ def _grouped(places: Array) -> tuple[Indices, Array]:
 
 
 def _limit(deviation: Array) -> float:
-    """Return the deviation at which a scale of colours ends: few are beyond it."""
+    """Return the deviation at which a scale of colours ends; few deviations exceed it."""
     return float(np.nanquantile(np.abs(deviation), SEEN)) or 1.0
 
 
 def _layer(name: str, z: Array, all_of_it: Array, half: float = np.nan, middle: float = 0.0) -> JSON:
-    """Return heights as they are drawn, and the extremes of all of them in words.
+    """Return the drawn heights, and the extremes of all heights in words.
 
     The colours of the face alone end at ``middle`` ± ``limit``.
     """
     low, high = float(np.nanmin(all_of_it)), float(np.nanmax(all_of_it))
     limit = _limit(all_of_it - middle)
-    told = f"from {number(low)} to {number(high)}"
+    extremes = f"from {number(low)} to {number(high)}"
     digits = decimals(half, limit)
-    return {"name": name, "z": packed(z), "middle": middle, "limit": limit, "decimals": digits, "told": told}
+    return {
+        "name": name,
+        "z": packed(z),
+        "middle": middle,
+        "limit": limit,
+        "decimals": digits,
+        "told": extremes,
+    }
 
 
 def _map(title: str, unit: str, limit: float, faces: list[JSON]) -> JSON:

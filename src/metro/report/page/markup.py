@@ -1,4 +1,4 @@
-"""HTML that escapes whatever it is given, and the report's items written in it."""
+"""HTML that escapes all text it is given, and the report's items written in it."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from metro.report.content import Abreast, Bullets, Facts, Heading, Item, Paragra
 from metro.report.document import UNIT
 from metro.report.style import to_svg
 
-SHORT = 26  # characters of a cell that is not broken into lines
+SHORT = 26  # most characters of a cell that is not broken into lines
 VOID = {"meta", "img", "hr"}
-# By a sign as well as by a word and a colour: told apart in grey print, too
+# A sign as well as a word and a colour, so that the verdicts are distinct in grey print, too.
 SIGNS = {
     "clean": "✓",
     "explained": "✓",
@@ -26,13 +26,13 @@ SIGNS = {
 
 
 class Html(str):
-    """Text that is markup already; any other text is escaped where it is put into markup."""
+    """Text that is markup already; any other text is escaped when it is put into markup."""
 
     __slots__ = ()
 
 
 def tag(name: str, /, *children: str, **attributes: str) -> Html:
-    """Return an element; ``class_`` stands for the attribute ``class``, ``_`` in a name for a hyphen."""
+    """Return an element; ``class_`` is the attribute ``class``, and ``_`` in a name means a hyphen."""
     said = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{html.escape(value)}"' for key, value in attributes.items()
     )
@@ -41,7 +41,7 @@ def tag(name: str, /, *children: str, **attributes: str) -> Html:
 
 
 def joined(children: Sequence[str]) -> Html:
-    """Put texts one after the other, each escaped unless it is markup."""
+    """Join texts, each escaped unless it is markup."""
     return Html("".join(each if isinstance(each, Html) else html.escape(each) for each in children))
 
 
@@ -62,7 +62,7 @@ def items_of(items: Sequence[Item], links: Mapping[str, str], level: int = 3) ->
 
     Parameters
     ----------
-    links : name of a batch → where it leads to, in tables and lists. level : of headings among them.
+    links : name of a batch → target of its link, in tables and lists. level : of headings among them.
     """
     flat = [part for item in items for part in (item.items if isinstance(item, Abreast) else [item])]
     return joined([_item(item, links, level) for item in flat])
@@ -113,7 +113,7 @@ def _cell(column: str, text: str, links: Mapping[str, str]) -> Html:
 
 
 def _linked(text: str, links: Mapping[str, str]) -> Html:
-    """Let the names of batches in a list, or before what is said of one, lead to them."""
+    """Link the names of batches in a list, or at the start of a sentence, to the batches."""
     names = text.split(", ")
     parts = [tag("a", name, href=links[name]) if name in links else _unbroken(name) for name in names]
     return joined([joined([", ", part]) if i else part for i, part in enumerate(parts)])

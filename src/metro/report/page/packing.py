@@ -1,4 +1,4 @@
-"""Numbers for a page: only as many as are seen, only as fine as is seen."""
+"""Numbers for a page: only as many and only as fine as the page can show."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from metro.units import JSON, Array
 
 Indices = npt.NDArray[np.intp]
 
-STEPS = 65534  # of the span of a curve; the code after them says that there is no value
+STEPS = 65534  # of the span of a curve; the code after the last step means that there is no value
 PARTS = 200  # into which a long curve is cut
 LONG = 6 * PARTS  # places that a curve may have before it is thinned
-GAP = 8  # median steps of a curve that make a gap, over which nothing is joined
+GAP = 8  # median steps of a curve that make a gap, over which no line is drawn
 THINNED = "of long curves the lowest and the highest of every line in each of 200 equal parts is drawn"
 
 
 def packed(values: Array) -> JSON:
-    """Return values as 16-bit steps of their span, in base64: off by at most 1/131 068 of the span."""
+    """Return values as 16-bit steps of their span, in base64; the error is at most 1/131 068 of the span."""
     known = np.isfinite(values)
     low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 0.0)
     share = np.divide(values - low, (high - low) or 1.0, out=np.zeros(len(values)), where=known)
@@ -39,12 +39,12 @@ def gaps(x: Array) -> Indices:
 
 
 def kept(lines: Sequence[Array], after: Indices | None = None) -> Indices:
-    """Return the places of a curve that are seen: in each of 200 equal parts, every line's extremes.
+    """Return the places of a curve that are drawn: in each of 200 equal parts, every line's extremes.
 
     Parameters
     ----------
-    lines : (n,) each. All n places are kept where there are no more than six times as many as parts.
-    after : places after a gap: they are kept, and those before it.
+    lines : (n,) each. All n places are kept if there are no more than six times as many as parts.
+    after : places after a gap: they and the places before the gap are kept.
     """
     count = len(lines[0])
     if count <= LONG:
@@ -70,7 +70,7 @@ def decimals(half_width: float, largest: float) -> int:
 
 
 def fitting(entries: Sequence[JSON], budget: int, worth: Sequence[float]) -> list[JSON]:
-    """Return the entries whose JSON fits into ``budget`` bytes, in their order: those of most worth first."""
+    """Return the entries of most worth whose JSON fits into ``budget`` bytes, in their order."""
     chosen: set[int] = set()
     left = budget
     for i in sorted(range(len(entries)), key=lambda i: (-worth[i], i)):
@@ -82,16 +82,16 @@ def fitting(entries: Sequence[JSON], budget: int, worth: Sequence[float]) -> lis
 
 
 def left_out(shown: int, of: int, what: str, where: str) -> str:
-    """Say that only a part of the runs is shown; empty where all are."""
+    """Say that only a part of the runs is shown; empty if all are."""
     return "" if shown == of else f"{shown} of {of} {what} are shown, {where}; the table holds all"
 
 
-def notes(*told: str) -> str:
-    """Join remarks to one sentence; empty where there are none."""
-    text = listing([each for each in told if each])
+def notes(*remarks: str) -> str:
+    """Join remarks to one sentence; empty if there are none."""
+    text = listing([each for each in remarks if each])
     return text[:1].upper() + text[1:] + "." if text else ""
 
 
-def rms_by_run(rest: Array, run: npt.NDArray[np.str_]) -> dict[str, float]:
-    """Return the root mean square of what is left of every run."""
-    return {str(name): float(np.sqrt(np.nanmean(rest[run == name] ** 2))) for name in np.unique(run)}
+def rms_by_run(residual: Array, run: npt.NDArray[np.str_]) -> dict[str, float]:
+    """Return the root mean square of every run's residual."""
+    return {str(name): float(np.sqrt(np.nanmean(residual[run == name] ** 2))) for name in np.unique(run)}

@@ -1,4 +1,4 @@
-"""Frequency responses, measured and as the modes make them, as a page draws them."""
+"""Frequency responses, measured and from the modal model, as data for the page."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PARTS = ("real_m_n", "imag_m_n", "modal_real_m_n", "modal_imag_m_n")
 
 
 def response_curves(results: Results, budget: int) -> JSON | None:
-    """Return the receptance of every pair of points over frequency; None where the modes make none."""
+    """Return the receptance of every pair of points over frequency; None without a modal model of it."""
     table = results.tables.get("frf_used")
     if table is None or not set(PARTS) <= set(table.columns):
         return None
@@ -62,7 +62,7 @@ def response_curves(results: Results, budget: int) -> JSON | None:
 
 
 def _logarithm(rows: pd.DataFrame, real: str, imaginary: str) -> Array:
-    """Return the decadic logarithm of a magnitude; NaN where it is zero or not known."""
+    """Return the decadic logarithm of a magnitude; NaN if it is zero or not known."""
     size = np.hypot(rows[real].to_numpy(float), rows[imaginary].to_numpy(float))
     logarithm: Array = np.log10(size, out=np.full(len(size), np.nan), where=size > 0)
     return logarithm

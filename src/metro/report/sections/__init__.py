@@ -1,1 +1,1 @@
-"""Sections of a report: what a batch's results say, as paragraphs, tables and figures."""
+"""Sections of a report: a batch's results as paragraphs, tables and figures."""

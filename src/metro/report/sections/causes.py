@@ -1,14 +1,15 @@
-"""The batch as one story: its causes, where each was seen, and what of an error came with the force."""
+"""The batch as one story: its causes, the observables that show them, errors propagated from the force."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from metro.observables.catalogue import title
 from metro.report.content import Item, Paragraph, Section, Table
 from metro.report.numbers import listing, number, percent, probability, words
 from metro.report.parameters import parameter_words
 from metro.report.phrases import sentence
-from metro.report.results import Results, title
+from metro.report.results import Results, with_own
 from metro.units import JSON, printed
 
 STATUS = {
@@ -18,21 +19,22 @@ STATUS = {
     "alone": "the others cannot tell",
     "one_observable": "no other can show it",
 }
-SAID = ("together", "contradiction")  # what the verdicts of single observables do not say
+SAID = ("together", "contradiction")  # statements that the verdicts of single observables do not contain
 
 
 def with_causes(summary: Section, results: Results) -> Section:
     """Return the first page with the causes of the batch behind the verdicts, where there are several."""
-    told = results.loop.get("causes") or []
-    if not told or len(results.verdicts()) < 2:
+    facts = results.loop.get("effects") or {}
+    causes = [with_own(cause, "cause", facts) for cause in results.loop.get("causes") or []]
+    if not causes or len(results.verdicts()) < 2:
         return summary
     items = list(summary.items)
     behind = [i for i, item in enumerate(items) if isinstance(item, Paragraph) and item.look == "verdict"]
     place = max(behind, default=len(items) - 1) + 1
-    return replace(summary, items=[*items[:place], *_story(told), *items[place:]])
+    return replace(summary, items=[*items[:place], *_story(causes), *items[place:]])
 
 
-def _story(told: list[JSON]) -> list[Item]:
+def _story(causes: list[JSON]) -> list[Item]:
     rows = [
         [
             cause_name(cause),
@@ -41,22 +43,22 @@ def _story(told: list[JSON]) -> list[Item]:
             probability(cause["probability"]),
             STATUS.get(cause["status"], words(cause["status"])),
         ]
-        for cause in told
+        for cause in causes
     ]
     header = ["cause", "seen in", "all together", "probability", "others"]
     caption = (
         "The causes in this batch over all observables; parameters that they share, with 95 % intervals."
     )
     table = Table(header, rows, caption, [1.5, 1.9, 2.0, 0.9, 1.4], numeric=[3])
-    notes = [str(cause["words"]) for cause in told if cause["status"] in SAID]
+    notes = [str(cause["words"]) for cause in causes if cause["status"] in SAID]
     return [table, *(Paragraph(sentence(note), "warning") for note in notes)]
 
 
-PARTS = ("total", "upstream", "own", "doubt")  # of an error that came with a force
+PARTS = ("total", "upstream", "own", "doubt")  # of an error that a force propagates to
 
 
 def cause_name(cause: JSON) -> str:
-    """Name of a cause, and of the joint that it is of."""
+    """Name of a cause, and of its joint."""
     joint = (cause.get("where") or {}).get("joint", "all")
     return words(str(cause["cause"])) + (f", joint {joint}" if joint != "all" else "")
 
@@ -64,20 +66,20 @@ def cause_name(cause: JSON) -> str:
 def _values(cause: JSON) -> str:
     if cause["status"] == "contradiction":
         return "not one value"
-    return ", ".join(parameter_words(str(cause["cause"]), cause["parameters"])) or "–"
+    return ", ".join(parameter_words(cause)) or "–"
 
 
 def upstream(results: Results) -> Section | None:
-    """Write what of each observable's error came with the predicted force, where that was measured, too."""
+    """Write the share of each observable's error from the predicted force, if that was measured, too."""
     chain = results.loop.get("chain") or {}
     rows = [
         [
             title(name),
             when,
-            *(f"{number(told[when][part])} {printed(told['unit'])}" for part in PARTS),
-            percent(told[when]["share"]),
+            *(f"{number(entry[when][part])} {printed(entry['unit'])}" for part in PARTS),
+            percent(entry[when]["share"]),
         ]
-        for name, told in chain.items()
+        for name, entry in chain.items()
         for when in ("before", "after")
     ]
     if not rows:

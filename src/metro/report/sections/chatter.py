@@ -1,4 +1,4 @@
-"""Chatter in the records: every test on the lobes, against labels and prediction, and the roughness left."""
+"""Chatter in the records: every test on the lobes, against labels and prediction, and its roughness."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from metro.report.results import Results
 from metro.units import JSON
 
 LONGEST = 30
-UNDECIDED = 0.5  # probability of a record that tells neither
+UNDECIDED = 0.5  # probability of a record that does not decide
 KINDS = {
     "hopf": "Hopf",
     "flip": "flip",
@@ -23,7 +23,7 @@ KINDS = {
 
 
 def chatter_items(results: Results) -> list[Item]:
-    """Write what the records of the test cuts say; nothing where there are no records."""
+    """Write the results from the records of the test cuts; nothing if there are no records."""
     tests = _tests(results)
     if tests is None:
         return []
@@ -40,7 +40,7 @@ def chatter_items(results: Results) -> list[Item]:
 
 
 def chatter_flags(results: Results) -> list[str]:
-    """Name the cuts that chattered in a batch that is no test of stability: its models assume none did."""
+    """Name the cuts that chattered in a batch that does not test stability; its models assume none did."""
     tests = _tests(results) if results.tables.get("lobes_final") is None else None
     if tests is None:
         return []
@@ -53,7 +53,7 @@ def chatter_flags(results: Results) -> list[str]:
 
 
 def _tests(results: Results) -> pd.DataFrame | None:
-    """Join tests whose record was looked at to what the lobes of their own modes say; None without any."""
+    """Join tests with an evaluated record to the prediction by the lobes of their modes; None without any."""
     table = results.tables.get("chatter_runs")
     if table is None or not table["probability"].notna().any():
         return None
@@ -65,9 +65,9 @@ def _tests(results: Results) -> pd.DataFrame | None:
     else:
         own = predicted[predicted["own_modes"].astype(bool)].drop_duplicates("run")
         tests = tests.join(own.set_index("run")[columns], on="run")
-    told = tests["probability"] != UNDECIDED
-    tests["unstable"] = np.where(told, tests["probability"] > 0.5, -1).astype(int)
-    tests["wrong_label"] = told & (tests["labelled"] >= 0) & (tests["labelled"] != tests["unstable"])
+    decided = tests["probability"] != UNDECIDED
+    tests["unstable"] = np.where(decided, tests["probability"] > 0.5, -1).astype(int)
+    tests["wrong_label"] = decided & (tests["labelled"] >= 0) & (tests["labelled"] != tests["unstable"])
     return tests.reset_index(drop=True)
 
 
@@ -94,11 +94,11 @@ def _table(tests: pd.DataFrame, manifest: JSON) -> Table:
 
 
 def _row(row: pd.Series, teeth: int) -> list[str]:
-    found = np.isfinite(row["chatter_hz"])
-    frequency = f"{row['chatter_hz']:.2f} ± {row['chatter_sd_hz']:.2f}" if found else "–"
+    known = np.isfinite(row["chatter_hz"])
+    frequency = f"{row['chatter_hz']:.2f} ± {row['chatter_sd_hz']:.2f}" if known else "–"
     passing = teeth * row["rpm"] / 60.0
     phases = [
-        f"{hz / passing % 1.0:.2f}" if found and pd.notna(hz) else "–"
+        f"{hz / passing % 1.0:.2f}" if known and pd.notna(hz) else "–"
         for hz in (row["chatter_hz"], row["predicted_hz"])
     ]
     place = [str(row["run"]), number(row["rpm"]), number(row["depth_mm"])]
@@ -107,15 +107,15 @@ def _row(row: pd.Series, teeth: int) -> list[str]:
 
 def _confusion(tests: pd.DataFrame) -> list[Item]:
     """Count records against labels and against the prediction."""
-    told = tests[tests["unstable"] >= 0]
-    predicted = pd.Series(np.where(told["probability_unstable"].astype(float) > 0.5, 1, 0), told.index)
+    decided = tests[tests["unstable"] >= 0]
+    predicted = pd.Series(np.where(decided["probability_unstable"].astype(float) > 0.5, 1, 0), decided.index)
     others = {
-        "label of the operator": told["labelled"],
-        "predicted boundary": predicted.where(told["probability_unstable"].notna(), -1),
+        "label of the operator": decided["labelled"],
+        "predicted boundary": predicted.where(decided["probability_unstable"].notna(), -1),
     }
     rows = []
     for name, other in others.items():
-        counts = [int(((told["unstable"] == a) & (other == b)).sum()) for a in (0, 1) for b in (0, 1)]
+        counts = [int(((decided["unstable"] == a) & (other == b)).sum()) for a in (0, 1) for b in (0, 1)]
         if sum(counts):
             right = f"{100 * (counts[0] + counts[3]) / sum(counts):.0f} %"
             rows.append([name, *(str(count) for count in counts), right])
@@ -133,7 +133,7 @@ def _confusion(tests: pd.DataFrame) -> list[Item]:
 
 
 def _words(tests: pd.DataFrame) -> list[str]:
-    """Say which labels are contradicted, and which records leave open what they are."""
+    """Say which labels the records contradict, and which records do not decide."""
     count = int((tests["unstable"] == 1).sum())
     words = [f"{count} of {len(tests)} records hold chatter."]
     wrong = [str(run) for run in tests["run"][tests["wrong_label"]]]
@@ -170,12 +170,12 @@ def _records(results: Results, tests: pd.DataFrame) -> list[Item]:
 
 
 def _roughness(tests: pd.DataFrame) -> list[Item]:
-    """Compare the roughness that stable and unstable tests left."""
+    """Compare the roughness of stable and unstable tests."""
     rough = tests[tests["ra_um"].notna() & (tests["unstable"] >= 0)]
     if rough.empty:
         return []
     kinds = (("stable", 0), ("unstable", 1))
     medians = {name: rough["ra_um"][rough["unstable"] == kind].median() for name, kind in kinds}
-    told = ", ".join(f"{name} {number(value)} µm" for name, value in medians.items() if np.isfinite(value))
-    caption = f"Roughness of stable and unstable tests; dashed: medians. Median Ra: {told}."
+    listed = ", ".join(f"{name} {number(value)} µm" for name, value in medians.items() if np.isfinite(value))
+    caption = f"Roughness of stable and unstable tests; dashed: medians. Median Ra: {listed}."
     return [Picture(figures.roughness_chart(rough), caption, caption)]

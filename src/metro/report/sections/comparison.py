@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from metro.observables.catalogue import names, title
 from metro.report.content import Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import comparison as figures
 from metro.report.figures import surface
 from metro.report.numbers import listing, number, percent
-from metro.report.results import OBSERVABLES, Results, heading, title
+from metro.report.results import Results, heading
 from metro.report.sections import findings
 from metro.report.sections.face_pairing import pairing_items
 from metro.report.sections.force import force_items
@@ -24,7 +25,7 @@ FEWEST = 3  # values of a run along an axis that make a curve
 def comparison(results: Results) -> Section:
     """Write for each observable overlay, residual, parity plot and the error of each run and axis."""
     items: list[Item] = []
-    compared = {name: frame for name in OBSERVABLES if (frame := results.compared(name)) is not None}
+    compared = {name: frame for name in names() if (frame := results.compared(name)) is not None}
     for observable, frame in compared.items():
         items.append(Heading(heading(observable)))
         if observable == "lobes":

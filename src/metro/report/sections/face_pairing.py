@@ -1,4 +1,4 @@
-"""Faces as predicted beside faces as scanned: X_m and similarity, before and after the loop."""
+"""Predicted and scanned faces: X_m and similarity, before and after the loop."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LONGEST, DRAWS = 30, 200
 
 
 def pairing_items(frame: pd.DataFrame) -> list[Item]:
-    """Tabulate and draw, by held-out face, X_m at the compared points as measured and as predicted.
+    """Tabulate and draw, by held-out face, the measured and the predicted X_m at the compared points.
 
     ``frame``: rows of comparison.parquet of flatness.
     """
@@ -58,7 +58,7 @@ def pairing_items(frame: pd.DataFrame) -> list[Item]:
 
 
 def by_face(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return a row per run: X_m as measured, before, after; similarity and D_r in per cent."""
+    """Return a row per run: X_m measured, before, after; similarity and D_r in per cent."""
     placed = frame[frame[["x_mm", "y_mm"]].notna().all(axis=1)]
     rows = [_row(str(run), part) for run, part in placed.groupby("run", sort=False) if len(part) > 3]
     return pd.DataFrame(rows)
@@ -81,17 +81,17 @@ def _row(run: str, part: pd.DataFrame) -> dict[str, str | float]:
     return row
 
 
-def _scatter(rest: Array) -> float:
-    """Return how measured heights scatter from point to point, by second differences of the rest.
+def _scatter(residual: Array) -> float:
+    """Return the scatter of measured heights from point to point, from second differences of the residual.
 
-    The table's ``sigma`` also holds what a whole face shares (its place, the arm's stiffness): that adds
-    nothing to a range about a plane.
+    The table's ``sigma`` also contains errors that a whole face shares (its place, the arm's stiffness); they
+    add nothing to a range about a plane.
     """
-    return 1.4826 * float(np.median(np.abs(np.diff(rest, 2)))) / math.sqrt(6.0)
+    return 1.4826 * float(np.median(np.abs(np.diff(residual, 2)))) / math.sqrt(6.0)
 
 
 def _of_noise(place: Array, surface: Array, sigma: float) -> float:
-    """Return what noise of ``sigma`` adds to a surface's range about its plane: the mean of draws."""
+    """Return the mean increase, over draws, of a surface's range about its plane by noise of ``sigma``."""
     rng = np.random.default_rng(0)
     noisy = surface[:, None] + sigma * rng.standard_normal((len(surface), DRAWS))
     return float(np.ptp(_about_plane(place, noisy), axis=0).mean() - np.ptp(surface))

@@ -1,4 +1,4 @@
-"""What a figure shows, as the sentence that its caption starts with: computed from the figure's own data."""
+"""The first sentence of a figure's caption, which states its result, computed from the figure's data."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SHARE = 0.95
 
 
 def changed(rows: Sequence[Change]) -> str:
-    """Say where an error fell by what was added, and where the largest one is left."""
+    """Say which errors the added effects reduced, and which remaining error is the largest."""
     fell = [row for row in rows if row.after < row.before]
     largest = max(rows, key=lambda row: row.after)
     if len(rows) == 1:
@@ -33,47 +33,52 @@ def changed(rows: Sequence[Change]) -> str:
 
 
 def left(frame: pd.DataFrame) -> str:
-    """Say how much of a signal the predictions leave, rms over the values of a table of comparison."""
+    """Say the residual of the predictions and the signal, rms over the values of a comparison table."""
     signal = f"of {_with_unit(_rms(frame['measured']), frame)} measured"
-    before, *after = (_with_unit(_rms(_rest(frame, k.column)), frame) for k in predictions(frame))
+    before, *after = (_with_unit(_rms(_residual(frame, k.column)), frame) for k in predictions(frame))
     if not after:
         return f"The base model leaves {before} rms {signal}."
     return f"The base model leaves {before} rms {signal}, with the effects found {after[0]}."
 
 
 def missed(frame: pd.DataFrame, run: str) -> str:
-    """Say how much a run leaves that the base model misses most."""
+    """Say the residual of the run for which the base model has the largest error."""
     said = left(frame[frame["run"] == run]).removeprefix("The base model leaves ")
     return f"Of the held-out runs the base model misses {run} most: it leaves {said}"
 
 
 def scatter(frame: pd.DataFrame) -> str:
-    """Say within what the differences lie, and within what those that noise makes would."""
-    told = listing(
+    """Say the limits of the differences, and the limits of differences from noise alone."""
+    limits = listing(
         [
-            f"{_with_unit(float(np.quantile(np.abs(_rest(frame, k.column)), _SHARE)), frame)} of "
+            f"{_with_unit(float(np.quantile(np.abs(_residual(frame, k.column)), _SHARE)), frame)} of "
             + ("the base model" if k.column == "before" else "the model with the effects found")
             for k in predictions(frame)
         ]
     )
     noise = NORMAL * _rms(frame["sigma"]) if frame["sigma"].notna().all() else 0.0
     beside = f"; noise alone puts them within {_with_unit(noise, frame)}" if noise else ""
-    return f"{percent(_SHARE)} of the values are within {told}{beside}."
+    return f"{percent(_SHARE)} of the values are within {limits}{beside}."
 
 
 def offsets(frame: pd.DataFrame) -> str:
-    """Say by how much a prediction is off on the average, axis by axis."""
-    told = []
+    """Say the mean error of a prediction, axis by axis."""
+    averages = []
     for kind in predictions(frame):
-        rests = pd.Series(_rest(frame, kind.column)).groupby(axis_labels(frame).to_numpy(), sort=False)
-        sizes = [f"{axis} {_rounded(float(rest.mean()), _rms(rest))}".strip() for axis, rest in rests]
+        residuals = pd.Series(_residual(frame, kind.column)).groupby(
+            axis_labels(frame).to_numpy(), sort=False
+        )
+        sizes = [
+            f"{axis} {_rounded(float(residual.mean()), _rms(residual))}".strip()
+            for axis, residual in residuals
+        ]
         name = "base model" if kind.column == "before" else "with the effects found"
-        told.append(f"{name} {', '.join(sizes)}{_unit(frame)}")
-    return f"Measured less predicted, on the average: {'; '.join(told)}."
+        averages.append(f"{name} {', '.join(sizes)}{_unit(frame)}")
+    return f"Measured less predicted, on the average: {'; '.join(averages)}."
 
 
 def peak_order(orders: pd.DataFrame) -> str:
-    """Say at which order of the spindle, along which axis, most is left."""
+    """Say at which order of the spindle, and along which axis, the residual is largest."""
     row = orders.iloc[int(orders["after"].argmax())]
     return (
         f"Most is left at order {row['order']:g} along {row['axis']}: {number(row['after'])} N "
@@ -82,7 +87,7 @@ def peak_order(orders: pd.DataFrame) -> str:
 
 
 def tooth_peaks(peaks: pd.DataFrame) -> str:
-    """Say by how much the peaks of single teeth are missed, in the median and at worst."""
+    """Say the errors of the peaks of single teeth, in the median and at worst."""
     said = []
     for model, name in MODELS.items():
         part = peaks[peaks["model"] == model]
@@ -96,31 +101,33 @@ def tooth_peaks(peaks: pd.DataFrame) -> str:
 
 
 def above_floor(blocks: Sequence[JSON], floor: float | None, shown: str | None) -> str:
-    """Say how many runs leave more than noise would, and which the most."""
-    rests = {str(b["run"]): float(b.get("rms_after") or b["rms_before"]) for b in blocks}
-    worst = max(rests, key=lambda run: rests[run])
-    most = f"{worst} leaves most, {number(rests[worst])} {printed(shown)}".rstrip()
+    """Say how many runs have a residual above the noise floor, and which has the largest."""
+    residuals = {str(b["run"]): float(b.get("rms_after") or b["rms_before"]) for b in blocks}
+    worst = max(residuals, key=lambda run: residuals[run])
+    most = f"{worst} leaves most, {number(residuals[worst])} {printed(shown)}".rstrip()
     if floor is None:
         return f"Run {most}."
-    above = sum(rest > floor for rest in rests.values())
-    some = f"{above or 'None'} of {len(rests)} runs {'lie' if above > 1 else 'lies'} above the noise floor"
+    above = sum(residual > floor for residual in residuals.values())
+    some = (
+        f"{above or 'None'} of {len(residuals)} runs {'lie' if above > 1 else 'lies'} above the noise floor"
+    )
     return f"{some}; {most}."
 
 
 def lowest_boundary(boundary: pd.DataFrame, columns: Sequence[tuple[str, str]]) -> str:
-    """Say how deep one may cut at the worst speed, and which that is, for each line of a diagram."""
-    told = []
+    """Say the stable depth at the worst speed, and this speed, for each line of a diagram."""
+    depths = []
     for column, name in columns:
         known = boundary[boundary[column].notna()]
         if len(known):
             row = known.iloc[int(known[column].argmin())]
-            told.append(f"{number(row[column])} mm (reached at {number(row['rpm'], 4)} rpm){name}")
-    return f"At every speed a cut is stable up to {listing(told)}." if told else ""
+            depths.append(f"{number(row[column])} mm (reached at {number(row['rpm'], 4)} rpm){name}")
+    return f"At every speed a cut is stable up to {listing(depths)}." if depths else ""
 
 
-def _rest(frame: pd.DataFrame, column: str) -> Array:
-    rest: Array = frame["measured"].to_numpy(float) - frame[column].to_numpy(float)
-    return rest
+def _residual(frame: pd.DataFrame, column: str) -> Array:
+    residual: Array = frame["measured"].to_numpy(float) - frame[column].to_numpy(float)
+    return residual
 
 
 def _rms(values: pd.Series | Array) -> float:
@@ -128,7 +135,7 @@ def _rms(values: pd.Series | Array) -> float:
 
 
 def _rounded(value: float, spread: float) -> str:
-    """Write a mean to the digits that the spread of what it is the mean of has."""
+    """Write a mean to the digits of the spread of its values."""
     return with_interval(value, [value - spread, value + spread]).partition(" ")[0]
 
 

@@ -1,4 +1,4 @@
-"""The cutting force of the held-out runs in figures of merit: table, order spectrum, peaks of the teeth."""
+"""Figures of merit of the cutting force of held-out runs: table, order spectrum, peaks of the teeth."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from metro.report.sections import findings
 
 LONGEST, MOST_GROUPS = 30, 8
 FEED = "feed_per_tooth_mm"
-# metric, its title, and whether its share of the measured is told
+# metric, its title, and whether its share of the measured value is written
 COLUMNS = (
     ("nrmse", "NRMSE (%)", False),
     ("peak", "peak (N)", True),
@@ -30,7 +30,7 @@ COLUMNS = (
 def force_items(results: Results) -> list[Item]:
     """Write the figures of merit of each held-out run, the order spectra and the peaks of the teeth.
 
-    Nothing where they were not computed.
+    There is nothing if they were not computed.
     """
     metrics, orders = results.tables.get("force_metrics"), results.tables.get("force_orders")
     if metrics is None or orders is None:
@@ -55,7 +55,7 @@ def force_items(results: Results) -> list[Item]:
 
 
 def mean_items(table: pd.DataFrame | None) -> list[Item]:
-    """Draw the mean forces over the feed with the coefficients' lines; nothing where all have one feed."""
+    """Draw the mean forces over the feed with the coefficients' lines; nothing if all have one feed."""
     if table is None or table[FEED].nunique() < 2:
         return []
     columns = [name for name in ("operation", "direction", *NUMBERS) if name in table and name != FEED]
@@ -63,9 +63,9 @@ def mean_items(table: pd.DataFrame | None) -> list[Item]:
     group = [_cut({name: row[name] for name in differ}) for row in table.to_dict("records")]
     if len(set(group)) > MOST_GROUPS:
         return []
-    rest = table["measured_n"] - table["fitted_n"]
-    share = float(np.sqrt(np.mean(rest**2) / np.mean(table["measured_n"] ** 2)))
-    worst = table.iloc[int(rest.abs().argmax())]
+    residual = table["measured_n"] - table["fitted_n"]
+    share = float(np.sqrt(np.mean(residual**2) / np.mean(table["measured_n"] ** 2)))
+    worst = table.iloc[int(residual.abs().argmax())]
     missed = abs(worst["measured_n"] - worst["fitted_n"])
     about = (
         f"The coefficients miss the mean forces by {percent(share)} rms, most in {worst['run']} along "
@@ -77,16 +77,16 @@ def mean_items(table: pd.DataFrame | None) -> list[Item]:
 
 def _cut(settings: Mapping[Hashable, Any]) -> str:
     """Name a cut by the settings that differ: slot; down, 4 mm wide."""
-    told = [
+    parts = [
         f"{value:g} {NUMBERS[str(name)].of_cut}" if isinstance(value, float | int) else str(value)
         for name, value in settings.items()
         if not (name == "operation" and "direction" in settings) and pd.notna(value)
     ]
-    return ", ".join(told) or "all cuts"
+    return ", ".join(parts) or "all cuts"
 
 
 def metrics_table(metrics: pd.DataFrame) -> Table:
-    """Tabulate NRMSE, peak, mean and phase of each run and axis; the base model in grey beside."""
+    """Tabulate NRMSE, peak, mean and phase of each run and axis, with those of the base model in grey."""
     whole = metrics[metrics["metric"] != "tooth_peak"]
     figures_of = {
         (row["run"], row["axis"], row["metric"], row["model"]): row for row in whole.to_dict("records")
@@ -128,7 +128,7 @@ def metrics_table(metrics: pd.DataFrame) -> Table:
 
 
 def _cell(row: Mapping[Hashable, Any], share: bool, whole: bool) -> str:
-    """Write a figure of merit with interval and share; what is beside it for comparison without them."""
+    """Write a figure of merit with interval and share; one for comparison is written without them."""
     if not whole:
         return number(row["value"])
     text = with_interval(float(row["value"]), [float(row["lo"]), float(row["hi"])])
@@ -136,16 +136,16 @@ def _cell(row: Mapping[Hashable, Any], share: bool, whole: bool) -> str:
 
 
 def _share(row: Mapping[Hashable, Any]) -> str:
-    """Write the share of the measured to the digit that the error's interval leaves it."""
+    """Write the share of the measured value to the digits of the error's interval."""
     scale = abs(row["percent"] / row["value"]) if row["value"] else 0.0
     interval = [row["percent"] + scale * (row[end] - row["value"]) for end in ("lo", "hi")]
     return with_interval(row["percent"], interval).partition(" ")[0]
 
 
 def _spectrum_words(orders: pd.DataFrame) -> str:
-    told = []
+    axes = []
     for axis, part in orders.groupby("axis"):
         largest = int(part["after"].argmax())
         order, size = part["order"].to_numpy()[largest], part["after"].to_numpy()[largest]
-        told.append(f"{axis}: largest residual at order {order}, {number(float(size))} N")
-    return "; ".join(told) + "."
+        axes.append(f"{axis}: largest residual at order {order}, {number(float(size))} N")
+    return "; ".join(axes) + "."

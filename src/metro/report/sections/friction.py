@@ -1,4 +1,4 @@
-"""Friction of the joints: what the idle runs tell, and of which joint they cannot."""
+"""Friction of the joints from the idle runs, and the joints for which it is not identifiable."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def friction(results: Results) -> list[Item]:
         Heading("Friction of the idle runs"),
         Table(HEADER, rows, caption, [0.5, 1.2, 1.4, 1.3, 1, 0.8], numeric=[1, 2, 3, 4, 5]),
     ]
-    told = table[table["remark"] != ""].groupby("remark", sort=False)["joint"]
-    if told.ngroups:
-        items.append(Bullets([f"{_joints(list(joints))}: {remark}." for remark, joints in told]))
+    remarks = table[table["remark"] != ""].groupby("remark", sort=False)["joint"]
+    if remarks.ngroups:
+        items.append(Bullets([f"{_joints(list(joints))}: {remark}." for remark, joints in remarks]))
     if curve is not None:
         viscous = (table["viscous"] * table["fastest_deg_s"] * DEG).to_numpy(float)
         most = int(np.nanargmax(viscous))

@@ -1,4 +1,4 @@
-"""What was identified, with 95 % intervals, and what was not and why."""
+"""Identified quantities with 95 % intervals, and the reasons why others could not be identified."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from typing import Any
 
 import pandas as pd
 
+from metro.observables.catalogue import title
 from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table, abreast
 from metro.report.numbers import listing, number, quantity, words
-from metro.report.results import Results, title
+from metro.report.results import Results
 from metro.report.sections.force import mean_items
 from metro.report.sections.lobes import boundaries
 from metro.report.sections.modes import modes
@@ -34,34 +35,46 @@ RUN_BLOCKS = {
     "waviness": "waviness",
     "observability": "observability of the joints",
 }
+ABOUT = ("format", "batch", "metro", "not_identified")  # the batch and the file, not quantities
+ELSEWHERE = {"faces": "flatness of faces", "study": "factors and configurations", "arm": "the robot arm"}
 OF_ROBOT = ("observability", "waviness")  # the robot's own section shows them
 LONGEST, ABREAST = 30, 3
 
 
 def identification(results: Results) -> Section:
     """Write every block of ``identified.json``, and the reasons why others are missing."""
-    found = results.identified
+    identified = results.identified
     items: list[Item] = [
-        *_force(found.get("force") or {}, mean_items(results.tables.get("mean_forces"))),
+        *_force(identified.get("force") or {}, mean_items(results.tables.get("mean_forces"))),
         *_yielding(results.tables.get("yielding")),
-        *modes(found.get("modes") or [], results.tables),
+        *modes(identified.get("modes") or [], results.tables),
         *boundaries(results),
-        *_arm(found.get("arm") or {}),
-        *_tip(found.get("tip") or {}),
+        *_arm(identified.get("arm") or {}),
+        *_tip(identified.get("tip") or {}),
     ]
     if not items:
-        items.append(Paragraph("Nothing could be identified from this batch."))
-    missing = _reasons(found)
+        items.append(Paragraph(_elsewhere(identified)))
+    missing = _reasons(identified)
     if missing:
         items.append(Heading("Not identified"))
         items.append(Bullets([f"{name}: {reason}." for name, reason in missing]))
     return Section("Identification", items)
 
 
-def _reasons(found: JSON) -> list[tuple[str, str]]:
-    """Return why blocks, and parts of blocks, are missing: those of one reason together."""
-    own = {title(str(name)): str(reason) for name, reason in (found.get("not_identified") or {}).items()}
-    for block, content in found.items():
+def _elsewhere(identified: JSON) -> str:
+    """Say where the quantities are that other sections show, or that there are none."""
+    blocks = [
+        ELSEWHERE.get(name, words(name)) for name, block in identified.items() if name not in ABOUT and block
+    ]
+    if not blocks:
+        return "Nothing could be identified from this batch."
+    return f"What was identified from this batch is in sections of its own: {listing(blocks)}."
+
+
+def _reasons(identified: JSON) -> list[tuple[str, str]]:
+    """Return the reasons why blocks, or parts of blocks, are missing; those with one reason together."""
+    own = {title(str(name)): str(reason) for name, reason in (identified.get("not_identified") or {}).items()}
+    for block, content in identified.items():
         if isinstance(content, dict) and block != "not_identified":
             parts = content.get("not_identified") or {}
             own |= {
@@ -75,7 +88,7 @@ def _reasons(found: JSON) -> list[tuple[str, str]]:
 
 
 def _force(force: JSON, drawn: list[Item]) -> list[Item]:
-    """Write the coefficients, what is ``drawn`` of them, and the speeds."""
+    """Write the coefficients, their figures ``drawn``, and the speeds."""
     sets = {key: force[key] for key in FORCE_SETS if force.get(key)}
     if not sets:
         return []
@@ -136,8 +149,8 @@ def _arm(arm: JSON) -> list[Item]:
     joints = arm.get("joint_stiffness") or []
     if joints:
         rows = [[str(i), quantity(q, with_unit=False) if q else "–"] for i, q in enumerate(joints, start=1)]
-        told = "Joint stiffness with 95 % intervals."
-        tables.append(Table(["joint", "stiffness (N m/rad)"], rows, told, [1, 3], small=True))
+        about = "Joint stiffness with 95 % intervals."
+        tables.append(Table(["joint", "stiffness (N m/rad)"], rows, about, [1, 3], small=True))
     for key, name in RUN_BLOCKS.items():
         if arm.get(key) and key not in OF_ROBOT:
             tables.append(_by_run(arm[key], name, f"{name.capitalize()}, run by run.", half=True))
@@ -159,7 +172,7 @@ def _tip(tip: JSON) -> list[Item]:
 def _by_run(blocks: JSON, name: str, caption: str, *, half: bool = False) -> Table:
     """Tabulate ``{run: quantity}``, ``{run: {name: quantity}}`` or ``{run: [quantities]}``, a row per run.
 
-    ``half``: for a place half as wide as the page.
+    ``half``: the table has half the width of the page.
     """
     rows = {run: _flat(value, name) for run, value in blocks.items()}
     columns = list(dict.fromkeys(key for row in rows.values() for key in row))

@@ -1,4 +1,4 @@
-"""Stability: the boundary by every method, the modes that govern it, positions, and the test cuts on it."""
+"""Stability: the boundary by every method, its governing modes, positions, and the test cuts on it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NO_TESTS = pd.DataFrame(columns=["position", "rpm", "depth_mm", "measured"], dt
 
 
 def boundaries(results: Results) -> list[Item]:
-    """Write the lowest depth of each position, the methods side by side, and what positions change."""
+    """Write the lowest depth of each position, the methods side by side, and the positions."""
     blocks: list[JSON] = results.identified.get("lobes") or []
     if not blocks:
         return chatter_items(results)
@@ -45,7 +45,7 @@ def boundaries(results: Results) -> list[Item]:
 
 
 def boundary_items(results: Results) -> list[Item]:
-    """Draw the boundary of a batch without a test of it; nothing where tests stand beside it elsewhere."""
+    """Draw the boundary of a batch without held-out tests; with tests another figure draws it."""
     boundary = results.tables.get("lobes_final")
     if boundary is None or results.compared("lobes") is not None:
         return []
@@ -84,11 +84,11 @@ def _methods(methods: pd.DataFrame, boundary: pd.DataFrame | None) -> list[Item]
 
 
 def agreement(methods: pd.DataFrame, boundary: pd.DataFrame | None) -> list[str]:
-    """Say how far the methods are from each other, in percent of depth."""
-    told = []
+    """Say by how much the methods differ from each other, in percent of depth."""
+    notes = []
     if boundary is not None and "error_mm" in boundary:
         error = float((100.0 * boundary["error_mm"] / boundary["depth_mm"]).max())
-        told.append(f"Two resolutions of the default method differ by at most {number(error, 2)} %.")
+        notes.append(f"Two resolutions of the default method differ by at most {number(error, 2)} %.")
     pairs = (
         ("semidiscretisation_mm", "depth_mm", "Semi-discretisation, which shares no step with it, differs"),
         ("tool_mm", "depth_mm", "With the tool's helix, pitch and declared runout the boundary differs"),
@@ -100,11 +100,11 @@ def agreement(methods: pd.DataFrame, boundary: pd.DataFrame | None) -> list[str]
         change = 100.0 * (checked[column] / checked[reference] - 1.0).to_numpy(float)
         known = change[np.isfinite(change)]
         if len(known):
-            told.append(f"{words} by {_spread(known)}, over {len(known)} speeds.")
+            notes.append(f"{words} by {_spread(known)}, over {len(known)} speeds.")
         missing = len(change) - len(known)
         if missing and column != "single_mode_mm":
-            told.append(f"At {missing} speeds that method found no boundary near the default one's.")
-    return told
+            notes.append(f"At {missing} speeds that method found no boundary near the default one's.")
+    return notes
 
 
 def _spread(change: Array) -> str:
@@ -118,8 +118,8 @@ def _spread(change: Array) -> str:
 
 def _governing_words(methods: pd.DataFrame) -> str:
     share = methods["governing_mode"].value_counts(normalize=True)
-    told = listing([f"{mode} at {100 * s:.0f} % of the speeds" for mode, s in share.items()])
-    return f"The mode that, solved alone, chatters first is {told}."
+    shares = listing([f"{mode} at {100 * s:.0f} % of the speeds" for mode, s in share.items()])
+    return f"The mode that, solved alone, chatters first is {shares}."
 
 
 def _stations(stations: pd.DataFrame) -> Table:
@@ -171,7 +171,7 @@ def cut_items(results: Results, frame: pd.DataFrame) -> list[Item]:
 
 
 def placed(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
-    """Join the held-out labels to where they were cut."""
+    """Join the held-out labels to the position, speed and depth of their cuts."""
     runs = results.batch.runs
     at = runs.reindex(frame["run"])
     position = at["pose"].astype(str).to_numpy() if "pose" in runs else [""] * len(frame)

@@ -1,4 +1,4 @@
-"""The closed loop: noise, what was tried and why not, what was added, what is left, what cannot be seen."""
+"""The closed loop: noise, candidates with their outcome, added effects, residual, undetectable effects."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def loop(results: Results) -> Section:
     items: list[Item] = []
     pictures: list[Picture] = []
     for observable, entry in results.verdicts().items():
-        name, told = heading(observable), results.told(observable)
+        name, record = heading(observable), results.loop_record(observable)
         items.append(Heading(f"{name}: {STATUS.get(str(entry.get('status')), '–')}"))
-        items += _observable(observable, entry, told, left_words(results, observable))
-        pictures += [*_runs(name, told, entry.get("unit")), *_signature(name, told)]
+        items += _observable(observable, entry, record, left_words(results, observable))
+        pictures += [*_runs(name, record, entry.get("unit")), *_signature(name, record)]
     if not items:
         nothing = "There was no residual to trace: no held-out run has both a measurement and a prediction."
         return Section("The closed loop", [Paragraph(nothing)])
@@ -33,38 +33,40 @@ def loop(results: Results) -> Section:
     return Section("The closed loop", [*items, *drawn])
 
 
-def _observable(observable: str, entry: JSON, told: JSON, left: str) -> list[Item]:
-    shown = entry.get("unit") or told.get("unit")
-    noise = told.get("noise") or {}
-    words_told = str(told.get("words") or "").partition(" What is left: ")[0]
-    items: list[Item] = [Paragraph(words_told or verdict_words(observable, entry, left))]
+def _observable(observable: str, entry: JSON, record: JSON, left: str) -> list[Item]:
+    shown = entry.get("unit") or record.get("unit")
+    noise = record.get("noise") or {}
+    story = str(record.get("words") or "").partition(" What is left: ")[0]
+    items: list[Item] = [Paragraph(story or verdict_words(observable, entry, left))]
     if noise:
         items.append(Paragraph(_noise_words(noise, shown)))
     items += _added(entry)
-    items += _candidates(told.get("candidates") or entry.get("candidates") or [], shown)
-    items += _path(told.get("path") or [], entry, shown)
-    return [*items, *_rest(entry, told, left)]
+    items += _candidates(record.get("candidates") or entry.get("candidates") or [], shown)
+    items += _path(record.get("path") or [], entry, shown)
+    return [*items, *_residual_items(entry, record, left)]
 
 
-def _runs(name: str, told: JSON, shown: str | None) -> list[Picture]:
-    blocks = [b for b in told.get("blocks") or [] if b.get("rms_before") is not None]
+def _runs(name: str, record: JSON, shown: str | None) -> list[Picture]:
+    blocks = [b for b in record.get("blocks") or [] if b.get("rms_before") is not None]
     if not blocks:
         return []
     alt = f"rms residual of {len(blocks)} runs before and after, in the order of cutting."
-    named, floor = shown or told.get("unit") or "", (told.get("noise") or {}).get("floor")
+    named, floor = shown or record.get("unit") or "", (record.get("noise") or {}).get("floor")
     caption = f"{name}. {findings.above_floor(blocks, floor, named)} Residual of every run."
     return [Picture(figures.runs(blocks, named, floor), caption, alt)]
 
 
-def _signature(name: str, told: JSON) -> list[Picture]:
-    """Draw what is left by pattern where any is beyond the noise, and say whether it stands out."""
-    entries = told.get("signature") or []
+def _signature(name: str, record: JSON) -> list[Picture]:
+    """Draw the residual by pattern, if there are several, and say how many places are significant."""
+    entries = record.get("signature") or []
     if len({e["label"] for e in entries}) < 2 or not any(e.get("relative") for e in entries):
         return []
     full = [f"{e.get('axis') or ''} {e['label']}".strip() for e in entries if e.get("significant")]
-    found = f"{len(full)} of {len(entries)} places stand" if full else f"None of {len(entries)} places stands"
+    significant_places = (
+        f"{len(full)} of {len(entries)} places stand" if full else f"None of {len(entries)} places stands"
+    )
     bars = " (full bars)" if full else ""
-    caption = f"{name}: what is left, by pattern and axis. {found} out of the noise{bars}."
+    caption = f"{name}: what is left, by pattern and axis. {significant_places} out of the noise{bars}."
     alt = "Significant: " + (", ".join(full[:6]) if full else "nothing") + "."
     return [Picture(figures.signature(entries), caption, alt)]
 
@@ -79,7 +81,7 @@ def _added(entry: JSON) -> list[Item]:
         [
             words(str(effect["effect"])) if i == 0 else "",
             parameter_name(name, value),
-            parameter_value(str(effect["effect"]), value),
+            parameter_value(effect, value),
             probability(effect.get("probability")) if i == 0 else "",
         ]
         for effect in entry.get("effects") or []
@@ -127,7 +129,7 @@ def _why(candidate: JSON) -> str:
 
 
 def _path(path: list[JSON], entry: JSON, shown: str | None) -> list[Item]:
-    """Table of the model's growth: base, then each effect added, with the errors of each step."""
+    """Table of the model's growth: the base model, then each added effect, with the errors of each step."""
     if len(path) < 2:
         return []
     rms = [("before_rms", "rms, identification runs"), ("held_out_rms", "rms, held-out runs")]
@@ -146,20 +148,20 @@ def _path(path: list[JSON], entry: JSON, shown: str | None) -> list[Item]:
     return [Table(header, rows, caption, [2.4, *([1.4] * len(known)), 1], numeric=numeric)]
 
 
-def _rest(entry: JSON, told: JSON, left: str) -> list[Item]:
+def _residual_items(entry: JSON, record: JSON, left: str) -> list[Item]:
     items: list[Item] = []
-    rest = entry.get("unexplained") or {}
-    if rest.get("signature"):
-        items.append(Paragraph(f"Unexplained: {left or plain(rest['signature'])}.", "warning"))
+    unexplained = entry.get("unexplained") or {}
+    if unexplained.get("signature"):
+        items.append(Paragraph(f"Unexplained: {left or plain(unexplained['signature'])}.", "warning"))
     groups = [" and ".join(words(str(n)) for n in group) for group in entry.get("indistinguishable") or []]
     if groups:
         items.append(Paragraph("Cannot be told apart with these data: " + "; ".join(groups) + "."))
     hidden: dict[str, list[str]] = {}
-    for one in told.get("cannot_be_seen") or []:
+    for one in record.get("cannot_be_seen") or []:
         hidden.setdefault(str(one.get("why") or ""), []).append(words(str(one["effect"])))
     if hidden:
         alike = [plain(f"{listing(names)}: {why}".rstrip(": ")) for why, names in hidden.items()]
         items += [Paragraph("Cannot be seen in this batch:"), Bullets(alike)]
-    if told_next := next_words(entry):
-        items.append(Paragraph(f"Measure next: {told_next}."))
+    if next_run := next_words(entry):
+        items.append(Paragraph(f"Measure next: {next_run}."))
     return items

@@ -1,4 +1,4 @@
-"""What a batch is and what was measured in it, in words."""
+"""A description of a batch and of its measurements, in words."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def count_of(count: int, name: str) -> str:
 
 
 def measured_words(results: Results) -> str:
-    """Say what the batch is and what was measured in it."""
+    """Describe the batch and its measurements."""
     manifest, runs = results.batch.manifest, results.batch.runs
     origin = {"measured": "Measured on", "simulated": "Simulated for", "published": "Published values of"}
     cell = results.batch.cell.get("cell", manifest.get("cell", "unknown"))
@@ -31,9 +31,9 @@ def measured_words(results: Results) -> str:
 
 
 def planned_runs(results: Results) -> list[str]:
-    """Return the runs that were not cut, on which the study gives advice."""
-    told = (results.identified.get("study") or {}).get("advice") or {}
-    return [str(run) for row in told.get("configurations") or [] for run in row["runs"]]
+    """Return the planned runs, which were not cut and on which the study gives advice."""
+    advice = (results.identified.get("study") or {}).get("advice") or {}
+    return [str(run) for row in advice.get("configurations") or [] for run in row["runs"]]
 
 
 def _planned_words(planned: list[str]) -> str:

@@ -1,13 +1,13 @@
-"""The campaign's memory in words, tables and figures: what changes from batch to batch, what comes back."""
+"""The campaign's memory in words, tables and figures: changes from batch to batch, and recurring effects."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from metro.observables.catalogue import title
 from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import memory as figures
 from metro.report.numbers import listing, number, percent, probability, quantity, with_interval, words
-from metro.report.results import title
 from metro.units import JSON, printed
 
 PANELS, MOST_FIGURES = 6, 4
@@ -23,7 +23,7 @@ COURSE = {
 
 
 def memory_section(memory: JSON) -> list[Section]:
-    """Return the section on what went on over the batches; none where no parameter has a history."""
+    """Return the section on the courses over the batches; none if no parameter has a history."""
     series, pooled = memory.get("series") or [], memory.get("pooled") or []
     items = [
         *_courses(series),
@@ -39,7 +39,7 @@ def _courses(series: Sequence[JSON]) -> list[Item]:
         return []
     ranked = sorted(series, key=_rank)
     changing = [row for row in ranked if row["course"] not in {"steady", "too few"}]
-    told = [Bullets([_sentence(row) for row in changing])] if changing else []
+    sentences = [Bullets([_sentence(row) for row in changing])] if changing else []
     asked = sum(row["p_value"] is not None for row in series)
     intro = (
         f"{len(series)} parameters were followed over batches of the same cell, tool and work; of {asked} "
@@ -67,11 +67,11 @@ def _courses(series: Sequence[JSON]) -> list[Item]:
         "what the next batch is to measure if it is as precise as these." + left
     )
     table = Table(header, rows, caption, [1.6, 1.6, 0.7, 0.75, 1.25, 1.2, 0.6, 1.25])
-    return [Paragraph(intro), *told, *_pictures(changing or ranked[:PANELS]), table]
+    return [Paragraph(intro), *sentences, *_pictures(changing or ranked[:PANELS]), table]
 
 
 def _order(series: Sequence[JSON]) -> str:
-    """Say by what the batches were ordered."""
+    """Say how the batches were ordered."""
     timed = [row["clock"] != "batches" for row in series]
     if all(timed):
         return "The batches are in the order in which their first runs started."
@@ -132,7 +132,7 @@ def _sentence(row: JSON) -> str:
 
 
 def _name(row: JSON) -> str:
-    """Name a parameter: of which effect, and without the unit that its key ends in."""
+    """Name a parameter with its effect, and without the unit at the end of its key."""
     name, shown = str(row["quantity"]), str(row["unit"] or "").replace(" ", "_").lower()
     for per in ("_per_", "_"):
         name = name.replace("_" + shown.replace("/", per), "", 1) if shown else name
@@ -143,16 +143,16 @@ def _pooled(pooled: Sequence[JSON]) -> list[Item]:
     if not pooled:
         return []
     shown = [row for row in pooled if row["shown"]]
-    told = [_pooled_sentence(row) for row in shown]
+    sentences = [_pooled_sentence(row) for row in shown]
     below = [row for row in pooled if row["below_budget"]]
     if below:
         named = listing(sorted({f"{_name(row)} ({row['owner']})" for row in below}))
-        told.append(
+        sentences.append(
             "Consistent over the batches, but smaller than what a model may get wrong by itself, and so "
             f"nobody's: {named}."
         )
-    if not told:
-        told = ["All batches together show no effect that none shows alone."]
+    if not sentences:
+        sentences = ["All batches together show no effect that none shows alone."]
     rows = [
         [
             row["owner"],
@@ -172,7 +172,7 @@ def _pooled(pooled: Sequence[JSON]) -> list[Item]:
     strong = [i for i, row in enumerate(pooled[:LONGEST]) if row["shown"]]
     return [
         Heading("What only all batches show"),
-        Bullets(told),
+        Bullets(sentences),
         Table(header, rows, caption, [1.6, 1.6, 1.6, 0.8, 0.8, 0.6], strong=strong),
     ]
 
@@ -209,11 +209,11 @@ def _recurring(recurring: Sequence[JSON]) -> list[Item]:
 
 
 def _undecided(undecided: Sequence[JSON]) -> list[Item]:
-    told = []
+    sentences = []
     for row in undecided:
         known = [f"{words(name)} in {k} of {n}" for name, (k, n) in row["elsewhere"].items()]
-        told.append(
+        sentences.append(
             f"{row['batch']}, {title(row['observable'])}: what it cannot tell apart was claimed elsewhere in "
             f"the cell, {listing(known)} batches. Its own verdict stays."
         )
-    return [Bullets(told)] if told else []
+    return [Bullets(sentences)] if sentences else []

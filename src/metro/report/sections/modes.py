@@ -1,4 +1,4 @@
-"""The modes, the responses they were identified from, and the diagram they were found in."""
+"""The modes, the responses from which they were identified, and the stabilisation diagram."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from metro.units import JSON
 
 LONGEST = 30
 FEWEST_POINTS = 3  # that make a shape
-ALIKE = 0.9  # MAC from which two shapes are taken for one
+ALIKE = 0.9  # MAC from which on two shapes count as the same
 KEYS = (
     ("frequency", "frequency (Hz)"),
     ("damping", "damping ratio"),
@@ -23,21 +23,24 @@ KEYS = (
 )
 
 
-def modes(found: list[JSON], tables: Mapping[str, pd.DataFrame]) -> list[Item]:
+def modes(identified: list[JSON], tables: Mapping[str, pd.DataFrame]) -> list[Item]:
     """Write the block ``modes`` of ``identified.json``, and figures of ``frf_used`` and ``stabilisation``."""
-    if not found:
+    if not identified:
         return []
     header = ["position", "direction", *(name for _, name in KEYS)]
     caption = "Modes with 95 % intervals; the frequency is the undamped one."
-    if any(not mode.get("resolved", True) for mode in found):
+    if any(not mode.get("resolved", True) for mode in identified):
         caption += " * not resolved: the data tell damping or stiffness no better than to a third."
-    if len(found) > LONGEST:
-        caption += f" The first {LONGEST} of {len(found)} are shown; identified.json has all."
-    rows = [_row(mode) for mode in found[:LONGEST]]
+    if len(identified) > LONGEST:
+        caption += f" The first {LONGEST} of {len(identified)} are shown; identified.json has all."
+    rows = [_row(mode) for mode in identified[:LONGEST]]
     items: list[Item] = [Heading("Modes"), Table(header, rows, caption, [0.7, 0.8, 1.3, 1.5, 1.8, 1.4])]
     drawn, diagram = _magnitudes(tables.get("frf_used")), tables.get("stabilisation")
     if drawn is not None:
-        items += [_responses(drawn), *([_diagram(diagram, drawn, len(found))] if diagram is not None else [])]
+        items += [
+            _responses(drawn),
+            *([_diagram(diagram, drawn, len(identified))] if diagram is not None else []),
+        ]
     return [*items, *_shapes(tables.get("mode_shapes"), tables.get("mode_mac"))]
 
 
@@ -50,10 +53,10 @@ def _responses(drawn: pd.DataFrame) -> Picture:
     return Picture(figures.responses(drawn), f"{caption}.", alt)
 
 
-def _diagram(diagram: pd.DataFrame, drawn: pd.DataFrame, modes_found: int) -> Picture:
+def _diagram(diagram: pd.DataFrame, drawn: pd.DataFrame, mode_count: int) -> Picture:
     poles = int(diagram["recurs"].sum())
     caption = (
-        f"{poles} of {len(diagram)} poles recur and make {count_of(modes_found, 'mode')}. Stabilisation "
+        f"{poles} of {len(diagram)} poles recur and make {count_of(mode_count, 'mode')}. Stabilisation "
         "diagram: the poles of every model order; one that recurs at a quarter of them, "
         "with like frequency, damping and shape starts a mode of the maximum-likelihood fit."
     )
@@ -80,15 +83,15 @@ def largest_response(tables: Mapping[str, pd.DataFrame]) -> list[Item]:
 
 
 def _shapes(residues: pd.DataFrame | None, alike: pd.DataFrame | None) -> list[Item]:
-    """Draw the shapes of the modes of each direction that was hit or measured at several points."""
+    """Draw the shapes of the modes of each direction with hits or responses at several points."""
     if residues is None or alike is None:
         return []
     items: list[Item] = []
     by = ["position", "direction"]
     of_direction = dict(tuple(alike.groupby(by)))
-    for key, part in residues.groupby(by, sort=False):
-        roving = "reference" if part["reference"].nunique() > 1 else "response"
-        if part[roving].nunique() < FEWEST_POINTS:
+    for key, of_pairs in residues.groupby(by, sort=False):
+        part = _along_one(of_pairs)
+        if len(part["point"].unique()) < FEWEST_POINTS:
             continue
         close = of_direction[key]
         above = close[(close["first_hz"] < close["second_hz"]) & (close["mac"] > ALIKE)]
@@ -96,11 +99,25 @@ def _shapes(residues: pd.DataFrame | None, alike: pd.DataFrame | None) -> list[I
         pairs = total * (total - 1) // 2
         about = (
             f"Like shapes (MAC over {ALIKE:g}) have {len(above) or 'none'} of {pairs} pairs of modes at the "
-            f"{part[roving].nunique()} points of position {key[0]}, direction {key[1]}: more points would "
+            f"{part['point'].nunique()} points of position {key[0]}, direction {key[1]}: more points would "
             "part them. Shapes of the modes, and the modal assurance criterion of every two."
         )
-        items.append(Picture(figures.shapes(part.assign(point=part[roving]), close), about, about))
+        items.append(Picture(figures.shapes(part, close), about, about))
     return items
+
+
+def _along_one(residues: pd.DataFrame) -> pd.DataFrame:
+    """Return the residues by ``point``, of the hits at most points or of the responses at most points.
+
+    Where both rove, the shape is that along the one with more points, seen from the point of the other one
+    that has most of them.
+    """
+    roving, fixed = "response", "reference"
+    if residues[roving].nunique() < residues[fixed].nunique():
+        roving, fixed = fixed, roving
+    seen_from = residues.groupby(fixed, sort=False)[roving].nunique().idxmax()
+    part = residues[residues[fixed] == seen_from]
+    return part.assign(point=part[roving])
 
 
 def _row(mode: JSON) -> list[str]:
@@ -110,7 +127,7 @@ def _row(mode: JSON) -> list[str]:
 
 
 def _magnitudes(frf: pd.DataFrame | None) -> pd.DataFrame | None:
-    """Magnitudes of measured and reconstructed receptance, where the table has both."""
+    """Magnitudes of measured and reconstructed receptance, if the table has both."""
     pairs = {"measured_m_n": ("real_m_n", "imag_m_n"), "modal_m_n": ("modal_real_m_n", "modal_imag_m_n")}
     if frf is None or not {c for pair in pairs.values() for c in pair} <= set(frf.columns):
         return None

@@ -1,4 +1,4 @@
-"""Printed pairs of measured and predicted values: what gain, if any, lies between the two."""
+"""Printed pairs of measured and predicted values: the gain between the two, if there is one."""
 
 from __future__ import annotations
 
@@ -21,15 +21,17 @@ CANNOT = (
     "an interval can be made of. Whether a gain is the model's (stiffness, coefficients, the frame that "
     "forces are turned into) or the instrument's, the pairs cannot tell."
 )
-Told = tuple[float, float, float, float]  # value, low and high end of 95 %, p-value
+Estimate = tuple[float, float, float, float]  # value, low and high end of 95 %, p-value
 
 
 def bias(name: str, pairs: pd.DataFrame) -> list[Item]:
-    """Tell the gain and the difference of each quantity and axis of a printed table, where there are enough.
+    """Write the gain and the difference of each quantity and axis of a printed table with enough pairs.
 
     The p-values of gains are Holm's, over the quantities of the table.
     """
-    told: list[tuple[str, str, int, Told, Told]] = []
+    from statsmodels.stats.multitest import multipletests
+
+    gains: list[tuple[str, str, int, Estimate, Estimate]] = []
     drawn: list[Common] = []
     axis = pairs["axis"].fillna("").astype(str)
     for (quantity, along), rows in pairs.groupby([pairs["quantity"], axis], sort=False):
@@ -38,30 +40,30 @@ def bias(name: str, pairs: pd.DataFrame) -> list[Item]:
         if gain is not None and math.isfinite(gain[3]):
             less = _mean(measured - predicted)
             what, shown = f"{quantity} {along}".strip(), printed(str(rows["unit"].iloc[0]))
-            told.append((what, shown, len(rows), gain, less))
+            gains.append((what, shown, len(rows), gain, less))
             offset = 0.0 if _of_one_sign(measured, predicted) else _offset(measured, predicted, gain[0])
             drawn.append(Common(what, shown, predicted, measured, gain[:3], offset))
-    if not told:
+    if not gains:
         return []
-    p_values = _holm(np.array([gain[3] for *_, gain, _ in told]))
-    body, found = [], []
-    for (what, shown, count, gain, less), p in zip(told, p_values, strict=True):
+    p_values = multipletests([gain[3] for *_, gain, _ in gains], method="holm")[1]
+    body, sentences = [], []
+    for (what, shown, count, gain, less), p in zip(gains, p_values, strict=True):
         ratio, difference = _written(gain), f"{_written(less)} {shown}".strip()
         body.append([what, str(count), ratio, probability(p), difference, probability(less[3])])
         if p <= SURE:
-            found.append(f"Table {name}, {what}: measured is {ratio} times what was predicted.")
+            sentences.append(f"Table {name}, {what}: measured is {ratio} times what was predicted.")
         else:
-            found.append(f"Table {name}, {what}: no gain is shown; it may be {ratio}.")
+            sentences.append(f"Table {name}, {what}: no gain is shown; it may be {ratio}.")
     header = ["quantity", "pairs", "measured / predicted", "p (Holm)", "measured − predicted", "p"]
     caption = (
         f"Table {name}: what the pairs have in common, with 95 % intervals from the scatter of the rows."
     )
     table = Table(header, body, caption, [1.5, 0.6, 1.4, 0.8, 1.6, 0.7])
-    sure = [what for (what, *_), p in zip(told, p_values, strict=True) if p <= SURE]
+    sure = [what for (what, *_), p in zip(gains, p_values, strict=True) if p <= SURE]
     finding = f"A gain is shown of {listing(sure)}" if sure else "No gain is shown"
-    about = f"Table {name}. {finding} ({len(sure)} of {len(told)}). Printed pairs, and the gain they share."
-    alt = f"Measured over predicted, {len(told)} quantities of table {name}. {finding}."
-    return [table, Picture(pairs_drawn(drawn), about, alt), Bullets(found)]
+    about = f"Table {name}. {finding} ({len(sure)} of {len(gains)}). Printed pairs, and the gain they share."
+    alt = f"Measured over predicted, {len(gains)} quantities of table {name}. {finding}."
+    return [table, Picture(pairs_drawn(drawn), about, alt), Bullets(sentences)]
 
 
 def _of_one_sign(measured: Array, predicted: Array) -> bool:
@@ -72,11 +74,11 @@ def _offset(measured: Array, predicted: Array, gain: float) -> float:
     return float(np.mean(measured) - gain * np.mean(predicted))
 
 
-def _gain(measured: Array, predicted: Array) -> Told | None:
-    """Return measured over predicted with its interval, and the p-value of one; None of too few pairs.
+def _gain(measured: Array, predicted: Array) -> Estimate | None:
+    """Return measured over predicted with its interval, and the p-value of one; None for too few pairs.
 
-    Of one sign: the geometric mean. Of either sign: the slope of a line with an offset, least squares; rows
-    that follow each other may be alike (Newey and West, Econometrica 55 (1987) 703).
+    For values of one sign it is the geometric mean. For values of either sign it is the least-squares slope
+    of a line with an offset; successive rows may be correlated (Newey and West, Econometrica 55 (1987) 703).
     """
     if len(measured) >= LEAST and _of_one_sign(measured, predicted):
         value, low, high, p = _mean(np.log(measured / predicted))
@@ -93,7 +95,7 @@ def _gain(measured: Array, predicted: Array) -> Told | None:
     return float(fitted.params[1]), float(low), float(high), float(fitted.t_test("x1 = 1").pvalue)
 
 
-def _mean(values: Array) -> Told:
+def _mean(values: Array) -> Estimate:
     """Return the mean with its interval by Student's t, and the p-value of zero."""
     from scipy.stats import ttest_1samp
 
@@ -102,15 +104,6 @@ def _mean(values: Array) -> Told:
     return float(np.mean(values)), float(low), float(high), float(test.pvalue)
 
 
-def _written(told: Told) -> str:
-    value, low, high, _ = told
+def _written(estimate: Estimate) -> str:
+    value, low, high, _ = estimate
     return with_interval(value, [low, high])
-
-
-def _holm(p: Array) -> list[float]:
-    """Return p-values (n,) for any of n tests being a false alarm (Holm, Scand. J. Stat. 6 (1979) 65)."""
-    order = np.argsort(p)
-    raised = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)).clip(max=1.0)
-    found = np.empty(len(p))
-    found[order] = raised
-    return [float(value) for value in found]

@@ -6,25 +6,13 @@ import hashlib
 import json
 
 from metro import __version__
+from metro.observables.catalogue import assumptions, title
 from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
 from metro.report.phrases import sentence
-from metro.report.results import Results, title
+from metro.report.results import Results
 from metro.units import JSON
 
 LONGEST, SHORT, DIGITS = 240, 16, 12
-LIMITS = {
-    "force": "The force model is mechanistic and linear in its coefficients: one edge force, one pressure, "
-    "no dependence on temperature or speed; the tool is rigid unless an effect says otherwise.",
-    "joint_force": "Tip forces come from motor torques above those of the idle run: friction that differs "
-    "between the two runs is read as force.",
-    "deformation": "The arm deforms at its joints alone, linearly; links, base and tool holder are rigid.",
-    "waviness": "Waviness is predicted from the tracking error of the joints; vibration faster than the "
-    "controller's log is not in it.",
-    "flatness": "The face is the answer of the tip to the mean force at each path point; transients at entry "
-    "and exit are in the base model where mass.csv gives the arm's mass.",
-    "lobes": "Stability is that of the linear delay equation with the identified modes; process damping and "
-    "modes that change with speed are not in the base model.",
-}
 
 
 def provenance(results: Results) -> Section:
@@ -36,8 +24,8 @@ def provenance(results: Results) -> Section:
 def _limits(results: Results) -> list[Item]:
     notes = []
     for observable in results.verdicts():
-        own = [str(note) for note in results.told(observable).get("notes") or []]
-        limit = [] if results.batch.manifest.get("source") == "published" else [LIMITS.get(observable, "")]
+        own = [str(note) for note in results.loop_record(observable).get("notes") or []]
+        limit = [] if results.batch.manifest.get("source") == "published" else [assumptions(observable)]
         text = " ".join(sentence(note) for note in [*limit, *own] if note)
         notes.append(f"{sentence(title(observable)).rstrip('.')}: {text}")
     return [Heading("Limits of the models"), Bullets(notes, small=True)] if notes else []

@@ -1,4 +1,4 @@
-"""Published tables: printed errors recomputed, errata, modal tables against themselves, load tests."""
+"""Published tables: printed errors recomputed, errata, consistency of modal tables, load tests."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CONVENTION = {"measured": "(m − p)/m", "predicted": "(m − p)/p"}
 
 
 def published(results: Results) -> Section | None:
-    """Write what the printed tables say and whether it holds together; None for other batches."""
+    """Write the content of the printed tables and whether it is consistent; None for other batches."""
     table = results.tables.get("published_errors")
     if table is None:
         return None
@@ -39,17 +39,19 @@ def published(results: Results) -> Section | None:
 
 def _errata(table: pd.DataFrame, tip: pd.DataFrame | None) -> list[Item]:
     flagged = table[table["flag"].fillna("") != ""]
-    found = [f"Table {r['table']}, {r['row']}, {r['quantity']}: {r['flag']}." for _, r in flagged.iterrows()]
+    errata = [f"Table {r['table']}, {r['row']}, {r['quantity']}: {r['flag']}." for _, r in flagged.iterrows()]
     if tip is not None:
         wrong = tip[tip["flag"] != ""]
-        found += [f"Section {r['table']}, {r['row']}: {r['flag']}." for _, r in wrong.iterrows()]
+        errata += [f"Section {r['table']}, {r['row']}: {r['flag']}." for _, r in wrong.iterrows()]
     noted = table[table["note"].fillna("").str.contains("erratum: ")]
-    rest = noted[~noted.index.isin(flagged.index)]
-    texts = [f"Table {r['table']}: {str(r['note']).partition('erratum: ')[2]}." for _, r in rest.iterrows()]
+    unflagged = noted[~noted.index.isin(flagged.index)]
+    texts = [
+        f"Table {r['table']}: {str(r['note']).partition('erratum: ')[2]}." for _, r in unflagged.iterrows()
+    ]
     stated = list(dict.fromkeys(texts))
-    if not found and not stated:
+    if not errata and not stated:
         return [Paragraph("Every printed error follows from the printed values, within rounding.")]
-    return [Heading("Errata"), Bullets([*found, *stated])]
+    return [Heading("Errata"), Bullets([*errata, *stated])]
 
 
 def _pairs(name: str, pairs: pd.DataFrame) -> list[Item]:
@@ -94,9 +96,9 @@ def _single(rows: pd.DataFrame, results: Results) -> list[Item]:
         if (t := results.tables.get(n)) is not None
     ]
     elsewhere = {str(name) for t in derived for name in t["table"]}
-    rest = rows[~rows["table"].astype(str).isin(elsewhere)]
+    remaining = rows[~rows["table"].astype(str).isin(elsewhere)]
     items: list[Item] = []
-    for name, part in rest.groupby("table", sort=False):
+    for name, part in remaining.groupby("table", sort=False):
         body = [
             [
                 str(r["row"]),
@@ -119,12 +121,12 @@ def _single(rows: pd.DataFrame, results: Results) -> list[Item]:
 
 
 def _named(row: pd.Series) -> str:
-    """Name the quantity of a printed value, and the axis that it is along."""
+    """Name the quantity of a printed value, and its axis."""
     return f"{row['quantity']} {row['axis'] if pd.notna(row['axis']) else ''}".strip()
 
 
 def _as_printed(values: pd.Series) -> list[str]:
-    """Write values to the decimals of the most precise of them, as a printed column has them."""
+    """Write values to the decimals of the most precise of them, like a printed column."""
     decimals = max((len(f"{v:.10g}".partition(".")[2]) for v in values.dropna()), default=0)
     return [f"{v:.{decimals}f}".replace("-", "−") if pd.notna(v) else "–" for v in values]
 
@@ -190,7 +192,7 @@ def _loads(loads: pd.DataFrame | None) -> list[Item]:
 
 
 def _forces(results: Results, table: pd.DataFrame) -> list[Item]:
-    """Draw the helical cut that the coefficients were checked on, with what the source says of it."""
+    """Draw the helical cut on which the coefficients were checked, with the statements of the source."""
     forces, runs = results.tables.get("published_forces"), results.batch.runs
     if forces is None or runs.empty:
         return []
@@ -210,11 +212,11 @@ def _forces(results: Results, table: pd.DataFrame) -> list[Item]:
         f"Mean along z {number(means['fz_n'])} N; in the plane the force turns with the orbit, "
         f"{number(row['orbit_rpm'] / 60.0)} times per second."
     )
-    told = " ".join(f"The source says: {note.rstrip('.')}." for note in said if note)
-    effect = " Such a fluctuation is what the effect orbit stiffness describes." if told else ""
+    statements = " ".join(f"The source says: {note.rstrip('.')}." for note in said if note)
+    effect = " Such a fluctuation is what the effect orbit stiffness describes." if statements else ""
     alt = f"Forces over one orbit and over two revolutions; mean along z {number(means['fz_n'])} N."
     return [
         Heading("The validation cut"),
-        Paragraph(f"{text} {told}{effect}".strip()),
+        Paragraph(f"{text} {statements}{effect}".strip()),
         Picture(figures.orbit(forces, float(row["spindle_rpm"])), caption, alt),
     ]

@@ -1,4 +1,4 @@
-"""Data quality: what was checked in the raw data, failures first."""
+"""Data quality: checks of the raw data, failures first."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MEANING = {
 
 
 def quality(results: Results) -> Section:
-    """List what failed, then each kind of check with the range of its values."""
+    """List the failed checks, then each kind of check with the range of its values."""
     table = results.tables.get("qc")
     if table is None:
         return Section("Data quality", [Paragraph("No signal was read, so there was nothing to check.")])
@@ -55,21 +55,21 @@ def quality(results: Results) -> Section:
 
 
 def with_flags(first: Section, results: Results) -> Section:
-    """Return the first page with what is wrong in the raw data, and what was left out for it."""
+    """Return the first page with the errors in the raw data, and the data that were omitted for them."""
     table = results.tables.get("qc")
     failed = [] if table is None else table[~table["ok"].astype(bool)].to_dict("records")
     failed.sort(key=lambda row: "left out" not in str(row["message"]))
-    told = [": ".join(str(row[part]) for part in ("file", "message") if row[part]) for row in failed]
-    told = [*chatter_flags(results), *told]
-    if not told:
+    flags = [": ".join(str(row[part]) for part in ("file", "message") if row[part]) for row in failed]
+    flags = [*chatter_flags(results), *flags]
+    if not flags:
         return first
-    more = f" And {len(told) - MOST_FLAGS} more, see Data quality." if len(told) > MOST_FLAGS else ""
-    text = f"Flagged in the raw data: {'; '.join(told[:MOST_FLAGS])}.{more}"
+    more = f" And {len(flags) - MOST_FLAGS} more, see Data quality." if len(flags) > MOST_FLAGS else ""
+    text = f"Flagged in the raw data: {'; '.join(flags[:MOST_FLAGS])}.{more}"
     return replace(first, items=[*first.items[:1], Paragraph(text, "warning"), *first.items[1:]])
 
 
 def _failures(failed: pd.DataFrame) -> Table:
-    """Tabulate what failed, a row for each check and meaning, with the runs (or files) that it failed in."""
+    """Tabulate the failures, a row for each check and meaning, with the runs (or files) of the failures."""
     groups = failed.assign(meaning=failed["message"].map(_without_numbers)).groupby(
         ["check", "meaning"], sort=False
     )
@@ -94,7 +94,7 @@ def _without_numbers(message: object) -> str:
 
 
 def _where(part: pd.DataFrame) -> str:
-    """Name the runs, else the files, that a check failed in."""
+    """Name the runs, else the files, in which a check failed."""
     runs = [str(run) for run in part["run"] if run and pd.notna(run)]
     named = list(dict.fromkeys(runs if len(runs) == len(part) else part["file"].astype(str)))
     if len(named) > MOST_NAMES:

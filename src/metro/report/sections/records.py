@@ -1,4 +1,4 @@
-"""The raw records at a glance: what of each was used, and whether the hammer's hits reach far enough."""
+"""The raw records at a glance: the parts that were used, and the bandwidth of the hammer's hits."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from metro.report.numbers import listing, number
 from metro.report.results import Results
 from metro.report.sections.measured import count_of
 
-FADED = -20.0  # dB, force of a hit below which a response hardly stands out of the noise
+FADED = -20.0  # dB, force of a hit below which a response hardly exceeds the noise
 
 
 def record_items(results: Results) -> list[Item]:
-    """Draw the force records with the part that was used, and the hits with the band that was."""
+    """Draw the force records and the hits, with the part and the band that were used."""
     return [*_force(results), *_hits(results)]
 
 

@@ -1,4 +1,4 @@
-"""The robot: sensorless force beside the dynamometer, deformation, stiffness, waviness, path error."""
+"""The robot: sensorless and measured force, deformation, stiffness, waviness, path error."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from metro.report.sections.friction import friction
 from metro.report.sections.stiffness import LONGEST, arm_stiffness, band, more, stations
 from metro.units import JSON
 
-SETTLED = 0.9  # of the wall's deformation in its middle: from where on it is steady
+SETTLED = 0.9  # share of the median deformation of a wall, from which on it counts as steady
 WHITE = 0.05
 _WAVES = ("wa", "wq", "wt")
 
 
 def robot(results: Results) -> Section | None:
-    """Write what a batch with an arm has; None for one without."""
+    """Write the results on the machine of a batch; None if there are none."""
     items = [
         *_force(results),
         *friction(results),
@@ -52,7 +52,7 @@ def _force(results: Results) -> list[Item]:
 
 
 def _means(means: pd.DataFrame) -> Table:
-    """Tabulate the steady means as [K] table 7 run by run, beside the dynamometer's where there is one."""
+    """Tabulate the steady means run by run, as in [K] table 7, with the dynamometer's if there is one."""
     beside = means[means["dynamometer_n"].notna()]
     rows = [
         [
@@ -61,13 +61,13 @@ def _means(means: pd.DataFrame) -> Table:
         ]
         for _, part in means.groupby("run", sort=False)
     ]
-    told = (
+    about = (
         "Mean force of the steady cut by the torques of the joints (N), with its 95 % interval (noise of the "
         "torques, slow noise as in the idle runs, and friction repeatable to a tenth of the noise)"
     )
     if len(beside):
         error = float((beside["sensorless_n"] - beside["dynamometer_n"]).abs().mean())
-        told += (
+        about += (
             ", beside the dynamometer's, and the error in percent of that. Mean of the absolute errors: "
             f"{number(error, 2)} N"
         )
@@ -77,17 +77,17 @@ def _means(means: pd.DataFrame) -> Table:
         header += [f"{axis}, measured", "by torques", "%"] if len(beside) else [f"{axis} (N)"]
     widths = [0.7, *([1.0, 1.4, 0.6] if len(beside) else [1.0]) * means["axis"].nunique()]
     numeric = list(range(1, len(header)))
-    caption = f"{told}.{star}{more(len(rows))}"
+    caption = f"{about}.{star}{more(len(rows))}"
     return Table(header, rows[:LONGEST], caption, widths, numeric=numeric, small=bool(len(beside)))
 
 
 def _mean(row: pd.Series, beside: bool) -> list[str]:
-    told = band(row["sensorless_n"], row["sensorless_sd_n"])
+    text = band(row["sensorless_n"], row["sensorless_sd_n"])
     measured = float(row["dynamometer_n"])
     if not beside:
-        return [told]
+        return [text]
     error = number(100 * (row["sensorless_n"] / measured - 1), 2) if measured else "–"
-    return [number(measured), told, error if math.isfinite(measured) else "–"]
+    return [number(measured), text, error if math.isfinite(measured) else "–"]
 
 
 def _starred(row: pd.Series) -> str:
@@ -101,9 +101,9 @@ def _course(results: Results, means: pd.DataFrame) -> list[Item]:
     beside = means.loc[means["dynamometer_n"].notna(), "run"].drop_duplicates()
     runs = [str(r) for r in dict.fromkeys([*beside, *force["run"].drop_duplicates()])][: figures.RUNS]
     off = (means["sensorless_n"] - means["dynamometer_n"]).abs() if len(beside) else None
-    found = "" if off is None else f"The steady means are {number(off.max(), 2)} N off at most. "
+    finding = "" if off is None else f"The steady means are {number(off.max(), 2)} N off at most. "
     caption = (
-        f"{found}Force on the tool along the wall from the torques of the joints, smoothed, with the "
+        f"{finding}Force on the tool along the wall from the torques of the joints, smoothed, with the "
         f"95 % band of each place; cut-in and cut-out shaded. Runs {listing(runs)} of "
         f"{force['run'].nunique()}."
     )
@@ -147,7 +147,7 @@ def _joints(joints: pd.DataFrame) -> list[Item]:
 
 
 def _deformation(compared: pd.DataFrame | None) -> list[Item]:
-    """Tabulate the steady deformation of held-out walls as [K] table 8."""
+    """Tabulate the steady deformation of held-out walls, as in [K] table 8."""
     if compared is None:
         return []
     rows = []
@@ -205,7 +205,7 @@ def _waviness(results: Results) -> list[Item]:
 
 
 def _alike(blocks: JSON) -> str:
-    """Say how alike the wall's waves and those of the tip's error are; empty where that is not known."""
+    """Say the correlation of the wall's waves with those of the tip's error; empty if it is not known."""
     known = [block["correlation"] for block in blocks.values() if block.get("correlation") is not None]
     values = [float(c["value"]) if isinstance(c, dict) else float(c) for c in known]
     if not values:
@@ -236,8 +236,12 @@ def _shares(blocks: JSON) -> list[Item]:
     if not known:
         return []
     shares = np.array(known, dtype=float)
-    told = {"least": shares.min(axis=0), "median": np.median(shares, axis=0), "greatest": shares.max(axis=0)}
-    rows = [[name, *(_whole_percent(share) for share in values)] for name, values in told.items()]
+    by_statistic = {
+        "least": shares.min(axis=0),
+        "median": np.median(shares, axis=0),
+        "greatest": shares.max(axis=0),
+    }
+    rows = [[name, *(_whole_percent(share) for share in values)] for name, values in by_statistic.items()]
     caption = (
         f"Share of each joint in the variance of the tip's waves, over {len(known)} runs; below zero: it "
         "works against the others."
@@ -255,9 +259,9 @@ def _spectra(results: Results) -> list[Item]:
     table, lines = results.tables.get("robot_spectra"), results.tables.get("robot_lines")
     if table is None:
         return []
-    found = "No line stands" if lines is None else f"{len(lines)} lines stand"
+    finding = "No line stands" if lines is None else f"{len(lines)} lines stand"
     caption = (
-        f"{found} out of the noise at a chance of one in a hundred per spectrum. Spectra of the tip's path "
+        f"{finding} out of the noise at a chance of one in a hundred per spectrum. Spectra of the tip's path "
         "error by the encoders (multitaper), all runs: over time and along the path. Marks: such lines."
     )
     items: list[Item] = [

@@ -1,4 +1,4 @@
-"""What the batch was measured with and at: tool, work, instruments as declared, and the conditions of cut."""
+"""The set-up of a batch: declared tool, work and instruments, and the cutting conditions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from metro.report.sections.measured import count_of
 from metro.units import JSON, printed
 
 LONGEST, MOST_RUNS = 40, 8
-# end of a key → its unit; the longest that fits counts
+# end of a key → its unit; the longest matching end is used
 ENDINGS = {
     "_deg": "deg",
     "_hz": "Hz",
@@ -73,13 +73,13 @@ def _values(values: JSON) -> Iterator[str]:
 
 
 def _conditions(runs: pd.DataFrame) -> list[Item]:
-    """Tabulate the settings that differ, runs of one condition together; tell those all runs share once."""
+    """Tabulate the settings that differ, runs of one condition together; name shared settings once."""
     columns = [name for name in CONDITIONS if name in runs and _given(runs[name]).any()]
     if runs.empty or not columns:
         return []
     shared = [name for name in columns if runs[name].nunique(dropna=False) == 1]
-    told = [name for name in columns if name not in shared]
-    by = [runs[name].map(_cell) for name in told]
+    differing = [name for name in columns if name not in shared]
+    by = [runs[name].map(_cell) for name in differing]
     groups = list(runs.groupby(by, sort=False)) if by else [((), runs)]
     rows = [
         [
@@ -92,24 +92,24 @@ def _conditions(runs: pd.DataFrame) -> list[Item]:
     caption = "Conditions of the cuts, and the runs that identify and that judge the models."
     caption += f" All runs: {same}." if same else ""
     caption += f" The first {LONGEST} of {len(rows)}; runs.csv has all." if len(rows) > LONGEST else ""
-    header = [*(CONDITIONS[name] for name in told), "identification", "held out"]
-    widths = [*([1.0] * len(told)), 2.2, 2.2]
+    header = [*(CONDITIONS[name] for name in differing), "identification", "held out"]
+    widths = [*([1.0] * len(differing)), 2.2, 2.2]
     table = Table(header, rows[:LONGEST], caption, widths, small=True)
     return [Heading("Conditions"), table]
 
 
 def _plan(results: Results) -> list[Item]:
-    """Say who held runs out, when and how."""
+    """Say how, and from which plan, runs were held out."""
     plan = results.batch.plan
     if not plan.get("identify") and not plan.get("validate"):
         reason = str(plan.get("how") or "no run was recorded").rstrip(".")
-        told = "; which printed rows were held out is said below" if results.verdicts() else ""
-        return [Heading("Hold-out plan"), Paragraph(f"No run was held out: {reason}{told}.")]
+        elsewhere = "; which printed rows were held out is said below" if results.verdicts() else ""
+        return [Heading("Hold-out plan"), Paragraph(f"No run was held out: {reason}{elsewhere}.")]
     how = f"Made from the manifest before any signal was read: {plan.get('how', 'not stated')}"
     seed = f" Seed {plan['seed']}." if plan.get("seed") is not None else ""
     used, held = (count_of(len(plan.get(role) or []), "run") for role in ("identify", "validate"))
-    told = f"{how.rstrip('.')}.{seed} To identify on: {used}; held out: {held}."
-    return [Heading("Hold-out plan"), Paragraph(told)]
+    text = f"{how.rstrip('.')}.{seed} To identify on: {used}; held out: {held}."
+    return [Heading("Hold-out plan"), Paragraph(text)]
 
 
 def _given(column: pd.Series) -> pd.Series:
@@ -123,7 +123,7 @@ def _cell(value: object) -> str:
 
 
 def _named(part: pd.DataFrame, role: str) -> str:
-    """Name the runs of a role; of many, the first and how many more."""
+    """Name the runs of a role; of many runs, the first ones and the number of the others."""
     names = [str(run) for run in part.index[part["role"] == role]]
     more = f" and {len(names) - MOST_RUNS} more" if len(names) > MOST_RUNS else ""
     return ", ".join(names[:MOST_RUNS]) + more or "–"

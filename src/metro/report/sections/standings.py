@@ -1,12 +1,12 @@
-"""Over all batches: which settings make a face flat, and where a model is furthest from what was measured."""
+"""Over all batches: the settings that make a face flat, and the verdicts with the largest residuals."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from metro.observables.catalogue import title
 from metro.report.content import Paragraph, Section, Table
 from metro.report.numbers import number, percent, probability, quantity
-from metro.report.results import title
 from metro.units import JSON, printed
 
 BEST, WORST = 3, 10
@@ -15,8 +15,8 @@ BEST, WORST = 3, 10
 def rankings(identified: Mapping[str, JSON]) -> list[Section]:
     """Tabulate the flattest and the least flat configuration of each batch that has a ranking of them."""
     rows = []
-    for batch, found in sorted(identified.items()):
-        ranked = (found.get("study") or {}).get("ranking") or []
+    for batch, content in sorted(identified.items()):
+        ranked = (content.get("study") or {}).get("ranking") or []
         shown = list(enumerate(ranked, start=1))
         shown = shown if len(shown) <= BEST + 1 else [*shown[:BEST], shown[-1]]
         rows += [
@@ -39,19 +39,19 @@ def rankings(identified: Mapping[str, JSON]) -> list[Section]:
     return [Section("Configurations", [Table(header, rows, caption, [1.5, 0.7, 3, 1.4, 1.2], numeric=[4])])]
 
 
-def largest_rests(entries: Iterable[tuple[str, str, JSON]]) -> list[Section]:
-    """Tabulate the verdicts whose rest after the loop is the most times the noise.
+def largest_residuals(entries: Iterable[tuple[str, str, JSON]]) -> list[Section]:
+    """Tabulate the verdicts with the largest residual after the loop, relative to the noise.
 
     Parameters
     ----------
     entries : batch, observable and verdict of each.
     """
-    told = [
+    ratios = [
         (float(entry["after"]["rms"]) / float(entry["noise_floor"]), batch, name, entry)
         for batch, name, entry in entries
         if (entry.get("after") or {}).get("rms") is not None and entry.get("noise_floor")
     ]
-    ranked = sorted(told, key=lambda row: (-row[0], row[1], row[2]))
+    ranked = sorted(ratios, key=lambda row: (-row[0], row[1], row[2]))
     if not ranked:
         return []
     above = sum(ratio > 1 for ratio, *_ in ranked)

@@ -46,13 +46,13 @@ def arm_stiffness(results: Results) -> list[Item]:
 
 
 def stations(results: Results) -> list[Item]:
-    """Tabulate each station's stiffness with its error by the other stations, and draw the surface."""
-    told, surface = results.tables.get("end_stations"), results.tables.get("end_surface")
-    if told is None or surface is None:
+    """Tabulate each station's stiffness with its leave-one-out error, and draw the surface."""
+    table, surface = results.tables.get("end_stations"), results.tables.get("end_surface")
+    if table is None or surface is None:
         return []
     columns = ["x_mm", "y_mm", "z_mm", *(f"k{a}_n_um" for a in "xyz"), *(f"error_{a}_percent" for a in "xyz")]
-    rows = [[str(r["position"]), *(number(r[c]) for c in columns)] for _, r in told.head(LONGEST).iterrows()]
-    first = told.iloc[0]
+    rows = [[str(r["position"]), *(number(r[c]) for c in columns)] for _, r in table.head(LONGEST).iterrows()]
+    first = table.iloc[0]
     errors = listing(
         [
             f"{a} {number(first[f'rms_{a}_percent'], 2)} % ({number(first[f'rms_{a}_low_percent'], 2)} … "
@@ -68,8 +68,8 @@ def stations(results: Results) -> list[Item]:
     about = "End stiffness over the workspace as the stations (dots) tell it, seen along the third axis."
     return [
         Heading("End stiffness of the machine"),
-        Table(header, rows, caption + more(len(told)), [0] * 10, numeric=list(range(1, 10)), small=True),
-        Picture(figures.stations(surface, told), about, about),
+        Table(header, rows, caption + more(len(table)), [0] * 10, numeric=list(range(1, 10)), small=True),
+        Picture(figures.stations(surface, table), about, about),
     ]
 
 

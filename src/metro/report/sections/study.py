@@ -1,4 +1,4 @@
-"""Which settings make a face flat: factors and interactions, ranking, advice before anything is cut."""
+"""The settings that make a face flat: factors and interactions, ranking, advice before anything is cut."""
 
 from __future__ import annotations
 
@@ -19,36 +19,36 @@ LONGEST = 30
 
 def study(results: Results) -> Section | None:
     """Write the factorial study, the ranking and the advice of ``identified.json``; None without."""
-    found = results.identified.get("study") or {}
-    items = [*_factors(found), *_ranking(found), *_bias(found), *_advice(found)]
+    entry = results.identified.get("study") or {}
+    items = [*_factors(entry), *_ranking(entry), *_bias(entry), *_advice(entry)]
     return Section("Settings and flatness", items) if items else None
 
 
-def _factors(found: JSON) -> list[Item]:
-    if not found.get("terms"):
+def _factors(entry: JSON) -> list[Item]:
+    if not entry.get("terms"):
         return []
     items: list[Item] = [
         Heading("Factors"),
-        Paragraph(_words(found)),
-        _terms(found, "Effects on X_m as factors and in µm of the mean face, with 95 % intervals."),
+        Paragraph(_words(entry)),
+        _terms(entry, "Effects on X_m as factors and in µm of the mean face, with 95 % intervals."),
     ]
-    told = [*_aliases(found), *_pooled(found)]
-    items += [Bullets(told)] if told else []
-    rows = found.get("ranking") or []
+    bullets = [*_aliases(entry), *_pooled(entry)]
+    items += [Bullets(bullets)] if bullets else []
+    rows = entry.get("ranking") or []
     if rows and len(rows[0].get("levels") or {}) > 1:
         caption = (
-            f"{_strongest(found)}Configurations (small) and their geometric means over the other factors "
+            f"{_strongest(entry)}Configurations (small) and their geometric means over the other factors "
             "(joined). On this logarithmic axis lines that are not parallel are an interaction."
         )
         items.append(Picture(figures.interactions(rows), caption, caption))
     return items
 
 
-def _strongest(found: JSON) -> str:
-    """Name the factor of the largest influence on the faces; empty where none is told from scatter."""
+def _strongest(entry: JSON) -> str:
+    """Name the factor with the largest influence on the faces, if any exceeds the scatter."""
     levels = [
         (term["term"], level)
-        for term in found["terms"]
+        for term in entry["terms"]
         if (term.get("p_value") or 1.0) < LEVEL
         for level in term.get("levels") or []
     ]
@@ -61,23 +61,23 @@ def _strongest(found: JSON) -> str:
     )
 
 
-def _words(found: JSON) -> str:
-    """Say what was studied and how."""
-    source = "X_m as printed" if found.get("printed") else "X_m less what noise adds to it"
-    mean, plates = quantity(found["mean"]), found.get("scatter_between_plates")
+def _words(entry: JSON) -> str:
+    """Describe the study and its method."""
+    source = "X_m as printed" if entry.get("printed") else "X_m less what noise adds to it"
+    mean, plates = quantity(entry["mean"]), entry.get("scatter_between_plates")
     between = f"; plates differ by {percent(plates)}, taken as random" if plates is not None else ""
     return (
-        f"{source}, of {found['runs']} runs, on a log scale: the geometric mean over the design is {mean}, "
-        f"one run scatters by {percent(found['scatter'])} about its configuration ({found['dof']} degrees of "
+        f"{source}, of {entry['runs']} runs, on a log scale: the geometric mean over the design is {mean}, "
+        f"one run scatters by {percent(entry['scatter'])} about its configuration ({entry['dof']} degrees of "
         f"freedom){between}. X_m is the one index that is judged as it is; the others are tested beside it, "
         "their p-values adjusted for all of these tests (Holm)."
     )
 
 
-def _terms(found: JSON, caption: str) -> Table:
+def _terms(entry: JSON, caption: str) -> Table:
     rows: list[list[str]] = []
     strong: list[int] = []
-    for term in found["terms"]:
+    for term in entry["terms"]:
         others = [
             INDICES.get(name, name)
             for name, p in (term.get("p_holm") or {}).items()
@@ -88,15 +88,15 @@ def _terms(found: JSON, caption: str) -> Table:
             if significant:
                 strong.append(len(rows))
             first = [term["term"], probability(term.get("p_value")), listing(others) or "–"]
-            name, p, rest = first if place == 0 else ["", "", ""]
-            rows.append([name, _level(level), _factor(level), _difference(level), p, rest])
+            name, p, significant_others = first if place == 0 else ["", "", ""]
+            rows.append([name, _level(level), _factor(level), _difference(level), p, significant_others])
     header = ["term", "level", "factor", "difference", "p", "other indices with p < 0.05"]
     bold = " In bold: p < 0.05." if strong else ""
     return Table(header, rows, caption + bold, [1.6, 1.5, 1.3, 1.3, 0.7, 1.5], strong=strong)
 
 
 def _shown(term: JSON) -> Sequence[JSON]:
-    """Levels of a term that say it all: of an interaction the last one, where each factor has two levels."""
+    """Sufficient levels of a term: only the last one of an interaction of factors with two levels each."""
     levels: Sequence[JSON] = term["levels"]
     main = levels[0]["over"] != "mean"
     return levels if main or term["dof"][0] > 1 else levels[-1:]
@@ -115,30 +115,30 @@ def _difference(level: JSON) -> str:
     return quantity(level["difference"])
 
 
-def _aliases(found: JSON) -> list[str]:
+def _aliases(entry: JSON) -> list[str]:
     same = [
         f"{listing([factor['name'], *factor['same_as']])} vary together: their effects cannot be told apart."
-        for factor in found.get("factors") or []
+        for factor in entry.get("factors") or []
         if factor.get("same_as")
     ]
     mixed = [
         f"{alias['term']} cannot be told from {listing(list(alias['from'])) or 'the mean'}"
         f"{' in part' if alias.get('in_part') else ''}: these runs lack the combinations that would."
-        for alias in found.get("not_separable") or []
+        for alias in entry.get("not_separable") or []
     ]
     return [*same, *mixed]
 
 
-def _pooled(found: JSON) -> list[str]:
-    pooled = found.get("counted_as_scatter") or []
+def _pooled(entry: JSON) -> list[str]:
+    pooled = entry.get("counted_as_scatter") or []
     return [f"For want of repeats these count as scatter: {listing(list(pooled))}."] if pooled else []
 
 
-def _ranking(found: JSON) -> list[Item]:
-    rows = found.get("ranking") or []
+def _ranking(entry: JSON) -> list[Item]:
+    rows = entry.get("ranking") or []
     if not rows:
         return []
-    after = {row["configuration"]: row for row in (found.get("after_loop") or {}).get("ranking") or []}
+    after = {row["configuration"]: row for row in (entry.get("after_loop") or {}).get("ranking") or []}
     body = []
     for row in rows[:LONGEST]:
         later = after.get(row["configuration"], {}).get("xm_predicted")
@@ -149,7 +149,7 @@ def _ranking(found: JSON) -> list[Item]:
     header += ["with effects"] if after else []
     caption = (
         "Configurations from the flattest on, measured once each, so that nothing says how surely."
-        if found.get("printed")
+        if entry.get("printed")
         else "Configurations from the flattest on: X_m with its 95 % interval, scatter pooled over all; the "
         "probability that each is the best of these; X_m as the model predicts it at the points of the path."
     )
@@ -159,33 +159,33 @@ def _ranking(found: JSON) -> list[Item]:
             header, body, caption, [2.6, 1.2, 1, 1, *([1] if after else [])], numeric=[*range(2, len(header))]
         ),
         Picture(
-            figures.ranking(rows, list(after.values()), _model(found)),
-            _ranking_caption(found),
-            _ranking_caption(found),
+            figures.ranking(rows, list(after.values()), _model(entry)),
+            _ranking_caption(entry),
+            _ranking_caption(entry),
         ),
     ]
-    told = [_agreement(name, block) for name, block in _agreements(found)]
-    return [*items, *([Bullets(told)] if told else [])]
+    sentences = [_agreement(name, block) for name, block in _agreements(entry)]
+    return [*items, *([Bullets(sentences)] if sentences else [])]
 
 
-def _model(found: JSON) -> str:
-    return "as printed" if found.get("printed") else "base model"
+def _model(entry: JSON) -> str:
+    return "as printed" if entry.get("printed") else "base model"
 
 
-def _ranking_caption(found: JSON) -> str:
-    beside = "" if found.get("printed") else ", with 95 % intervals and the probability of being the best"
-    agreed = (found.get("after_loop") or {}).get("agreement") or found.get("agreement") or {}
+def _ranking_caption(entry: JSON) -> str:
+    beside = "" if entry.get("printed") else ", with 95 % intervals and the probability of being the best"
+    agreed = (entry.get("after_loop") or {}).get("agreement") or entry.get("agreement") or {}
     rank = agreed.get("spearman")
     alike = f" Measured and predicted rank correlate with {quantity(rank)}." if rank else ""
-    first = (found.get("ranking") or [{}])[0].get("configuration")
+    first = (entry.get("ranking") or [{}])[0].get("configuration")
     best = f"The flattest is {first}.{alike} " if first else ""
     return f"{best}Ranking of the configurations{beside}; beside it the predicted rank over the measured one."
 
 
-def _agreements(found: JSON) -> list[tuple[str, JSON]]:
-    after = (found.get("after_loop") or {}).get("agreement")
+def _agreements(entry: JSON) -> list[tuple[str, JSON]]:
+    after = (entry.get("after_loop") or {}).get("agreement")
     both = [
-        (f"Prediction, {_model(found)}", found.get("agreement")),
+        (f"Prediction, {_model(entry)}", entry.get("agreement")),
         ("Prediction with the effects found", after),
     ]
     return [(name, block) for name, block in both if block]
@@ -210,8 +210,8 @@ def _correlation(entry: JSON) -> str:
     return number(entry["value"], 2) + (f" ({number(low, 2)} … {number(high, 2)})" if low is not None else "")
 
 
-def _bias(found: JSON) -> list[Item]:
-    bias = found.get("bias")
+def _bias(entry: JSON) -> list[Item]:
+    bias = entry.get("bias")
     if not bias:
         return []
     mean = bias["mean"]
@@ -229,15 +229,15 @@ def _bias(found: JSON) -> list[Item]:
         Heading("Measured over simulated"),
         Paragraph(text),
         _terms(bias, "Effects on the ratio of measured to simulated X_m, with 95 % intervals."),
-        Bullets([str(line) for line in found.get("cannot_tell") or []]),
+        Bullets([str(line) for line in entry.get("cannot_tell") or []]),
     ]
 
 
-def _advice(found: JSON) -> list[Item]:
-    told = (found.get("after_loop") or {}).get("advice") or found.get("advice")
-    if not told:
+def _advice(entry: JSON) -> list[Item]:
+    advised = (entry.get("after_loop") or {}).get("advice") or entry.get("advice")
+    if not advised:
         return []
-    rows = told["configurations"]
+    rows = advised["configurations"]
     body = [
         [
             row["configuration"],
@@ -250,7 +250,7 @@ def _advice(found: JSON) -> list[Item]:
     best = rows[0]
     items: list[Item] = [
         Heading("Before cutting"),
-        Paragraph(told["statement"], "warning"),
+        Paragraph(advised["statement"], "warning"),
         Paragraph(
             f"Predicted to be the flattest: {best['configuration']}, X_m {quantity(best['xm_predicted'])}, "
             f"the best of {len(rows)} with probability {probability(best['probability_best'])}."
@@ -266,5 +266,5 @@ def _advice(found: JSON) -> list[Item]:
     if len(rows) > 1:
         caption = "Predicted X_m of the planned configurations with 95 % intervals; nothing was measured."
         items.append(Picture(figures.advice(rows), caption, caption))
-    left = told.get("left_out") or []
+    left = advised.get("left_out") or []
     return [*items, *([Bullets([f"Not predicted, {line}." for line in left])] if left else [])]

@@ -1,13 +1,14 @@
-"""The first page: what was measured, the verdicts, what to trust, what to measure next, the key numbers."""
+"""The first page: measurements, verdicts, what to trust, what to measure next, key numbers."""
 
 from __future__ import annotations
 
+from metro.observables.catalogue import title
 from metro.report.content import Bullets, Facts, Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import verdicts as figures
 from metro.report.figures.comparison import coordinate, overlay
 from metro.report.numbers import listing, number, percent, probability, quantity, words
 from metro.report.phrases import sentence
-from metro.report.results import Results, heading, title
+from metro.report.results import Results, heading
 from metro.report.sections import findings
 from metro.report.sections.lobes import boundary_items
 from metro.report.sections.measured import count_of, measured_words
@@ -25,20 +26,24 @@ from metro.report.sections.verdict import (
 )
 from metro.units import JSON
 
-MOST_DRAWN = 2  # verdicts beside which a first page has room for a run
+MOST_DRAWN = 2  # most verdicts with which the first page has room for the figure of a run
 
 
 def summary(results: Results) -> Section:
-    """Write the first page: what it says, the key numbers, errors before and after, the run missed most."""
+    """Write the first page: text, key numbers, errors before and after, the run with the largest error."""
     verdicts = results.verdicts()
     items = [*first_words(results), *_key_numbers(verdicts)]
-    told = [c for c in (change(title(name), entry) for name, entry in verdicts.items()) if c is not None]
-    if told:
+    drawn_changes = [
+        c for c in (change(title(name), entry) for name, entry in verdicts.items()) if c is not None
+    ]
+    if drawn_changes:
         items.append(
             Picture(
-                figures.changes(told, "error on held-out runs (% of the signal)"),
-                f"{findings.changed(told)} Errors with 95 % intervals, and the noise floor.",
-                "; ".join(f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in told),
+                figures.changes(drawn_changes, "error on held-out runs (% of the signal)"),
+                f"{findings.changed(drawn_changes)} Errors with 95 % intervals, and the noise floor.",
+                "; ".join(
+                    f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in drawn_changes
+                ),
             )
         )
     drawn = _one_run(results) if len(verdicts) <= MOST_DRAWN else []
@@ -48,7 +53,7 @@ def summary(results: Results) -> Section:
 def first_words(results: Results) -> list[Item]:
     """Say what was measured, the verdicts, what to trust and what to measure next."""
     verdicts = results.verdicts()
-    told = [verdict_words(name, entry, left_words(results, name)) for name, entry in verdicts.items()]
+    texts = [verdict_words(name, entry, left_words(results, name)) for name, entry in verdicts.items()]
     nexts = [f"{title(n)}: {words_next}" for n, e in verdicts.items() if (words_next := next_words(e))]
     lacking = (results.identified.get("not_identified") or {}).get("lobes")
     if not verdicts and lacking and results.identified.get("modes"):
@@ -56,7 +61,7 @@ def first_words(results: Results) -> list[Item]:
     measure: list[Item] = [Heading("What to measure next"), Bullets([sentence(text) for text in nexts])]
     return [
         Paragraph(measured_words(results)),
-        *(Paragraph(text, "verdict") for text in told or [no_verdict(results)]),
+        *(Paragraph(text, "verdict") for text in texts or [no_verdict(results)]),
         Heading("What to trust"),
         Bullets(trust(results)),
         *(measure if nexts else []),
@@ -65,13 +70,13 @@ def first_words(results: Results) -> list[Item]:
     ]
 
 
-def advice(found: JSON) -> list[Item]:
+def advice(identified: JSON) -> list[Item]:
     """Name the planned configuration that is predicted to be the flattest."""
-    study = found.get("study") or {}
-    told = (study.get("after_loop") or {}).get("advice") or study.get("advice")
-    if not told:
+    study = identified.get("study") or {}
+    advised = (study.get("after_loop") or {}).get("advice") or study.get("advice")
+    if not advised:
         return []
-    best, count = told["configurations"][0], len(told["configurations"])
+    best, count = advised["configurations"][0], len(advised["configurations"])
     text = (
         f"Of {count} planned configurations of faces, none of them cut, {best['configuration']} is predicted "
         f"to be the flattest: X_m {quantity(best['xm_predicted'])}, the best with probability "
@@ -81,7 +86,7 @@ def advice(found: JSON) -> list[Item]:
 
 
 def _one_run(results: Results) -> list[Item]:
-    """Draw the held-out run that the base model misses most, of the first observable that has curves."""
+    """Draw the held-out run with the base model's largest error, of the first observable with curves."""
     for name in results.verdicts():
         frame = results.compared(name) if name != "lobes" else None
         if frame is None or not coordinate(frame):
@@ -94,10 +99,11 @@ def _one_run(results: Results) -> list[Item]:
 
 
 def _identified(results: Results) -> list[Item]:
-    """Give the mode that yields most, and the boundary or the response that tells what was identified."""
+    """Give the most compliant mode, and the boundary or the response that shows the identification."""
+    shown = [*boundary_items(results), *largest_response(results.tables)]
     yielding = [mode for mode in results.identified.get("modes") or [] if _peak(mode) > 0.0]
     if not yielding:
-        return []
+        return shown
     softest = max(yielding, key=_peak)
     where = f"position {softest['position']}, direction {softest['direction']}"
     facts = Facts(
@@ -108,38 +114,38 @@ def _identified(results: Results) -> list[Item]:
             ("receptance at its peak", f"{number(_peak(softest))} m/N", "1 / (2 damping ratio · stiffness)"),
         ]
     )
-    return [facts, *boundary_items(results), *largest_response(results.tables)]
+    return [facts, *shown]
 
 
 def _peak(mode: JSON) -> float:
-    """Receptance of a mode alone at its peak, m/N; 0 where its stiffness is not known."""
-    stiffness, damping = mode.get("stiffness"), mode.get("damping")
+    """Receptance of a single mode at its peak, m/N; 0 if its stiffness is not known."""
+    stiffness, damping = ((mode.get(name) or {}).get("value") for name in ("stiffness", "damping"))
     if not stiffness or not damping or not mode.get("resolved", True):
         return 0.0
-    return float(1.0 / (2.0 * damping["value"] * stiffness["value"]))
+    return float(1.0 / (2.0 * damping * stiffness))
 
 
 def no_verdict(results: Results) -> str:
-    """Say that nothing was compared, and what was identified instead."""
+    """Say that nothing was compared, and which quantities were identified instead."""
     nothing = "No held-out measurement could be compared with a prediction in this batch: no verdict."
     return f"{nothing} {_identified_words(results.identified)}".strip()
 
 
-def _identified_words(found: JSON) -> str:
-    """Name what was identified, for a batch that has nothing else to show."""
-    modes = len(found.get("modes") or [])
+def _identified_words(identified: JSON) -> str:
+    """Name the identified quantities, for a batch without a verdict."""
+    modes = len(identified.get("modes") or [])
     named = [
         f"{modes} mode{'s' if modes > 1 else ''}" if modes else "",
-        "cutting coefficients" if found.get("force") else "",
-        "joint stiffness" if (found.get("arm") or {}).get("joint_stiffness") else "",
-        "flatness of faces" if found.get("faces") else "",
+        "cutting coefficients" if identified.get("force") else "",
+        "joint stiffness" if (identified.get("arm") or {}).get("joint_stiffness") else "",
+        "flatness of faces" if identified.get("faces") else "",
     ]
-    told = listing([name for name in named if name])
-    return f"Identified: {told}." if told else ""
+    listed = listing([name for name in named if name])
+    return f"Identified: {listed}." if listed else ""
 
 
 def print_check(results: Results) -> list[Item]:
-    """Say on the first page of a published batch what became of its printed errors."""
+    """Summarise the check of the printed errors on the first page of a published batch."""
     table = results.tables.get("published_errors")
     if table is None:
         return []
@@ -211,6 +217,6 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
 
 
 def _share(error: JSON) -> str:
-    """Write an error as a share of the signal, and why it has no interval where it has none."""
+    """Write an error as a share of the signal, with the reason if it has no interval."""
     point = error.get("rms") is not None and known_interval(error) is None
     return f"{percent(error.get('nrmse'))} of the signal{'; one condition: no interval' if point else ''}"

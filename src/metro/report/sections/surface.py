@@ -1,4 +1,4 @@
-"""Flatness of the faces: indices as read and less the noise, filter, noise, minimum zone, maps."""
+"""Flatness of the faces: indices, raw and corrected for noise, filter, noise, minimum zone, maps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ISO = {"fltt": "FLTt", "fltp": "FLTp", "fltv": "FLTv", "fltq": "FLTq", "minimum_
 
 
 def flatness(results: Results) -> Section | None:
-    """Write what the scans of faces say; None for a batch without any."""
+    """Write the results from the scans of faces; None for a batch without any."""
     table = results.tables.get("face_indices")
     if table is None:
         return None
@@ -45,7 +45,7 @@ def _indices(
     about: str,
     predicted: dict[str, float] | None = None,
 ) -> list[Item]:
-    """Tabulate indices, each as read and corrected with its interval, a face a row."""
+    """Tabulate indices, each raw and corrected with its interval, a row per face."""
     shown = [name for name in names if any(name in part.index for part in faces.values())]
     if not shown:
         return []
@@ -96,7 +96,7 @@ def _about_filtered(faces: dict[str, pd.DataFrame]) -> str:
 
 
 def _by_noise_alone(faces: dict[str, pd.DataFrame]) -> list[Item]:
-    """Say of which faces X_m is noise: all of it, or, where no filter took some of it out, most of it."""
+    """Name the faces whose X_m is noise: all of it, or most of it if no filter removed some."""
     said = []
     for run, part in faces.items():
         value, bias, corrected, low, high, sigma = _numbers(
@@ -107,11 +107,11 @@ def _by_noise_alone(faces: dict[str, pd.DataFrame]) -> list[Item]:
         if not high > 0 or not (alone or (unfiltered and bias > value / 2)):
             continue
         face = with_interval(corrected, [low, high])
-        told = "is not told from flat" if alone else "is the rest"
+        judged = "is not told from flat" if alone else "is the rest"
         said.append(
             f"{run}: X_m reads {number(value)} µm, but {number(bias)} µm of that is what noise of "
             f"{number(sigma, 2)} µm per point makes of {int(part['points'].iloc[0])} points. The face "
-            f"itself {told}: X_m {face} µm (95 %)."
+            f"itself {judged}: X_m {face} µm (95 %)."
         )
     return (
         [Paragraph("Noise, not flatness, is what X_m of these scans reads:", "warning"), Bullets(said)]
@@ -121,7 +121,7 @@ def _by_noise_alone(faces: dict[str, pd.DataFrame]) -> list[Item]:
 
 
 def _noise(faces: dict[str, pd.DataFrame]) -> list[Item]:
-    """Tabulate noise and where it is from, points, rejections and the crop."""
+    """Tabulate noise and its source, points, rejections and the crop."""
     rows = []
     for run, part in list(faces.items())[:LONGEST]:
         first = part.iloc[0]

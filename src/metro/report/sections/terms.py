@@ -1,4 +1,4 @@
-"""The words of a report, for those who sign it: how uncertainty is stated, and what each term means."""
+"""The terms of a report, for those who sign it: the statement of uncertainty, and a glossary."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ OF_STABILITY = {
 
 
 def terms(results: Results) -> Section:
-    """Write how uncertainty is stated, and the terms that this report uses."""
-    verdicts, told = results.verdicts(), dict(ALWAYS)
-    told |= OF_THE_LOOP if verdicts else {}
-    found = {str(entry.get("status")) for entry in verdicts.values()}
-    told |= {STATUS[status]: meaning for status, meaning in VERDICTS.items() if status in found}
-    told |= OF_MODES if results.identified.get("modes") else {}
-    told |= OF_FACES if "flatness" in verdicts or "face_indices" in results.tables else {}
-    told |= OF_STABILITY if "lobes" in verdicts else {}
-    rows = [[term, meaning] for term, meaning in told.items()]
+    """Write the statement of uncertainty, and the terms that this report uses."""
+    verdicts, used = results.verdicts(), dict(ALWAYS)
+    used |= OF_THE_LOOP if verdicts else {}
+    statuses = {str(entry.get("status")) for entry in verdicts.values()}
+    used |= {STATUS[status]: meaning for status, meaning in VERDICTS.items() if status in statuses}
+    used |= OF_MODES if results.identified.get("modes") else {}
+    used |= OF_FACES if "flatness" in verdicts or "face_indices" in results.tables else {}
+    used |= OF_STABILITY if "lobes" in verdicts else {}
+    rows = [[term, meaning] for term, meaning in used.items()]
     table = Table(["term", "meaning"], rows, "Terms of this report.", [1, 4.6], small=True)
     return Section("Terms and uncertainty", [Paragraph(INTERVALS), table])

@@ -1,4 +1,4 @@
-"""What of a batch may be relied on: how far, for which cuts; which causes are findings, which but leads."""
+"""The reliability of a batch's results: accuracy, tested cuts, and identified or only possible causes."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from metro.report.numbers import listing, number, percent, probability, words
 from metro.report.results import Results, heading
 from metro.units import JSON, printed
 
-SURE = 0.95  # probability from which a cause is a finding
+SURE = 0.95  # probability from which on a cause counts as identified
 HOLDS = ("clean", "explained")
 NOTHING = (
-    "What is identified holds within its intervals for the set-up as declared. No prediction was put to the "
-    "test here: how well these values predict a cut is not known."
+    "No prediction was tested here. A value that was identified, where there is one, holds within its "
+    "interval for the set-up as declared; how well it predicts a cut is not known."
 )
 
 
 def trust(results: Results) -> list[str]:
-    """Say of each verdict how far the prediction holds, how sure its causes are, and for which cuts.
+    """Say for each verdict the accuracy of the prediction, the certainty of its causes, and the tested cuts.
 
-    Verdicts that were tested on cuts of the same settings share a paragraph.
+    Verdicts that were tested on cuts with the same settings share a paragraph.
     """
     alike: dict[str, list[str]] = {}
     for name, entry in results.verdicts().items():
@@ -32,13 +32,13 @@ def trust(results: Results) -> list[str]:
 
 
 def trust_in(results: Results, observable: str) -> str:
-    """Say of one verdict what :func:`trust` says of all."""
+    """Say for one verdict what :func:`trust` says for all."""
     entry = results.verdicts()[observable]
     return " ".join(filter(None, [_reach(observable, entry), _causes(entry), _tested(results, entry)]))
 
 
 def _reach(observable: str, entry: JSON) -> str:
-    """Say how far predictions were off on runs that no fit saw, at the upper end of the interval."""
+    """Say the error of predictions on held-out runs, at the upper end of its interval."""
     name, status = heading(observable), str(entry.get("status"))
     if status == "insufficient":
         return f"{name}: nothing; no prediction was tested."
@@ -52,7 +52,7 @@ def _reach(observable: str, entry: JSON) -> str:
 
 
 def _size(entry: JSON) -> str:
-    """Write the upper end of the error after the loop's 95 % interval, in its unit and of the signal."""
+    """Write the upper end of the 95 % interval of the error after the loop, in its unit and of the signal."""
     after, unit = entry.get("after") or {}, printed(entry.get("unit"))
     rms = after.get("rms")
     if rms is None:
@@ -67,31 +67,31 @@ def _size(entry: JSON) -> str:
 
 
 def _tested(results: Results, entry: JSON) -> str:
-    """Name the settings of the cuts that judged a prediction, and those of which there was but one."""
+    """Name the settings of the cuts that tested a prediction, and those with only one level."""
     runs = results.batch.runs
     judged = runs[runs.index.isin([str(run) for run in entry.get("held_out_runs") or []])]
     if judged.empty:
         return ""
-    names = [told for column in NAMES if column in judged and (told := _levels(column, judged[column]))]
+    names = [text for column in NAMES if column in judged and (text := _levels(column, judged[column]))]
     known = [(one, sorted(judged[c].dropna().unique())) for c, one in NUMBERS.items() if c in judged]
     ranges = [f"{one.name} {_range(values)} {one.unit}" for one, values in known if len(values) > 1]
-    single = [told for column in NAMES[1:] if column in runs and (told := _but_one(column, runs, judged))]
+    single = [text for column in NAMES[1:] if column in runs and (text := _but_one(column, runs, judged))]
     single += [f"{one.name} ({values[0]:g} {one.unit})" for one, values in known if len(values) == 1]
     tested = f"Tested on {listing([*names, *ranges])}" if names or ranges else "Tested"
     return f"{tested}{f', at one {listing(single)} only' if single else ''}."
 
 
 def _levels(column: str, values: pd.Series) -> str:
-    # a slot is cut up and down at once
+    # A slot is cut by up milling and down milling at once.
     levels = sorted({str(v) for v in values.dropna()} - {"", "slot" if column == "direction" else ""})
     if not levels or (len(levels) == 1 and column != "operation"):
         return ""
-    told = listing(levels)
-    return f"{told} cuts" if column == "operation" else f"{column} {told}"
+    listed = listing(levels)
+    return f"{listed} cuts" if column == "operation" else f"{column} {listed}"
 
 
 def _but_one(column: str, runs: pd.DataFrame, judged: pd.DataFrame) -> str:
-    """Name the one level of a setting that was tested where the batch has others; empty elsewhere."""
+    """Name the only tested level of a setting of which the batch has others; empty otherwise."""
     tested, all_levels = ({str(v) for v in part[column].dropna()} - {""} for part in (judged, runs))
     return f"{column} ({min(tested)})" if len(tested) == 1 and len(all_levels) > 1 else ""
 
@@ -102,12 +102,12 @@ def _range(values: list[float]) -> str:
 
 
 def _causes(entry: JSON) -> str:
-    """Part the causes that are as good as certain from those that are only the likeliest."""
-    told: dict[bool, list[str]] = {True: [], False: []}
+    """Distinguish the causes that are almost certain from those that are only the likeliest."""
+    certain: dict[bool, list[str]] = {True: [], False: []}
     for effect in entry.get("effects") or []:
         chance = effect.get("probability")
         name = f"{words(str(effect['effect']))} (probability {probability(chance)})"
-        told[chance is not None and chance >= SURE].append(name)
-    found = f"A finding: {listing(told[True])}." if told[True] else ""
-    lead = f"A lead, not a finding: {listing(told[False])}." if told[False] else ""
-    return f"{found} {lead}".strip()
+        certain[chance is not None and chance >= SURE].append(name)
+    finding = f"A finding: {listing(certain[True])}." if certain[True] else ""
+    lead = f"A lead, not a finding: {listing(certain[False])}." if certain[False] else ""
+    return f"{finding} {lead}".strip()

@@ -1,11 +1,11 @@
-"""The verdict in words that an engineer understands."""
+"""The verdict in an engineer's words."""
 
 from __future__ import annotations
 
 from metro.report.figures.verdicts import Change
 from metro.report.numbers import listing, number, percent, with_interval, words
 from metro.report.parameters import effect_words
-from metro.report.phrases import plain, rest_words
+from metro.report.phrases import plain, residual_words
 from metro.report.results import Results, heading
 from metro.report.sections.trust import HOLDS
 from metro.units import JSON, printed
@@ -21,29 +21,31 @@ STATUS = {
 
 
 def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
-    """Say the verdict on an observable in a few sentences, with its numbers and what is ``left``."""
+    """Say the verdict on an observable in a few sentences, with its numbers; ``left`` is the residual."""
     start, status = heading(observable), str(entry.get("status"))
     floor = entry.get("noise_floor")
     noise = f" (noise floor {number(floor)}{unit_after(entry)})" if floor is not None else ""
-    found = listing([effect_words(effect) for effect in entry.get("effects") or []])
+    causes = listing([effect_words(effect) for effect in entry.get("effects") or []])
     says = {
         "clean": f"{start}: the base model holds. What it leaves on held-out runs is within the "
         f"noise{noise} or its declared accuracy.",
-        "explained": f"{start}: the difference from the base model is traced to {found}. {_fall(entry)} "
+        "explained": f"{start}: the difference from the base model is traced to {causes}. {_fall(entry)} "
         f"What is left is within the noise{noise}.",
-        "partly_explained": f"{start}: part of the difference is traced to {found}. {_fall(entry)} "
-        f"A significant rest remains{noise}. {_rest(entry, left)}",
+        "partly_explained": f"{start}: part of the difference is traced to {causes}. {_fall(entry)} "
+        f"A significant rest remains{noise}. {_residual(entry, left)}",
         "undetermined": f"{start}: something is missing from the base model; these data cannot tell what. "
         f"{_rivals(entry)}{_fall(entry)}",
         "unexplained": f"{start}: the base model leaves a significant error{noise}, and no effect of the "
-        f"library accounts for it. {_fall(entry)} {_rest(entry, left)}",
+        f"library accounts for it. {_fall(entry)} {_residual(entry, left)}",
         "insufficient": f"{start}: too few runs to tell. {_fall(entry)}",
     }
+    if entry.get("contradicted"):
+        return f"{start}: the data contradict what the batch declares; nothing is attributed. {_fall(entry)}"
     return says.get(status, f"{start}: {words(status)}.").strip()
 
 
 def error_text(error: JSON | None, unit_name: str | None) -> str:
-    """Write an error of the verdict: rms with its interval, where it has one, and unit."""
+    """Write an error of the verdict: rms with its interval, if it has one, and unit."""
     if not error or error.get("rms") is None:
         return "–"
     text = with_interval(error["rms"], known_interval(error))
@@ -52,13 +54,13 @@ def error_text(error: JSON | None, unit_name: str | None) -> str:
 
 
 def known_interval(error: JSON) -> list[float | None] | None:
-    """Return the interval of an error; None where one condition, which has no scatter, makes it a point."""
+    """Return the interval of an error; None if there is one condition only, which has no scatter."""
     low, high = error.get("ci95") or (None, None)
     return [low, high] if low is not None and high is not None and high > low else None
 
 
 def change(label: str, entry: JSON) -> Change | None:
-    """Errors relative to the signal (%), before and after, for the figures; None where they are not known."""
+    """Errors relative to the signal (%), before and after, for the figures; None if they are not known."""
     before, after = entry.get("before") or {}, entry.get("after") or {}
     if before.get("nrmse") is None or after.get("nrmse") is None or _dimensionless(entry):
         return None
@@ -83,12 +85,12 @@ def _scaled(error: JSON) -> tuple[float, float] | None:
 
 
 def _dimensionless(entry: JSON) -> bool:
-    """Tell whether the value is a probability, whose error has no signal to be relative to."""
+    """Whether the value is a probability, whose error has no signal as a reference."""
     return entry.get("unit") == "1"
 
 
 def unit_after(entry: JSON) -> str:
-    """Write the unit of a verdict behind a number; empty where it has none."""
+    """Write the unit of a verdict behind a number; empty if it has none."""
     shown = printed(entry.get("unit"))
     return f" {shown}" if shown else ""
 
@@ -115,17 +117,17 @@ def _fall(entry: JSON) -> str:
     return f"{where} {what} goes from {old} to {new}{share}."
 
 
-def _rest(entry: JSON, left: str) -> str:
-    rest = entry.get("unexplained") or {}
-    if not rest.get("signature"):
+def _residual(entry: JSON, left: str) -> str:
+    unexplained = entry.get("unexplained") or {}
+    if not unexplained.get("signature"):
         return ""
-    return f"What is left: {left or plain(str(rest['signature']))}."
+    return f"What is left: {left or plain(str(unexplained['signature']))}."
 
 
 def left_words(results: Results, observable: str) -> str:
-    """Say what an observable's loop left over, as an engineer would; empty where that is not known."""
+    """Describe an observable's residual after the loop in an engineer's words; empty if not known."""
     teeth = int((results.batch.manifest.get("tool") or {}).get("teeth") or 0)
-    return rest_words(results.told(observable).get("signature") or [], teeth)
+    return residual_words(results.loop_record(observable).get("signature") or [], teeth)
 
 
 def _rivals(entry: JSON) -> str:
@@ -136,7 +138,7 @@ def _rivals(entry: JSON) -> str:
 
 
 def next_words(entry: JSON) -> str:
-    """Say what to measure next; and where the verdict does without. Empty where there is nothing."""
-    told = plain(str(entry.get("next_experiment") or "")).rstrip(".")
+    """Say what to measure next, and whether the verdict does not need it; empty if there is nothing."""
+    text = plain(str(entry.get("next_experiment") or "")).rstrip(".")
     needless = entry.get("status") in HOLDS
-    return f"{told} (the verdict does not need it)" if told and needless else told
+    return f"{text} (the verdict does not need it)" if text and needless else text

@@ -1,0 +1,150 @@
+"""``python -m proof.slips``: every slip in every suitable batch, and what the check and the report say of it.
+
+Outcomes: *caught by check* (an error, or a contradiction, that the batch as it is does not give), *flagged on
+page one*, *undecidable* (no datum of the batch contradicts it, for the reason that the list gives), and two
+that must not be: *named a false cause* and *clean without a word*.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+from metro.batch.batch import Batch
+from metro.batch.findings import Finding
+from metro.batch.processed import Tables, read_json
+from metro.stages.contradictions import contradictions
+from metro.stages.whole import check_whole
+from metro.units import JSON
+from metro.workflow import Plan
+from proof.run import CHECKOUT, STAGES
+from proof.slip_edits import Mistake
+from proof.slip_list import mistakes
+
+CAUGHT, FLAGGED, UNDECIDABLE = "caught by check", "flagged on page one", "undecidable"
+FALSE_CAUSE, SILENT = "NAMED A FALSE CAUSE", "CLEAN WITHOUT A WORD"
+NEVER = (FALSE_CAUSE, SILENT)
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of a slip in a batch; ``said`` is what the check or page one said."""
+
+    slip: str
+    batch: str
+    outcome: str
+    said: str = ""
+
+
+def tried(folder: Path, slips: Sequence[Mistake], *, loop: bool) -> Iterator[Result]:
+    """Make each slip in a copy of a batch and run the check, and the stages where it says nothing.
+
+    ``loop``: run the stages; else a slip that the check does not catch is given as such.
+    """
+    known = _said(folder)
+    clean: JSON | None = None
+    for slip in slips:
+        with tempfile.TemporaryDirectory() as place:
+            copy = Path(place) / "raw" / folder.name
+            shutil.copytree(folder, copy)
+            if not slip.edit(copy):
+                continue
+            new = [text for text in _said(copy) if text not in known]
+            if new:
+                yield Result(slip.name, folder.name, CAUGHT, new[0])
+                continue
+            if slip.undecidable:
+                yield Result(slip.name, folder.name, UNDECIDABLE, slip.undecidable)
+                continue
+            if not loop:
+                yield Result(slip.name, folder.name, "not caught by check")
+                continue
+            clean = clean or _verdict(folder, Path(place) / "clean")
+            yield _judged(slip, folder.name, clean, _verdict(copy, Path(place) / "out"))
+
+
+def _said(folder: Path) -> list[str]:
+    """Return the errors of the check, and the contradictions that it finds; no other warning counts."""
+    found: list[str] = []
+
+    def also(batch: Batch, read: Tables) -> Iterator[Finding]:
+        for finding in contradictions(batch, read):
+            found.append(str(finding))
+            yield finding
+
+    report = check_whole(folder, CHECKOUT / "config/cells", also=also)
+    return [*(str(one) for one in report.problems if one.severity == "error"), *found]
+
+
+def _verdict(folder: Path, out: Path) -> JSON:
+    """Run the stages of a batch; return its verdict.json."""
+    plan = Plan.read(CHECKOUT, {"raw_roots": [str(folder.parent)]})
+    processed, reports = out / "processed", out / "reports"
+    given = {
+        "ingest": {"folder": folder, "cells": Path(plan.cells), "out": processed},
+        "loop": {"processed": processed, "reports": reports},
+        "verdict": {"processed": processed, "reports": reports},
+    }
+    for stage in STAGES:
+        run = getattr(import_module(f"metro.stages.{stage}"), stage)
+        run(**given.get(stage, {"processed": processed}), settings=json.loads(plan.settings(stage)), code="")
+    return read_json(reports / "verdict.json")
+
+
+def _judged(slip: Mistake, batch: str, clean: JSON, verdict: JSON) -> Result:
+    """Compare a verdict with that of the batch as it is."""
+    entries = verdict["observables"]
+    flagged = [one["words"] for one in verdict.get("contradictions") or []]
+    flagged += [f"{name} misses half of the signal" for name in entries if "misses" in entries[name]]
+    causes = _causes(verdict) - _causes(clean)
+    if causes:
+        return Result(slip.name, batch, FALSE_CAUSE, ", ".join(sorted(causes)))
+    if flagged:
+        return Result(slip.name, batch, FLAGGED, flagged[0])
+    before, after = _statuses(clean), _statuses(verdict)
+    worse = [
+        f"{name}: {status} → {after.get(name, 'lost')}"
+        for name, status in before.items()
+        if after.get(name, "lost") not in (status, "clean")
+    ]
+    return Result(slip.name, batch, FLAGGED if worse else SILENT, "; ".join(worse))
+
+
+def _statuses(verdict: JSON) -> dict[str, str]:
+    return {name: one["status"] for name, one in verdict["observables"].items()}
+
+
+def _causes(verdict: JSON) -> set[str]:
+    entries = verdict["observables"].items()
+    return {f"{name}: {one['effect']}" for name, entry in entries for one in entry["effects"]}
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Print the table slip × batch × outcome; exit with 1 where an outcome must not be."""
+    parser = argparse.ArgumentParser(prog="python -m proof.slips", description=__doc__)
+    parser.add_argument("batches", type=Path, nargs="+", help="folders of batches")
+    parser.add_argument("--few", action="store_true", help="a few of the wrong orientations, the check alone")
+    parser.add_argument("--slip", default="", help="only slips whose name contains this")
+    options = parser.parse_args(arguments)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    chosen = [one for one in mistakes(full=not options.few) if options.slip in one.name]
+    count: Counter[str] = Counter()
+    for folder in options.batches:
+        for result in tried(folder, chosen, loop=not options.few):
+            count[result.outcome] += 1
+            print(f"| {result.slip} | {result.batch} | {result.outcome} | {result.said} |", flush=True)
+    print("; ".join(f"{outcome}: {number}" for outcome, number in count.most_common()))
+    sys.exit(int(any(count[outcome] for outcome in NEVER)))
+
+
+if __name__ == "__main__":
+    main()

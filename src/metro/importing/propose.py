@@ -1,0 +1,187 @@
+"""What unknown files probably are, and how they are read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from metro.importing.look import Column, Seen
+
+_AXIS = re.compile(
+    r"(?P<head>.*?(?:f|force|kraft|load)[ _]?)(?P<axis>[xyz])(?P<tail>(?![a-z]).*)", re.IGNORECASE
+)
+_NUMBER = re.compile(r"(\d+)(?!.*\d)")
+_RUN_COLUMNS = {
+    "spindle_rpm": r"(?:n|rpm|s)",
+    "feed_per_tooth_mm": r"fz",
+    "axial_depth_mm": r"ap",
+    "radial_depth_mm": r"ae",
+}
+_VALUE = r"[_-]?(\d+(?:[.p]\d+)?)"
+LEAST_RUN = 3  # rows that count
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """How a group of files is read.
+
+    Attributes
+    ----------
+    kind : a key of KINDS, or ``modes``.
+    pattern : of the names of the files, where they need a mapping.
+    columns : column of the contract → the file's own name or number, or (other file, number).
+    why : what each guess is from, by column.
+    rows : what the table names: the file with its record, and what is taken for ``{record}``.
+    timed : whether the files have a time of their own, or need none.
+    """
+
+    kind: str
+    rows: tuple[tuple[str, str], ...]
+    pattern: str = ""
+    columns: dict[str, str | int | tuple[str, int]] = field(default_factory=dict)
+    why: dict[str, str] = field(default_factory=dict)
+    timed: bool = True
+    stated: dict[str, str] = field(default_factory=dict)
+    more: tuple[str, ...] = ()
+
+
+def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
+    """Propose how files are read; what nothing is proposed for is in the second list, with the reason."""
+    proposals: list[Proposal] = []
+    unknown = [f"{seen.path.name}: {seen.fault}" for seen in files if seen.fault]
+    rest = [seen for seen in files if not seen.fault]
+    for kind in dict.fromkeys(seen.kind for seen in rest if seen.kind):
+        group = [seen for seen in rest if seen.kind == kind]
+        proposals.append(Proposal(kind, tuple((seen.path.name, _record(seen)) for seen in group)))
+    rest = [seen for seen in rest if not seen.kind]
+    pairs, rest = _hammer_pairs(rest)
+    proposals += pairs
+    for seen in rest:
+        found = _forces(seen) or _numbered(seen)
+        if found is None:
+            unknown.append(_reason(seen))
+        else:
+            proposals.append(found)
+    return proposals, unknown
+
+
+def _record(seen: Seen) -> str:
+    number = _NUMBER.search(seen.path.name.split(".")[0])
+    return str(int(number[1])) if number else ""
+
+
+def _forces(seen: Seen) -> Proposal | None:
+    """Find three forces by their names, of one record or of several with a number at the end."""
+    groups: dict[tuple[str, str], dict[str, Column]] = {}
+    for column in seen.columns:
+        match = _AXIS.fullmatch(column.name.strip())
+        if match:
+            groups.setdefault((match["head"], match["tail"]), {})[match["axis"].lower()] = column
+    whole = {key: group for key, group in groups.items() if set(group) == set("xyz")}
+    if not whole:
+        return None
+    (_, tail), first = next(iter(whole.items()))
+    time = next(
+        (
+            each
+            for each in seen.columns
+            if re.fullmatch(r"t|time|zeit", each.name.split("[")[0].strip().lower())
+        ),
+        None,
+    )
+    why = {f"f{axis}_n": f"the name {first[axis].name}" for axis in "xyz"}
+    stated = {f"f{axis}_n": first[axis].unit for axis in "xyz" if first[axis].unit}
+    file = seen.path.name
+    records: tuple[tuple[str, str], ...] = ((file, ""),)
+    if len(whole) == 1:
+        columns: dict[str, str | int | tuple[str, int]] = {f"f{axis}_n": first[axis].name for axis in "xyz"}
+    else:
+        number = _NUMBER.search(tail)
+        if number is None:
+            return None
+        tails = [_NUMBER.search(other) for _, other in whole]
+        columns = {
+            f"f{axis}_n": first[axis].name[: -len(tail)]
+            + tail[: number.start()]
+            + "{record}"
+            + tail[number.end() :]
+            for axis in "xyz"
+        }
+        records = tuple((f"{file}#{each[1]}", each[1]) for each in tails if each)
+    if time is not None:
+        columns["t_s"] = time.name
+        why["t_s"] = f"the name {time.name}"
+        stated |= {"t_s": time.unit} if time.unit else {}
+    return Proposal(
+        "force", tuple(records), file, columns, why, time is not None or seen.step is not None, stated
+    )
+
+
+def _numbered(seen: Seen) -> Proposal | None:
+    """Find a list of points: without names, the first column counts them, and more follow."""
+    if len(seen.columns) < 4 or any(column.name for column in seen.columns):
+        return None
+    counts = seen.columns[0].values
+    if counts.size < LEAST_RUN or not (np.diff(counts) == 1.0).all():
+        return None
+    columns: dict[str, str | int | tuple[str, int]] = {f"{axis}_mm": k for k, axis in enumerate("xyz", 2)}
+    why = {
+        name: f"column 1 counts the points, so that column {at} is the next" for name, at in columns.items()
+    }
+    return Proposal("cloud", ((seen.path.name, ""),), seen.path.name, columns, why)
+
+
+def _hammer_pairs(files: Sequence[Seen]) -> tuple[list[Proposal], list[Seen]]:
+    """Find files of a hammer and files of a sensor that share a number, each of time and value."""
+    two = [seen for seen in files if len(seen.columns) == 2]
+    hammers = [seen for seen in two if re.search(r"impact|hammer|force", seen.path.name, re.IGNORECASE)]
+    sensors = [seen for seen in two if re.search(r"acc|resp|vel|disp", seen.path.name, re.IGNORECASE)]
+    if not hammers or sorted(map(_record, hammers)) != sorted(map(_record, sensors)):
+        return [], list(files)
+    first, other = _template(hammers[0]), _template(sensors[0])
+    columns: dict[str, str | int | tuple[str, int]] = {"force_n": 2, "response": (other, 2)}
+    why = {
+        "force_n": f"the file's name {hammers[0].path.name}",
+        "response": f"the file's name {sensors[0].path.name}",
+    }
+    rows = tuple((f"{seen.path.name}#{_record(seen)}", _record(seen)) for seen in hammers)
+    names = tuple(seen.path.name for seen in sensors)
+    found = Proposal("record", rows, first.replace("{record}", "*"), columns, why, False, more=names)
+    return [found], [seen for seen in files if seen not in hammers and seen not in sensors]
+
+
+def _template(seen: Seen) -> str:
+    return _NUMBER.sub("{record}", seen.path.name, count=1)
+
+
+def _reason(seen: Seen) -> str:
+    named = sum(bool(column.name) for column in seen.columns)
+    listed = ", ".join(column.name for column in seen.columns[:8] if column.name)
+    names = f", named {listed}" if named else " without names"
+    message = f"{seen.path.name}: {len(seen.columns)} columns{names}: no dynamometer, hammer, profile or scan"
+    joints = "a robot log of a cut takes t_s, q1_set_deg …, q1_deg …, tau1_nm … (currents with 10 Nm/A)"
+    return f"{message}; {joints}: write its mapping by hand, as docs/data-contract.md says"
+
+
+def from_name(name: str) -> dict[str, str]:
+    """Return what a file's name says of its run: n6000, fz0.1, ap3, ae25."""
+    stem = name.rsplit(".", 1)[0].lower()
+    found = {}
+    for column, mark in _RUN_COLUMNS.items():
+        match = re.search(rf"(?<![a-z]){mark}{_VALUE}", stem)
+        if match:
+            found[column] = match[1].replace("p", ".")
+    return found
+
+
+def told_by_names(names: Sequence[str]) -> dict[str, list[str]]:
+    """Return by column of runs.csv what every file's name says of its run."""
+    said = [from_name(name) for name in names]
+    return {
+        column: [each[column] for each in said]
+        for column in _RUN_COLUMNS
+        if all(column in each for each in said)
+    }

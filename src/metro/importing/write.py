@@ -1,0 +1,204 @@
+"""The batch that is proposed for files nobody has described, with a comment at all that was guessed."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from metro.batch.whole_folder import whole_folder
+from metro.importing.look import Seen
+from metro.importing.propose import Proposal, from_name, told_by_names
+from metro.importing.questions import needs_sensitivity
+
+RUN_COLUMN = {
+    "force": "dynamometer",
+    "robot": "robot_log",
+    "profile": "profile",
+    "cloud": "scan",
+    "path": "path",
+}
+_RUN_KEYS = (
+    *("operation", "direction", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm"),
+    *("cut_length_mm", "feed_direction_deg"),
+)
+Answers = Mapping[str, str]
+
+
+class AnswerError(ValueError):
+    """An answer does not fit the files: its key, what was found and what was expected."""
+
+
+def write_batch(folder: Path, files: Sequence[Seen], proposals: Sequence[Proposal], answers: Answers) -> None:
+    """Write the folder of a batch: the files, batch.yaml and the tables.
+
+    Raises
+    ------
+    AnswerError
+        An answer does not fit the files.
+    ContractError
+        The folder cannot be written.
+    """
+    texts = {
+        "batch.yaml": "\n".join(_manifest(folder.name, proposals, answers)) + "\n",
+        "runs.csv": _runs(proposals, answers),
+        "impacts.csv": _impacts(proposals, answers),
+        "published.csv": _published(files),
+    }
+    with whole_folder(folder) as filled:
+        for seen in files:
+            shutil.copyfile(seen.path, filled / seen.path.name)
+        for name, text in texts.items():
+            if text:
+                (filled / name).write_text(text, encoding="utf-8")
+
+
+def _manifest(name: str, proposals: Sequence[Proposal], answers: Answers) -> Iterator[str]:
+    """Yield the lines of batch.yaml; what was guessed says from what."""
+    yield '# Written by metro import. Lines with a comment "guessed" are for you to check.'
+    yield from ("format: 1", f"batch: {name}")
+    if answers.get("title"):
+        yield f"title: {json.dumps(answers['title'], ensure_ascii=False)}"
+    modes = any(each.kind == "modes" for each in proposals)
+    yield f"source: {'published' if modes else 'measured'}"
+    if modes:
+        yield f"citation: {json.dumps(answers['citation'], ensure_ascii=False)}"
+    yield f"cell: {answers.get('cell', 'unknown')}"
+    tool = ", ".join(f"{key[5:]}: {value}" for key, value in answers.items() if key.startswith("tool."))
+    if tool:
+        yield f"tool: {{{tool}}}"
+    if answers.get("work.size_mm"):
+        yield f"work: {{size_mm: [{answers['work.size_mm']}]}}"
+    if any(each.kind == "force" for each in proposals):
+        yield from _dynamometer(answers)
+    names = [row for each in proposals if each.kind == "force" for row, _ in each.rows]
+    for column in told_by_names(names) if names else ():
+        if column not in answers:
+            yield f"# {column} of runs.csv: guessed from the files' names"
+    mapped = [each for each in proposals if each.columns]
+    if mapped:
+        yield "files:"
+        for each in mapped:
+            yield from _mapping(each, answers)
+
+
+def _dynamometer(answers: Answers) -> Iterator[str]:
+    reads = answers.get("dynamometer.reads", "work")
+    given = [
+        f"{axis}: {value.strip()}"
+        for axis, value in zip("xyz", answers.get("dynamometer.axes", "").split(","), strict=False)
+    ]
+    axes = f", axes: {{{', '.join(given)}}}" if answers.get("dynamometer.axes") else ""
+    yield "instruments:"
+    if not axes:
+        yield "  # The directions of the sensor's axes were not stated: taken to be those of the work frame."
+    rate = f", rate_hz: {answers['rate_hz']}" if answers.get("rate_hz") else ""
+    yield f"  dynamometer: {{reads: {reads}{axes}{rate}}}"
+
+
+def _mapping(proposal: Proposal, answers: Answers) -> Iterator[str]:
+    yield f"  {json.dumps(proposal.pattern, ensure_ascii=False)}:"
+    if not proposal.timed:
+        yield f"    rate_hz: {answers['rate_hz']}"
+    yield "    columns:"
+    for column, source in proposal.columns.items():
+        given = {"file": source[0], "from": source[1]} if isinstance(source, tuple) else {"from": source}
+        unit = proposal.stated.get(column) or answers[f"unit.{_quantity(column)}"]
+        entry: dict[str, object] = {**given, "unit": unit}
+        if needs_sensitivity(unit):
+            entry["sensitivity"] = answers[f"sensitivity.{_quantity(column)}"]
+        text = ", ".join(f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in entry.items())
+        yield f"      {column}: {{{text}}}  # guessed from {proposal.why[column]}"
+
+
+def _quantity(column: str) -> str:
+    return {"n": "force", "mm": "length", "s": "time"}.get(column.rpartition("_")[2], "response")
+
+
+def _runs(proposals: Sequence[Proposal], answers: Answers) -> str:
+    """Return runs.csv: a row for each record of a cut, a scan or a profile; "" where there is none."""
+    used = [each for each in proposals if each.kind in RUN_COLUMN]
+    rows: list[dict[str, str]] = []
+    for each in used:
+        for at, (name, record) in enumerate(each.rows):
+            row = {"run": f"r{len(rows) + 1:02d}", RUN_COLUMN[each.kind]: name}
+            if each.kind == "force":
+                row |= from_name(name.partition("#")[0])
+            row |= {
+                key: _of_run(key, answers[key], at, len(each.rows), record)
+                for key in _RUN_KEYS
+                if answers.get(key)
+            }
+            rows.append(row)
+    return _csv(rows)
+
+
+def _of_run(key: str, value: str, at: int, count: int, record: str) -> str:
+    """Return the value of a run: one for all, one for each by commas, or with the record's name in it."""
+    parts = [part.strip() for part in value.split(",")]
+    if len(parts) > 1 and len(parts) != count:
+        raise AnswerError(f"{key}: found {len(parts)} values, expected one, or {count} as there are runs")
+    return (parts[at] if len(parts) > 1 else parts[0]).replace("{record}", record).replace("{number}", record)
+
+
+def _impacts(proposals: Sequence[Proposal], answers: Answers) -> str:
+    rows = []
+    for each in proposals:
+        for name, record in each.rows if each.kind in ("record", "frf") else ():
+            points = {key: _numbered(key, answers[key], record) for key in ("reference", "response")}
+            unit = answers.get("unit.response", "")
+            unit = _of_sensor(answers) if needs_sensitivity(unit) else unit
+            row = {"position": "1", **points, "replicate": "1", "kind": each.kind, "file": name}
+            rows.append(row | ({"response_unit": unit} if each.kind == "record" else {}))
+    return _csv(rows)
+
+
+def _of_sensor(answers: Answers) -> str:
+    """Return the unit of a response that a sensitivity names."""
+    sensitivity = answers.get("sensitivity.response", "")
+    return next(
+        (unit for unit in ("m/s2", "m/s", "g", "m") if re.search(rf"[ /(]{unit}\)?$", sensitivity)), "m/s2"
+    )
+
+
+def _numbered(key: str, value: str, record: str) -> str:
+    if "{number}" in value and not record:
+        raise AnswerError(f"{key}: asks for the number in a file's name, but there is none")
+    return value.replace("{number}", record)
+
+
+def _published(files: Sequence[Seen]) -> str:
+    rows = []
+    for seen in files:
+        for mode in seen.modes:
+            place = {"table": "modes", "row": str(mode.number), "observable": "modes"}
+            damped = f"damped {mode.damped:.6g} Hz"
+            rows.append(
+                {
+                    **place,
+                    "quantity": "frequency",
+                    "measured": f"{mode.frequency:.8g}",
+                    "unit": "Hz",
+                    "note": damped,
+                }
+            )
+            rows.append(
+                {**place, "quantity": "damping", "measured": f"{mode.damping:.6g}", "unit": "1", "note": ""}
+            )
+    return _csv(rows)
+
+
+def _csv(rows: Sequence[Mapping[str, str]]) -> str:
+    if not rows:
+        return ""
+    stream = io.StringIO()
+    writer = csv.DictWriter(
+        stream, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n"
+    )
+    writer.writeheader()
+    writer.writerows(rows)
+    return stream.getvalue()

@@ -1,0 +1,1 @@
+"""Causes over several observables: their witnesses, and where an error comes from upstream."""

@@ -1,0 +1,1 @@
+"""Tests of a fit: the residual's signature, differences between conditions, drift, evidence, prediction."""

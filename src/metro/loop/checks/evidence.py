@@ -1,0 +1,246 @@
+"""What speaks for an effect: evidence on the runs of the fit, on conditions left out, and its size.
+
+The unit of evidence is the run, and for generality the condition; never the sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from metro.loop.checks.predictive import predictive
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.descent import State, linearised, normal_equations, solution
+from metro.loop.fitting.fit import Fit, refit
+from metro.loop.fitting.noise import PRIOR_RUNS, Noise
+from metro.observables.problem import Block
+from metro.units import Array
+
+TOUCHED = 0.01  # of the largest gain or loss at a left-out condition: below it, the condition is not touched
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How a larger candidate compares with a smaller one.
+
+    Attributes
+    ----------
+    statistic : twice the gain in log-likelihood. p_value : of it, by F with run-level degrees of freedom.
+    held_out : gain in log-likelihood of each condition when it is left out of both fits; empty where that was
+        not worth computing.
+    size : rms change of the prediction over the rms of the signal. missed : rms of what the larger candidate
+        misses beyond the noise, over that of the signal.
+    sought : number of places among which the additional effects were sought, on all runs.
+    """
+
+    statistic: float
+    p_value: float
+    held_out: dict[str, float]
+    size: float
+    missed: float
+    sought: float = 1.0
+
+    @property
+    def gain(self) -> float:
+        """Sum of the held-out gains, less what the best of the places sought gains by chance."""
+        return sum(self.held_out.values()) - math.log(self.sought)
+
+    @property
+    def better_share(self) -> float:
+        """Share of the left-out conditions that the larger candidate predicts better.
+
+        Those that it hardly touches (an orbit that only holes have) say nothing either way.
+        """
+        gains = np.array([*self.held_out.values()])
+        touched = gains[np.abs(gains) > TOUCHED * np.abs(gains).max(initial=0.0)]
+        return float(np.mean(touched > 0)) if len(touched) else 0.0
+
+
+def compare(smaller: Fit, larger: Fit) -> Evidence:
+    """Compare two fits of the same blocks; nothing is left out yet (:func:`hold_out` does that)."""
+    runs = sum(block.role != "calibrate" for block in larger.blocks)
+    statistic = 2.0 * (larger.total - smaller.total)
+    parameters = len(larger.theta) - len(smaller.theta) + runs * (_own(larger) - _own(smaller))
+    sought = _sought(larger) / _sought(smaller)
+    p_value = -math.expm1(sought * math.log1p(-min(tail(statistic, parameters, runs), 1.0 - 1e-16)))
+    return Evidence(statistic, p_value, {}, change(smaller, larger), missed(larger), sought)
+
+
+def hold_out(evidence: Evidence, smaller_out: Mapping[str, float], larger: Fit, prior: Noise) -> Evidence:
+    """Add each condition's gain when left out; ``smaller_out`` is :func:`leave_out` of the smaller fit."""
+    out = leave_out(larger, prior)
+    # Where neither predicts a condition, as where all runs are of one, nothing is gained.
+    gains = {name: 0.0 if out[name] == value else out[name] - value for name, value in smaller_out.items()}
+    return replace(evidence, held_out=gains)
+
+
+def _sought(fitted: Fit) -> float:
+    return math.prod(effect.sought for effect in fitted.candidate.effects)
+
+
+def _own(fitted: Fit) -> int:
+    """Count the unknowns that the effects of a fit give each run."""
+    return sum(effect.own for effect in fitted.candidate.effects)
+
+
+def tail(statistic: float, parameters: int, runs: int) -> float:
+    """P-value of twice a gain in log-likelihood by so many parameters: F on run-level degrees of freedom."""
+    from scipy.stats import f
+
+    return float(f.sf(max(statistic, 0.0) / parameters, parameters, runs + PRIOR_RUNS))
+
+
+def change(smaller: Fit, larger: Fit) -> float:
+    """Rms difference of two fits' predictions over the rms measured, over the runs, not the load tests."""
+    difference, signal = 0.0, 0.0
+    for block in larger.blocks:
+        if block.role != "calibrate":
+            difference += float(np.sum((larger.predict(block) - smaller.predict(block)) ** 2))
+            signal += float(np.sum(block.measured**2))
+    return math.sqrt(difference / signal)
+
+
+def missed(fitted: Fit) -> float:
+    """Rms of what a fit misses beyond the noise over the rms measured, over the runs, not the load tests."""
+    lost, signal = 0.0, 0.0
+    for block in fitted.blocks:
+        if block.role != "calibrate":
+            share = np.array([fitted.noise.misfit.get(str(axis), 0.0) for axis in np.unique(block.axis)])
+            power = [float(np.sum(block.measured[block.axis == axis] ** 2)) for axis in np.unique(block.axis)]
+            lost, signal = lost + float(share**2 @ power), signal + sum(power)
+    return math.sqrt(lost / signal)
+
+
+@lru_cache(maxsize=256)
+def leave_out(fitted: Fit, prior: Noise, moved: Callable[[Fit], Fit] | None = None) -> dict[str, float]:
+    """Log-likelihood of each condition under the fit of all others; of each run if there is one condition.
+
+    ``moved`` puts the fit of all others where something else than these runs wants it.
+    """
+    cut = [block for block in fitted.blocks if block.role != "calibrate"]
+    by_condition = len({block.condition for block in cut}) > 1
+    groups: dict[str, list[Block]] = {}
+    for block in cut:
+        groups.setdefault(block.condition if by_condition else block.run, []).append(block)
+    if len(groups) == 1:
+        return dict.fromkeys(groups, -math.inf)
+    whole = moved(fitted) if moved else fitted
+    return {name: _unseen(fitted, held, prior, moved, whole.noise) for name, held in groups.items()}
+
+
+def _unseen(
+    fitted: Fit, held: Sequence[Block], prior: Noise, moved: Callable[[Fit], Fit] | None, known: Noise
+) -> float:
+    """Log-likelihood of runs under the fit of all others, less one for each unknown that is their own.
+
+    Such an unknown is fitted to the run that is predicted, which gains that much by chance. Of runs that
+    alone tell a base parameter (the only hole among slots) nothing can be predicted without them: they are
+    left out one by one. ``known``: the noise by all runs.
+    """
+    left_out = {block.run for block in held}
+    others = refit(fitted, [block for block in fitted.blocks if block.run not in left_out], prior)
+    if len(held) > 1 and _determined(others) < _determined(fitted):
+        return sum(_unseen(fitted, [block], prior, moved, known) for block in held)
+    others = moved(others) if moved else others
+    # What a model misses may show in the condition that is left out only (where a gap closes): it is known.
+    others = replace(others, noise=replace(others.noise, misfit=_most_missed(others.noise, known)))
+    return predictive(others, held) - len(held) * _own(fitted)
+
+
+def _most_missed(noise: Noise, other: Noise) -> dict[str, float]:
+    return {axis: max(rms, other.misfit.get(axis, 0.0)) for axis, rms in noise.misfit.items()}
+
+
+def _determined(fitted: Fit) -> int:
+    """Count the base parameters that the runs of a fit tell."""
+    return int(np.isfinite(np.diag(fitted.covariance)[: len(fitted.beta)]).sum())
+
+
+def weights(
+    held_out: Sequence[dict[str, float]], seed: int, draws: int = 2000, prior: Sequence[float] | None = None
+) -> Array:
+    """Pseudo-BMA weights of candidates by Bayesian bootstrap over conditions, (candidates,).
+
+    Parameters
+    ----------
+    held_out : for each candidate, its held-out log-likelihood (or gain over a common reference) by condition.
+    prior : weight of each candidate before anything is known; None: all alike.
+    """
+    names = list(held_out[0])
+    table = np.array([[candidate[name] for name in names] for candidate in held_out])
+    known = table[np.isfinite(table)]
+    table = np.clip(table, known.min() - 100.0, known.max() + 100.0) if known.size else np.zeros_like(table)
+    share = np.random.default_rng(seed).dirichlet(np.ones(len(names)), size=draws) * len(names)
+    total = share @ table.T + np.log(np.ones(len(table)) if prior is None else prior)
+    likelihood = np.exp(total - total.max(axis=1, keepdims=True))
+    return np.asarray((likelihood / likelihood.sum(axis=1, keepdims=True)).mean(axis=0))
+
+
+def surviving_share(candidate: Candidate, base: Fit) -> float:
+    """Share of an effect's signature that the base parameters and the runs' unknowns cannot absorb (0…1).
+
+    The signature is the change of the prediction with the effect's first parameter, its size, near the first
+    start. Near zero, the data cannot speak of the effect: the base absorbs it.
+    """
+    return unabsorbed_share(sensitivity(candidate, base), len(base.beta) + len(base.theta))
+
+
+@dataclass(frozen=True)
+class Dimmed:
+    """What the base parameters and the zeros of the runs leave of an effect.
+
+    ``share`` of its signature; ``least``: three standard errors of its first parameter, its size.
+    """
+
+    share: float
+    least: float
+
+
+def dimmed(candidate: Candidate, base: Fit) -> Dimmed:
+    """Return what the base parameters and the zeros of the runs, known to some error, leave of an effect.
+
+    Unlike what the base parameters absorb, an effect that is much larger than the zeros is seen all the same.
+    """
+    place = len(base.beta) + len(base.theta)
+    whole = sensitivity(candidate, replace(base, noise=replace(base.noise, zero_factor=0.0))).total
+    seen = sensitivity(candidate, base)
+    left = unabsorbed_share(seen, place) * seen.total
+    return Dimmed(left / whole if whole > 0 else 0.0, 3.0 / math.sqrt(left) if left > 0 else math.inf)
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What runs say of an effect not there yet: its whitened sum of squares, and the normal matrix."""
+
+    total: float
+    normal: Array
+
+    def __add__(self, other: Sensitivity) -> Sensitivity:
+        """Put two sets of runs together."""
+        return Sensitivity(self.total + other.total, self.normal + other.normal)
+
+    def __mul__(self, repeats: int) -> Sensitivity:
+        """Make the runs several times."""
+        return Sensitivity(self.total * repeats, self.normal * repeats)
+
+
+@lru_cache(maxsize=64)
+def sensitivity(candidate: Candidate, base: Fit) -> Sensitivity:
+    """Return the signature of the effects that a candidate has more than the fit ``base``, in its blocks."""
+    theta = np.concatenate([base.theta, [p.starts[0] for p in candidate.parameters[len(base.theta) :]]])
+    system = linearised(candidate, base.blocks, base.noise, State(theta, base.beta, dict(base.nuisance)))
+    first = len(base.theta)
+    total = sum(float(effect[:, first] @ effect[:, first]) for _, _, effect, _ in system.rows)
+    normal, _ = normal_equations(replace(system, weight=np.zeros_like(system.weight)))
+    return Sensitivity(total, normal)
+
+
+def unabsorbed_share(seen: Sensitivity, place: int) -> float:
+    """Share of the signature of parameter ``place`` that those before it leave."""
+    known, mixed = seen.normal[:place, :place], seen.normal[:place, place]
+    left = seen.normal[place, place] - mixed @ solution(known, mixed)
+    return max(0.0, float(left)) / seen.total if seen.total > 0 else 0.0

@@ -1,0 +1,335 @@
+"""The joint fit: base parameters, effect parameters and every run's unknowns together, on the runs given.
+
+A fit of a larger candidate starts from the fit of the smaller one, with the new effect parameters at all
+combinations of their starting values; the noise is re-estimated from the residual as the fit goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from metro.loop.fitting import noise as noise_room
+from metro.loop.fitting.candidate import Candidate, started
+from metro.loop.fitting.covariance import between_runs
+from metro.loop.fitting.descent import (
+    ENOUGH,
+    ITERATIONS,
+    State,
+    condition,
+    descend,
+    free,
+    inverse,
+    linearised,
+    normal_equations,
+    polish,
+    solution,
+)
+from metro.loop.fitting.least_squares import least_squares
+from metro.loop.fitting.noise import Noise
+from metro.observables.problem import Block, Model
+from metro.units import Array
+
+FOLLOWED = 4  # starts of new effect parameters that are followed to the end
+FIRST_STEPS, KEPT = 3, 2  # where little is left to explain, after so many steps so many are kept
+HOPELESS = 1.0  # and none, where twice the log-likelihood has not gained that much per parameter: chance does
+ALIKE = 1e-9  # relative difference of the sums of squares of starts that are the same
+UNDECIDED = 0.1  # differences in twice the log-likelihood that the noise, once known better, may turn round
+ROUNDS, SETTLED = 12, 0.2  # of noise estimation and descent; gain in twice the log-likelihood that ends them
+EM_STEPS = 8
+# Where a prediction is rough (that of a tool too soft to be in balance) no step leads on down, although the
+# derivatives promise one. An interval that is off by half a deviation holds the truth in 92 cases of 100.
+CONVERGED = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted candidate.
+
+    Attributes
+    ----------
+    theta, beta : effect parameters (units of the contract), base parameters (SI).
+    nuisance : each block's nonlinear unknowns, by run.
+    covariance : of ``[beta, theta]``, for a dispersion of one.
+    step : by how much another step of the descent would move a parameter, in its standard deviation, at most.
+    condition : of the whitened, scaled columns of base and effects; infinite: a parameter is not determined.
+    log_likelihood : marginal, by run; ``chi2`` and ``elements``: whitened sum of squares and count, by run.
+    """
+
+    candidate: Candidate
+    theta: Array
+    beta: Array
+    nuisance: Mapping[str, Array]
+    noise: Noise
+    covariance: Array
+    step: float
+    condition: float
+    log_likelihood: Mapping[str, float]
+    chi2: Mapping[str, float]
+    elements: Mapping[str, int]
+    blocks: tuple[Block, ...] = field(repr=False)
+
+    @property
+    def rank(self) -> int:
+        """How many of the base and effect parameters the blocks determine."""
+        return int(np.count_nonzero(np.isfinite(np.diag(self.covariance))))
+
+    @property
+    def converged(self) -> bool:
+        """Whether the descent ended where the likelihood is highest, to what its interval would not show."""
+        return self.step < CONVERGED
+
+    @property
+    def total(self) -> float:
+        """Log-likelihood of all blocks."""
+        return sum(self.log_likelihood.values())
+
+    @property
+    def dispersion(self) -> float:
+        """Whitened mean square of the residual, at least one: how much worse than the noise the fit is."""
+        freedom = sum(self.elements.values()) - len(self.beta) - len(self.theta)
+        return max(1.0, sum(self.chi2.values()) / max(1, freedom))
+
+    def predict(self, block: Block) -> Array:
+        """Prediction of a block of this fit in the fit's basis, (n,) SI."""
+        matrix, offset = self.candidate.model(self.theta).design(block, self.nuisance[block.run], self.beta)
+        return offset + matrix @ self.beta
+
+
+class _End(NamedTuple):
+    """What a linearisation at the end of a descent says of it; see :class:`Fit`."""
+
+    covariance: Array
+    step: float
+    condition: float
+
+
+@lru_cache(maxsize=256)
+def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fit | None = None) -> Fit:
+    """Fit a candidate to blocks: base parameters, effect parameters and nuisances jointly.
+
+    ``start``, a fit of the same or of a simpler candidate, gives the base parameters and the noise to begin
+    with; effect parameters that it lacks are started from all combinations of their starting values, group
+    after group, and the best few are followed.
+    """
+    noise = start.noise if start else prior
+    known = start.theta if start else np.zeros(0)
+    fresh = candidate.parameters[len(known) :]
+    theta = np.concatenate([known, [parameter.neutral for parameter in fresh]])
+    beta = start.beta if start else _first_beta(candidate, blocks, noise)
+    around = start.nuisance if start and fresh else None
+    best = [State(theta, beta, {})]
+    for places in candidate.groups(len(known)) or [[]]:
+        trials: list[tuple[float, State]] = []
+        for given in started(candidate, best[0].theta, places):
+            state = State(given, beta.copy(), {})
+            trials.append((_search_nuisance(candidate, blocks, noise, state, around), state))
+        best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
+    if start and fresh:
+        first = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS)
+        best = _distinct(first, ENOUGH)
+        if all(missed < noise.budget for missed in noise.misfit.values()):
+            best = best[:KEPT]
+            here = State(start.theta, start.beta, dict(start.nuisance))
+            without = linearised(start.candidate, blocks, noise, here, derivatives="none").cost
+            if without - first[0][0] < HOPELESS * len(fresh):
+                return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
+    reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS)
+    near = [state for cost, state in reached if cost < reached[0][0] + UNDECIDED]
+    refined = [_refined(candidate, blocks, prior, noise, state, rounds=ROUNDS) for state in near]
+    return max(refined, key=lambda fitted: fitted.total)
+
+
+def _distinct(reached: Sequence[tuple[float, State]], apart: float) -> list[State]:
+    """Return states with rising costs, without those that cost the same as the one before.
+
+    They are the same with another tooth as the first one, or come from two starts that lead to one place.
+    """
+    costs = [-np.inf, *(cost for cost, _ in reached)]
+    return [state for (cost, state), lower in zip(reached, costs, strict=False) if cost - lower > apart]
+
+
+def _lowest_first(
+    candidate: Candidate, blocks: Sequence[Block], noise: Noise, states: Sequence[State], *, steps: int
+) -> list[tuple[float, State]]:
+    """Follow each state some steps down; return where they lead, with the cost there."""
+    reached = [descend(candidate, blocks, noise, state, steps) for state in states]
+    return sorted(((cost, state) for state, cost in reached), key=lambda pair: pair[0])
+
+
+def refit(start: Fit, blocks: Sequence[Block], prior: Noise) -> Fit:
+    """Fit the same candidate to other blocks, from where ``start`` ended (leave-one-condition-out)."""
+    nuisance = {run: value.copy() for run, value in start.nuisance.items()}
+    state = State(start.theta.copy(), start.beta.copy(), nuisance)
+    return _refined(start.candidate, blocks, prior, start.noise, state, rounds=1)
+
+
+def polished(fitted: Fit) -> Fit:
+    """Follow a fit from where its likelihood tells no more to where its parameters have all their digits."""
+    state = State(fitted.theta, fitted.beta, dict(fitted.nuisance))
+    state = polish(fitted.candidate, fitted.blocks, fitted.noise, state)
+    end = _end_of(fitted.candidate, fitted.blocks, fitted.noise, state)
+    return _finished(fitted.candidate, fitted.blocks, fitted.noise, state, end)
+
+
+def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
+    """Evaluate a fit on blocks it has not seen: only their nuisances are estimated, nothing else moves."""
+    candidate, noise = fitted.candidate, fitted.noise
+    model = candidate.model(fitted.theta)
+    state = State(fitted.theta, fitted.beta, {})
+    for block in blocks:
+        starts = model.nuisance_starts(block)
+        states = [State(state.theta, state.beta, {block.run: start}) for start in starts]
+        costs = _costs(model, block, noise, state.beta, starts).tolist()
+        near = _distinct(sorted(zip(costs, states, strict=True), key=lambda one: one[0]), ALIKE * min(costs))
+        reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
+        state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
+    return _finished(candidate, blocks, noise, state, _End(fitted.covariance, fitted.step, fitted.condition))
+
+
+def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> Array:
+    """Fit the base parameters, each block's nuisance at the start that fits the block alone best."""
+    theta = np.array([parameter.starts[0] for parameter in candidate.parameters])
+    model = candidate.model(theta)
+    rows, right = [], []
+    for block in blocks:
+        weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
+        best, kept = np.inf, None
+        for nuisance in model.nuisance_starts(block):
+            matrix, offset = model.design(block, nuisance, None)
+            scaled, target = matrix * weight[:, None], (block.measured - offset) * weight
+            solution = np.linalg.lstsq(scaled, target, rcond=None)[0]
+            cost = float(np.sum((target - scaled @ solution) ** 2))
+            if cost < best:
+                best, kept = cost, (scaled, target)
+        if kept is not None:
+            rows.append(kept[0])
+            right.append(kept[1])
+    return least_squares(np.vstack(rows), np.concatenate(right))
+
+
+def _search_nuisance(
+    candidate: Candidate,
+    blocks: Sequence[Block],
+    noise: Noise,
+    state: State,
+    around: Mapping[str, Array] | None = None,
+) -> float:
+    """Put each block's nuisance at the best of its starts for the state's parameters; return the cost.
+
+    The starts are those of the model, or only the symmetric images of ``around``; an unknown that ``around``
+    lacks, since it is of a simpler candidate, takes all of its starts.
+    """
+    model = candidate.model(state.theta)
+    total = 0.0
+    for block in blocks:
+        starts = model.nuisance_starts(block)
+        starts = _images(block, around[block.run], starts) if around else starts
+        costs = _costs(model, block, noise, state.beta, starts)
+        best = int(np.argmin(costs))
+        state.nuisance[block.run] = np.asarray(starts[best], dtype=float)
+        total += float(costs[best])
+    return total
+
+
+def _costs(model: Model, block: Block, noise: Noise, beta: Array, starts: Array) -> Array:
+    """Weighted sum of squares that each of a block's nuisances leaves, (starts,)."""
+    weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
+    costs = np.empty(len(starts))
+    for i, nuisance in enumerate(starts):
+        matrix, offset = model.design(block, nuisance, beta)
+        costs[i] = np.sum(((block.measured - offset - matrix @ beta) * weight) ** 2)
+    return costs
+
+
+def _images(block: Block, nuisance: Array, starts: Array) -> Array:
+    images = nuisance[None] if block.symmetries is None else nuisance + block.symmetries
+    lacking = np.unique(starts[:, len(nuisance) :], axis=0)
+    if not lacking.size:
+        return images
+    return np.hstack([np.repeat(images, len(lacking), axis=0), np.tile(lacking, (len(images), 1))])
+
+
+def _refined(
+    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State, *, rounds: int
+) -> Fit:
+    """Re-estimate the noise from the residual and descend, in turn, until that gains next to nothing."""
+    before = np.inf
+    for _ in range(rounds):
+        noise = _reestimated(candidate, blocks, prior, noise, state)
+        state, cost = descend(candidate, blocks, noise, state)
+        if before - cost < SETTLED:
+            break
+        before = cost
+    return _finished(candidate, blocks, noise, state, _end_of(candidate, blocks, noise, state))
+
+
+def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> _End:
+    """Covariance of base and effect parameters, (p + q, p + q), and how well the end was reached.
+
+    The base parameters scatter from run to run, and the runs tell how far that leaves them off. What the
+    model gets wrong where an effect shows may be the same in all runs: the variances of the effect parameters
+    allow for that.
+    """
+    system, wide = (
+        linearised(candidate, blocks, kind, state) for kind in (noise, noise_room.all_alike(noise))
+    )
+    normal, right = normal_equations(system)
+    covariance, alike = inverse(normal), inverse(normal_equations(wide)[0])
+    p = len(state.beta)
+    factor = between_runs(system)
+    factor[p:] = 1.0
+    covariance *= np.outer(factor, factor)
+    covariance[p:, p:] = alike[p:, p:]
+    moving = free(candidate, state, right)
+    still, downhill = normal[np.ix_(moving, moving)], right[moving]
+    step = np.abs(solution(still, downhill)) / np.sqrt(np.diag(inverse(still)))
+    return _End(covariance, float(step.max(initial=0.0)), condition(normal))
+
+
+def _reestimated(
+    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State
+) -> Noise:
+    """Estimate the noise from the residual: from what it was, or from no misfit on, whichever is likelier.
+
+    A misfit hides from what whole runs share what that would explain, and may then never come down.
+    """
+    starts = [noise, replace(noise, misfit={})] if any(noise.misfit.values()) else [noise]
+    reached = [_expected(candidate, blocks, prior, start, state) for start in starts]
+    if len(reached) == 1:
+        return reached[0]
+    return min(reached, key=lambda one: linearised(candidate, blocks, one, state, derivatives="none").cost)
+
+
+def _expected(
+    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State
+) -> Noise:
+    """Take some steps of expectation–maximisation for the noise."""
+    model = candidate.model(state.theta)
+    parts = []
+    for block in blocks:
+        matrix, offset = model.design(block, state.nuisance[block.run], state.beta)
+        parts.append((block, block.measured - offset - matrix @ state.beta, matrix))
+    for _ in range(EM_STEPS):
+        noise = noise_room.updated(
+            noise,
+            prior,
+            [
+                (block, residual, noise_room.shared(block, noise, matrix, state.beta))
+                for block, residual, matrix in parts
+            ],
+        )
+    return noise
+
+
+def _finished(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, end: _End) -> Fit:
+    system = linearised(candidate, blocks, noise, state, derivatives="none")
+    elements = {block.run: len(block.measured) for block in blocks}
+    return Fit(
+        candidate, state.theta, state.beta, dict(state.nuisance), noise, *end,
+        system.log_likelihood, system.chi2, elements, tuple(blocks),
+    )  # fmt: skip

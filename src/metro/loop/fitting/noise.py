@@ -1,0 +1,251 @@
+"""How far a run may be from a right model: within-run error, model-form budget, run-to-run scatter.
+
+The covariance of a block is ``D + U Uᵀ``. ``D`` is diagonal: the standard error within the run, and the
+declared budget for what a simple model never gets exactly right. ``U`` holds what a whole run shares: each
+base parameter a little off (its column of the design times the scatter), and the zeros. Without ``U``, 10^5
+samples make everything significant (loop.md).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from itertools import combinations
+
+import numpy as np
+
+from metro.observables.problem import Block
+from metro.units import Array
+
+PRIOR_RUNS = 4
+MISFIT_CORRELATION = 12.0
+# Of the way to the misfit estimated: a larger one lets the elements that are measured best weigh less, and is
+# then estimated smaller, so that whole steps would go to and fro about the point where it stays.
+MISFIT_STEP = 0.5
+LARGEST_ZERO = 4.0  # of its deviation: a zero that is farther off is something else that is taken for it
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of an observable.
+
+    Attributes
+    ----------
+    budget : relative model-form budget.
+    scatter : (p,) relative run-to-run standard deviation of each base parameter; 0: the same in every run.
+    zero_factor : estimated size of the zeros in units of each block's ``zero_sd``.
+    repeats : runs per condition: the budget is shared by the repeats of a condition, so it does not average
+        out over them.
+    everywhere : conditions that what a model gets wrong is shared by, too.
+    alike : how much of the error that repeats may share (``Block.alike``) they do share, as a part of its
+        variance; the rest is each run's own. All of it, until the repeats tell.
+    misfit : by axis, relative rms of what the model at hand misses, spread evenly over the elements. It is
+        estimated with each fit, so that a model that misses much does not bend its parameters to please the
+        elements that are measured best. What is missed is a smooth shape, the same in every run: about twelve
+        neighbouring elements count as one piece of evidence.
+    """
+
+    budget: float
+    scatter: Array
+    repeats: dict[str, float]
+    zero_factor: float = 1.0
+    everywhere: float = 1.0
+    alike: float = 1.0
+    misfit: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def scattering(self) -> np.ndarray:
+        """Places of the base parameters that differ from run to run."""
+        return np.flatnonzero(self.scatter)
+
+    @cached_property
+    def sound(self) -> Noise:
+        """The noise of a model that misses nothing."""
+        return replace(self, misfit={})
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """The inverse square root of a block's covariance, in factored form: 1 − vectors × shrink × vectorsᵀ."""
+
+    inverse_sd: Array
+    vectors: Array
+    shrink: Array
+
+    def __call__(self, values: Array) -> Array:
+        """Apply to a vector (n,) or to the columns of a matrix (n, k)."""
+        scaled = (values.T * self.inverse_sd).T
+        weights = self.vectors.T @ scaled
+        return np.asarray(scaled - self.vectors @ (weights.T * self.shrink).T)
+
+
+def first_noise(budget: float, scatter: Array, blocks: Sequence[Block]) -> Noise:
+    """Return the noise before anything is known of the repeats."""
+    return Noise(budget, np.asarray(scatter, dtype=float), {**Counter(block.condition for block in blocks)})
+
+
+@lru_cache(maxsize=1024)
+def _axes(block: Block) -> tuple[tuple[str, ...], np.ndarray, Array]:
+    """Names of a block's axes, the number of each element's axis, and the rms of its axis's signal."""
+    names, number = np.unique(block.axis.astype(str), return_inverse=True)
+    signal = block.measured if block.scale is None else block.scale
+    power = np.bincount(number, signal**2) / np.bincount(number)
+    return tuple(names.tolist()), number, np.sqrt(power)[number]
+
+
+@lru_cache(maxsize=512)
+def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION) -> Array:
+    """Variance of each element that nothing else shares, (n,).
+
+    What all repeats share counts as many times as there are repeats. The misfit counts ``correlation``
+    times, so that that many elements weigh as one.
+    """
+    names, number, rms = _axes(block)
+    scale = rms if block.scale is None else block.scale
+    missed = np.array([noise.misfit.get(name, 0.0) for name in names])[number] * rms
+    repeats = noise.repeats.get(block.condition, 1) * block.repeats
+    alike = 0.0 if block.alike is None else block.alike**2 * (1.0 + noise.alike * (repeats - 1.0))
+    wrong = (noise.budget * scale) ** 2 + correlation * missed**2
+    variance = np.asarray(block.sigma**2 + alike + repeats * noise.everywhere * wrong)
+    variance.flags.writeable = False
+    return variance
+
+
+def all_alike(noise: Noise) -> Noise:
+    """Return the noise for intervals: what a model gets wrong may be the same in all conditions.
+
+    Then more conditions do not average it out, any more than repeats do.
+    """
+    return replace(noise, everywhere=float(len(noise.repeats)))
+
+
+def log_scale(block: Block, noise: Noise) -> float:
+    """Logarithm of the determinant of the unshared variance, elements counted as in :func:`diagonal`.
+
+    In units of the variance without a misfit, which is that of every model, and less one for each element:
+    elements that a misfit leaves uncounted must gain nothing by it, whatever the unit.
+    """
+    once, known = diagonal(block, noise, correlation=1.0), diagonal(block, noise.sound)
+    return float(np.sum(once / diagonal(block, noise) * (np.log(once / known) - 1.0)))
+
+
+def log_shared(block: Block, noise: Noise, directions: Array) -> float:
+    """Return what the shared directions (n, k) add to the logarithm of the determinant if nothing is missed.
+
+    Elements that a misfit leaves uncounted say less about the errors that a whole run shares. That
+    must gain nothing either: else a model that misses a little is likelier than one that misses nothing.
+    """
+    scaled = directions / np.sqrt(diagonal(block, noise.sound))[:, None]
+    return float(np.linalg.slogdet(np.eye(scaled.shape[1]) + scaled.T @ scaled)[1])
+
+
+def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
+    """Directions of the errors that the whole block shares, (n, k), each of one standard deviation."""
+    zeros = block.zeros * (block.zero_sd * noise.zero_factor)
+    if block.role == "calibrate":
+        return zeros
+    unidentified = zeros[:, :0] if block.unidentified is None else block.unidentified
+    at = noise.scattering
+    return np.hstack([design[:, at] * (beta[at] * noise.scatter[at]), zeros, unidentified])
+
+
+def whitener(variance: Array, directions: Array) -> Whitener:
+    """Factor the covariance ``diag(variance) + directions @ directionsᵀ``."""
+    inverse_sd = 1.0 / np.sqrt(variance)
+    scaled = inverse_sd[:, None] * directions[:, directions.any(axis=0)]
+    power, turn = np.linalg.eigh(scaled.T @ scaled)
+    power = np.maximum(power, 0.0)
+    root = np.sqrt(1.0 + power)
+    # 1 − 1/root over the power, without the loss of digits where there is next to none of it.
+    return Whitener(inverse_sd, scaled @ turn, 1.0 / (root * (1.0 + root)))
+
+
+def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
+    """Return the standard deviation of measured less predicted, per row of the comparison table, (m,)."""
+    alone = replace(noise, repeats={block.condition: 1.0 / block.repeats}, misfit={})
+    unshared, directions = diagonal(block, alone), shared(block, noise, design, beta)
+    if block.synthesis is None:
+        return np.asarray(np.sqrt(unshared + (directions**2).sum(axis=1)))
+    spread = block.synthesis**2 @ unshared + ((block.synthesis @ directions) ** 2).sum(axis=1)
+    return np.asarray(np.sqrt(spread))
+
+
+def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Array]]) -> Noise:
+    """One step of expectation–maximisation for scatter, zeros and misfit, and what repeats share.
+
+    Scatter and zeros are drawn towards the prior, as if it were ``PRIOR_RUNS`` runs.
+
+    Parameters
+    ----------
+    parts : for each run: block, residual (n,), and directions (n, k) under ``noise``. The first p directions
+        of a run are those of the base parameters that scatter, then come its zeros.
+    """
+    at = prior.scattering
+    p = len(at)
+    amplitudes = {"scatter": [1.0] * PRIOR_RUNS, "zero": [1.0] * PRIOR_RUNS}
+    size = float(np.mean(noise.scatter[at] / prior.scatter[at])) if p else 1.0
+    pull: dict[str, float] = {}
+    weight: dict[str, float] = {}
+    residuals: list[tuple[Block, Array, Array]] = []
+    for block, residual, directions in parts:
+        if block.role == "calibrate":
+            continue
+        variance = diagonal(block, noise)
+        deviation, uncertain = amplitude(directions, residual, variance)
+        expected = deviation**2 + np.diag(uncertain)
+        amplitudes["scatter"] += [float(size**2 * expected[:p].mean())] if p else []
+        of_zeros = expected[p : p + block.zeros.shape[1]]
+        amplitudes["zero"] += [float(noise.zero_factor**2 * of_zeros.mean())] if len(of_zeros) else []
+        # The misfit as it is, not as it weighs: else it takes what the shared directions explain.
+        deviation, uncertain = amplitude(directions, residual, diagonal(block, noise, correlation=1.0))
+        left = residual - directions @ deviation
+        residuals.append((block, left, variance))
+        spread = left**2 + ((directions @ uncertain) * directions).sum(axis=1)
+        excess = spread - diagonal(block, noise.sound)
+        names, number, rms = _axes(block)
+        pulls = np.bincount(number, rms**2 * excess / variance**2)
+        weights = np.bincount(number, (rms**2 / variance) ** 2)
+        for name, one, other in zip(names, pulls, weights, strict=True):
+            pull[name] = pull.get(name, 0.0) + float(one)
+            weight[name] = weight.get(name, 0.0) + float(other)
+    factor = {key: float(np.sqrt(np.mean(values))) for key, values in amplitudes.items()}
+    misfit: dict[str, float] = {}
+    for name, pulled in pull.items():
+        square = max(0.0, pulled) / weight[name] if weight[name] else 0.0
+        before = noise.misfit.get(name, 0.0) ** 2
+        misfit[name] = math.sqrt(MISFIT_STEP * square + (1.0 - MISFIT_STEP) * before)
+    return replace(
+        noise,
+        scatter=prior.scatter * factor["scatter"],
+        zero_factor=min(factor["zero"], LARGEST_ZERO),
+        misfit=misfit,
+        alike=_alike(residuals),
+    )
+
+
+def _alike(residuals: Sequence[tuple[Block, Array, Array]]) -> float:
+    """How much of ``Block.alike`` repeats share, by the products of their residuals, plus a standard error.
+
+    Parameters
+    ----------
+    residuals : for each run: block, what is left of it (n,), and its variance (n,).
+    """
+    shared, possible = 0.0, 0.0
+    for (one, left, variance), (other, right, its) in combinations(residuals, 2):
+        if one.condition != other.condition or one.alike is None or other.alike is None:
+            continue
+        if one.alike.shape == other.alike.shape:  # else they are not the same waves
+            each = one.alike * other.alike / (variance * its)
+            shared += float(each @ (left * right))
+            possible += float(each @ (one.alike * other.alike))
+    return min(1.0, max(0.0, shared / possible) + 1.0 / math.sqrt(possible)) if possible else 1.0
+
+
+def amplitude(directions: Array, residual: Array, variance: Array) -> tuple[Array, Array]:
+    """Return the expected amplitude of each shared direction (k,), and the covariance of that."""
+    scaled = directions / np.sqrt(variance)[:, None]
+    covariance = np.asarray(np.linalg.inv(np.eye(scaled.shape[1]) + scaled.T @ scaled), dtype=float)
+    return covariance @ (scaled.T @ (residual / np.sqrt(variance))), covariance

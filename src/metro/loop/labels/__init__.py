@@ -1,0 +1,1 @@
+"""The loop where the measurement is a label, stable or unstable."""

@@ -1,0 +1,155 @@
+"""What labels say of the boundary: stable below it, unstable above, give or take what the model leaves out.
+
+The error of the model, in the logarithm of the depth, has three parts: one that all tests share, one of each
+speed (the boundary is wrong there for every depth), one of each test (where the operator draws the line). So
+the tests at one speed speak of one unknown depth, and their likelihood as a function of it is a table; tests
+at the same speed are never counted as if each were evidence of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from metro.units import Array
+
+# Shares of the variance of the model's error.
+SHARED, OF_SPEED, OF_TEST = 0.45, 0.45, 0.1
+_ERRORS = np.linspace(-4.0, 4.0, 33)  # of a speed, in standard deviations
+_GRID, _BEYOND = 300, 4.0  # depths of the table, to so many standard deviations beyond the tests
+# Chatter frequencies: standard deviation of the logarithm, share of those that follow no model (another mode,
+# once chatter is full grown), and the width over which these spread.
+FREQUENCY_SD, STRAY, STRAY_WIDTH = 0.07, 0.2, 3.0
+# Which line is the loudest: teeth that leave the cut modulate the vibration, so that it has lines at its own
+# frequency and at so many tooth frequencies from that (Insperger et al. 2003, Int. J. Mach. Tools Manuf. 43,
+# 25). Shares of the frequencies heard that follow the model.
+LINES = {0: 0.6, -1: 0.15, 1: 0.15, -2: 0.05, 2: 0.05}
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Tests with labels, of a problem of n tests at p points (speeds of cuts).
+
+    Attributes
+    ----------
+    point, depth, unstable, chatter_hz : (n,) place among the points; log of the depth in m; label 1 or 0;
+        frequency, Hz, or NaN.
+    rpm, tooth_hz : (p,) speed of each point, and frequency of its teeth, Hz.
+    model_sd, label_error : of the model, in the log of the depth; probability of a wrong label.
+    """
+
+    point: np.ndarray
+    depth: Array
+    unstable: Array
+    chatter_hz: Array
+    rpm: Array
+    tooth_hz: Array
+    model_sd: float
+    label_error: float
+
+    @property
+    def speeds(self) -> Array:
+        """(j,) speeds, each once: what is left out as a whole."""
+        tested: Array = np.unique(self.rpm[self.point])
+        return tested
+
+    def take(self, which: np.ndarray) -> Labels:
+        """Return the tests under a mask."""
+        return replace(
+            self,
+            point=self.point[which],
+            depth=self.depth[which],
+            unstable=self.unstable[which],
+            chatter_hz=self.chatter_hz[which],
+        )
+
+
+def unstable_probability(tests: Labels, boundary: Array, sd: float) -> Array:
+    """Probability that tests are unstable, at log depths of the boundary (..., n), in error by ``sd``."""
+    from scipy.special import ndtr
+
+    chance: Array = ndtr((tests.depth - boundary) / sd)
+    return tests.label_error + (1.0 - 2.0 * tests.label_error) * chance
+
+
+def own_sd(tests: Labels) -> float:
+    """Return the part of the model's error that is not shared by all tests."""
+    return tests.model_sd * float(np.sqrt(OF_SPEED + OF_TEST))
+
+
+def log_likelihood(
+    tests: Labels, depth: Array, chatter: Array, deviations: Array, unsure: Array | None = None
+) -> Array:
+    """Log-likelihood (t, s, j) of the tests at each of j speeds.
+
+    Parameters
+    ----------
+    depth, chatter : (t, p) log depth and chatter frequency (Hz) of t boundaries at all points.
+    deviations : (s, p) deviations of the log depth, what all tests share included.
+    unsure : (t, p) standard deviations of ``depth``, where it is not known exactly.
+    """
+    own = np.random.default_rng(0).standard_normal(deviations.shape)  # the same for all boundaries
+    total = np.zeros((len(depth), len(deviations), len(tests.speeds)))
+    for point in np.unique(tests.point):
+        here = tests.take(tests.point == point)
+        grid, log_chance = _table(here)
+        at = depth[:, None, point] + deviations[None, :, point]
+        if unsure is not None:
+            at = at + unsure[:, None, point] * own[None, :, point]
+        speed = np.searchsorted(tests.speeds, tests.rpm[point])
+        total[:, :, speed] += (
+            np.interp(at, grid, log_chance)
+            + _frequency(here, chatter[:, point], tests.tooth_hz[point])[:, None]
+        )
+    return total
+
+
+def _table(here: Labels) -> tuple[Array, Array]:
+    """Log depths of the boundary at one point, and the log-likelihood of the labels there."""
+    from scipy.special import logsumexp
+
+    margin = _BEYOND * here.model_sd
+    grid = np.linspace(here.depth.min() - margin, here.depth.max() + margin, _GRID)
+    weights = np.exp(-0.5 * _ERRORS**2)
+    moved = grid[:, None] + _ERRORS * here.model_sd * np.sqrt(OF_SPEED)
+    chance = unstable_probability(here, moved[..., None], here.model_sd * np.sqrt(OF_TEST))
+    each = np.log(np.where(here.unstable > 0.5, chance, 1.0 - chance)).sum(axis=-1)
+    return grid, np.asarray(logsumexp(each, b=weights / weights.sum(), axis=1))
+
+
+def _frequency(here: Labels, predicted: Array, tooth_hz: float) -> Array:
+    """Log-likelihood (t,) of the chatter frequencies at one point: their mean, as they share their cause."""
+    measured = here.chatter_hz[np.isfinite(here.chatter_hz)]
+    if not len(measured):
+        return np.zeros(len(predicted))
+    known = np.where(predicted > 0.0, predicted, np.nan)[:, None]
+    followed = np.zeros((len(predicted), len(measured)))
+    for line, share in LINES.items():
+        distance = np.log(measured / np.abs(known + line * tooth_hz)) / FREQUENCY_SD
+        density = np.exp(-0.5 * distance**2) / (np.sqrt(2.0 * np.pi) * FREQUENCY_SD)
+        followed += share * (1.0 - STRAY) * np.nan_to_num(density)
+    mean: Array = np.log(followed + STRAY / STRAY_WIDTH).mean(axis=1)
+    return mean
+
+
+def log_evidence(likelihood: Array, prior: Array) -> float:
+    """Log of the marginal likelihood: ``likelihood`` (t, s, j), ``prior`` (t,) weights of the boundaries."""
+    from scipy.special import logsumexp
+
+    total = likelihood.sum(axis=2)
+    return float(logsumexp(total, b=prior[:, None] / total.shape[1]))
+
+
+def left_out(likelihood: Array, prior: Array) -> Array:
+    """(j,) log-likelihood of the tests at each speed given those at all others."""
+    every = log_evidence(likelihood, prior)
+    speeds = range(likelihood.shape[2])
+    return np.array([every - log_evidence(np.delete(likelihood, j, axis=2), prior) for j in speeds])
+
+
+def posterior(likelihood: Array, prior: Array) -> Array:
+    """(t,) weights of the boundaries given the tests."""
+    total = likelihood.sum(axis=2)
+    weight: Array = prior * np.exp(total - total.max()).mean(axis=1)
+    return np.asarray(weight / weight.sum())

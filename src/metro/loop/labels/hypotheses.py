@@ -1,0 +1,318 @@
+"""Hypotheses on labels: sets of effects, their parameters drawn from their prior, and what they predict.
+
+Nothing is fitted: an effect is weighed by its marginal likelihood over the parameters that it may have.
+Parameters are points of a unit cube in which the prior is uniform. A quasi-random set covers it; where
+the tests leave but a few of its points, more are drawn about these, again and again, and all are weighed by
+the density that they were drawn from (adaptive multiple importance sampling, Cornuet et al., Scand. J. Stat.
+39 (2012) 798).
+
+The boundary is solved at some of the points: first all over the prior, then where the tests leave them. At
+the others it is a quick estimate, corrected by what was learnt where it was solved
+(:mod:`metro.loop.labels.kriging`); how unsure that correction is counts as uncertainty of the boundary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from metro.effects.effect import Effect, EffectParameter, by_name
+from metro.loop.labels.evidence import Labels, log_evidence, log_likelihood, posterior
+from metro.loop.labels.kriging import krige
+from metro.units import JSON, Array
+
+_MOST, _MOST_EACH = 256, 64  # points of a set, and of each parameter
+_ROUNDS = 12  # sets after the first, at most
+_ENOUGH, _ENOUGH_JOINED = 100.0, 50.0  # effective points at which no more are drawn
+_SURE = 0.04  # mean deviation of the log depth that is learnt, at which no more are solved
+_SPREAD, _SPREAD_EACH = 8, 4  # points of the first set where the boundary is solved, and of each parameter
+_BEYOND = 1.0  # natural logarithm of depth beyond those tested, at which boundaries are all alike
+_CENTRES, _LEAST_WIDTH = 64, 0.02  # of clouds, in the unit cube
+Change = Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
+class LabelEvidence:
+    """What hypotheses are weighed by.
+
+    Attributes
+    ----------
+    predict : ``predict(change)`` is the log depth (p,) and the chatter frequency (p,) at the boundary at all
+        points, once ``change`` has been made to the models.
+    estimate : the same (t, p), roughly and quickly, for t changes.
+    tests : with their labels. deviations : (s, p) of the log depth, by what the base model is uncertain.
+    seed : of the draws.
+    """
+
+    predict: Callable[[Change], tuple[Array, Array]]
+    estimate: Callable[[Sequence[Change]], tuple[Array, Array]]
+    tests: Labels
+    deviations: Array
+    seed: int
+
+    def testable(self, log_depth: Array) -> Array:
+        """Return log depths, within the range in which the tests can tell one from another."""
+        tested = self.tests.depth
+        return np.clip(log_depth, tested.min() - _BEYOND, tested.max() + _BEYOND)
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """Effects and what they predict, for t values of their parameters.
+
+    Attributes
+    ----------
+    effects : those that act; none: the base model.
+    cube : (t, d) points of the unit cube. theta : (t, d) parameters there, in the units of the contract.
+    prior : (t,) weights.
+    depth, chatter : (t, p) log depth (m) and chatter frequency (Hz) at the boundary, at all points.
+    unsure : (t, p) standard deviation of ``depth``, as far as it is not solved but learnt.
+    likelihood : (t, s, j) log-likelihood of the tests at each speed, for s deviations of the base.
+    """
+
+    effects: tuple[Effect, ...]
+    cube: Array
+    theta: Array
+    prior: Array
+    depth: Array
+    chatter: Array
+    unsure: Array
+    likelihood: Array
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(effect.name for effect in self.effects)
+
+    @property
+    def log_evidence(self) -> float:
+        """Log of the marginal likelihood of the tests."""
+        return log_evidence(self.likelihood, self.prior)
+
+    @property
+    def weights(self) -> Array:
+        """(t,) posterior weights of the parameters."""
+        return posterior(self.likelihood, self.prior)
+
+    @property
+    def in_doubt(self) -> Array:
+        """(t,) shares of what the boundary, where it is learnt, leaves open of the weights."""
+        doubt = self.weights * self.unsure.mean(axis=1)
+        return np.asarray(doubt / doubt.sum())
+
+    @property
+    def likeliest(self) -> Callable[[Any], Any]:
+        """Return what the effects do to a model with the parameters of the highest posterior density."""
+        return changed(self, int(np.argmax(self.weights / self.prior)))
+
+    def parameters(self, name: str) -> JSON:
+        """Medians and 95 % intervals of the parameters of one effect; of a choice, the likelier one."""
+        parameters = _parameters(self.effects)
+        place = [i for i, (owner, _) in enumerate(parameters) if owner.name == name]
+        entries = [_estimate(parameters[i][1], self.theta[:, i], self.weights) for i in place]
+        return by_name(tuple(parameters[i][1] for i in place), entries)
+
+
+def hypothesis(
+    effects: tuple[Effect, ...], evidence: LabelEvidence, known: Hypothesis | None = None
+) -> Hypothesis:
+    """Draw the parameters of the effects and weigh them by the tests.
+
+    ``known``: the hypothesis that the first of the effects act alone, about whose parameters more are drawn.
+    """
+    from scipy.stats import qmc
+
+    size = len(_parameters(effects))
+    if not size:
+        depth, chatter = (part[None] for part in evidence.predict(_change((), np.zeros(0))))
+        sure = np.zeros_like(depth)
+        likelihood = log_likelihood(evidence.tests, depth, chatter, evidence.deviations)
+        none = np.zeros((1, 0))
+        return Hypothesis((), none, none, np.ones(1), depth, chatter, sure, likelihood)
+    rng = np.random.default_rng(evidence.seed)
+    drawn = _Drawn(effects, evidence, np.zeros((0, size))).longer(
+        qmc.Sobol(size, seed=evidence.seed).random(_count(size))
+    )
+    if known:
+        drawn = drawn.about(known, rng)
+    spread = (_SPREAD + _SPREAD_EACH * size) // (2 if known else 1)
+    enough = _ENOUGH_JOINED if known else _ENOUGH
+    drawn = drawn.solved_at(np.linspace(0, len(drawn.cube) - 1, spread).astype(int))
+    weighed = drawn.weighed()
+    for _ in range(_ROUNDS):
+        drawn = drawn.solved_at(_thinned(weighed.in_doubt, spread // 2, rng)).about(weighed, rng)
+        weighed = drawn.weighed()
+        enough_points = 1.0 / np.sum(weighed.weights**2) >= enough
+        if enough_points and float((weighed.weights @ weighed.unsure).mean()) < _SURE:
+            break
+    return weighed
+
+
+def _count(size: int) -> int:
+    """Points of a set, for so many parameters."""
+    return min(_MOST, _MOST_EACH * size)
+
+
+def _thinned(weights: Array, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Return indices (count,) of points, evenly by weight."""
+    share = (np.arange(count) + rng.random()) / count
+    thinned: np.ndarray = np.searchsorted(np.cumsum(weights), share).clip(max=len(weights) - 1)
+    return thinned
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """Points (t, d) of the cube, the clouds that some were drawn from, and those that are solved.
+
+    ``estimate``: log depth and frequency (t, p) at all; ``at`` (n,) indices and ``exact`` log depth and
+    frequency (n, p) of those solved.
+    """
+
+    effects: tuple[Effect, ...]
+    evidence: LabelEvidence
+    cube: Array
+    clouds: tuple[_Nearby, ...] = ()
+    estimate: tuple[Array, ...] = ()
+    at: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    exact: tuple[Array, ...] = ()
+
+    def longer(self, points: Array) -> _Drawn:
+        """Estimate the boundary at more points."""
+        estimate = self.evidence.estimate(
+            [_change(self.effects, row) for row in _theta(self.effects, points)]
+        )
+        return replace(
+            self, cube=np.concatenate([self.cube, points]), estimate=_longer(self.estimate, estimate)
+        )
+
+    def about(self, centre: Hypothesis, rng: np.random.Generator) -> _Drawn:
+        """Draw more points about the heavy ones of a hypothesis."""
+        cloud = _about(centre, rng)
+        points = cloud.drawn(rng, self.cube.shape[1])
+        return replace(self.longer(points), clouds=(*self.clouds, cloud))
+
+    def solved_at(self, which: np.ndarray) -> _Drawn:
+        """Solve the boundary at some of the points."""
+        fresh = np.setdiff1d(which, self.at)
+        if not len(fresh):
+            return self
+        changes = [_change(self.effects, row) for row in _theta(self.effects, self.cube[fresh])]
+        boundaries = [self.evidence.predict(change) for change in changes]
+        solved = tuple(np.stack(part) for part in zip(*boundaries, strict=True))
+        return replace(self, at=np.append(self.at, fresh), exact=_longer(self.exact, solved))
+
+    def weighed(self) -> Hypothesis:
+        """Weigh all points by the tests."""
+        (rough, hz), (solved, solved_hz), cube = self.estimate, self.exact, self.cube
+        rough, solved = self.evidence.testable(rough), self.evidence.testable(solved)
+        learnt = krige(cube[self.at], solved - rough[self.at])
+        correction, unsure = learnt(cube)
+        depth = rough + correction
+        chatter = hz * (solved_hz / hz[self.at])[learnt.nearest(cube)]
+        tests, deviations = self.evidence.tests, self.evidence.deviations
+        likelihood = log_likelihood(tests, depth, chatter, deviations, unsure)
+        density = np.ones(len(cube))  # that of the first set; all sets have equally many points
+        for cloud in self.clouds:
+            density += cloud.density(cube)
+        prior = (1.0 / density) / np.sum(1.0 / density)
+        theta = _theta(self.effects, cube)
+        return Hypothesis(self.effects, cube, theta, prior, depth, chatter, unsure, likelihood)
+
+
+def _longer(first: tuple[Array, ...], second: tuple[Array, ...]) -> tuple[Array, ...]:
+    return tuple(np.concatenate(pair) for pair in zip(first, second, strict=True)) if first else second
+
+
+def _theta(effects: tuple[Effect, ...], cube: Array) -> Array:
+    """Parameters (t, d) at points of the cube."""
+    columns = [quantile(p, cube[:, i]) for i, (_, p) in enumerate(_parameters(effects))]
+    return np.stack(columns, axis=1)
+
+
+def _applied(model: Any, effects: tuple[Effect, ...], theta: Array) -> Any:
+    first = 0
+    for effect in effects:
+        last = first + len(effect.parameters)
+        model = effect.apply(model, effect.values(theta[first:last]))
+        first = last
+    return model
+
+
+def _change(effects: tuple[Effect, ...], theta: Array) -> Callable[[Any], Any]:
+    return lambda model: _applied(model, effects, theta)
+
+
+def changed(chosen: Hypothesis, which: int) -> Callable[[Any], Any]:
+    """Return what the effects do to a model with their parameters of index ``which``."""
+    return _change(chosen.effects, chosen.theta[which])
+
+
+@dataclass(frozen=True)
+class _Nearby:
+    """Normal clouds about points (h, c), folded back at the faces of the cube; ``width`` (c,).
+
+    They tell of its first c coordinates; the others are uniform.
+    """
+
+    centres: Array
+    width: Array
+
+    def drawn(self, rng: np.random.Generator, size: int) -> Array:
+        """Points (n, size)."""
+        points = rng.random((_count(size), size))
+        near = self.centres[rng.integers(len(self.centres), size=len(points))]
+        near = near + self.width * rng.standard_normal(near.shape)
+        points[:, : near.shape[1]] = 1.0 - np.abs(1.0 - near % 2.0)
+        return points
+
+    def density(self, cube: Array) -> Array:
+        """Density (t,) at points (t, d)."""
+        at = cube[:, None, : self.centres.shape[1]]
+        images = (self.centres, -self.centres, 2.0 - self.centres)
+        near = sum((np.exp(-0.5 * ((at - image) / self.width) ** 2) for image in images), np.zeros(1))
+        peak = np.prod(self.width * np.sqrt(2.0 * np.pi))
+        density: Array = near.prod(axis=2).mean(axis=1) / peak
+        return density
+
+
+def _about(centre: Hypothesis, rng: np.random.Generator) -> _Nearby:
+    weights, cube = centre.weights, centre.cube
+    spread = np.sqrt(weights @ (cube - weights @ cube) ** 2)
+    width = spread * (np.sum(weights**2)) ** (1.0 / (4 + cube.shape[1]))  # Silverman's rule
+    return _Nearby(cube[_thinned(weights, _CENTRES, rng)], np.clip(width, _LEAST_WIDTH, 0.5))
+
+
+def quantile(parameter: EffectParameter, share: Array) -> Array:
+    """Value of a parameter below which its prior has a ``share`` (n,).
+
+    A choice: each alike. Plausible about zero: normal within the bounds. Positive: flat in the logarithm.
+    """
+    from scipy.special import ndtr, ndtri
+
+    low, high = parameter.lower, parameter.upper
+    if parameter.choices:
+        return np.minimum(np.floor(share * len(parameter.choices)), len(parameter.choices) - 1.0)
+    if parameter.plausible is not None:
+        below, above = ndtr(np.array([low, high]) / parameter.plausible)
+        return np.asarray(parameter.plausible * ndtri(below + share * (above - below)))
+    if low > 0.0:
+        return np.asarray(low * (high / low) ** share)
+    return low + share * (high - low)
+
+
+def _parameters(effects: tuple[Effect, ...]) -> list[tuple[Effect, EffectParameter]]:
+    return [(effect, parameter) for effect in effects for parameter in effect.parameters]
+
+
+def _estimate(parameter: EffectParameter, values: Array, weights: Array) -> JSON:
+    if parameter.choices:
+        share = [float(weights[values == i].sum()) for i in range(len(parameter.choices))]
+        first = int(np.argmax(share))
+        return {"value": parameter.choices[first], "ci95": None, "unit": "", "probability": share[first]}
+    order = np.argsort(values)
+    below = np.cumsum(weights[order]) - 0.5 * weights[order]
+    low, middle, high = np.interp([0.025, 0.5, 0.975], below, values[order])
+    return {"value": float(middle), "ci95": [float(low), float(high)], "unit": parameter.unit}

@@ -1,0 +1,104 @@
+"""Which test to make next: the speed and depth whose label would tell most about what holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from metro.loop.labels.hypotheses import Hypothesis, changed
+from metro.loop.labels.search import NOTHING, LabelOutcome, Weighed
+from metro.loop.labels.unknown import UNKNOWN, curves
+from metro.loop.statement import Statement
+from metro.observables.labelled import Labelled
+from metro.units import MM, Array
+
+_DEPTHS = 9  # tried, from the least to the greatest that was tested
+_DRAWS = 12  # parameters of each hypothesis, by their posterior
+_WORTH = 0.02  # probability of a hypothesis below which it is not asked about
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """A test that could be made.
+
+    Attributes
+    ----------
+    rpm, depth : rev/min and m.
+    information : mutual information of its label and the hypothesis, bits.
+    leading, leading_now : expected probability of the hypothesis that leads after the test, and that of the
+        one that leads now.
+    """
+
+    rpm: float
+    depth: float
+    information: float
+    leading: float
+    leading_now: float
+
+    @property
+    def statement(self) -> Statement:
+        """Its speed and depth."""
+        return Statement("test", {"rpm": self.rpm, "depth_mm": self.depth / MM})
+
+
+def next_tests(problem: Labelled, outcome: LabelOutcome) -> list[NextTest]:
+    """Try tests between the speeds that were tested, within their depths; the most telling first."""
+    speeds = np.unique(problem.point_rpm)
+    between = 0.5 * (speeds[1:] + speeds[:-1])
+    used = problem.depth[problem.point >= 0]
+    depth = np.geomspace(used.min(), used.max(), _DEPTHS)
+    asked = [one for one in outcome.weighed if one.probability > _WORTH]
+    prior = np.array([one.probability for one in asked])
+    prior /= prior.sum()
+    chance = np.stack([_chance(problem, one, between, depth, outcome) for one in asked])
+    joint = np.stack([chance, 1.0 - chance]) * prior[:, None, None]
+    label = joint.sum(axis=1)
+    information = np.sum(joint * np.log2(joint / (label[:, None] * prior[:, None, None])), axis=(0, 1))
+    leading = joint.max(axis=1).sum(axis=0)
+    order = np.argsort(-information, axis=None)
+    places = [np.unravel_index(place, information.shape) for place in order]
+    now = float(prior.max())
+    return [
+        NextTest(float(between[i]), float(depth[j]), float(information[i, j]), float(leading[i, j]), now)
+        for i, j in places
+    ]
+
+
+def _chance(problem: Labelled, one: Weighed, rpm: Array, depth: Array, outcome: LabelOutcome) -> Array:
+    """Probability (k, d) that tests are unstable, if the hypothesis holds."""
+    from scipy.special import ndtr
+
+    tests, mine = outcome.evidence.tests, one.hypothesis
+    heavy = _drawn(mine, outcome.evidence.seed)
+    if one.names == (UNKNOWN,):
+        base = problem.boundary_at(lambda model: model, rpm)
+        boundary = base + curves(mine, outcome.base_boundary, (rpm, outcome.evidence.testable(base)))[heavy]
+    else:
+        boundary = np.stack([problem.boundary_at(changed(mine, which), rpm) for which in heavy])
+    chance: Array = ndtr((np.log(depth) - boundary[:, :, None]) / tests.model_sd).mean(axis=0)
+    return tests.label_error + (1.0 - 2.0 * tests.label_error) * chance
+
+
+def _drawn(mine: Hypothesis, seed: int) -> np.ndarray:
+    count = min(_DRAWS, len(mine.prior))
+    return np.random.default_rng(seed).choice(len(mine.prior), size=count, p=mine.weights)
+
+
+def advice(tests: Sequence[NextTest], outcome: LabelOutcome) -> Statement:
+    """State which test would be most informative, and what it promises."""
+    best = tests[0]
+    lead = outcome.lead.names if outcome.lead else ()
+    names = [*lead, *outcome.rivals] or [NOTHING]
+    promise = {"information": best.information, "leading": best.leading, "leading_now": best.leading_now}
+    return Statement("next_test", {"test": best.statement, "names": names, **promise})
+
+
+def beside(rows: pd.DataFrame) -> Statement:
+    """State what to test next where no effect is in question: where the prediction is least sure."""
+    if rows.empty:
+        return Statement("any_tests")
+    closest = rows.iloc[int(np.argmin(np.abs(rows["after"].to_numpy() - 0.5)))]
+    return Statement("test_beside", {"run": str(closest["run"]), "probability": float(closest["after"])})

@@ -1,0 +1,64 @@
+"""Whether labels contradict a hypothesis: against labels drawn from it with all its errors.
+
+What a model gets wrong is the same in many tests: labels of one speed, and of all, are wrong together. Drawn
+one by one they would be too seldom wrong by chance, and tests that are each a little unlikely, but all the
+same way, would not count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from metro.loop.labels.evidence import OF_SPEED, OF_TEST, Labels, log_evidence, log_likelihood
+from metro.loop.labels.hypotheses import Hypothesis
+from metro.units import Array
+
+DRAWS = 400
+_BOUNDARIES = 12  # of a hypothesis, by their weights
+
+
+def drawn(tests: Labels, boundary: Array, rng: np.random.Generator) -> Array:
+    """Labels (n,) of tests, drawn with the errors of speeds and tests; ``boundary`` (p,) log depth."""
+    speeds = np.searchsorted(tests.speeds, tests.rpm[tests.point])
+    at = boundary[tests.point]
+    at = at + tests.model_sd * OF_SPEED**0.5 * rng.standard_normal(len(tests.speeds))[speeds]
+    at = at + tests.model_sd * OF_TEST**0.5 * rng.standard_normal(len(speeds))
+    wrong = rng.random(len(speeds)) < tests.label_error
+    return np.asarray((tests.depth > at) ^ wrong, dtype=float)
+
+
+def surprise(tests: Labels, mine: Hypothesis, deviations: Array, seed: int) -> float:
+    """Probability that labels drawn from a hypothesis are at least as unlikely as those measured.
+
+    Parameters
+    ----------
+    deviations : (s, p) of the log depth by what the base model is uncertain of and what all tests share.
+    """
+    if not len(tests.depth):
+        return 1.0
+    rng = np.random.default_rng([seed, 3])
+    chosen = rng.choice(len(mine.prior), size=min(_BOUNDARIES, len(mine.prior)), p=mine.weights)
+    depth = mine.depth[chosen]
+    silent = replace(tests, chatter_hz=np.full(len(tests.depth), np.nan))
+    places = [tests.point == point for point in np.unique(tests.point)]
+    known: dict[tuple[int, bytes], Array] = {}  # log-likelihood (t, s, 1) of labels of a place
+
+    def evidence(labels: Array) -> float:
+        here = [(i, labels[place].tobytes()) for i, place in enumerate(places)]
+        for key in here:
+            if key not in known:
+                place = silent.take(places[key[0]])
+                known[key] = log_likelihood(
+                    replace(place, unstable=labels[places[key[0]]]), depth, depth, deviations
+                )
+        total = np.sum([known[key] for key in here], axis=0)
+        return log_evidence(total, np.full(len(depth), 1.0 / len(depth)))
+
+    measured = evidence(tests.unstable)
+    below = 0
+    for _ in range(DRAWS):
+        boundary = depth[rng.integers(len(depth))] + deviations[rng.integers(len(deviations))]
+        below += evidence(drawn(tests, boundary, rng)) <= measured + 1e-9
+    return (1 + below) / (1 + DRAWS)

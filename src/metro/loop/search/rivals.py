@@ -1,0 +1,111 @@
+"""Rivals: other effects in the place of one that was chosen, refitted with all the others.
+
+An effect that was added first may have stood for one that fits better once the others are known; and what
+explains the runs as well, on conditions left out, is named beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from metro.effects.effect import Effect
+from metro.loop.checks.evidence import leave_out, weights
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import Fit, fit
+from metro.loop.fitting.noise import Noise
+from metro.loop.search.trial import Gates, unlike, without
+
+RIVAL_WEIGHT = 0.05
+HOPELESS = 12.0  # log-likelihood on the runs of the fit by which a rival may be behind and still be weighed
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An effect in the place of one that was chosen: names of both, weight of the other, and its fit.
+
+    The names are with their forms (``friction_reversal (joint 3)``) where two forms of one effect are rivals.
+    """
+
+    effect: str
+    other: str
+    weight: float
+    fit: Fit
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """The two names."""
+        return self.effect, self.other
+
+
+@dataclass(frozen=True)
+class Contest:
+    """The model after the contest, the weight of each of its effects, and the rivals that stay undecided."""
+
+    final: Fit
+    weight: dict[str, float] = field(default_factory=dict)
+    rivals: tuple[Rival, ...] = ()
+
+
+def believed(effect: Effect, weight: float) -> tuple[bool, float]:
+    """Order of belief: what is not of the library comes after all that is and has a weight that counts."""
+    return not effect.resembled and weight > RIVAL_WEIGHT, weight
+
+
+def contested(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> Contest:
+    """Weigh every effect chosen against each other effect in its place, and put the better one there."""
+    swapped: set[tuple[str, str]] = set()
+    while True:
+        contest, better = _round(current, effects, prior, gates)
+        if better is None or set(_keys(better)) <= swapped:
+            return contest
+        swapped |= set(_keys(current)) | set(_keys(better))
+        current = better
+
+
+def _titles(chosen: Effect, other: Effect) -> tuple[str, str]:
+    """Names of two effects, with their forms where the name is the same."""
+    if chosen.name != other.name:
+        return chosen.name, other.name
+    return f"{chosen.name} ({chosen.form})", f"{other.name} ({other.form})"
+
+
+def _keys(fitted: Fit) -> list[tuple[str, str]]:
+    return [effect.key for effect in fitted.candidate.effects]
+
+
+def _round(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> tuple[Contest, Fit | None]:
+    """Contest each effect once; also the fit with the best rival in place, where one is better."""
+    weight: dict[str, float] = {}
+    rivals: list[Rival] = []
+    better: Fit | None = None
+    out = leave_out(current, prior) if current.candidate.effects else {}
+    for effect in current.candidate.effects:
+        smaller = without(current, tuple(e for e in current.candidate.effects if e is not effect), prior)
+        others = _replaced(current, smaller, effects, prior)
+        in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
+        left_out = [leave_out(smaller, prior), out, *(leave_out(fitted, prior) for fitted in others)]
+        share = weights(left_out, gates.seed, prior=[1.0, *(one.odds for one in in_place)])[1:]
+        weight[effect.name] = float(share[0])
+        for fitted, other in zip(others, share[1:], strict=True):
+            if other > RIVAL_WEIGHT:
+                rivals.append(Rival(*_titles(effect, fitted.candidate.effects[-1]), float(other), fitted))
+        belief = [believed(one, float(part)) for one, part in zip(in_place, share, strict=True)]
+        first = belief.index(max(belief))
+        if better is None and first > 0:
+            better = others[first - 1]
+    return Contest(current, weight, tuple(rivals)), better
+
+
+def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Noise) -> list[Fit]:
+    """Fit every other effect in place of the one that ``smaller`` lacks; those not far behind."""
+    others = {effect.name for effect in smaller.candidate.effects}
+    present = set(_keys(current))
+    fits = []
+    for effect in effects:
+        if effect.name not in others and effect.key not in present:
+            candidate = Candidate(current.candidate.base, (*smaller.candidate.effects, effect))
+            fitted = fit(candidate, current.blocks, prior, smaller)
+            if fitted.total > current.total - HOPELESS and not unlike(effect, fitted):
+                fits.append(fitted)
+    return fits

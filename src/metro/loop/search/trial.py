@@ -1,0 +1,186 @@
+"""Trials: one effect fitted jointly with what a model has already, and the gates that it must pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from metro.effects.effect import Effect
+from metro.loop.checks import signature as residual
+from metro.loop.checks.evidence import Evidence, compare, hold_out, leave_out, missed, weights
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import Fit, fit
+from metro.loop.fitting.noise import Noise
+from metro.loop.statement import Statement
+from metro.observables.problem import Block, Limited
+from metro.units import Array
+
+LEAST_BETTER = 0.4
+HALF_INTERVAL = 2.0  # standard deviations: half a 95 % interval
+OF_THE_RESIDUAL = 0.5  # an effect smaller than this share of what stays unexplained may be part of that
+
+
+@dataclass(frozen=True)
+class Gates:
+    """Thresholds of the configuration.
+
+    Attributes
+    ----------
+    model_form_budget : relative to the signal.
+    materiality : least relative change of the prediction.
+    false_additions : rate of false discoveries over the candidates.
+    held_out_gain : least gain in log-likelihood on conditions left out.
+    seed : of the bootstraps.
+    """
+
+    model_form_budget: float
+    materiality: float
+    false_additions: float
+    held_out_gain: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One effect tried on top of those already chosen; ``why_not``: why it may not be added, None: it may."""
+
+    effect: Effect
+    fit: Fit
+    evidence: Evidence
+    q_value: float = 1.0
+    weight: float = 0.0
+    why_not: Statement | None = None
+
+
+def tried(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, least: float) -> list[Trial]:
+    """Fit each effect jointly with what is there, compare, and apply the gates.
+
+    Conditions are left out only for effects that pass the gates before.
+    """
+    trials = []
+    for effect in effects:
+        candidate = Candidate(current.candidate.base, (*current.candidate.effects, effect))
+        larger = fit(candidate, current.blocks, prior, current)
+        trials.append(Trial(effect, larger, compare(current, larger)))
+    p_values = [trial.evidence.p_value for trial in trials]
+    q_values = residual.q_values(p_values)
+    trials = [
+        replace(
+            trial,
+            q_value=float(q),
+            why_not=unsettled(trial.fit)
+            or _why_not(trial.evidence, float(q), gates, least)
+            or (Statement("unlike") if unlike(trial.effect, trial.fit) else None),
+        )
+        for trial, q in zip(trials, q_values, strict=True)
+    ]
+    return _held_out(current, trials, prior, gates)
+
+
+def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> list[Trial]:
+    """Apply the held-out gate, and weigh the candidates against each other and against adding nothing."""
+    if all(trial.why_not for trial in trials):
+        return trials
+    out = leave_out(current, prior)
+    trials = [
+        trial if trial.why_not else replace(trial, evidence=hold_out(trial.evidence, out, trial.fit, prior))
+        for trial in trials
+    ]
+    weighed = [trial for trial in trials if not trial.why_not]
+    nothing = dict.fromkeys(out, 0.0)
+    odds = [1.0, *(trial.effect.odds for trial in weighed)]
+    gains = [nothing, *(trial.evidence.held_out for trial in weighed)]
+    share = weights(gains, gates.seed, prior=odds)[1:]
+    weight = {trial.effect.key: float(value) for trial, value in zip(weighed, share, strict=True)}
+    return [
+        replace(
+            trial,
+            weight=weight.get(trial.effect.key, 0.0),
+            why_not=trial.why_not or _not_held_out(trial.evidence, gates),
+        )
+        for trial in trials
+    ]
+
+
+def unsettled(fitted: Fit) -> Statement | None:
+    """Return why a fit is no result; None where it is one.
+
+    It did not converge, or determines no parameter of an effect, or these would have to be larger than they
+    may be, or its model does not hold there.
+    """
+    if not fitted.converged:
+        return Statement("not_converged", {"step": fitted.step})
+    variance = np.diag(fitted.covariance)[len(fitted.beta) :] * fitted.dispersion
+    half = HALF_INTERVAL * np.sqrt(np.maximum(variance, 0.0))
+    parts = fitted.candidate.parts(fitted.theta)
+    reasons = (_undetermined(effect, fitted.theta[place], half[place]) for effect, place in parts)
+    return next(filter(None, reasons), None) or beyond(fitted, fitted.blocks)
+
+
+def _undetermined(effect: Effect, value: Array, half: Array) -> Statement | None:
+    """Return why the parameters of an effect are no result; None where they are one.
+
+    The interval of each is as wide as its bounds, or an identified one is at a bound: it would be beyond.
+    """
+    settled = False
+    for parameter, at, width in zip(effect.parameters, value.tolist(), half.tolist(), strict=True):
+        if parameter.period is not None:
+            identified = 2.0 * width < parameter.period
+        else:
+            identified = at - width > parameter.lower or at + width < parameter.upper
+            if identified and at in {parameter.lower, parameter.upper} - {parameter.neutral}:
+                return Statement("implausible", {"parameter": parameter.name, "bound": at})
+        settled = settled or identified
+    return None if settled else Statement("undetermined")
+
+
+def beyond(fitted: Fit, blocks: Sequence[Block]) -> Statement | None:
+    """Name the first of ``blocks`` for which a fitted model has no prediction, and why; None: it has all."""
+    model = fitted.candidate.model(fitted.theta)
+    if not isinstance(model, Limited):
+        return None
+    reasons = ((block.run, model.beyond(block, fitted.beta)) for block in blocks)
+    return next((Statement("no_prediction", {"run": run, "why": why}) for run, why in reasons if why), None)
+
+
+def _why_not(evidence: Evidence, q: float, gates: Gates, least: float) -> Statement | None:
+    if q > gates.false_additions:
+        by_chance = q if evidence.p_value <= gates.false_additions else None
+        return Statement("no_evidence", {"p_value": evidence.p_value, "q_value": by_chance})
+    if evidence.size < least:
+        return Statement("immaterial", {"size": evidence.size, "least": least})
+    if evidence.size < OF_THE_RESIDUAL * evidence.missed:
+        return Statement("small_beside_residual", {"size": evidence.size, "missed": evidence.missed})
+    return None
+
+
+def _not_held_out(evidence: Evidence, gates: Gates) -> Statement | None:
+    if evidence.gain < gates.held_out_gain:
+        return Statement("no_gain", {"gain": evidence.gain, "needed": gates.held_out_gain})
+    if evidence.better_share < LEAST_BETTER:
+        return Statement("better_in_few", {"share": evidence.better_share})
+    return None
+
+
+def unlike(effect: Effect, fitted: Fit) -> bool:
+    """Whether an effect that is not of the library leaves a significant residual: no likeness then.
+
+    Where much stays unexplained, what has more freedom comes nearer to it, whatever the cause.
+    """
+    budget = fitted.noise.budget
+    if not effect.resembled or missed(fitted) <= budget:
+        return False
+    return bool(residual.share_left(residual.signature(fitted, budget)))
+
+
+def without(current: Fit, kept: tuple[Effect, ...], prior: Noise) -> Fit:
+    """Refit with the effects that are kept, from the base up."""
+    first = Candidate(current.candidate.base)
+    fitted = fit(first, current.blocks, prior)
+    for effect in kept:
+        fitted = fit(
+            Candidate(first.base, (*fitted.candidate.effects, effect)), current.blocks, prior, fitted
+        )
+    return fitted

@@ -1,0 +1,1 @@
+"""The verdict on an observable and the story of how it was reached."""

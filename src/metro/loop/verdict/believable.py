@@ -1,0 +1,62 @@
+"""When nothing is attributed: the data contradict the batch, or the model misses half of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.search.outcome import Outcome, withdrawn
+from metro.loop.statement import Statement
+from metro.observables.problem import Problem
+from metro.units import JSON
+
+HALF = 0.5  # of the signal, beyond the noise: a base model that misses more is not one of this cut
+
+
+def believable(problem: Problem, outcome: Outcome) -> Outcome:
+    """Return the outcome, without its effects where even with these the model misses half of the signal.
+
+    The effects of the library are changes of a model that is right in the main. Judged on held-out runs,
+    beyond their noise.
+    """
+    if not outcome.names:
+        return outcome
+    missed = _missed(problem, outcome)
+    if missed <= HALF:
+        return outcome
+    return withdrawn(outcome, Statement("misses_half", {"share": missed}))
+
+
+def _missed(problem: Problem, outcome: Outcome) -> float:
+    """Error of the final model on held-out runs beyond their noise, relative to the signal."""
+    rows = comparison(problem, held_out(problem, outcome.final))
+    if not len(rows):
+        return 0.0
+    measured, predicted = rows["measured"].to_numpy(float), rows["before"].to_numpy(float)
+    noise = float(np.mean(rows["sigma"].to_numpy(float) ** 2))
+    error = float(np.mean((measured - predicted) ** 2))
+    return math.sqrt(max(error - noise, 0.0) / max(float(np.mean(measured**2)), 1e-300))
+
+
+def with_share(verdict: JSON) -> JSON:
+    """Return an observable's verdict, with the share of the signal that is missed where it is over half."""
+    after, floor = verdict["after"], verdict["noise_floor"] or 0.0
+    if not after or not after["rms"] or verdict["unit"] == "1":
+        return verdict
+    share = after["nrmse"] * math.sqrt(max(after["rms"] ** 2 - floor**2, 0.0)) / after["rms"]
+    return {**verdict, "misses": share} if share > HALF else verdict
+
+
+def contradicted(verdict: JSON) -> JSON:
+    """Return an observable's verdict where a contradiction was found: no cause, correct the batch first."""
+    return {
+        **verdict,
+        "status": "unexplained",
+        "effects": [],
+        "indistinguishable": [],
+        "contradicted": True,
+        "next_experiment": Statement("correct_first"),
+        "unexplained": {"rms": None, "unit": verdict["unit"], "signature": Statement("contradiction")},
+    }

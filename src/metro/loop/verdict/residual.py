@@ -1,0 +1,107 @@
+"""What remains of an observable's residual when the search is through, and what it resembles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from metro.effects.effect import Effect
+from metro.loop.checks.signature import Line, places, signature
+from metro.loop.fitting.fit import Fit, score
+from metro.loop.search.outcome import Outcome
+from metro.loop.search.trial import Gates, beyond, unsettled
+from metro.loop.statement import Statement
+from metro.observables.problem import Block, Problem
+from metro.units import JSON, Array
+
+LEAST_RUNS = 2  # to identify on
+WORSE = 2.0  # times the least residual that counts: on unseen runs, errors of the parameters add to it
+
+
+@dataclass(frozen=True)
+class Residual:
+    """The significant residual: its ``parts``, one statement each, none where nothing significant remains.
+
+    ``fit`` and ``lines`` are those that it was seen in: of the held-out runs where it shows in these alone.
+    """
+
+    parts: tuple[Statement, ...]
+    fit: Fit
+    lines: tuple[Line, ...]
+
+    @property
+    def statement(self) -> Statement:
+        """All parts in one statement."""
+        return Statement("residual", {"parts": self.parts})
+
+
+def enough_runs(problem: Problem) -> bool:
+    """Whether there are runs to fit and runs to judge by."""
+    return len(problem.role("identify")) >= LEAST_RUNS and bool(problem.role("validate"))
+
+
+def residual_of(problem: Problem, outcome: Outcome, gates: Gates) -> Residual:
+    """Return what remains, if only on held-out runs."""
+    parts, fitted, lines = remaining(outcome), outcome.final, outcome.lines
+    astray = unsettled(outcome.final)
+    if astray:  # nothing is claimed of it, least of all that nothing remains
+        return Residual((*parts, astray), fitted, lines)
+    if enough_runs(problem) and not parts:
+        fitted = score(outcome.final, problem.role("validate"))
+        lines = _unseen(problem, fitted, gates)
+        seen = places(lines)
+        parts = (Statement("unseen", {"places": seen}),) if seen else ()
+    nowhere = beyond(outcome.final, problem.role("validate"))
+    makeshift = (Statement("makeshift", {"why": nowhere}),) if nowhere else ()
+    return Residual((*parts, *makeshift), fitted, lines)
+
+
+def _unseen(problem: Problem, scored: Fit, gates: Gates) -> tuple[Line, ...]:
+    """Test the residual on the held-out runs, too: a model may be right only where it was fitted."""
+    least = max(gates.materiality, 2.0 * problem.systematic, gates.model_form_budget)
+    return tuple(line for line in signature(scored, WORSE * least) if line.significant)
+
+
+def remaining(outcome: Outcome) -> tuple[Statement, ...]:
+    """State the significant residual of the runs of the fit, and what it resembles; empty: there is none."""
+    parts = [Statement("like", {"effects": _resembled(outcome.likeness)})] if outcome.likeness else []
+    parts += [
+        Statement("may_be", {"effect": rival.effect, "others": _resembled(rival.fit)})
+        for rival in outcome.rivals
+        if rival.fit.candidate.effects[-1].resembled
+    ]
+    parts += [seen] if (seen := places(outcome.lines)) else []
+    if outcome.step:
+        parts.append(Statement("step", vars(outcome.step)))
+    if outcome.between:
+        parts.append(Statement("between", vars(outcome.between)))
+    if outcome.restless:
+        parts.append(Statement("restless", vars(outcome.restless)))
+    return tuple(parts)
+
+
+def _resembled(likeness: Fit) -> list[JSON]:
+    """Name what is not of the library and would lower the residual, with the values that do it best."""
+    return [
+        {"name": effect.name, "values": _values(effect, likeness.theta[place])}
+        for effect, place in likeness.candidate.parts(likeness.theta)
+        if effect.resembled
+    ]
+
+
+def _values(effect: Effect, theta: Array) -> list[JSON]:
+    return [
+        {"name": one.name, "value": value, "unit": one.unit}
+        for one, value in zip(effect.reported, (effect.matrix @ theta).tolist(), strict=True)
+    ]
+
+
+def largest_residual(fitted: Fit) -> Block:
+    """Return a run of the condition whose residual is largest against the noise."""
+    chi2: dict[str, float] = {}
+    elements: dict[str, int] = {}
+    for block in fitted.blocks:
+        if block.role != "calibrate":
+            chi2[block.condition] = chi2.get(block.condition, 0.0) + fitted.chi2[block.run]
+            elements[block.condition] = elements.get(block.condition, 0) + fitted.elements[block.run]
+    worst = max(chi2, key=lambda name: chi2[name] / elements[name])
+    return next(block for block in fitted.blocks if block.condition == worst)

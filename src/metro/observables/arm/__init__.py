@@ -1,0 +1,1 @@
+"""What a robot arm is known by: load tests, tip force, walls, clocks; shared by the robot's observables."""

@@ -1,0 +1,70 @@
+"""Deflection of an arm under the mean force of a side cut: the tool leaves the wall proud and cuts less."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.batch.processed import Tables
+from metro.observables.arm import tip_force
+from metro.observables.arm.load_tests import ANGLES, best_compliance, usable
+from metro.observables.arm.tip_force import Log
+from metro.observables.arm.wall import Wall, wall
+from metro.observables.arm.wall_profile import in_one_pose
+from metro.observables.deformation.model import DeformationModel
+from metro.observables.problem import Refusal
+from metro.robot.kinematics import arm_of_cell
+from metro.units import DEG, Array
+
+
+@dataclass(frozen=True, eq=False)
+class GivingArm:
+    """An arm as it is known before any cut: its model, load tests, and joint compliances (6,) rad/(N m)."""
+
+    model: DeformationModel
+    loads: pd.DataFrame
+    compliance: Array
+
+    def log(self, batch: Batch, run: str, cut: Log, face: Wall) -> Log | Refusal:
+        """Return the log of the arm in a cut; without a log, the pose is that of the run's load tests."""
+        if len(cut.tip):
+            return cut
+        rows = self.loads[self.loads["pose"] == batch.runs.loc[run, "pose"]].dropna(subset=ANGLES)
+        if rows.empty:
+            return Refusal("no robot_log, and no load test in its pose: where the arm stood is not known")
+        return in_one_pose(rows[ANGLES].to_numpy(dtype=float)[0] * DEG, face, self.model.arm)
+
+    def give(self, log: Log | Refusal, face: Wall, force: Array) -> float:
+        """Height by which the wall is proud under a force on the tip (3,) N, in the middle of the cut, m.
+
+        It is zero if the pose of the arm is not known, or if there is no single wall.
+        """
+        if isinstance(log, Refusal) or not face.normal.any():
+            return 0.0
+        middle = log.commanded[len(log.commanded) // 2]
+        return float(face.normal @ self.model.contributions(middle, force) @ self.compliance)
+
+
+def giving_arm(batch: Batch, read: Tables) -> GivingArm | Refusal:
+    """Return the arm of a batch's cell."""
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    if arm is None:
+        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
+    model, loads = DeformationModel(arm), usable(read("loads"))
+    return GivingArm(model, loads, best_compliance(batch, model, loads))
+
+
+def give_of(batch: Batch, run: str, read: Tables, arm: GivingArm | Refusal, force: Array) -> float:
+    """Height by which a run's wall is proud under its mean force (3,) N, m; zero on a machine without an arm.
+
+    The force is the measured one, just as the speed is that of the record. The model's prediction changes by
+    a few per cent with it.
+    """
+    if isinstance(arm, Refusal) or not np.isfinite(force).all():
+        return 0.0
+    face = wall(batch, run)
+    cut, _ = tip_force.logs(read("robot", run), arm.model.arm)
+    return arm.give(arm.log(batch, run, cut, face), face, force)

@@ -1,0 +1,168 @@
+"""Evidence on the joints without any cut: load tests, and the cell file for joints they do not identify."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.observables.deformation.model import DeformationModel, KnownJoints, LoadTest
+from metro.observables.problem import Block, Refusal
+from metro.robot import identifiability
+from metro.robot.identifiability import Identifiability, NextLoad
+from metro.robot.stiffness import Compliances, joint_compliances
+from metro.units import DEG, MM, UM, Array
+
+KNOWN = 0.02  # assumed relative uncertainty of joint stiffnesses that the cell file states without one
+GAUGE = 0.1 * UM
+ANGLES = [f"q{i}_deg" for i in range(1, 7)]
+LOAD_FORCE, MOVED = ["fx_n", "fy_n", "fz_n"], ["dx_mm", "dy_mm", "dz_mm"]
+
+
+def usable(loads: pd.DataFrame) -> pd.DataFrame:
+    """Return the load tests that an arm's model can use: with joint angles and the whole force."""
+    return loads.dropna(subset=[*ANGLES, *LOAD_FORCE]).reset_index(drop=True)
+
+
+def calibration(
+    batch: Batch, model: DeformationModel, loads: pd.DataFrame
+) -> tuple[list[Block], tuple[str, ...]] | Refusal:
+    """Gather the evidence on the joints: load tests, and the cell file for joints they do not identify.
+
+    A joint without any evidence is taken as rigid; its uncertainty is the compliance of the softest joint.
+    """
+    known = batch.cell.get("joint_stiffness_nm_rad")
+    tests = fitted_loads(model, loads)
+    if isinstance(tests, Refusal):
+        if known is None:
+            return Refusal(f"{tests.reason}, and cell.yaml gives no joint_stiffness_nm_rad")
+        value = 1.0 / np.asarray(known, dtype=float)
+        note = f"Joint stiffnesses are those of the cell file, taken to be within {KNOWN:.0%}."
+        return [_known_block(np.arange(len(value)), value, KNOWN * value)], (note,)
+    sigma = max(tests.scatter, GAUGE) * _relative(loads)
+    blocks = [
+        _load_block(str(pose), loads.iloc[at], sigma[at])
+        for pose, at in loads.groupby("pose", sort=False, dropna=False).indices.items()
+    ]
+    notes = [f"Load tests scatter by {tests.scatter / UM:.2g} µm about linear joints ({tests.dof} dof)."]
+    seen = joint_observability(model, loads)
+    notes += [] if isinstance(seen, Refusal) else [in_words(*seen)]
+    weak = np.flatnonzero(tests.sd > tests.value.max())
+    if len(weak):
+        names = ", ".join(str(i + 1) for i in weak)
+        if known is None:
+            value, sd = np.zeros(len(weak)), np.full(len(weak), tests.value.max())
+            notes.append(
+                f"The load tests do not tell joint {names}: taken as rigid, give or take the softest joint."
+            )
+        else:
+            value = 1.0 / np.asarray(known, dtype=float)[weak]
+            sd = KNOWN * value
+            notes.append(f"The load tests do not tell joint {names}: from the cell file, within {KNOWN:.0%}.")
+        blocks.append(_known_block(weak, value, sd))
+    return blocks, tuple(notes)
+
+
+def best_compliance(batch: Batch, model: DeformationModel, loads: pd.DataFrame) -> Array:
+    """Joint compliances (6,) before any cut: from the load tests, else the cell file, else of a rigid arm."""
+    tests = fitted_loads(model, loads)
+    if not isinstance(tests, Refusal):
+        return tests.value
+    known = batch.cell.get("joint_stiffness_nm_rad")
+    return np.zeros(len(model.parameters)) if known is None else 1.0 / np.asarray(known, dtype=float)
+
+
+def fitted_loads(model: DeformationModel, loads: pd.DataFrame) -> Compliances | Refusal:
+    """Joint compliances from the load tests alone."""
+    if loads.empty:
+        return Refusal("loads.csv has no test with joint angles and force")
+    joints, force, moved = _load_arrays(loads)
+    try:
+        return joint_compliances(model.contributions(joints, force), moved, _relative(loads))
+    except ValueError as error:
+        return Refusal(f"loads.csv: {error}")
+
+
+def joint_observability(
+    model: DeformationModel, loads: pd.DataFrame
+) -> tuple[Identifiability, NextLoad] | Refusal:
+    """Return how well the load tests identify each joint, and the test that is best for the worst joint.
+
+    The next test has the largest force so far, in a pose of the tests or with one joint turned by 30° from
+    it. A joint that no test sees is taken to be as soft as the softest.
+    """
+    tests = fitted_loads(model, loads)
+    if isinstance(tests, Refusal):
+        return tests
+    joints, force, moved = _load_arrays(loads)
+    softest = float(tests.value.max())
+    size = np.where(tests.value > 0.01 * softest, tests.value, softest)
+    sigma = max(tests.scatter, GAUGE)
+    rows = model.contributions(joints, force)
+    matrix = identifiability.information(rows, np.isfinite(moved), sigma * _relative(loads), size)
+    newton = float(np.linalg.norm(force, axis=1).max())
+    poses = identifiability.around(np.unique(joints, axis=0))
+    return identifiability.assess(matrix), identifiability.next_load(
+        model.arm, matrix, poses, newton=newton, sigma=sigma, size=size
+    )
+
+
+def in_words(joints: Identifiability, load: NextLoad) -> str:
+    """Describe how well load tests identify the joints, and which load to apply next."""
+    unseen = [str(i + 1) for i in np.flatnonzero(~np.isfinite(joints.relative))]
+    if unseen:
+        known = f"The load tests do not see joint {', '.join(unseen)} apart from the others."
+    else:
+        known = (
+            f"The load tests tell every joint; joint {joints.worst + 1} least, "
+            f"to {100 * joints.relative[joints.worst]:.2g} %."
+        )
+    angles = ", ".join(f"{value:.0f}" for value in load.joints / DEG)
+    pull = ", ".join(f"{value:.0f}" for value in load.force)
+    return (
+        f"{known} A load of ({pull}) N on the tip in the pose ({angles})° would tell joint {load.joint + 1} "
+        f"to {100 * load.after:.2g} %."
+    )
+
+
+def _load_arrays(loads: pd.DataFrame) -> tuple[Array, Array, Array]:
+    angles, force, moved = (loads[names].to_numpy(dtype=float) for names in (ANGLES, LOAD_FORCE, MOVED))
+    return angles * DEG, force, moved * MM
+
+
+def _relative(loads: pd.DataFrame) -> Array:
+    """Size of the error of each test's readings relative to the mean, (m, 1), as ``sigma_mm`` says.
+
+    A test whose error is not stated is taken to be as good as the average of the others.
+    """
+    if "sigma_mm" not in loads or loads["sigma_mm"].isna().all():
+        return np.ones((len(loads), 1))
+    stated = loads["sigma_mm"].to_numpy(dtype=float)
+    return np.asarray(np.where(np.isfinite(stated), stated / np.nanmean(stated), 1.0)[:, None])
+
+
+def _load_block(pose: str, loads: pd.DataFrame, sigma: Array) -> Block:
+    joints, force, moved = _load_arrays(loads)
+    measured = np.isfinite(moved)
+    axis = np.broadcast_to(["load x", "load y", "load z"], moved.shape)[measured]
+    name = f"load tests {pose}"
+    return _evidence(
+        name,
+        moved[measured],
+        np.broadcast_to(sigma, moved.shape)[measured],
+        LoadTest(joints, force, measured),
+        axis,
+    )
+
+
+def _known_block(joints: np.ndarray, value: Array, sd: Array) -> Block:
+    axis = np.array([f"joint {i + 1}" for i in joints])
+    return _evidence("known joints", value, sd, KnownJoints(joints), axis)
+
+
+def _evidence(
+    name: str, measured: Array, sigma: Array, setting: LoadTest | KnownJoints, axis: np.ndarray
+) -> Block:
+    """Return a block that calibrates: it belongs to no cut, has no zeros, and is never compared."""
+    zeros = np.zeros((len(measured), 0))
+    return Block(name, name, "calibrate", 0, measured, sigma, setting, axis, zeros, np.zeros(0), {})

@@ -1,0 +1,269 @@
+"""The force on the tip along the path: from joint torques, else a dynamometer, else the cutting law."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.batch.processed import Tables
+from metro.observables.arm.wall import Wall
+from metro.observables.cut import conditions as cutting_force
+from metro.observables.cut.long_record import LongRecord
+from metro.observables.problem import Refusal
+from metro.robot.drive_torques import TURNING
+from metro.robot.kinematics import Arm
+from metro.robot.sensorless import (
+    LEAST_INDEX,
+    TipForce,
+    Torques,
+    noise_of_bins,
+    observability,
+    smoothed_torque,
+    tip_force,
+)
+from metro.robot.statics import tip_jacobian
+from metro.signals import align, steady
+from metro.signals.intervals import uneven
+from metro.signals.kalman import noise_variance
+from metro.signals.path_match import match
+from metro.signals.waves import wandering
+from metro.units import DEG, JSON, MM, Array
+
+Read = Callable[..., pd.DataFrame]
+JOINTS = range(1, 7)
+SET = [f"q{i}_set_deg" for i in JOINTS]
+ACTUAL = [f"q{i}_deg" for i in JOINTS]
+TORQUE = [f"tau{i}_nm" for i in JOINTS]
+FORCE = ["fx_n", "fy_n", "fz_n"]
+BIN = 1 * MM
+LEAST_BINS = 5
+ITERATIONS = 6
+LEAST_NOISE = 1e-3  # N m: floor for a log whose digits are coarser than its noise
+
+# Relative error that all runs may share, by the source of the force: friction that differs from the idle run;
+# the dynamometer's calibration; a radial depth that differs from the nominal one because the tool yields.
+SYSTEMATIC = {"torque": 0.05, "dynamometer": 0.01, "coefficients": 0.03}
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """The moving part of a robot log: joint angles (n, 6) rad, torques (n, 6) N m, commanded tip (n, 3) m.
+
+    ``time`` (n,) s by the dynamometer's clock; empty if there is none.
+    """
+
+    commanded: Array
+    actual: Array
+    torque: Array
+    tip: Array
+    time: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def interval(self) -> Array | None:
+        """Intervals of the clock over their median; None where it is even."""
+        return uneven(self.time)
+
+
+def logs(table: pd.DataFrame, arm: Arm) -> tuple[Log, Log]:
+    """Return the log of the cut and that of the idle run; a log that does not exist is empty."""
+    idle = (table["log"] == "idle").to_numpy()
+    return _log(table[~idle], arm), _log(table[idle], arm)
+
+
+def _log(table: pd.DataFrame, arm: Arm) -> Log:
+    commanded = table[SET].to_numpy(dtype=float) * DEG
+    tip = arm.tip(commanded)
+    moves = align.moving(tip) if len(tip) > 2 else np.zeros(len(tip), dtype=bool)
+    actual, torque = table[ACTUAL].to_numpy(dtype=float) * DEG, table[TORQUE].to_numpy(dtype=float)
+    time = table["t_s"].to_numpy(dtype=float)
+    return Log(commanded[moves], actual[moves], torque[moves], tip[moves], time[moves])
+
+
+@dataclass(frozen=True, eq=False)
+class Sensorless:
+    """The force on the tip of a run, estimated from the torques of the joints over m bins of its path.
+
+    Attributes
+    ----------
+    s, x : (m,) along the path, and along the wall from its start, m. steady : (m,) bool.
+    torques : the smoothed torque of the cut less that of the idle run. wander : (6,) level of its slow noise,
+        N² m² (:mod:`metro.signals.waves`), estimated from the idle run. index : (6,) observability.
+    solution : force; None if it could not be solved for, and ``refusal`` gives the reason. remarks : in which
+        ways the idle run and the cut differ.
+    """
+
+    s: Array
+    x: Array
+    steady: np.ndarray
+    torques: Torques
+    wander: Array
+    index: Array
+    solution: TipForce | None
+    refusal: str
+    remarks: tuple[str, ...]
+
+
+def sensorless(
+    cut: Log, idle: Log, arm: Arm, wall: Wall, least_index: float = LEAST_INDEX
+) -> Sensorless | Refusal:
+    """Solve for the force on the tip from the torques of the cut less those of the idle run.
+
+    ``least_index``: observability that a joint needs to be used.
+    """
+    if not len(cut.tip) or not len(idle.tip):
+        return Refusal(f"no {'idle_log' if len(cut.tip) else 'robot_log'}")
+    alike = match(cut.tip, cut.time, idle.tip, idle.time)
+    if alike.refusal is not None:
+        return Refusal(alike.refusal)
+    places = [align.along_path(log.tip, cut.tip) for log in (cut, idle)]
+    steps = [float(np.median(np.abs(np.diff(place[np.isfinite(place)])))) for place in places]
+    width = max(BIN, 3 * max(steps))
+    channels = [
+        np.column_stack([log.torque, log.commanded, log.tip @ wall.along - wall.start, _turning(log)])
+        for log in (cut, idle)
+    ]
+    clocks = cut.interval, idle.interval
+    gaps = any(interval is not None for interval in clocks)
+    try:
+        pair = align.align(places[0], channels[0], places[1], channels[1], width, gaps=gaps)
+    except ValueError as error:
+        return Refusal(str(error))
+    x, joints = pair.first[:, 12], pair.first[:, 6:12]
+    steady = wall.steady(x)
+    if steady.sum() < LEAST_BINS:
+        return Refusal(f"the logs hold {int(steady.sum())} mm of the cut; at least {LEAST_BINS} are needed")
+    samples = (width / steps[0], width / steps[1])
+    noise = noise_of_bins(cut.torque, idle.torque, samples, _turning(idle), clocks)
+    noise = np.maximum(noise, LEAST_NOISE**2)
+    white = np.maximum(noise_variance(idle.torque, clocks[1]), LEAST_NOISE**2) / samples[1]
+    # The slow noise of the idle run is as large in the cut, where the force conceals it.
+    interval = uneven(pair.s) if gaps else None
+    wander = 2.0 * wandering(pair.second[:, :6], white, pair.second[:, 13:], interval)
+    torques = smoothed_torque(pair.first[:, :6] - pair.second[:, :6], noise, pair.s if gaps else None)
+    index = observability((pair.first[:, :6] - pair.second[:, :6])[steady], pair.second[steady, :6])
+    remarks = tuple(alike.remarks(np.gradient(cut.commanded, cut.time, axis=0)))
+    moves = tip_jacobian(arm, joints)
+    try:
+        solution, refusal = tip_force(torques.level, torques.variance, moves, index, least_index), ""
+    except ValueError as error:
+        return Sensorless(pair.s, x, steady, torques, wander, index, None, str(error), remarks)
+    return Sensorless(pair.s, x, steady, torques, wander, index, solution, refusal, remarks)
+
+
+def _turning(log: Log) -> Array:
+    """Which way the joints turn, (n, 6): the shape of their Coulomb friction."""
+    return np.asarray(np.tanh(np.gradient(log.commanded, log.time, axis=0) / TURNING))
+
+
+def from_torques(
+    cut: Log, idle: Log, arm: Arm, wall: Wall
+) -> tuple[pd.DataFrame | Refusal, pd.DataFrame | None]:
+    """Force along the path from the torques of the cut less those of the idle run, and observability.
+
+    Returns
+    -------
+    tuple
+        The force, ``s_mm, x_mm, fx_n … sd_fz_n, condition_number`` per bin, or the reason why there is none;
+        and, if the logs could be aligned, ``joint, index, used, noise_nm, drift_nm, whiteness, remark`` per
+        joint.
+    """
+    solved = sensorless(cut, idle, arm, wall)
+    if isinstance(solved, Refusal):
+        return solved, None
+    solution = solved.solution
+    per_joint = pd.DataFrame(
+        {
+            "joint": list(JOINTS),
+            "index": solved.index,
+            "used": solved.index >= LEAST_INDEX if solution is None else solution.used,
+            "noise_nm": np.sqrt(solved.torques.noise),
+            "drift_nm": np.sqrt(solved.torques.drift),
+            "whiteness": solved.torques.whiteness,
+            "remark": "; ".join(solved.remarks),
+        }
+    )
+    if solution is None:
+        return Refusal(solved.refusal), per_joint
+    sd = np.sqrt(np.einsum("maa->ma", solution.covariance))
+    return _table(solved.s, solved.x, solution.force, sd, solution.condition), per_joint
+
+
+def from_dynamometer(batch: Batch, run: str, read: Tables, wall: Wall) -> pd.DataFrame | Refusal:
+    """Mean force of the steady cut, constant along the wall; its zero is the signal in the air, if any."""
+    about = about_air(batch, run, read, wall)
+    if isinstance(about, Refusal):
+        return about
+    count, total, square = 0, np.zeros(3), np.zeros(3)
+    for part in about.record.stretches(about.steady):
+        signal = part.signal - about.zero
+        total, square = total + signal.sum(axis=0), square + (signal**2).sum(axis=0)
+        count += len(signal)
+    mean = total / count
+    row: Any = batch.runs.loc[run]
+    turns = count / about.record.rate * row["spindle_rpm"] / 60.0
+    return _constant(mean, np.sqrt(np.maximum(square / count - mean**2, 0.0) / turns), wall)
+
+
+@dataclass(frozen=True, eq=False)
+class AboutAir:
+    """A dynamometer record, its ``zero`` (3,) N in the air, and the slice of the steady cut."""
+
+    record: LongRecord
+    zero: Array
+    steady: slice
+
+
+def about_air(batch: Batch, run: str, read: Tables, wall: Wall) -> AboutAir | Refusal:
+    """Estimate the zero of a record from the samples in which the tool is in the air, if there are any."""
+    if blank := cutting_force.unset(batch, run):
+        return Refusal(blank)
+    row: Any = batch.runs.loc[run]
+    record = LongRecord(read, run)
+    if record.samples < 2:
+        return Refusal("no dynamometer record")
+    turns = record.turns(record.rate * 60.0 / row["spindle_rpm"])
+    try:
+        segments = steady.segments(turns, round(record.rate * wall.leaving / cutting_force.feed(batch, run)))
+    except ValueError as error:
+        return Refusal(str(error))
+    zero = turns.mean[segments.quiet].mean(axis=0) if segments.quiet.any() else np.zeros(3)
+    return AboutAir(record, zero, segments.steady)
+
+
+def from_coefficients(
+    batch: Batch, run: str, identified: JSON, wall: Wall, give: Callable[[Array], float]
+) -> pd.DataFrame | Refusal:
+    """Mean force by the cutting law, constant along the wall.
+
+    A tool that yields cuts less. The radial depth is the nominal one less ``give(force)``, the height (m) by
+    which the wall is proud under a force (3,) N. Fixed-point iteration solves for it; it converges because
+    the give is a small part of the depth.
+    """
+    values = cutting_force.coefficients(batch, identified)
+    if isinstance(values, Refusal):
+        return values
+    try:
+        force = cutting_force.mean_force_on_tool(batch, run, values)
+        for _ in range(ITERATIONS):
+            force = cutting_force.mean_force_on_tool(batch, run, values, give(force))
+    except ValueError as error:
+        return Refusal(str(error))
+    return _constant(force, SYSTEMATIC["coefficients"] * np.abs(force), wall)
+
+
+def _constant(force: Array, sd: Array, wall: Wall) -> pd.DataFrame:
+    end = wall.length - wall.leaving if math.isfinite(wall.length) else 1.0
+    x = np.array([0.0, end])
+    return _table(x, x, np.tile(force, (2, 1)), np.tile(sd, (2, 1)), np.full(2, np.nan))
+
+
+def _table(s: Array, x: Array, force: Array, sd: Array, condition: Array) -> pd.DataFrame:
+    columns = {"s_mm": s / MM, "x_mm": x / MM, **dict(zip(FORCE, force.T, strict=True))}
+    columns |= {f"sd_{name}": values for name, values in zip(FORCE, sd.T, strict=True)}
+    return pd.DataFrame({**columns, "condition_number": condition})

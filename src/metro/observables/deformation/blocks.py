@@ -1,0 +1,103 @@
+"""Walls as blocks: the deformation of one run from its trace, and the uncertainty of its force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.observables.arm import tip_force
+from metro.observables.arm.tip_force import ACTUAL, FORCE, SET
+from metro.observables.arm.wall import wall
+from metro.observables.arm.wall_profile import SPACING
+from metro.observables.cut.conditions import feed
+from metro.observables.deformation.model import CutWall
+from metro.observables.problem import Block
+from metro.units import DEG, MM, UM, Array
+
+# Relative error of the force of a run, and of the error that all runs share, by the source of the force. The
+# force from a repeat with a dynamometer is as accurate as repeats agree.
+SYSTEMATIC = {**tip_force.SYSTEMATIC, "repeat": 0.02}
+ZERO = 5 * UM  # standard error of a profile's zero against the programmed wall
+PerNewton = Callable[[CutWall], Array]
+
+
+def cutoff(batch: Batch) -> float:
+    """Wavelength between deformation and waviness, m."""
+    return float(batch.instrument("profiler").get("cutoff_mm", 8.0)) * MM
+
+
+def wall_blocks(
+    batch: Batch, observed: Mapping[str, pd.DataFrame], per_newton: PerNewton
+) -> tuple[list[Block], tuple[str, ...]]:
+    """Return a block per wall that was traced, and sentences on the runs that have none.
+
+    For ``per_newton`` see :meth:`metro.observables.deformation.model.DeformationModel.per_newton`.
+    """
+    refused = observed["deformation_refused"].groupby(["what", "reason"], sort=False)["run"]
+    notes = [f"No {what} of {', '.join(runs)}: {reason}." for (what, reason), runs in refused]
+    blocks: list[Block] = []
+    forces = dict(tuple(observed["tip_force"].groupby("run"))) if "tip_force" in observed else {}
+    points = observed.get("profile_points", pd.DataFrame({"run": []}))
+    for name, table in points.groupby("run", sort=False):
+        run = str(name)
+        if run in forces and batch.runs.loc[run, "role"] in {"identify", "validate"}:
+            block = _wall_block(batch, run, table, forces[run], per_newton)
+            if block is None:
+                notes.append(f"Run {run}: the wall is too short for the filter.")
+            else:
+                blocks.append(block)
+    return blocks, tuple(notes)
+
+
+def _wall_block(
+    batch: Batch,
+    run: str,
+    points: pd.DataFrame,
+    force: pd.DataFrame,
+    per_newton: PerNewton,
+) -> Block | None:
+    """Wall points away from the filter's and the wall's ends; half a cut-off apart their noise is white.
+
+    The force of a run has about the same error as the force of all runs, in each direction. Neither that
+    error nor the zero of the trace is estimated from the residual, because a displaced wall is no wrong zero.
+    """
+    face, longest = wall(batch, run), cutoff(batch)
+    row: Any = batch.runs.loc[run]
+    x = points["x_mm"].to_numpy() * MM
+    last = min(face.length - face.leaving, float(x[-1])) - longest / 2
+    kept = np.flatnonzero((x >= x[0] + longest / 2 - 1e-9) & (x <= last + 1e-9))[
+        :: max(round(longest / 2 / SPACING), 1)
+    ]
+    if len(kept) < 2:
+        return None
+    along = force.sort_values("x_mm")
+    at_points = np.stack([np.interp(x / MM, along["x_mm"], along[name]) for name in FORCE], axis=1)
+    commanded, actual = points[SET].to_numpy() * DEG, points[ACTUAL].to_numpy() * DEG
+    count = len(kept)
+    # Without a feed in the run table the rate is zero, and no effect that depends on it is predicted.
+    rate = np.gradient(commanded, SPACING, axis=0) * np.nan_to_num(feed(batch, run))
+    setting = CutWall(commanded, actual, rate, at_points, face.normal, SPACING, longest, kept)
+    off = SYSTEMATIC[str(force["source"].iloc[0])]
+    return Block(
+        run=run,
+        condition=str(row["condition"]),
+        role="validate" if row["role"] == "validate" else "identify",
+        order=int(row["order"]),
+        measured=points["deformation_mm"].to_numpy()[kept] * MM,
+        sigma=points["sigma_mm"].to_numpy()[kept] * MM,
+        setting=setting,
+        axis=np.full(count, "z"),
+        zeros=np.zeros((count, 0)),
+        zero_sd=np.zeros(0),
+        unidentified=np.column_stack([np.full(count, ZERO), force_error(setting, off, per_newton)]),
+        coordinates={"axis": np.full(count, "z"), "s_mm": x[kept] / MM, "x_mm": x[kept] / MM},
+    )
+
+
+def force_error(setting: CutWall, relative: float, per_newton: PerNewton) -> Array:
+    """Return the error of a wall for an error in x, y or z by a share of the whole force, (n, 3) m."""
+    return relative * float(np.linalg.norm(setting.force, axis=1).max()) * per_newton(setting)

@@ -1,0 +1,210 @@
+"""The deformation model: the twist of the joints under the cutting force, and the tip's tracking error.
+
+The wall at x is proud by n · Σ_i j_i x_i. The force twists joint i by x_i, which moves the tip by j_i, the
+column of its Jacobian. The tracking error of the tip along the wall's normal n is added; it has no unknown.
+Load tests are the same sum without a cut. Joints that are linear springs, x_i = c_i T_i, make the sum linear
+in their compliances; with other joints the model is linear about given compliances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from metro.observables.problem import Block, Parameter
+from metro.robot.drive_torques import DriveTorques
+from metro.robot.kinematics import Arm
+from metro.robot.statics import joint_torque, moving_jacobian, tip_jacobian
+from metro.robot.torsion import Torsion
+from metro.structure import Structure
+from metro.surface.profile import gaussian_filter
+from metro.units import Array
+
+
+@dataclass(frozen=True, eq=False)
+class CutWall:
+    """Inputs of a run's deformation, at m points evenly spaced along the wall.
+
+    Attributes
+    ----------
+    commanded, actual : (m, 6) joint angles of the log of the cut, rad. rate : (m, 6) their speeds, rad/s.
+    force : (m, 3) on the tool, work frame, N. normal : (3,) of the wall, out of the material.
+    spacing, cutoff : of the points and of the profile's filter, m. kept : (n,) points that are compared.
+    """
+
+    commanded: Array
+    actual: Array
+    rate: Array
+    force: Array
+    normal: Array
+    spacing: float
+    cutoff: float
+    kept: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LoadTest:
+    """Static loads: joint angles (m, 6) rad, forces (m, 3) N, which displacements (m, 3) were measured."""
+
+    joints: Array
+    force: Array
+    measured: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class KnownJoints:
+    """Joints whose compliances are known beforehand: their indices."""
+
+    joints: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class DeformationModel:
+    """Wall deformation of an arm with elastic joints.
+
+    Attributes
+    ----------
+    arm : geometry: DH, tip in the flange, work in the base. The force acts on this tip, and this tip cuts;
+        the path of the joints is that of the log, whichever tip it was programmed for.
+    structure : stiffness in the cut relative to the load tests.
+    flange_rotation : share of the flange's rotation that moves the tip; physically it is 1.
+    torsion : deviations of the joints from linear springs.
+    drives : friction that the idle run does not have, on the far side of the springs.
+    drift : displacement of the tip from one run to the next, work frame x and y, m.
+    give : compliance between flange and edge in the cut: m of the wall per newton along its normal.
+    """
+
+    arm: Arm
+    structure: Structure = field(default_factory=Structure)
+    flange_rotation: float = 1.0
+    torsion: Torsion = field(default_factory=Torsion)
+    drives: DriveTorques = field(default_factory=DriveTorques)
+    drift: tuple[float, float] = (0.0, 0.0)
+    give: float = 0.0
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Compliances of the joints, from the base up."""
+        return tuple(Parameter(f"joint_compliance_{i + 1}", "rad/(N m)") for i in range(len(self.arm.dh)))
+
+    def nuisance_starts(self, _block: Block) -> Array:
+        """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
+        return np.zeros((1, 0))
+
+    def design(self, block: Block, _nuisance: Array, beta: Array | None = None) -> tuple[Array, Array]:
+        """Design matrix (n, 6), m per rad/(N m), and offset (n,), m, of a cut, load test or known joints."""
+        setting: Any = block.setting
+        about = np.zeros(len(self.arm.dh)) if beta is None else beta
+        if isinstance(setting, CutWall):
+            matrix, offset = self._cut(setting, about)
+            return matrix, offset + block.order * float(setting.normal[:2] @ np.array(self.drift))
+        if isinstance(setting, LoadTest):
+            return self._loaded(setting, about)
+        rows = np.eye(len(self.arm.dh))[setting.joints]
+        return rows, np.zeros(len(rows))
+
+    def torques(self, joints: Array, force: Array) -> Array:
+        """Torque on the link of each joint that a force on the tip makes, (m, 6), N m."""
+        return -joint_torque(tip_jacobian(self.arm, joints), force)
+
+    def contributions(self, joints: Array, force: Array) -> Array:
+        """Deflection of the tip per joint compliance, (m, 3, 6), work frame, by the load tests' stiffness."""
+        moved = moving_jacobian(self.arm, joints, self.flange_rotation)
+        return moved * self.torques(joints, force)[..., None, :]
+
+    def deflection(self, setting: CutWall, compliance: Array) -> Array:
+        """Deflection of the tip in the cut, (m, 3) m, work frame, for joint compliances (6,)."""
+        moved, _ = _static(self.arm, self.flange_rotation, setting)
+        return np.asarray(np.einsum("mai,mi->ma", moved, self.twists(setting, compliance)))
+
+    def twists(self, setting: CutWall, compliance: Array) -> Array:
+        """Twist of the joints in the cut, (m, 6) rad."""
+        _, torque = _static(self.arm, self.flange_rotation, setting)
+        return self.torsion.in_cut(self.structure.in_cut(torque), compliance)[0]
+
+    def per_newton(self, setting: CutWall, compliance: Array) -> Array:
+        """Height by which the wall is proud per additional newton in x, y and z at the tool, (n, 3) m/N.
+
+        The joints are linear springs here. The error of the force is assumed to vary along the wall as the
+        force does.
+        """
+        moved, _ = _static(self.arm, self.flange_rotation, setting)
+        at_tip = tip_jacobian(self.arm, setting.commanded)
+        size = np.linalg.norm(setting.force, axis=1)
+        share = size / max(float(size.max()), np.finfo(float).tiny)
+        columns = np.einsum("m,a,mai,i,mbi->mb", share, setting.normal, moved, compliance, at_tip)
+        return np.asarray(_filter(len(size), setting.spacing, setting.cutoff)[setting.kept] @ columns)
+
+    def largest_twists(self, blocks: Sequence[Block]) -> tuple[Array, Array]:
+        """Approximate compliance of each joint, (6,) rad/(N m), and its largest torsion in a batch, (6,) rad.
+
+        Linear springs are fitted to the evidence on the joints alone. A joint without evidence is taken to
+        have at least a hundredth of the largest compliance.
+        """
+        rows = [self.design(block, np.zeros(0))[0] / block.sigma[:, None] for block in _calibrating(blocks)]
+        right = [block.measured / block.sigma for block in _calibrating(blocks)]
+        size = np.linalg.norm(matrix := np.vstack(rows), axis=0)
+        scale = np.where(size > 0.0, size, 1.0)
+        estimate = np.linalg.lstsq(matrix / scale, np.concatenate(right), rcond=1e-6)[0] / scale
+        compliance = np.maximum(estimate, 0.01 * estimate.max())
+        settings: list[Any] = [block.setting for block in blocks]
+        forced = [one for one in settings if isinstance(one, CutWall | LoadTest)]
+        torque = np.vstack([_static(self.arm, self.flange_rotation, one)[1] for one in forced])
+        return compliance, np.abs(torque).max(axis=0) * compliance
+
+    def _cut(self, setting: CutWall, compliance: Array) -> tuple[Array, Array]:
+        out, torque = _outwards(self.arm, self.flange_rotation, setting)
+        twist, slope = self.torsion.in_cut(self.structure.in_cut(torque), compliance)
+        held = self._held(setting)
+        twist, slope = twist - held * compliance, slope - held
+        # The prediction passes the same filter as the profile, because that matters at the entry.
+        smooth = _filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
+        constant = (out * (twist - slope * compliance)).sum(axis=1) + _strayed(self.arm, setting)
+        constant = constant + self.give * (setting.force @ setting.normal)
+        return smooth @ (out * slope), smooth @ constant
+
+    def _held(self, setting: CutWall) -> Array:
+        """Torque (m, 6), N m, that friction keeps off the springs in the cut, at load-test stiffness."""
+        friction = self.drives.at(setting.commanded, setting.rate, np.zeros(len(setting.rate)))
+        return np.asarray(self.structure.in_cut(friction) / np.array(self.torsion.factor))
+
+    def _loaded(self, setting: LoadTest, compliance: Array) -> tuple[Array, Array]:
+        moved, torque = _static(self.arm, self.flange_rotation, setting)
+        twist, slope = self.torsion.at_rest(torque, compliance)
+        constant = np.einsum("mai,mi->ma", moved, twist - slope * compliance)
+        return (moved * slope[:, None, :])[setting.measured], constant[setting.measured]
+
+
+def _calibrating(blocks: Sequence[Block]) -> list[Block]:
+    return [block for block in blocks if block.role == "calibrate"]
+
+
+@lru_cache(maxsize=1024)
+def _static(arm: Arm, flange_rotation: float, setting: CutWall | LoadTest) -> tuple[Array, Array]:
+    """Displacement of the tip per turn of each joint (m, 3, 6), and the torques of the force on it (m, 6)."""
+    joints = setting.commanded if isinstance(setting, CutWall) else setting.joints
+    torque = -joint_torque(tip_jacobian(arm, joints), setting.force)
+    return moving_jacobian(arm, joints, flange_rotation), torque
+
+
+@lru_cache(maxsize=1024)
+def _outwards(arm: Arm, flange_rotation: float, setting: CutWall) -> tuple[Array, Array]:
+    """Displacement of the tip out of the wall per turn of each joint (m, 6), and the torques of the force."""
+    moved, torque = _static(arm, flange_rotation, setting)
+    return np.einsum("a,mai->mi", setting.normal, moved), torque
+
+
+@lru_cache(maxsize=256)
+def _strayed(arm: Arm, setting: CutWall) -> Array:
+    """Tracking error of the tip along the wall's normal, (m,) m."""
+    return np.asarray((arm.tip(setting.actual) - arm.tip(setting.commanded)) @ setting.normal)
+
+
+@lru_cache(maxsize=32)
+def _filter(points: int, spacing: float, cutoff: float) -> Array:
+    """Return the filter of the profile as a matrix (points, points)."""
+    return gaussian_filter(np.eye(points), spacing, cutoff)

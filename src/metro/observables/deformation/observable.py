@@ -1,0 +1,155 @@
+"""Force-induced deformation of machined walls: stylus profiles, load tests, and joints that give way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.batch.processed import Tables
+from metro.observables.arm import tip_force
+from metro.observables.arm.give import GivingArm, giving_arm
+from metro.observables.arm.load_tests import best_compliance, calibration
+from metro.observables.arm.tip_force import Log
+from metro.observables.arm.wall import Wall, wall
+from metro.observables.arm.wall_profile import wall_points
+from metro.observables.deformation import NAME, TABLES
+from metro.observables.deformation.blocks import SYSTEMATIC, cutoff, wall_blocks
+from metro.observables.deformation.model import DeformationModel
+from metro.observables.deformation.proposals import feasible
+from metro.observables.deformation.report import arm_block
+from metro.observables.observable import Observable
+from metro.observables.problem import BaseFit, Problem, Refusal
+from metro.robot.kinematics import Arm, arm_of_cell
+from metro.units import JSON, MM
+
+LOADED = 0.01  # load cell and gauge of the load tests, which all walls share
+SCATTER = 0.005  # of a joint from run to run: what scatters is the force, which each wall allows for
+
+
+def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
+    """Tip forces along the path, points along the walls, observability of the joints, and the load tests.
+
+    Tables ``tip_force``, ``profile_points``, ``observability``, ``arm_loads``, ``deformation_refused``.
+    """
+    arm = giving_arm(batch, read)
+    if isinstance(arm, Refusal):
+        return arm
+    by_table: dict[str, list[pd.DataFrame]] = {"tip_force": [], "profile_points": [], "observability": []}
+    refused: list[JSON] = []
+    for run in batch.with_files("robot_log", "profile", any_of=True):
+        for name, table in _observed(batch, run, read, arm, identified).items():
+            if isinstance(table, Refusal):
+                refused.append({"run": run, "what": name.replace("_", " "), "reason": table.reason})
+            else:
+                by_table[name].append(table.assign(run=run))
+    by_table["tip_force"] = [
+        by_repeat(batch, force, by_table["tip_force"]) for force in by_table["tip_force"]
+    ]
+    tables = {name: pd.concat(parts, ignore_index=True) for name, parts in by_table.items() if parts}
+    tables["arm_loads"] = arm.loads
+    tables["deformation_refused"] = pd.DataFrame(refused, columns=["run", "what", "reason"], dtype=str)
+    return tables
+
+
+def _observed(
+    batch: Batch, run: str, read: Tables, known: GivingArm, identified: JSON
+) -> dict[str, pd.DataFrame | Refusal]:
+    """Tables of one run, or why it has none."""
+    face, arm = wall(batch, run), known.model.arm
+    cut, idle = tip_force.logs(read("robot", run), arm)
+    log = known.log(batch, run, cut, face)
+    tables: dict[str, pd.DataFrame | Refusal] = {}
+    sensorless, per_joint = tip_force.from_torques(cut, idle, arm, face)
+    if per_joint is not None:
+        tables["observability"] = per_joint
+    if isinstance(sensorless, Refusal):
+        tables["sensorless force"] = sensorless
+    force, source = tip_force.from_dynamometer(batch, run, read, face), "dynamometer"
+    if isinstance(force, Refusal):
+        force, source = sensorless, "torque"
+    if isinstance(force, Refusal):
+        give = partial(known.give, log, face)
+        force, source = tip_force.from_coefficients(batch, run, identified, face, give), "coefficients"
+    tables["tip_force"] = force if isinstance(force, Refusal) else force.assign(source=source)
+    if run in batch.with_files("profile"):
+        tables["profile_points"] = _points(batch, read("profile", run), log, face, arm)
+    return tables
+
+
+def by_repeat(batch: Batch, force: pd.DataFrame, others: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Return the force that the dynamometer read in a repeat, where that is better than the run's own."""
+    if SYSTEMATIC[str(force["source"].iloc[0])] <= SYSTEMATIC["repeat"]:
+        return force
+    run, condition = force["run"].iloc[0], batch.runs["condition"].to_dict()
+    for other in others:
+        alike = condition[other["run"].iloc[0]] == condition[run] and condition[run] != ""
+        if alike and other["source"].iloc[0] == "dynamometer":
+            return other.assign(run=run, source="repeat")
+    return force
+
+
+def _points(
+    batch: Batch, profile: pd.DataFrame, log: Log | Refusal, face: Wall, arm: Arm
+) -> pd.DataFrame | Refusal:
+    """Points along a wall, or why the trace cannot be placed on it."""
+    if isinstance(log, Refusal):
+        return log
+    if not face.normal.any():
+        return Refusal("direction is neither up nor down: which wall was traced is not known")
+    return wall_points(profile, log, arm, face, cutoff=cutoff(batch), noise=_noise(batch))
+
+
+def _noise(batch: Batch) -> float:
+    return float(batch.instrument("profiler").get("sigma_mm", 0.0005)) * MM
+
+
+def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSON) -> Problem | Refusal:
+    """Walls and load tests as blocks, and the model of the arm with elastic joints."""
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    if arm is None:
+        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
+    model = DeformationModel(arm)
+    softness = best_compliance(batch, model, observed["arm_loads"])
+    per_newton = partial(model.per_newton, compliance=softness)
+    walls, notes = wall_blocks(batch, observed, per_newton)
+    if not walls:
+        return Refusal("; ".join(notes) or "no run has a profile")
+    evidence = calibration(batch, model, observed["arm_loads"])
+    if isinstance(evidence, Refusal):
+        return evidence
+    calibrate, said = evidence
+    sources = observed["tip_force"].drop_duplicates("run").set_index("run")["source"]
+    used = sorted({str(sources[block.run]) for block in walls})
+    notes = (
+        "The joints are linear springs; links, tool and work are rigid.",
+        f"The force on the tip is taken from: {', '.join(used)}.",
+        f"Profiles and predictions are low-passed at {cutoff(batch) / MM:g} mm (ISO 16610-21); "
+        "half of that is left out at both ends.",
+        *said,
+        *notes,
+    )
+    systematic = math.hypot(max(SYSTEMATIC[source] for source in used), LOADED)
+    scatter = np.full(len(model.parameters), SCATTER)
+    return Problem(
+        NAME, "mm", MM, model, (*calibrate, *walls), scatter, systematic, tuple(notes),
+        feasible(walls, calibrate, model.arm, per_newton),
+    )  # fmt: skip
+
+
+def report(
+    batch: Batch,
+    observed: Mapping[str, pd.DataFrame],
+    _identified: JSON,
+    task: Problem | Refusal,
+    fit: BaseFit | None,
+) -> JSON:
+    """Return the ``arm`` block: joint stiffnesses, and what is known of each run."""
+    return {"arm": arm_block(batch, observed, task, fit)}
+
+
+OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, observed_with_coefficients=True)

@@ -1,0 +1,29 @@
+"""The error of a predicted face that follows from the error of the damping."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from metro.observables.flatness.model import FaceSetting, FlatnessModel, PoseField
+from metro.units import Array
+
+
+def damping_doubt(field: PoseField, setting: FaceSetting) -> Array | None:
+    """Heights (n, k), m, by which a face changes as the damping changes by one standard deviation each.
+
+    None if there is no ringing. The damping is not fitted to a face, because a large residual with another
+    cause would bias it.
+    """
+    ringing = setting.ringing
+    if ringing is None:
+        return None
+    model = FlatnessModel((field,))
+    chosen, _ = model.finished(setting, np.zeros(1))
+    known = ringing.heights(model.structure, setting.middle)[chosen]
+    columns = []
+    for weight, damping in ringing.damping.doubts():
+        other = replace(ringing, damping=damping).heights(model.structure, setting.middle)[chosen]
+        columns.append(weight * setting.mean(other - known))
+    return np.column_stack(columns)

@@ -1,0 +1,179 @@
+"""The dynamics of the arm's tip at a pose, from a batch's tables: mass, compliance, damping over the face."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from metro.observables.quantity import quantity
+from metro.surface.tip_damping import Rayleigh, fit_rayleigh
+from metro.surface.tip_field import MatrixField, choose_field, field_in, least_eigenvalue
+from metro.surface.tip_response import tip_modes
+from metro.surface.tip_stiffness import Basis, points_compliance
+from metro.units import JSON, MM, Array
+
+MASS = ("mxx", "mxy", "mxz", "mxy", "myy", "myz", "mxz", "myz", "mzz")
+OF_THE_ARM = 2.0  # modes up to this factor times the highest of M and K belong to the arm
+SURE = 3.0  # standard errors
+
+
+@dataclass(frozen=True, eq=False)
+class TipDynamics:
+    """M(P), C(P) = K(P)⁻¹ and the damping of the tip; ``damping`` is None if no impacts identify it."""
+
+    mass: MatrixField
+    compliance: MatrixField
+    damping: Rayleigh | None
+
+
+def tip_dynamics(
+    pose: str, basis: Basis, loads: tuple[Array, Array, Array], mass: pd.DataFrame, modes: pd.DataFrame
+) -> tuple[TipDynamics | None, list[str]]:
+    """Return the dynamics of the tip at a pose, None if the tables do not give it, and notes on it.
+
+    Parameters
+    ----------
+    basis : terms in which the compliance varies. loads : positions, forces, displacements, (m, 3) each, SI.
+    mass : rows of mass.csv of the pose. modes : the modes that the batch's impacts showed, all positions.
+    """
+    if mass.empty:
+        return None, []
+    places, at_points = points_compliance(*loads)
+    matrices = np.array([np.nan_to_num(each.matrix) for each in at_points])
+    if not all(np.isfinite(np.diagonal(each.matrix)).all() for each in at_points):
+        words = f"Pose {pose}: a load point lacks a direction, so that no stiffness matrix can be made of it"
+        return None, [f"{words}; the tip is taken to follow the force without ringing."]
+    masses = mass[[*MASS]].to_numpy(dtype=float).reshape(-1, 3, 3)
+    wrong = [
+        *_indefinite("mass.csv", "mass", pose, mass["point"].astype(str), masses),
+        *_indefinite("loads.csv", "compliance", pose, _names(places), matrices),
+    ]
+    if wrong:
+        return None, [*wrong, f"Pose {pose}: without ringing, therefore."]
+    x, y = mass["x_mm"].to_numpy(dtype=float) * MM, mass["y_mm"].to_numpy(dtype=float) * MM
+    own = choose_field(x, y, masses)
+    compliance = field_in(basis, places[:, 0], places[:, 1], matrices)
+    spread = [
+        np.linalg.norm(np.nan_to_num(each.sd)) / np.linalg.norm(np.nan_to_num(each.matrix))
+        for each in at_points
+    ]
+    error = math.hypot(float(np.nanmean(spread)), *(np.nan_to_num([own.error, compliance.error])))
+    notes = _interpolated(pose, own, len(mass))
+    if least_eigenvalue(compliance(x, y)).min() <= 0:
+        return None, [
+            *notes,
+            f"Pose {pose}: between its load points the compliance is not positive definite.",
+        ]
+    frequency = tip_modes(own(*places.T), np.linalg.inv(matrices)).frequency
+    damping, said = _damping(pose, frequency, 0.5 * error, modes)
+    return TipDynamics(own, compliance, damping), notes + said
+
+
+def _indefinite(
+    file: str, what: str, pose: str, points: pd.Series | list[str], matrices: Array
+) -> Iterator[str]:
+    """Name every point whose matrix is not positive definite, which no structure can have."""
+    for point, share in zip(points, least_eigenvalue(matrices), strict=True):
+        if share <= 0:
+            yield (
+                f"{file}, pose {pose}, point {point}: the {what} matrix is not positive definite "
+                f"(least eigenvalue {100 * share:.2g} % of the greatest)."
+            )
+
+
+def _names(places: Array) -> list[str]:
+    return [f"at x {x / MM:g}, y {y / MM:g} mm" for x, y in places]
+
+
+def _interpolated(pose: str, mass: MatrixField, points: int) -> list[str]:
+    if points == 1:
+        return []
+    share = f"to {100 * mass.error:.1g} %" if math.isfinite(mass.error) else "to an unknown error"
+    return [
+        f"Pose {pose}: the mass over the face is a polynomial of {mass.basis.terms} terms through {points} "
+        f"points; leaving out one at a time, it predicts the mass there {share}."
+    ]
+
+
+def _damping(
+    pose: str, frequency: Array, error: float, modes: pd.DataFrame
+) -> tuple[Rayleigh | None, list[str]]:
+    """Return a0, a1 of the measured modes of the arm, and notes on modes that contradict M and K.
+
+    ``frequency`` (n, 3) rad/s: that of M and K at the load points, with the relative error ``error``.
+    """
+    table = _of_the_pose(pose, modes)
+    if table.empty:
+        return None, []
+    measured = 2 * np.pi * table["frequency_hz"].to_numpy(dtype=float)
+    arm = measured <= OF_THE_ARM * frequency.max()
+    table, measured = table[arm], measured[arm]
+    notes = list(_contradictions(pose, frequency, error, table))
+    try:
+        rayleigh = fit_rayleigh(measured, *table[["damping", "damping_sd"]].to_numpy(dtype=float).T)
+    except ValueError:
+        return None, [
+            *notes,
+            _free(pose, f"the impacts show {len(table)} of the arm's modes, two are needed"),
+        ]
+    if rayleigh.ratio(frequency).min() <= 0:
+        return None, [*notes, _free(pose, "a0 and a1 of the impacts give a mode of M and K no damping")]
+    a0, a1 = rayleigh.values
+    sd = np.sqrt(np.diag(rayleigh.covariance))
+    misfit = f", missed by {rayleigh.misfit:.1f} times their errors" if rayleigh.misfit > 1 else ""
+    notes.append(
+        f"Pose {pose}: damping from {len(table)} modes of the impacts{misfit}: "
+        f"a0 {a0:.4g} ± {sd[0]:.1g} 1/s, a1 {a1:.4g} ± {sd[1]:.1g} s."
+    )
+    return rayleigh, notes
+
+
+def _free(pose: str, why: str) -> str:
+    return f"Pose {pose}: {why}: the modes share one damping ratio of 5 %, known to a factor of two."
+
+
+def _of_the_pose(pose: str, modes: pd.DataFrame) -> pd.DataFrame:
+    """Modes whose impacts were at the pose (``pose`` or ``pose/point``), with a known damping."""
+    if modes.empty:
+        return modes
+    place = modes["position"].astype(str)
+    known = np.isfinite(modes["damping_sd"].astype(float)) & (modes["damping_sd"].astype(float) > 0)
+    return modes[((place == pose) | place.str.startswith(f"{pose}/")) & known]
+
+
+def _contradictions(pose: str, frequency: Array, error: float, table: pd.DataFrame) -> Iterator[str]:
+    """Name each measured mode that differs from every mode of M and K by more than the errors of both."""
+    low, high = frequency.min(axis=0) / (2 * np.pi), frequency.max(axis=0) / (2 * np.pi)
+    columns = (table[name].to_numpy(dtype=float) for name in ("frequency_hz", "frequency_sd_hz"))
+    for measured, sd, direction in zip(*columns, table["direction"], strict=True):
+        off = np.maximum(np.maximum(low - measured, measured - high), 0.0)
+        nearest = int(np.argmin(off))
+        allowed = SURE * math.hypot(np.nan_to_num(sd), error * measured)
+        if off[nearest] > allowed:
+            yield (
+                f"Pose {pose}: the impacts show a mode at {measured:.4g} Hz along {direction}, M and K "
+                f"(mass.csv, loads.csv) none nearer than {low[nearest]:.4g} to {high[nearest]:.4g} Hz over "
+                f"the face, known to {allowed:.2g} Hz: they contradict each other."
+            )
+
+
+def tip_block(damping: Mapping[str, Rayleigh]) -> JSON:
+    """Return the block ``tip`` of identified.json from a0, a1 by pose: their weighted mean, and each."""
+    if not damping:
+        return {}
+    weight = [np.linalg.inv(each.covariance) for each in damping.values()]
+    covariance = np.linalg.inv(np.sum(weight, axis=0))
+    mean = covariance @ np.sum([w @ d.values for w, d in zip(weight, damping.values(), strict=True)], axis=0)
+    block = _coefficients(mean, covariance)
+    if len(damping) > 1:
+        block["poses"] = {pose: _coefficients(d.values, d.covariance) for pose, d in damping.items()}
+    return {"tip": block}
+
+
+def _coefficients(values: Array, covariance: Array) -> JSON:
+    sd = np.sqrt(np.diag(covariance))
+    return {"a0": quantity(values[0], sd[0], "1/s"), "a1": quantity(values[1], sd[1], "s")}

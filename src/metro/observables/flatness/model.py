@@ -1,0 +1,281 @@
+"""The flatness model: the tip's deflection under the mean force, as the cutter's rim leaves it in a face."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from metro.observables.flatness.path import Pace, Passages
+from metro.observables.flatness.ringing import Ringing
+from metro.observables.flatness.setup import Setup, swung
+from metro.observables.problem import Block, Parameter
+from metro.observables.waviness.model import Vibration
+from metro.structure import Structure
+from metro.surface.footprint import RADIUS
+from metro.surface.tip_stiffness import POWERS, Basis, Rows, heights_design
+from metro.units import UM, Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+ENTRIES = ("zx", "zy", "zz")
+# Places across and along the feed, in radii of a disc, whose mean equals that over the disc: exactly for a
+# cubic, and to 0.2 % for a wave of three radii or more.
+ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
+STIFF_NODES = (
+    0.02  # spacing of nodes in the logarithm of the stiffness, between which ringing is interpolated
+)
+PHASES = tuple(2 * math.pi * third / 3 for third in range(3))
+
+
+@dataclass(frozen=True, eq=False)
+class PoseField:
+    """The z row of the tip compliance over the face at one pose; ``entries`` (3,): those that loads show."""
+
+    pose: str
+    basis: Basis
+    entries: tuple[bool, ...]
+
+    @property
+    def used(self) -> np.ndarray:
+        """Mask of the coefficients (3 · terms) that are parameters of the model."""
+        return np.repeat(self.entries, self.basis.terms)
+
+
+@dataclass(frozen=True, eq=False)
+class FaceSetting:
+    """A face at the points of its path, and beside it.
+
+    Attributes
+    ----------
+    pose : of the arm. x, y : (4 n,) places of n points, m: four about each one, which represent its disc.
+    first : index of the first point of each bin that is compared.
+    passages : of the rim over the points. pace : their times. size : of the work along x and y, m; NaN if it
+        is not known.
+    force : (3,) mean force on the tool in full engagement, N, work frame.
+    loaded : (3 · terms,) coefficients of the compliance from the load tests alone; they determine which
+        passage was the lowest.
+    ringing : None if the mass of the arm is not known; the tip then follows the force statically.
+    """
+
+    pose: str
+    x: Array
+    y: Array
+    first: np.ndarray
+    passages: Passages
+    pace: Pace
+    size: tuple[float, float]
+    force: Array
+    loaded: Array
+    ringing: Ringing | None
+
+    @cached_property
+    def middle(self) -> Passages:
+        """The passages, with the axis' position along the pass for the middle of each disc."""
+        ahead = np.tile(RADIUS * AHEAD, len(self.x) // len(AHEAD))
+        return replace(self.passages, along=self.passages.along - ahead[:, None])
+
+    def mean(self, values: Array) -> Array:
+        """Average the values of places, (4 n,) or (4 n, p), over the discs, and these over the bins."""
+        return np.asarray(self._weights @ values)
+
+    def binned(self, values: Array) -> Array:
+        """Average the values of points, (n,) or (n, p), over the bins."""
+        return np.asarray((np.add.reduceat(values, self.first, axis=0).T / self._count).T)
+
+    @property
+    def _count(self) -> np.ndarray:
+        """Points in each bin."""
+        return np.diff(np.append(self.first, len(self.x) // len(ACROSS)))
+
+    @cached_property
+    def _weights(self) -> csr_array:
+        """Weight of each place in the mean of each bin; it is cached because a fit averages many times."""
+        from scipy.sparse import csr_array
+
+        weight = np.repeat(1.0 / self._count, self._count * len(ACROSS)) / len(ACROSS)
+        begins = np.append(len(ACROSS) * self.first, len(weight))
+        return csr_array((weight, np.arange(len(weight)), begins))
+
+
+@dataclass(frozen=True, eq=False)
+class LoadSetting:
+    """The static load tests of one pose."""
+
+    pose: str
+    rows: Rows
+
+
+@dataclass(frozen=True)
+class FlatnessModel:
+    """Height of the face over its programmed plane: that of the tip, (C(P) F)_z and the ringing about it.
+
+    The lowest of all passages of the rim over a point determines the height, because removed material does
+    not come back. The static part is linear in the coefficients of C; the ringing is computed with C from the
+    load tests, and is the model's offset.
+
+    Attributes
+    ----------
+    fields : the compliance over (x, y) at each pose, known from load tests.
+    structure : stiffness of the arm in the cut, relative to these tests.
+    setup : deviations of spindle, tool and work from the programmed setup.
+    vibration : of the tip, from the start of the first pass; each face has its own phase of each wave.
+    """
+
+    fields: tuple[PoseField, ...]
+    structure: Structure = field(default_factory=Structure)
+    setup: Setup = field(default_factory=Setup)
+    vibration: tuple[Vibration, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Coefficients of C_zx, C_zy, C_zz in the terms of each pose's basis, um/N."""
+        return tuple(
+            Parameter(f"c_{entry}_u{i}v{j}_{part.pose}", "um/N", UM)
+            for part in self.fields
+            for entry, seen in zip(ENTRIES, part.entries, strict=True)
+            if seen
+            for i, j in POWERS[: part.basis.terms]
+        )
+
+    def nuisance_starts(self, block: Block) -> Array:
+        """Return starts of a face's nuisance, (k, m): the phase of each wave, and at least one."""
+        if not isinstance(block.setting, FaceSetting):
+            return np.zeros((1, 0))
+        each = [PHASES if swing.amplitude else PHASES[:1] for swing in self.vibration]
+        return np.array(list(itertools.product(*(each or [PHASES[:1]]))))
+
+    def design(self, block: Block, nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
+        """Matrix (n, p) in m per (m/N), and the offset of ringing, vibration and setup (n,) m."""
+        setting = block.setting
+        if isinstance(setting, LoadSetting):
+            return _loaded(self.fields, setting), np.zeros(len(block.measured))
+        terms, offset = _shaped(self, setting, self._phases(nuisance))
+        columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
+        parts = [_own(part, setting.pose, columns) for part in self.fields]
+        return np.hstack(parts), offset.copy()
+
+    def finished(self, setting: FaceSetting, nuisance: Array) -> tuple[tuple[np.ndarray, np.ndarray], Array]:
+        """Index of the passage that finished each point, and heights over the static one, (n, k) m.
+
+        The passage with the lowest cut finishes a point. For ``nuisance`` see :meth:`nuisance_starts`.
+        """
+        height, above_static = self._heights(setting, nuisance)
+        lowest = height.argmin(axis=1)
+        return (np.arange(len(lowest)), lowest), above_static
+
+    def heights(self, setting: FaceSetting, nuisance: Array) -> Array:
+        """Height of the cut at each passage by the load tests, (n, k) m; infinite if there is no passage."""
+        return self._heights(setting, nuisance)[0]
+
+    def _heights(self, setting: FaceSetting, nuisance: Array) -> tuple[Array, Array]:
+        passages = setting.passages
+        above_static = self.setup.cuts(setting.x, setting.y, passages, setting.pace)
+        for swing, phase in zip(self.vibration, self._phases(nuisance), strict=True):
+            above_static = above_static + swung(swing, phase, passages, setting.pace)
+        if setting.ringing is not None:
+            above_static = above_static + _ringing(setting, setting.ringing, self.structure)
+        static = self.structure.in_cut(self._static(setting))
+        return np.where(passages.valid, static + above_static, np.inf), above_static
+
+    def _phases(self, nuisance: Array) -> tuple[float, ...]:
+        """Return the phase of each wave: zero where its amplitude is, and where no phase is given."""
+        known = itertools.chain(nuisance, itertools.repeat(0.0))
+        return tuple(
+            float(phase) if swing.amplitude else 0.0
+            for swing, phase in zip(self.vibration, known, strict=False)
+        )
+
+    def _static(self, setting: FaceSetting) -> Array:
+        return _static(self._basis(setting), setting)
+
+    def _basis(self, setting: FaceSetting) -> Basis:
+        return next(part.basis for part in self.fields if part.pose == setting.pose)
+
+
+def _own(part: PoseField, pose: str, columns: Array) -> Array:
+    """Return those ``columns``, (n, 3 · terms) of a face at ``pose``, that are parameters; else zeros."""
+    count = int(part.used.sum())
+    return columns[:, part.used] if part.pose == pose else np.zeros((len(columns), count))
+
+
+@lru_cache(maxsize=16)
+def _loaded(fields: tuple[PoseField, ...], setting: LoadSetting) -> Array:
+    """Return the matrix of load tests, which no effect of a cut changes."""
+    rows = {part.pose: setting.rows.design(part.basis) for part in fields if part.pose == setting.pose}
+    none = np.zeros((len(setting.rows.displacement), 0))
+    return np.hstack([_own(part, setting.pose, rows.get(part.pose, none)) for part in fields])
+
+
+@lru_cache(maxsize=512)
+def _shaped(model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...]) -> tuple[Array, Array]:
+    """Return the mean of the basis' terms over each bin, (bins, terms), and of the offset, (bins,) m.
+
+    The result is cached because noise and parameters are estimated in turn, many times over.
+    """
+    chosen, above_static = model.finished(setting, np.array(phases))
+    bowed = model.setup.bowed(setting.x, setting.y, setting.size)
+    finished_by = chosen[1].astype(np.int8).tobytes()
+    return _terms(model._basis(setting), setting, finished_by), setting.mean(above_static[chosen] + bowed)
+
+
+@lru_cache(maxsize=512)
+def _terms(basis: Basis, setting: FaceSetting, finished_by: bytes) -> Array:
+    """Mean of the basis' terms where the tool was, (bins, terms); ``finished_by``: index of each passage.
+
+    The result is cached because a small change of an effect rarely changes which passage is the lowest.
+    """
+    lowest = np.frombuffer(finished_by, dtype=np.int8).astype(np.intp)
+    rows = np.arange(len(lowest))
+    return setting.mean(basis(setting.passages.x[rows, lowest], setting.passages.y[rows, lowest]))
+
+
+@lru_cache(maxsize=64)
+def _static(basis: Basis, setting: FaceSetting) -> Array:
+    """Return the static height of the tip by the load tests, at each passage, (n, k) m."""
+    at = setting.passages
+    rows = heights_design(basis, at.x.ravel(), at.y.ravel(), setting.force)
+    return np.asarray((rows @ setting.loaded).reshape(at.x.shape))
+
+
+@lru_cache(maxsize=128)
+def _ringing(setting: FaceSetting, ringing: Ringing, structure: Structure) -> Array:
+    """Return the ringing at each passage, (n, k) m; other effects on the face do not change it.
+
+    It is already a mean along the feed, because its waves may be shorter than a disc.
+    """
+    rung = ringing.at(_rung(ringing, structure), setting.middle)
+    return rung + ringing.of_teeth(structure, setting.passages)
+
+
+@lru_cache(maxsize=64)
+def _rung(ringing: Ringing, structure: Structure) -> Array:
+    """Return the height over the static one along the passes, (passes, n) m.
+
+    It is interpolated over the logarithm of the stiffness with a cubic, to 1e-3 of the ringing.
+    """
+    if structure.stiffness_factor == 1.0:
+        return _rung_at(ringing, structure)
+    place = math.log(structure.stiffness_factor) / STIFF_NODES
+    parts = [
+        weight * _rung_at(ringing, Structure(math.exp(node * STIFF_NODES))) for node, weight in _cubic(place)
+    ]
+    return np.asarray(sum(parts))
+
+
+def _cubic(place: float) -> list[tuple[int, float]]:
+    """Return the four integers about a place, each with its weight in Lagrange's cubic interpolation."""
+    first = math.floor(place) - 1
+    share = place - first
+    return [(first + i, math.prod((share - j) / (i - j) for j in range(4) if j != i)) for i in range(4)]
+
+
+@lru_cache(maxsize=512)
+def _rung_at(ringing: Ringing, structure: Structure) -> Array:
+    """Ringing at one stiffness, cached: it takes long, and other effects on the face do not change it."""
+    return ringing.moved(structure)

@@ -1,0 +1,72 @@
+"""Influences on a face other than the force: deviations of spindle, tool and work from the program.
+
+All of them are zero in a base model; each part is set by one effect of the library.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from metro.observables.flatness.path import Pace, Passages
+from metro.observables.waviness.model import Vibration
+from metro.units import Array
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Deviations of spindle, tool and work.
+
+    Attributes
+    ----------
+    tilt : of the spindle about work x and y through the tool's tip, rad.
+    growth : of tool and spindle from the start of the first pass, m/s.
+    levels : heights of the passes, from the first to the last of a face: coefficients, m, of the Legendre
+        polynomials of degree 1, 2, … over that order.
+    bow : (xx, xy, yy) of the work, m: height xx u² + xy u v + yy v², with u, v from −1 to 1 over the work.
+    cubic : (uuu, uuv, uvv, vvv) of work or scanner, m: height uuu u³ + uuv u² v + uvv u v² + vvv v³.
+    entry : transients: for each the additional height of the tip when the axis reaches the block's edge, m,
+        and the way over which it decays to 1/e, m.
+    """
+
+    tilt: tuple[float, float] = (0.0, 0.0)
+    growth: float = 0.0
+    levels: tuple[float, ...] = ()
+    bow: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    cubic: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    entry: tuple[tuple[float, float], ...] = ()
+
+    def cuts(self, x: Array, y: Array, passages: Passages, pace: Pace) -> Array:
+        """Additional height of the cut at the points ``x``, ``y`` (n,) at each passage, (n, k) m."""
+        about_x, about_y = self.tilt
+        higher = np.zeros(passages.along.shape)
+        if about_x or about_y:
+            higher = (y[:, None] - passages.y) * about_x - (x[:, None] - passages.x) * about_y
+        if self.growth:
+            higher = higher - self.growth * pace.time(passages)
+        if any(self.levels):
+            place = np.linspace(-1.0, 1.0, len(pace.edge)) if len(pace.edge) > 1 else np.zeros(1)
+            higher = higher + np.polynomial.legendre.legval(place, [0.0, *self.levels])[passages.number]
+        for amplitude, length in self.entry:
+            inside = pace.inside(passages)
+            higher = higher + amplitude * np.where(inside >= 0.0, np.exp(-np.abs(inside) / length), 0.0)
+        return np.asarray(higher)
+
+    def bowed(self, x: Array, y: Array, size: tuple[float, float]) -> Array:
+        """Additional height of the work at points, (n,) m; ``size`` (m) of the work, whose corner is zero."""
+        if not any(self.bow) and not any(self.cubic):
+            return np.zeros(len(x))
+        u, v = 2.0 * x / size[0] - 1.0, 2.0 * y / size[1] - 1.0
+        (xx, xy, yy), (uuu, uuv, uvv, vvv) = self.bow, self.cubic
+        uu, vv = u * u, v * v
+        return np.asarray(uu * (xx + uuu * u + uuv * v) + xy * u * v + vv * (yy + uvv * u + vvv * v))
+
+
+def swung(vibration: Vibration, phase: float, passages: Passages, pace: Pace) -> Array:
+    """Height of a vibrating tip, at passages (n, k), m; each face has its own ``phase``, rad."""
+    if not vibration.amplitude:
+        return np.zeros(passages.along.shape)
+    turn = 2 * math.pi * vibration.frequency * pace.time(passages) + phase
+    return np.asarray(vibration.amplitude * np.sin(turn))

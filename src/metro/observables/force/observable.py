@@ -1,0 +1,182 @@
+"""Cutting force: dynamometer records as order averages, and the mechanistic model that predicts them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.batch.processed import Tables
+from metro.cutting.chip import path_difference
+from metro.cutting.cutter import Cutter
+from metro.cutting.helical import bottom_thrust
+from metro.cutting.law import EdgeLaw
+from metro.observables.arm.wall import wall
+from metro.observables.cut import conditions as cutting_force
+from metro.observables.force import NAME, TABLES
+from metro.observables.force.blocks import block_of
+from metro.observables.force.coefficients import correlation, mean_coefficients, waveform
+from metro.observables.force.dynamometer import Dynamometer
+from metro.observables.force.model import ForceModel
+from metro.observables.force.orders import observe, recorded
+from metro.observables.force.proposals import feasible
+from metro.observables.force.yielding_table import yielding_table
+from metro.observables.observable import Observable
+from metro.observables.problem import BaseFit, Block, Problem, Refusal
+from metro.observables.quantity import quantity
+from metro.units import JSON, MM, N_MM2, UM, Array
+
+__all__ = ["NAME", "observe", "problem", "report"]
+
+SCATTER = 0.01
+UNIDENTIFIED_KFAC = (
+    140.0 * N_MM2
+)  # rms of what it may be: anything up to the 243 N/mm² that [T] table 4 found
+LEAST_FEED_RATIO = 1.1  # between axial feeds that part the shear from the edge term of the bottom edges
+
+
+def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSON) -> Problem | Refusal:
+    """Blocks of evidence from the order averages, and the base model without any effect, declared or not."""
+    tool = cutting_force.cutter(batch)
+    if isinstance(tool, Refusal) or "orders" not in observed:
+        return tool if isinstance(tool, Refusal) else Refusal("no order averages")
+    by_run = dict(tuple(observed["orders"].groupby("run", sort=False)))
+    spindle = observed["spindle"].set_index("run")
+    blocks = tuple(
+        block_of(batch, run, by_run[run], tool, spindle.loc[run]) for run in recorded(batch) if run in by_run
+    )
+    helical = any(block.setting.helix is not None for block in blocks)
+    bottom = _bottom_edges(blocks)
+    if bottom == ("kfae",):
+        blocks = _at_other_feeds(blocks, tool)
+    model = ForceModel(
+        cutter=replace(tool, runout_radius=0.0, runout_angle=0.0),  # what is declared of it is an effect's
+        law=EdgeLaw(),
+        bottom_edges=bottom,
+        sensor=Dynamometer(axes=cutting_force.channels(batch)),
+    )
+    notes = [
+        "The chip thickness is that of the true tooth paths, the force law linear in it; "
+        "tool, machine and dynamometer are rigid in the base model.",
+        _path_note(tool, blocks),
+        *_give_note(batch, observed["spindle"]),
+        f"Forces are compared per revolution up to spindle order {blocks[0].setting.highest}, "
+        "in the work frame"
+        + (" (helical runs: in the frame that turns with the orbit)." if helical else "."),
+        *(f"Left out: {reason}." for reason in observed["force_refused"]["reason"]),
+    ]
+    scatter = np.full(len(model.parameters), SCATTER)
+    next_runs = feasible(blocks, tool, batch.manifest.get("limits"))
+    return Problem(NAME, "N", 1.0, model, blocks, scatter, notes=tuple(notes), feasible=next_runs)
+
+
+def _path_note(tool: Cutter, blocks: tuple[Block, ...]) -> str:
+    """Say how far the true tooth paths are from feed × sine of the immersion, at the largest feed."""
+    widest = max((block.setting.cut for block in blocks), key=lambda cut: cut.feed_per_tooth)
+    difference = path_difference(tool, widest)
+    share = difference.largest / widest.feed_per_tooth
+    return (
+        f"At {widest.feed_per_tooth / MM:.3g} mm per tooth the true chip differs from feed × sine by up to "
+        f"{difference.largest / UM:.2g} µm ({100 * share:.2g} % of the feed), "
+        f"{difference.rms / UM:.2g} µm rms."
+    )
+
+
+def _give_note(batch: Batch, spindle: pd.DataFrame) -> tuple[str, ...]:
+    """Say by how much an arm gives way in side cuts, or that nobody knows."""
+    run, give = max(zip(spindle["run"], spindle["give_mm"], strict=True), key=lambda one: abs(one[1]))
+    if give:
+        return (
+            "The radial depth of side cuts is the nominal one less what the arm gives way to the measured "
+            f"mean force by its load tests: at most {give:.2g} mm, in run {run}.",
+        )
+    if "arm" in batch.cell and any(wall(batch, name).normal.any() for name in spindle["run"]):
+        return (
+            "How far the arm gives way in side cuts is not known (no load tests of it where it stood): their "
+            "radial depth is taken as programmed, and what the arm gives way is in the forces of up and "
+            "down milling with opposite signs.",
+        )
+    return ()
+
+
+def _bottom_edges(blocks: tuple[Block, ...]) -> tuple[str, ...]:
+    """Coefficients of the bottom edges that the helical runs identify: one axial feed gives the sum alone."""
+    feeds = [
+        block.setting.helix.axial_feed for block in blocks if block.role == "identify" and block.setting.helix
+    ]
+    if not feeds:
+        return ()
+    return ("kfac", "kfae") if max(feeds) > LEAST_FEED_RATIO * min(feeds) else ("kfae",)
+
+
+def _at_other_feeds(blocks: tuple[Block, ...], tool: Cutter) -> tuple[Block, ...]:
+    """Allow helical runs at another axial feed than the one that was identified to have another thrust."""
+    helices = [block.setting.helix for block in blocks if block.role == "identify"]
+    identified_feed = float(np.mean([helix.axial_feed for helix in helices if helix]))
+    return tuple(
+        replace(block, unidentified=_unidentified_thrust(block, tool, identified_feed))
+        if block.setting.helix
+        else block
+        for block in blocks
+    )
+
+
+def _unidentified_thrust(block: Block, tool: Cutter, identified_feed: float) -> Array | None:
+    """Direction (n, 1) of the thrust of an unknown K_Fac, at an axial feed other than the identified one."""
+    helix = block.setting.helix
+    if max(helix.axial_feed, identified_feed) <= LEAST_FEED_RATIO * min(helix.axial_feed, identified_feed):
+        return None
+    per_unit = bottom_thrust(tool, helix)[0] * (1.0 - identified_feed / helix.axial_feed)
+    return np.asarray(UNIDENTIFIED_KFAC * per_unit * block.zeros[:, 2:])
+
+
+def report(
+    _batch: Batch,
+    observed: Mapping[str, pd.DataFrame],
+    _identified: JSON,
+    task: Problem | Refusal,
+    fit: BaseFit | None,
+) -> JSON:
+    """Return coefficients by means and by waveform, and each run's spindle speed, for identified.json."""
+    if isinstance(task, Refusal):
+        return {}
+    model = cast("ForceModel", task.base)
+    spindle = observed["spindle"]
+    runs = zip(spindle["run"], spindle["spindle_rpm"], spindle["spindle_rpm_sd"], strict=True)
+    block: JSON = {
+        "spindle_rpm": {run: quantity(speed, sd, "rpm") for run, speed, sd in runs},
+        "edge_length": "axial",
+    }
+    turned = all(block.setting.helix is not None for block in task.role("identify"))
+    results: dict[str, JSON | Refusal] = {
+        "mean": mean_coefficients(model, task.role("identify"), spindle),
+        "mean_all_runs": mean_coefficients(model, task.blocks, spindle),
+        "waveform": waveform(model, fit, turned=turned),
+    }
+    lacking = {name: value.reason for name, value in results.items() if isinstance(value, Refusal)}
+    if turned and fit:
+        lacking["ktc"] = lacking["krc"] = lacking["kte"] = lacking["kre"] = (
+            "all runs are helical and where on the orbit their records begin is not known: the force in the "
+            "plane is told but for a rotation; cut one slot"
+        )
+    if model.bottom_edges == ("kfae",):
+        lacking["kfac"] = (
+            "the helical runs have one axial feed: kfae holds the whole thrust of the bottom edges; at other "
+            "feeds the thrust is uncertain until a second one is identified"
+        )
+    block |= {name: value for name, value in results.items() if not isinstance(value, Refusal)}
+    block |= correlation(model, fit)
+    return {"force": {**block, "not_identified": lacking} if lacking else block}
+
+
+def yielding(batch: Batch, read: Tables, identified: JSON) -> tuple[dict[str, pd.DataFrame], JSON]:
+    """Return what a tabulated machine's stiffness makes of the identified cutting force."""
+    table = yielding_table(batch, read, identified)
+    return ({} if isinstance(table, Refusal) else {"yielding": table}), {}
+
+
+OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, beside=yielding, gives_coefficients=True)

@@ -1,0 +1,112 @@
+"""Friction of an arm's joints from its idle runs, and the joints for which it cannot be identified."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+
+from metro.batch.batch import Batch
+from metro.observables.arm.tip_force import ACTUAL, TORQUE
+from metro.observables.problem import Refusal
+from metro.robot.friction import Friction, of_idle_runs
+from metro.robot.kinematics import arm_of_cell
+from metro.robot.motion import Motion
+from metro.units import DEG, JSON, Array
+
+Read = Callable[..., pd.DataFrame]
+UNITS = {"coulomb": "N m", "viscous": "N m s/rad"}
+BINS = 12  # of speed, per direction, in the figure
+LEAST_SAMPLES = 100
+
+
+def observe(batch: Batch, read: Read) -> dict[str, pd.DataFrame] | Refusal:
+    """Identify the friction of all idle runs together.
+
+    Tables ``joint_friction`` (a row per joint: Coulomb and viscous friction, N m and N m s/rad, with their
+    95 % intervals; blank where the runs do not identify it, and ``remark`` gives the reason) and
+    ``joint_friction_curve`` (mean of the torque less that of the weight, by joint and speed).
+    """
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    if arm is None:
+        return Refusal("")  # without an arm there is nothing to report as missing
+    table = read("robot")
+    idle = [rows for _, rows in table[table["log"] == "idle"].groupby("run") if len(rows) >= LEAST_SAMPLES]
+    if not idle:
+        return Refusal("no run has an idle_log")
+    runs = [(r["t_s"].to_numpy(), r[ACTUAL].to_numpy() * DEG, r[TORQUE].to_numpy()) for r in idle]
+    try:
+        friction, log = of_idle_runs(arm.dh, runs)
+    except ValueError as error:
+        return Refusal(f"idle runs: {error}")
+    return {"joint_friction": _table(friction, log), "joint_friction_curve": _curve(friction, log)}
+
+
+def _table(friction: Friction, log: Motion) -> pd.DataFrame:
+    fastest = np.where(log.moving, np.abs(log.rate), 0.0).max(axis=0)
+    interval = friction.interval()
+    half = 0.5 * np.ptp(interval, axis=-1)
+    rows = []
+    for j in range(len(fastest)):
+        value = friction.value[j].copy()
+        # Friction whose error exceeds the whole range of the motor's torque is not identified.
+        swing = float(np.ptp(log.torque[:, j]))
+        value[:2][half[j, :2] * (1.0, fastest[j]) > swing] = np.nan
+        row = {"joint": j + 1, "fastest_deg_s": fastest[j] / DEG, "noise_nm": friction.noise[j]}
+        for i, name in enumerate(UNITS):
+            low, high = interval[j, i] if np.isfinite(value[i]) else (np.nan, np.nan)
+            row |= {name: value[i], f"{name}_low": low, f"{name}_high": high}
+        rows.append(row | {"remark": _remark(friction, j, value)})
+    return pd.DataFrame(rows)
+
+
+def _remark(friction: Friction, joint: int, value: Array) -> str:
+    """Say why the runs do not identify a joint's friction; empty if they do."""
+    forward, backward = friction.forward[joint], friction.backward[joint]
+    if not (forward or backward):
+        return "too slow for the encoder to tell which way"
+    if np.isfinite(value[:2]).all():
+        return ""
+    if not (forward and backward):
+        both = "" if np.isfinite(value[1]) else ", and at too few speeds for viscous friction"
+        return f"one way only, so that Coulomb friction looks like weight{both}"
+    return "speeds that differ too little to part Coulomb from viscous friction"
+
+
+def _curve(friction: Friction, log: Motion) -> pd.DataFrame:
+    """Friction torque by speed: mean and standard deviation of bins with equal numbers of samples."""
+    known = np.nan_to_num(friction.value)
+    resists = friction.residual + known[:, 0] * log.direction + known[:, 1] * log.rate
+    rows = []
+    for j in range(log.rate.shape[1]):
+        for sign in (1, -1):
+            inside = log.moving[:, j] & (sign * log.rate[:, j] > 0)
+            rate, torque = log.rate[inside, j], resists[inside, j]
+            for part in np.array_split(np.argsort(rate), min(BINS, len(rate))) if len(rate) else ():
+                mean, spread = torque[part].mean(), torque[part].std()
+                rows.append((j + 1, rate[part].mean() / DEG, mean, spread))
+    return pd.DataFrame(rows, columns=["joint", "speed_deg_s", "friction_nm", "sd_nm"])
+
+
+def report(observed: dict[str, pd.DataFrame] | Refusal) -> JSON:
+    """Return the part of the ``arm`` block: six quantities each of ``coulomb`` and ``viscous`` friction.
+
+    A value that the idle runs do not identify is null, with the reason under ``not_identified``.
+    """
+    if isinstance(observed, Refusal):
+        return {"arm": {"not_identified": {"friction": observed.reason}}} if observed.reason else {}
+    table = observed["joint_friction"]
+    block: JSON = {
+        name: [
+            {"value": _known(value), "ci95": [_known(low), _known(high)], "unit": unit}
+            for value, low, high in table[[name, f"{name}_low", f"{name}_high"]].to_numpy()
+        ]
+        for name, unit in UNITS.items()
+    }
+    not_identified = {f"joint {r['joint']}": str(r["remark"]) for _, r in table.iterrows() if r["remark"]}
+    return {"arm": {"friction": {**block, **({"not_identified": not_identified} if not_identified else {})}}}
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,133 @@
+"""The joint force model: motor torques of the cut less those of the idle run, given the force on the tool.
+
+Per joint and bin of the path: torque = gain × (−Jᵀ f) + drives + payload (virtual work), with f the
+dynamometer's force, averaged over a revolution of the spindle and over the bin. Each joint's torque and each
+axis of the dynamometer may have a small additional gain, to first order, within the accuracy of the
+instruments. The rows of the comparison are forces: that of the dynamometer, and the sensorless force, which
+is that of the dynamometer plus the force at the tip that belongs to the residual torques.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from metro.observables.problem import Block, Parameter
+from metro.robot.drive_torques import DriveTorques
+from metro.robot.kinematics import Arm
+from metro.robot.payload import Payload, gravity_torque
+from metro.robot.statics import joint_torque, tip_jacobian
+from metro.signals.waves import waves
+from metro.units import Array
+
+JOINTS, AXES = range(1, 7), "xyz"
+
+
+@dataclass(frozen=True, eq=False)
+class ForceRecord:
+    """The force on the tool, work frame, through the running integral of its record.
+
+    ``t`` (k,) s from the record's start; ``integral`` (k, 3), N s, of the force averaged over a revolution;
+    before and after the record there is none.
+    """
+
+    t: Array
+    integral: Array
+
+    def mean(self, middle: Array, width: Array) -> Array:
+        """Mean force (m, 3), N, over windows of ``width`` (m,) s about ``middle`` (m,) s."""
+        ends = np.stack([middle - width / 2, middle + width / 2])
+        sums = np.stack([np.interp(ends, self.t, column) for column in self.integral.T], axis=-1)
+        return np.asarray((sums[1] - sums[0]) / width[:, None])
+
+
+def running(t: Array, force: Array) -> ForceRecord:
+    """Return a record (k, 3), N, at times ``t`` (k,), s, as its running integral (trapezia)."""
+    steps = 0.5 * (force[1:] + force[:-1]) * np.diff(t)[:, None]
+    return ForceRecord(t, np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]))
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueRun:
+    """Inputs of a run's torques, at m bins of the path.
+
+    Attributes
+    ----------
+    q, rate : (m, 6) joint angles, rad, and speeds, rad/s. t, width : (m,) middle and length of the bin's
+        time, s, by the dynamometer's clock. since : (m,) the same from the start of the log.
+    force : the dynamometer's record.
+    """
+
+    q: Array
+    rate: Array
+    t: Array
+    since: Array
+    width: Array
+    force: ForceRecord
+
+
+@dataclass(frozen=True, eq=False)
+class Instruments:
+    """Setting of the prior knowledge on the gains of joints and axes: they are small."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointForceModel:
+    """Torques of the cut less those of the idle run.
+
+    Attributes
+    ----------
+    arm : geometry: DH, tip in the flange, work in the base.
+    drives : torques of friction and gears that the idle run does not have.
+    payload : masses on the flange that the idle run does not have.
+    offset : time by which the robot log of the cut stamps an event later than the dynamometer, s.
+    """
+
+    arm: Arm
+    drives: DriveTorques = field(default_factory=DriveTorques)
+    payload: tuple[Payload, ...] = ()
+    offset: float = 0.0
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """One gain error that all torques share, and one for each joint and each axis."""
+        names = ["torque_gain", *(f"gain_of_joint_{i}" for i in JOINTS), *(f"gain_of_{a}" for a in AXES)]
+        return tuple(Parameter(name, "1") for name in names)
+
+    def nuisance_starts(self, _block: Block) -> Array:
+        """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
+        return np.zeros((1, 0))
+
+    def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
+        """Torque (6 m, 10) per gain, and the torque without a force (6 m,), N m, as waves along the path.
+
+        For :class:`Instruments` they are the gains (9, 10) themselves.
+        """
+        run: Any = block.setting
+        if isinstance(run, Instruments):
+            return np.eye(10)[1:], np.zeros(9)
+        other = self.drives.at(run.q, run.rate, run.since, run.width)
+        for mass in self.payload:
+            other = other + gravity_torque(self.arm, run.q, mass)
+        return carried(self.arm, run, self.offset), in_waves(other)
+
+
+@lru_cache(maxsize=256)
+def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
+    """Waves (6 m, 10), N m, of the torque that balances the force: whole, of each joint, of each axis.
+
+    The log stamps it ``offset`` s later than the dynamometer.
+    """
+    force, jacobian = run.force.mean(run.t - offset, run.width), tip_jacobian(arm, run.q)
+    by_axis = [in_waves(joint_torque(jacobian, force * axis)) for axis in np.eye(3)]
+    whole = np.sum(by_axis, axis=0)
+    by_joint = np.kron(np.eye(6), np.ones((len(force), 1))) * whole[:, None]
+    return np.column_stack([whole, by_joint, *by_axis])
+
+
+def in_waves(torque: Array) -> Array:
+    """Return torques (m, 6) as waves along the path (6 m,), joint after joint."""
+    return waves(torque).T.ravel()

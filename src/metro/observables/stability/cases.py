@@ -1,0 +1,94 @@
+"""Stability models of the cuts whose tests have labels, which effects change.
+
+A case is a place with measured modes and a cut that was made there. It is solved at the speeds of its tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from metro.dynamics.band import depth_samples
+from metro.dynamics.lobes import stability_boundary
+from metro.dynamics.stability_model import StabilityModel, estimated
+from metro.observables.stability import boundary as stability
+from metro.observables.stability.boundary import Cutting
+from metro.observables.stability.positions import Tip
+from metro.units import Array
+
+NOWHERE = -1  # point of a test at a place where no modes were measured
+
+Change = Callable[[StabilityModel], StabilityModel]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A cut at a place.
+
+    Attributes
+    ----------
+    position : of the modes.
+    model : without effects.
+    rpm : (k,) rising speeds of its tests, rev/min.
+    sd : (3 m + 2,) standard deviations of the logarithms of the modes' frequencies, damping ratios and
+        stiffnesses, and of ktc and krc; NaN if not known.
+    """
+
+    position: str
+    model: StabilityModel
+    rpm: Array
+    sd: Array
+
+    def at(self, rpm: Array) -> Case:
+        """Return the case at other speeds."""
+        return replace(self, rpm=rpm)
+
+    def deviations(self, draws: int, seed: int) -> Array:
+        """Draws (draws, k) of the depth's logarithm from the errors of modes and coefficients."""
+        rng = np.random.default_rng(seed)
+        normal = rng.normal(size=(draws, len(self.sd))) * np.where(np.isfinite(self.sd), self.sd, 0.0)
+        solved = [(cut, stability_boundary(self.model.structure, cut, self.rpm)) for cut in self.model.cuts]
+        samples = [depth_samples(self.model.structure, cut, one, normal) for cut, one in solved]
+        lowest, sampled = np.min([one.depth for _, one in solved], axis=0), np.min(samples, axis=0)
+        known = np.isfinite(lowest) & np.isfinite(sampled)
+        return np.log(np.where(known, sampled, 1.0) / np.where(known, lowest, 1.0))
+
+
+def boundaries(cases: Sequence[Case], change: Change) -> tuple[Array, Array]:
+    """Log depth and chatter frequency (Hz) at the speeds of all cases, one after another, after a change."""
+    solved = [change(case.model).boundary(case.rpm) for case in cases]
+    depth, chatter = (np.concatenate(part) for part in zip(*solved, strict=True))
+    return np.log(depth), chatter
+
+
+def estimates(cases: Sequence[Case], changes: Sequence[Change]) -> tuple[Array, Array]:
+    """Log depths and chatter frequencies (t, p), to zeroth order, after each of t changes."""
+    solved = [estimated([change(case.model) for change in changes], case.rpm) for case in cases]
+    depth, chatter = (np.concatenate(part, axis=1) for part in zip(*solved, strict=True))
+    return np.log(depth), chatter
+
+
+def cases_of(
+    runs: pd.DataFrame, position: Mapping[str, str], tips: Sequence[Tip], cutting: Cutting
+) -> tuple[tuple[Case, ...], np.ndarray]:
+    """Cases of the tests, and the point (n,) of each test: its place among the speeds of all cases.
+
+    Parameters
+    ----------
+    runs : (n) rows of the run table. position : of each run, by its name. tips : the measured structures.
+    """
+    made: list[Case] = []
+    point = pd.Series(NOWHERE, index=runs.index)
+    known, first = {tip.position: tip for tip in tips}, 0
+    for name, here in runs.groupby(runs.index.map(position), sort=False):
+        for same in stability.same_cut(here) if name in known else ():
+            tip, rpm = known[str(name)], np.unique(same["spindle_rpm"].to_numpy(float))
+            cuts = stability.cuts_of(same.iloc[0], cutting)[1]
+            model = StabilityModel(tip.structure, cuts, cutting.tool.radius)
+            made.append(Case(tip.position, model, rpm, np.concatenate([tip.sd, cutting.sd])))
+            point[same.index] = first + np.searchsorted(rpm, same["spindle_rpm"].to_numpy(float))
+            first += len(rpm)
+    return tuple(made), point.to_numpy()

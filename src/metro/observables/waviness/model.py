@@ -1,0 +1,104 @@
+"""The waviness model: the wall follows the tip's tracking error, and joint motion that no encoder sees.
+
+waviness = transfer × (tracking error of the tip by the encoders) + F n · [Σ_i j_i x_i + vibration], with F
+the filter of the profile, n the wall's normal, j_i the columns of the tip's Jacobian. The encoders are on the
+motors, so they do not see the twist x_i = (T_i − τ_i) c_i of joint i. T_i is the torque of the cut, and τ_i
+the friction and ripple of the gears. When T_i changes its sign, the joint passes its gap.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from metro.observables.problem import Block, Parameter
+from metro.robot.drive_torques import DriveTorques
+from metro.robot.torsion import Torsion, passed
+from metro.units import Array
+
+
+@dataclass(frozen=True, eq=False)
+class WavyCut:
+    """Inputs of a run's waviness: n waves of the wall, at m points along it.
+
+    Attributes
+    ----------
+    by_joint : (n, 6) tracking error of the tip along the wall's normal by the encoders, joint by joint,
+        filtered as the profile is, m. idle : (n, 6) that of the idle run; None if there is none.
+    share : (n, 6) share of each joint's waves that is not noise of its encoder.
+    q, rate : (m, 6) joint angles, rad, and speeds, rad/s. t : (m,) from the start of the log of the cut, s.
+    moves : (m, 6) displacement of the tip along the wall's normal per turn of each joint, m/rad.
+    load : (m, 6) torque of the steady cut on the link of each joint, N m; zero if no force is known.
+    compliance : (6,) of the joints, rad/(N m).
+    filtered : (n, m) map from heights at the points to waves, filtered as the profile is.
+    longer : (2, rows) longer waves that pass the filter, of the profile and of the tracking error, m. They
+        belong to the deformation too, so they are not compared.
+    """
+
+    by_joint: Array
+    idle: Array | None
+    share: Array
+    q: Array
+    rate: Array
+    t: Array
+    moves: Array
+    load: Array
+    compliance: Array
+    filtered: Array
+    longer: Array
+
+    @property
+    def tracking(self) -> Array:
+        """Tracking error (n,), m, without the share that is noise."""
+        return np.asarray((self.share * self.by_joint).sum(axis=1))
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """A vibration of the tip along the wall's normal: amplitude sin(2π frequency t + phase); m, Hz, rad."""
+
+    frequency: float = 0.0
+    amplitude: float = 0.0
+    phase: float = 0.0
+
+    def at(self, t: Array) -> Array:
+        """Displacement (m,) at times ``t`` (m,), s."""
+        return np.asarray(self.amplitude * np.sin(2.0 * math.pi * self.frequency * t + self.phase))
+
+
+@dataclass(frozen=True, eq=False)
+class WavinessModel:
+    """Waviness of a side-milled wall.
+
+    Attributes
+    ----------
+    drives : torques of friction and gears that the idle run does not have.
+    torsion : of the joints; only its gaps make waves.
+    vibration : waves that are functions of time alone, not of the place.
+    """
+
+    drives: DriveTorques = field(default_factory=DriveTorques)
+    torsion: Torsion = field(default_factory=Torsion)
+    vibration: tuple[Vibration, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Share of the tracking error that the wall shows; ideally it is 1."""
+        return (Parameter("transfer", "1"),)
+
+    def nuisance_starts(self, _block: Block) -> Array:
+        """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
+        return np.zeros((1, 0))
+
+    def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
+        """Waves (n, 1), m per unit of transfer, and the waves that no encoder sees (n,), m."""
+        run: Any = block.setting
+        torque = run.load - self.drives.at(run.q, run.rate, run.t)
+        twist = run.compliance * torque + passed(run.load, np.array(self.torsion.gap))
+        unseen = (run.moves * twist).sum(axis=1)
+        for swing in self.vibration:
+            unseen = unseen + swing.at(run.t)
+        return run.tracking[:, None], run.filtered @ unseen

@@ -1,0 +1,119 @@
+"""The torques of the joints against those that the dynamometer's force asks for: signs, order and gain.
+
+Virtual work predicts the torque of each joint from the measured force; a channel that is another joint's, or
+has the other sign, fits the prediction of that joint and not its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from metro.observables.joint_force.model import Instruments, JointForceModel, carried
+from metro.observables.problem import Block, Problem
+from metro.slips.slip import Slip
+from metro.units import Array
+
+OBSERVABLES = ("joint_force", "deformation", "waviness")
+JOINTS = 6
+CLEAR = 10.0  # signal over noise, rms over all runs, from which on a joint's torque shows whose it is
+BETTER = 0.7  # residual over that of the declared order, over the joints that show; the limit of the force
+GAINS = (0.5, 2.0)  # of all torques together: a drive's torque constant is known far better than that
+DEVIATIONS = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Moments:
+    """Sums over all waves of all runs, each channel in units of its noise.
+
+    ``across`` (6, 6): channel i with the prediction of joint j; ``own`` (6,): power of each channel;
+    ``predicted`` (6, 6): power of the prediction of joint j in the noise of channel i; ``count`` of waves.
+    """
+
+    across: Array
+    own: Array
+    predicted: Array
+    count: int
+
+
+def joint_slips(problem: Problem) -> tuple[Slip, ...]:
+    """Try every assignment of the torques to joints with either sign, and the gain of all together."""
+    from scipy.optimize import linear_sum_assignment
+
+    model = cast("JointForceModel", problem.base)
+    blocks = [block for block in problem.blocks if not isinstance(block.setting, Instruments)]
+    if not blocks:
+        return ()
+    sums = _moments(model, blocks)
+    strong = np.sqrt(np.diag(sums.predicted) / sums.count) > CLEAR / np.sqrt(sums.count)
+    if not strong.any():
+        return ()
+    sign = np.where(sums.across < 0.0, -1.0, 1.0)
+    cost = sums.own[:, None] - 2.0 * np.abs(sums.across) + sums.predicted
+    place = linear_sum_assignment(cost)[1]
+    declared = sums.own - 2.0 * np.diag(sums.across) + np.diag(sums.predicted)
+    joints = np.arange(JOINTS)
+    moved = ((place != joints) | (sign[joints, place] < 0.0)) & (strong | strong[place])
+    best = np.where(moved, cost[joints, place], declared)
+    before, after = (float(np.sqrt(each.sum() / max(sums.own.sum(), 1e-300))) for each in (declared, best))
+    if moved.any() and after < BETTER * before:
+        return (_moved(place, sign[joints, place], moved, before, after),)
+    return _gain(sums)
+
+
+def _moved(place: Array, sign: Array, moved: Array, before: float, after: float) -> Slip:
+    found = (
+        "the torques of the joints are not those that the dynamometer's force asks for: residual "
+        f"{100 * before:.3g} % of the torque as declared, {100 * after:.3g} % otherwise"
+    )
+    turned = [f"tau{i + 1}_nm" for i in np.flatnonzero(moved) if place[i] == i]
+    other = [
+        f"tau{i + 1}_nm holds {'minus ' if sign[i] < 0 else ''}the torque of joint {place[i] + 1}"
+        for i in np.flatnonzero(moved)
+        if place[i] != i
+    ]
+    if len(turned) >= 2 and moved.sum() == len(turned) and np.all(sign[moved] < 0):
+        words = (
+            f"Likely in the robot logs: the sign of {', '.join(turned)} is turned, or the dynamometer reads"
+        )
+        remedy = f"{words} the other body (instruments.dynamometer.reads)"
+    else:
+        texts = ([f"the sign of {', '.join(turned)} is turned"] if turned else []) + other
+        remedy = f"Likely in the robot logs: {'; '.join(texts)}"
+    return Slip(OBSERVABLES, found, remedy, "runs.csv", "robot_log")
+
+
+def _gain(sums: _Moments) -> tuple[Slip, ...]:
+    """Judge the one gain of all torques."""
+    power = float(np.trace(sums.predicted))
+    gain, deviation = float(np.trace(sums.across)) / power, 1.0 / np.sqrt(power)
+    low, high = GAINS
+    if low - DEVIATIONS * deviation <= gain <= high + DEVIATIONS * deviation:
+        return ()
+    found = (
+        f"the torques of the joints are {gain:.3g} ± {1.96 * deviation:.2g} times those that the "
+        f"dynamometer's force asks for; a gain beyond {low:g} to {high:g} is none of a drive"
+    )
+    remedy = "Likely: the unit of tau1_nm … tau6_nm (motor torque before the gear, N mm) or of the force"
+    return (Slip(OBSERVABLES, found, remedy, "runs.csv", "robot_log"),)
+
+
+def _moments(model: JointForceModel, blocks: list[Block]) -> _Moments:
+    across, own, predicted = np.zeros((JOINTS, JOINTS)), np.zeros(JOINTS), np.zeros((JOINTS, JOINTS))
+    count = 0
+    for block in blocks:
+        measured = _by_joint(block.measured)
+        asked = _by_joint(carried(model.arm, block.setting, model.offset)[:, 0])
+        sigma = _by_joint(block.sigma)
+        across += (measured / sigma**2) @ asked.T
+        own += np.sum((measured / sigma) ** 2, axis=1)
+        predicted += (1.0 / sigma**2) @ (asked**2).T
+        count += measured.shape[1]
+    return _Moments(across, own, predicted, count)
+
+
+def _by_joint(values: Array) -> Array:
+    """Waves (6, m - 1) without the first one, which holds the friction's change."""
+    return np.asarray(values.reshape(JOINTS, -1)[:, 1:])

@@ -1,0 +1,76 @@
+"""The causes of a batch, who bears witness of them, and what of an error came with the force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from metro.units import JSON, printed, printed_name
+from metro.wording.candidates import Sentence
+from metro.wording.names import plain
+
+ENDS = {
+    "together": "too weak to be named by any of them alone, and beyond chance in all together; the models "
+    "are not corrected for it",
+    "contradiction": "the estimates differ beyond their errors, so that it is not one cause of one size",
+    "confirmed": "and the estimates agree",
+    "alone": "the other observables that could show it cannot tell",
+    "one_observable": "no other observable of this batch could show it",
+}
+
+
+def cause_in_words(cause: JSON) -> str:
+    """Name a cause, what each observable says of it, and what follows from that."""
+    named = _named(cause["cause"], cause["where"])
+    if cause["status"] == "one_observable":
+        return f"{named}: seen in {plain(cause['seen_in'][0])}; {ENDS['one_observable']}."
+    witnesses = "; ".join(f"{plain(one['observable'])} {_says(one)}" for one in cause["witnesses"])
+    text = f"{named}: {witnesses}; {ENDS[cause['status']]}"
+    if cause["or_else"]:
+        text += f" (it may as well be {' or '.join(cause['or_else'])})"
+    if cause["status"] == "contradiction":
+        p_value = cause["agreement"]["p_value"]
+        text += f" (p = {p_value:.2g}): one of them has another cause besides, or a wrong input"
+    return text + "."
+
+
+def split_in_words(split: JSON) -> str:
+    """Say how much of an observable's error came with the force."""
+    unit = printed(split["unit"])
+    sentences = [
+        f"{when.capitalize()}, the error with the predicted force is {parts['total']:.3g} {unit} rms "
+        f"and with the measured force {parts['own']:.3g} {unit}: the force accounts for "
+        f"{parts['upstream']:.3g} {unit}, of which {parts['doubt']:.2g} {unit} (one standard "
+        "deviation) may be the error of the measured force."
+        for when, parts in (("before", split["before"]), ("after", split["after"]))
+    ]
+    return " ".join(sentences)
+
+
+def _says(witness: JSON) -> str:
+    values = [
+        _value(name, value)
+        for name, value in witness["parameters"].items()
+        if isinstance(value, dict) and value["value"] is not None and value["ci95"][0] is not None
+    ]
+    return f"{witness['says']} ({', '.join(values)})" if values else str(witness["says"])
+
+
+def _value(name: str, entry: JSON) -> str:
+    value, (low, high), unit = entry["value"], entry["ci95"], entry["unit"]
+    return f"{printed_name(name, unit)} {value:.3g} ± {(high - low) / 2:.2g} {printed(unit)}".rstrip()
+
+
+def _named(cause: str, where: JSON) -> str:
+    return plain(cause) + (f" of joint {where['joint']}" if "joint" in where else "")
+
+
+def _cause(values: JSON) -> str:
+    return _named(values["name"], {} if values["joint"] == "all" else {"joint": values["joint"]})
+
+
+SENTENCES: Mapping[str, Sentence] = {
+    "cause": _cause,
+    "names_it": "found it",
+    "sees_it": "sees it",
+    "cannot_tell": "cannot tell",
+}

@@ -1,0 +1,106 @@
+"""What remains of the residual, what it resembles, and the noise that it is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from metro.units import JSON, printed, printed_name
+from metro.wording.candidates import Sentence
+from metro.wording.names import plain
+
+MOST_PLACES = 4  # that are named
+
+
+def _residual(values: JSON) -> str:
+    return "; ".join(values["parts"])
+
+
+def _residual_and_likeness(values: JSON) -> str:
+    rms = f"{values['rms']:.3g} {printed(values['unit'])} rms"
+    return f"{values['residual']}; with that the error would be {rms}"
+
+
+def _places(values: JSON) -> str:
+    places = values["places"]
+    parts = [
+        f"{'all along' if place['label'] == 'all' else place['label']} in {place['axis']} "
+        f"({100 * place['relative']:.2g} % of the signal there)"
+        for place in places[:MOST_PLACES]
+    ]
+    more = len(places) - MOST_PLACES
+    return "; ".join(parts) + (f" and {more} more places" if more > 0 else "")
+
+
+def _step(values: JSON) -> str:
+    return f"a step of {values['parameter']} by {100 * values['relative']:+.1f} % after run {values['after']}"
+
+
+def _between(values: JSON) -> str:
+    return (
+        f"the base parameters differ between conditions by {100 * values['relative']:.2g} % of the signal, "
+        f"more than repeats scatter, most in {values['condition']}"
+    )
+
+
+def _restless(values: JSON) -> str:
+    return (
+        f"runs scatter by {100 * values['relative']:.2g} % of the signal, {values['times']:.0f} times what "
+        "is usual: something changes from run to run (a drift, another clamping)"
+    )
+
+
+def _like(values: JSON) -> str:
+    return f"like a {_resembled(values['effects'])}"
+
+
+def _may_be(values: JSON) -> str:
+    return f"it may be no {plain(values['effect'])} but a {_resembled(values['others'])}"
+
+
+def _resembled(effects: Sequence[JSON]) -> str:
+    """Name effects that are not of the library, with their values."""
+    named = [f"{plain(effect['name'])} ({', '.join(map(_value, effect['values']))})" for effect in effects]
+    return f"{' and a '.join(named)}, which is no effect of the library"
+
+
+def _value(entry: JSON) -> str:
+    name, unit = printed_name(entry["name"], entry["unit"]), printed(entry["unit"])
+    return f"{name} {entry['value']:.3g} {unit}".rstrip()
+
+
+def _unseen(values: JSON) -> str:
+    return f"only on runs that no fit has seen: {values['places']}"
+
+
+def _makeshift(values: JSON) -> str:
+    return f"what is predicted of a run that no fit has seen is a makeshift: {values['why']}"
+
+
+def _noise(values: JSON) -> str:
+    words = (
+        f"From run to run the base parameters scatter by {values['scatter_percent']:.2g} % (from repeats, "
+        f"drawn towards {100 * values['prior']:.2g} %); differences below {100 * values['budget']:.2g} % of "
+        "the signal are the declared model-form budget and nobody's effect."
+    )
+    if values["systematic"]:
+        words += (
+            f" All runs may share an error of {100 * values['systematic']:.2g} % that the inputs of the "
+            "model have; an effect must change the prediction by more than twice that."
+        )
+    return words
+
+
+SENTENCES: Mapping[str, Sentence] = {
+    "residual": _residual,
+    "residual_and_likeness": _residual_and_likeness,
+    "places": _places,
+    "step": _step,
+    "between": _between,
+    "restless": _restless,
+    "like": _like,
+    "may_be": _may_be,
+    "unseen": _unseen,
+    "makeshift": _makeshift,
+    "noise": _noise,
+    "contradiction": "not judged: the data contradict what the batch declares",
+}

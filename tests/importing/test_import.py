@@ -1,0 +1,204 @@
+"""``metro import``: files of other programs become a batch that passes its check; the unknown is asked."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.io
+import yaml
+from typer.testing import CliRunner
+
+from metro.batch.check import check, load
+from metro.batch.sources import source
+from metro.cli import app
+from metro.formats.registry import read
+from metro.importing.look import copies, look, sparkline
+from metro.importing.propose import from_name
+from metro.stages.whole import check_whole
+
+FIELD = Path(os.environ.get("METRO_REAL_DATA", Path(__file__).parents[2] / "../shared/real")).parent / "field"
+field = pytest.mark.skipif(not FIELD.is_dir(), reason="the field files are not there")
+RANDOM = np.random.default_rng(1)
+CUTS = {
+    "unit.force": "kN",
+    "rate_hz": "2000",
+    "tool.diameter_mm": "16",
+    "tool.teeth": "2",
+    "tool.helix_deg": "25",
+    "dynamometer.reads": "work",
+    "dynamometer.axes": "none",
+    "operation": "slot",
+    "direction": "slot",
+    "spindle_rpm": "800",
+    "feed_per_tooth_mm": "0.1",
+    "axial_depth_mm": "{record}",
+    "radial_depth_mm": "16",
+}
+
+
+def called(folder, *files, **answers):
+    given = [f"--set={key}={value}" for key, value in answers.items()]
+    return CliRunner().invoke(app, ["import", *map(str, files), f"--out={folder}", *given])
+
+
+def records(tmp_path):
+    forces = {f"F{axis}_cut_{k}": RANDOM.normal(size=4000) / 10 for axis in "xyz" for k in (1, 2, 3)}
+    scipy.io.savemat(tmp_path / "cuts.mat", forces)
+    return tmp_path / "cuts.mat", forces
+
+
+def test_several_records_in_one_file_become_runs_and_give_the_numbers_of_the_file(tmp_path):
+    path, forces = records(tmp_path)
+    result = called(tmp_path / "cuts", path, **CUTS)
+    assert result.exit_code == 0, result.output
+    assert "guessed from the name Fx_cut_1" in (tmp_path / "cuts/batch.yaml").read_text()
+    batch = load(tmp_path / "cuts").batch
+    assert batch.runs["axial_depth_mm"].tolist() == [1, 2, 3]
+    one = source(tmp_path / "cuts", batch.runs["dynamometer"].iloc[1], batch.manifest["files"])
+    table = read(one, "force")
+    np.testing.assert_array_equal(table["fy_n"], forces["Fy_cut_2"] * 1e3)
+    np.testing.assert_array_equal(table["t_s"], np.arange(4000) / 2000)
+
+
+def test_what_nobody_answers_is_listed_and_nothing_is_written(tmp_path):
+    path, _ = records(tmp_path)
+    result = called(tmp_path / "cuts", path, **{key: CUTS[key] for key in CUTS if key != "unit.force"})
+    assert result.exit_code == 2
+    assert "1 questions are open" in result.output
+    assert "--set unit.force=…" in result.output
+    assert not (tmp_path / "cuts").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"unit.forces": "N"}, 'did you mean "unit.force"'),
+        ({"operation": "slotting"}, "slot or side"),
+        ({"axial_depth_mm": "1,2"}, "found 2 values, expected one, or 3"),
+        ({"unit.force": "V"}, "--set sensitivity.force=…"),
+    ],
+)
+def test_an_answer_that_does_not_fit_is_refused(tmp_path, change, says):
+    path, _ = records(tmp_path)
+    result = called(tmp_path / "cuts", path, **(CUTS | change))
+    assert result.exit_code == 2
+    assert says in result.output
+    assert not (tmp_path / "cuts").exists()
+
+
+def test_files_of_a_hammer_and_a_sensor_become_one_record(tmp_path):
+    hit = np.concatenate([np.hanning(16) * 300, np.zeros(2032)])
+    for point in (3, 8):
+        ring = np.cumsum(RANDOM.normal(size=2048))
+        for name, values in ((f"impact_p{point}.txt", hit + 1e-3 * ring), (f"accel_p{point}.txt", ring)):
+            text = "".join(f"{k / 4000:.3g}\t{value!r}\n" for k, value in enumerate(values.tolist()))
+            (tmp_path / name).write_text(text)
+    answers = {"unit.force": "N", "unit.response": "V", "sensitivity.response": "10 mV/g", "rate_hz": "4000"}
+    points = {"reference": "{number}z", "response": "1z"}
+    result = called(tmp_path / "plate", *sorted(tmp_path.glob("*.txt")), **answers, **points)
+    assert result.exit_code == 0, result.output
+    impacts = load(tmp_path / "plate").impacts
+    assert impacts["reference"].tolist() == ["3z", "8z"]
+    assert set(impacts["response_unit"]) == {"g"}
+    files = yaml.safe_load((tmp_path / "plate/batch.yaml").read_text())["files"]
+    found = read(source(tmp_path / "plate", impacts["file"].iloc[1], files), "record")
+    np.testing.assert_allclose(found["response"], ring / 0.01, rtol=1e-12)
+
+
+def test_two_files_with_the_same_numbers_in_other_digits_are_refused(tmp_path):
+    values = RANDOM.normal(size=40).round(3)
+    for name, form in (("a.csv", "{:.3f}"), ("b.csv", "{:.5e}")):
+        rows = "".join(f"{k},{form.format(value)}\n" for k, value in enumerate(values))
+        (tmp_path / name).write_text(rows)
+    result = called(tmp_path / "c", tmp_path / "a.csv", tmp_path / "b.csv")
+    assert result.exit_code == 1
+    assert "hold the same numbers, bit for bit" in result.output
+
+
+def test_files_that_are_none_of_what_can_be_used_are_named_with_what_they_have(tmp_path):
+    pd.DataFrame(RANDOM.normal(size=(20, 2)), columns=["shoulder", "elbow"]).to_csv(
+        tmp_path / "a.csv", index=False
+    )
+    result = called(tmp_path / "c", tmp_path / "a.csv")
+    assert result.exit_code == 1
+    assert "not used: a.csv: 2 columns, named shoulder, elbow" in result.output
+
+
+def test_a_name_says_what_it_says_and_no_more():
+    assert from_name("6-n6000f300ap3ae25.csv") == {
+        "spindle_rpm": "6000",
+        "axial_depth_mm": "3",
+        "radial_depth_mm": "25",
+    }
+    assert from_name("wrapping2.csv") == {}
+
+
+def test_a_sparkline_rises_with_its_values():
+    assert sparkline(np.arange(8.0)) == "▁▂▃▄▅▆▇█"
+
+
+@field
+@pytest.mark.parametrize(
+    ("name", "answers"),
+    [
+        ("force-ball-d16", {**CUTS, "unit.force": "N", "rate_hz": "10000"}),
+        ("scan-numbered-points", {"unit.length": "mm", "work.size_mm": "none"}),
+        ("modal-poles-unv", {"citation": "GVT"}),
+    ],
+)
+def test_files_as_recorded_become_batches_that_pass_their_check(tmp_path, name, answers):
+    result = called(tmp_path / name, *(FIELD / name).iterdir(), **answers)
+    assert result.exit_code == 0, result.output
+    assert check(tmp_path / name).ok
+
+
+@field
+@pytest.mark.parametrize(
+    ("name", "answers", "reason"),
+    [
+        (
+            "scan-gocator",
+            {"work.size_mm": "none"},
+            "of one plane, expected 90 % or more of a scan of one face",
+        ),
+        ("profile-square", {}, "nothing can be computed from this batch"),
+    ],
+)
+def test_files_of_which_nothing_can_be_computed_are_refused_by_name(tmp_path, name, answers, reason):
+    result = called(tmp_path / name, *(FIELD / name).iterdir(), **answers)
+    assert result.exit_code == 1
+    assert reason in " ".join(result.output.split())
+    assert not check_whole(tmp_path / name).ok
+
+
+@field
+def test_the_duplicated_channel_of_the_plate_is_found():
+    files = [look(path) for path in sorted((FIELD / "modal-duplicated-channel").iterdir())]
+    ((one, _, other, _),) = copies(files)
+    assert (one.path.name, other.path.name) == ("accel-pt18.txt", "accel-pt8.txt")
+
+
+def test_a_person_who_answers_wrongly_is_asked_again_and_the_batch_passes_its_check(tmp_path):
+    path, _ = records(tmp_path)
+    said = {
+        **CUTS,
+        "unit.force": ["mm", "kN"],
+        "tool.diameter_mm": ["12,5", "16"],
+        "operation": ["mill", "slot"],
+    }
+    said |= {"dynamometer.axes": ["up", "none"], "axial_depth_mm": ["deep", "{record}"]}
+    lines = ["", *(line for one in said.values() for line in ([one] if isinstance(one, str) else one))]
+    screen, terminal = os.openpty()
+    call = [Path(sys.executable).parent / "metro", "import", path, "--out", tmp_path / "cuts"]
+    with subprocess.Popen(call, stdin=terminal, stdout=subprocess.PIPE, text=True) as asking:
+        os.close(terminal)
+        os.write(screen, ("\n".join(lines) + "\n").encode())
+        printed = asking.communicate(timeout=60)[0]
+    assert asking.returncode == 0, printed
+    for wrong in ("mm", "12,5", "mill", "up", "deep"):
+        assert f'found "{wrong}", expected' in printed
+    assert check(tmp_path / "cuts").ok

@@ -1,0 +1,113 @@
+"""A force record whose bookkeeping is wrong is found, with the line to write; one that is right is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from slip_cuts import BETA, CUTTER, SENSOR, records, with_settings
+
+from metro.cutting.cutter import evenly_pitched
+from metro.slips.force import contradictions
+from metro.slips.orientation import axes_text, signed_permutations
+from metro.slips.physical import impossible, mean_chip
+from metro.slips.waveform import design, fit
+
+EVERY = list(signed_permutations())
+OTHERS = [matrix for matrix in EVERY if not np.array_equal(matrix, np.eye(3))]
+FEW = OTHERS[::9]
+
+
+def said(given, cutter=CUTTER, sensor=SENSOR):
+    slips = contradictions(given, cutter, sensor)
+    return slips[0].text if slips else ""
+
+
+def found_orientation(matrix):
+    """What is said of records that were read with axes turned by a signed permutation."""
+    return said([record.mapped(matrix) for record in records()])
+
+
+def true_axes(matrix):
+    """The line that undoes it: right-handed, with reads exchanged where it is not."""
+    back = matrix.T
+    right = np.linalg.det(back) > 0
+    axes = axes_text(back if right else -back)
+    if right:
+        return f"Likely: axes: {axes}"
+    return "Likely: reads: tool" + ("" if np.array_equal(back, -np.eye(3)) else f", axes: {axes}")
+
+
+def test_records_with_the_right_bookkeeping_contradict_nothing():
+    for seed in range(2):
+        assert said(records(seed=seed, noise=2.0)) == ""
+
+
+@pytest.mark.parametrize("matrix", FEW, ids=axes_text)
+def test_a_wrong_orientation_is_found_with_the_line_to_write(matrix):
+    assert true_axes(matrix) in found_orientation(matrix)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("matrix", OTHERS, ids=axes_text)
+def test_each_of_the_wrong_orientations_is_found(matrix):
+    assert true_axes(matrix) in found_orientation(matrix)
+
+
+def test_the_declared_axes_and_rotation_are_where_the_proposal_starts():
+    sensor = SENSOR | {"axes": {"x": "-y", "y": "-x", "z": "-z"}, "rotation_deg": 90.0}
+    half_turn = np.diag([-1.0, -1.0, 1.0])
+    text = said([record.mapped(half_turn) for record in records()], sensor=sensor)
+    assert "Likely: axes: {x: y, y: x, z: -z}" in text
+
+
+def test_the_coefficients_that_the_proposal_gives_are_those_of_the_cut():
+    text = found_orientation(np.diag([-1.0, -1.0, 1.0]))
+    ktc = float(text.split("with K_tc ")[1].split(",")[0])
+    assert ktc == pytest.approx(BETA[0] / 1e6, rel=0.03)
+    assert "K_tc h + K_te is -" in text
+
+
+@pytest.mark.parametrize(("declared", "teeth"), [(6, 3), (2, 3)])
+def test_a_wrong_number_of_teeth_is_found(declared, teeth):
+    cutter = replace(CUTTER, tooth_angles=evenly_pitched(declared))
+    assert f"teeth: {teeth} (or every spindle_rpm" in said(records(), cutter=cutter)
+
+
+def test_the_range_of_one_channel_in_the_plane_is_found():
+    text = said([record.mapped(np.diag([1.0, 10.0, 1.0])) for record in records()])
+    assert "the values of fy times 0.1" in text
+
+
+def test_an_axial_force_that_the_helix_cannot_give_is_impossible():
+    text = said([record.mapped(np.diag([1.0, 1.0, 10.0])) for record in records()])
+    assert "K_ac h + K_ae" in text
+    assert "exceeds" in text
+
+
+def test_two_rows_of_the_run_table_that_are_exchanged_are_named():
+    text = said(with_settings(records(), (0, 5, 2, 3, 4, 1)))
+    assert "r2 with the row of r6" in text
+    assert "r6 with the row of r2" in text
+
+
+def test_up_and_down_exchanged_is_found_and_so_is_one_run_alone():
+    assert "exchange up and down in the column direction" in said(
+        with_settings(records(), (0, 1, 4, 5, 2, 3))
+    )
+    assert "the other direction (up or down) in the row of r4" in said(
+        with_settings(records(), (0, 1, 2, 5, 4, 5))
+    )
+
+
+def test_runout_that_hides_half_of_the_teeth_is_no_slip():
+    worn = replace(CUTTER, runout_radius=15e-6, runout_angle=0.4)
+    assert said(records(cutter=worn)) == ""
+
+
+def test_coefficients_are_impossible_beyond_their_error_alone():
+    given = records()
+    designs = [design(CUTTER, record.setting) for record in given]
+    chip = mean_chip(given)
+    slightly = records(beta=BETA * np.array([1.0, 1.0, -1e-3, 1.0, 1.0, -1e-3]), noise=20.0)
+    for made, expected in ((given, False), (slightly, False), (records(beta=-BETA), True)):
+        assert bool(impossible(fit(made, designs), chip, CUTTER.helix)) is expected

@@ -1,0 +1,54 @@
+"""The speed in a force record against the declared one."""
+
+import numpy as np
+import pytest
+
+from metro.slips.speed import period, repeats_per_revolution
+
+RATE, RPM, TEETH = 10000.0, 6000.0, 3
+
+
+def record(rpm=RPM, runout=0.0, noise=0.05, seconds=0.6, ring_hz=None):
+    """Pulses of three teeth, one of them weaker by ``runout``; or the ringing of a resonance with each."""
+    rng = np.random.default_rng(2)
+    t = np.arange(0.0, seconds, 1.0 / RATE)
+    turn = t * rpm / 60.0
+    tooth = np.floor(turn * TEETH) % TEETH
+    phase = (turn * TEETH) % 1.0
+    force = np.where(phase < 0.5, np.sin(2 * np.pi * phase), 0.0) * (1.0 - runout * (tooth == 0))
+    if ring_hz:
+        since = phase / (TEETH * rpm / 60.0)
+        force = force + np.exp(-since * 300.0) * np.sin(2 * np.pi * ring_hz * since)
+    channels = np.column_stack([force, 0.7 * np.roll(force, 9), 0.3 * force])
+    return channels + noise * rng.normal(size=channels.shape)
+
+
+def passes(signal, declared):
+    found = period(signal, RATE, 60.0 / declared)
+    return None if found is None else repeats_per_revolution(found, 60.0 / declared)
+
+
+@pytest.mark.parametrize("runout", [0.0, 0.6])
+@pytest.mark.parametrize("declared", [6000.0, 5970.0, 6030.0])
+def test_a_record_of_the_declared_speed_repeats_with_its_revolution(declared, runout):
+    assert passes(record(runout=runout), declared) is None
+
+
+@pytest.mark.parametrize("declared", [6600.0, 5400.0, 12000.0 / 7.0])
+def test_a_speed_that_is_off_is_measured(declared):
+    found = passes(record(), declared)
+    assert found * declared / TEETH == pytest.approx(RPM, rel=0.01)
+
+
+def test_sixty_for_six_thousand_repeats_more_often_than_a_tool_has_teeth():
+    assert passes(record(seconds=1.2), 60.0) == pytest.approx(300.0, rel=0.01)
+
+
+def test_a_resonance_that_rings_between_the_teeth_is_no_speed():
+    assert passes(record(ring_hz=2200.0), RPM) is None
+
+
+def test_noise_has_no_period():
+    noise = np.random.default_rng(1).normal(size=(4000, 3))
+    assert period(noise, RATE, 0.01) is None
+    assert period(np.zeros((100, 3)), RATE, 0.01) is None
