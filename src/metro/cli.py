@@ -87,10 +87,11 @@ def check(
     Example: `metro check data/raw/*`
     """
     from metro.commands.check import check_batches
+    from metro.commands.which import holdout
     from metro.stages.contradictions import contradictions
     from metro.stages.whole import check_whole
 
-    one = partial(check_whole, cells=cells, quick=quick, also=contradictions)
+    one = partial(check_whole, cells=cells, holdout=holdout(), quick=quick, also=contradictions)
     raise typer.Exit(check_batches(folders, one, as_json))
 
 

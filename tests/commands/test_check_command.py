@@ -71,3 +71,15 @@ def test_files_that_were_not_copied_are_one_line_and_counted_one_by_one(check):
     assert f"{len(rows)} errors" in result.stdout
     (report,) = json.loads(check("uncopied", "--json").stdout)
     assert sum(problem["severity"] == "error" for problem in report["problems"]) == len(rows)
+
+
+def test_the_check_holds_out_what_the_workflow_holds_out(check):
+    """The plan is that of config.yaml's settings, so that the check shows what ingest will do."""
+
+    def held_out():
+        return json.loads(check("sound", "--quick", "--json").stdout)[0]["holdout"]
+
+    assert held_out()["seed"] == 1
+    config = Path("config/config.yaml")
+    config.write_text(config.read_text().replace("\n  seed: 1  ", "\n  seed: 5  ", 1))
+    assert held_out()["seed"] == 5

@@ -85,7 +85,7 @@ def test_a_full_disk_is_told_and_room_is_all_that_it_needs(finished, reference, 
         shutil.copytree(finished.folder, disk / "work", ignore=shutil.ignore_patterns("src"))
         checkout = Checkout(disk / "work")
         checkout.environment = finished.environment
-        # The summary stays: its job runs beside the report's, and its old pages would make room for the report.
+        # The summary stays: its job runs beside that of the report, and removes pages that leave room.
         without_report(checkout, but="reports/summary.pdf")
         free = os.statvfs(disk).f_bavail * os.statvfs(disk).f_frsize
         (disk / "filler").write_bytes(bytes(free - 20_000))

@@ -8,6 +8,7 @@ from pathlib import Path
 from metro.batch.findings import ContractError, Finding
 from metro.commands.calls import CallError, wrong_call
 from metro.spelling import suggestion
+from metro.units import JSON
 
 RAW, PROCESSED, REPORTS = Path("data/raw"), Path("data/processed"), Path("reports")
 CONFIG = Path("config/config.yaml")
@@ -23,6 +24,21 @@ def raw_roots(config: Path = CONFIG) -> list[Path]:
     given = read_yaml(config, str(config))[0].get("raw_roots")
     named = [Path(root) for root in given if isinstance(root, str)] if isinstance(given, list) else []
     return named or [RAW]
+
+
+def holdout(config: Path = CONFIG) -> JSON:
+    """Return the settings of the hold-out plan that the workflow has here: config.yaml's, where there is one.
+
+    Raises
+    ------
+    ConfigError
+        What is wrong with config.yaml.
+    """
+    from metro.batch.check import HOLDOUT
+    from metro.batch.config import load_config
+
+    settings: JSON = load_config(config)["holdout"] if config.exists() else HOLDOUT
+    return settings
 
 
 def batch_name(given: str, processed: Path, reports: Path) -> str:

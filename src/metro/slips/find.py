@@ -18,6 +18,7 @@ from metro.slips.scans import scan_slips
 from metro.slips.slip import Slip
 from metro.units import JSON
 
+JUDGED = ("force", "joint_force", "lobes")  # observables whose problems and tables are looked at
 LABEL = {"yes": 0.0, "no": 1.0}  # the column ``stable``, as unstable
 
 

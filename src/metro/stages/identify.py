@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from metro.observables.published import TABLES as PRINTED
 from metro.observables.published import observable as published
 from metro.observables.published.study import printed_study
 from metro.observables.registry import observables
-from metro.slips.find import find
+from metro.slips.find import JUDGED, LABEL, find
 from metro.slips.slip import Slip
 from metro.stages.problem_file import Posed, write_problems
 from metro.stages.problems import merged, pose
@@ -32,13 +33,16 @@ from metro.units import JSON
 
 @dataclass(frozen=True)
 class BaseModel:
-    """Handler: the fit of a base model on identification runs and load tests; None where there is none."""
+    """Handler: the fit of a base model on identification runs and load tests; None where there is none.
 
-    budget: float
+    ``budget``: the model-form budget. None: nothing is fitted.
+    """
+
+    budget: float | None
 
     def sampled(self, problem: Problem) -> Fit | None:
         """Fit the base parameters of a problem."""
-        return base_fit(problem, self.budget)
+        return None if self.budget is None else base_fit(problem, self.budget)
 
     def labelled(self, _problem: Labelled) -> None:
         """Nothing is fitted to labels."""
@@ -96,7 +100,7 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
     ``settings``: ``model_form_budget``.
     """
     batch = read_batch(processed)
-    state = _identified(batch, Processed(processed), settings["model_form_budget"])
+    state = _identified(batch, Processed(processed), settings["model_form_budget"], observables())
     slips = [slip.row for slip in _slips(state)]
     state.identified |= {"slips": slips} if slips else {}
     for observable in observables():
@@ -121,11 +125,16 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
 def slips_of(batch: Batch, read: Tables, budget: float) -> tuple[Slip, ...]:
     """Return what the data of a batch contradict, as :func:`identify` finds it; nothing is written.
 
+    Models are fitted only where cuts are labelled stable or not: these are held against the lobes, which need
+    the cutting coefficients. All other contradictions are found in the problems as they are posed.
+
     Parameters
     ----------
     read : the canonical tables. budget : the model-form budget.
     """
-    return _slips(_identified(batch, read, budget))
+    labelled = batch.runs["stable"].isin(list(LABEL)).any()
+    judged = [observable for observable in observables() if observable.name in JUDGED]
+    return _slips(_identified(batch, read, budget if labelled else None, judged))
 
 
 def _slips(state: _State) -> tuple[Slip, ...]:
@@ -133,15 +142,18 @@ def _slips(state: _State) -> tuple[Slip, ...]:
     return find(state.batch, state.read, state.observed, tasks, state.identified)
 
 
-def _identified(batch: Batch, read: Tables, budget: float) -> _State:
-    """Observe all, pose the problems and fit their base models."""
+def _identified(
+    batch: Batch, read: Tables, budget: float | None, wanted: Iterable[Observable[Any]]
+) -> _State:
+    """Observe, pose the problems and fit their base models."""
     head: JSON = {"format": 1, "batch": batch.name, "metro": __version__}
     state = _State(batch, read, BaseModel(budget), head)
-    for observable in observables():
+    wanted = tuple(wanted)
+    for observable in wanted:
         state.observe(observable)
         if observable.gives_coefficients and observable.name not in state.posed:
             state.identify(observable)
-    for observable in observables():
+    for observable in wanted:
         if observable.name not in state.posed:
             state.identify(observable)
     return state

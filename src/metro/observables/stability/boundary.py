@@ -119,7 +119,8 @@ def same_cut(runs: pd.DataFrame) -> list[pd.DataFrame]:
 
 def _undirected(runs: pd.DataFrame) -> pd.Series:
     """Return which runs have no direction; a hole needs none."""
-    return (runs["direction"].fillna("") == "") & (runs["operation"] != "helical")
+    nobody_says = runs["direction"].isna() | (runs["direction"] == "")
+    return nobody_says & (runs["operation"] != "helical")
 
 
 def _directions(first: pd.Series) -> tuple[float, ...]:
