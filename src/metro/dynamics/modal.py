@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.dynamics.modes import Mode, modal_constants
-from metro.dynamics.polefit import PoleFit, Scatter
+from metro.dynamics.polefit import PoleFit, Scatter, criterion
 from metro.dynamics.refine import Data, losses, refine
 from metro.dynamics.shapes import residues
 from metro.dynamics.stabilisation import Diagram, stabilisation
@@ -94,6 +94,7 @@ def identify_modes(
     fit = _converged(data, refine(data, start.omega, start.zeta, real=start.real))
     change = np.linalg.norm(fit.evaluate(data.omega) - frf, axis=0) / np.linalg.norm(frf, axis=0)
     inside = (fit.omega > data.omega[0]) & (fit.omega < data.omega[-1]) & (fit.zeta < _LARGEST_DAMPING)
+    inside &= _is_there(data, fit)
     free = residues(data.omega, frf, np.sqrt(np.mean(data.weight**2, axis=1)), fit.poles)
     order = [int(r) for r in np.argsort(fit.omega) if inside[r]]
     modes = tuple(modal_constants(fit, r, driving, free[r], decay) for r in order)
@@ -146,6 +147,18 @@ def _converged(data: Data, fit: PoleFit) -> PoleFit:
         f"modes: the fit does not converge, its last {_FEW_STEPS} steps still lower chi² by {gain:.2g}: "
         "modes too close for these lines? Record longer, or choose a narrower band"
     )
+
+
+def _is_there(data: Data, fit: PoleFit) -> bool:
+    """Return whether a fit of one mode is better than the residual terms alone, by the criterion.
+
+    A search starts from one mode at least and removes modes down to one: where there is none in the band, that
+    one has next to no residue, and rounding decides where it stands. A fit of several was pruned already.
+    """
+    if len(fit.omega) > 1:
+        return True
+    without = fit.chi2 + float(losses(data, fit)[0])
+    return fit.bic() < criterion(without, (fit.count[0], 2 * data.frf.shape[1]))
 
 
 def _pruned(data: Data, fit: PoleFit) -> PoleFit:

@@ -65,8 +65,7 @@ class PoleFit:
 
     def bic(self) -> float:
         """Bayesian information criterion; fitting below the stated noise gains nothing."""
-        data, parameters = self.count
-        return data * float(np.log1p(self.chi2 / data)) + parameters * float(np.log(data))
+        return criterion(self.chi2, self.count)
 
     def sd(self, gradient: Array, response: int) -> float:
         """Return the standard deviation of a function of (log omega, log zeta, Im A) with ``gradient``.
@@ -91,6 +90,12 @@ class PoleFit:
         ) @ self.residues.conj()
         total: ComplexArray = value + self.residual_terms[0] + self.residual_terms[1] / omega[:, None] ** 2
         return total
+
+
+def criterion(chi2: float, count: tuple[int, int]) -> float:
+    """Bayesian information criterion of a fit by its weighted sum of squares, (real data, parameters)."""
+    data, parameters = count
+    return data * float(np.log1p(chi2 / data)) + parameters * float(np.log(data))
 
 
 def _widening(freedom: float) -> float:
