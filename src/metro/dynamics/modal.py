@@ -152,8 +152,8 @@ def _converged(data: Data, fit: PoleFit) -> PoleFit:
 def _is_there(data: Data, fit: PoleFit) -> bool:
     """Return whether a fit of one mode is better than the residual terms alone, by the criterion.
 
-    A search starts from one mode at least and removes modes down to one: where there is none in the band, that
-    one has next to no residue, and rounding decides where it stands. A fit of several was pruned already.
+    A search starts from one mode at least and removes modes down to one: where there is none in the band,
+    that one has next to no residue, and rounding decides where it stands. A fit of several was pruned.
     """
     if len(fit.omega) > 1:
         return True
