@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from metro.formats import gocator, matlab, rosbag, rsi, signalcalc, softgauge, tdms
+from metro.formats import gocator, matlab, rosbag, rsi, signalcalc, softgauge, sur, tdms
 from metro.formats.contents import Contents, of_channels, of_frame, of_text
 from metro.formats.dynoware import dynoware_pieces
 from metro.formats.e57 import SIGNATURE, e57_pieces
@@ -115,6 +115,7 @@ FORMATS = (
     ),
     replace(_pieces("TDMS", (".tdms",), (tdms.START,), _CHANNELS, tdms.tdms_pieces), contents=_tdms),
     replace(_pieces("MATLAB", (".mat",), matlab.STARTS, _CHANNELS, matlab.mat_pieces), contents=_mat),
+    Format("SUR", (".sur", ".pro"), sur.STARTS, ("profile", "cloud"), sur.read_sur),
     Format("X3P", (".x3p",), (b"PK\x03\x04",), ("profile", "cloud"), read_x3p),
     replace(_cloud("PTS", (".pts",), _ANY, pts_pieces), contents=of_text),
     _cloud("STL", (".stl",), _ANY, stl_pieces),
