@@ -168,10 +168,10 @@ def forecasts(signal: Array, measurement: Array, drift: Iterable[Array]) -> Iter
 
 
 def whiteness(values: Array, fitted: Array | float = 0.0, lags: int = LAGS) -> Array:
-    """Probability (k,) of autocorrelations at least as large in white noise (Li & McLeod 1981).
+    """Probability (k,) of autocorrelations at least as large in white noise of mean zero (Li & McLeod 1981).
 
-    Their statistic n Σ r² + m (m + 1) / 2n has the variance of χ² in short records too; that of Ljung & Box
-    has more, and is beyond its 5 % in 7 % of records of 50 samples.
+    Their statistic n Σ r² + m (m + 1) / 2n has the variance of χ² in short records too, where that of Ljung &
+    Box has more; with n + 2 in front its mean is exactly m, as E r² = (n − h) / n (n + 2).
 
     Parameters
     ----------
@@ -189,10 +189,9 @@ def whiteness(values: Array, fitted: Array | float = 0.0, lags: int = LAGS) -> A
     if count < 3:
         return np.full(values.shape[1], np.nan)
     lags = max(2, min(lags, count // 5))
-    centred = values - values.mean(axis=0)
-    power = (centred**2).sum(axis=0)
-    r = np.stack([(centred[h:] * centred[:-h]).sum(axis=0) / power for h in range(1, lags + 1)])
-    statistic = count * (r**2).sum(axis=0) + lags * (lags + 1) / (2.0 * count)
+    power = (values**2).sum(axis=0)
+    r = np.stack([(values[h:] * values[:-h]).sum(axis=0) / power for h in range(1, lags + 1)])
+    statistic = (count + 2) * (r**2).sum(axis=0) + lags * (lags + 1) / (2.0 * count)
     return np.asarray(chi2.sf(statistic, lags - fitted))
 
 

@@ -22,8 +22,15 @@ from metro.observables.arm.wall import Wall, wall
 from metro.observables.joint_force.observable import REPEATABLE
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import Arm
-from metro.robot.sensorless import LEAST_INDEX, beyond_noise, friction_repeatability, mean_force
-from metro.robot.sensorless import tip_force as solve
+from metro.robot.sensorless import (
+    LEAST_INDEX,
+    LEAST_JOINTS,
+    TipForce,
+    beyond_noise,
+    friction_repeatability,
+    mean_force,
+)
+from metro.robot.sensorless import tip_force as tip_force_of
 from metro.signals.kalman import noise_variance
 from metro.signals.segmentation import knees
 from metro.units import MM, Array
@@ -63,20 +70,20 @@ def run_force(batch: Batch, cut: Log, idle: Log, arm: Arm, face: Wall) -> RunFor
 
 def force_tables(batch: Batch, read: Tables, solved: Mapping[str, RunForce]) -> dict[str, list[pd.DataFrame]]:
     """Return the tables of all runs together, which share the level of slow noise and of friction."""
-    common = _common(list(solved.values()))
+    shared = common(list(solved.values()))
     parts: dict[str, list[pd.DataFrame]] = {}
     for run, one in solved.items():
         if isinstance(one.sensorless, Refusal):
             tables = {"robot_refused": pd.DataFrame({"reason": [one.sensorless.reason]})}
         else:
-            tables = _tables(one.sensorless, common, _measured(batch, run, read), one.turn)
+            tables = _tables(one.sensorless, shared, _measured(batch, run, read), one.turn)
         for name, table in tables.items():
             parts.setdefault(name, []).append(table.assign(run=run))
     return parts
 
 
-def _common(runs: Sequence[RunForce]) -> Common:
-    """One run says little of its slow noise and of its friction, so their levels are means over all runs."""
+def common(runs: Sequence[RunForce]) -> Common:
+    """Return the mean levels of slow noise and friction over all runs, of which one alone says little."""
     known = [(one.noise, one.sensorless) for one in runs if isinstance(one.sensorless, Sensorless)]
     if not known:
         return Common(np.zeros(COUNT), np.zeros(COUNT))
@@ -89,26 +96,38 @@ def _common(runs: Sequence[RunForce]) -> Common:
     return Common(friction_repeatability(mean, variance, least), wander)
 
 
+def force_of_all(one: Sensorless, shared: Common) -> TipForce:
+    """Solve for the force from all joints, each weighted by its noise and by how repeatable its friction is.
+
+    Raises
+    ------
+    ValueError
+        If the joints do not tell the three axes apart.
+    """
+    variance = beyond_noise(one.torques.variance, shared.friction, shared.wander)
+    return tip_force_of(one.torques.level, variance, one.moves, one.index, 0.0)
+
+
 def _tables(
-    one: Sensorless, common: Common, measured: tuple[Array, Array], turn: Array | None
+    one: Sensorless, shared: Common, measured: tuple[Array, Array], turn: Array | None
 ) -> dict[str, pd.DataFrame]:
     """Tables of a run whose steady mean is ``measured`` (3,), covariance (3, 3), by a dynamometer."""
-    variance = beyond_noise(one.torques.variance, common.friction, common.wander)
     joints = pd.DataFrame(
         {
             "joint": list(JOINTS),
             "index": one.index,
+            "threshold": LEAST_INDEX,
             "used": False,
             "noise_nm": np.sqrt(one.torques.noise),
             "drift_nm": np.sqrt(one.torques.drift),
-            "friction_nm": common.friction,
+            "friction_nm": shared.friction,
             "whiteness": one.torques.whiteness,
             "remark": "; ".join(one.remarks),
         }
     )
     tables = {"robot_joints": joints, "robot_torques": _torques(one)}
     try:
-        solution = solve(one.torques.level, variance, one.moves, one.index, 0.0)
+        solution = force_of_all(one, shared)
     except ValueError as error:
         return tables | {"robot_refused": pd.DataFrame({"reason": [str(error)]})}
     joints["used"] = solution.used
@@ -116,9 +135,9 @@ def _tables(
     course = pd.DataFrame({"x_mm": one.x / MM, "part": names})
     course[FORCE] = solution.force
     course[[f"sd_{name}" for name in FORCE]] = np.sqrt(np.einsum("maa->ma", solution.covariance))
-    mean = mean_force(solution, one.torques, one.steady, common.friction, common.wander)
-    passing = int((one.index >= LEAST_INDEX).sum())
-    means = _means(mean, measured, turn).assign(passing=passing, condition=float(solution.condition.max()))
+    mean = mean_force(solution, one.torques, one.steady, shared.friction, shared.wander)
+    enough = bool((one.index >= LEAST_INDEX).sum() >= LEAST_JOINTS)
+    means = _means(mean, measured, turn).assign(enough=enough, condition=float(solution.condition.max()))
     return tables | {"robot_force": course, "robot_means": means}
 
 
