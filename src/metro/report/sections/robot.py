@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pandas as pd
 
 from metro.report.content import Heading, Item, Picture, Section, Table
 from metro.report.figures import robot as figures
@@ -26,7 +25,7 @@ def robot(results: Results) -> Section | None:
     items = [
         *joint_torques(results),
         *friction(results),
-        *_deformation(results.compared("deformation")),
+        *_deformation(results),
         *arm_stiffness(results),
         *stations(results),
         *_waviness(results),
@@ -37,10 +36,12 @@ def robot(results: Results) -> Section | None:
     )
 
 
-def _deformation(compared: pd.DataFrame | None) -> list[Item]:
-    """Tabulate the steady deformation of held-out walls, as in [K] table 8."""
+def _deformation(results: Results) -> list[Item]:
+    """Tabulate the steady deformation of held-out walls, as in [K] table 8, and the flange's share of it."""
+    compared = results.compared("deformation")
     if compared is None:
         return []
+    walls: JSON = (results.identified.get("arm") or {}).get("walls") or {}
     rows = []
     for run, part in compared.sort_values("s_mm").groupby("run"):
         measured, predicted = (part[name].to_numpy(float) for name in ("measured", "after"))
@@ -59,19 +60,29 @@ def _deformation(compared: pd.DataFrame | None) -> list[Item]:
                 number(p),
                 number(100 * (base / m - 1), 2),
                 number(100 * (p / m - 1), 2),
+                _flange_percent(walls.get(str(run))),
             ]
         )
     if not rows:
         return []
     caption = (
         "Steady deformation of held-out walls: mean where the wall is beyond nine tenths of its median; the "
-        "interval is that of the measured mean."
+        "interval is that of the measured mean. Last: how much of the predicted tip's deflection is left "
+        "where the rotation of the flange is neglected ([K] eq. 17 in place of eq. 18)."
     )
-    header = ["run", "measured (mm)", "base model", "with effects", "error of base (%)", "with effects (%)"]
+    errors = ("error of base (%)", "with effects (%)", "flange (%)")
+    header = ["run", "measured (mm)", "base model", "with effects", *errors]
     return [
         Heading("Deformation, steady value"),
-        Table(header, rows, caption, [0.8, 1.4, 1, 1, 1.1, 1.1], numeric=[1, 2, 3, 4, 5]),
+        Table(header, rows, caption, [0.8, 1.4, 1, 1, 1.1, 1.1, 0.8], numeric=[1, 2, 3, 4, 5, 6]),
     ]
+
+
+def _flange_percent(wall: JSON | None) -> str:
+    """Write the deflection of the flange along a wall's normal as a share of the tip's."""
+    if not wall or not wall.get("with_flange_rotation"):
+        return "–"
+    return number(100.0 * wall["without_flange_rotation"] / wall["with_flange_rotation"], 2)
 
 
 def _waviness(results: Results) -> list[Item]:
