@@ -125,7 +125,7 @@ def test_the_steady_means_stand_beside_the_dynamometers_with_their_error_and_joi
     items = content(robot_means=means(), robot_force=force(), robot_joints=joints())
     table = table_with(items, "beside the dynamometer")
     assert table.rows[0][:2] + table.rows[0][5:8] == ["r1", "1 3 5 6", "−160", "−170.0 ± 3.9", "6.2"]
-    assert "Mean of the absolute errors: 4.3 N" in table.caption
+    assert "Mean of the absolute errors: 4.3 N (x 2.0, y 10, z 1.0)" in table.caption
     assert table.rows[1][:5] == ["r2", "1–6 *", "–", "50.0 ± 3.9", "–"]
     assert "by the rule of [K] there is no estimate" in table.caption
 

@@ -114,10 +114,13 @@ def _mean_table(means: pd.DataFrame, joints: pd.DataFrame, axes: str) -> Table:
         "95 % interval by noise and friction, and the joints that it is solved from"
     )
     if len(beside):
-        error = float((beside["sensorless_n"] - beside["dynamometer_n"]).abs().mean())
+        off = (beside["sensorless_n"] - beside["dynamometer_n"]).abs()
+        by_axis = ", ".join(
+            f"{a} {number(float(e), 2)}" for a, e in off.groupby(beside["axis"]).mean().items()
+        )
         caption += (
             "; beside the dynamometer's, with the error in percent of that. Mean of the absolute errors: "
-            f"{number(error, 2)} N"
+            f"{number(float(off.mean()), 2)} N ({by_axis})"
         )
     caption += f". Condition number: {number(float(means['condition'].max()), 2)} at most."
     if not means["enough"].all():
