@@ -9,8 +9,11 @@ from fake_tables import FakeTables
 
 from metro.batch.batch import Batch
 from metro.observables.arm.robot_tables import SPACING, _waves, robot_tables
+from metro.observables.arm.tip_force import Log
+from metro.observables.arm.tracking_tables import tracking_tables
+from metro.observables.arm.wall import Wall
 from metro.observables.waviness.points import IDLE, STRAYED
-from metro.robot.kinematics import arm_of_cell
+from metro.robot.kinematics import Arm, arm_of_cell
 from metro.robot.workspace import reach
 from metro.units import DEG, MM
 
@@ -21,6 +24,7 @@ LENGTH, FEED, PERIOD = 80.0, 5.0, 0.012
 MANIFEST = {
     "tool": {"diameter_mm": 16.0, "teeth": 3},
     "tool_in_flange_mm": [212.5, 0.0, 279.91],
+    "tool_axes_in_flange": [[0, 0, -1], [0, -1, 0], [-1, 0, 0]],
     "work_in_base": {"xyz_mm": [1510.0, -210.0, 590.0], "rpy_deg": [0, 0, 30]},
     "work": {"size_mm": [LENGTH, LENGTH, 20.0]},
 }
@@ -68,11 +72,85 @@ def tables():
 
 
 def test_the_steady_mean_is_the_force_within_its_interval(tables):
-    means = tables["robot_means"]
+    means = tables["robot_means"].query("frame == 'work'")
     error = (means["sensorless_n"] - FORCE) / means["sensorless_sd_n"]
     assert (error.abs() < 3).all()
     assert (means["sensorless_sd_n"] < 3).all()
     assert means["dynamometer_n"].isna().all()
+
+
+def test_the_tools_frame_is_that_of_an_independent_arm(tables):
+    """The tool's axes by the simulated arm, which shares no code with the models."""
+    from virtual_cell.arm import Arm as Independent
+
+    by_frame = dict(tuple(tables["robot_means"].groupby("frame")))
+    independent = Independent(
+        np.array(DH, dtype=float),
+        ARM.tool,
+        np.array(MANIFEST["tool_axes_in_flange"]),
+        np.ones(6),
+        np.zeros(6),
+    )
+    middle = tables["robot_aligned"].query("log == 'cut'")["x_mm"].median()
+    [q] = reach(ARM, NEAR, np.array([[middle, 5.0, -4.0]]) * MM)
+    axes = ARM.work[:3, :3].T @ independent.pose(q)[1]
+    work = by_frame["work"]["sensorless_n"].to_numpy()
+    np.testing.assert_allclose(by_frame["tool"]["sensorless_n"], work @ axes, rtol=2e-3, atol=0.2)
+    assert np.abs(by_frame["tool"]["sensorless_n"].to_numpy() - work).max() > 10.0
+
+
+def test_all_joints_count_and_the_rule_of_the_paper_is_told(tables):
+    joints, means = tables["robot_joints"], tables["robot_means"]
+    passing = joints["index"] >= joints["threshold"]
+    assert means["enough"].iloc[0] == (passing.sum() >= 3)
+    assert joints["used"].sum() >= 3
+    assert (joints["friction_nm"] >= 0.1 * 0.9).all()  # a tenth of 1 N m of noise, at least
+
+
+def test_what_the_cut_adds_is_kept_by_bin_and_filtered(tables):
+    torques = tables["robot_torques"]
+    off = (torques["bin_nm"] - torques["level_nm"]) / np.sqrt(2.0)
+    assert off.std() < 1.0
+    assert torques.groupby("joint").size().nunique() == 1
+    together = tables["robot_aligned"]
+    assert set(together["log"]) == {"cut", "idle"}
+    first = tables["robot_joints"].set_index("joint")["index"].idxmax()
+    assert set(together["joint"]) == {first}
+
+
+def test_tip_and_flange_stray_as_the_joints_make_them(tables):
+    """The swing is 10 µm across the path at the tip; the flange by differences of an arm without a tool."""
+    [size] = tables["robot_tracking_size"].to_dict("records")
+    assert size["tip_cut_um"] == pytest.approx(10.0, abs=1.5)
+    assert size["tip_idle_um"] == pytest.approx(10.0, abs=1.5)
+    bare = Arm(ARM.dh, np.zeros(3), ARM.work)
+    [q] = reach(ARM, NEAR, np.array([[40.0, 5.0, -4.0]]) * MM)
+    moves = np.stack([(ARM.tip(q + 1e-6 * e) - ARM.tip(q - 1e-6 * e)) / 2e-6 for e in np.eye(6)], axis=1)
+    at_flange = np.stack(
+        [(bare.tip(q + 1e-6 * e) - bare.tip(q - 1e-6 * e)) / 2e-6 for e in np.eye(6)], axis=1
+    )
+    swing = np.linalg.pinv(moves)[:, 1]
+    assert size["flange_cut_um"] == pytest.approx(10.0 * abs(at_flange[1] @ swing), abs=1.5)
+    assert size["joint"] == np.argmax(moves[1] * swing) + 1
+
+
+@pytest.mark.parametrize("joint", [2, 6])
+def test_the_joint_that_strays_is_found(joint):
+    """One joint alone is off its set-point; its torque goes with it."""
+    t = PERIOD * np.arange(800)
+    line = np.linspace([-20.0, 5.0, -4.0], [LENGTH + 20.0, 5.0, -4.0], 21) * MM
+    path = reach(ARM, reach(ARM, NEAR, line[:1])[0], line)
+    q = np.stack([np.interp(t / t[-1], np.linspace(0, 1, 21), column) for column in path.T], axis=1)
+    error = 50e-6 * np.sin(2 * np.pi * t)[:, None] * np.eye(6)[joint - 1]
+    log = Log(q, q + error, 1e5 * error, ARM.tip(q), t)
+    face = Wall(np.array([1.0, 0, 0]), np.array([0, -1.0, 0]), 0.0, LENGTH * MM, 7 * MM)
+    found = tracking_tables(log, Log(*[part[:0] for part in (q, q, q, line, t)]), ARM, face)
+    [size] = found["robot_tracking_size"].to_dict("records")
+    assert size["joint"] == joint
+    assert size["share"] == pytest.approx(1.0, abs=1e-3)
+    assert size["joint_um"] == pytest.approx(size["tip_cut_um"], rel=1e-3)
+    assert size["correlation"] == pytest.approx(1.0, abs=1e-6)
+    assert set(found["robot_tracking"]["log"]) == {"cut"}
 
 
 def test_the_course_is_parted_where_the_tool_enters_and_leaves(tables):

@@ -3,11 +3,13 @@
 import base64
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pandas as pd
 import pytest
+import synthetic_results as synthetic
 from drawn_page import EVIL, written_page
 
 from metro.report.content import Bullets, Table
@@ -15,6 +17,7 @@ from metro.report.page.curves import run_curves
 from metro.report.page.faces import coarse, face_maps
 from metro.report.page.markup import embedded, items_of, tag
 from metro.report.page.packing import decimals, fitting, gaps, kept, packed
+from metro.report.page.path_errors import path_errors
 from metro.report.results import Results
 
 VOID = {"meta", "img", "hr", "br", "link", "input"}
@@ -213,6 +216,26 @@ def test_responses_are_logarithms_of_the_measured_and_of_the_modal_receptance(pa
     exact = np.abs(1e-8 / (1 - (hz / 120.0) ** 2 + 0.04j * hz / 120.0))
     assert 10.0**measured == pytest.approx(exact, rel=1e-3)
     assert modal - measured == pytest.approx(np.full(200, np.log10(1.01)), abs=1e-4)
+
+
+@pytest.mark.parametrize("idle", [1.0, np.nan])
+def test_the_tips_path_error_is_drawn_with_that_of_the_joint_with_the_largest_share(idle):
+    x = np.arange(0.0, 40.0, 0.16)
+    points = pd.DataFrame({"run": "r1", "x_mm": x})
+    for i in range(1, 7):
+        points[f"strayed{i}_um"] = i * np.sin(x)
+        points[f"strayed_idle{i}_um"] = idle * np.cos(x)
+    shares = {"arm": {"waviness": {"r1": {"joint_share": [0.0, 0.1, 0.7, 0.2, 0.0, 0.0]}}}}
+    results = replace(synthetic.results(), tables={"waviness_points": points}, identified=shares)
+    [curve] = path_errors(results, 10**6)["curves"]
+    assert curve["said"] == "r1: joint 3 makes 70 % of the waves"
+    lines = {line["name"]: unpacked(line["y"]) for line in curve["lines"]}
+    assert lines.pop("tip in the cut") == pytest.approx(21 * np.sin(x), abs=1e-3)
+    assert lines.pop("joint 3 alone") == pytest.approx(3 * np.sin(x), abs=1e-3)
+    if idle == 1.0:
+        assert lines.pop("tip in the idle run") == pytest.approx(6 * np.cos(x), abs=1e-3)
+    assert lines == {}
+    assert path_errors(replace(results, tables={}), 10**6) is None
 
 
 def test_names_of_batches_lead_to_them_and_values_stay_with_their_intervals():

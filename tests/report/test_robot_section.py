@@ -8,6 +8,7 @@ import pytest
 import synthetic_results as synthetic
 
 from metro.report.content import Bullets, Picture, Table
+from metro.report.figures import joint_torques, tracking
 from metro.report.figures import robot as figures
 from metro.report.sections.robot import robot
 from metro.report.style import to_svg
@@ -23,17 +24,51 @@ def force():
     return pd.DataFrame({"run": "r1", "x_mm": X, "part": part, **columns, **errors})
 
 
-def means():
-    frame = pd.DataFrame({"run": "r1", "axis": list("xyz"), "sensorless_n": [50.0, -170.0, -30.0]})
-    frame = frame.assign(sensorless_sd_n=2.0, dynamometer_n=[48.0, -160.0, -31.0], by_index=True)
-    return pd.concat([frame, frame.assign(run="r2", dynamometer_n=np.nan, by_index=False)])
+def means(turn=None):
+    """Means of two runs in the work's frame and, turned by ``turn``, in that of the tool."""
+    parts = []
+    for name, axes in (("work", np.eye(3)), ("tool", turn)) if turn is not None else (("work", np.eye(3)),):
+        columns = {
+            "sensorless_n": [50.0, -170.0, -30.0] @ axes,
+            "dynamometer_n": [48.0, -160.0, -31.0] @ axes,
+        }
+        parts.append(pd.DataFrame({"frame": name, "axis": list("xyz"), **columns}))
+    frame = pd.concat(parts).assign(run="r1", sensorless_sd_n=2.0, enough=True, condition=4.2)
+    return pd.concat([frame, frame.assign(run="r2", dynamometer_n=np.nan, enough=False)])
 
 
 def joints():
     frame = pd.DataFrame({"run": "r1", "joint": range(1, 7), "index": [9.0, 0.1, 4.0, 0.3, 5.0, 2.1]})
-    frame = frame.assign(used=frame["index"] > 2, noise_nm=1.5, drift_nm=0.4, remark="")
+    frame = frame.assign(used=frame["index"] > 2, noise_nm=1.5, drift_nm=0.4, friction_nm=0.3, remark="")
+    frame = frame.assign(threshold=2.0, whiteness=[0.001, 0.5, 0.5, 0.5, 0.5, 0.5])
     frame.loc[0, "remark"] = "the idle run was +10.0 % faster than the cut"
-    return frame.assign(whiteness=[0.001, 0.5, 0.5, 0.5, 0.5, 0.5])
+    return pd.concat([frame, frame.assign(run="r2", index=[9.0, 0.1, 4.0, 0.3, 0.5, 0.1], used=True)])
+
+
+def courses_of_torque():
+    parts = [
+        pd.DataFrame({"run": "r1", "joint": joint, "x_mm": X, "bin_nm": joint * X, "level_nm": joint * X})
+        for joint in range(1, 7)
+    ]
+    together = pd.DataFrame({"run": "r1", "log": ["cut"] * 2 + ["idle"] * 2, "joint": 1, "torque_nm": 1.0})
+    return (
+        together.assign(t_s=[0.0, 1.0, 0.5, 1.5], x_mm=[0.0, 1.0, 0.0, 1.0]),
+        pd.concat(parts).assign(level_sd_nm=1.0),
+    )
+
+
+def strayed():
+    """A tip that strays by joint 4, in a cut and an idle run, and the sizes of that."""
+    wave = np.sin(X / 5.0)
+    columns = {"x_mm": X, "flange_um": 2.0 * wave, "tip_um": 9.0 * wave}
+    columns |= {f"joint{i}_um": (8.0 if i == 4 else 0.2) * wave for i in range(1, 7)}
+    columns |= {f"error{i}_urad": 30.0 * wave for i in range(1, 7)}
+    columns |= {f"torque{i}_nm": -5.0 * wave for i in range(1, 7)}
+    columns |= {f"rate{i}_rad_s": np.where(X < 20.2, -1e-3, 1e-3) for i in range(1, 7)}
+    course = pd.concat([pd.DataFrame({**columns, "log": name, "run": "r1"}) for name in ("cut", "idle")])
+    size = {"flange_cut_um": 2.0, "tip_cut_um": 9.0, "flange_idle_um": 2.1, "tip_idle_um": 9.3, "joint": 4}
+    size |= {"share": 0.889, "joint_um": 8.0, "correlation": -1.0, "run": "r1"}
+    return course, pd.DataFrame([size])
 
 
 def ellipsoids():
@@ -86,40 +121,90 @@ def test_a_batch_without_an_arm_has_no_such_section():
     assert robot(bare) is None
 
 
-def test_the_steady_means_stand_beside_the_dynamometers_with_their_error():
+def test_the_steady_means_stand_beside_the_dynamometers_with_their_error_and_joints():
     items = content(robot_means=means(), robot_force=force(), robot_joints=joints())
     table = table_with(items, "beside the dynamometer")
-    assert table.rows[0][:1] + table.rows[0][4:7] == ["r1", "−160", "−170.0 ± 3.9", "6.2"]
-    assert "Mean of the absolute errors: 4.3 N" in table.caption
-    assert table.rows[1] == [
-        "r2 *",
-        "–",
-        "50.0 ± 3.9",
-        "–",
-        "–",
-        "−170.0 ± 3.9",
-        "–",
-        "–",
-        "−30.0 ± 3.9",
-        "–",
-    ]
-    assert "Too few joints" in table.caption
+    assert table.rows[0][:2] + table.rows[0][5:8] == ["r1", "1 3 5 6", "−160", "−170.0 ± 3.9", "6.2"]
+    assert "Mean of the absolute errors: 4.3 N (x 2.0, y 10, z 1.0)" in table.caption
+    assert table.rows[1][:5] == ["r2", "1–6 *", "–", "50.0 ± 3.9", "–"]
+    assert "by the rule of [K] there is no estimate" in table.caption
+
+
+def test_frames_that_differ_have_a_table_each_and_frames_that_are_one_share_it():
+    """The tool's axes of the paper: x of the tool is −z of the work, and so on."""
+    turn = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
+    both = content(robot_means=means(turn), robot_joints=joints())
+    work, tool = (table_with(both, f"in the {name}'s axes") for name in ("work", "tool"))
+    assert work.rows[0][3::3] == ["50.0 ± 3.9", "−170.0 ± 3.9", "−30.0 ± 3.9"]
+    assert tool.rows[0][3::3] == ["30.0 ± 3.9", "170.0 ± 3.9", "−50.0 ± 3.9"]
+    one = content(robot_means=means(np.eye(3)), robot_joints=joints())
+    assert sum("Mean force" in item.caption for item in one if isinstance(item, Table)) == 1
+    assert table_with(one, "the work's axes, which are the tool's")
 
 
 def test_without_a_dynamometer_there_is_a_column_per_axis():
-    table = table_with(content(robot_means=means().query("run == 'r2'")), "Mean force of the steady cut")
-    assert table.rows == [["r2 *", "50.0 ± 3.9", "−170.0 ± 3.9", "−30.0 ± 3.9"]]
-    assert list(table.header) == ["run", "x (N)", "y (N)", "z (N)"]
+    items = content(robot_means=means().query("run == 'r2'"), robot_joints=joints())
+    table = table_with(items, "Mean force on the tool in the steady cut")
+    assert table.rows == [["r2", "1–6 *", "50.0 ± 3.9", "−170.0 ± 3.9", "−30.0 ± 3.9"]]
+    assert list(table.header) == ["run", "joints", "x (N)", "y (N)", "z (N)"]
 
 
-def test_unused_joints_coloured_innovations_and_remarks_are_told():
+def test_joints_that_pass_the_index_coloured_innovations_and_remarks_are_told():
     items = content(robot_means=means(), robot_joints=joints())
-    table = table_with(items, "Observability")
-    assert table.rows[0] == ["r1", "9.0 †", "0.10 –", "4.0", "0.30 –", "5.0", "2.1"]
-    assert [row[1] for row in table.rows[1:]] == ["1.5", "0.40"]
-    assert "1 of 6" in table.caption
-    said = [text for item in items if isinstance(item, Bullets) for text in item.items]
-    assert said == ["r1: the idle run was +10.0 % faster than the cut."]
+    [said] = [item for item in items if isinstance(item, Picture) and "bservability" in item.caption]
+    assert "fewer than three joints reach in 1 of 2 runs" in said.caption
+    assert "2 of 12 are below 0.05, where chance puts 0.60" in said.caption
+    table = table_with(items, "What each joint's torque is weighted by")
+    assert [row[1] for row in table.rows] == ["1.5", "0.40", "0.30"]
+    remarks = [text for item in items if isinstance(item, Bullets) for text in item.items]
+    assert remarks == ["r1 and r2: the idle run was +10.0 % faster than the cut."]
+
+
+def test_the_indices_are_drawn_beside_the_threshold_and_the_p_values_in_order():
+    figure = joint_torques.joints(joints(), 2.0)
+    used, unused, threshold = figure.axes[0].get_lines()
+    assert (len(used.get_xdata()), len(unused.get_xdata())) == (10, 2)
+    assert set(threshold.get_ydata()) == {2.0}
+    assert list(figure.axes[1].get_lines()[0].get_ydata()) == sorted([0.001, 0.001] + 10 * [0.5])
+    assert to_svg(figure)
+
+
+def test_torques_are_drawn_joint_by_joint_beside_the_logs_by_time_and_by_place():
+    together, table = courses_of_torque()
+    figure = joint_torques.torques(together, table, joints().query("run == 'r1'"))
+    by_time, by_place = figure.axes[0], figure.axes[4]
+    assert by_time.get_lines()[1].get_xdata()[0] == 0.5
+    assert by_place.get_lines()[0].get_xdata()[0] == by_place.get_lines()[1].get_xdata()[0]
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert titles.count("joint 2, not used") == titles.count("joint 3") == 1
+    items = content(robot_joints=joints(), robot_aligned=together, robot_torques=table)
+    assert any("Torques of run r1" in item.caption for item in items if isinstance(item, Picture))
+
+
+def test_flange_and_tip_are_drawn_with_the_joint_that_makes_most_of_it():
+    course, sizes = strayed()
+    figure = tracking.tracking(course, 4)
+    flange, tip, alone, drive, torque = figure.axes
+    heights = [np.ptp(axes.get_lines()[0].get_ydata()) for axes in (flange, tip)]
+    assert heights[1] / heights[0] == pytest.approx(4.5)
+    assert [line.get_label() for line in alone.get_lines()] == ["all joints", "joint 4 alone"]
+    assert drive.get_lines()[1].get_xdata()[0] == pytest.approx(20.5)  # where it turns round
+    assert np.corrcoef(drive.get_lines()[0].get_ydata(), torque.get_lines()[0].get_ydata())[0, 1] < -0.99
+    items = content(robot_tracking=course, robot_tracking_size=sizes)
+    [row] = table_with(items, "Amplitude of the path error").rows
+    assert row == ["r1", "2.0", "2.1", "9.0", "9.3", "4", "8.0", "89", "−1.0"]
+    [picture] = [item for item in items if isinstance(item, Picture)]
+    assert picture.caption.startswith("The tip strays 4.5 times as far as the flange")
+    assert "in 1 of 1 runs joint 4 makes most of it" in picture.caption
+
+
+def test_without_an_idle_run_the_cut_is_drawn_alone():
+    course, sizes = strayed()
+    figure = tracking.tracking(course[course["log"] == "cut"], 4)
+    assert [line.get_label() for line in figure.axes[0].get_lines()] == ["cut"]
+    bare = sizes.drop(columns=["flange_idle_um", "tip_idle_um"])
+    [row] = table_with(content(robot_tracking=course, robot_tracking_size=bare), "Amplitude").rows
+    assert row[:5] == ["r1", "2.0", "–", "9.0", "–"]
 
 
 def test_the_steady_deformation_is_compared_as_a_share_of_the_measured():
@@ -127,9 +212,12 @@ def test_the_steady_deformation_is_compared_as_a_share_of_the_measured():
     shape = 0.2 * np.clip(s / 8, 0, 1)
     frame = pd.DataFrame({"s_mm": s, "measured": shape, "before": 0.8 * shape, "after": 1.01 * shape})
     frame = frame.assign(observable="deformation", run="r9", axis="z", sigma=0.004, unit="mm")
-    [row] = table_with(content(comparison=frame), "Steady deformation").rows
-    assert row[0] == "r9"
-    assert row[-2:] == ["−20", "1.0"]
+    walls = {"arm": {"walls": {"r9": {"with_flange_rotation": 0.2, "without_flange_rotation": 0.12}}}}
+    for identified, share in ((walls, "60"), ({}, "–")):
+        section = robot(replace(results(comparison=frame), identified=identified))
+        [row] = table_with(section.items, "Steady deformation").rows
+        assert row[0] == "r9"
+        assert row[-3:] == ["−20", "1.0", share]
 
 
 def test_stiffness_is_drawn_with_its_principal_axes():
@@ -159,7 +247,7 @@ def test_waves_are_drawn_without_an_idle_run_too():
 
 
 def test_courses_hold_the_dynamometers_level_over_the_steady_cut():
-    figure = figures.courses(force(), means(), ["r1"])
+    figure = joint_torques.courses(force(), means(), ["r1"])
     level = figure.axes[0].collections
     spans = [c.get_segments()[0] for c in level if hasattr(c, "get_segments") and len(c.get_segments())]
     np.testing.assert_allclose(sorted(s[0][1] for s in spans), [-160.0, -31.0, 48.0])

@@ -48,3 +48,16 @@ def test_it_is_said_how_runs_were_held_out():
 
 def test_a_batch_that_declares_nothing_has_no_such_section():
     assert tables({}, role=["identify"] * 3) is None
+
+
+def test_the_arm_of_a_batch_is_tabulated_joint_by_joint():
+    """Table 1 of [K], with the tip of its section 3.2."""
+    dh = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0]]
+    batch = replace(synthetic.results().batch, cell={"cell": "kr160", "arm": {"dh": [*dh, [0, 0, 215, 0]]}})
+    batch = replace(batch, manifest={"tool_in_flange_mm": [212.5, 0.0, 279.91]})
+    section = setup(replace(synthetic.results(), batch=batch))
+    [table] = [item for item in section.items if "Denavit" in getattr(item, "caption", "")]
+    assert [row[3] for row in table.rows] == ["−180", "−90", "0", "70"]
+    assert [row[-1] for row in table.rows] == ["0", "0", "215", "0"]
+    assert "arm kr160" in table.caption
+    assert "212.5, 0, 279.91 mm" in table.caption

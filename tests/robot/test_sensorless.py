@@ -9,7 +9,15 @@ import pytest
 from kr160_arm import arm_with_tool
 from scipy.signal import lfilter
 
-from metro.robot.sensorless import mean_force, noise_of_bins, observability, smoothed_torque, tip_force
+from metro.robot.sensorless import (
+    beyond_noise,
+    friction_repeatability,
+    mean_force,
+    noise_of_bins,
+    observability,
+    smoothed_torque,
+    tip_force,
+)
 from metro.robot.statics import tip_jacobian
 
 ARM = arm_with_tool()
@@ -169,3 +177,23 @@ def test_slow_noise_widens_the_interval_of_the_mean_by_what_it_does_to_it():
     told = mean_force(found, still, steady, 0.0, level)[1]
     np.testing.assert_allclose(np.diag(told), np.var(draws, axis=0), rtol=0.12)
     assert np.diag(mean_force(found, still, steady)[1]).max() < 1e-3 * np.diag(told).min()
+
+
+def test_slow_noise_at_a_place_varies_as_its_waves_together():
+    rng, count, level = np.random.default_rng(13), 60, np.array([4.0, 1.0])
+    number = np.arange(1, count)
+    shapes = np.sqrt(2 / count) * np.cos(np.pi * np.outer(np.arange(count) + 0.5, number) / count)
+    draws = shapes @ (rng.normal(size=(3000, count - 1, 2)) * np.sqrt(level / number[:, None]))
+    told = beyond_noise(np.full((count, 2), 0.5), np.array([0.3, 0.0]), level)
+    np.testing.assert_allclose((draws**2).mean(axis=(0, 1)), told[0] - [0.5 + 0.09, 0.5], rtol=0.05)
+
+
+def test_friction_by_the_air_holds_a_further_run_as_often_as_it_says():
+    """The next run's friction lies within 1.96 of it in 95 % of batches, be there two runs or twelve."""
+    rng = np.random.default_rng(14)
+    for runs in (2, 12):
+        air = rng.normal(0.0, np.hypot(3.0, 0.5), (runs, 4000))
+        told = friction_repeatability(air, np.full((runs, 4000), 0.25), np.full(4000, 0.01))
+        held = np.abs(rng.normal(0.0, 3.0, 4000)) < 1.96 * told
+        assert held.mean() == pytest.approx(0.95, abs=0.015)
+    assert friction_repeatability(np.zeros((3, 1)), np.ones((3, 1)), np.array([0.3])) == pytest.approx(0.3)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.stats import chi2, multivariate_normal
 
 from metro.signals.kalman import (
     combined_covariance,
+    freedom_of_drift,
     innovations,
     likeliest_drift,
     log_likelihood,
@@ -144,14 +145,35 @@ def test_the_error_of_a_mean_of_levels_is_that_of_the_inverse_information_matrix
     np.testing.assert_allclose(combined_covariance(weights, r, q), expected, rtol=1e-9)
 
 
-def test_the_whiteness_test_is_ljung_and_box_on_the_drifts_degrees_of_freedom():
-    diagnostic = pytest.importorskip("statsmodels.stats.diagnostic", reason="statsmodels is missing")
+def test_the_whiteness_test_is_that_of_li_and_mcleod_on_the_freedom_that_the_fit_leaves():
+    stattools = pytest.importorskip("statsmodels.tsa.stattools", reason="statsmodels is missing")
 
     found = np.random.default_rng(9).normal(size=(200, 2))
-    expected = [
-        diagnostic.acorr_ljungbox(channel, lags=[10], model_df=1)["lb_pvalue"].iloc[0] for channel in found.T
-    ]
-    np.testing.assert_allclose(whiteness(found), expected, rtol=1e-9)
+    found -= found.mean(axis=0)  # statsmodels takes the mean off
+    r = np.stack([stattools.acf(channel, nlags=10, fft=False)[1:] for channel in found.T], axis=1)
+    statistic = 202 * (r**2).sum(axis=0) + 10 * 11 / 400
+    for fitted in (0.0, 0.7):
+        np.testing.assert_allclose(whiteness(found, fitted), chi2.sf(statistic, 10 - fitted), rtol=1e-9)
+    assert np.isnan(whiteness(found[:2])).all()
+
+
+def test_the_freedom_of_the_drift_is_the_share_of_the_autocorrelations_in_its_information():
+    """By numerical derivatives: of the autocorrelations that a wrong drift leaves, and of the likelihood."""
+    r, q, step = 1.0, 0.3, 1e-4
+
+    def kernel(ratio):
+        """Coefficient λ of the steps, and their variance, from the autocovariances q + 2r and −r."""
+        root = np.roots([1.0, -(2.0 + ratio), 1.0]).min()
+        return root, r / root
+
+    (near, size), (far, _) = kernel(q), kernel(q + step)
+    h = np.arange(1, 11)
+    left = ((far - near) * near ** (h - 1)) / step  # (1 − λ'B)⁻¹(1 − λB): residual correlations of a wrong λ
+    change = (np.log(kernel(q + step)[1]) - np.log(size)) / step
+    whole = ((far - near) / step) ** 2 / (1 - near**2) + 0.5 * change**2
+    expected = (left**2).sum() / whole
+    assert freedom_of_drift(np.ones(1), np.array([q]))[0] == pytest.approx(expected, rel=1e-3)
+    assert freedom_of_drift(np.ones(1), np.array([1e4]))[0] < 1e-6
 
 
 def test_innovations_of_the_model_are_white_and_those_of_a_wrong_noise_are_not():
@@ -159,9 +181,9 @@ def test_innovations_of_the_model_are_white_and_those_of_a_wrong_noise_are_not()
     right, wrong = [], []
     for seed in range(200):
         _, z = walk(150, r, q, seed)
-        right.append(whiteness(innovations(z, r, likeliest_drift(z, r)))[0])
-        small = 0.05 * r
-        wrong.append(whiteness(innovations(z, small, likeliest_drift(z, small)))[0])
+        for noise, found in ((r, right), (0.05 * r, wrong)):
+            drift = likeliest_drift(z, noise)
+            found.append(whiteness(innovations(z, noise, drift), freedom_of_drift(noise, drift))[0])
     assert 0.01 <= np.mean(np.array(right) < 0.05) <= 0.10
     assert np.mean(np.array(wrong) < 0.05) > 0.8
 

@@ -18,6 +18,7 @@ Share = bool | Literal["none", "all", "row", "col"]
 # Okabe & Ito (2008): distinct for every common kind of colour vision, and in grey by line style and marker
 MEASURED, BEFORE, AFTER = "#000000", "#D55E00", "#0072B2"
 GREY, GREEN, PURPLE, SKY, YELLOW = "#8C8C8C", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"
+AXES = (("x", AFTER), ("y", BEFORE), ("z", GREEN))
 SERIES = (AFTER, BEFORE, GREEN, PURPLE, YELLOW, SKY, MEASURED)
 DIVERGING, SEQUENTIAL = "RdBu_r", "cividis"
 WIDTH, HALF = 6.7, 3.25  # of the text, and of one of two figures abreast, inches

@@ -33,6 +33,10 @@ class Arm:
         in_base = flange[..., :3, :3] @ self.tool + flange[..., :3, 3]
         return (in_base - self.work[:3, 3]) @ self.work[:3, :3]
 
+    def flange_axes(self, q: Array) -> Array:
+        """Axes of the flange in the work frame, columns of (..., 3, 3)."""
+        return np.asarray(self.work[:3, :3].T @ forward(self.dh, q)[..., :3, :3])
+
     def lever(self, q: Array) -> Array:
         """Vector from the flange's origin to the tip, base frame, m, shape (..., 3)."""
         return forward(self.dh, q)[..., :3, :3] @ self.tool

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from metro.signals import kalman, kalman_uneven
+from metro.signals import kalman, kalman_stretches
 from metro.signals.intervals import uneven
 from metro.signals.waves import variance as variance_of_waves
 from metro.signals.waves import waves
@@ -49,6 +49,7 @@ class Torques:
     ----------
     level, variance : (m, n) N m, N² m². noise, drift : (n,) R and Q.
     whiteness : (n,) probability of the innovations' autocorrelation in white noise.
+    parts : stretches of bins over which the level wanders; between them it may jump.
     interval : (m - 1,) between the bins, over the median; None where all are even.
     """
 
@@ -57,6 +58,7 @@ class Torques:
     noise: Array
     drift: Array
     whiteness: Array
+    parts: tuple[slice, ...]
     interval: Array | None = None
 
 
@@ -86,21 +88,25 @@ def noise_of_bins(
     return np.asarray(coloured * (shaken / samples[0] + 1.0 / samples[1]))
 
 
-def smoothed_torque(difference: Array, noise: Array, place: Array | None = None) -> Torques:
+def smoothed_torque(
+    difference: Array, noise: Array, free: np.ndarray | None = None, place: Array | None = None
+) -> Torques:
     """Smooth torques (m, n), N m, by the random walk whose drift is likeliest given their noise R (n,).
 
-    ``place`` (m,) along the path, of logs whose clock is not even: where samples were lost, bins are missing,
-    and the walk goes on without them.
+    Parameters
+    ----------
+    free : (m,) bool, bins in which the tool enters or leaves the work: there the torque may do anything, and
+        the walk starts anew behind them (:mod:`metro.signals.kalman_stretches`).
+    place : (m,) along the path, of logs whose clock is not even: where samples were lost, bins are missing,
+        and the walk goes on without them.
     """
+    parts = kalman_stretches.stretches(np.zeros(len(difference), bool) if free is None else free)
     interval = None if place is None else uneven(place)
-    if interval is not None:
-        drift = kalman_uneven.likeliest_drift(difference, noise, interval)
-        probability = kalman.whiteness(kalman_uneven.innovations(difference, noise, drift, interval))
-        smoothed = kalman_uneven.smooth(difference, noise, drift, interval)
-        return Torques(*smoothed, noise, drift, probability, interval)
-    drift = kalman.likeliest_drift(difference, noise)
-    probability = kalman.whiteness(kalman.innovations(difference, noise, drift))
-    return Torques(*kalman.smooth(difference, noise, drift), noise, drift, probability)
+    drift = kalman_stretches.likeliest_drift(difference, noise, parts, interval)
+    innovations = kalman_stretches.innovations(difference, noise, drift, parts, interval)
+    probability = kalman.whiteness(innovations, kalman.freedom_of_drift(noise, drift))
+    smoothed = kalman_stretches.smooth(difference, noise, drift, parts, interval)
+    return Torques(*smoothed, noise, drift, probability, parts, interval)
 
 
 def observability(cutting: Array, idle: Array) -> Array:
@@ -188,6 +194,37 @@ def tip_force(
     return TipForce(force, covariance, np.sqrt(values[:, -1] / values[:, 0]), use, solve)
 
 
+def beyond_noise(variance: Array, repeatability: Array, wander: Array) -> Array:
+    """Variance (m, n), N² m², of torques as measures of the force, from that (m, n) of their smoothed levels.
+
+    The smoother knows the white noise alone. Friction that is not that of the idle run, ``repeatability``
+    (n,) N m, adds its square, and slow noise of level ``wander`` (n,) N² m², whose waves i have the variance
+    wander / i, adds the mean of their sum at a place, wander · Σ 1/i / m.
+    """
+    count = len(variance)
+    slow = wander * float((1.0 / np.arange(1, count)).sum()) / count
+    return np.asarray(variance + repeatability**2 + slow)
+
+
+def friction_repeatability(air: Array, variance: Array, least: Array) -> Array:
+    """How well the friction of a cut is that of its idle run (n,), N m, by the torques in the air.
+
+    Where no force acts the two logs differ by noise and friction alone. One run's friction is one draw: the
+    mean square over the runs is its variance and that of the noise. It is widened by Student's quantile for
+    as many runs over the normal one, so that intervals of 1.96 of it hold the truth as often as they say.
+
+    Parameters
+    ----------
+    air : (r, n) mean over the air of each of r runs, cut less idle run. variance : (r, n) of these means by
+        the noise. least : (n,) which it does not fall below.
+    """
+    from scipy.special import stdtrit
+
+    wider = float(stdtrit(len(air), 0.975)) / 1.96
+    square = (wider**2 * air**2 - variance).mean(axis=0)
+    return np.asarray(np.sqrt(np.maximum(square, least**2)))
+
+
 def mean_force(
     tip_force: TipForce,
     torques: Torques,
@@ -203,11 +240,8 @@ def mean_force(
     (:mod:`metro.signals.waves`), which the smoother takes for the cut's.
     """
     weights = np.where(steady[:, None, None], tip_force.solve, 0.0) / steady.sum()
-    levels = np.moveaxis(weights, 1, 0), torques.noise, torques.drift
-    covariance = (
-        kalman.combined_covariance(*levels)
-        if torques.interval is None
-        else kalman_uneven.combined_covariance(*levels, torques.interval)
+    covariance = kalman_stretches.combined_covariance(
+        np.moveaxis(weights, 1, 0), torques.noise, torques.drift, torques.parts, torques.interval
     )
     common = weights.sum(axis=0) * repeatability
     slow = waves(weights)

@@ -20,6 +20,7 @@ from metro.signals.quality import GAP
 from metro.units import Array
 
 RATIOS = (1e-8, 1e4)
+LAGS = 10  # of the innovations' autocorrelation
 
 
 def noise_variance(signal: Array, interval: Array | None = None) -> Array:
@@ -166,23 +167,44 @@ def forecasts(signal: Array, measurement: Array, drift: Iterable[Array]) -> Iter
         variance = gain * measurement
 
 
-def whiteness(values: Array, lags: int = 10, fitted: int = 1) -> Array:
-    """Probability (k,) of autocorrelations at least as large in white noise (Ljung & Box 1978).
+def whiteness(values: Array, fitted: Array | float = 0.0, lags: int = LAGS) -> Array:
+    """Probability (k,) of autocorrelations at least as large in white noise of mean zero (Li & McLeod 1981).
+
+    Their statistic n Σ r² + m (m + 1) / 2n has the variance of χ² in short records too, where that of Ljung &
+    Box has more; with n + 2 in front its mean is exactly m, as E r² = (n − h) / n (n + 2).
 
     Parameters
     ----------
-    values : (n, k) innovations. lags : how many, at most a fifth of the samples.
-    fitted : parameters that were fitted to the channel, here its drift.
+    values : (n, k) innovations. fitted : degrees of freedom that the fit of the channel took, (k,) or one.
+    lags : how many, at most a fifth of the samples.
+
+    Returns
+    -------
+    Array
+        NaN for records of fewer than three samples, of which nothing can be said.
     """
     from scipy.stats import chi2
 
     count = len(values)
-    lags = max(fitted + 1, min(lags, count // 5))
-    centred = values - values.mean(axis=0)
-    power = (centred**2).sum(axis=0)
-    r = np.stack([(centred[h:] * centred[:-h]).sum(axis=0) / power for h in range(1, lags + 1)])
-    statistic = count * (count + 2) * (r**2 / (count - np.arange(1, lags + 1))[:, None]).sum(axis=0)
+    if count < 3:
+        return np.full(values.shape[1], np.nan)
+    lags = max(2, min(lags, count // 5))
+    power = (values**2).sum(axis=0)
+    r = np.stack([(values[h:] * values[:-h]).sum(axis=0) / power for h in range(1, lags + 1)])
+    statistic = (count + 2) * (r**2).sum(axis=0) + lags * (lags + 1) / (2.0 * count)
     return np.asarray(chi2.sf(statistic, lags - fitted))
+
+
+def freedom_of_drift(measurement: Array, drift: Array, lags: int = LAGS) -> Array:
+    """Degrees of freedom (k,) that fitting the drift takes from the autocorrelations of the innovations.
+
+    The steps of the channel are an MA(1) of coefficient −λ and variance R/λ, with Q/R = (1 − λ)²/λ. Where λ
+    is wrong by dλ, autocorrelation h is by λ^(h − 1) dλ; the likelihood knows λ from the autocorrelations,
+    1/(1 − λ²), and, as R is known, from the variance, 1/2λ². So the sum of squares of m autocorrelations
+    loses 2λ²/(1 + λ²) · (1 − λ^2m): less than one, as a drift that would whiten them is not the likeliest.
+    """
+    square = np.exp(-4.0 * np.arcsinh(0.5 * np.sqrt(drift / measurement)))
+    return np.asarray(2.0 * square / (1.0 + square) * (1.0 - square**lags))
 
 
 def _steps(count: int) -> Array:

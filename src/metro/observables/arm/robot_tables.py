@@ -1,14 +1,11 @@
 """Tables of the robot for the report, beyond the observables: sensorless force, stiffness, path error.
 
-Tables ``robot_force`` and ``robot_means`` (the force along the path, and its steady mean with that of the
-dynamometer), ``robot_joints`` (observability, noise, whiteness), ``robot_spectra`` and ``robot_lines`` (of
-the tip's tracking error), ``arm_map`` and ``arm_ellipsoids`` (stiffness over the work), ``robot_waves``
-(walls and tips, filtered).
+Those of :mod:`metro.observables.arm.force_tables` and :mod:`metro.observables.arm.tracking_tables`,
+``arm_map`` and ``arm_ellipsoids`` (stiffness over the work), ``robot_waves`` (walls and tips, filtered).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,22 +14,17 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
-from metro.observables.arm.tip_force import FORCE, JOINTS, Log, Sensorless
+from metro.observables.arm.force_tables import RunForce, aligned, force_tables, run_force
+from metro.observables.arm.tip_force import JOINTS, Log, Sensorless
+from metro.observables.arm.tracking_tables import tracking_tables
 from metro.observables.arm.wall import Wall, wall
-from metro.observables.joint_force.observable import REPEATABLE
-from metro.observables.problem import Refusal
 from metro.observables.waviness.points import GRID as SPACING
 from metro.observables.waviness.points import IDLE, STRAYED
 from metro.robot.kinematics import Arm, arm_of_cell
-from metro.robot.sensorless import LEAST_INDEX, mean_force
 from metro.robot.workspace import ellipsoid, principal_sd, stiffness_map
-from metro.signals.kalman import noise_variance
-from metro.signals.path_spectrum import FINER, even_samples, spectrum
-from metro.signals.segmentation import knees
 from metro.surface.profile import part
-from metro.units import JSON, MM, N_UM, UM, Array
+from metro.units import JSON, MM, N_UM, Array
 
-CALIBRATED = tip_force.SYSTEMATIC["dynamometer"]
 GRID, MARGIN = (
     13,
     0.5,
@@ -52,121 +44,29 @@ def robot_tables(
     parts: dict[str, list[pd.DataFrame]] = {}
     start = None
     logged = set(read("robot")["run"].astype(str))
-    solved: dict[str, _RunForce] = {}
+    solved: dict[str, RunForce] = {}
     for run in [str(r) for r in batch.runs.sort_values("order", kind="stable").index if str(r) in logged]:
         cut, idle = tip_force.logs(read("robot", run), arm)
         if not len(cut.tip):
             continue
+        face = wall(batch, run)
         start = cut.commanded[len(cut.commanded) // 2] if start is None else start
-        solved[run] = _run_force(cut, idle, arm, wall(batch, run))
-        _add(parts, run, _spectra(cut, arm))
-    wanders = [one.sensorless.wander for one in solved.values() if isinstance(one.sensorless, Sensorless)]
-    # The slow noise of one run is poorly determined, so its level is the mean over all runs.
-    wander = np.mean(wanders, axis=0) if wanders else np.zeros(len(JOINTS))
-    for run, one in solved.items():
-        _add(parts, run, _forces(batch, run, read, one, wander))
+        solved[run] = run_force(batch, cut, idle, arm, face)
+        first = "robot_aligned" not in parts and isinstance(solved[run].sensorless, Sensorless)
+        tables = {"robot_aligned": _aligned(cut, idle, face, solved[run])} if first else {}
+        for name, table in (tables | tracking_tables(cut, idle, arm, face)).items():
+            parts.setdefault(name, []).append(table.assign(run=run))
+    parts |= force_tables(batch, read, solved)
     tables = {name: pd.concat(tables, ignore_index=True) for name, tables in parts.items()}
     if points is not None:
         tables["robot_waves"] = _waves(batch, points)
     return tables | _stiffness(batch, read, arm, start, identified)
 
 
-def _add(parts: dict[str, list[pd.DataFrame]], run: str, tables: dict[str, pd.DataFrame]) -> None:
-    for name, table in tables.items():
-        parts.setdefault(name, []).append(table.assign(run=run))
-
-
-@dataclass(frozen=True, eq=False)
-class _RunForce:
-    """Sensorless force of a run, whether its joints pass the index, and the error of friction, (6,) N m."""
-
-    sensorless: Sensorless | Refusal
-    by_index: bool
-    friction: Array
-
-
-def _run_force(cut: Log, idle: Log, arm: Arm, face: Wall) -> _RunForce:
-    """Solve for the force of a run from the joints that pass the index; if that fails, from all joints."""
-    solved = tip_force.sensorless(cut, idle, arm, face)
-    by_index = not isinstance(solved, Refusal) and solved.solution is not None
-    if not by_index:
-        solved = tip_force.sensorless(cut, idle, arm, face, 0.0)
-    return _RunForce(solved, by_index, REPEATABLE * np.sqrt(noise_variance(cut.torque, cut.interval)))
-
-
-def _forces(batch: Batch, run: str, read: Tables, one: _RunForce, wander: Array) -> dict[str, pd.DataFrame]:
-    """Tables of the sensorless force of a run, or why there is none; ``wander`` (6,) is that of all runs."""
-    sensorless = one.sensorless
-    if isinstance(sensorless, Refusal):
-        return {"robot_refused": pd.DataFrame({"reason": [sensorless.reason]})}
-    used = sensorless.index >= LEAST_INDEX if sensorless.solution is None else sensorless.solution.used
-    joints = pd.DataFrame(
-        {
-            "joint": list(JOINTS),
-            "index": sensorless.index,
-            "used": used,
-            "noise_nm": np.sqrt(sensorless.torques.noise),
-            "drift_nm": np.sqrt(sensorless.torques.drift),
-            "whiteness": sensorless.torques.whiteness,
-            "remark": "; ".join(sensorless.remarks),
-        }
-    )
-    if sensorless.solution is None:
-        return {"robot_joints": joints, "robot_refused": pd.DataFrame({"reason": [sensorless.refusal]})}
-    sd = np.sqrt(np.einsum("maa->ma", sensorless.solution.covariance))
-    names = knees(sensorless.x, sensorless.solution.force).names(sensorless.x)
-    course = pd.DataFrame({"x_mm": sensorless.x / MM, "part": names})
-    course[FORCE], course[[f"sd_{name}" for name in FORCE]] = sensorless.solution.force, sd
-    mean, covariance = mean_force(
-        sensorless.solution, sensorless.torques, sensorless.steady, one.friction, wander
-    )
-    means = _means(batch, run, read, mean, np.sqrt(np.diag(covariance))).assign(by_index=one.by_index)
-    return {"robot_joints": joints, "robot_force": course, "robot_means": means}
-
-
-def _means(batch: Batch, run: str, read: Tables, mean: Array, sd: Array) -> pd.DataFrame:
-    """Mean force (3,) of the steady cut by axis with standard errors, and the dynamometer's if measured."""
-    table = pd.DataFrame({"axis": list("xyz"), "sensorless_n": mean, "sensorless_sd_n": sd})
-    record = tip_force.from_dynamometer(batch, run, read, wall(batch, run))
-    if isinstance(record, Refusal):
-        return table.assign(dynamometer_n=np.nan, dynamometer_sd_n=np.nan)
-    measured = record[FORCE].to_numpy(dtype=float)[0]
-    own = record[[f"sd_{name}" for name in FORCE]].to_numpy(dtype=float)[0]
-    return table.assign(dynamometer_n=measured, dynamometer_sd_n=np.hypot(own, CALIBRATED * np.abs(measured)))
-
-
-def _spectra(cut: Log, arm: Arm) -> dict[str, pd.DataFrame]:
-    """Spectra of the tip's tracking error (encoder less set, work frame), over time and along the path."""
-    error = arm.tip(cut.actual) - cut.tip
-    place = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(cut.tip, axis=0), axis=1))])
-    spectra, lines = [], []
-    for domain, along, unit in (("time", cut.time, 1.0), ("path", place, MM)):
-        even, spacing = even_samples(along, error)
-        for axis, channel in zip("xyz", even.T, strict=True):
-            try:
-                resolved = spectrum(channel, spacing)
-            except ValueError:
-                continue
-            keep = slice(FINER, None, FINER)  # the zero padding gives finer steps than the record resolves
-            density = {
-                "frequency": resolved.frequency[keep] * unit,
-                "density_um2": resolved.density[keep] / UM**2 / unit,
-            }
-            spectra.append(pd.DataFrame({"domain": domain, "axis": axis, **density}))
-            lines += [
-                {
-                    "domain": domain,
-                    "axis": axis,
-                    "frequency": line.frequency * unit,
-                    "frequency_sd": line.frequency_sd * unit,
-                    "amplitude_um": line.amplitude / UM,
-                    "amplitude_sd_um": line.amplitude_sd / UM,
-                    "probability": line.probability,
-                }
-                for line in resolved.lines
-            ]
-    tables = {"robot_spectra": pd.concat(spectra, ignore_index=True)} if spectra else {}
-    return tables | ({"robot_lines": pd.DataFrame(lines)} if lines else {})
+def _aligned(cut: Log, idle: Log, face: Wall, one: RunForce) -> pd.DataFrame:
+    """Return the logs of the joint whose torque the cut changes most."""
+    assert isinstance(one.sensorless, Sensorless)
+    return aligned(cut, idle, face, int(np.argmax(one.sensorless.index)) + 1)
 
 
 def _waves(batch: Batch, points: pd.DataFrame) -> pd.DataFrame:

@@ -32,7 +32,7 @@ from metro.signals import align, steady
 from metro.signals.intervals import uneven
 from metro.signals.kalman import noise_variance
 from metro.signals.path_match import match
-from metro.signals.waves import wandering
+from metro.signals.waves import wandering, waves
 from metro.units import DEG, JSON, MM, Array
 
 Read = Callable[..., pd.DataFrame]
@@ -91,9 +91,12 @@ class Sensorless:
 
     Attributes
     ----------
-    s, x : (m,) along the path, and along the wall from its start, m. steady : (m,) bool.
-    torques : the smoothed torque of the cut less that of the idle run. wander : (6,) level of its slow noise,
-        N² m² (:mod:`metro.signals.waves`), estimated from the idle run. index : (6,) observability.
+    s, x : (m,) along the path, and along the wall from its start, m.
+    steady, air : (m,) bool, where the tool is wholly in the work, and where it touches nothing.
+    difference : (m, 6) N m, torque of the cut less that of the idle run, by bins; ``torques``: smoothed.
+    moves : (m, 3, 6) Jacobian of the tip, m/rad.
+    wander : (6,) level of the slow noise, N² m² (:mod:`metro.signals.waves`), estimated from the idle run.
+    index : (6,) observability.
     solution : force; None if it could not be solved for, and ``refusal`` gives the reason. remarks : in which
         ways the idle run and the cut differ.
     """
@@ -101,6 +104,9 @@ class Sensorless:
     s: Array
     x: Array
     steady: np.ndarray
+    air: np.ndarray
+    difference: Array
+    moves: Array
     torques: Torques
     wander: Array
     index: Array
@@ -145,15 +151,33 @@ def sensorless(
     # The slow noise of the idle run is as large in the cut, where the force conceals it.
     interval = uneven(pair.s) if gaps else None
     wander = 2.0 * wandering(pair.second[:, :6], white, pair.second[:, 13:], interval)
-    torques = smoothed_torque(pair.first[:, :6] - pair.second[:, :6], noise, pair.s if gaps else None)
-    index = observability((pair.first[:, :6] - pair.second[:, :6])[steady], pair.second[steady, :6])
+    free, difference = wall.changing(x, width), pair.first[:, :6] - pair.second[:, :6]
+    air = ~(free | steady)
+    torques = smoothed_torque(difference, noise, free, pair.s if gaps else None)
+    index = observability(difference[steady], pair.second[steady, :6])
     remarks = tuple(alike.remarks(np.gradient(cut.commanded, cut.time, axis=0)))
     moves = tip_jacobian(arm, joints)
+    solution, refusal = None, ""
     try:
-        solution, refusal = tip_force(torques.level, torques.variance, moves, index, least_index), ""
+        solution = tip_force(torques.level, torques.variance, moves, index, least_index)
     except ValueError as error:
-        return Sensorless(pair.s, x, steady, torques, wander, index, None, str(error), remarks)
-    return Sensorless(pair.s, x, steady, torques, wander, index, solution, refusal, remarks)
+        refusal = str(error)
+    return Sensorless(
+        pair.s, x, steady, air, difference, moves, torques, wander, index, solution, refusal, remarks
+    )
+
+
+def in_the_air(one: Sensorless, wander: Array) -> tuple[Array, Array] | None:
+    """Mean (6,) of the torques in the air, N m, and its variance by the noise; None if no air was logged.
+
+    ``wander`` (6,) is the level of the slow noise.
+    """
+    if not one.air.any():
+        return None
+    weights = one.air / one.air.sum()
+    shares = waves(weights[:, None])[1:, 0] ** 2
+    noise = one.torques.noise / one.air.sum() + wander * float((shares / np.arange(1, len(weights))).sum())
+    return weights @ one.difference, noise
 
 
 def _turning(log: Log) -> Array:

@@ -38,6 +38,15 @@ class Wall:
         """Mask of the places along the wall (m from its start) at which the tool is wholly engaged."""
         return np.asarray((x >= 0.0) & (x <= self.length - self.leaving))
 
+    def changing(self, x: Array, margin: float) -> np.ndarray:
+        """Mask of the places along the wall at which the tool enters or leaves the block.
+
+        ``margin`` (m) before and after: what is measured at a place is a mean over its surroundings.
+        """
+        entering = (x > -self.leaving - margin) & (x < margin)
+        leaves = self.length - self.leaving
+        return np.asarray(entering | ((x > leaves - margin) & (x < self.length + margin)))
+
 
 def wall(batch: Batch, run: str) -> Wall:
     """Return the wall of a run from the manifest and the run table.

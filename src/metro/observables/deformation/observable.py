@@ -68,7 +68,7 @@ def _observed(
     if per_joint is not None:
         tables["observability"] = per_joint
     if isinstance(sensorless, Refusal):
-        tables["sensorless force"] = sensorless
+        tables["sensorless force for the deformation"] = sensorless
     force, source = tip_force.from_dynamometer(batch, run, read, face), "dynamometer"
     if isinstance(force, Refusal):
         force, source = sensorless, "torque"

@@ -29,6 +29,6 @@ DESCRIPTION = Description(
     ),
     tables=TABLES,
     shown=("waviness_points",),
-    drawn=(),
+    drawn=("waviness_points",),
     needs=needs,
 )

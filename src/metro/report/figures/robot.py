@@ -1,4 +1,4 @@
-"""The robot: force from the joints' torques, stiffness around the work, waviness and path error."""
+"""The robot: stiffness around the work, friction of the joints, waviness of walls."""
 
 from __future__ import annotations
 
@@ -14,59 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-AXES = (("x", style.AFTER), ("y", style.BEFORE), ("z", style.GREEN))
 RUNS = 2
-SHADES = {"cut-in": 0.16, "cut-out": 0.16, "steady": 0.06}
-DOMAINS = (("time", "frequency (Hz)", "µm²/Hz"), ("path", "waves per mm", "µm² mm"))
-NORMAL = 1.96
-
-
-def courses(force: pd.DataFrame, means: pd.DataFrame, runs: Sequence[str]) -> Figure:
-    """Draw the sensorless force along the wall with its 95 % band, and the dynamometer's steady mean.
-
-    Parameters
-    ----------
-    force : rows of ``robot_force``. means : of ``robot_means``. runs : to draw.
-    """
-    columns = min(2, len(runs))
-    rows = -(-len(runs) // columns)
-    with style.style():
-        figure, grid = style.new_figure(0.5 + 1.0 * rows, rows, columns)
-        flat = [axes for row in grid for axes in row]
-        for axes, run in zip(flat, runs, strict=False):
-            _course(axes, force[force["run"] == run], means[means["run"] == run])
-            axes.set_title(f"run {run}", loc="left")
-            axes.set(xlabel="along the wall (mm)", ylabel="force (N)")
-        for axes in flat[len(runs) :]:
-            axes.set_visible(False)
-        style.legend_above(figure, flat[0])
-    return figure
-
-
-def _course(axes: Axes, course: pd.DataFrame, means: pd.DataFrame) -> None:
-    x, part = course["x_mm"].to_numpy(float), course["part"].to_numpy(str)
-    for name, alpha in SHADES.items():
-        inside = x[part == name]
-        for piece in np.split(inside, np.flatnonzero(np.diff(inside) > 3 * np.median(np.diff(x))) + 1):
-            if len(piece):
-                axes.axvspan(piece[0], piece[-1], color=style.GREY, alpha=alpha, lw=0)
-    steady = x[part == "steady"]
-    for name, colour in AXES:
-        value, sd = (course[f"{start}f{name}_n"].to_numpy(float) for start in ("", "sd_"))
-        axes.fill_between(x, value - NORMAL * sd, value + NORMAL * sd, color=colour, alpha=0.25, lw=0)
-        axes.plot(x, value, color=colour, label=f"{name}, from the torques")
-        measured = means.loc[means["axis"] == name, "dynamometer_n"].to_numpy(float)
-        if len(steady) and np.isfinite(measured).all() and len(measured):
-            axes.hlines(
-                measured,
-                steady[0],
-                steady[-1],
-                color=style.MEASURED,
-                ls="--",
-                lw=0.9,
-                zorder=3,
-                label="dynamometer, steady mean" if name == "z" else "",
-            )
 
 
 def stiffness(chart: pd.DataFrame, ellipsoids: pd.DataFrame) -> Figure:
@@ -220,35 +168,4 @@ def waviness(waves: pd.DataFrame, runs: Sequence[str]) -> Figure:
             axes.set_xlabel("along the wall (mm)")
         figure.supylabel("height (µm)", fontsize="medium")
         style.legend_above(figure, flat[0])
-    return figure
-
-
-def spectra(table: pd.DataFrame, lines: pd.DataFrame | None) -> Figure:
-    """Draw the spectra of the tip's path error over time and along the path, all runs; mark the lines.
-
-    Parameters
-    ----------
-    table : rows of ``robot_spectra``. lines : of ``robot_lines``; None if there are none.
-    """
-    domains = [domain for domain in DOMAINS if (table["domain"] == domain[0]).any()]
-    with style.style():
-        figure, [row] = style.new_figure(1.65, 1, len(domains))
-        for axes, (domain, label, unit) in zip(row, domains, strict=True):
-            part = table[table["domain"] == domain]
-            for name, colour in AXES:
-                for i, (_, one) in enumerate(part[part["axis"] == name].groupby("run", sort=False)):
-                    axes.loglog(
-                        one["frequency"],
-                        one["density_um2"],
-                        color=colour,
-                        lw=0.5,
-                        alpha=0.6,
-                        label=name if i == 0 else None,
-                    )
-                if lines is not None:
-                    marked = lines[(lines["domain"] == domain) & (lines["axis"] == name)]
-                    height = np.full(len(marked), 2.0 * float(part["density_um2"].max()))
-                    axes.plot(marked["frequency"], height, "v", color=colour, ms=4)
-            axes.set(xlabel=label, ylabel=f"density ({unit})")
-        style.legend_above(figure, row[0])
     return figure

@@ -43,7 +43,11 @@ CONDITIONS = {
 
 def setup(results: Results) -> Section | None:
     """Write the declared tool, work and instruments, and the conditions with their runs; None without any."""
-    items = [*_declared(results.batch.manifest), *_conditions(results.batch.runs)]
+    items = [
+        *_declared(results.batch.manifest),
+        *_arm(results.batch.cell, results.batch.manifest),
+        *_conditions(results.batch.runs),
+    ]
     return Section("What was measured", [*items, *_plan(results)]) if items else None
 
 
@@ -56,6 +60,24 @@ def _declared(manifest: JSON) -> list[Item]:
         return []
     caption = "Tool, work and instruments as batch.yaml declares them; nothing of this was inferred."
     return [Heading("Tool and instruments"), Table(["what", "declared"], rows, caption, [1, 5], small=True)]
+
+
+def _arm(cell: JSON, manifest: JSON) -> list[Item]:
+    """Tabulate the arm's Denavit–Hartenberg parameters, as in [K] table 1; nothing where there is no arm."""
+    dh = (cell.get("arm") or {}).get("dh")
+    if not dh:
+        return []
+    names = ("θ₀ (°)", "α (°)", "d (mm)", "a (mm)")
+    rows = [[name, *(f"{float(row[i]):g}".replace("-", "−") for row in dh)] for i, name in enumerate(names)]
+    caption = (
+        f"Denavit–Hartenberg parameters of the arm {cell.get('cell', '')}, standard (distal) convention."
+    )
+    if tip := manifest.get("tool_in_flange_mm"):
+        place = ", ".join(f"{float(value):g}" for value in tip).replace("-", "−")
+        caption += f" Tool tip in the flange frame: {place} mm."
+    numeric = list(range(1, len(dh) + 1))
+    header = ["", *(f"joint {i}" for i in numeric)]
+    return [Table(header, rows, caption, [1.2, *([1.0] * len(dh))], numeric=numeric, small=True)]
 
 
 def _values(values: JSON) -> Iterator[str]:
