@@ -128,7 +128,7 @@ def stations(surface: pd.DataFrame, dots: pd.DataFrame) -> Figure:
     drawn = [(f"k{a}_n_um", f"k {a} (N/µm)") for a in "xyz"] + [("sd_percent", "standard deviation (%)")]
     with style.style():
         figure, grid = style.new_figure(
-            0.5 + 1.45 * len(drawn), len(drawn), len(levels), sharex=True, sharey=True
+            0.5 + 1.15 * len(drawn), len(drawn), len(levels), sharex=True, sharey=True
         )
         for row, (column, label) in zip(grid, drawn, strict=True):
             steps = _steps(surface[column].to_numpy(float))

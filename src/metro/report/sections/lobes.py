@@ -70,10 +70,11 @@ def _limits(results: Results, boundary: pd.DataFrame) -> Table:
         ends = f"{known.idxmax()} / {known.idxmin()}"
         rows.append([number(float(str(rpm)), 4), *(number(float(d)) for d in depths), ratio, ends])
     spread = (grid.max(axis=1) / grid.min(axis=1)).dropna()
+    least, most = (number(float(str(rpm)), 4) for rpm in (spread.idxmin(), spread.idxmax()))
     caption = (
-        f"Limit of the depth of cut (mm) by speed and position. The greatest is {number(spread.min(), 2)} "
-        f"times the least at {number(float(str(spread.idxmin())), 4)} rpm and {number(spread.max(), 2)} times at "
-        f"{number(float(str(spread.idxmax())), 4)} rpm."
+        "Limit of the depth of cut (mm) by speed and position. The greatest is "
+        f"{number(spread.min(), 2)} times the least at {least} rpm and {number(spread.max(), 2)} times at "
+        f"{most} rpm."
     )
     header = ["speed (rpm)", *map(str, grid.columns), "greatest / least", "at positions"]
     widths = [0.9, *([0.8] * len(grid.columns)), 1.1, 0.9]
@@ -150,8 +151,8 @@ def _governing_words(methods: pd.DataFrame) -> str:
         return words
     rising: list[str] = []
     falling: list[str] = []
-    for position, part in methods.sort_values("rpm").groupby("position", sort=False):
-        order = part["governing_mode"].str.extract(r"(\d+)$")[0].astype(int)
+    for position, part in methods.groupby("position", sort=False):
+        order = part.sort_values("rpm")["governing_mode"].str.extract(r"(\d+)$")[0].astype(int)
         (rising if order.is_monotonic_increasing else falling).append(str(position))
     said = []
     said += [f"its number rises with the speed at position {listing(rising)}"] if rising else []
@@ -161,12 +162,17 @@ def _governing_words(methods: pd.DataFrame) -> str:
 
 def _stations(stations: pd.DataFrame) -> Table:
     columns = ("x_mm", "y_mm", "z_mm", "lowest_mm", "lowest_from_others_mm", "depth_error_percent")
-    rows = [[str(row["position"]), *(number(row[c]) for c in columns)] for _, row in stations.iterrows()]
-    header = ["position", "x (mm)", "y", "z", "lowest (mm)", "told by the others", "depth error (%)"]
+    known = stations[stations["lowest_from_others_mm"].notna()]
+    rows = [[str(row["position"]), *(number(row[c]) for c in columns)] for _, row in known.iterrows()]
+    header = ["position", "x (mm)", "y", "z", "lowest (mm)", "from the others", "depth error (%)"]
     caption = (
-        "Each position's boundary as the other positions tell it: modes interpolated between stations, "
-        "median error of depth over the speeds."
+        "Boundary of a position as predicted from the other positions, with the coefficients of the base "
+        "model: modes interpolated between stations, median error of depth over the speeds."
     )
+    if beyond := [
+        str(position) for position in stations["position"] if position not in set(known["position"])
+    ]:
+        caption += f" Position {listing(beyond)}: too far from the others to be predicted from them."
     return Table(header, rows, caption, [0.8, 0.8, 0.8, 0.8, 1, 1.2, 1.2], numeric=[1, 2, 3, 4, 5, 6])
 
 

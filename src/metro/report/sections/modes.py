@@ -104,10 +104,11 @@ def _shapes(residues: pd.DataFrame, alike: pd.DataFrame) -> list[Item]:
         above = close[(close["first_hz"] < close["second_hz"]) & (close["mac"] > ALIKE)]
         total = part["frequency_hz"].nunique()
         pairs = total * (total - 1) // 2
+        close_ones = ": more points would distinguish them" if len(above) else ""
         about = (
             f"Like shapes (MAC over {ALIKE:g}) have {len(above) or 'none'} of {pairs} pairs of modes at the "
-            f"{part['point'].nunique()} points of position {key[0]}, direction {key[1]}: more points would "
-            "part them. Shapes of the modes, and the modal assurance criterion of every two."
+            f"{part['point'].nunique()} points of position {key[0]}, direction {key[1]}{close_ones}. "
+            "Shapes of the modes, and the modal assurance criterion of every two."
         )
         items.append(Picture(figures.shapes(part, close), about, about))
     return items
