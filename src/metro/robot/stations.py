@@ -49,7 +49,7 @@ class Stations:
         """Logarithm of the stiffness (n, d): of each value, or of the matrix, entry by entry.
 
         That of a diagonal matrix is the logarithms of its diagonal. The exponential of a mean of logarithms
-        of positive definite matrices is positive definite (Arsigny et al. 2006).
+        of positive definite matrices is positive definite (Arsigny et al. 2007).
         """
         if self.stiffness.ndim == 2:
             return np.asarray(np.log(self.stiffness))
