@@ -147,7 +147,7 @@ def stations(surface: pd.DataFrame, dots: pd.DataFrame) -> Figure:
             bar.ax.locator_params(nbins=4)
             row[0].set_ylabel(f"{second[0]} (mm)")
         for axes, level in zip(grid[0], levels, strict=True):
-            axes.set_title(f"{third[0]} = {level:.0f} mm", loc="left")
+            axes.set_title(f"{third[0]} = {level:.0f} mm".replace("-", "−"), loc="left")
         for axes in grid[-1]:
             axes.set_xlabel(f"{first[0]} (mm)")
     return figure
