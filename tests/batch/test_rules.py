@@ -8,6 +8,7 @@ LOADS = "pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,fx_n,fy_n
 MASS = "pose,mxx,mxy,mxz,myy,myz,mzz\n"
 PUBLISHED = "table,row,observable,quantity,measured,predicted,unit\n"
 STATIONS = "position,x_mm,y_mm,z_mm,kx_n_um,ky_n_um,kz_n_um\n"
+ACROSS = STATIONS.strip() + ",kxy_n_um\n"
 CHECKS = {
     "impacts": rules.impact_findings,
     "loads": rules.load_findings,
@@ -31,6 +32,7 @@ def faults(folder, name, text):
         ("mass", MASS + "p25,654.58,0,382.51,903.38,0,269.57\n"),
         ("published", PUBLISHED + "4,Ktc,force,coefficient,10145,,N/mm2\n"),
         ("stations", STATIONS + "1,0,0,0,1,2,3\n2,0,0,-320,1,2,3\n"),
+        ("stations", ACROSS + "1,0,0,0,1,2,3,1.2\n2,0,0,-320,1,2,3,\n"),
     ],
 )
 def test_rows_that_follow_the_contract_pass(tmp_path, name, text):
@@ -81,6 +83,11 @@ def test_rows_that_follow_the_contract_pass(tmp_path, name, text):
             "stations",
             STATIONS + "1,0,0,0,1,2,3\n1,0,0,9,1,2,3\n",
             'row 3 (1): column position: position "1" stands',
+        ),
+        (
+            "stations",
+            ACROSS + "1,0,0,0,1,2,3,0\n2,0,0,9,1,2,3,1.5\n",
+            "row 3 (2): column kxy_n_um: the stiffness across is so large that the end gives way",
         ),
     ],
 )

@@ -42,7 +42,9 @@ def tables(directions=("x", "y")):
         parts.append(part.assign(test="tip", position="1", reference=f"1{d}", response=f"1{d}", replicate=1))
     hit = pd.DataFrame(columns=[*COLUMNS, "response_unit", "t_s", "force_n", "response_si"])
     stations = pd.DataFrame(columns=["position", "x_mm", "y_mm", "z_mm"])
-    return {"hit": hit, "frf": pd.concat(parts, ignore_index=True), "stations": stations}
+    pickups = pd.DataFrame(columns=["position", "reference", "response", "distance_mm"])
+    frf = pd.concat(parts, ignore_index=True)
+    return {"hit": hit, "frf": frf, "stations": stations, "pickups": pickups}
 
 
 def batch(**changes):
@@ -128,7 +130,9 @@ def test_the_label_never_changes_the_prediction(observed):
 
 def test_the_report_has_the_blocks_of_the_contract(observed):
     blocks = lobes.report(batch(), observed, {}, Refusal(""), None)
-    assert set(blocks["modes"][0]) == {"position", "direction", "frequency", "damping", "stiffness", "mass"}
+    quantities = {"frequency", "damping", "stiffness", "mass"}
+    assert set(blocks["modes"][0]) == {"position", "direction", "mode", *quantities}
+    assert [mode["mode"] for mode in blocks["modes"]] == ["x1", "x2", "y1", "y2"]
     assert blocks["modes"][0]["position"] == 1
     assert blocks["lobes"][0]["boundary"] == "data/processed/press/lobes_final.parquet"
     lowest = blocks["lobes"][0]["lowest_mm"]
@@ -142,6 +146,50 @@ def test_cross_receptances_are_not_taken_for_direct_ones(observed):
     source["frf"] = pd.concat([source["frf"], cross])
     found = lobes.observe(batch(), lambda name: source[name], {})
     pd.testing.assert_frame_equal(found["modes"], observed["modes"])
+
+
+def test_a_response_across_is_tabulated_as_a_share_of_that_along():
+    source = tables()
+    cross = source["frf"][source["frf"]["response"] == "1x"].assign(response="1y")
+    source["frf"] = pd.concat([source["frf"], cross.assign(real_m_n=0.03 * cross["real_m_n"], imag_m_n=0.0)])
+    [row] = lobes.observe(batch(), lambda name: source[name], {})["mode_cross"].to_dict("records")
+    assert (row["reference"], row["response"]) == ("1x", "1y")
+    within = cross[cross["frequency_hz"] > 0]
+    real, size = within["real_m_n"], np.hypot(within["real_m_n"], within["imag_m_n"])
+    expected = 0.03 * np.sqrt((real**2).mean() / (size**2).mean())
+    assert row["share"] == pytest.approx(expected, rel=0.05)
+
+
+def two_positions():
+    """The same structure at two positions, in the second slower by a tenth and half as stiff."""
+    source = tables()
+    second = source["frf"].assign(position="2", frequency_hz=0.9 * source["frf"]["frequency_hz"])
+    second[["real_m_n", "imag_m_n"]] *= 2.0
+    source["frf"] = pd.concat([source["frf"], second], ignore_index=True)
+    return source
+
+
+def test_a_position_without_runs_has_the_lobes_of_the_cut_that_most_runs_share():
+    source = two_positions()
+    made = batch()
+    found = lobes.observe(made, lambda name: source[name], {})
+    depths = found["lobes"].set_index("position")["depth_mm"]
+    elsewhere = replace(made, runs=made.runs.assign(pose="2"))
+    own = lobes.observe(elsewhere, lambda name: source[name], {})["lobes"].set_index("position")["depth_mm"]
+    np.testing.assert_allclose(depths.loc["2"], own.loc["2"], rtol=1e-9)
+    methods = found["lobe_methods"].groupby("position")
+    assert methods["checked"].any().to_dict() == {"1": True, "2": False}
+    assert set(found["lobe_runs"]["position"]) == {"1"}
+    followed = found["mode_tracks"].groupby("position")["mode"].agg(list)
+    assert followed["1"] == followed["2"] == ["x1", "x2", "y1", "y2"]
+
+
+def test_runs_without_a_pose_belong_to_none_of_several_positions_and_a_note_says_so():
+    source, made = two_positions(), batch()
+    made.runs.loc[made.runs.index[1:3], "pose"] = ""
+    found = lobes.observe(made, lambda name: source[name], {})
+    assert list(found["lobe_runs"]["run"]) == [made.runs.index[0], made.runs.index[3]]
+    assert found["lobes_refused"]["reason"].str.contains("2 runs without a pose").any()
 
 
 def test_modes_in_x_and_z_use_z_as_the_second_direction(observed):

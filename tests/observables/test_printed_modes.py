@@ -47,7 +47,7 @@ def observed():
     columns = ["test", "position", "reference", "response", "replicate", "response_unit", "t_s"]
     empty = pd.DataFrame(columns=[*columns, "force_n", "response_si", "frequency_hz", "real_m_n", "imag_m_n"])
     stations = pd.DataFrame(columns=["position", "x_mm", "y_mm", "z_mm"])
-    source = {"hit": empty, "frf": empty, "stations": stations, "published": published()}
+    source = {"hit": empty, "frf": empty, "stations": stations, "published": published(), "pickups": empty}
     return lobes.observe(batch, lambda name: source[name], {})
 
 

@@ -248,7 +248,7 @@ def row(of, stations=STATIONS):
 
 def test_a_run_at_a_station_has_the_stations_stiffness_turned_into_its_feed_frame():
     found = row(batch())
-    assert (found.position, found.method, found.kx_n_um) == ("1", "as tabulated", 2.0)
+    assert (found.position, found.method, found.kxx_n_um) == ("1", "as tabulated", 2.0)
     ratio, _ = ratios(tool(math.radians(40)), LAW, SLOT, TITANIUM, np.diag([40e6, 2e6]))
     assert found.fixed_point_ratio == pytest.approx(ratio, rel=1e-9)
 
@@ -257,7 +257,7 @@ def test_a_run_elsewhere_is_at_the_middle_of_its_work():
     found = row(batch(pose=""))
     assert found.position == ""
     assert (found.x_mm, found.y_mm, found.z_mm) == pytest.approx((0.0, 0.0, -100.0))
-    assert 2.0 < found.kx_n_um < 3.0
+    assert 2.0 < found.kxx_n_um < 3.0
     assert found.leave_one_out_x_percent > 0.0
 
 
@@ -265,6 +265,34 @@ def test_a_work_that_is_turned_meets_another_axis_of_the_machine():
     frame = {"xyz_mm": [0, 0, 0], "rpy_deg": [90, 0, 0]}  # work y along base z
     ratio, _ = ratios(tool(math.radians(40)), LAW, SLOT, TITANIUM, np.diag([9e6, 2e6]))
     assert row(batch(work_in_base=frame)).fixed_point_ratio == pytest.approx(ratio, rel=1e-9)
+
+
+def test_stiffness_across_the_axes_is_that_of_a_machine_seen_from_a_turned_work():
+    c, s = math.cos(math.radians(20)), math.sin(math.radians(20))
+    seen = (2.0 * c**2 + 40.0 * s**2, 38.0 * s * c, 2.0 * s**2 + 40.0 * c**2)
+    across = STATIONS.assign(**dict(zip(("kx_n_um", "kxy_n_um", "ky_n_um"), seen, strict=True)), kz_n_um=9.0)
+    upright = STATIONS.assign(kx_n_um=2.0, ky_n_um=40.0, kz_n_um=9.0)
+    found = row(batch(), across)
+    turned_work = row(batch(work_in_base={"xyz_mm": [0, 0, 0], "rpy_deg": [0, 0, 20]}), upright)
+    names = ["plane_xx_n_um", "plane_xy_n_um", "plane_yx_n_um", "plane_yy_n_um"]
+    assert list(found[names]) == pytest.approx([seen[0], seen[1], seen[1], seen[2]])
+    for quantity in (*names, "fixed_point_ratio", "difference_n", "entry_difference_n"):
+        assert found[quantity] == pytest.approx(turned_work[quantity], rel=1e-6)
+
+
+def test_one_of_a_pair_across_counts_for_both_and_two_of_them_each_for_itself():
+    one, both = (
+        row(batch(), STATIONS.assign(kxy_n_um=3.0)),
+        row(batch(), STATIONS.assign(kxy_n_um=3.0, kyx_n_um=1.0)),
+    )
+    assert (one.plane_xy_n_um, one.plane_yx_n_um) == pytest.approx((3.0, 3.0))
+    assert (both.plane_xy_n_um, both.plane_yx_n_um) == pytest.approx((3.0, 1.0))
+
+
+def test_the_deflection_is_the_force_over_the_whole_matrix():
+    stiffness = np.array([[2e7, -5e6], [3e6, 4e7]])
+    found = yielding_force(tool(math.radians(40)), LAW, SLOT, TITANIUM, stiffness)
+    np.testing.assert_allclose(found.deflection @ stiffness.T, found.force[:, :2], atol=0.01)
 
 
 def test_a_helical_run_counts_with_the_worst_of_its_directions():

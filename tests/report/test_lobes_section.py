@@ -111,9 +111,38 @@ def test_several_positions_are_compared():
     both = pd.concat([tables["lobes_final"], tables["lobes_final"].assign(position="2")])
     made = replace(synthetic.results(), tables={**tables, "lobes_final": both, "lobe_stations": STATIONS})
     items = lobes.boundaries(made)
-    assert isinstance(items[-2], Picture)
-    assert items[-1].rows[0] == ["1", "0", "0", "0", "1.00", "1.20", "18.2"]
-    assert items[-1].rows[1][-1] == "–"
+    chart, limits, stations = items[-3:]
+    assert isinstance(chart, Picture)
+    assert limits.rows[0][0] == "1000"
+    assert limits.rows[0][1] == limits.rows[0][2]
+    assert limits.rows[0][3] == "1.0"
+    assert stations.rows == [["1", "0", "0", "0", "1.00", "1.20", "18.2"]]
+    assert "Position 2: too far" in stations.caption
+
+
+def test_limits_are_at_the_speeds_of_the_runs_with_the_best_and_the_worst_position():
+    tables = synthetic.tables()
+    own = tables["lobes_final"]
+    deeper = own.assign(position="2", depth_mm=own["depth_mm"] * np.where(own["rpm"] < 2500, 1.5, 0.25))
+    made = synthetic.results()
+    made = replace(made, tables={**tables, "lobes_final": pd.concat([own, deeper])})
+    [limits] = [
+        item
+        for item in lobes.boundaries(made)
+        if isinstance(item, Table) and "by speed and position" in item.caption
+    ]
+    ratios = {float(row[0]): row[3:] for row in limits.rows}
+    assert set(np.sign(np.array(list(ratios)) - 2500)) == {-1, 1}
+    assert all(said == (["1.5", "2 / 1"] if rpm < 2500 else ["4.0", "1 / 2"]) for rpm, said in ratios.items())
+    assert "times the least" in limits.caption
+
+
+def test_the_course_of_the_governing_mode_over_the_speed_is_said_of_each_position():
+    one = synthetic.methods()
+    falling = one.assign(position="2", governing_mode=np.where(one["rpm"] < 2500, "x4", "x2"))
+    rising = one.assign(governing_mode=np.where(one["rpm"] < 2500, "x2", "y4"))
+    words = lobes._governing_words(pd.concat([rising, falling]))
+    assert "its number rises with the speed at position 1 and it falls again at position 2" in words
 
 
 def test_without_a_boundary_there_is_nothing():

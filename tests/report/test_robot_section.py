@@ -255,21 +255,59 @@ def test_courses_hold_the_dynamometers_level_over_the_steady_cut():
     assert to_svg(figure)
 
 
-def test_stations_are_tabulated_with_what_the_others_make_of_them():
+def end_tables():
     told = pd.DataFrame({"position": ["1", "2"], "x_mm": [0.0, 100.0], "y_mm": 0.0, "z_mm": [0.0, -300.0]})
     told = told.assign(method="linear polynomial")
     x, z = (g.ravel() for g in np.meshgrid([0.0, 50.0, 100.0], [-300.0, -150.0, 0.0]))
-    surface = pd.DataFrame({"first": "x", "second": "z", "x_mm": x, "y_mm": 0.0, "z_mm": z})
+    surface = pd.DataFrame({"first": "x", "second": "z", "third": "y", "x_mm": x, "y_mm": 0.0, "z_mm": z})
+    surface = surface.assign(level_mm=0.0, sd_percent=1.0 + 1e-2 * x)
+    region = {"softest_n_um": 0.9, "x_mm": 0.0, "y_mm": 0.0, "z_mm": -60.0, "stiffest": "y"}
+    region |= {"stiffest_count": 2, "stations": 2, "ratio_low": 3.3, "ratio_high": 3.4}
     for a in "xyz":
         told[f"k{a}_n_um"], told[f"error_{a}_percent"] = [1.0, 0.8], [3.0, -4.0]
-        told[f"rms_{a}_percent"], told[f"rms_{a}_low_percent"], told[f"rms_{a}_high_percent"] = 3.5, 2.0, 9.0
         surface[f"k{a}_n_um"] = 1 + 1e-3 * x
-    items = content(end_stations=told, end_surface=surface)
+        region |= {f"{a}_low_mm": -50.0, f"{a}_high_mm": 50.0}
+        region |= {f"inner_k{a}_n_um": 1.0, f"outer_k{a}_n_um": 0.8}
+    errors = pd.DataFrame({"entry": ["kx", "kxy"], "least_n_um": [0.8, -0.1], "greatest_n_um": [1.0, 0.2]})
+    errors = errors.assign(rms_percent=3.5, rms_low_percent=2.0, rms_high_percent=9.0, within_percent=95.0)
+    errors = errors.assign(kriging_rms_percent=3.0, kriging_sd_percent=3.2)
+    return {
+        "end_stations": told, "end_surface": surface, "end_errors": errors,
+        "end_region": pd.DataFrame([region]),
+    }  # fmt: skip
+
+
+def test_stations_are_tabulated_with_what_the_others_make_of_them():
+    items = content(**end_tables())
     table = table_with(items, "End stiffness at the stations")
     assert table.rows[1] == ["2", "100", "0", "−300", *3 * ["0.800"], *3 * ["−4.00"]]
-    assert "x 3.5 % (2.0 … 9.0)" in table.caption
-    [figure] = [item.figure for item in items if isinstance(item, Picture) and len(item.figure.axes) == 6]
-    assert figure.axes[0].get_lines()[0].get_xydata().tolist() == [[0.0, 0.0], [100.0, -300.0]]
+    errors = table_with(items, "leave-one-out error")
+    assert errors.rows[1] == ["kxy", "−0.100 … 0.200", "3.5 (2.0 … 9.0)", "3.0", "3.2", "95"]
+    [figure] = [item.figure for item in items if isinstance(item, Picture)]
+    assert figure.axes[0].get_lines()[0].get_xdata().tolist() == [0.0, 100.0]
+    assert to_svg(figure)
+
+
+def test_the_best_region_the_fall_to_the_border_and_the_dominating_direction_are_said():
+    items = content(**end_tables())
+    said = " ".join(text for item in items if isinstance(item, Bullets) for text in item.items)
+    assert "k x 1.00 to 0.800 N/µm (−20 %)" in said
+    assert "k y is the largest at 2 of 2 stations, 3.3 to 3.4 times" in said
+    [picture] = [item for item in items if isinstance(item, Picture)]
+    assert picture.caption.startswith("The softest direction is stiffest at (0, 0, −60) mm, 0.900 N/µm")
+
+
+def test_of_many_stations_those_that_the_batch_names_are_tabulated():
+    tables = end_tables()
+    first = tables["end_stations"]
+    tables["end_stations"] = pd.concat(
+        [first, *(first.iloc[[1]].assign(position=f"s{i}") for i in range(20))], ignore_index=True
+    )
+    made = replace(results(**tables), identified={"modes": [{"position": 1}]})
+    section = robot(made)
+    assert section is not None
+    table = table_with(section.items, "stations that the batch names")
+    assert [row[0] for row in table.rows] == ["1"]
 
 
 def frictions():

@@ -124,3 +124,35 @@ def test_each_stations_own_error_is_signed():
     errors = left_out(stations)
     np.testing.assert_allclose(errors[3], 1 / 1.2 - 1, rtol=1e-9)
     np.testing.assert_allclose(np.sqrt((errors**2).mean(axis=0)), leave_one_out(stations))
+
+
+def leaning(places, turn=0.0):
+    """Matrices (n, 3, 3) whose principal stiffnesses change exponentially, axes turned about y."""
+    c, s = np.cos(turn), np.sin(turn)
+    axes = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    return axes @ (exponential(places)[..., None] * np.eye(3)) @ axes.T
+
+
+def test_without_stiffness_across_a_matrix_is_interpolated_as_its_diagonal():
+    places = grid(3)
+    diagonal = domed(places)
+    scalar, matrix = Stations(places, diagonal), Stations(places, diagonal[:, :, None] * np.eye(3))
+    place = np.array([0.13, 0.22, 0.05])
+    np.testing.assert_allclose(
+        stiffness_at(matrix, place).value, np.diag(stiffness_at(scalar, place).value), rtol=1e-9, atol=1e-3
+    )
+    np.testing.assert_allclose(
+        np.diagonal(left_out(matrix), axis1=1, axis2=2), left_out(scalar), rtol=1e-6, atol=1e-9
+    )
+
+
+def test_a_machine_in_another_frame_has_the_turned_matrix_between_its_stations_too():
+    place = np.array([-0.1, 0.03, -0.2])
+    found = stiffness_at(Stations(PLACES, leaning(PLACES, 0.3)), place)
+    np.testing.assert_allclose(found.value, leaning(place, 0.3), rtol=1e-9, atol=1e-2)
+
+
+def test_unlike_stiffness_across_stays_unlike():
+    follower = np.array([[2.0, 0.3, 0.0], [0.1, 2.0, 0.0], [0.0, 0.0, 5.0]]) * 1e6
+    stations = Stations(PLACES, np.tile(follower, (7, 1, 1)))
+    np.testing.assert_allclose(stiffness_at(stations, PLACES[0]).value, follower, rtol=1e-9, atol=1e-3)

@@ -14,6 +14,7 @@ from virtual_cell.hammer import hit
 from virtual_cell.lobes import stable
 from virtual_cell.milling import in_millimetres
 from virtual_cell.modes import Modes
+from virtual_cell.recipes.trimule_structure import FILES, write_modal_tests, write_stations
 from virtual_cell.session import Plan, Session, cut_all
 from virtual_cell.units import DEG, MM, UM
 from virtual_cell.write import (
@@ -49,19 +50,6 @@ MODES = {
         *(np.array(column) for column in zip(*((f, zeta / 100.0, k) for f, zeta, k in rows), strict=True))
     )
     for direction, rows in _TABLE_6.items()
-}
-# table 5, position: x, y, z (mm). The source draws the end stiffness without numbers, so that of this
-# simulated machine is made up (kx, ky, kz in N/um) after what is said of it: y by far the stiffest, all less
-# towards the border. Along x and z the first position has the static stiffness of the modes above. The cuts
-# of this batch are those of a rigid tool.
-_STATIONS = {
-    "1": ((0, 0, 0), (0.93, 31.0, 9.3)),
-    "2": ((0, 0, -320), (0.84, 27.5, 8.1)),
-    "3": ((0, 200, -320), (0.75, 24.0, 7.2)),
-    "4": ((-200, 0, -320), (0.79, 26.0, 7.7)),
-    "5": ((-400, 0, -320), (0.68, 22.0, 6.6)),
-    "6": ((-200, 0, 50), (0.87, 29.0, 8.7)),
-    "7": ((0, 200, 0), (0.82, 27.0, 8.2)),
 }
 _CHATTER_FEED_MM = 0.02
 _CHATTER_RPM = (1000.0, 1250.0, 1500.0, 1750.0, 2000.0, 2250.0, 2500.0)
@@ -102,12 +90,12 @@ def make(folder: Path) -> Row:
     fresh_folder(folder)
     rows = cut_all(session, PLANS, folder, rng)
     for row in rows:
-        row["pose"] = "4"
+        row["pose"] = ""  # of a rigid tool, between the stations: work_in_base says where
     rows += _chatter_tests(len(rows))
     write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
-    write_csv(folder / "impacts.csv", impacts(folder, rng))
+    write_modal_tests(folder, MODES, np.random.default_rng(2603))
     write_yaml(folder / "cell.yaml", {"cell": "trimule", "stations": "stations.csv"})
-    write_csv(folder / "stations.csv", _stations())
+    write_stations(folder, np.random.default_rng(2604))
     write_yaml(folder / "batch.yaml", _manifest(folder.name))
     return {
         "batch": folder.name,
@@ -159,15 +147,6 @@ def _chatter_tests(before: int) -> list[Row]:
     return rows
 
 
-def _stations() -> list[Row]:
-    """Return simulated end stiffness at the published positions."""
-    columns = ("x_mm", "y_mm", "z_mm", "kx_n_um", "ky_n_um", "kz_n_um")
-    return [
-        {"position": name, **dict(zip(columns, (*place, *stiffness), strict=True))}
-        for name, (place, stiffness) in _STATIONS.items()
-    ]
-
-
 def impacts(folder: Path, rng: np.random.Generator) -> list[Row]:
     """Write five hits on the tip in each direction; return their rows."""
     rows: list[Row] = []
@@ -188,6 +167,7 @@ def _manifest(name: str) -> Row:
         "cell": "trimule",
         "tool": {"diameter_mm": 12, "teeth": 4, "helix_deg": 40, "pitch_deg": [90, 90, 90, 90]},
         "work": {"material": "Ti6Al4V", "size_mm": [120, 80, 12]},
+        "work_in_base": {"xyz_mm": [-260, 0, -340], "rpy_deg": [90, 0, 0]},  # the tool points along base y
         "hole_diameter_mm": HOLE_MM,
         "instruments": {
             "dynamometer": {
@@ -200,4 +180,5 @@ def _manifest(name: str) -> Row:
             },
             "hammer": {"rate_hz": 2048, "window": "none"},
         },
+        "files": FILES,
     }

@@ -102,6 +102,7 @@ IMPACTS = (
     Column("kind", choices=("record", "frf")),
     Column("file", "file", required=True),
     Column("response_unit", choices=("m/s2", "m/s", "m", "g")),
+    *_numbers("distance_mm", "distance_mm"),
 )
 
 LOADS = (
@@ -138,10 +139,13 @@ PUBLISHED = (
     Column("note", longest=5000),
 )
 
+# Force along the first axis over deflection along the second; one of a pair that is blank is as the other.
+CROSS_STIFFNESS = ("kxy_n_um", "kyx_n_um", "kxz_n_um", "kzx_n_um", "kyz_n_um", "kzy_n_um")
 STATIONS = (
     Column("position", required=True),
     *_numbers("place_mm", "x_mm", "y_mm", "z_mm", required=True),
     *_numbers("stiffness_n_um", "kx_n_um", "ky_n_um", "kz_n_um", required=True),
+    *_numbers("cross_stiffness_n_um", *CROSS_STIFFNESS),
 )
 
 # Table → its columns; the first one or two label a row in messages.

@@ -12,6 +12,7 @@ import pandas as pd
 
 from metro import __version__
 from metro.batch.batch import Batch
+from metro.batch.columns import CROSS_STIFFNESS
 from metro.batch.writing import write_atomically
 from metro.units import JSON
 
@@ -51,6 +52,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "imag_m_n",
         "coherence",
     ),
+    "pickups": ("position", "reference", "response", "distance_mm"),
     "loads": (
         "pose",
         "point",
@@ -59,7 +61,10 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "sigma_mm",
     ),
     "mass": ("pose", "point", "x_mm", "y_mm", "z_mm", "mxx", "mxy", "mxz", "myy", "myz", "mzz"),
-    "stations": ("position", "x_mm", "y_mm", "z_mm", "kx_n_um", "ky_n_um", "kz_n_um"),
+    "stations": (
+        *("position", "x_mm", "y_mm", "z_mm", "kx_n_um", "ky_n_um", "kz_n_um"),
+        *CROSS_STIFFNESS,
+    ),
     "published": (
         *("table", "row", "observable", "quantity", "axis", "measured", "predicted", "unit"),
         *("printed_error_percent", "note"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -118,10 +119,22 @@ def published_findings(table: Table) -> Iterator[Finding]:
 
 
 def station_findings(table: Table) -> Iterator[Finding]:
-    """Check that no station is tabulated twice."""
+    """Check that no station is tabulated twice, and that each resists a push in every direction."""
     for position, name in enumerate(table.frame["position"]):
         if name in list(table.frame["position"][:position]):
             yield table.finding(position, "position", f'position "{name}" stands twice')
+    for position, row in table.sound():
+        size = np.array([row[f"k{axis}_n_um"] for axis in "xyz"], dtype=float)
+        across = {(a, b): row[f"k{a}{b}_n_um"] for a, b in itertools.permutations("xyz", 2)}
+        push = np.diag(size)
+        for (a, b), value in across.items():
+            mirrored = across[b, a] if math.isnan(value) else value
+            push["xyz".index(a), "xyz".index(b)] = 0.0 if math.isnan(mirrored) else mirrored
+        if np.linalg.eigvalsh(0.5 * (push + push.T))[0] <= 0:
+            fault = "the stiffness across is so large that the end gives way against a push"
+            expected = f"expected a positive definite matrix with {', '.join(f'{k:g}' for k in size)} N/µm"
+            first = next(f"k{a}{b}_n_um" for (a, b), value in across.items() if not math.isnan(value))
+            yield table.finding(position, first, f"{fault}, {expected} on its diagonal: check signs and unit")
 
 
 def _twice(table: Table, columns: tuple[str, ...]) -> Iterator[Finding]:

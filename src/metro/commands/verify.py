@@ -171,7 +171,8 @@ def _same_stations(now: Path, was: Path) -> bool:
     if not (now.is_file() and was.is_file()):
         return False
     frames = [read_table(now.parent, "stations", now.stem)[0].frame, pd.read_parquet(was)]
-    first, second = (frame[list(COLUMNS["stations"])].astype(str).to_numpy().tolist() for frame in frames)
+    columns = list(COLUMNS["stations"])
+    first, second = (frame.reindex(columns=columns).astype(str).to_numpy().tolist() for frame in frames)
     return bool(first == second)
 
 

@@ -184,9 +184,16 @@ def _tables(loaded: Loaded, recordings: Recordings) -> Iterator[tuple[str, Itera
     yield "profile", parts.profile(batch, recordings)
     yield "hit", parts.hit(batch, loaded.impacts, recordings)
     yield "frf", parts.frf(loaded.impacts, recordings)
+    yield "pickups", _whole(_pickups(loaded.impacts))
     for name in ("loads", "mass", "stations", "published"):
         yield name, _whole(getattr(loaded, name))
     yield "qc", _whole(pd.DataFrame(recordings.findings, columns=COLUMNS["qc"]))
+
+
+def _pickups(impacts: pd.DataFrame) -> pd.DataFrame:
+    """Return how far from the blow each response was measured, where impacts.csv says so."""
+    known = impacts[impacts["distance_mm"].notna()]
+    return known[list(COLUMNS["pickups"])].drop_duplicates(["position", "reference", "response"])
 
 
 def _named_files(loaded: Loaded) -> dict[str, list[str]]:

@@ -8,7 +8,7 @@ the density that they were drawn from (adaptive multiple importance sampling, Co
 
 The boundary is solved at some of the points: first all over the prior, then where the tests leave them. At
 the others it is a quick estimate, corrected by what was learnt where it was solved
-(:mod:`metro.loop.labels.kriging`); how unsure that correction is counts as uncertainty of the boundary.
+(:mod:`metro.kriging`); how unsure that correction is counts as uncertainty of the boundary.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, by_name
+from metro.kriging import krige
 from metro.loop.labels.evidence import Labels, log_evidence, log_likelihood, posterior
-from metro.loop.labels.kriging import krige
 from metro.units import JSON, Array
 
 _MOST, _MOST_EACH = 256, 64  # points of a set, and of each parameter

@@ -12,6 +12,7 @@ from metro.batch.batch import Batch
 from metro.cutting.cutter import Cutter
 from metro.cutting.force import COEFFICIENTS, Cut
 from metro.cutting.law import EdgeLaw
+from metro.observables.arm.station_table import entries, stations_of
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.force.orders import recorded
 from metro.observables.force.yielding import ANGLES, NotConvergedError, ratios, yielding_force
@@ -21,6 +22,7 @@ from metro.robot.stations import EndStiffness, Stations, leave_one_out, stiffnes
 from metro.units import DEG, JSON, MM, N_UM, Array
 
 AXES = ("x", "y", "z")
+PLANE = ("plane_xx_n_um", "plane_xy_n_um", "plane_yx_n_um", "plane_yy_n_um")
 HELIX_DIRECTIONS_DEG = (
     0.0,
     45.0,
@@ -35,14 +37,16 @@ def yielding_table(batch: Batch, read: Read, identified: JSON) -> pd.DataFrame |
     """Solve the deflection feedback of every run with a dynamometer record, else of every run.
 
     A run is cut at the station that its ``pose`` names; if it names none, at the middle of the work's face,
-    which ``work_in_base`` places. The stiffness acts along the base frame's axes; the tip yields in the plane
-    of cutting to the force of the peripheral edges. Helical runs are slots in four directions of feed; the
-    one with the largest difference after entry is used.
+    which ``work_in_base`` places. The stiffness, with that across the axes where it is tabulated, is of the
+    base frame; the tip yields in the plane of cutting to the force of the peripheral edges ([T] eq. 10).
+    Helical runs are slots in four directions of feed; the one with the largest difference after entry is
+    used.
 
     Returns
     -------
-    A row per run: ``position`` (the station, blank between stations), x_mm … z_mm, kx_n_um … kz_n_um,
-    ``method``, the leave-one-out error of interpolation per axis, the ratios of
+    A row per run: ``position`` (the station, blank between stations), x_mm … z_mm, kxx_n_um … kzz_n_um
+    (base frame), ``method``, the leave-one-out error of interpolation per axis, plane_xx_n_um … plane_yy_n_um
+    (stiffness of a tip that is free along the spindle, work frame), the ratios of
     :func:`metro.observables.force.yielding.ratios`, ``iterations_newton``, ``iterations_fixed_point``
     ("diverges" where it does), the largest difference to the rigid tool's force in the first and in the last
     of the revolutions, in N and in % of the largest rigid force, and ``refused``: the reason if a row has no
@@ -57,27 +61,23 @@ def yielding_table(batch: Batch, read: Read, identified: JSON) -> pd.DataFrame |
     if isinstance(values, Refusal):
         return values
     si = np.array([values[name] for name in COEFFICIENTS]) * cutting_force.TO_SI
-    stations = Stations(
-        table[[f"{axis}_mm" for axis in AXES]].to_numpy(float) * MM,
-        table[[f"k{axis}_n_um" for axis in AXES]].to_numpy(float) * N_UM,
-    )
+    stations = stations_of(table)
     names = tuple(str(name) for name in table["position"])
-    error = {
-        f"leave_one_out_{a}_percent": 100.0 * e for a, e in zip(AXES, leave_one_out(stations), strict=True)
-    }
+    errors = np.diagonal(leave_one_out(stations))
+    error = {f"leave_one_out_{a}_percent": 100.0 * e for a, e in zip(AXES, errors, strict=True)}
     rows = []
     for run in recorded(batch) or [str(run) for run in batch.runs.index]:
         try:
-            row = _end_stiffness(batch, run, stations, names)
-            row |= _worst(batch, run, tool, si, np.array([row[f"k{axis}_n_um"] for axis in AXES]) * N_UM)
+            row, stiffness = _end_stiffness(batch, run, stations, names)
+            row |= _worst(batch, run, tool, si, stiffness)
         except (ValueError, NotConvergedError) as refusal:
             row = {"run": run, "refused": str(refusal)}
         rows.append(row | error)
     return pd.DataFrame(rows)
 
 
-def _end_stiffness(batch: Batch, run: str, stations: Stations, names: tuple[str, ...]) -> JSON:
-    """Position of a run, and the machine's stiffness there: the first columns of its row."""
+def _end_stiffness(batch: Batch, run: str, stations: Stations, names: tuple[str, ...]) -> tuple[JSON, Array]:
+    """First columns of a run's row: its position and the machine's stiffness there, (3, 3) N/m as well."""
     pose = str(batch.runs.loc[run, "pose"])
     if pose in names:
         position, place = pose, stations.place[names.index(pose)]
@@ -89,7 +89,7 @@ def _end_stiffness(batch: Batch, run: str, stations: Stations, names: tuple[str,
         end = stiffness_at(stations, place)
     row: JSON = {"run": run, "position": position, "method": end.method, "refused": ""}
     row |= {f"{axis}_mm": x / MM for axis, x in zip(AXES, place, strict=True)}
-    return row | {f"k{axis}_n_um": k / N_UM for axis, k in zip(AXES, end.value, strict=True)}
+    return row | entries(end.value), end.value
 
 
 def _base_from_work(batch: Batch) -> Array:
@@ -97,12 +97,14 @@ def _base_from_work(batch: Batch) -> Array:
 
 
 def _worst(batch: Batch, run: str, tool: Cutter, coefficients: Array, stiffness: Array) -> JSON:
-    """Solve one run in its directions of feed; ``stiffness`` (3,) N/m along the axes of the base."""
+    """Solve one run in its directions of feed; ``stiffness`` (3, 3) N/m, base frame."""
     turn, cut = _base_from_work(batch), cutting_force.cut(batch, run, tool.radius)
-    compliance = turn.T @ np.diag(1.0 / stiffness) @ turn
+    compliance = turn.T @ np.linalg.inv(stiffness) @ turn
+    plane = _in_plane(compliance, 0.0) / N_UM
     springs = [_in_plane(compliance, angle) for angle in _directions(batch.runs.loc[run])]
     rows = [_feedback(tool, cut, coefficients, spring) for spring in springs]
-    return max(rows, key=lambda row: float(row["difference_n"]))
+    worst = max(rows, key=lambda row: float(row["difference_n"]))
+    return worst | dict(zip(PLANE, plane.ravel().tolist(), strict=True))
 
 
 def _directions(row: Any) -> list[float]:

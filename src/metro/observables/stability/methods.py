@@ -39,27 +39,28 @@ _PER_CYCLE = 30  # steps of semi-discretisation per cycle of the fastest mode; t
 _LEAST_STEPS = 24  # per passage of a tooth
 
 
-def methods(lobes: Lobes, tool: Cutter, feed_per_tooth: float) -> pd.DataFrame:
+def methods(lobes: Lobes, tool: Cutter, feed_per_tooth: float, *, check: bool = True) -> pd.DataFrame:
     """Depths by each method, the lowest over the directions of feed.
 
     ``single_mode_mm``: the lowest of all modes solved alone, exactly; ``governing_mode``: that mode. At the
-    speeds that are ``checked``, ``cdsem_mm``: that depth by the published method; ``semidiscretisation_mm``:
-    all modes together, in the direction with the lowest depth by the default method; ``tool_mm``: likewise
-    with the tool's helix, pitch and declared runout. The last two are extrapolated from two step sizes. They
-    are NaN if there is no boundary near that of the default method.
+    speeds that are ``checked`` (none without ``check``), ``cdsem_mm``: that depth by the published method;
+    ``semidiscretisation_mm``: all modes together, in the direction with the lowest depth by the default
+    method; ``tool_mm``: likewise with the tool's helix, pitch and declared runout. The last two are
+    extrapolated from two step sizes. They are NaN if there is no boundary near that of the default method.
     """
     finite = np.flatnonzero(np.isfinite(lobes.boundary.depth))
     rpm, depth = lobes.boundary.rpm[finite], lobes.boundary.depth[finite]
     structure = lobes.tip.structure
     exact = np.stack([cdsem.single_mode_depths(structure, cut, rpm) for cut in lobes.cuts])
     alone = exact.min(axis=0)
-    checked = np.arange(len(rpm)) % EVERY == 0
+    checked = (np.arange(len(rpm)) % EVERY == 0) & check
     slow = np.full((3, len(rpm)), np.nan)
-    published = [
-        cdsem.cdsem_depths(structure, cut, rpm[checked], one[:, checked])
-        for cut, one in zip(lobes.cuts, exact, strict=True)
-    ]
-    slow[0, checked] = np.min(published, axis=(0, 1))
+    if checked.any():
+        published = [
+            cdsem.cdsem_depths(structure, cut, rpm[checked], one[:, checked])
+            for cut, one in zip(lobes.cuts, exact, strict=True)
+        ]
+        slow[0, checked] = np.min(published, axis=(0, 1))
     for i, (cut, turn) in enumerate(zip(lobes.cuts, lobes.turns, strict=True)):
         here = checked & (lobes.which[finite] == i)
         if here.any():

@@ -12,6 +12,7 @@ import pandas as pd
 from metro.dynamics.modal import ModalModel, identify_modes
 from metro.dynamics.modes import Mode
 from metro.dynamics.shapes import mac
+from metro.observables.stability.pickups import crossed
 from metro.observables.stability.receptance import Receptance, arranged, from_files, from_records, scatter
 from metro.units import JSON, N_UM, Array, ComplexArray
 
@@ -36,6 +37,7 @@ class ModalTest:
     stabilisation : the poles of every model order, their cluster, and whether it recurs.
     shapes : each mode's residue at each pair, 1 at the driving point.
     alike : the modal assurance criterion of every two modes.
+    cross : the responses across the blow, beside those along it.
     notes : results that could not be identified, with the reasons.
     """
 
@@ -44,6 +46,7 @@ class ModalTest:
     stabilisation: pd.DataFrame
     shapes: pd.DataFrame
     alike: pd.DataFrame
+    cross: pd.DataFrame
     notes: list[str]
 
 
@@ -76,12 +79,14 @@ def observe_modes(read: Read, hammer: JSON) -> ModalTest:
         alike.append(_alike_rows(position, direction, model))
         notes += [f"{name}: {note}" for note in _doubts(model)]
     columns = (*MODE_COLUMNS, *_MORE_COLUMNS)
+    fitted = _joined(used, ())
     return ModalTest(
         modes=_joined(modes, columns),
-        used=_joined(used, ()),
+        used=fitted,
         stabilisation=_joined(diagrams, ()),
         shapes=_joined(shapes, ()),
         alike=_joined(alike, ()),
+        cross=crossed(measured, fitted),
         notes=notes,
     )
 
@@ -273,6 +278,13 @@ def _alike_rows(position: str, direction: str, model: ModalModel) -> pd.DataFram
     return pd.DataFrame({**columns, "mac": mac(shapes, shapes).ravel()})
 
 
+def _noise(item: Receptance, keep: np.ndarray) -> float:
+    """Scatter of a receptance's repeats, rms over rms; NaN without repeats."""
+    if item.variance is None:
+        return math.nan
+    return float(np.sqrt(np.mean(item.variance[keep]) / np.mean(np.abs(item.frf[keep]) ** 2)))
+
+
 def _used_rows(group: list[Receptance], model: ModalModel, keep: np.ndarray) -> pd.DataFrame:
     parts = []
     for column, item in enumerate(group):
@@ -288,6 +300,7 @@ def _used_rows(group: list[Receptance], model: ModalModel, keep: np.ndarray) -> 
             "modal_real_m_n": modal.real,
             "modal_imag_m_n": modal.imag,
             "error": model.error[column],
+            "noise": _noise(item, keep),
         }
         parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)

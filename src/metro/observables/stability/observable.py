@@ -21,8 +21,10 @@ from metro.observables.stability import methods as lobe_methods
 from metro.observables.stability import positions as lobe_positions
 from metro.observables.stability.cases import cases_of
 from metro.observables.stability.modal_test import observe_modes
+from metro.observables.stability.pickups import pickups
 from metro.observables.stability.positions import Tip
 from metro.observables.stability.problem import LabelProblem
+from metro.observables.stability.tracks import track
 from metro.units import JSON, MM, Array
 
 _PRINTED = "modes as printed, without intervals: the bands hold the uncertainty of the coefficients alone"
@@ -45,11 +47,11 @@ _COLUMNS: dict[str, tuple[str, ...]] = {
 def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Identify the modes of every position and solve the lobes of the cuts that were made there.
 
-    Tables ``modes``, ``mode_shapes``, ``mode_mac``, ``frf_used``, ``stabilisation``, ``lobes`` (diagram per
-    position), ``lobe_runs`` (probability per run with a depth), ``chatter_runs`` (what the runs' own records
-    say), ``chatter_records`` (a record of each kind), those of :mod:`metro.observables.stability.methods`,
-    ``lobes_refused`` (reasons and notes). Without modes: what the records say of chatter, and why there are
-    no lobes.
+    Tables ``modes``, ``mode_tracks``, ``mode_shapes``, ``mode_mac``, ``mode_pickups``, ``mode_cross``,
+    ``frf_used``, ``stabilisation``, ``lobes`` (diagram per position), ``lobe_runs`` (probability per run with
+    a depth), ``chatter_runs`` (what the runs' own records say), ``chatter_records`` (a record of each kind),
+    those of :mod:`metro.observables.stability.methods`, ``lobes_refused`` (reasons and notes). Without modes:
+    what the records say of chatter, and why there are no lobes.
     """
     test = observe_modes(read, batch.instrument("hammer"))
     modes, notes = test.modes, test.notes
@@ -61,8 +63,10 @@ def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFr
     if modes.empty:
         return _heard(batch, read, "; ".join(notes) or "no impacts.csv: no hammer record and no FRF")
     cutting = stability.cutting(batch, identified)
-    tips = lobe_positions.tips(modes, notes)
     where = lobe_positions.places(read("stations"))
+    tracks = track(modes, test.shapes, where) if len(test.shapes) else pd.DataFrame()
+    modes = modes.assign(mode=tracks["mode"]) if len(tracks) else modes
+    tips = lobe_positions.tips(modes, notes)
     chatter = chatter_runs.observe_chatter(batch, read, modes)
     records = chatter_runs.observe_records(batch, read, chatter)
     parts: dict[str, list[pd.DataFrame]] = {}
@@ -70,14 +74,15 @@ def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFr
         notes += stability.assumptions(batch)
         pairs = lobe_positions.pairs(batch, tips, where, notes)
         measured = chatter_runs.measured(chatter)
-        parts = _solved(batch, cutting, pairs, where=where, measured=measured, notes=notes)
+        parts = _solved(batch, cutting, pairs, tips=tips, where=where, measured=measured, notes=notes)
     tables = {name: _joined(parts.get(name, []), columns) for name, columns in _COLUMNS.items()}
     reason = "no run with a depth of cut at a position whose modes are known" if tables["lobes"].empty else ""
     reason = cutting.reason if isinstance(cutting, Refusal) else reason
     said = [("refusal", reason)] if reason else []
     refused = pd.DataFrame([*said, *(("note", n) for n in notes)], columns=["kind", "reason"], dtype=str)
     modal = {"modes": modes, "frf_used": test.used, "stabilisation": test.stabilisation}
-    modal |= {"mode_shapes": test.shapes, "mode_mac": test.alike}
+    modal |= {"mode_shapes": test.shapes, "mode_mac": test.alike, "mode_cross": test.cross}
+    modal |= {"mode_tracks": tracks, "mode_pickups": pickups(test.used, read("pickups"))}
     return {
         **modal,
         **tables,
@@ -110,11 +115,15 @@ def _solved(
     cutting: stability.Cutting,
     pairs: list[tuple[pd.DataFrame, Tip]],
     *,
+    tips: list[Tip],
     where: Mapping[str, Array],
     measured: pd.DataFrame,
     notes: list[str],
 ) -> dict[str, list[pd.DataFrame]]:
-    """Tables of lobes, as parts to be joined: one boundary per position, of the cut that most runs share."""
+    """Tables of lobes, as parts to be joined: one boundary per position, of the cut that most runs share.
+
+    A position without runs has that of the cut that most runs of the batch share, at their speeds.
+    """
     parts: dict[str, list[pd.DataFrame]] = {name: [] for name in _COLUMNS}
     solved = []
     for rows, tip in pairs:
@@ -131,9 +140,35 @@ def _solved(
                 parts["lobe_methods"].append(lobe_methods.methods(lobes, cutting.tool, feed))
                 notes += lobe_methods.left_out(parts["lobe_methods"][-1], cutting.tool)
                 parts["lobe_islands"].append(lobe_methods.islands(lobes, deepest))
+    solved += _elsewhere(cutting, pairs, _others(tips, pairs), parts)
     parts["lobe_stations"].append(lobe_methods.stations(solved, where))
     notes += stability.worth(solved)
     return parts
+
+
+def _others(tips: list[Tip], pairs: list[tuple[pd.DataFrame, Tip]]) -> list[Tip]:
+    """Return the structures that no run belongs to."""
+    return [tip for tip in tips if not any(tip is own for _, own in pairs)]
+
+
+def _elsewhere(
+    cutting: stability.Cutting,
+    pairs: list[tuple[pd.DataFrame, Tip]],
+    tips: list[Tip],
+    parts: dict[str, list[pd.DataFrame]],
+) -> list[stability.Lobes]:
+    """Solve the lobes of positions without runs; the slower methods are not repeated there."""
+    cuts = [same for rows, _ in pairs for same in stability.same_cut(rows)]
+    if not cuts:
+        return []
+    most = max(cuts, key=len)
+    rpm, feed = stability.speeds_of(most, whole=True), float(most["feed_per_tooth_mm"].iloc[0]) * MM
+    solved = [stability.solve(tip, cutting, most.iloc[0], rpm, check=False) for tip in tips]
+    solved = [lobes for lobes in solved if np.any(np.isfinite(lobes.boundary.depth))]
+    for lobes in solved:
+        parts["lobes"].append(stability.diagram(lobes))
+        parts["lobe_methods"].append(lobe_methods.methods(lobes, cutting.tool, feed, check=False))
+    return solved
 
 
 def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON) -> LabelProblem | Refusal:
@@ -191,6 +226,7 @@ def report(
         {
             "position": _number(row["position"]),
             "direction": row["direction"],
+            **({"mode": row["mode"]} if "mode" in row else {}),
             "frequency": quantity(row["frequency_hz"], row["frequency_sd_hz"], "Hz"),
             "damping": quantity(row["damping"], row["damping_sd"], "1"),
             "stiffness": quantity(row["stiffness_n_m"], row["stiffness_sd"], "N/m"),

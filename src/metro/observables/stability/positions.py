@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.capabilities import plural
 from metro.dynamics.system import Structure
 from metro.robot.stations import Stations, leave_one_out, stiffness_at
 from metro.units import MM, Array
@@ -22,7 +23,7 @@ class Tip:
     ----------
     position : its name; the part before "/" is the pose.
     structure : modes in x and in y (or z in its place).
-    names : (m,) direction and number of each mode, "x1".
+    names : (m,) direction and number of each mode, "x1": the same mode has the same name at every position.
     sd : (3 m,) standard deviations of the logarithms of omega, zeta, stiffness.
     interpolated : whether the modes are those of other positions, interpolated.
     """
@@ -41,26 +42,31 @@ class Tip:
 
 def tips(modes: pd.DataFrame, notes: list[str]) -> list[Tip]:
     """Structures of the positions: x and y of the tool; with modes in x and z alone, z replaces y."""
-    tips = []
+    found: list[Tip] = []
+    said: dict[str, list[str]] = {}
     for position, rows in modes[modes["used"].astype(bool)].groupby("position", sort=False):
         letters = [str(d).lstrip("+-") for d in rows["direction"]]
         second = "y" if "y" in letters or "z" not in letters else "z"
-        if second == "z":
-            notes.append(
-                f"position {position}: modes in x and z: z is taken as the second direction of cutting"
-            )
-        notes += [
-            f"position {position}: no modes in {d}: rigid there" for d in ("x", second) if d not in letters
-        ]
+        doubts = ["modes in x and z: z is taken as the second direction of cutting"] if second == "z" else []
+        doubts += [f"no modes in {d}: rigid there" for d in ("x", second) if d not in letters]
+        for doubt in doubts:
+            said.setdefault(doubt, []).append(str(position))
         inside = np.isin(letters, ["x", second])
         if inside.any():
-            tips.append(_tip(str(position), rows[inside], np.array(letters)[inside]))
-    return tips
+            found.append(_tip(str(position), rows[inside], np.array(letters)[inside]))
+    for doubt, positions in said.items():
+        notes.append(f"position{'s' * (len(positions) > 1)} {', '.join(positions)}: {doubt}")
+    return found
 
 
 def _tip(position: str, rows: pd.DataFrame, letters: np.ndarray) -> Tip:
-    """Structure of the modes ``rows``, direction by direction, each by rising frequency."""
-    order = np.lexsort((rows["frequency_hz"], letters))
+    """Structure of the modes ``rows``, direction by direction, each by its number.
+
+    The number is that of the mode over all positions, where it was followed; else by rising frequency.
+    """
+    followed = "mode" in rows
+    rank = rows["mode"].str.extract(r"(\d+)$")[0].astype(int) if followed else rows["frequency_hz"]
+    order = np.lexsort((rank, letters))
     rows, letters = rows.iloc[order], letters[order]
     omega = 2 * np.pi * rows["frequency_hz"].to_numpy(float)
     axis = np.where(letters == "x", 0, 1)
@@ -71,7 +77,8 @@ def _tip(position: str, rows: pd.DataFrame, letters: np.ndarray) -> Tip:
         ("stiffness_sd", "stiffness_n_m"),
     )
     relative = [rows[sd].to_numpy(float) / rows[value].to_numpy(float) for sd, value in pairs]
-    names = tuple(f"{d}{1 + int(np.sum(letters[:i] == d))}" for i, d in enumerate(letters))
+    counted = [f"{d}{1 + int(np.sum(letters[:i] == d))}" for i, d in enumerate(letters)]
+    names = tuple(rows["mode"].astype(str)) if followed else tuple(counted)
     return Tip(position, structure, names, np.concatenate(relative))
 
 
@@ -84,7 +91,7 @@ def places(stations: pd.DataFrame) -> dict[str, Array]:
 def from_others(position: str, others: Sequence[Tip], where: Mapping[str, Array]) -> Tip | None:
     """Interpolate the modes at station ``position``; None if that is not possible.
 
-    Modes are matched by their number in each direction, so at least two stations must have equally many.
+    Modes are matched by their names, so at least two stations must have the same modes.
     The logarithms of their frequencies, damping ratios and stiffnesses vary like the end stiffness of a
     tabulated machine. The leave-one-out error of each adds to its standard deviation.
     """
@@ -128,5 +135,8 @@ def pairs(
     lost = [pose for pose in poses if pose not in known | {tip.pose for tip in between}]
     if lost and tips:
         notes.append(f"no modes at pose {', '.join(lost)}, and none to interpolate between: left out")
+    nowhere = runs.index[~runs["pose"].astype(str).isin(poses)]
+    if len(nowhere):
+        notes.append(f"{plural(len(nowhere), 'run')} without a pose: no modes belong to them, left out")
     pairs = [(runs[runs["pose"].astype(str) == tip.pose], tip) for tip in [*tips, *between]]
     return [(rows, tip) for rows, tip in pairs if len(rows)]

@@ -65,7 +65,7 @@ def stabilisation(diagram: pd.DataFrame, frf: pd.DataFrame) -> Figure:
     """
     panels = list(diagram.groupby(["position", "direction"], sort=False))[:DIAGRAMS]
     with style.style():
-        figure, grid = style.new_figure(0.5 + 2.2 * len(panels), len(panels))
+        figure, grid = style.new_figure(0.5 + 1.7 * len(panels), len(panels))
         for (axes,), ((position, direction), poles) in zip(grid, panels, strict=True):
             here = frf[(frf["position"] == position) & frf["response"].str.endswith(str(direction))]
             total = here.groupby("frequency_hz")["measured_m_n"].sum()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -61,28 +62,51 @@ def _map(figure: Figure, axes: Axes, chart: pd.DataFrame) -> None:
 
 
 def stations(surface: pd.DataFrame, dots: pd.DataFrame) -> Figure:
-    """Draw the end stiffness of a tabulated machine over its workspace, a panel per axis; dots are stations.
+    """Draw the end stiffness over slices of the workspace, a row per axis; dots are the slice's stations.
+
+    The last row is the standard deviation of kriging.
 
     Parameters
     ----------
     surface : rows of ``end_surface``. dots : of ``end_stations``.
     """
-    first, second = (f"{surface[name].iloc[0]}_mm" for name in ("first", "second"))
-    x, y = np.unique(surface[first]), np.unique(surface[second])
-    table = surface.sort_values([first, second])
+    first, second, third = (f"{surface[name].iloc[0]}_mm" for name in ("first", "second", "third"))
+    levels = list(surface["level_mm"].drop_duplicates())
+    reach = 0.5 * min(np.diff(levels), default=math.inf)
+    drawn = [(f"k{a}_n_um", f"k {a} (N/µm)") for a in "xyz"] + [("sd_percent", "standard deviation (%)")]
     with style.style():
-        figure, [row] = style.new_figure(2.6, 1, 3, sharey=True)
-        for axes, name in zip(row, "xyz", strict=True):
-            value = table[f"k{name}_n_um"].to_numpy(float).reshape(len(x), len(y)).T
-            filled = axes.contourf(x, y, value, levels=10, cmap=style.SEQUENTIAL)
-            bar = figure.colorbar(filled, ax=axes, location="bottom", shrink=0.9, pad=0.02)
-            bar.set_label(f"k {name} (N/µm)")
+        figure, grid = style.new_figure(
+            0.5 + 1.15 * len(drawn), len(drawn), len(levels), sharex=True, sharey=True
+        )
+        for row, (column, label) in zip(grid, drawn, strict=True):
+            steps = _steps(surface[column].to_numpy(float))
+            for axes, level in zip(row, levels, strict=True):
+                part = surface[surface["level_mm"] == level].sort_values([first, second])
+                x, y = np.unique(part[first]), np.unique(part[second])
+                value = part[column].to_numpy(float).reshape(len(x), len(y)).T
+                filled = axes.contourf(x, y, value, levels=steps, cmap=style.SEQUENTIAL, extend="both")
+                lines = axes.contour(x, y, value, levels=steps[1::2], colors="white", linewidths=0.5)
+                axes.clabel(lines, fontsize=6)
+                near = dots[(dots[third] - level).abs() < reach]
+                axes.plot(near[first], near[second], "o", color=style.MEASURED, mfc="white", ms=2.5, mew=0.6)
+                axes.grid(visible=False)
+            bar = figure.colorbar(filled, ax=list(row), shrink=0.9, pad=0.01)
+            bar.set_label(label)
             bar.ax.locator_params(nbins=4)
-            axes.plot(dots[first], dots[second], "o", color=style.MEASURED, mfc="white", ms=4, clip_on=False)
-            axes.grid(visible=False)
+            row[0].set_ylabel(f"{second[0]} (mm)")
+        for axes, level in zip(grid[0], levels, strict=True):
+            axes.set_title(f"{third[0]} = {level:.0f} mm".replace("-", "−"), loc="left")
+        for axes in grid[-1]:
             axes.set_xlabel(f"{first[0]} (mm)")
-        row[0].set_ylabel(f"{second[0]} (mm)")
     return figure
+
+
+def _steps(values: np.ndarray) -> np.ndarray:
+    """Levels of contours at round numbers over the range of some values."""
+    from matplotlib.ticker import MaxNLocator
+
+    known = values[np.isfinite(values)]
+    return np.asarray(MaxNLocator(10).tick_values(known.min(), known.max()))
 
 
 def _outline(axes: Axes, pose: pd.DataFrame, seen: tuple[int, int]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import pandas as pd
@@ -39,6 +40,7 @@ ABOUT = ("format", "batch", "metro", "not_identified")  # the batch and the file
 ELSEWHERE = {"faces": "flatness of faces", "study": "factors and configurations", "arm": "the robot arm"}
 OF_ROBOT = ("observability", "waviness")  # the robot's own section shows them
 LONGEST, ABREAST = 30, 3
+PLANE = ("xx", "xy", "yx", "yy")
 
 
 def identification(results: Results) -> Section:
@@ -124,18 +126,31 @@ def _yielding(table: pd.DataFrame | None) -> list[Item]:
     items: list[Item] = [Heading("Deflection feedback")]
     if "difference_n" in table:
         rows = [
-            [str(row["run"]), *(number(row[f"k{axis}_n_um"]) for axis in "xyz"), *_feedback(row)]
-            for _, row in table[table["refused"] == ""].iterrows()
+            [", ".join(runs), *cells]
+            for cells, runs in _alike(
+                (str(row["run"]), [*(number(row[f"plane_{entry}_n_um"]) for entry in PLANE), *_feedback(row)])
+                for _, row in table[table["refused"] == ""].iterrows()
+            )
         ]
-        head = ["run", "k x (N/µm)", "k y", "k z", "iterations", "plain scheme", "entry (N)", "last (N)"]
+        head = ["runs", "k_xx (N/µm)", "k_xy", "k_yx", "k_yy"]
+        head += ["iterations", "plain scheme", "entry (N)", "last (N)"]
         caption = (
-            "Force of the yielding tool against that of a rigid one: iterations to convergence, those of the "
+            "Stiffness of the tip in the plane of cutting (work frame, free along the spindle), and the "
+            "force of the yielding tool against that of a rigid one: iterations to convergence, those of the "
             "plain fixed-point scheme, largest difference in the first and the last of six revolutions."
         )
-        items.append(Table(head, rows, caption, [1] * len(head), small=True))
+        items.append(Table(head, rows, caption, [1.6, *([1] * 8)], numeric=list(range(1, 9)), small=True))
     refused = table[table["refused"] != ""].groupby("refused")["run"].agg(", ".join)
     items += [Bullets([f"{runs}: {reason}." for reason, runs in refused.items()])] if len(refused) else []
     return items
+
+
+def _alike(rows: Iterable[tuple[str, list[str]]]) -> list[tuple[list[str], list[str]]]:
+    """Return the cells that rows share, with the names of those rows, in the order of the first."""
+    shared: dict[tuple[str, ...], list[str]] = {}
+    for name, cells in rows:
+        shared.setdefault(tuple(cells), []).append(name)
+    return [(list(cells), names) for cells, names in shared.items()]
 
 
 def _feedback(row: pd.Series) -> list[str]:

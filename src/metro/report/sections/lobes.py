@@ -38,7 +38,7 @@ def boundaries(results: Results) -> list[Item]:
         )
         if boundary["interpolated"].any():
             caption += " Dashed: with modes interpolated between the positions where they were measured."
-        items.append(Picture(figures.positions_chart(boundary), caption, caption))
+        items += [Picture(figures.positions_chart(boundary), caption, caption), _limits(results, boundary)]
     if stations is not None:
         items.append(_stations(stations))
     return items + chatter_items(results)
@@ -53,6 +53,32 @@ def boundary_items(results: Results) -> list[Item]:
     caption = f"{lowest} Stability boundary with its bands.".lstrip()
     chart = figures.lobes_chart(boundary, _NO_TESTS, results.tables.get("lobe_islands"))
     return [Picture(chart, caption, caption)]
+
+
+def _limits(results: Results, boundary: pd.DataFrame) -> Table:
+    """Tabulate the limit of the depth of cut by speed and position, at the speeds of the runs."""
+    grid = boundary.pivot_table(index="rpm", columns="position", values="depth_mm", sort=False).sort_index()
+    cut = results.batch.runs["spindle_rpm"].astype(float).unique()
+    grid = (
+        grid[grid.index.isin(cut)] if grid.index.isin(cut).any() else grid.iloc[:: max(1, len(grid) // SHORT)]
+    )
+    grid = grid.head(LONGEST)
+    rows = []
+    for rpm, depths in grid.iterrows():
+        known = depths.dropna()
+        ratio = number(float(known.max() / known.min()), 2)
+        ends = f"{known.idxmax()} / {known.idxmin()}"
+        rows.append([number(float(str(rpm)), 4), *(number(float(d)) for d in depths), ratio, ends])
+    spread = (grid.max(axis=1) / grid.min(axis=1)).dropna()
+    least, most = (number(float(str(rpm)), 4) for rpm in (spread.idxmin(), spread.idxmax()))
+    caption = (
+        "Limit of the depth of cut (mm) by speed and position. The greatest is "
+        f"{number(spread.min(), 2)} times the least at {least} rpm and {number(spread.max(), 2)} times at "
+        f"{most} rpm."
+    )
+    header = ["speed (rpm)", *map(str, grid.columns), "greatest / least", "at positions"]
+    widths = [0.9, *([0.8] * len(grid.columns)), 1.1, 0.9]
+    return Table(header, rows, caption, widths, numeric=list(range(len(header) - 1)), small=True)
 
 
 def _lowest(blocks: list[JSON]) -> Table:
@@ -70,14 +96,15 @@ def _lowest(blocks: list[JSON]) -> Table:
 
 def _methods(methods: pd.DataFrame, boundary: pd.DataFrame | None) -> list[Item]:
     lines = [("depth_mm", " by all modes together"), ("single_mode_mm", " by single modes")]
+    compared = methods[methods.groupby("position")["checked"].transform("any")]
     caption = (
-        f"{findings.lowest_boundary(methods, lines)} The boundary by each method, with the "
+        f"{findings.lowest_boundary(compared, lines)} The boundary by each method, with the "
         "coefficients of the base model. Published diagrams of this kind take the lowest of all "
         "modes solved alone, by complete discretisation with Euler's method (CDSEM)."
     )
     governing = f"{_governing_words(methods)} Direction and number by rising frequency."
     return [
-        Picture(figures.methods_chart(methods), caption, caption),
+        Picture(figures.methods_chart(compared), caption, caption),
         Bullets(agreement(methods, boundary)),
         Picture(figures.governing_modes(methods), governing, governing),
     ]
@@ -119,17 +146,33 @@ def _spread(change: Array) -> str:
 def _governing_words(methods: pd.DataFrame) -> str:
     share = methods["governing_mode"].value_counts(normalize=True)
     shares = listing([f"{mode} at {100 * s:.0f} % of the speeds" for mode, s in share.items()])
-    return f"The mode that, solved alone, chatters first is {shares}."
+    words = f"The mode that, solved alone, chatters first is {shares}."
+    if methods["position"].nunique() < 2:
+        return words
+    rising: list[str] = []
+    falling: list[str] = []
+    for position, part in methods.groupby("position", sort=False):
+        order = part.sort_values("rpm")["governing_mode"].str.extract(r"(\d+)$")[0].astype(int)
+        (rising if order.is_monotonic_increasing else falling).append(str(position))
+    said = []
+    said += [f"its number rises with the speed at position {listing(rising)}"] if rising else []
+    said += [f"it falls again at position {listing(falling)}"] if falling else []
+    return f"{words[:-1]}; {listing(said)}."
 
 
 def _stations(stations: pd.DataFrame) -> Table:
     columns = ("x_mm", "y_mm", "z_mm", "lowest_mm", "lowest_from_others_mm", "depth_error_percent")
-    rows = [[str(row["position"]), *(number(row[c]) for c in columns)] for _, row in stations.iterrows()]
-    header = ["position", "x (mm)", "y", "z", "lowest (mm)", "told by the others", "depth error (%)"]
+    known = stations[stations["lowest_from_others_mm"].notna()]
+    rows = [[str(row["position"]), *(number(row[c]) for c in columns)] for _, row in known.iterrows()]
+    header = ["position", "x (mm)", "y", "z", "lowest (mm)", "from the others", "depth error (%)"]
     caption = (
-        "Each position's boundary as the other positions tell it: modes interpolated between stations, "
-        "median error of depth over the speeds."
+        "Boundary of a position as predicted from the other positions, with the coefficients of the base "
+        "model: modes interpolated between stations, median error of depth over the speeds."
     )
+    if beyond := [
+        str(position) for position in stations["position"] if position not in set(known["position"])
+    ]:
+        caption += f" Position {listing(beyond)}: too far from the others to be predicted from them."
     return Table(header, rows, caption, [0.8, 0.8, 0.8, 0.8, 1, 1.2, 1.2], numeric=[1, 2, 3, 4, 5, 6])
 
 

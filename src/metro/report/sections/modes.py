@@ -10,6 +10,7 @@ from metro.report.content import Heading, Item, Picture, Table
 from metro.report.figures import modal as figures
 from metro.report.numbers import number, percent, quantity
 from metro.report.sections.measured import count_of
+from metro.report.sections.mode_positions import over_positions, reconstruction
 from metro.units import JSON
 
 LONGEST = 30
@@ -27,21 +28,29 @@ def modes(identified: list[JSON], tables: Mapping[str, pd.DataFrame]) -> list[It
     """Write the block ``modes`` of ``identified.json``, and figures of ``frf_used`` and ``stabilisation``."""
     if not identified:
         return []
+    positions = list(dict.fromkeys(str(mode.get("position")) for mode in identified))
+    shown = [mode for mode in identified if len(positions) == 1 or str(mode.get("position")) == positions[0]]
     header = ["position", "direction", *(name for _, name in KEYS)]
     caption = "Modes with 95 % intervals; the frequency is the undamped one."
-    if any(not mode.get("resolved", True) for mode in identified):
+    if any(not mode.get("resolved", True) for mode in shown):
         caption += " * not resolved: the data tell damping or stiffness no better than to a third."
-    if len(identified) > LONGEST:
-        caption += f" The first {LONGEST} of {len(identified)} are shown; identified.json has all."
-    rows = [_row(mode) for mode in identified[:LONGEST]]
+    rows = [_row(mode) for mode in shown[:LONGEST]]
+    if len(rows) < len(identified):
+        caption += f" The first {len(rows)} of {len(identified)} are shown; identified.json has all."
     items: list[Item] = [Heading("Modes"), Table(header, rows, caption, [0.7, 0.8, 1.3, 1.5, 1.8, 1.4])]
     drawn, diagram = _magnitudes(tables.get("frf_used")), tables.get("stabilisation")
     if drawn is not None:
-        items += [
-            _responses(drawn),
-            *([_diagram(diagram, drawn, len(identified))] if diagram is not None else []),
-        ]
-    return [*items, *_shapes(tables.get("mode_shapes"), tables.get("mode_mac"))]
+        diagrams = [] if diagram is None else [_diagram(_of(diagram, positions), drawn, len(shown))]
+        items += [_responses(drawn), *diagrams]
+    residues, alike = tables.get("mode_shapes"), tables.get("mode_mac")
+    if residues is not None and alike is not None:
+        items += _shapes(_of(residues, positions), _of(alike, positions))
+    return [*items, *reconstruction(tables), *over_positions(tables)]
+
+
+def _of(table: pd.DataFrame, positions: list[str]) -> pd.DataFrame:
+    """Return the rows of the first of several positions: of the others, figures follow that have them all."""
+    return table if len(positions) == 1 else table[table["position"].astype(str) == positions[0]]
 
 
 def _responses(drawn: pd.DataFrame) -> Picture:
@@ -82,10 +91,8 @@ def largest_response(tables: Mapping[str, pd.DataFrame]) -> list[Item]:
     return [Picture(figures.responses(part), about, about)]
 
 
-def _shapes(residues: pd.DataFrame | None, alike: pd.DataFrame | None) -> list[Item]:
+def _shapes(residues: pd.DataFrame, alike: pd.DataFrame) -> list[Item]:
     """Draw the shapes of the modes of each direction with hits or responses at several points."""
-    if residues is None or alike is None:
-        return []
     items: list[Item] = []
     by = ["position", "direction"]
     of_direction = dict(tuple(alike.groupby(by)))
@@ -97,10 +104,11 @@ def _shapes(residues: pd.DataFrame | None, alike: pd.DataFrame | None) -> list[I
         above = close[(close["first_hz"] < close["second_hz"]) & (close["mac"] > ALIKE)]
         total = part["frequency_hz"].nunique()
         pairs = total * (total - 1) // 2
+        close_ones = ": more points would distinguish them" if len(above) else ""
         about = (
             f"Like shapes (MAC over {ALIKE:g}) have {len(above) or 'none'} of {pairs} pairs of modes at the "
-            f"{part['point'].nunique()} points of position {key[0]}, direction {key[1]}: more points would "
-            "part them. Shapes of the modes, and the modal assurance criterion of every two."
+            f"{part['point'].nunique()} points of position {key[0]}, direction {key[1]}{close_ones}. "
+            "Shapes of the modes, and the modal assurance criterion of every two."
         )
         items.append(Picture(figures.shapes(part, close), about, about))
     return items

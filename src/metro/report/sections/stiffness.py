@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from metro.report.content import Heading, Item, Picture, Table
+import pandas as pd
+
+from metro.report.content import Bullets, Heading, Item, Picture, Table
 from metro.report.figures import robot as figures
 from metro.report.numbers import listing, number, with_interval
 from metro.report.results import Results
 
 LONGEST = 30
+FEW = 12  # stations that are all tabulated
 NORMAL = 1.96
 
 
@@ -46,30 +49,82 @@ def arm_stiffness(results: Results) -> list[Item]:
 
 
 def stations(results: Results) -> list[Item]:
-    """Tabulate each station's stiffness with its leave-one-out error, and draw the surface."""
+    """Tabulate the stations with the errors of interpolation, and draw slices through the workspace."""
     table, surface = results.tables.get("end_stations"), results.tables.get("end_surface")
-    if table is None or surface is None:
+    errors, region = results.tables.get("end_errors"), results.tables.get("end_region")
+    if table is None or surface is None or errors is None or region is None:
         return []
+    named = _named(results, table)
     columns = ["x_mm", "y_mm", "z_mm", *(f"k{a}_n_um" for a in "xyz"), *(f"error_{a}_percent" for a in "xyz")]
-    rows = [[str(r["position"]), *(number(r[c]) for c in columns)] for _, r in table.head(LONGEST).iterrows()]
-    first = table.iloc[0]
-    errors = listing(
-        [
-            f"{a} {number(first[f'rms_{a}_percent'], 2)} % ({number(first[f'rms_{a}_low_percent'], 2)} … "
-            f"{number(first[f'rms_{a}_high_percent'], 2)})"
-            for a in "xyz"
-        ]
-    )
-    caption = (
-        f"End stiffness at the stations, and the error of each as told by all others. Between stations: "
-        f"{first['method']}. Leave-one-out error, rms with its 95 % interval: {errors}."
-    )
+    rows = [[str(r["position"]), *(number(r[c]) for c in columns)] for _, r in named.iterrows()]
+    which = "at the stations" if len(named) == len(table) else "at the stations that the batch names"
+    caption = f"End stiffness {which}, and the error of each as predicted from all {len(table) - 1} others."
     header = ["station", "x (mm)", "y", "z", "k x (N/µm)", "k y", "k z", "error x (%)", "error y", "error z"]
-    about = "End stiffness over the workspace as the stations (dots) tell it, seen along the third axis."
+    about = (
+        f"{_stiffest(region.iloc[0])} End stiffness over slices of the workspace, interpolated between "
+        f"{len(table)} stations (dots: those of the slice), and the largest standard deviation of kriging."
+    )
     return [
         Heading("End stiffness of the machine"),
-        Table(header, rows, caption + more(len(table)), [0] * 10, numeric=list(range(1, 10)), small=True),
+        Bullets(_over_workspace(region.iloc[0])),
+        _interpolation(errors, str(table["method"].iloc[0])),
+        Table(header, rows, caption, [0] * 10, numeric=list(range(1, 10)), small=True),
         Picture(figures.stations(surface, table), about, about),
+    ]
+
+
+def _named(results: Results, table: pd.DataFrame) -> pd.DataFrame:
+    """Return the stations at which runs were cut or modes measured; all if they are few, or none is named."""
+    if len(table) <= FEW:
+        return table
+    runs = results.batch.runs
+    poses = list(runs["pose"].astype(str)) if "pose" in runs else []
+    tested = [str(mode.get("position")).split("/")[0] for mode in results.identified.get("modes") or []]
+    named = table[table["position"].astype(str).isin({*poses, *tested})]
+    return (named if len(named) else table).head(LONGEST)
+
+
+def _interpolation(errors: pd.DataFrame, method: str) -> Table:
+    """Tabulate how well each entry of the stiffness is interpolated."""
+    rows = []
+    for _, row in errors.iterrows():
+        span = f"{number(row['least_n_um'])} … {number(row['greatest_n_um'])}"
+        interval = f"({number(row['rms_low_percent'], 2)} … {number(row['rms_high_percent'], 2)})"
+        left = f"{number(row['rms_percent'], 2)} {interval}"
+        kriged = (number(row[f"kriging_{name}_percent"], 2) for name in ("rms", "sd"))
+        rows.append([str(row["entry"]), span, left, *kriged, number(row["within_percent"], 2)])
+    caption = (
+        f"Interpolation between the stations by a {method}: leave-one-out error, rms with its 95 % interval, "
+        "beside that of kriging, the standard deviation that kriging expects, and how many stations are "
+        "within 1.96 of it. In percent of the stiffness; across two axes, of the root of their product."
+    )
+    header = ["entry", "range (N/µm)", "left out (%)", "kriging (%)", "expected (%)", "within (%)"]
+    return Table(header, rows, caption, [0.6, 1.5, 1.6, 0.9, 0.9, 0.9], numeric=[3, 4, 5], small=True)
+
+
+def _stiffest(region: pd.Series) -> str:
+    place = ", ".join(f"{region[f'{a}_mm']:.0f}" for a in "xyz").replace("-", "−")
+    spans = [f"{a} {region[f'{a}_low_mm']:.0f} … {region[f'{a}_high_mm']:.0f} mm" for a in "xyz"]
+    return (
+        f"The softest direction is stiffest at ({place}) mm, {number(region['softest_n_um'])} N/µm; it has "
+        f"95 % of that within {listing(spans)}."
+    ).replace(" -", " −")
+
+
+def _over_workspace(region: pd.Series) -> list[str]:
+    """State where stiffness is largest, how it falls towards the border, and which direction dominates."""
+    falls = []
+    for a in "xyz":
+        inner, outer = region[f"inner_k{a}_n_um"], region[f"outer_k{a}_n_um"]
+        falls.append(
+            f"k {a} {number(inner)} to {number(outer)} N/µm ({number(100 * (outer / inner - 1), 2)} %)"
+        )
+    ratio = f"{number(region['ratio_low'], 2)} to {number(region['ratio_high'], 2)}"
+    return [
+        f"From the stations in the middle (the nearest 30 %) to those at the border (the farthest 30 %): "
+        f"{listing(falls)}.",
+        f"k {region['stiffest']} is the largest at {region['stiffest_count']} of {region['stations']} "
+        f"stations, {ratio} times the second largest.",
     ]
 
 

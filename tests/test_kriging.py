@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from metro.loop.labels.kriging import krige
+from metro.kriging import krige
 
 RNG = np.random.default_rng(3)
 
@@ -39,3 +39,18 @@ def test_far_from_all_points_the_trend_is_told_and_unsure():
     mean, sd = learnt(np.array([[50.0]]))
     np.testing.assert_allclose(mean[0], learnt.trend, atol=1e-6)
     np.testing.assert_allclose(sd[0] ** 2, learnt.variance, rtol=1e-6)
+
+
+def test_values_left_out_are_told_as_without_them():
+    """Dubrule's formula against kriging written out without each point, lengths and trend kept."""
+    at = RNG.random((12, 2))
+    learnt = krige(at, smooth(at))
+    error, sd = learnt.left_out()
+    covariance = np.linalg.inv(learnt.inverse)
+    for i in range(12):
+        rest = np.arange(12) != i
+        weights = np.linalg.solve(covariance[np.ix_(rest, rest)], covariance[rest, i])
+        told = learnt.trend + weights @ (smooth(at)[rest] - learnt.trend)
+        np.testing.assert_allclose(error[i], told - smooth(at)[i], atol=1e-8)
+        left = covariance[i, i] - weights @ covariance[rest, i]
+        np.testing.assert_allclose(sd[i], np.sqrt(left * learnt.variance), rtol=1e-6)

@@ -42,6 +42,14 @@ class Kriged:
         sd = np.sqrt(np.clip(unknown, 0.0, 1.0)[:, None] * self.variance)
         return self.trend + shared @ self.weights, sd
 
+    def left_out(self) -> tuple[Array, Array]:
+        """Errors and standard deviations (n, p) of each value as told by the others, the trend kept.
+
+        Dubrule (1983): both are in the inverse of the covariances, without solving anew.
+        """
+        own = np.diag(self.inverse)[:, None]
+        return -self.weights / own, np.sqrt(self.variance / own)
+
     def nearest(self, cube: Array) -> np.ndarray:
         """Index (t,) of the known point that has most in common with each."""
         nearest: np.ndarray = _covariance(cube, self.at, self.lengths).argmax(axis=1)
