@@ -72,10 +72,11 @@ def test_every_file_that_the_run_table_names_is_there(batch):
 
 
 def test_roles_order_and_conditions_serve_the_hold_out(batch):
-    _, _, runs = batch
+    folder, _, runs = batch
     assert runs.run.is_unique
     assert sorted(runs.order) == list(range(1, len(runs) + 1))
-    assert set(runs.role) == {"identify", "validate"}
+    # Tests of stability identify nothing: they judge lobes from the hammer and from declared coefficients.
+    assert set(runs.role) == {"validate"} | (set() if folder.name == "trimule-chatter" else {"identify"})
     assert runs.groupby("condition").role.nunique().max() == 1
     assert runs.condition.nunique() >= 5
 
@@ -84,7 +85,7 @@ def test_repeats_are_spread_over_the_session(batch):
     _, _, runs = batch
     repeated = runs.groupby("condition").order.agg(["min", "max", "size"])
     repeated = repeated[repeated["size"] > 1]
-    assert (repeated["max"] - repeated["min"]).min() >= 2
+    assert ((repeated["max"] - repeated["min"]) >= 2).all()
 
 
 def test_bundled_batches_stay_small():

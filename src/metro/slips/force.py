@@ -19,7 +19,7 @@ from metro.slips import channels, chip_geometry, orientation, run_table
 from metro.slips.hypothesis import Hypothesis
 from metro.slips.physical import coefficients_text, impossible, mean_chip
 from metro.slips.slip import Slip
-from metro.slips.speed import period, repeats_per_revolution
+from metro.slips.speed import period, repeats_per_revolution, turns_as_declared
 from metro.slips.waveform import Design, Record, WaveFit, design, fit, record_of
 from metro.units import JSON
 
@@ -143,4 +143,7 @@ def _passes(batch: Batch, read: Tables, run: str) -> float | None:
     if np.isfinite(stretch.tacho).all():
         return None
     found = period(stretch.signal, record.rate, 60.0 / rpm)
-    return None if found is None else repeats_per_revolution(found, 60.0 / rpm)
+    passes = None if found is None else repeats_per_revolution(found, 60.0 / rpm)
+    if found is None or passes is None:
+        return None
+    return None if turns_as_declared(stretch.signal, record.rate, 60.0 / rpm, found) else passes

@@ -15,6 +15,7 @@ from metro.units import JSON, Array
 
 AXES = ("x", "y", "z")
 IN_PLANE = ("ktc", "krc", "kte", "kre")
+NOT_IDENTIFIED_ON = "no run has the role identify"
 INSEPARABLE = 0.98  # correlation from which on shear and edge term cannot be distinguished
 
 
@@ -25,7 +26,7 @@ def waveform(model: ForceModel, fit: BaseFit | None, *, turned: bool) -> JSON | 
     identified only up to a rotation, and the tangential and radial coefficients are not identifiable.
     """
     if fit is None:
-        return Refusal("no run has the role identify")
+        return Refusal(NOT_IDENTIFIED_ON)
     deviation = np.sqrt(np.diag(fit.covariance))
     return {
         parameter.name: quantity(value / parameter.si, sd / parameter.si, parameter.unit, fit.dof)
@@ -65,6 +66,8 @@ def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.
     blocks : runs to use; helical ones are omitted. spindle : the observed table, with the mean force of each
         run.
     """
+    if not blocks:
+        return Refusal(NOT_IDENTIFIED_ON)
     means = spindle.set_index("run")[[f"mean_{axis}_n" for axis in AXES]]
     straight = [block for block in blocks if block.setting.helix is None]
     if not straight:
