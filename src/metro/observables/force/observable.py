@@ -21,6 +21,7 @@ from metro.observables.force import NAME, TABLES
 from metro.observables.force.blocks import block_of
 from metro.observables.force.coefficients import correlation, mean_coefficients, waveform
 from metro.observables.force.dynamometer import Dynamometer
+from metro.observables.force.mean_bias import mean_bias
 from metro.observables.force.model import ForceModel
 from metro.observables.force.orders import observe, recorded
 from metro.observables.force.proposals import feasible
@@ -53,12 +54,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     bottom = _bottom_edges(blocks)
     if bottom == ("kfae",):
         blocks = _at_other_feeds(blocks, tool)
-    model = ForceModel(
-        cutter=replace(tool, runout_radius=0.0, runout_angle=0.0),  # what is declared of it is an effect's
-        law=EdgeLaw(),
-        bottom_edges=bottom,
-        sensor=Dynamometer(axes=cutting_force.channels(batch)),
-    )
+    model = _base(batch, tool, bottom)
     notes = [
         "The chip thickness is that of the true tooth paths, the force law linear in it; "
         "tool, machine and dynamometer are rigid in the base model.",
@@ -72,6 +68,16 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     scatter = np.full(len(model.parameters), SCATTER)
     next_runs = feasible(blocks, tool, batch.manifest.get("limits"))
     return Problem(NAME, "N", 1.0, model, blocks, scatter, notes=tuple(notes), feasible=next_runs)
+
+
+def _base(batch: Batch, tool: Cutter, bottom: tuple[str, ...]) -> ForceModel:
+    """Return the model without any effect, declared or not."""
+    return ForceModel(
+        cutter=replace(tool, runout_radius=0.0, runout_angle=0.0),  # what is declared of it is an effect's
+        law=EdgeLaw(),
+        bottom_edges=bottom,
+        sensor=Dynamometer(axes=cutting_force.channels(batch)),
+    )
 
 
 def _path_note(tool: Cutter, blocks: tuple[Block, ...]) -> str:
@@ -173,10 +179,24 @@ def report(
     return {"force": {**block, "not_identified": lacking} if lacking else block}
 
 
+def after_loop(
+    batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON, problem: Problem, fit: BaseFit
+) -> JSON:
+    """Return what the effects found make of the coefficients that the mean forces give."""
+    tool, reported = cutting_force.cutter(batch), identified.get("force") or {}
+    if isinstance(tool, Refusal):
+        return {}
+    base = _base(batch, tool, cast("ForceModel", problem.base).bottom_edges)
+    block = mean_bias(base, problem, observed["spindle"], reported, fit)
+    return {"force": block} if block else {}
+
+
 def yielding(batch: Batch, read: Tables, identified: JSON) -> tuple[dict[str, pd.DataFrame], JSON]:
     """Return what a tabulated machine's stiffness makes of the identified cutting force."""
     table = yielding_table(batch, read, identified)
     return ({} if isinstance(table, Refusal) else {"yielding": table}), {}
 
 
-OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, beside=yielding, gives_coefficients=True)
+OBSERVABLE = Observable(
+    NAME, TABLES, observe, problem, report, beside=yielding, gives_coefficients=True, after_loop=after_loop
+)
