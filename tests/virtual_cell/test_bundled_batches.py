@@ -35,7 +35,7 @@ def batch(request):
     )
 
 
-@pytest.mark.parametrize("name", ["clean-slot", "irb6640-face"])
+@pytest.mark.parametrize("name", ["clean-slot", "irb6640-face", "trimule-bottom"])
 def test_remaking_a_batch_gives_the_same_bytes(name, tmp_path):
     BUNDLED[name](tmp_path / name)
     assert digest(tmp_path / name) == digest(RAW / name)
@@ -89,7 +89,7 @@ def test_repeats_are_spread_over_the_session(batch):
 
 
 def test_bundled_batches_stay_small():
-    assert sum(p.stat().st_size for name in BUNDLED for p in (RAW / name).rglob("*") if p.is_file()) < 9e6
+    assert sum(p.stat().st_size for name in BUNDLED for p in (RAW / name).rglob("*") if p.is_file()) < 10e6
 
 
 def test_orbit_and_feed_agree_at_the_tools_centre():

@@ -12,6 +12,7 @@ import numpy as np
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.cutting.cutter import Cutter
+from metro.observables.cut.conditions import or_zero
 from metro.observables.cut.long_record import LongRecord
 from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem
@@ -135,7 +136,8 @@ def _spread(found: Mapping[str, float]) -> float:
 def _passes(batch: Batch, read: Tables, run: str) -> float | None:
     """Repeats per declared revolution of a run's record, where no cutter has as many; None else."""
     row: Any = batch.runs.loc[run]
-    record, rpm = LongRecord(read, run), float(row["spindle_rpm"])
+    # in a hole the feed turns against the spindle: the teeth pass it as fast as both together
+    record, rpm = LongRecord(read, run), float(row["spindle_rpm"]) + or_zero(float(row["orbit_rpm"]))
     if record.samples < 100 or not rpm > 0.0:
         return None
     middle = slice(record.samples // 4, record.samples - record.samples // 4)

@@ -118,14 +118,15 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
     write_made(processed, "identify", settings, code)
 
 
-def slips_of(batch: Batch, read: Tables, budget: float) -> tuple[Slip, ...]:
-    """Return what the data of a batch contradict, as :func:`identify` finds it; nothing is written.
+def slips_of(batch: Batch, read: Tables, budget: float) -> tuple[tuple[Slip, ...], JSON]:
+    """Return what the data of a batch contradict, and what is identified; nothing is written.
 
     Parameters
     ----------
     read : the canonical tables. budget : the model-form budget.
     """
-    return _slips(_identified(batch, read, budget))
+    state = _identified(batch, read, budget)
+    return _slips(state), state.identified
 
 
 def _slips(state: _State) -> tuple[Slip, ...]:

@@ -48,6 +48,55 @@ def yielding_table(batch: Batch, read: Read, identified: JSON) -> pd.DataFrame |
     of the revolutions, in N and in % of the largest rigid force, and ``refused``: the reason if a row has no
     figures.
     """
+    machine = _machine(batch, read, identified)
+    if isinstance(machine, Refusal):
+        return machine
+    tool, si, stations, names = machine
+    error = {
+        f"leave_one_out_{a}_percent": 100.0 * e for a, e in zip(AXES, leave_one_out(stations), strict=True)
+    }
+    rows = []
+    for run in recorded(batch) or [str(run) for run in batch.runs.index]:
+        try:
+            row = _end_stiffness(batch, run, stations, names)
+            row |= _worst(batch, run, tool, si, np.array([row[f"k{axis}_n_um"] for axis in AXES]) * N_UM)
+        except (ValueError, NotConvergedError) as refusal:
+            row = {"run": run, "refused": str(refusal)}
+        rows.append(row | error)
+    return pd.DataFrame(rows)
+
+
+def gains(batch: Batch, read: Read, identified: JSON) -> pd.DataFrame | Refusal:
+    """Return ``run, gain``: by what the plain iteration multiplies an error of the force, at worst.
+
+    The runs are those of :func:`yielding_table`, less those that it refuses; nothing is solved.
+    """
+    machine = _machine(batch, read, identified)
+    if isinstance(machine, Refusal):
+        return machine
+    tool, si, stations, names = machine
+    known: dict[tuple[Any, ...], float] = {}
+    rows = []
+    for run in recorded(batch) or [str(run) for run in batch.runs.index]:
+        try:
+            row = _end_stiffness(batch, run, stations, names)
+            cut = cutting_force.cut(batch, run, tool.radius)
+        except ValueError:
+            continue
+        stiffness = np.array([row[f"k{axis}_n_um"] for axis in AXES]) * N_UM
+        directions = _directions(batch.runs.loc[run])
+        key = cut, tuple(stiffness), tuple(directions)  # repeats are solved once
+        if key not in known:
+            springs = _springs(batch, stiffness, directions)
+            known[key] = max(ratios(tool, EdgeLaw(), cut, si, spring)[0] for spring in springs)
+        rows.append({"run": run, "gain": known[key]})
+    return pd.DataFrame(rows, columns=["run", "gain"])
+
+
+def _machine(
+    batch: Batch, read: Read, identified: JSON
+) -> tuple[Cutter, Array, Stations, tuple[str, ...]] | Refusal:
+    """Return tool, coefficients (6,) SI, stations and their names."""
     table = read("stations")
     if table.empty:
         return Refusal("cell.yaml names no stations: the machine's end stiffness is not tabulated")
@@ -61,19 +110,7 @@ def yielding_table(batch: Batch, read: Read, identified: JSON) -> pd.DataFrame |
         table[[f"{axis}_mm" for axis in AXES]].to_numpy(float) * MM,
         table[[f"k{axis}_n_um" for axis in AXES]].to_numpy(float) * N_UM,
     )
-    names = tuple(str(name) for name in table["position"])
-    error = {
-        f"leave_one_out_{a}_percent": 100.0 * e for a, e in zip(AXES, leave_one_out(stations), strict=True)
-    }
-    rows = []
-    for run in recorded(batch) or [str(run) for run in batch.runs.index]:
-        try:
-            row = _end_stiffness(batch, run, stations, names)
-            row |= _worst(batch, run, tool, si, np.array([row[f"k{axis}_n_um"] for axis in AXES]) * N_UM)
-        except (ValueError, NotConvergedError) as refusal:
-            row = {"run": run, "refused": str(refusal)}
-        rows.append(row | error)
-    return pd.DataFrame(rows)
+    return tool, si, stations, tuple(str(name) for name in table["position"])
 
 
 def _end_stiffness(batch: Batch, run: str, stations: Stations, names: tuple[str, ...]) -> JSON:
@@ -98,11 +135,17 @@ def _base_from_work(batch: Batch) -> Array:
 
 def _worst(batch: Batch, run: str, tool: Cutter, coefficients: Array, stiffness: Array) -> JSON:
     """Solve one run in its directions of feed; ``stiffness`` (3,) N/m along the axes of the base."""
-    turn, cut = _base_from_work(batch), cutting_force.cut(batch, run, tool.radius)
-    compliance = turn.T @ np.diag(1.0 / stiffness) @ turn
-    springs = [_in_plane(compliance, angle) for angle in _directions(batch.runs.loc[run])]
+    cut = cutting_force.cut(batch, run, tool.radius)
+    springs = _springs(batch, stiffness, _directions(batch.runs.loc[run]))
     rows = [_feedback(tool, cut, coefficients, spring) for spring in springs]
     return max(rows, key=lambda row: float(row["difference_n"]))
+
+
+def _springs(batch: Batch, stiffness: Array, directions: list[float]) -> list[Array]:
+    """Stiffness (2, 2) in the plane, in the frames of some directions of feed, rad."""
+    turn = _base_from_work(batch)
+    compliance = turn.T @ np.diag(1.0 / stiffness) @ turn
+    return [_in_plane(compliance, angle) for angle in directions]
 
 
 def _directions(row: Any) -> list[float]:
