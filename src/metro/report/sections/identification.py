@@ -51,7 +51,10 @@ def identification(results: Results) -> Section:
             mean_items(results.tables.get("mean_forces")),
             _effects((results.verdict.get("observables") or {}).get("force") or {}),
         ),
-        *_yielding(results.tables.get("yielding"), static_reason(results)),
+        *_yielding(
+            results.tables.get("yielding"),
+            ((identified.get("force") or {}).get("static_deflection") or {}).get("reason") or "",
+        ),
         *modes(identified.get("modes") or [], results.tables),
         *boundaries(results),
         *_arm(identified.get("arm") or {}),
@@ -156,18 +159,12 @@ def _bias(bias: JSON, effects: str) -> str:
     return f"{text}. Use the coefficients from the waveform, or those less the effects found."
 
 
-def static_reason(results: Results) -> str:
-    """Say why the static deflection of a tabulated machine is not what happens; "" if it is."""
-    reason = ((results.identified.get("force") or {}).get("static_deflection") or {}).get("reason") or ""
-    return f"{reason[0].upper()}{reason[1:]}." if reason else ""
-
-
 def _yielding(table: pd.DataFrame | None, denied: str) -> list[Item]:
     """Write the deflection feedback at the stations of a tabulated machine, and what ``denied`` it."""
     if table is None:
         return []
     items: list[Item] = [Heading("Deflection feedback")]
-    items += [Paragraph(denied, "warning")] if denied else []
+    items += [Paragraph(f"{denied[0].upper()}{denied[1:]}.", "warning")] if denied else []
     if "difference_n" in table:
         rows = [
             [str(row["run"]), *(number(row[f"k{axis}_n_um"]) for axis in "xyz"), *_feedback(row)]

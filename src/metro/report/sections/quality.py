@@ -11,7 +11,6 @@ from metro.report.content import Item, Paragraph, Section, Table
 from metro.report.numbers import listing, number, words
 from metro.report.results import Results
 from metro.report.sections.chatter import chatter_flags
-from metro.report.sections.identification import static_reason
 from metro.report.sections.records import record_items
 
 LONGEST, MOST_NAMES, MOST_FLAGS = 40, 24, 5
@@ -62,10 +61,11 @@ def with_flags(first: Section, results: Results) -> Section:
     failed.sort(key=lambda row: "left out" not in str(row["message"]))
     flags = [": ".join(str(row[part]) for part in ("file", "message") if row[part]) for row in failed]
     flags = [*chatter_flags(results), *flags]
+    if not flags:
+        return first
     more = f" And {len(flags) - MOST_FLAGS} more, see Data quality." if len(flags) > MOST_FLAGS else ""
-    text = f"Flagged in the raw data: {'; '.join(flags[:MOST_FLAGS])}.{more}" if flags else ""
-    said = [Paragraph(each, "warning") for each in (text, static_reason(results)) if each]
-    return replace(first, items=[*first.items[:1], *said, *first.items[1:]]) if said else first
+    text = f"Flagged in the raw data: {'; '.join(flags[:MOST_FLAGS])}.{more}"
+    return replace(first, items=[*first.items[:1], Paragraph(text, "warning"), *first.items[1:]])
 
 
 def _failures(failed: pd.DataFrame) -> Table:
