@@ -173,7 +173,7 @@ def test_helical_runs_give_their_coefficients_once_the_runout_is_known(tmp_path)
     value = found.beta / [parameter.si for parameter in task.base.parameters]
     assert value[:3] == pytest.approx(truth[:3], rel=0.03)
     assert value[3] == pytest.approx(truth[3], rel=0.05)
-    assert [parameter.name for parameter in task.base.parameters][6:] == ["kfac", "kfae"]
+    assert [parameter.name for parameter in task.base.parameters][6:] == ["kfae"]
     # Two records of one hole begin anywhere on the orbit: ψ₀ is found so that the prediction holds.
     helices = [block for block in blocks if block.setting.helix is not None]
     for block in helices:
@@ -271,6 +271,6 @@ def test_holes_alone_do_not_tell_tangential_from_radial(tmp_path):
     blocks = tuple(block for block in holes.task.blocks if block.setting.helix is not None)
     holes.task = replace(holes.task, blocks=blocks)
     found = holes.identified()
-    assert set(found["waveform"]) == {"kac", "kae", "kfac", "kfae"}
+    assert set(found["waveform"]) == {"kac", "kae", "kfae"}
     assert "cut one slot" in found["not_identified"]["krc"]
     assert found["not_identified"]["mean"].startswith("all runs are helical")

@@ -25,12 +25,12 @@ TABLE_4 = {
     "kfac": 243.47, "kfae": 33.072,
 }  # fmt: skip
 RATE = 8192.0
-HOLE = 19.05
+HOLE = 13.0  # where the bottom edges feed enough to tell K_Fac
 TOOL = {"diameter_mm": 12, "teeth": 4, "helix_deg": 40}
 
 
 def plans(replicates):
-    """Slots of the identification, and holes at two feeds along the axis: 0.1 and 0.3 mm per orbit."""
+    """Slots of the identification, and holes at two feeds along the axis: 0.1 and 0.4 mm per orbit."""
     slots = [
         Plan(f"slot-{feed}", "identify", "slot", 2000.0, feed, 0.2, 12.0, full_s=0.75, replicates=replicates)
         for feed in (0.02, 0.03, 0.04, 0.05)
@@ -40,7 +40,7 @@ def plans(replicates):
             f"hole-{depth}", "identify", "helical", 2000.0, 0.05, depth, 12.0,
             full_s=1.2, replicates=replicates,
         )
-        for depth in (0.1, 0.3)
+        for depth in (0.1, 0.4)
     ]  # fmt: skip
     return tuple(slots + holes)
 
@@ -71,8 +71,8 @@ def identified(folder, out):
     records = read_batch(out)
     observed = force.observe(records, Processed(out), {})
     task = force.problem(records, observed, {})
-    prior = first_noise(0.007, task.scatter, task.blocks)
-    base = fit(Candidate(task.base), task.blocks, prior)
+    blocks = task.role("identify")
+    base = fit(Candidate(task.base), blocks, first_noise(0.007, task.scatter, blocks))
     return force.report(records, observed, {}, task, identified_fit(task, base))["force"]["waveform"]
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metro.slips.speed import period, repeats_per_revolution
+from metro.slips.speed import period, repeats_per_revolution, turns_as_declared
 
 RATE, RPM, TEETH = 10000.0, 6000.0, 3
 
@@ -52,3 +52,27 @@ def test_noise_has_no_period():
     noise = np.random.default_rng(1).normal(size=(4000, 3))
     assert period(noise, RATE, 0.01) is None
     assert period(np.zeros((100, 3)), RATE, 0.01) is None
+
+
+def with_chatter(order, seconds=2.0):
+    """Chatter on an order of 6000 rpm, twenty times as strong as the runout that shows the revolution."""
+    rng = np.random.default_rng(3)
+    turn = np.arange(0.0, seconds, 1.0 / RATE) * RPM / 60.0
+    wave = 20.0 * np.sin(2 * np.pi * order * turn) + np.sin(2 * np.pi * turn) + 2.0
+    return np.column_stack([wave, 0.6 * np.roll(wave, 7)]) + 0.3 * rng.normal(size=(len(wave), 2))
+
+
+@pytest.mark.parametrize("order", [0.727, 2.744, 4.35])
+def test_chatter_that_drowns_the_teeth_is_no_other_speed(order):
+    signal = with_chatter(order)
+    found = period(signal, RATE, 60.0 / RPM)
+    assert repeats_per_revolution(found, 60.0 / RPM) == pytest.approx(order, rel=0.01)
+    assert turns_as_declared(signal, RATE, 60.0 / RPM, found)
+
+
+@pytest.mark.parametrize("runout", [0.0, 0.6])
+@pytest.mark.parametrize("declared", [60.0, 5400.0, 6150.0, 6600.0, 12000.0 / 7.0])
+def test_a_speed_that_is_off_leaves_no_line_at_the_declared_orders(declared, runout):
+    signal = record(runout=runout, seconds=2.0)
+    found = period(signal, RATE, 60.0 / declared)
+    assert not turns_as_declared(signal, RATE, 60.0 / declared, found)

@@ -35,7 +35,7 @@ def batch(request):
     )
 
 
-@pytest.mark.parametrize("name", ["clean-slot", "irb6640-face"])
+@pytest.mark.parametrize("name", ["clean-slot", "irb6640-face", "trimule-bottom"])
 def test_remaking_a_batch_gives_the_same_bytes(name, tmp_path):
     BUNDLED[name](tmp_path / name)
     assert digest(tmp_path / name) == digest(RAW / name)
@@ -72,10 +72,11 @@ def test_every_file_that_the_run_table_names_is_there(batch):
 
 
 def test_roles_order_and_conditions_serve_the_hold_out(batch):
-    _, _, runs = batch
+    folder, _, runs = batch
     assert runs.run.is_unique
     assert sorted(runs.order) == list(range(1, len(runs) + 1))
-    assert set(runs.role) == {"identify", "validate"}
+    # Tests of stability identify nothing: they judge lobes from the hammer and from declared coefficients.
+    assert set(runs.role) == {"validate"} | (set() if folder.name == "trimule-chatter" else {"identify"})
     assert runs.groupby("condition").role.nunique().max() == 1
     assert runs.condition.nunique() >= 5
 
@@ -84,11 +85,11 @@ def test_repeats_are_spread_over_the_session(batch):
     _, _, runs = batch
     repeated = runs.groupby("condition").order.agg(["min", "max", "size"])
     repeated = repeated[repeated["size"] > 1]
-    assert (repeated["max"] - repeated["min"]).min() >= 2
+    assert ((repeated["max"] - repeated["min"]) >= 2).all()
 
 
 def test_bundled_batches_stay_small():
-    assert sum(p.stat().st_size for name in BUNDLED for p in (RAW / name).rglob("*") if p.is_file()) < 13e6
+    assert sum(p.stat().st_size for name in BUNDLED for p in (RAW / name).rglob("*") if p.is_file()) < 14e6
 
 
 def test_orbit_and_feed_agree_at_the_tools_centre():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -147,13 +148,15 @@ def _chatter_tests(before: int) -> list[Row]:
     return rows
 
 
-def impacts(folder: Path, rng: np.random.Generator) -> list[Row]:
-    """Write five hits on the tip in each direction; return their rows."""
+def impacts(
+    folder: Path, rng: np.random.Generator, modes: Mapping[str, Modes] = MODES, hits: int = 5
+) -> list[Row]:
+    """Write some hits on the tip in each direction; return their rows."""
     rows: list[Row] = []
-    for direction, modes in MODES.items():
-        for replicate in range(1, 6):
+    for direction, along in modes.items():
+        for replicate in range(1, hits + 1):
             file = f"impacts/1{direction}-{replicate}.parquet"
-            write_signal(folder / file, hit(modes, 2048.0, 2.0, rng))
+            write_signal(folder / file, hit(along, 2048.0, 2.0, rng))
             rows.append(impact_row(f"1{direction}", file, "record", "m/s2", replicate))
     return rows
 

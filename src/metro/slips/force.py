@@ -12,6 +12,7 @@ import numpy as np
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.cutting.cutter import Cutter
+from metro.observables.cut.conditions import or_zero
 from metro.observables.cut.long_record import LongRecord
 from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem
@@ -19,7 +20,7 @@ from metro.slips import channels, chip_geometry, orientation, run_table
 from metro.slips.hypothesis import Hypothesis
 from metro.slips.physical import coefficients_text, impossible, mean_chip
 from metro.slips.slip import Slip
-from metro.slips.speed import period, repeats_per_revolution
+from metro.slips.speed import period, repeats_per_revolution, turns_as_declared
 from metro.slips.waveform import Design, Record, WaveFit, design, fit, record_of
 from metro.units import JSON
 
@@ -135,7 +136,8 @@ def _spread(found: Mapping[str, float]) -> float:
 def _passes(batch: Batch, read: Tables, run: str) -> float | None:
     """Repeats per declared revolution of a run's record, where no cutter has as many; None else."""
     row: Any = batch.runs.loc[run]
-    record, rpm = LongRecord(read, run), float(row["spindle_rpm"])
+    # in a hole the feed turns against the spindle: the teeth pass it as fast as both together
+    record, rpm = LongRecord(read, run), float(row["spindle_rpm"]) + or_zero(float(row["orbit_rpm"]))
     if record.samples < 100 or not rpm > 0.0:
         return None
     middle = slice(record.samples // 4, record.samples - record.samples // 4)
@@ -143,4 +145,7 @@ def _passes(batch: Batch, read: Tables, run: str) -> float | None:
     if np.isfinite(stretch.tacho).all():
         return None
     found = period(stretch.signal, record.rate, 60.0 / rpm)
-    return None if found is None else repeats_per_revolution(found, 60.0 / rpm)
+    passes = None if found is None else repeats_per_revolution(found, 60.0 / rpm)
+    if found is None or passes is None:
+        return None
+    return None if turns_as_declared(stretch.signal, record.rate, 60.0 / rpm, found) else passes

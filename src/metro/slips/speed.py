@@ -7,6 +7,7 @@ force does not repeat, or so many repeats in it that no tool has as many teeth.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,11 @@ PERIODIC = 0.8  # autocorrelation of a record that repeats; noise and resonance 
 MISSED = 0.5  # of the best repetition: at the declared revolution, a record of that speed has far more
 MOST_TEETH = 12
 ALL_OF_IT = 0.97  # of the best repetition, at a period too short for teeth: ringing between teeth has less
+LINES = 12  # orders of the declared revolution at which the teeth or runout would be seen
+FALSE_ALARM = 1e-4  # probability that noise makes lines at these orders as strong
 TOLERANCE = 0.015  # of the speed: 0.6 % by which a spindle may differ, and as much again for rounding of lags
+
+_LEAK = 2  # bins to either side into which a Hann taper spreads a line
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,38 @@ def period(signal: Array, rate: float, revolution: float) -> Period | None:
     length = _refined(match, first)
     near = match[_window(revolution * rate, len(match))]
     return Period(length / rate, best, float(match[first]), float(near.max(initial=-1.0)))
+
+
+def turns_as_declared(signal: Array, rate: float, revolution: float, found: Period) -> bool:
+    """Whether a record has lines at orders of the declared revolution besides those of the period found.
+
+    Then the spindle turns as declared, and the period is that of a vibration that is stronger than the force
+    of the teeth: chatter. A spindle that turns at another speed makes no line there but by chance: orders
+    within the resolution of a multiple of the period found are left out, and the power at the others, at the
+    best speed within ``TOLERANCE``, is compared with the median about each, as noise would have it.
+
+    Parameters
+    ----------
+    signal, rate, revolution : as of :func:`period`, which gave ``found``.
+    """
+    from scipy.stats import gamma
+
+    signal = signal[:MOST_SAMPLES]
+    taper = np.hanning(len(signal))[:, None]
+    power = (np.abs(np.fft.rfft((signal - signal.mean(axis=0)) * taper, axis=0)) ** 2).sum(axis=1)
+    turns = len(signal) / (rate * revolution)  # bins from order to order
+    about = max(3, round(0.5 * turns))
+    best = 0.0
+    speeds = np.arange(1.0 - TOLERANCE, 1.0 + TOLERANCE, 0.25 / (LINES * turns))
+    for speed in speeds:
+        place = np.rint(np.arange(1, LINES + 1) * turns * speed).astype(int)
+        multiples = place * found.length * rate / len(signal)
+        own = np.abs(multiples - np.round(multiples)) * len(signal) / (found.length * rate) > 2.0 * _LEAK
+        place = place[own & (place > _LEAK) & (place + about < len(power))]
+        floor = [np.median(power[max(bin_ - about, 1) : bin_ + about]) / math.log(2.0) for bin_ in place]
+        chance = gamma.sf(float((power[place] / floor).sum()), len(place)) if len(place) else 1.0
+        best = max(best, -math.log(max(float(chance) * len(speeds), 1e-300)))
+    return best > -math.log(FALSE_ALARM)
 
 
 def _autocorrelation(signal: Array) -> Array:

@@ -122,19 +122,21 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
     write_made(processed, "identify", settings, code)
 
 
-def slips_of(batch: Batch, read: Tables, budget: float) -> tuple[Slip, ...]:
-    """Return what the data of a batch contradict, as :func:`identify` finds it; nothing is written.
+def slips_of(batch: Batch, read: Tables, budget: float) -> tuple[tuple[Slip, ...], JSON]:
+    """Return what the data of a batch contradict, and what is identified; nothing is written.
 
-    Models are fitted only where cuts are labelled stable or not: these are held against the lobes, which need
-    the cutting coefficients. All other contradictions are found in the problems as they are posed.
+    Models are fitted only where cutting coefficients are asked for: by the lobes that cuts labelled stable or
+    not are held against, and by a tabulated machine that yields to the force. All else that contradicts is
+    found in the problems as they are posed.
 
     Parameters
     ----------
     read : the canonical tables. budget : the model-form budget.
     """
-    labelled = batch.runs["stable"].isin(list(LABEL)).any()
+    needed = batch.runs["stable"].isin(list(LABEL)).any() or not read("stations").empty
     judged = [observable for observable in observables() if observable.name in JUDGED]
-    return _slips(_identified(batch, read, budget if labelled else None, judged))
+    state = _identified(batch, read, budget if needed else None, judged)
+    return _slips(state), state.identified
 
 
 def _slips(state: _State) -> tuple[Slip, ...]:

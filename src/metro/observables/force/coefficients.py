@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from metro.units import JSON, Array
 
 AXES = ("x", "y", "z")
 IN_PLANE = ("ktc", "krc", "kte", "kre")
+NOT_IDENTIFIED_ON = "no run has the role identify"
 INSEPARABLE = 0.98  # correlation from which on shear and edge term cannot be distinguished
 
 
@@ -25,7 +27,7 @@ def waveform(model: ForceModel, fit: BaseFit | None, *, turned: bool) -> JSON | 
     identified only up to a rotation, and the tangential and radial coefficients are not identifiable.
     """
     if fit is None:
-        return Refusal("no run has the role identify")
+        return Refusal(NOT_IDENTIFIED_ON)
     deviation = np.sqrt(np.diag(fit.covariance))
     return {
         parameter.name: quantity(value / parameter.si, sd / parameter.si, parameter.unit, fit.dof)
@@ -53,7 +55,12 @@ def correlation(model: ForceModel, fit: BaseFit | None) -> JSON:
     return {**block, "warnings": together} if together else block
 
 
-def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.DataFrame) -> JSON | Refusal:
+def mean_coefficients(
+    model: ForceModel,
+    blocks: tuple[Block, ...],
+    spindle: pd.DataFrame,
+    changes: Mapping[str, Array] | None = None,
+) -> JSON | Refusal:
     """Classical identification: least squares of the mean forces of runs over the feed ([T] §4.1).
 
     The mean over a revolution does not depend on the start phase, so it needs no waveform. The chip is that
@@ -63,8 +70,10 @@ def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.
     Parameters
     ----------
     blocks : runs to use; helical ones are omitted. spindle : the observed table, with the mean force of each
-        run.
+        run. changes : by run, what (3,), N, of its mean force is no matter of the coefficients.
     """
+    if not blocks:
+        return Refusal(NOT_IDENTIFIED_ON)
     means = spindle.set_index("run")[[f"mean_{axis}_n" for axis in AXES]]
     straight = [block for block in blocks if block.setting.helix is None]
     if not straight:
@@ -74,6 +83,8 @@ def mean_coefficients(model: ForceModel, blocks: tuple[Block, ...], spindle: pd.
         for path in (False, True)
     )
     target = means.loc[[block.run for block in straight]].to_numpy()
+    if changes:
+        target = target - np.array([changes[block.run] for block in straight])
     size = np.sqrt((circular**2).sum(axis=(0, 1)))
     scaled = circular / np.maximum(size, 1e-300)
     if not _parted(scaled):
@@ -109,9 +120,12 @@ def _left_out(designs: Array, residual: Array) -> Array:
     return np.asarray(np.sqrt((moves**2).sum(axis=(0, 2))))
 
 
-def mean_design(model: ForceModel, block: Block, *, true_path: bool) -> Array:
-    """Mean force per unit of each coefficient at the nominal feed, (3, 6), in the comparison's frame."""
+def mean_design(model: ForceModel, block: Block, *, true_path: bool, beta: Array | None = None) -> Array:
+    """Mean force per unit of each coefficient at the nominal feed, (3, 6), in the comparison's frame.
+
+    ``beta``: coefficients of the force to which a tool yields, where the model has one.
+    """
     nominal = replace(block, setting=replace(block.setting, feed_ratio=1.0))
-    matrix, _ = replace(model, true_path=true_path).design(nominal, np.zeros(1), None)
+    matrix, _ = replace(model, true_path=true_path).design(nominal, np.zeros(1), beta)
     first = matrix[: len(matrix) // block.repeats, :6]
     return np.stack([first[zero[: len(first)] > 0].sum(axis=0) for zero in block.zeros.T])

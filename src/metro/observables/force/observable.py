@@ -19,11 +19,14 @@ from metro.observables.arm.wall import wall
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.force import NAME, TABLES
 from metro.observables.force.blocks import block_of
+from metro.observables.force.bottom_edges import advice, told_apart
 from metro.observables.force.coefficients import correlation, mean_coefficients, waveform
 from metro.observables.force.dynamometer import Dynamometer
+from metro.observables.force.mean_bias import mean_bias
 from metro.observables.force.model import ForceModel
 from metro.observables.force.orders import observe, recorded
 from metro.observables.force.proposals import feasible
+from metro.observables.force.static_meaning import static_deflection
 from metro.observables.force.yielding_table import yielding_table
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
@@ -36,7 +39,7 @@ SCATTER = 0.01
 UNIDENTIFIED_KFAC = (
     140.0 * N_MM2
 )  # rms of what it may be: anything up to the 243 N/mm² that [T] table 4 found
-LEAST_FEED_RATIO = 1.1  # between axial feeds that part the shear from the edge term of the bottom edges
+LEAST_FEED_RATIO = 1.1  # between axial feeds at which the thrust of an unknown K_Fac differs
 
 
 def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSON) -> Problem | Refusal:
@@ -53,12 +56,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     bottom = _bottom_edges(blocks)
     if bottom == ("kfae",):
         blocks = _at_other_feeds(blocks, tool)
-    model = ForceModel(
-        cutter=replace(tool, runout_radius=0.0, runout_angle=0.0),  # what is declared of it is an effect's
-        law=EdgeLaw(),
-        bottom_edges=bottom,
-        sensor=Dynamometer(axes=cutting_force.channels(batch)),
-    )
+    model = _base(batch, tool, bottom)
     notes = [
         "The chip thickness is that of the true tooth paths, the force law linear in it; "
         "tool, machine and dynamometer are rigid in the base model.",
@@ -72,6 +70,16 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     scatter = np.full(len(model.parameters), SCATTER)
     next_runs = feasible(blocks, tool, batch.manifest.get("limits"))
     return Problem(NAME, "N", 1.0, model, blocks, scatter, notes=tuple(notes), feasible=next_runs)
+
+
+def _base(batch: Batch, tool: Cutter, bottom: tuple[str, ...]) -> ForceModel:
+    """Return the model without any effect, declared or not."""
+    return ForceModel(
+        cutter=replace(tool, runout_radius=0.0, runout_angle=0.0),  # what is declared of it is an effect's
+        law=EdgeLaw(),
+        bottom_edges=bottom,
+        sensor=Dynamometer(axes=cutting_force.channels(batch)),
+    )
 
 
 def _path_note(tool: Cutter, blocks: tuple[Block, ...]) -> str:
@@ -104,19 +112,22 @@ def _give_note(batch: Batch, spindle: pd.DataFrame) -> tuple[str, ...]:
 
 
 def _bottom_edges(blocks: tuple[Block, ...]) -> tuple[str, ...]:
-    """Coefficients of the bottom edges that the helical runs identify: one axial feed gives the sum alone."""
-    feeds = [
-        block.setting.helix.axial_feed for block in blocks if block.role == "identify" and block.setting.helix
-    ]
+    """Coefficients of the bottom edges that the helical runs identify: feeds too alike give the sum alone."""
+    feeds = _axial_feeds(blocks)
     if not feeds:
         return ()
-    return ("kfac", "kfae") if max(feeds) > LEAST_FEED_RATIO * min(feeds) else ("kfae",)
+    return ("kfac", "kfae") if told_apart(feeds) else ("kfae",)
+
+
+def _axial_feeds(blocks: tuple[Block, ...]) -> list[float]:
+    """Axial feed per tooth, m, of each helical identification run."""
+    helices = [block.setting.helix for block in blocks if block.role == "identify"]
+    return [helix.axial_feed for helix in helices if helix]
 
 
 def _at_other_feeds(blocks: tuple[Block, ...], tool: Cutter) -> tuple[Block, ...]:
     """Allow helical runs at another axial feed than the one that was identified to have another thrust."""
-    helices = [block.setting.helix for block in blocks if block.role == "identify"]
-    identified_feed = float(np.mean([helix.axial_feed for helix in helices if helix]))
+    identified_feed = float(np.mean(_axial_feeds(blocks)))
     return tuple(
         replace(block, unidentified=_unidentified_thrust(block, tool, identified_feed))
         if block.setting.helix
@@ -165,18 +176,35 @@ def report(
         )
     if model.bottom_edges == ("kfae",):
         lacking["kfac"] = (
-            "the helical runs have one axial feed: kfae holds the whole thrust of the bottom edges; at other "
-            "feeds the thrust is uncertain until a second one is identified"
+            "kfae holds the whole thrust of the bottom edges. K_Fac takes "
+            f"{advice(_axial_feeds(task.blocks))}"
         )
     block |= {name: value for name, value in results.items() if not isinstance(value, Refusal)}
     block |= correlation(model, fit)
     return {"force": {**block, "not_identified": lacking} if lacking else block}
 
 
+def after_loop(
+    batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON, problem: Problem, fit: BaseFit
+) -> JSON:
+    """Return what the effects found make of the coefficients that the mean forces give."""
+    tool, reported = cutting_force.cutter(batch), identified.get("force") or {}
+    if isinstance(tool, Refusal):
+        return {}
+    base = _base(batch, tool, cast("ForceModel", problem.base).bottom_edges)
+    block = mean_bias(base, problem, observed["spindle"], reported, fit)
+    return {"force": block} if block else {}
+
+
 def yielding(batch: Batch, read: Tables, identified: JSON) -> tuple[dict[str, pd.DataFrame], JSON]:
     """Return what a tabulated machine's stiffness makes of the identified cutting force."""
     table = yielding_table(batch, read, identified)
-    return ({} if isinstance(table, Refusal) else {"yielding": table}), {}
+    if isinstance(table, Refusal):
+        return {}, {}
+    static = static_deflection(batch, read, identified)
+    return {"yielding": table}, {"force": {"static_deflection": static}} if static else {}
 
 
-OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, beside=yielding, gives_coefficients=True)
+OBSERVABLE = Observable(
+    NAME, TABLES, observe, problem, report, beside=yielding, gives_coefficients=True, after_loop=after_loop
+)

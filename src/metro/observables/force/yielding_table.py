@@ -52,17 +52,10 @@ def yielding_table(batch: Batch, read: Read, identified: JSON) -> pd.DataFrame |
     of the revolutions, in N and in % of the largest rigid force, and ``refused``: the reason if a row has no
     figures.
     """
-    table = read("stations")
-    if table.empty:
-        return Refusal("cell.yaml names no stations: the machine's end stiffness is not tabulated")
-    tool, values = cutting_force.cutter(batch), cutting_force.coefficients(batch, identified)
-    if isinstance(tool, Refusal):
-        return tool
-    if isinstance(values, Refusal):
-        return values
-    si = np.array([values[name] for name in COEFFICIENTS]) * cutting_force.TO_SI
-    stations = stations_of(table)
-    names = tuple(str(name) for name in table["position"])
+    machine = _machine(batch, read, identified)
+    if isinstance(machine, Refusal):
+        return machine
+    tool, si, stations, names = machine
     errors = np.diagonal(leave_one_out(stations))
     error = {f"leave_one_out_{a}_percent": 100.0 * e for a, e in zip(AXES, errors, strict=True)}
     rows = []
@@ -74,6 +67,48 @@ def yielding_table(batch: Batch, read: Read, identified: JSON) -> pd.DataFrame |
             row = {"run": run, "refused": str(refusal)}
         rows.append(row | error)
     return pd.DataFrame(rows)
+
+
+def gains(batch: Batch, read: Read, identified: JSON) -> pd.DataFrame | Refusal:
+    """Return ``run, gain``: by what the plain iteration multiplies an error of the force, at worst.
+
+    The runs are those of :func:`yielding_table`, less those that it refuses; nothing is solved.
+    """
+    machine = _machine(batch, read, identified)
+    if isinstance(machine, Refusal):
+        return machine
+    tool, si, stations, names = machine
+    known: dict[tuple[Any, ...], float] = {}
+    rows = []
+    for run in recorded(batch) or [str(run) for run in batch.runs.index]:
+        try:
+            _, stiffness = _end_stiffness(batch, run, stations, names)
+            cut = cutting_force.cut(batch, run, tool.radius)
+        except ValueError:
+            continue
+        directions = _directions(batch.runs.loc[run])
+        key = cut, tuple(stiffness.ravel()), tuple(directions)  # repeats are solved once
+        if key not in known:
+            springs = _springs(_compliance(batch, stiffness), directions)
+            known[key] = max(ratios(tool, EdgeLaw(), cut, si, spring)[0] for spring in springs)
+        rows.append({"run": run, "gain": known[key]})
+    return pd.DataFrame(rows, columns=["run", "gain"])
+
+
+def _machine(
+    batch: Batch, read: Read, identified: JSON
+) -> tuple[Cutter, Array, Stations, tuple[str, ...]] | Refusal:
+    """Return tool, coefficients (6,) SI, stations and their names."""
+    table = read("stations")
+    if table.empty:
+        return Refusal("cell.yaml names no stations: the machine's end stiffness is not tabulated")
+    tool, values = cutting_force.cutter(batch), cutting_force.coefficients(batch, identified)
+    if isinstance(tool, Refusal):
+        return tool
+    if isinstance(values, Refusal):
+        return values
+    si = np.array([values[name] for name in COEFFICIENTS]) * cutting_force.TO_SI
+    return tool, si, stations_of(table), tuple(str(name) for name in table["position"])
 
 
 def _end_stiffness(batch: Batch, run: str, stations: Stations, names: tuple[str, ...]) -> tuple[JSON, Array]:
@@ -98,13 +133,23 @@ def _base_from_work(batch: Batch) -> Array:
 
 def _worst(batch: Batch, run: str, tool: Cutter, coefficients: Array, stiffness: Array) -> JSON:
     """Solve one run in its directions of feed; ``stiffness`` (3, 3) N/m, base frame."""
-    turn, cut = _base_from_work(batch), cutting_force.cut(batch, run, tool.radius)
-    compliance = turn.T @ np.linalg.inv(stiffness) @ turn
+    cut, compliance = cutting_force.cut(batch, run, tool.radius), _compliance(batch, stiffness)
     plane = _in_plane(compliance, 0.0) / N_UM
-    springs = [_in_plane(compliance, angle) for angle in _directions(batch.runs.loc[run])]
+    springs = _springs(compliance, _directions(batch.runs.loc[run]))
     rows = [_feedback(tool, cut, coefficients, spring) for spring in springs]
     worst = max(rows, key=lambda row: float(row["difference_n"]))
     return worst | dict(zip(PLANE, plane.ravel().tolist(), strict=True))
+
+
+def _compliance(batch: Batch, stiffness: Array) -> Array:
+    """Compliance (3, 3) m/N in the work frame; ``stiffness`` (3, 3) N/m, base frame."""
+    turn = _base_from_work(batch)
+    return np.asarray(turn.T @ np.linalg.inv(stiffness) @ turn)
+
+
+def _springs(compliance: Array, directions: list[float]) -> list[Array]:
+    """Stiffness (2, 2) in the plane, in the frames of some directions of feed, rad."""
+    return [_in_plane(compliance, angle) for angle in directions]
 
 
 def _directions(row: Any) -> list[float]:

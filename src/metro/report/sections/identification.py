@@ -23,6 +23,7 @@ COEFFICIENTS = {
 FORCE_SETS = {
     "mean": "mean forces, identification runs",
     "mean_all_runs": "mean forces, all runs",
+    "mean_corrected": "mean forces, identification runs, less the effects found",
     "waveform": "waveform, identification runs",
 }
 FACES = {
@@ -47,8 +48,15 @@ def identification(results: Results) -> Section:
     """Write every block of ``identified.json``, and the reasons why others are missing."""
     identified = results.identified
     items: list[Item] = [
-        *_force(identified.get("force") or {}, mean_items(results.tables.get("mean_forces"))),
-        *_yielding(results.tables.get("yielding")),
+        *_force(
+            identified.get("force") or {},
+            mean_items(results.tables.get("mean_forces")),
+            _effects((results.verdict.get("observables") or {}).get("force") or {}),
+        ),
+        *_yielding(
+            results.tables.get("yielding"),
+            ((identified.get("force") or {}).get("static_deflection") or {}).get("reason") or "",
+        ),
         *modes(identified.get("modes") or [], results.tables),
         *boundaries(results),
         *_arm(identified.get("arm") or {}),
@@ -89,28 +97,34 @@ def _reasons(identified: JSON) -> list[tuple[str, str]]:
     return [(listing(names), reason) for reason, names in alike.items()]
 
 
-def _force(force: JSON, drawn: list[Item]) -> list[Item]:
-    """Write the coefficients, their figures ``drawn``, and the speeds."""
+def _effects(verdict: JSON) -> str:
+    """Name the effects that were found in the cutting force, as a subject."""
+    return listing([words(effect["effect"]) for effect in verdict.get("effects") or []]) or "what was found"
+
+
+def _force(force: JSON, drawn: list[Item], effects: str) -> list[Item]:
+    """Write the coefficients, their figures ``drawn``, what ``effects`` made of them, and the speeds."""
     sets = {key: force[key] for key in FORCE_SETS if force.get(key)}
     if not sets:
         return []
     names = [name for name in COEFFICIENTS if any(name in block for block in sets.values())]
     rows = []
     for name in names:
-        cells = [block.get(name) for block in sets.values()]
-        known = next(cell for cell in cells if cell)
-        rows.append(
-            [
-                COEFFICIENTS[name],
-                printed(known.get("unit")),
-                *(quantity(c, with_unit=False) if c else "–" for c in cells),
-            ]
-        )
+        known = next(cell for block in sets.values() if (cell := block.get(name)))
+        cells = [
+            f"{quantity(cell, with_unit=False)}{' *' if _biased(force, key, name) else ''}" if cell else "–"
+            for key, block in sets.items()
+            for cell in [block.get(name)]
+        ]
+        rows.append([COEFFICIENTS[name], printed(known.get("unit")), *cells])
     edge = force.get("edge_length", "axial")
     caption = f"Cutting coefficients with 95 % intervals; the edge terms count along the {edge} edge length."
+    biased = any(_biased(force, key, name) for key in sets for name in names)
+    caption += " * biased by more than the interval: see below." if biased else ""
     header = ["coefficient", "unit", *(FORCE_SETS[key] for key in sets)]
     items: list[Item] = [Heading("Cutting force"), Table(header, rows, caption, [1, 0.8, *([2] * len(sets))])]
     items += drawn
+    items += [Bullets([_bias(force["mean_bias"], effects)])] if biased else []
     warnings = force.get("warnings") or []
     items += [Bullets([f"{str(warning).rstrip('.')}." for warning in warnings])] if warnings else []
     speeds = force.get("spindle_rpm") or {}
@@ -119,11 +133,40 @@ def _force(force: JSON, drawn: list[Item]) -> list[Item]:
     return items
 
 
-def _yielding(table: pd.DataFrame | None) -> list[Item]:
-    """Write the deflection feedback at the stations of a tabulated machine, run by run."""
+def _biased(force: JSON, key: str, name: str) -> bool:
+    """Whether the effects found change a coefficient from the mean forces by more than its interval."""
+    bias = ((force.get("mean_bias") or {}).get(key) or {}).get(name)
+    if not bias:
+        return False
+    low, high = force[key][name]["ci95"]
+    return bool(abs(bias["value"]) > 0.5 * (high - low))
+
+
+def _bias(bias: JSON, effects: str) -> str:
+    """Say how the effects found spoil the coefficients from the mean forces, and which are to be used."""
+    shares = {feed: share for feed, share in bias["edge_in_cut"].items() if share is not None}
+    least, most = (f"{100 * shares[feed]:.0f} %" for feed in (next(iter(shares)), next(reversed(shares))))
+    shifts = [
+        f"{COEFFICIENTS[name]} by {number(one['value'])} {printed(one['unit'])}"
+        for name, one in (bias.get("mean") or bias["mean_all_runs"]).items()
+    ]
+    text = f"The mean forces take every tooth to cut. The model with {effects} says that they shift "
+    text += listing(shifts)
+    if least != most:
+        first, *_, last = shares
+        text += (
+            f": the edges cut on {least} of their way through the work at {first} mm per tooth and on {most} "
+            f"at {last} mm, and the line over the feed reads this change as shear"
+        )
+    return f"{text}. Use the coefficients from the waveform, or those less the effects found."
+
+
+def _yielding(table: pd.DataFrame | None, denied: str) -> list[Item]:
+    """Write the deflection feedback at the stations of a tabulated machine, and what ``denied`` it."""
     if table is None:
         return []
     items: list[Item] = [Heading("Deflection feedback")]
+    items += [Paragraph(f"{denied[0].upper()}{denied[1:]}.", "warning")] if denied else []
     if "difference_n" in table:
         rows = [
             [", ".join(runs), *cells]

@@ -13,7 +13,7 @@ from metro.report.sections import findings
 from metro.report.sections.lobes import boundary_items
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
-from metro.report.sections.trust import trust
+from metro.report.sections.trust import static_deflection, trust
 from metro.report.sections.verdict import (
     STATUS,
     change,
@@ -63,7 +63,7 @@ def first_words(results: Results) -> list[Item]:
         Paragraph(measured_words(results)),
         *(Paragraph(text, "verdict") for text in texts or [no_verdict(results)]),
         Heading("What to trust"),
-        Bullets(trust(results)),
+        Bullets([*trust(results), *static_deflection(results)]),
         *(measure if nexts else []),
         *advice(results.identified),
         *print_check(results),

@@ -31,6 +31,19 @@ def trust(results: Results) -> list[str]:
     return [f"{' '.join(said)} {tested}".rstrip() for tested, said in alike.items()] or [NOTHING]
 
 
+def static_deflection(results: Results) -> list[str]:
+    """Say with its figures that a static deflection of the machine has no meaning; nothing where it has."""
+    found = (results.identified.get("force") or {}).get("static_deflection") or {}
+    if not found.get("reason"):
+        return []
+    figures = [f"gain of its iteration {number(found['iteration_gain'])}"]
+    if "moves" in found:
+        low, high = (number(end) for end in found["modes_hz"])
+        figures.append(f"teeth at {number(found['tooth_hz'])} Hz, modes at {low} to {high} Hz")
+    runs = f"{len(found['runs'])} run{'s' if len(found['runs']) > 1 else ''}"
+    return [f"No static deflection of the machine: it has no meaning in {runs} ({'; '.join(figures)})."]
+
+
 def trust_in(results: Results, observable: str) -> str:
     """Say for one verdict what :func:`trust` says for all."""
     entry = results.verdicts()[observable]
