@@ -124,6 +124,7 @@ MASS = (
     *_numbers("mass_kg", "myy", required=True),
     *_numbers("mass_between_kg", "myz", required=True),
     *_numbers("mass_kg", "mzz", required=True),
+    *_numbers("joint_deg", *(f"q{i}_deg" for i in range(1, 7))),
 )
 
 PUBLISHED = (

@@ -58,7 +58,10 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("x_mm", "y_mm", "z_mm", "fx_n", "fy_n", "fz_n", "dx_mm", "dy_mm", "dz_mm", "replicate"),
         "sigma_mm",
     ),
-    "mass": ("pose", "point", "x_mm", "y_mm", "z_mm", "mxx", "mxy", "mxz", "myy", "myz", "mzz"),
+    "mass": (
+        *("pose", "point", "x_mm", "y_mm", "z_mm", "mxx", "mxy", "mxz", "myy", "myz", "mzz"),
+        *(f"q{i}_deg" for i in range(1, 7)),
+    ),
     "stations": ("position", "x_mm", "y_mm", "z_mm", "kx_n_um", "ky_n_um", "kz_n_um"),
     "published": (
         *("table", "row", "observable", "quantity", "axis", "measured", "predicted", "unit"),

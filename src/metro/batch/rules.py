@@ -58,11 +58,7 @@ def load_findings(table: Table) -> Iterator[Finding]:
 def _load_units(table: Table) -> Iterator[Finding]:
     """Check the units of load tests by the stiffness that they make, and by the extent of the places."""
     rows = [row for _, row in table.sound()]
-    angles = np.array([[row[f"q{i}_deg"] for i in range(1, 7)] for row in rows]).reshape(-1, 6)
-    known = angles[np.isfinite(angles).all(axis=1)]
-    if known.size and 0 < np.abs(known).max() <= 2 * math.pi:
-        fault = f"no angle is beyond {np.abs(known).max():g}: they seem to be in radians, expected degrees"
-        yield Finding("error", table.file, fault, column="q1_deg")
+    yield from _radians(table)
     stiffness = [
         abs(row[f"f{axis}_n"] / row[f"d{axis}_mm"])
         for row in rows
@@ -86,6 +82,15 @@ def _load_units(table: Table) -> Iterator[Finding]:
         yield Finding("error", table.file, fault, column="x_mm")
 
 
+def _radians(table: Table) -> Iterator[Finding]:
+    """Report joint angles that seem to be in radians."""
+    angles = np.array([[row[f"q{i}_deg"] for i in range(1, 7)] for _, row in table.sound()]).reshape(-1, 6)
+    known = angles[np.isfinite(angles).all(axis=1)]
+    if known.size and 0 < np.abs(known).max() <= 2 * math.pi:
+        fault = f"no angle is beyond {np.abs(known).max():g}: they seem to be in radians, expected degrees"
+        yield Finding("error", table.file, fault, column="q1_deg")
+
+
 def _odd(table: Table, column: str, typical: float, hint: str) -> Finding:
     low, high = STIFFNESS_N_MM
     fault = f"load over displacement is {typical:.3g} N/mm (median), expected {low:g} to {high:g}: {hint}"
@@ -106,6 +111,7 @@ def mass_findings(table: Table) -> Iterator[Finding]:
             fault = f"found {mean:g} (mean of the diagonal), expected {MASSES_KG[0]:g} to {MASSES_KG[1]:g} kg"
             yield table.finding(position, "mxx", f"{fault}: it seems to be in {unit}")
     yield from _twice(table, ("pose", "point"))
+    yield from _radians(table)
 
 
 def published_findings(table: Table) -> Iterator[Finding]:
