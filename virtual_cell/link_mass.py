@@ -1,4 +1,4 @@
-"""The mass of the links of an arm as the tip feels it when the joints yield to a force there."""
+"""What the masses of an arm's links do: the mass that the tip feels, and the torques that hold them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import numpy as np
 
 from virtual_cell.arm import Arm
 from virtual_cell.units import Array
+
+_GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -36,3 +38,13 @@ def tip_mass(arm: Arm, q: Array, bodies: tuple[Body, ...]) -> Array:
             moved += np.outer(lever, rates[joint])
         total += body.mass * moved.T @ moved
     return total
+
+
+def holding(arm: Arm, q: Array, bodies: tuple[Body, ...]) -> Array:
+    """Torques (6,), N m, of the motors that hold the bodies at rest."""
+    frames, torque = arm.frames(q), np.zeros(6)
+    for body in bodies:
+        at = frames[body.joint, :3, :3] @ np.array(body.centre) + frames[body.joint, :3, 3]
+        lever = at - frames[: body.joint, :3, 3]
+        torque[: body.joint] += body.mass * _GRAVITY * np.cross(frames[: body.joint, :3, 2], lever)[:, 2]
+    return torque

@@ -1,6 +1,7 @@
 """irb6640-setup: what is measured of a milling cell before the first face is cut.
 
-Load tests, hammer records and link masses of two wrists; encoders along a pass whose path error swings at
+Touched points that place tool and work, torques with and without the machining head; load tests, hammer
+records and link masses of two wrists; encoders along a pass whose path error swings at
 0.6 Hz; and two faces that are planned, for which all of this is a prediction.
 """
 
@@ -17,7 +18,7 @@ from virtual_cell.arm import rotation_rpy
 from virtual_cell.face import Passes
 from virtual_cell.face_tables import load_rows, mass_row, path_rows
 from virtual_cell.hammer import hit
-from virtual_cell.link_mass import Body, tip_mass
+from virtual_cell.link_mass import Body, holding, tip_mass
 from virtual_cell.modes import Modes
 from virtual_cell.noise import quantised
 from virtual_cell.recipes import irb6640
@@ -43,6 +44,19 @@ SWING_HZ, SWING_MM = 0.6, 0.045  # of the path error, and how far it carries the
 PERIOD = 0.012
 ENCODER = 3e-6  # rad, noise
 HAMMER_HZ, RING_S, HITS = 256.0, 6.0, 2
+TOUCH, PIN_MM, TILTS = 20.0 * UM, (1600.0, 250.0, 600.0), 8  # noise of a touch; the fixed point; so often
+BLOCK_MM = {  # where the faces of the block are touched: z = 0, y = 0, x = 0
+    "primary": (
+        (30.0, 20.0, 0.0),
+        (470.0, 25.0, 0.0),
+        (250.0, 85.0, 0.0),
+        (60.0, 80.0, 0.0),
+        (440.0, 85.0, 0.0),
+    ),
+    "secondary": ((40.0, 0.0, -4.0), (250.0, 0.0, -5.0), (460.0, 0.0, -4.0)),
+    "tertiary": ((0.0, 30.0, -5.0), (0.0, 70.0, -5.0)),
+}
+HELD, TORQUE_NM = 24, (6.0, 6.0, 4.0, 1.5, 1.0, 0.8)  # poses held, and noise of the joints' torques
 ARM = irb6640.ARM
 _SIZE = (SIZE_MM[0] * MM, SIZE_MM[1] * MM)
 _ORIGIN = np.array(ORIGIN_MM) * MM
@@ -75,6 +89,8 @@ def make(folder: Path) -> Row:
     write_csv(folder / "loads.csv", itertools.chain(*loads))
     write_csv(folder / "mass.csv", masses)
     write_csv(folder / "impacts.csv", impacts)
+    write_csv(folder / "touches.csv", _touches(rng))
+    write_csv(folder / "payload.csv", _held(rng))
     write_signal(folder / "log/encoders.parquet", _encoders(rng))
     write_csv(folder / "path/L.csv", path_rows(_passes()))
     write_csv(folder / "runs.csv", _runs(), RUN_COLUMNS)
@@ -136,6 +152,45 @@ def _encoders(rng: np.random.Generator) -> dict[str, Array]:
     columns |= {f"q{i}_set_deg": wanted[:, i - 1] / DEG for i in range(1, 7)}
     columns |= {f"q{i}_deg": quantised(actual[:, i - 1] / DEG, 1e-5) for i in range(1, 7)}
     return columns | {f"tau{i}_nm": quantised(torque[:, i - 1], 0.1) for i in range(1, 7)}
+
+
+def _touches(rng: np.random.Generator) -> list[Row]:
+    """Touch a fixed point with tilted tools, and the faces of the block with an upright one."""
+    upright = rotation_rpy(0.0, 0.0, WRIST_YAW_DEG["A"] * DEG)
+    tilts = rng.uniform(-25.0, 25.0, (TILTS, 3)) * DEG
+    pin = np.array(PIN_MM) * MM
+    touched: list[tuple[str, Array, Array]] = [("pin", pin, rotation_rpy(*tilt) @ upright) for tilt in tilts]
+    for face, points in BLOCK_MM.items():
+        touched += [(face, _ORIGIN + np.array(point) * MM, upright) for point in points]
+    rows = []
+    for name, point, axes in touched:
+        flange = ARM.frames(ARM.reach(point, axes, NEAR))[6]
+        at = (flange[:3, 3] + TOUCH * rng.normal(size=3)) / MM
+        row: Row = {"touched": name} | {f"{a}_mm": round(float(v), 3) for a, v in zip("xyz", at, strict=True)}
+        quaternion = _quaternion(flange[:3, :3])
+        rows.append(row | {f"q{i}": round(float(v), 8) for i, v in enumerate(quaternion, start=1)})
+    return rows
+
+
+def _quaternion(turn: Array) -> Array:
+    """Scalar first, as the controller has it."""
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, scalar = Rotation.from_matrix(turn).as_quat()
+    return np.array([scalar, x, y, z])
+
+
+def _held(rng: np.random.Generator) -> list[Row]:
+    """Hold the arm in some poses, with and without the machining head, and read the joints' torques."""
+    spread, rows = np.array([30.0, 15.0, 15.0, 120.0, 70.0, 120.0]) * DEG, []
+    for pose in range(HELD):
+        q, loaded = NEAR + spread * rng.uniform(-1.0, 1.0, 6), pose % 2 == 0
+        borne = bodies() if loaded else bodies()[:-1]
+        torque = holding(ARM, q, borne) + np.array(TORQUE_NM) * rng.normal(size=6)
+        row: Row = {"loaded": "yes" if loaded else "no"}
+        row |= {f"q{i}_deg": round(float(angle / DEG), 4) for i, angle in enumerate(q, start=1)}
+        rows.append(row | {f"tau{i}_nm": round(float(part), 2) for i, part in enumerate(torque, start=1)})
+    return rows
 
 
 def _runs() -> list[Row]:

@@ -139,6 +139,22 @@ PUBLISHED = (
     Column("note", longest=5000),
 )
 
+TOUCHES = (
+    Column("touched", required=True),
+    *_numbers("place_mm", "x_mm", "y_mm", "z_mm", required=True),
+    *_numbers("direction_cosine", "q1", "q2", "q3", "q4"),
+    *_numbers("orientation_deg", "rx_deg", "ry_deg", "rz_deg"),
+    *_numbers("sigma_mm", "sigma_mm"),
+)
+
+PAYLOAD = (
+    Column("loaded", required=True, choices=("yes", "no")),
+    *_numbers("joint_deg", *(f"q{i}_deg" for i in range(1, 7)), required=True),
+    *_numbers("torque_nm", *(f"tau{i}_nm" for i in range(1, 7)), required=True),
+    *_numbers("rate_deg_s", *(f"rate{i}_deg_s" for i in range(1, 7))),
+    *_numbers("acceleration_deg_s2", *(f"acceleration{i}_deg_s2" for i in range(1, 7))),
+)
+
 STATIONS = (
     Column("position", required=True),
     *_numbers("place_mm", "x_mm", "y_mm", "z_mm", required=True),
@@ -151,6 +167,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "impacts": IMPACTS,
     "loads": LOADS,
     "mass": MASS,
+    "touches": TOUCHES,
+    "payload": PAYLOAD,
     "published": PUBLISHED,
     "stations": STATIONS,
 }

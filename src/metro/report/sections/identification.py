@@ -37,7 +37,12 @@ RUN_BLOCKS = {
     "observability": "observability of the joints",
 }
 ABOUT = ("format", "batch", "metro", "not_identified")  # the batch and the file, not quantities
-ELSEWHERE = {"faces": "flatness of faces", "study": "factors and configurations", "arm": "the robot arm"}
+ELSEWHERE = {
+    "faces": "flatness of faces",
+    "study": "factors and configurations",
+    "arm": "the robot arm",
+    "calibration": "tool, work and payload",
+}
 OF_ROBOT = ("observability", "waviness")  # the robot's own section shows them
 LONGEST, ABREAST = 30, 3
 
