@@ -11,6 +11,7 @@ from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Sec
 from metro.report.figures import force as figures
 from metro.report.numbers import number
 from metro.report.results import Results
+from metro.report.sections.along_path import printed_path
 from metro.report.sections.printed_bias import CANNOT, bias
 from metro.units import printed
 
@@ -85,7 +86,7 @@ def _pairs(name: str, pairs: pd.DataFrame) -> list[Item]:
     bold = " Rows in bold cannot be right as printed." if strong else ""
     caption = f"Table {name}: printed pairs and recomputed errors.{says}{bold}"
     table = Table(header, rows, caption, [1, 1.5, 1, 1, 1, 1, 1], numeric=[2, 3, 4, 5, 6], strong=strong)
-    return [table, *bias(name, pairs)]
+    return [table, *bias(name, pairs), *printed_path(name, pairs)]
 
 
 def _single(rows: pd.DataFrame, results: Results) -> list[Item]:
