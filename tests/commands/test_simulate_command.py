@@ -139,6 +139,7 @@ def test_the_effects_and_their_parameters_are_those_of_the_simulator():
             effect: (one, boundary_draws.drawn_machine(rng)) for effect, one in BOUNDARY_EFFECTS.items()
         },
         "flatness": {effect: (one, faces_draws.drawn(rng, "a")) for effect, one in FACE_EFFECTS.items()},
+        "study": {effect: (one, faces_draws.drawn(rng, "a")) for effect, one in FACE_EFFECTS.items()},
         **dict.fromkeys(SHOWN, arm),
     }
     assert simulated() == {kind: recipe.effects for kind, recipe in KINDS.items()}

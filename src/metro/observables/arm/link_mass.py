@@ -28,8 +28,10 @@ def link_masses(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.Da
     ``difference_percent`` of declared (Frobenius; the declared matrix less this one).
     """
     arm, links = arm_of_cell(batch.cell, batch.manifest), links_of_cell(batch.cell)
+    if arm is None or not links:
+        return {}
     mass = read("mass").dropna(subset=ANGLES)
-    if arm is None or not links or mass.empty:
+    if mass.empty:
         return {}
     q = np.radians(mass[ANGLES].to_numpy(dtype=float))
     compliance = _joint_compliance(batch, identified)

@@ -10,7 +10,6 @@ import pandas as pd
 from metro.report.content import Item, Paragraph, Picture, Table
 from metro.report.figures import face_pairing as figures
 from metro.report.numbers import number
-from metro.report.sections.along_path import face_path
 from metro.units import Array, printed
 
 KINDS = ("measured", "before", "after")
@@ -55,7 +54,6 @@ def pairing_items(frame: pd.DataFrame) -> list[Item]:
         Paragraph(text),
         Table(header, rows, caption, [0] * len(header), numeric=list(range(1, len(header))), small=True),
         Picture(figures.parity(faces, shown), about, about),
-        *face_path(frame),
     ]
 
 

@@ -11,7 +11,7 @@ from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Sec
 from metro.report.figures import force as figures
 from metro.report.numbers import number
 from metro.report.results import Results
-from metro.report.sections.along_path import printed_path
+from metro.report.sections.along_path import along_path
 from metro.report.sections.printed_bias import CANNOT, bias
 from metro.units import printed
 
@@ -27,7 +27,7 @@ def published(results: Results) -> Section | None:
     items: list[Item] = [*_errata(table, tip)]
     for name, rows in table.groupby("table", sort=False):
         pairs = rows[rows["predicted"].notna()]
-        items += _pairs(str(name), pairs) if len(pairs) else []
+        items += [*_pairs(str(name), pairs), *along_path(results, str(name))] if len(pairs) else []
     if any(isinstance(item, Picture) for item in items):
         items.append(Paragraph(CANNOT, "note"))
     items += _single(table[table["predicted"].isna()], results)
@@ -86,7 +86,7 @@ def _pairs(name: str, pairs: pd.DataFrame) -> list[Item]:
     bold = " Rows in bold cannot be right as printed." if strong else ""
     caption = f"Table {name}: printed pairs and recomputed errors.{says}{bold}"
     table = Table(header, rows, caption, [1, 1.5, 1, 1, 1, 1, 1], numeric=[2, 3, 4, 5, 6], strong=strong)
-    return [table, *bias(name, pairs), *printed_path(name, pairs)]
+    return [table, *bias(name, pairs)]
 
 
 def _single(rows: pd.DataFrame, results: Results) -> list[Item]:
