@@ -108,6 +108,8 @@ def walk(schema: JSON, above: str = "") -> Iterator[tuple[str, JSON, bool]]:
 
 def allowed(rule: JSON) -> str:
     """Say in words what a rule allows."""
+    # A reference is to keys that several parts of the schema share: what they are is in the meaning.
+    rule = {"type": "object"} if "$ref" in rule else rule
     if "const" in rule:
         return f"`{rule['const']}`"
     if "enum" in rule:

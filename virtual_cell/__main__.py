@@ -13,7 +13,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from virtual_cell.batches import bundled
-from virtual_cell.blind import RECIPES
+from virtual_cell.blind import KINDS
 from virtual_cell.hidden import Parameters
 from virtual_cell.recipes.force import STYLES
 
@@ -25,9 +25,9 @@ def main(arguments: list[str] | None = None) -> None:
         bundled(options.root)
         return
     if options.command == "effects":
-        print(json.dumps({name: dict(recipe.effects) for name, recipe in RECIPES.items()}))
+        print(json.dumps({name: dict(recipe.effects) for name, recipe in KINDS.items()}))
         return
-    recipe = RECIPES[options.command]
+    recipe = KINDS[options.command]
     hidden = dict(_effect(words, recipe.effects) for words in options.effect)
     truth = recipe.make(options.folder, hidden, options.seed, options.style)
     path = options.truth or options.folder.parent / f"{options.folder.name}.truth.json"
@@ -40,7 +40,7 @@ def _parser() -> argparse.ArgumentParser:
     every = commands.add_parser("bundled", help="remake the bundled batches")
     every.add_argument("root", type=Path)
     commands.add_parser("effects", help="list as JSON what each kind of batch can hide, with its parameters")
-    for name, recipe in RECIPES.items():
+    for name, recipe in KINDS.items():
         hidden = ", ".join(recipe.effects)
         one = commands.add_parser(
             name, help=f"make a {name} batch; the truth goes beside the folder, not into it"

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from virtual_cell.recipes import bottom, chatter, irb6640, kr160, slot, trimule
+from virtual_cell.recipes import bottom, chatter, irb6640, irb6640_setup, kr160, slot, trimule
 from virtual_cell.write import Row
 
 BUNDLED: dict[str, Callable[[Path], Row]] = {
     "clean-slot": slot.make,
     "irb6640-face": irb6640.make,
+    "irb6640-setup": irb6640_setup.make,
     "kr160-side": kr160.make,
     "trimule-bottom": bottom.make,
     "trimule-chatter": chatter.make,

@@ -36,3 +36,5 @@ RECIPES = {
     "flatness": Recipe(faces.make, _named(FACE_EFFECTS)),
     "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS)),
 }
+# What can be made: a batch of each observable, and a factorial study of faces.
+KINDS = {**RECIPES, "study": Recipe(faces.make_study, _named(FACE_EFFECTS))}

@@ -152,7 +152,8 @@ def simulate(
     kind: Annotated[
         str,
         typer.Option(
-            help="What is measured: force, joint_force, deformation, waviness, flatness, lobes.",
+            help="What is measured: force, joint_force, deformation, waviness, flatness, lobes; "
+            "or study, 72 faces of eight configurations.",
             autocompletion=observables,
         ),
     ] = "force",

@@ -32,6 +32,7 @@ PRINTED = {
     "mdeg": "m°",
     "N/mm2": "N/mm²",
     "N mm2": "N mm²",
+    "kg m2": "kg m²",
     "um/min": "µm/min",
     "N/um": "N/µm",
     "N*m/rad": "N m/rad",

@@ -92,3 +92,28 @@ def test_joint_stiffness_without_an_arm_is_of_no_use(tmp_path):
         ("warning", "maker"),
         ("warning", "joint_stiffness_nm_rad"),
     ]
+
+
+BODY = "{mass_kg: 10, centre_mm: [0, 0, 0]%s}"
+DH = "[[0,90,500,250],[90,0,0,610],[-180,-90,0,70],[0,90,710,0],[0,-90,0,0],[0,0,215,0]]"
+ARM = f"cell: kr160\narm:\n  dh: {DH}\n"
+
+
+def test_links_and_head_of_an_arm_are_read(tmp_path):
+    links = ", ".join([BODY % ""] * 6)
+    head = BODY % ", inertia_kg_m2: [1, 2, 1.5, 0, 0, 0]"
+    (tmp_path / "cell.yaml").write_text(ARM + f"  links: [{links}]\n  head: {head}\n")
+    assert faults(tmp_path) == ""
+
+
+def test_moments_of_inertia_that_no_body_has_are_an_error(tmp_path):
+    """Those of [F] table 4: 3.122 exceeds 0.934 + 1.433."""
+    links = ", ".join([BODY % ""] * 6)
+    head = BODY % ", inertia_kg_m2: [0.934, 3.122, 1.433, 0, 0, 0]"
+    (tmp_path / "cell.yaml").write_text(ARM + f"  links: [{links}]\n  head: {head}\n")
+    assert "arm.head.inertia_kg_m2: found principal moments of 0.934, 1.433, 3.122" in faults(tmp_path)
+
+
+def test_links_must_be_six_with_a_mass_each(tmp_path):
+    (tmp_path / "cell.yaml").write_text(ARM + "  links: [{mass_kg: 10}]\n")
+    assert "arm.links" in faults(tmp_path)

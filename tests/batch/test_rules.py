@@ -9,7 +9,13 @@ MASS = "pose,mxx,mxy,mxz,myy,myz,mzz\n"
 PUBLISHED = "table,row,observable,quantity,measured,predicted,unit\n"
 STATIONS = "position,x_mm,y_mm,z_mm,kx_n_um,ky_n_um,kz_n_um\n"
 ACROSS = STATIONS.strip() + ",kxy_n_um\n"
+TOUCHES = "touched,x_mm,y_mm,z_mm,q1,q2,q3,q4,rx_deg,ry_deg,rz_deg\n"
+PAYLOAD = (
+    ",".join(["loaded", *(f"q{i}_deg" for i in range(1, 7)), *(f"tau{i}_nm" for i in range(1, 7))]) + "\n"
+)
 CHECKS = {
+    "touches": rules.touch_findings,
+    "payload": rules.payload_findings,
     "impacts": rules.impact_findings,
     "loads": rules.load_findings,
     "mass": rules.mass_findings,
@@ -33,6 +39,8 @@ def faults(folder, name, text):
         ("published", PUBLISHED + "4,Ktc,force,coefficient,10145,,N/mm2\n"),
         ("stations", STATIONS + "1,0,0,0,1,2,3\n2,0,0,-320,1,2,3\n"),
         ("stations", ACROSS + "1,0,0,0,1,2,3,1.2\n2,0,0,-320,1,2,3,\n"),
+        ("touches", TOUCHES + "pin,1300,20,700,0.6,0,0.8,0,,,\nprimary,1300,20,700,,,,,0,90,0\n"),
+        ("payload", PAYLOAD + "yes,10,20,30,40,50,60,1,2,3,4,5,6\nno,10,20,30,40,50,60,1,2,3,4,5,6\n"),
     ],
 )
 def test_rows_that_follow_the_contract_pass(tmp_path, name, text):
@@ -93,3 +101,34 @@ def test_rows_that_follow_the_contract_pass(tmp_path, name, text):
 )
 def test_a_row_that_cannot_be_used_is_named(tmp_path, name, text, message):
     assert message in faults(tmp_path, name, text)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        (
+            "touches",
+            TOUCHES + "pin,1300,20,700,,,,,,,\n",
+            "row 2 (pin): column q1: expected the orientation of the flange once",
+        ),
+        ("touches", TOUCHES + "pin,1300,20,700,1,0,0,0,0,90,0\n", "q1 to q4, or rx_deg, ry_deg and rz_deg"),
+        (
+            "touches",
+            TOUCHES + "pin,1300,20,700,0.6,0,0.6,0,,,\n",
+            "found a quaternion of length 0.8485, expected 1",
+        ),
+        ("touches", TOUCHES + "pin,1.3,0.02,0.7,1,0,0,0,,,\n", "they seem to be in metres, expected mm"),
+        (
+            "payload",
+            PAYLOAD + "yes,10,20,30,40,50,60,1,2,3,4,5,6\n",
+            "expected torques with and without the load",
+        ),
+        (
+            "payload",
+            PAYLOAD + "yes,1,1,1,1,1,1,1,2,3,4,5,6\nno,1,1,1,1,1,1,1,2,3,4,5,6\n",
+            "in radians, expected degrees",
+        ),
+    ],
+)
+def test_what_is_wrong_with_touches_and_torques_is_said(tmp_path, name, text, said):
+    assert said in faults(tmp_path, name, text)

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from metro.cli import app
 from metro.commands.hidden import Style, hidden, parameters, simulated
 from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
-from virtual_cell.blind import RECIPES
+from virtual_cell.blind import KINDS
 from virtual_cell.face_effects import FACE_EFFECTS
 from virtual_cell.hidden import BOUNDARY_EFFECTS
 from virtual_cell.hidden import EFFECTS as FORCE_EFFECTS
@@ -139,9 +139,10 @@ def test_the_effects_and_their_parameters_are_those_of_the_simulator():
             effect: (one, boundary_draws.drawn_machine(rng)) for effect, one in BOUNDARY_EFFECTS.items()
         },
         "flatness": {effect: (one, faces_draws.drawn(rng, "a")) for effect, one in FACE_EFFECTS.items()},
+        "study": {effect: (one, faces_draws.drawn(rng, "a")) for effect, one in FACE_EFFECTS.items()},
         **dict.fromkeys(SHOWN, arm),
     }
-    assert simulated() == {kind: recipe.effects for kind, recipe in RECIPES.items()}
+    assert simulated() == {kind: recipe.effects for kind, recipe in KINDS.items()}
     for kind, effects in simulated().items():
         for effect in effects:
             one, subject = known[kind][effect]

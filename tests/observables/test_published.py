@@ -10,6 +10,7 @@ import yaml
 
 from metro.batch.batch import Batch
 from metro.observables.problem import Problem, Refusal
+from metro.observables.published.misprints import grubbs
 from metro.observables.published.observable import errors, loads, modes, observe, problems
 from metro.structure import Structure
 
@@ -53,10 +54,15 @@ def test_face_milling_tables_divide_by_the_prediction_and_sensorless_tables_by_t
     assert (force["flag"] == "").all()
 
 
-def test_the_two_misprinted_percentages_and_the_impossible_index_are_the_only_flags():
+def test_the_misprints_of_the_face_milling_tables_are_the_only_flags():
     table = errors(batch("irb6640-published")[1])
     flagged = table[table["flag"] != ""].set_index(["row", "quantity"])
-    assert set(flagged.index) == {("case 5", "X_m"), ("case 7", "X_m"), ("case 3", "X_g")}
+    gauge = ("P3", "displacement under 150 N, second gauge")
+    inertia = ("machining head", "moment of inertia")
+    indices = {("case 5", "X_m"), ("case 7", "X_m"), ("case 3", "X_g")}
+    assert set(flagged.index) == indices | {gauge, inertia}
+    assert "0.97 mm stands out of the other 7 points, 0.081 to 0.139" in flagged.loc[gauge, "flag"]
+    assert "3.122 exceeds the sum of the other two, 2.367" in flagged.loc[inertia, "flag"]
     assert flagged.loc[("case 5", "X_m"), "of_predicted_percent"] == pytest.approx(12.06, abs=0.005)
     assert flagged.loc[("case 7", "X_m"), "of_predicted_percent"] == pytest.approx(23.88, abs=0.005)
     assert "X_g exceeds X_a" in flagged.loc[("case 3", "X_g"), "flag"]
@@ -108,6 +114,24 @@ def test_the_printed_structure_is_not_linear_between_its_two_loads():
     assert x[250.0] < x[150.0]
     y = table.xs("y").droplevel(1)
     assert y[250.0] < 0.2 * y[150.0]
+
+
+def test_a_compliance_leaves_out_the_value_that_is_called_a_misprint():
+    table = loads(batch("irb6640-published")[1]).set_index(["axis", "load_n", "quantity"])
+    gauge = table.loc[("z", 150.0, "displacement under 150 N, second gauge")]
+    others = [0.109, 0.127, 0.115, 0.139, 0.136, 0.099, 0.081]
+    assert gauge["points"] == len(others)
+    assert gauge["compliance_um_n"] == pytest.approx(1e3 * np.mean(others) / 150)
+
+
+def test_values_of_a_sound_column_are_rarely_called_a_misprint():
+    """The chance that Grubbs's test states is one: of 4000 normal columns as many are called as it says."""
+    rng = np.random.default_rng(3)
+    chance = np.array([grubbs(rng.normal(size=8))[1] for _ in range(4000)])
+    assert np.mean(chance < 0.05) == pytest.approx(0.05, abs=0.011)
+    place, probability = grubbs(np.array([0.0, 0.1, -0.1, 0.05, 9.0, -0.05]))
+    assert place == 4
+    assert probability < 1e-6
 
 
 def test_only_pairs_along_an_axis_become_a_residual():

@@ -116,6 +116,7 @@ def test_a_pose_that_follows_from_two_factors_is_no_third_one():
     told = {alias.term: alias for alias in design.aliases}
     assert told["pose",].part is False
     assert told["pose",].same_as == (("C",), ("b",), ("C", "b"))
+    assert [term for term in told if "pose" in term] == [("pose",)]
     assert ("C", "b") in design.terms
 
 

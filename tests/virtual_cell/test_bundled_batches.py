@@ -25,7 +25,10 @@ def digest(folder):
     return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
 
 
-@pytest.fixture(params=sorted(BUNDLED))
+CUT = sorted(set(BUNDLED) - {"irb6640-setup"})  # which is measured before anything is cut
+
+
+@pytest.fixture(params=CUT)
 def batch(request):
     folder = RAW / request.param
     return (
@@ -35,7 +38,7 @@ def batch(request):
     )
 
 
-@pytest.mark.parametrize("name", ["clean-slot", "irb6640-face", "trimule-bottom"])
+@pytest.mark.parametrize("name", ["clean-slot", "irb6640-face", "irb6640-setup", "trimule-bottom"])
 def test_remaking_a_batch_gives_the_same_bytes(name, tmp_path):
     BUNDLED[name](tmp_path / name)
     assert digest(tmp_path / name) == digest(RAW / name)

@@ -172,3 +172,17 @@ def test_a_batch_of_style_b_passes_the_pipelines_check(tmp_path):
     made(tmp_path / "one", {}, seed=4, style="b")
     report = check.check(tmp_path / "one", tmp_path)
     assert not [problem for problem in report.problems if "role" not in str(problem)]
+
+
+def test_a_study_has_nine_faces_of_each_of_the_eight_configurations(tmp_path):
+    """The scans are the whole of the work, and are left out here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(faces, "_cut", lambda *_: np.zeros((1, 3)))
+        truth = faces.make_study(tmp_path / "study", {}, 1)
+    runs = pd.read_csv(tmp_path / "study/runs.csv")
+    counts = runs.groupby(["wrist", "location", "orientation"]).size()
+    assert len(runs) == 72
+    assert set(counts) == {9}
+    assert len(counts) == 8
+    assert truth["effects"] == {}
+    assert runs.groupby("condition").role.nunique().max() == 1

@@ -30,6 +30,7 @@ from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_
 Listener = Callable[[str, Case, SideForce], Row]
 _SCATTER, _SPEED_ERROR = 0.01, 0.003
 _THICK_MM = 10.0
+_REPEATS, _COARSE = 9, 1.1 * MM  # of a study: faces of each configuration, and pitch of their scans
 _HAMMER_HZ, _HAMMER_NOISE = np.arange(0.5, 60.0, 0.125), 0.01
 
 
@@ -52,6 +53,17 @@ def make_eight_cases(
     """Write a batch of all eight configurations on a fixed bench, half of them held out; return the truth."""
     rng = np.random.default_rng([seed, 43])
     return _made(folder, drawn(rng, "a", eight_cases(replicates)), hidden, rng) | {"seed": seed}
+
+
+def make_study(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style: str = "a") -> Row:
+    """Write the whole study of Iglesias et al. 2025 (tables 1, 2): eight configurations, each cut nine times.
+
+    The 72 scans are as coarse as the heights at the points of the path allow, so that the batch is small.
+    """
+    rng = np.random.default_rng([seed, 45])
+    cell = drawn(rng, style, eight_cases(_REPEATS))
+    cell = replace(cell, scanner=replace(cell.scanner, spacing=max(cell.scanner.spacing, _COARSE)))
+    return _made(folder, cell, hidden, rng) | {"seed": seed, "style": style}
 
 
 def _made(

@@ -19,6 +19,7 @@ Part = Mapping[str, np.ndarray | pd.Series | str | int]
 _TEXT = {
     *("run", "log", "test", "position", "reference", "response", "response_unit", "pose", "point"),
     *("table", "row", "observable", "quantity", "axis", "unit", "note", "file", "check", "message"),
+    *("touched", "loaded"),
 }
 _WHOLE = {("path", "point"), ("path", "pass"), ("hit", "replicate"), ("frf", "replicate")}
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
+
+import numpy as np
 
 from metro.batch.documents import Likeness, read_yaml, schema_findings
 from metro.batch.findings import Finding, Severity, linked_outside, misspelt
@@ -13,6 +16,7 @@ FILE = "cell.yaml"
 CELLS = Path("config/cells")  # unless config.yaml or the command line says otherwise
 CHECKOUT = Path(__file__).parents[3]  # where this package is used from a checkout
 SHORTEST_ARM_MM = 10.0
+ROUNDED = 0.001  # of moments of inertia that are declared with three digits
 
 
 def shared_cells(cells: Path, checkout: Path = CHECKOUT) -> Path:
@@ -65,7 +69,7 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
         message = f'found "{content["cell"]}", expected the cell that batch.yaml names, "{name}"'
         findings.append(Finding("error", file, message, column="cell"))
     if not findings and content.get("arm"):
-        findings += _arm(content["arm"]["dh"], file)
+        findings += [*_arm(content["arm"]["dh"], file), *_bodies(content["arm"], file)]
     stations = content.get("stations")
     if isinstance(stations, str) and (Path(stations).is_absolute() or ".." in Path(stations).parts):
         message = f'found "{stations}", expected a table beside {source.name}'
@@ -89,6 +93,26 @@ def _arm(rows: list[list[float]], file: str) -> list[Finding]:
         message = f"found no length beyond {length:g}, expected mm: d and a seem to be in metres"
         findings.append(Finding("error", file, message, column="arm.dh"))
     return findings
+
+
+def _bodies(arm: JSON, file: str) -> Iterator[Finding]:
+    """Check masses and moments of inertia of an arm's links and of what its flange carries."""
+    links = arm.get("links") or []
+    if arm.get("head") and not links:
+        message = "is of no use without arm.links: the mass of the tip takes those of all bodies"
+        yield Finding("warning", file, message, column="arm.head")
+    named = [(f"arm.links[{i}]", body) for i, body in enumerate(links)]
+    for name, body in [*named, *([("arm.head", arm["head"])] if arm.get("head") else [])]:
+        if "inertia_kg_m2" not in body:
+            continue
+        xx, yy, zz, xy, xz, yz = body["inertia_kg_m2"]
+        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if moments[0] < 0 or 2.0 * moments[2] > moments.sum() * (1.0 + ROUNDED):
+            message = (
+                f"found principal moments of {', '.join(f'{m:.4g}' for m in moments)}, expected none below "
+                "zero and none above the sum of the other two, as every body has them"
+            )
+            yield Finding("error", file, message, column=f"{name}.inertia_kg_m2")
 
 
 def stations_path(cell: JSON, source: Path | None) -> Path | None:

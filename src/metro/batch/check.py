@@ -38,6 +38,8 @@ class Loaded:
     impacts: pd.DataFrame
     loads: pd.DataFrame
     mass: pd.DataFrame
+    touches: pd.DataFrame
+    payload: pd.DataFrame
     published: pd.DataFrame
     stations: pd.DataFrame
     findings: tuple[Finding, ...]
@@ -145,7 +147,7 @@ def examine(folder: Path, cells: Path, holdout: JSON) -> Examined:
     cell, source, more = _cell(folder, cells, manifest)
     findings += more
     tables: dict[str, Table] = {}
-    for name in ("runs", "impacts", "loads", "mass", "published"):
+    for name in ("runs", "impacts", "loads", "mass", "touches", "payload", "published"):
         tables[name], more = read_table(folder, name)
         findings += more
     tables["stations"], more = _stations(cell, source)
@@ -155,6 +157,7 @@ def examine(folder: Path, cells: Path, holdout: JSON) -> Examined:
     unread = not manifest or HOLE in faulty
     findings += [*run_findings(tables["runs"], sound, unread), *rules.impact_findings(tables["impacts"])]
     findings += [*rules.load_findings(tables["loads"]), *rules.mass_findings(tables["mass"])]
+    findings += [*rules.touch_findings(tables["touches"]), *rules.payload_findings(tables["payload"])]
     findings += [*rules.published_findings(tables["published"]), *rules.station_findings(tables["stations"])]
     findings += file_findings(folder, tables["runs"], tables["impacts"], sound.get(SECTION) or {})
     runs = filled(tables["runs"].frame, sound)

@@ -125,6 +125,7 @@ MASS = (
     *_numbers("mass_kg", "myy", required=True),
     *_numbers("mass_between_kg", "myz", required=True),
     *_numbers("mass_kg", "mzz", required=True),
+    *_numbers("joint_deg", *(f"q{i}_deg" for i in range(1, 7))),
 )
 
 PUBLISHED = (
@@ -137,6 +138,22 @@ PUBLISHED = (
     Column("unit", required=True),
     *_numbers("printed_error_percent", "printed_error_percent"),
     Column("note", longest=5000),
+)
+
+TOUCHES = (
+    Column("touched", required=True),
+    *_numbers("place_mm", "x_mm", "y_mm", "z_mm", required=True),
+    *_numbers("direction_cosine", "q1", "q2", "q3", "q4"),
+    *_numbers("orientation_deg", "rx_deg", "ry_deg", "rz_deg"),
+    *_numbers("sigma_mm", "sigma_mm"),
+)
+
+PAYLOAD = (
+    Column("loaded", required=True, choices=("yes", "no")),
+    *_numbers("joint_deg", *(f"q{i}_deg" for i in range(1, 7)), required=True),
+    *_numbers("torque_nm", *(f"tau{i}_nm" for i in range(1, 7)), required=True),
+    *_numbers("rate_deg_s", *(f"rate{i}_deg_s" for i in range(1, 7))),
+    *_numbers("acceleration_deg_s2", *(f"acceleration{i}_deg_s2" for i in range(1, 7))),
 )
 
 # Force along the first axis over deflection along the second; one of a pair that is blank is as the other.
@@ -154,6 +171,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "impacts": IMPACTS,
     "loads": LOADS,
     "mass": MASS,
+    "touches": TOUCHES,
+    "payload": PAYLOAD,
     "published": PUBLISHED,
     "stations": STATIONS,
 }

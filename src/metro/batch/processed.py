@@ -60,7 +60,21 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("x_mm", "y_mm", "z_mm", "fx_n", "fy_n", "fz_n", "dx_mm", "dy_mm", "dz_mm", "replicate"),
         "sigma_mm",
     ),
-    "mass": ("pose", "point", "x_mm", "y_mm", "z_mm", "mxx", "mxy", "mxz", "myy", "myz", "mzz"),
+    "mass": (
+        *("pose", "point", "x_mm", "y_mm", "z_mm", "mxx", "mxy", "mxz", "myy", "myz", "mzz"),
+        *(f"q{i}_deg" for i in range(1, 7)),
+    ),
+    "touches": (
+        *("touched", "x_mm", "y_mm", "z_mm", "q1", "q2", "q3", "q4", "rx_deg", "ry_deg", "rz_deg"),
+        "sigma_mm",
+    ),
+    "payload": (
+        "loaded",
+        *(f"q{i}_deg" for i in range(1, 7)),
+        *(f"tau{i}_nm" for i in range(1, 7)),
+        *(f"rate{i}_deg_s" for i in range(1, 7)),
+        *(f"acceleration{i}_deg_s2" for i in range(1, 7)),
+    ),
     "stations": (
         *("position", "x_mm", "y_mm", "z_mm", "kx_n_um", "ky_n_um", "kz_n_um"),
         *CROSS_STIFFNESS,

@@ -14,6 +14,8 @@ from metro.batch.tables import Table
 
 STIFFNESS_N_MM = (10.0, 2e5)  # softer than any arm … stiffer than any machine tool
 CLOSEST_MM = 1.0
+QUATERNION = 0.01  # by which the length of one with two digits may differ from 1
+NEAREST_MM = 10.0  # no flange of an arm comes as near to the base
 MASSES_KG = (1.0, 2e4)
 SELF_DESCRIBING = (".uff", ".unv", ".uf")  # universal files carry points, axes, kind and unit themselves
 
@@ -59,11 +61,7 @@ def load_findings(table: Table) -> Iterator[Finding]:
 def _load_units(table: Table) -> Iterator[Finding]:
     """Check the units of load tests by the stiffness that they make, and by the extent of the places."""
     rows = [row for _, row in table.sound()]
-    angles = np.array([[row[f"q{i}_deg"] for i in range(1, 7)] for row in rows]).reshape(-1, 6)
-    known = angles[np.isfinite(angles).all(axis=1)]
-    if known.size and 0 < np.abs(known).max() <= 2 * math.pi:
-        fault = f"no angle is beyond {np.abs(known).max():g}: they seem to be in radians, expected degrees"
-        yield Finding("error", table.file, fault, column="q1_deg")
+    yield from _radians(table)
     stiffness = [
         abs(row[f"f{axis}_n"] / row[f"d{axis}_mm"])
         for row in rows
@@ -87,6 +85,15 @@ def _load_units(table: Table) -> Iterator[Finding]:
         yield Finding("error", table.file, fault, column="x_mm")
 
 
+def _radians(table: Table) -> Iterator[Finding]:
+    """Report joint angles that seem to be in radians."""
+    angles = np.array([[row[f"q{i}_deg"] for i in range(1, 7)] for _, row in table.sound()]).reshape(-1, 6)
+    known = angles[np.isfinite(angles).all(axis=1)]
+    if known.size and 0 < np.abs(known).max() <= 2 * math.pi:
+        fault = f"no angle is beyond {np.abs(known).max():g}: they seem to be in radians, expected degrees"
+        yield Finding("error", table.file, fault, column="q1_deg")
+
+
 def _odd(table: Table, column: str, typical: float, hint: str) -> Finding:
     low, high = STIFFNESS_N_MM
     fault = f"load over displacement is {typical:.3g} N/mm (median), expected {low:g} to {high:g}: {hint}"
@@ -107,6 +114,36 @@ def mass_findings(table: Table) -> Iterator[Finding]:
             fault = f"found {mean:g} (mean of the diagonal), expected {MASSES_KG[0]:g} to {MASSES_KG[1]:g} kg"
             yield table.finding(position, "mxx", f"{fault}: it seems to be in {unit}")
     yield from _twice(table, ("pose", "point"))
+    yield from _radians(table)
+
+
+def touch_findings(table: Table) -> Iterator[Finding]:
+    """Check that every touched pose has one orientation: a quaternion of length one, or three angles."""
+    for position, row in table.sound():
+        quaternion = np.array([row[f"q{i}"] for i in range(1, 5)])
+        angles = np.array([row[f"{name}_deg"] for name in ("rx", "ry", "rz")])
+        whole = [bool(np.isfinite(part).all()) for part in (quaternion, angles)]
+        if sum(whole) != 1 or np.isfinite(angles).any() == np.isfinite(quaternion).any():
+            fault = "expected the orientation of the flange once: q1 to q4, or rx_deg, ry_deg and rz_deg"
+            yield table.finding(position, "q1", fault)
+        elif whole[0] and abs(float(np.linalg.norm(quaternion)) - 1.0) > QUATERNION:
+            length = float(np.linalg.norm(quaternion))
+            fault = f"found a quaternion of length {length:.4g}, expected 1: scalar first, then x, y, z"
+            yield table.finding(position, "q1", fault)
+    places = np.array([[row[f"{axis}_mm"] for axis in "xyz"] for _, row in table.sound()]).reshape(-1, 3)
+    most = float(np.abs(places).max()) if places.size else 0.0
+    if 0 < most < NEAREST_MM:
+        fault = f"no place is beyond {most:g}: they seem to be in metres, expected mm"
+        yield Finding("error", table.file, fault, column="x_mm")
+
+
+def payload_findings(table: Table) -> Iterator[Finding]:
+    """Check the units of the angles, and that there are torques with and without the load."""
+    yield from _radians(table)
+    states = {row["loaded"] for _, row in table.sound()}
+    if len(states) == 1:
+        fault = f'every row has "{states.pop()}", expected torques with and without the load'
+        yield Finding("error", table.file, fault, column="loaded")
 
 
 def published_findings(table: Table) -> Iterator[Finding]:

@@ -34,7 +34,7 @@ def simulate(
 
     Parameters
     ----------
-    kind : what is measured in it: force, lobes, flatness, joint_force, deformation or waviness.
+    kind : what is measured in it: force, lobes, flatness, joint_force, deformation, waviness or study.
     effects : ``NAME``, whose parameters are drawn, or ``NAME:PARAMETER=VALUE,…``, with all of them given.
 
     Raises

@@ -23,7 +23,7 @@ RECORDED = {"raw", "processed", "results", "stages", "metro", "python", "package
 # Files that are part of a batch by their name alone: nothing has to name them.
 BY_NAME = {
     f"{stem}{suffix}"
-    for stem in ("runs", "impacts", "loads", "mass", "published", "cell")
+    for stem in ("runs", "impacts", "loads", "mass", "touches", "payload", "published", "cell")
     for suffix in (".csv", ".parquet", ".yaml")
 }
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from metro import __version__
 from metro.report.document import Cover, compile_pdf
 from metro.report.results import Results
+from metro.report.sections.calibration import calibration
 from metro.report.sections.causes import upstream, with_causes
 from metro.report.sections.comparison import comparison
 from metro.report.sections.contradictions import with_contradictions
@@ -30,6 +31,7 @@ def batch_report(results: Results) -> bytes:
         setup(results),
         quality(results),
         published(results),
+        calibration(results),
         identification(results),
         flatness(results),
         robot(results),

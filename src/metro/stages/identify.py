@@ -17,6 +17,7 @@ from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, fit
 from metro.loop.fitting.held_out import identified_fit
 from metro.loop.fitting.noise import first_noise
+from metro.observables.arm.calibration import calibration
 from metro.observables.labelled import Labelled
 from metro.observables.observable import Observable
 from metro.observables.problem import Problem, Refusal
@@ -116,6 +117,7 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
         tasks = published.problems(batch, state.observed, state.identified)
         posed = {task.observable: Posed(task, state.base_model.sampled(task), printed=True) for task in tasks}
     state.add(printed_study(batch, state.observed))
+    state.add(calibration(batch, state.read))
     _write(processed, batch, state.observed)
     write_problems(processed, posed)
     write_json(processed / "identified.json", {**state.identified, "not_identified": lacking})

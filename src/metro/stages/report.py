@@ -13,9 +13,12 @@ from metro.batch.batch import Batch
 from metro.batch.processed import Processed, read_batch, write_json
 from metro.batch.writing import write_atomically
 from metro.observables.arm.end_stiffness import end_stiffness
+from metro.observables.arm.link_mass import link_masses
 from metro.observables.arm.robot_tables import robot_tables
 from metro.observables.catalogue import shown_tables
 from metro.observables.cut.record_view import record_tables
+from metro.observables.flatness.path_errors import path_errors
+from metro.observables.flatness.struck import struck_tables
 from metro.observables.force import metrics as force_metrics
 from metro.observables.force.mean_forces import mean_forces
 from metro.report.batch_report import batch_report
@@ -43,6 +46,8 @@ def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> R
     identified = _json(reports / "identified.json")
     read = Processed(processed)
     tables |= robot_tables(batch, read, identified, tables.get("waviness_points"))
+    tables |= link_masses(batch, read, identified) | _struck(processed, tables.get("frf_used"))
+    tables |= path_errors(tables.get("comparison"), tables.get("published_errors"))
     tables |= _mean_forces(batch, processed, tables, identified) | record_tables(
         batch, read, tables.get("qc")
     )
@@ -56,6 +61,14 @@ def read_results(processed: Path, reports: Path, settings: JSON, code: str) -> R
         stages=provenance.stages(processed, settings, code),
         packages=provenance.packages(),
     )
+
+
+def _struck(processed: Path, responses: pd.DataFrame | None) -> dict[str, pd.DataFrame]:
+    """Tables of the struck tip, where impacts showed modes."""
+    modes = _tables(processed, ("modes",)).get("modes")
+    if responses is None or modes is None:
+        return {}
+    return struck_tables(Processed(processed), modes, responses)
 
 
 def _mean_forces(

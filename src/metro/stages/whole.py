@@ -45,7 +45,18 @@ RUN_FILES = {
 }
 
 OF_THE_TABLES = "contract"  # the check, in the quality table, that findings on the batch's tables are of
-DESCRIPTION = {"batch", "cell", "runs", "impacts", "loads", "mass", "stations", "published"}
+DESCRIPTION = {
+    "batch",
+    "cell",
+    "runs",
+    "impacts",
+    "loads",
+    "mass",
+    "touches",
+    "payload",
+    "stations",
+    "published",
+}
 
 
 @dataclass(frozen=True)
@@ -185,7 +196,7 @@ def _tables(loaded: Loaded, recordings: Recordings) -> Iterator[tuple[str, Itera
     yield "hit", parts.hit(batch, loaded.impacts, recordings)
     yield "frf", parts.frf(loaded.impacts, recordings)
     yield "pickups", _whole(_pickups(loaded.impacts))
-    for name in ("loads", "mass", "stations", "published"):
+    for name in ("loads", "mass", "touches", "payload", "stations", "published"):
         yield name, _whole(getattr(loaded, name))
     yield "qc", _whole(pd.DataFrame(recordings.findings, columns=COLUMNS["qc"]))
 

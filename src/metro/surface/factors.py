@@ -143,8 +143,14 @@ def make_design(factors: Sequence[Factor]) -> Design:
         columns[term] = slice(matrix.shape[1], matrix.shape[1] + block.shape[1])
         matrix = np.hstack([matrix, block])
     pooled = tuple(term for term in kept if len(term) > limit)
-    aliases = tuple(_alias(term, kept, factors) for term in refused)
+    aliases = _without_followers([_alias(term, kept, factors) for term in refused])
     return Design(tuple(factors), tuple(terms), matrix, columns, aliases, pooled)
+
+
+def _without_followers(aliases: Sequence[Alias]) -> tuple[Alias, ...]:
+    """Omit interactions with a factor that follows from others: that it does is said once, of the factor."""
+    follows = {alias.term[0] for alias in aliases if len(alias.term) == 1 and not alias.part}
+    return tuple(a for a in aliases if len(a.term) == 1 or not follows & set(a.term))
 
 
 def _estimable(factors: Sequence[Factor], count: int) -> tuple[list[Term], list[Term]]:

@@ -178,7 +178,9 @@ def report(
     faces: JSON = {}
     for run, table in observed["face_indices"].groupby("run", sort=False):
         faces[str(run)] = _face_json(table) | predicted.get(str(run), {})
-    blocks: JSON = {"faces": faces} | ({} if isinstance(task, Refusal) else tip_block(_damping(task)))
+    blocks: JSON = {"faces": faces} | (
+        {} if isinstance(task, Refusal) else tip_block(_damping(task, observed))
+    )
     if len(observed["face_loads"]):
         blocks["tip_compliance"] = _compliance_json(observed["face_loads"])
     advised = advice(
@@ -210,11 +212,18 @@ def _face_json(table: pd.DataFrame) -> JSON:
     return entry | {"points": int(first["points"]), "outliers": int(first["outliers"])}
 
 
-def _damping(task: Problem) -> dict[str, Rayleigh]:
-    """Return a0 and a1 of each pose where impacts identified them."""
+def _damping(task: Problem, observed: Mapping[str, pd.DataFrame]) -> dict[str, Rayleigh]:
+    """Return a0 and a1 of each pose where impacts identified them: of milled faces, and of planned ones."""
     settings = [block.setting for block in task.role("identify", "validate")]
-    rung = [(each.pose, each.ringing.damping) for each in settings if each.ringing is not None]
-    return {pose: damping for pose, damping in rung if isinstance(damping, Rayleigh)}
+    rung = {each.pose: each.ringing.damping for each in settings if each.ringing is not None}
+    return struck_damping(observed) | {n: d for n, d in rung.items() if isinstance(d, Rayleigh)}
+
+
+def struck_damping(observed: Mapping[str, pd.DataFrame]) -> dict[str, Rayleigh]:
+    """Return a0 and a1 of each pose of the load tests for which impacts identified them."""
+    poses = {str(name): _pose(str(name), observed) for name in observed["face_loads"]["pose"].unique()}
+    known = {n: p.dynamics for n, p in poses.items() if isinstance(p, Pose) and p.dynamics is not None}
+    return {n: tip.damping for n, tip in known.items() if tip.damping is not None}
 
 
 def _compliance_json(loads: pd.DataFrame) -> JSON:

@@ -142,7 +142,9 @@ def _points(run: str, cloud: Points, outliers: np.ndarray, path: pd.DataFrame, p
     number = path["pass"].to_numpy()
     step = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(number) == 0)
     alone = sampled.sd / np.sqrt(np.maximum(sampled.count, 1))
-    correlated = _noise_along_passes(sampled.height - points[:, 2], number) / float(np.nanmedian(alone))
+    known = alone[np.isfinite(alone)]  # none where the cloud is too coarse for a disc to hold points
+    typical = float(np.median(known)) if known.size else float("nan")
+    correlated = _noise_along_passes(sampled.height - points[:, 2], number) / typical
     sigma = alone * max(1.0, correlated) if np.isfinite(correlated) else alone
     return pd.DataFrame(
         {

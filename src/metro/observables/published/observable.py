@@ -7,7 +7,6 @@ several loads are compared, and pairs along an axis are treated as evidence on t
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ from metro.batch.batch import Batch
 from metro.observables.problem import Block, Parameter, Problem, Refusal
 from metro.observables.published.forces import forces
 from metro.observables.published.matrices import matrices
+from metro.observables.published.misprints import disorder, impossible_inertia, outlying
 from metro.structure import Structure
 from metro.units import JSON, MM, UM, Array
 
@@ -34,7 +34,6 @@ NOISE = {
     "force": ("dynamometer", "noise_n", 1.0),
 }
 GROUP = ["table", "observable", "quantity", "unit"]
-INDICES = ("X_g", "X_a", "X_m")
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,7 @@ def errors(published: pd.DataFrame) -> pd.DataFrame:
     }
     half["printed_error_percent"] = _rounding(table, "printed_error_percent")
     table["convention"] = ""
-    table["flag"] = _disorder(table)
+    table["flag"] = disorder(table) + outlying(table, _load(table)) + impossible_inertia(table)
     for row in table.index[table["printed_error_percent"].notna() & predicted.notna()]:
         convention = _convention(table.loc[row], {column: float(h[row]) for column, h in half.items()})
         table.loc[row, "convention"] = convention
@@ -135,22 +134,6 @@ def _convention(row: pd.Series, half: Mapping[str, float]) -> str:
         if off <= 100 * slack[name] + half["printed_error_percent"] + 1e-9:
             agreeing.append(name)
     return "both" if len(agreeing) == 2 else agreeing[0] if agreeing else "neither"
-
-
-def _disorder(table: pd.DataFrame) -> pd.Series:
-    """Flag flatness indices that break X_g ≤ X_a ≤ X_m, which holds for every set of deviations."""
-    flags = pd.Series("", index=table.index)
-    for _, rows in table[table["quantity"].isin(INDICES)].groupby(["table", "row"], sort=False):
-        values = {
-            str(r["quantity"]): (float(r["measured"]), float(r["predicted"])) for _, r in rows.iterrows()
-        }
-        for low, high in itertools.pairwise(INDICES):
-            pairs = zip(("measured", "predicted"), values.get(low, ()), values.get(high, ()), strict=False)
-            wrong = [name for name, lower, upper in pairs if lower > upper]
-            if wrong:
-                words = f"{low} exceeds {high} ({' and '.join(wrong)}), which no surface can do"
-                flags[rows.index[rows["quantity"] == low]] = words
-    return flags
 
 
 def modes(published: pd.DataFrame) -> pd.DataFrame:
@@ -184,8 +167,10 @@ def loads(published: pd.DataFrame) -> pd.DataFrame:
 
     Rows count whose quantity reads ``displacement under <load> N``; columns ``table, quantity, axis, load_n,
     points, compliance_um_n, sd_um_n`` (over the points). A linear structure has one compliance per axis.
+    A value that stands out of its column as a misprint would is left out.
     """
-    rows = published.assign(load_n=_load(published)).dropna(subset=["load_n"])
+    load = _load(published)
+    rows = published.assign(load_n=load)[load.notna() & (outlying(published, load) == "")]
     rows = rows.assign(compliance_um_n=1e3 * rows["measured"] / rows["load_n"])
     grouped = rows.groupby(["table", "quantity", "axis", "load_n"], sort=False)["compliance_um_n"]
     table = grouped.agg(points="size", mean="mean", sd="std").reset_index()

@@ -12,6 +12,7 @@ from metro.report.figures import surface
 from metro.report.numbers import listing, number, percent
 from metro.report.results import Results, heading
 from metro.report.sections import findings
+from metro.report.sections.along_path import along_path
 from metro.report.sections.face_pairing import pairing_items
 from metro.report.sections.force import force_items
 from metro.report.sections.lobes import cut_items
@@ -33,7 +34,7 @@ def comparison(results: Results) -> Section:
             continue
         merit = force_items(results) if observable == "force" else []
         items += _values(frame, title(observable), merit, alone=len(compared) == 1)
-        items += pairing_items(frame) if observable == "flatness" else []
+        items += [*pairing_items(frame), *along_path(results, "faces")] if observable == "flatness" else []
     if not items:
         nothing = "No held-out run has both a measurement and a prediction: there is nothing to compare."
         return Section("Predicted against measured", [Paragraph(nothing)])

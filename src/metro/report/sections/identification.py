@@ -14,6 +14,7 @@ from metro.report.results import Results
 from metro.report.sections.force import mean_items
 from metro.report.sections.lobes import boundaries
 from metro.report.sections.modes import modes
+from metro.report.sections.tip import tip
 from metro.units import JSON, printed
 
 COEFFICIENTS = {
@@ -38,7 +39,12 @@ RUN_BLOCKS = {
     "observability": "observability of the joints",
 }
 ABOUT = ("format", "batch", "metro", "not_identified")  # the batch and the file, not quantities
-ELSEWHERE = {"faces": "flatness of faces", "study": "factors and configurations", "arm": "the robot arm"}
+ELSEWHERE = {
+    "faces": "flatness of faces",
+    "study": "factors and configurations",
+    "arm": "the robot arm",
+    "calibration": "tool, work and payload",
+}
 OF_ROBOT = ("observability", "waviness")  # the robot's own section shows them
 LONGEST, ABREAST = 30, 3
 PLANE = ("xx", "xy", "yx", "yy")
@@ -60,7 +66,7 @@ def identification(results: Results) -> Section:
         *modes(identified.get("modes") or [], results.tables),
         *boundaries(results),
         *_arm(identified.get("arm") or {}),
-        *_tip(identified.get("tip") or {}),
+        *tip(results),
     ]
     if not items:
         items.append(Paragraph(_elsewhere(identified)))
@@ -213,18 +219,6 @@ def _arm(arm: JSON) -> list[Item]:
         if arm.get(key) and key not in OF_ROBOT:
             tables.append(_by_run(arm[key], name, f"{name.capitalize()}, run by run.", half=True))
     return [Heading("Robot"), *abreast(tables)] if tables else []
-
-
-def _tip(tip: JSON) -> list[Item]:
-    rows = [[words(name), quantity(q)] for name, q in tip.items() if isinstance(q, dict) and "value" in q]
-    return (
-        [
-            Heading("Damping at the tip"),
-            Table(["quantity", "value"], rows, "Proportional damping, C = a0 M + a1 K.", [1, 2]),
-        ]
-        if rows
-        else []
-    )
 
 
 def _by_run(blocks: JSON, name: str, caption: str, *, half: bool = False) -> Table:

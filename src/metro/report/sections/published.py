@@ -11,6 +11,7 @@ from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Sec
 from metro.report.figures import force as figures
 from metro.report.numbers import number
 from metro.report.results import Results
+from metro.report.sections.along_path import along_path
 from metro.report.sections.printed_bias import CANNOT, bias
 from metro.units import printed
 
@@ -26,7 +27,7 @@ def published(results: Results) -> Section | None:
     items: list[Item] = [*_errata(table, tip)]
     for name, rows in table.groupby("table", sort=False):
         pairs = rows[rows["predicted"].notna()]
-        items += _pairs(str(name), pairs) if len(pairs) else []
+        items += [*_pairs(str(name), pairs), *along_path(results, str(name))] if len(pairs) else []
     if any(isinstance(item, Picture) for item in items):
         items.append(Paragraph(CANNOT, "note"))
     items += _single(table[table["predicted"].isna()], results)
@@ -186,7 +187,7 @@ def _loads(loads: pd.DataFrame | None) -> list[Item]:
     ]
     caption = (
         "Compliance of the printed load tests. A linear structure has the same at every load; where it "
-        "differs, no one stiffness describes the machine."
+        "differs, no one stiffness describes the machine. Values that the errata name are left out."
     )
     return [Table(header, rows, caption, [2.6, 0.6, 0.8, 0.7, 1.5, 1.2], numeric=[2, 3, 4, 5])]
 

@@ -1,0 +1,133 @@
+"""Setting a cell up: tool and work from touched points, the payload from torques, beside what is declared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
+from metro.report.numbers import number, quantity
+from metro.report.results import Results
+from metro.units import JSON, printed
+
+ANGLES = {"rx": "roll", "ry": "pitch", "rz": "yaw"}
+FAR = 3.0  # half widths of the interval
+CONVENTION = (
+    "Angles: R = Rz(rz) Ry(ry) Rx(rx), the Z-Y-X order of ABB; quaternions: scalar first. All touched points "
+    "share one least squares, so that an error of the tool is in that of the work."
+)
+Row = tuple[str, JSON, float]
+
+
+def calibration(results: Results) -> Section | None:
+    """Write tool, work and payload with intervals and the declared values; None for a batch without."""
+    block = results.identified.get("calibration")
+    if not block:
+        return None
+    items: list[Item] = []
+    for title, rows, said in (
+        (
+            "Tool and work from touched points",
+            [*_tool(block, results), *_work(block, results)],
+            _touching(block),
+        ),
+        ("Payload from the joints' torques", [*_payload(block, results)], _torques(block)),
+    ):
+        if rows:
+            items += [Heading(title), _table(rows, said)]
+    quaternion = (block.get("work") or {}).get("quaternion")
+    if quaternion:
+        parts = ", ".join(f"{part:.6f}" for part in quaternion).replace("-", "−")
+        items.append(
+            Paragraph(
+                f"Orientation of the work as a quaternion (q1, q2, q3, q4): {parts}. {CONVENTION}", "note"
+            )
+        )
+    missing = block.get("not_identified") or {}
+    if missing:
+        items.append(
+            Bullets([f"{name}: not identified, {reason.rstrip('.')}." for name, reason in missing.items()])
+        )
+    return Section("Setup and calibration", items)
+
+
+def _tool(block: JSON, results: Results) -> Iterator[Row]:
+    declared = results.batch.manifest.get("tool_in_flange_mm") or [math.nan] * 3
+    for axis, value in zip("xyz", declared, strict=True):
+        if "tool" in block:
+            yield f"tool centre point {axis}, flange frame", block["tool"][axis], float(value)
+
+
+def _work(block: JSON, results: Results) -> Iterator[Row]:
+    if "work" not in block:
+        return
+    frame = results.batch.manifest.get("work_in_base") or {}
+    place, angles = frame.get("xyz_mm") or [math.nan] * 3, frame.get("rpy_deg") or [math.nan] * 3
+    for axis, value in zip("xyz", place, strict=True):
+        yield f"work origin {axis}, base", block["work"][axis], float(value)
+    for name, value in zip(ANGLES, angles, strict=True):
+        yield f"work angle {name} ({ANGLES[name]})", block["work"][name], float(value)
+
+
+def _payload(block: JSON, results: Results) -> Iterator[Row]:
+    carried = block.get("payload")
+    if not carried:
+        return
+    head = (results.batch.cell.get("arm") or {}).get("head") or {}
+    yield "mass", carried["mass"], float(head.get("mass_kg", math.nan))
+    for axis, value in zip("xyz", head.get("centre_mm") or [math.nan] * 3, strict=True):
+        yield f"centre of gravity {axis}, flange frame", carried["centre"][axis], float(value)
+    xx, yy, zz, xy, xz, yz = head.get("inertia_kg_m2") or [math.nan] * 6
+    declared = {"xx": xx, "xy": xy, "xz": xz, "yy": yy, "yz": yz, "zz": zz}
+    for name, own in (carried.get("inertia") or {}).items():
+        yield f"moment of inertia {name} about the centre", own, float(declared[name])
+
+
+def _table(rows: list[Row], said: str) -> Table:
+    apart = [_apart(found, declared) for _, found, declared in rows]
+    far = [place for place, off in enumerate(apart) if off > FAR]
+    known = sum(math.isfinite(off) for off in apart)
+    finding = (
+        f"{len(far) or 'None'} of {known} declared values are outside {FAR:g} intervals. " if known else ""
+    )
+    body = [
+        [
+            name,
+            quantity(found, with_unit=False),
+            printed(found["unit"]),
+            number(declared, 6) if math.isfinite(declared) else "–",
+            number(off, 2) if math.isfinite(off) else "–",
+        ]
+        for (name, found, declared), off in zip(rows, apart, strict=True)
+    ]
+    header = ["quantity", "identified", "unit", "declared", "difference over interval"]
+    caption = f"{finding}{said} Difference: of identified and declared, over half the 95 % interval."
+    return Table(header, body, caption, [2.4, 1.6, 0.6, 1, 1.2], numeric=[1, 3, 4], strong=far)
+
+
+def _apart(found: JSON, declared: float) -> float:
+    low, high = found["ci95"]
+    half = 0.5 * (high - low) if low is not None and high is not None else 0.0
+    return abs(found["value"] - declared) / half if half > 0 else math.nan
+
+
+def _touching(block: JSON) -> str:
+    touching = block.get("touching")
+    if not touching:
+        return ""
+    rms = quantity(touching["rms"])
+    return (
+        f"The touched points leave {rms} (rms, {touching['dof']} degrees of freedom); errors from "
+        f"{touching['errors_from']}."
+    )
+
+
+def _torques(block: JSON) -> str:
+    carried = block.get("payload")
+    if not carried:
+        return ""
+    left = ", ".join(number(value, 2) for value in np.asarray(carried["rms"]))
+    inertia = "" if "inertia" in carried else " Torques at rest do not tell the moments of inertia."
+    return f"Torques with and without the load leave {left} N m at joints 1 to 6 (rms).{inertia}"
