@@ -39,6 +39,10 @@ def test_free_samples_are_alone_and_the_others_together():
     assert stretches(np.zeros(5, dtype=bool)) == (slice(0, 5),)
 
 
+def test_a_phase_whose_samples_were_lost_parts_the_others_all_the_same():
+    assert stretches(np.array([0, 0, 1, 2, 2, 4, 4])) == (slice(0, 2), slice(2, 3), slice(3, 5), slice(5, 7))
+
+
 @pytest.mark.parametrize("uneven", [False, True])
 def test_level_variance_and_covariance_are_those_of_the_joint_gaussian(uneven):
     interval = np.random.default_rng(2).uniform(0.5, 3.0, 39) if uneven else None

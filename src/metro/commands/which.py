@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from metro.batch.findings import ContractError, Finding
 from metro.commands.calls import CallError, wrong_call
 from metro.spelling import suggestion
-from metro.units import JSON
 
 RAW, PROCESSED, REPORTS = Path("data/raw"), Path("data/processed"), Path("reports")
 CONFIG = Path("config/config.yaml")
@@ -26,7 +26,7 @@ def raw_roots(config: Path = CONFIG) -> list[Path]:
     return named or [RAW]
 
 
-def holdout(config: Path = CONFIG) -> JSON:
+def holdout(config: Path = CONFIG) -> dict[str, Any]:
     """Return the settings of the hold-out plan that the workflow has here: config.yaml's, where there is one.
 
     Raises
@@ -37,7 +37,7 @@ def holdout(config: Path = CONFIG) -> JSON:
     from metro.batch.check import HOLDOUT
     from metro.batch.config import load_config
 
-    settings: JSON = load_config(config)["holdout"] if config.exists() else HOLDOUT
+    settings: dict[str, Any] = load_config(config)["holdout"] if config.exists() else HOLDOUT
     return settings
 
 

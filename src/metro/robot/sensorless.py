@@ -89,18 +89,18 @@ def noise_of_bins(
 
 
 def smoothed_torque(
-    difference: Array, noise: Array, free: np.ndarray | None = None, place: Array | None = None
+    difference: Array, noise: Array, phase: np.ndarray | None = None, place: Array | None = None
 ) -> Torques:
     """Smooth torques (m, n), N m, by the random walk whose drift is likeliest given their noise R (n,).
 
     Parameters
     ----------
-    free : (m,) bool, bins in which the tool enters or leaves the work: there the torque may do anything, and
-        the walk starts anew behind them (:mod:`metro.signals.kalman_stretches`).
+    phase : (m,) int of the cut, odd where the tool enters or leaves the work: there the torque may do
+        anything, and the walk starts anew behind (:mod:`metro.signals.kalman_stretches`).
     place : (m,) along the path, of logs whose clock is not even: where samples were lost, bins are missing,
         and the walk goes on without them.
     """
-    parts = kalman_stretches.stretches(np.zeros(len(difference), bool) if free is None else free)
+    parts = kalman_stretches.stretches(np.zeros(len(difference)) if phase is None else phase)
     interval = None if place is None else uneven(place)
     drift = kalman_stretches.likeliest_drift(difference, noise, parts, interval)
     innovations = kalman_stretches.innovations(difference, noise, drift, parts, interval)

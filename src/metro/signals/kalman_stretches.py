@@ -18,10 +18,15 @@ from metro.signals import kalman, kalman_uneven
 from metro.units import Array
 
 
-def stretches(free: np.ndarray) -> tuple[slice, ...]:
-    """Part samples at which the level is ``free`` (n,) bool, each alone, from the runs of others between."""
-    starts = np.flatnonzero(np.concatenate([[True], free[1:] | free[:-1]]))
-    return tuple(slice(int(a), int(b)) for a, b in zip(starts, [*starts[1:], len(free)], strict=True))
+def stretches(phase: np.ndarray) -> tuple[slice, ...]:
+    """Part samples by their ``phase`` (n,) int: one stretch each, where it is odd every sample by itself.
+
+    In an odd phase the level may do anything. It may have done so, too, where a phase is skipped because the
+    samples of it were lost.
+    """
+    phase = phase.astype(int)
+    starts = np.flatnonzero(np.concatenate([[True], (phase[1:] != phase[:-1]) | (phase[1:] % 2 == 1)]))
+    return tuple(slice(int(a), int(b)) for a, b in zip(starts, [*starts[1:], len(phase)], strict=True))
 
 
 def _within(part: slice, interval: Array | None) -> Array | None:

@@ -151,9 +151,9 @@ def sensorless(
     # The slow noise of the idle run is as large in the cut, where the force conceals it.
     interval = uneven(pair.s) if gaps else None
     wander = 2.0 * wandering(pair.second[:, :6], white, pair.second[:, 13:], interval)
-    free, difference = wall.changing(x, width), pair.first[:, :6] - pair.second[:, :6]
-    air = ~(free | steady)
-    torques = smoothed_torque(difference, noise, free, pair.s if gaps else None)
+    phase, difference = wall.phase(x, width), pair.first[:, :6] - pair.second[:, :6]
+    air = (phase % 2 == 0) & ~steady
+    torques = smoothed_torque(difference, noise, phase, pair.s if gaps else None)
     index = observability(difference[steady], pair.second[steady, :6])
     remarks = tuple(alike.remarks(np.gradient(cut.commanded, cut.time, axis=0)))
     moves = tip_jacobian(arm, joints)

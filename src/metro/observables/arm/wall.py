@@ -38,14 +38,16 @@ class Wall:
         """Mask of the places along the wall (m from its start) at which the tool is wholly engaged."""
         return np.asarray((x >= 0.0) & (x <= self.length - self.leaving))
 
-    def changing(self, x: Array, margin: float) -> np.ndarray:
-        """Mask of the places along the wall at which the tool enters or leaves the block.
+    def phase(self, x: Array, margin: float) -> np.ndarray:
+        """Phase of the cut at places along the wall, int: odd where the tool enters or leaves the block.
 
-        ``margin`` (m) before and after: what is measured at a place is a mean over its surroundings.
+        0 before the block, 1 while it enters, 2 wholly engaged, 3 while it leaves, 4 behind. ``margin`` (m)
+        before and after a change: what is measured at a place is a mean over its surroundings.
         """
-        entering = (x > -self.leaving - margin) & (x < margin)
         leaves = self.length - self.leaving
-        return np.asarray(entering | ((x > leaves - margin) & (x < self.length + margin)))
+        ends = (-self.leaving - margin, min(margin, leaves - margin), leaves - margin, self.length + margin)
+        passed = [x > end for end in (ends[0], ends[2])] + [x >= end for end in (ends[1], ends[3])]
+        return np.asarray(np.sum(passed, axis=0))
 
 
 def wall(batch: Batch, run: str) -> Wall:
