@@ -68,7 +68,7 @@ def test_what_nobody_answers_is_listed_and_nothing_is_written(tmp_path):
     path, _ = records(tmp_path)
     result = called(tmp_path / "cuts", path, **{key: CUTS[key] for key in CUTS if key != "unit.force"})
     assert result.exit_code == 2
-    assert "1 questions are open" in result.output
+    assert "1 question is open" in result.output
     assert "--set unit.force=…" in result.output
     assert not (tmp_path / "cuts").exists()
 
@@ -202,3 +202,38 @@ def test_a_person_who_answers_wrongly_is_asked_again_and_the_batch_passes_its_ch
     for wrong in ("mm", "12,5", "mill", "up", "deep"):
         assert f'found "{wrong}", expected' in printed
     assert check(tmp_path / "cuts").ok
+
+
+def test_a_clock_without_a_name_is_the_time_and_no_rate_is_asked(tmp_path):
+    """A rate that was asked beside the file's own times gave modes at a tenth of their frequency."""
+    time = np.arange(4000) / 4000
+    for name in ("impact_1.txt", "accel_1.txt"):
+        np.savetxt(tmp_path / name, np.column_stack([time, RANDOM.normal(size=4000)]), fmt="%.6f")
+    files = [tmp_path / "impact_1.txt", tmp_path / "accel_1.txt"]
+    asked = called(tmp_path / "hits", *files)
+    assert "unit.time" in asked.output
+    assert "rate_hz" not in asked.output
+    places = {"reference": "{number}x", "response": "7x"}
+    units = {"unit.force": "N", "unit.response": "g", "unit.time": "ms"}
+    called(tmp_path / "hits", *files, **units, **places)
+    mapping = yaml.safe_load((tmp_path / "hits/batch.yaml").read_text())["files"]["impact_*.txt"]
+    assert mapping["columns"]["t_s"] == {"from": 1, "unit": "ms"}
+    assert "rate_hz" not in mapping
+
+
+def test_a_place_that_is_left_out_or_is_none_is_refused_before_anything_is_written(tmp_path):
+    time = np.arange(400) / 4000
+    for name in ("impact_1.txt", "accel_1.txt"):
+        np.savetxt(tmp_path / name, np.column_stack([time, RANDOM.normal(size=400)]))
+    for place in ("none", "unknown", "7"):
+        answers = {
+            "unit.force": "N",
+            "unit.response": "g",
+            "unit.time": "s",
+            "reference": "1x",
+            "response": place,
+        }
+        result = called(tmp_path / "hits", tmp_path / "impact_1.txt", tmp_path / "accel_1.txt", **answers)
+        assert result.exit_code == 2, result.output
+        assert f'response: found "{place}", expected a' in result.output
+    assert not (tmp_path / "hits").exists()

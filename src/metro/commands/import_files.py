@@ -57,7 +57,9 @@ def import_files(
     name = answers.pop("batch")
     folder = out or Path("data/raw") / name
     if folder.exists():
-        raise wrong_call(str(folder), "is there already: nothing was written")
+        raise wrong_call(
+            str(folder), "is there already, nothing was written: remove it, or give another --out"
+        )
     used = {row.partition("#")[0] for each in proposals for row, _ in each.rows} | {
         n for p in proposals for n in p.more
     }
@@ -70,6 +72,8 @@ def import_files(
     from rich.console import Console
 
     Console(highlight=False).print(render(report))
+    if not report.ok:
+        typer.echo(f"{folder} was written, and snakemake will refuse it: mend it, or remove it", err=True)
     return 0 if report.ok else 1
 
 
@@ -91,7 +95,8 @@ def _answers(proposals: Sequence[Proposal], given: Sequence[str]) -> dict[str, s
     open_questions += _fill(list(sensitivities(answers)), answers, ask)
     if open_questions:
         listed = "\n".join(f"  --set {question.key}=…   {question.words}" for question in open_questions)
-        raise wrong_call("metro import", f"{len(open_questions)} questions are open:\n{listed}")
+        count = f"{len(open_questions)} question{'s are' if len(open_questions) > 1 else ' is'} open"
+        raise wrong_call("metro import", f"{count}:\n{listed}")
     return {key: value for key, value in answers.items() if value not in ("", NONE)}
 
 
@@ -102,7 +107,7 @@ def _fill(
     still_open = []
     for question in asked:
         value = answers.get(question.key, "")
-        expected = question.accepts(value) if value else ""
+        expected = question.expected(value) if value else ""
         if expected:
             raise wrong_call(question.key, f'found "{value}", expected {expected}')
         if not value and ask is not None:
@@ -115,9 +120,12 @@ def _fill(
 def _prompt(question: Question) -> str:
     """Ask until the answer is one that the question accepts."""
     while True:
-        default = "" if question.optional else None
-        answer = str(typer.prompt(question.words, default=default, show_default=False)).strip()
-        expected = question.accepts(answer) if answer else ""
+        answer = str(typer.prompt(question.words, default="", show_default=False)).strip()
+        if not answer and not question.optional:
+            none = "; none, where it is not known" if question.leaves_out else ""
+            typer.echo(f"an answer is needed, since no file says it and it decides a number{none}")
+            continue
+        expected = question.expected(answer) if answer else ""
         if not expected:
             return answer
         typer.echo(f'found "{answer}", expected {expected}')

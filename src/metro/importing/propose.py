@@ -147,10 +147,23 @@ def _hammer_pairs(files: Sequence[Seen]) -> tuple[list[Proposal], list[Seen]]:
         "force_n": f"the file's name {hammers[0].path.name}",
         "response": f"the file's name {sensors[0].path.name}",
     }
+    timed = all(_is_clock(seen.columns[0].values) for seen in hammers)
+    if timed:
+        columns |= {"t_s": 1}
+        why |= {"t_s": "column 1, which rises by the same step from row to row"}
     rows = tuple((f"{seen.path.name}#{_record(seen)}", _record(seen)) for seen in hammers)
     names = tuple(seen.path.name for seen in sensors)
-    found = Proposal("record", rows, first.replace("{record}", "*"), columns, why, False, more=names)
+    found = Proposal("record", rows, first.replace("{record}", "*"), columns, why, timed, more=names)
     return [found], [seen for seen in files if seen not in hammers and seen not in sensors]
+
+
+def _is_clock(values: np.ndarray) -> bool:
+    """Return whether values rise by one step from row to row, as times do; a step of 1 counts the rows."""
+    if values.size < LEAST_RUN:
+        return False
+    steps = np.diff(values)
+    step = float(np.median(steps))
+    return step > 0.0 and step != 1.0 and bool((np.abs(steps - step) < 0.01 * step).all())
 
 
 def _template(seen: Seen) -> str:

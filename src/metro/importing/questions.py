@@ -27,12 +27,24 @@ class Question:
     words : the question.
     accepts : says of an answer what would be right instead; "" where it is.
     optional : whether it may stay open.
+    leaves_out : whether ``none`` is an answer, which leaves the key out.
     """
 
     key: str
     words: str
     accepts: Callable[[str], str] = lambda _answer: ""
     optional: bool = False
+    leaves_out: bool = False
+
+    def expected(self, answer: str) -> str:
+        """Say of an answer what would be right instead; "" where it is."""
+        if answer == NONE:
+            return (
+                ""
+                if self.leaves_out or self.optional
+                else f"a value, without which it cannot be read: {self.words}"
+            )
+        return self.accepts(answer)
 
 
 def questions(proposals: Sequence[Proposal]) -> Iterator[Question]:
@@ -49,11 +61,11 @@ def questions(proposals: Sequence[Proposal]) -> Iterator[Question]:
         yield from _of_cuts([name for each in proposals if each.kind == "force" for name, _ in each.rows])
     if kinds & {"record", "frf"}:
         number = "as 1x; {number} is the number in the file's name"
-        yield Question("reference", f"where the hammer struck, {number}")
-        yield Question("response", f"where the sensor was, {number}")
+        yield Question("reference", f"where the hammer struck, point and axis, {number}", _place)
+        yield Question("response", f"where the sensor was, point and axis, {number}", _place)
     if "cloud" in kinds:
         size = "size of the scanned part as x,y,z in mm, or none where it is not known"
-        yield Question("work.size_mm", size, _size)
+        yield Question("work.size_mm", size, _size, leaves_out=True)
     if "modes" in kinds:
         yield Question("citation", "where these values are published")
 
@@ -77,7 +89,7 @@ def _of_cuts(names: Sequence[str]) -> Iterator[Question]:
     yield Question("tool.helix_deg", "helix angle, degrees", _number)
     yield _choice("dynamometer.reads", "the dynamometer reads the force on the", ("work", "tool"))
     axes = "the sensor's x,y,z in the work frame (x along the feed, z to the spindle), as y,x,-z"
-    yield Question("dynamometer.axes", f"{axes}, or none", _axes)
+    yield Question("dynamometer.axes", f"{axes}, or none", _axes, leaves_out=True)
     yield _choice("operation", "operation", ("slot", "side", "face", "helical"))
     yield _choice("direction", "direction", ("up", "down", "slot"))
     for column, words in (
@@ -143,10 +155,17 @@ def _numbers(answer: str) -> str:
 def _axes(answer: str) -> str:
     parts = [part.strip() for part in answer.split(",")]
     fits = sorted(part.lstrip("-+") for part in parts) == ["x", "y", "z"]
-    return "" if answer == NONE or fits else "three directions, as y,x,-z, or none"
+    return "" if fits else "three directions, as y,x,-z, or none"
 
 
 def _size(answer: str) -> str:
     parts = [part.strip() for part in answer.split(",")]
     fits = len(parts) == 3 and all(map(_is_number, parts))
-    return "" if answer == NONE or fits else "three numbers, as 200,100,20, or none"
+    return "" if fits else "three numbers, as 200,100,20, or none"
+
+
+def _place(answer: str) -> str:
+    fits = re.fullmatch(r"(?:[A-Za-z0-9_.]|\{number\})+[+-]?[xyz]", answer)
+    return (
+        "" if fits else "a point and an axis, as 7z (a name of your own where the point has no number: tip-z)"
+    )

@@ -57,7 +57,8 @@ def cutting_force(largest_n: float, chip_mm2: float, known_n_mm2: float | None) 
     over = f"their peak over the chip's section (a_p f_z = {chip_mm2:g} mm2)"
     fault = f"columns fx_n, fy_n, fz_n: {over} is {pressure:.3g}"
     expected = f"expected {low:g} to {high:g} N/mm2: the forces seem to be in {unit}; export newtons"
-    return f"{fault} N/mm2, {expected} (a work as soft as that: declare coefficients.ktc_n_mm2)"
+    soft = " (a work as soft as that: declare coefficients.ktc_n_mm2)" if pressure < low else ""
+    return f"{fault} N/mm2, {expected}, or mend their unit under files in batch.yaml{soft}"
 
 
 def angles(names: list[str], values_deg: Array) -> str:

@@ -116,15 +116,18 @@ def speed_slips(batch: Batch, read: Tables) -> tuple[Slip, ...]:
     )
     first, passes = next(iter(found.items()))
     rpm = float(batch.runs["spindle_rpm"][first])
-    speed = rpm * passes / teeth
     text = (
         f"run {named}: the force of {first} repeats {passes:.4g} times in a revolution of {rpm:g} rpm, which "
-        f"no cutter does; as {teeth} teeth it is {speed:.5g} rpm"
+        f"no cutter does"
     )
-    ratio = passes / teeth
-    remedy = f"Likely in runs.csv: spindle_rpm is {speed:.5g}"
+    rates = {"once in a revolution": passes}
+    if teeth > 1:
+        rates = {f"with each of {teeth} teeth, which are alike": passes / teeth} | rates
+    speeds = " or ".join(f"{rpm * ratio:.5g} (it repeats {how})" for how, ratio in rates.items())
+    remedy = f"Likely in runs.csv: spindle_rpm is {speeds}"
     if len(found) == len(batch.with_files("dynamometer")) and _spread(found) < 0.02:
-        remedy += f"; or the time of the records (rate_hz, column t_s) is {ratio:.3g} times too fast"
+        factors = " or ".join(f"{ratio:.3g}" for ratio in rates.values())
+        remedy += f"; or the time of the records (rate_hz, column t_s) runs {factors} times too fast"
     return (Slip(OBSERVABLES, text, remedy, "runs.csv", "spindle_rpm", first),)
 
 
