@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from metro.observables.catalogue import title
 from metro.report.content import Bullets, Facts, Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import verdicts as figures
@@ -13,6 +15,7 @@ from metro.report.sections import findings
 from metro.report.sections.lobes import boundary_items
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
+from metro.report.sections.surface import first_faces
 from metro.report.sections.trust import static_deflection, trust
 from metro.report.sections.verdict import (
     STATUS,
@@ -27,6 +30,7 @@ from metro.report.sections.verdict import (
 from metro.units import JSON
 
 MOST_DRAWN = 2  # most verdicts with which the first page has room for the figure of a run
+MOST_MODES = 12  # printed frequencies that are listed on the first page
 
 
 def summary(results: Results) -> Section:
@@ -100,7 +104,7 @@ def _one_run(results: Results) -> list[Item]:
 
 def _identified(results: Results) -> list[Item]:
     """Give the most compliant mode, and the boundary or the response that shows the identification."""
-    shown = [*boundary_items(results), *largest_response(results.tables)]
+    shown = [*first_faces(results), *boundary_items(results), *largest_response(results.tables)]
     yielding = [mode for mode in results.identified.get("modes") or [] if _peak(mode) > 0.0]
     if not yielding:
         return shown
@@ -151,12 +155,22 @@ def print_check(results: Results) -> list[Item]:
         return []
     pairs, flagged = int(table["predicted"].notna().sum()), int((table["flag"].fillna("") != "").sum())
     errata = int(table["note"].fillna("").str.contains("erratum: ").sum())
-    text = (
-        f"{len(table)} printed values were transcribed, {pairs} of them with a prediction beside them; "
-        f"every printed error was recomputed. {f'{flagged} cannot' if flagged else 'All can'} be right as "
-        f"printed; for {errata or 'none'} an erratum is stated."
-    )
-    return [Paragraph(text)]
+    text = f"{len(table)} printed values were transcribed"
+    if pairs:
+        text += f", {pairs} of them with a prediction beside them; every printed error was recomputed"
+    text += f". {f'{flagged} cannot' if flagged else 'All can'} be right as printed"
+    text += f"; for {errata} an erratum is stated." if errata else "."
+    return [Paragraph(text), *_printed_modes(table)]
+
+
+def _printed_modes(table: pd.DataFrame) -> list[Item]:
+    """List the printed frequencies of modes."""
+    modes = table[(table["observable"] == "modes") & (table["quantity"] == "frequency")]
+    if modes.empty:
+        return []
+    shown = ", ".join(number(float(value), 5) for value in modes["measured"].head(MOST_MODES))
+    more = f" and {len(modes) - MOST_MODES} more" if len(modes) > MOST_MODES else ""
+    return [Paragraph(f"{len(modes)} modes, natural frequencies in Hz: {shown}{more}.")]
 
 
 def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:

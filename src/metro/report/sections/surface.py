@@ -6,9 +6,9 @@ import math
 
 import pandas as pd
 
-from metro.report.content import Bullets, Item, Paragraph, Picture, Section, Table
+from metro.report.content import Bullets, Facts, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import surface as figures
-from metro.report.numbers import listing, number, with_interval
+from metro.report.numbers import listing, number, quantity, with_interval
 from metro.report.results import Results
 
 LONGEST = 24
@@ -37,6 +37,31 @@ def flatness(results: Results) -> Section | None:
         *_maps(results, contacts),
     ]
     return Section("Flatness", items)
+
+
+def first_faces(results: Results) -> list[Item]:
+    """Give the flatness of the faces with the largest and the least X_m, and what of it is noise alone."""
+    found = {
+        run: face
+        for run, face in (results.identified.get("faces") or {}).items()
+        if isinstance(face, dict) and face.get("xm")
+    }
+    if not found:
+        return []
+    by_size = sorted(found, key=lambda run: float(found[run]["xm"]["value"]), reverse=True)
+    facts = []
+    for run in dict.fromkeys([by_size[0], by_size[-1]]):
+        face = found[run]
+        freed = (face.get("noise_corrected") or {}).get("xm")
+        facts.append((f"X_m of {run}", quantity(face["xm"]), "range of the points as scanned"))
+        if freed:
+            facts.append(("without the noise", quantity(freed), f"X_m of {run}"))
+        if len(found) == 1 and face.get("minimum_zone"):
+            facts.append(("minimum zone", quantity(face["minimum_zone"]), f"of {run}"))
+    table = results.tables.get("face_indices")
+    parts = {} if table is None else dict(tuple(table.groupby("run", sort=False)))
+    noisy = _by_noise_alone({str(run): part.set_index("index_name") for run, part in parts.items()})
+    return [Facts(facts), *noisy]
 
 
 def _indices(
