@@ -196,9 +196,11 @@ def _face_json(table: pd.DataFrame) -> JSON:
     read, corrected, sd = (table[name].to_numpy(dtype=float) for name in ("value_um", "corrected_um", "u_um"))
     names = table["index_name"].astype(str)
     entry: JSON = {n: quantity(v, u, "um") for n, v, u in zip(names, read, sd, strict=True)}
+    ends = table[["low_um", "high_um"]].to_numpy(dtype=float)
     entry["noise_corrected"] = {
-        n: quantity(v, u, "um")
-        for n, v, u in zip(names, corrected, sd, strict=True)
+        # The interval under the noise is not symmetric, and begins at zero for a face not told from flat.
+        n: quantity(v, u, "um") | ({"ci95": end.tolist()} if np.isfinite(end).all() else {})
+        for n, v, u, end in zip(names, corrected, sd, ends, strict=True)
         if n != "percentile_range"
     }
     entry["sigma"] = quantity(float(first["sigma_um"]), math.nan, "um")
