@@ -129,7 +129,8 @@ def impacts(unit: str) -> Edit:
 def _impact_files(folder: Path) -> list[Path]:
     path = folder / "impacts.csv"
     table = pd.read_csv(path, dtype=str) if path.exists() else pd.DataFrame({"file": []})
-    return [folder / file for file in dict.fromkeys(table["file"]) if str(file).endswith(".parquet")]
+    names = table["file"].astype(str).str.partition("#")[0]  # several records may be in one file
+    return [folder / name for name in dict.fromkeys(names) if name.endswith(".parquet")]
 
 
 def hits(name: str, factor: float) -> Edit:
@@ -138,7 +139,8 @@ def hits(name: str, factor: float) -> Edit:
     def edit(folder: Path) -> bool:
         for file in _impact_files(folder):
             table = pd.read_parquet(file)
-            table[name] = factor * table[name]
+            for column in _channels(table, name):
+                table[column] = factor * table[column]
             table.to_parquet(file)
         return bool(_impact_files(folder))
 
@@ -151,9 +153,15 @@ def hit_copied(folder: Path) -> bool:
     if len(files) < 2:
         return False
     one, other = pd.read_parquet(files[0]), pd.read_parquet(files[1])
-    other["response"] = one["response"].to_numpy()[: len(other)]
+    column = _channels(one, "response")[0]
+    other[column] = one[column].to_numpy()[: len(other)]
     other.to_parquet(files[1])
     return True
+
+
+def _channels(table: pd.DataFrame, name: str) -> list[str]:
+    """Return the columns of a channel of the contract: its own name, or that name with a number behind."""
+    return [column for column in table if column == name or column.startswith(f"{name}_")]
 
 
 def _read_ply(path: Path) -> np.ndarray:
