@@ -129,7 +129,7 @@ def impacts(unit: str) -> Edit:
 def _impact_files(folder: Path) -> list[Path]:
     path = folder / "impacts.csv"
     table = pd.read_csv(path, dtype=str) if path.exists() else pd.DataFrame({"file": []})
-    names = table["file"].astype(str).str.partition("#")[0]  # several records may be in one file
+    names = [str(file).partition("#")[0] for file in table["file"]]  # several records may be in one file
     return [folder / name for name in dict.fromkeys(names) if name.endswith(".parquet")]
 
 
