@@ -161,7 +161,7 @@ def hit_copied(folder: Path) -> bool:
 
 def _channels(table: pd.DataFrame, name: str) -> list[str]:
     """Return the columns of a channel of the contract: its own name, or that name with a number behind."""
-    return [column for column in table if column == name or column.startswith(f"{name}_")]
+    return [column for column in map(str, table) if column == name or column.startswith(f"{name}_")]
 
 
 def _read_ply(path: Path) -> np.ndarray:
