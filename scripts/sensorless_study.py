@@ -23,7 +23,15 @@ from metro.observables.arm.tip_force import Log, Sensorless, sensorless
 from metro.observables.arm.wall import Wall
 from metro.observables.joint_force.observable import REPEATABLE
 from metro.robot.kinematics import Arm, rotation, transform
-from metro.robot.sensorless import LEAST_INDEX, LEAST_JOINTS, mean_force, smoothed_torque, tip_force
+from metro.robot.sensorless import (
+    LEAST_INDEX,
+    LEAST_JOINTS,
+    TipForce,
+    Torques,
+    mean_force,
+    smoothed_torque,
+    tip_force,
+)
 from metro.units import DEG, MM, Array
 from virtual_cell import noise, robot
 from virtual_cell.recipes import kr160
@@ -81,6 +89,15 @@ def drawn(which: int, friction: float, rng: np.random.Generator) -> tuple[Log, L
     )
 
 
+@dataclass(frozen=True)
+class Estimate:
+    """The force of a run by one rule, with the torques that it is from and the noise all runs share."""
+
+    torques: Torques
+    solution: TipForce
+    shared: Common
+
+
 @dataclass
 class Tally:
     """Errors of the mean force, N, half-widths of its interval, and whether intervals hold the truth."""
@@ -91,8 +108,13 @@ class Tally:
     mean_held: list[np.ndarray] = field(default_factory=list)
     place_held: list[Array] = field(default_factory=list)
 
-    def add(self, error: Array, sd: Array, off: Array, spread: Array) -> None:
-        """Count a run: of its mean (3,), and of its places (m, 3), errors and standard errors."""
+    def add(self, one: Sensorless, estimate: Estimate, truth: Array) -> None:
+        """Count a run's mean force and the force at its places; ``truth`` (3,) N, where the tool is engaged."""
+        solution, shared = estimate.solution, estimate.shared
+        mean, covariance = mean_force(solution, estimate.torques, one.steady, shared.friction, shared.wander)
+        error, sd = mean - truth, np.sqrt(np.diag(covariance))
+        off = solution.force - np.outer(share(one.x), truth)
+        spread = np.sqrt(np.einsum("maa->ma", solution.covariance))
         self.refused.append(False)
         self.error.append(error)
         self.half.append(1.96 * sd)
@@ -113,16 +135,15 @@ def batch(friction: float, rng: np.random.Generator, tallies: dict[str, Tally], 
     fixed = Common(np.full(6, REPEATABLE * NOISE), shared.wander)
     for run, item in enumerate(solved):
         one, truth = item.sensorless, FORCES[run % len(FORCES)]
-        course = np.outer(share(one.x), truth)
         of_all = force_of_all(one, shared)
-        _count(tallies[RULES[2]], one, one.torques, of_all, shared, truth, course)
+        tallies[RULES[2]].add(one, Estimate(one.torques, of_all, shared), truth)
         whole = smoothed_torque(one.difference, one.torques.noise)
         least = LEAST_INDEX if (one.index >= LEAST_INDEX).sum() >= LEAST_JOINTS else 0.0
         try:
             before = tip_force(whole.level, whole.variance, one.moves, one.index, least)
         except ValueError:
             before = tip_force(whole.level, whole.variance, one.moves, one.index, 0.0)
-        _count(tallies[RULES[1]], one, whole, before, fixed, truth, course)
+        tallies[RULES[1]].add(one, Estimate(whole, before, fixed), truth)
         passing = one.index >= LEAST_INDEX
         if passing.sum() < LEAST_JOINTS:
             tallies[RULES[0]].refused.append(True)
@@ -131,12 +152,6 @@ def batch(friction: float, rng: np.random.Generator, tallies: dict[str, Tally], 
         force = np.einsum("mai,mi->ma", pinv, whole.level[:, passing])
         tallies[RULES[0]].refused.append(False)
         tallies[RULES[0]].error.append(force[one.steady].mean(axis=0) - truth)
-
-
-def _count(tally, one, torques, solution, shared, truth, course) -> None:  # noqa: ANN001, PLR0917
-    mean, covariance = mean_force(solution, torques, one.steady, shared.friction, shared.wander)
-    spread = np.sqrt(np.einsum("maa->ma", solution.covariance))
-    tally.add(mean - truth, np.sqrt(np.diag(covariance)), solution.force - course, spread)
 
 
 def study(batches: int, friction: float, seed: int = 1) -> tuple[dict[str, Tally], Array]:
