@@ -109,7 +109,7 @@ class Tally:
     place_held: list[Array] = field(default_factory=list)
 
     def add(self, one: Sensorless, estimate: Estimate, truth: Array) -> None:
-        """Count a run's mean force and the force at its places; ``truth`` (3,) N, where the tool is engaged."""
+        """Count a run's mean force and the force at its places; ``truth`` (3,) N when engaged."""
         solution, shared = estimate.solution, estimate.shared
         mean, covariance = mean_force(solution, estimate.torques, one.steady, shared.friction, shared.wander)
         error, sd = mean - truth, np.sqrt(np.diag(covariance))
