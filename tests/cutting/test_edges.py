@@ -161,3 +161,19 @@ def test_the_rule_of_roots_integrates_powers_of_the_distance_from_both_ends(powe
     exact = 1 / (power + 1)
     assert weights @ points**power == pytest.approx(exact, rel=2e-6)
     assert weights @ (1 - points) ** power == pytest.approx(exact, rel=2e-6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.01, 1.5))
+def test_an_arc_as_short_as_any_is_integrated_to_a_billionth_of_itself(length):
+    # An arc that begins where the chip does is the hardest: all that is integrated is small there.
+    tool = Cutter(10e-3, math.radians(30.0), (0.0,))
+    depth = 1.5 / tool.lag_per_depth
+    cut = Cut(0.1e-3, depth, Engagement(0.0, length))
+    at = math.ceil(1.5 * ANGLES / (2.0 * math.pi)) - 1
+    reached = min(length, at * 2.0 * math.pi / ANGLES)  # the edge is just behind the start of the arc
+    shear = 0.1e-3 / tool.lag_per_depth * np.array([
+        0.5 * math.sin(reached) ** 2, 0.5 * reached - 0.25 * math.sin(2.0 * reached)
+    ])  # fmt: skip
+    table = force_basis(tool, EdgeLaw(), cut)[at]
+    np.testing.assert_allclose(table[:2, 0], [-shear[0], shear[1]], rtol=1e-9)
