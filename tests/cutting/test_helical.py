@@ -10,7 +10,7 @@ from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import mean_force
-from metro.cutting.helical import Helix, helical_signal, ramped, turned
+from metro.cutting.helical import Helix, helical_signal, ramped, turn
 from metro.cutting.law import EdgeLaw
 from metro.cutting.time_signal import time_signal
 
@@ -86,12 +86,12 @@ def test_teeth_pass_a_fixed_direction_at_the_speed_of_the_spindle():
 
 def test_rotations_keep_length_and_hand():
     basis = np.eye(3)[None]
-    for turn in (ramped(basis, 0.3), turned(basis, 0.7)):
-        assert np.linalg.det(turn[0]) == pytest.approx(1.0)
-        assert turn[0] @ turn[0].T == pytest.approx(np.eye(3))
+    for turned in (ramped(basis, 0.3), turn(0.7) @ basis):
+        assert np.linalg.det(turned[0]) == pytest.approx(1.0)
+        assert turned[0] @ turned[0].T == pytest.approx(np.eye(3))
     # A ramp leads downwards: a force along the inclined feed has a part along −z.
     assert ramped(np.array([[1.0, 0.0, 0.0]]), 0.1)[0, 2] < 0
-    assert turned(np.array([[1.0, 0.0, 0.0]]), 0.1)[0, 1] > 0
+    assert (turn(0.1) @ [1.0, 0.0, 0.0])[1] > 0
 
 
 @pytest.mark.parametrize("orbit", [ORBIT, -ORBIT], ids=["left", "right"])

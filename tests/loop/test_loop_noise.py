@@ -106,6 +106,11 @@ def test_the_budget_does_not_average_out_over_repeats():
     assert three == pytest.approx(3 * alone)
 
 
+def log_determinant(block, noise, directions):
+    whiten = noise_room.whitener(diagonal(block, noise), directions)
+    return noise_room.log_determinant(block, noise, directions, whiten)
+
+
 def test_misfit_weighs_many_neighbours_as_one_element():
     one = runs(1, 0.0)[0][0]
     noise = Noise(0.0, np.full(2, 0.01), {}, misfit={"x": 1.0})
@@ -114,10 +119,11 @@ def test_misfit_weighs_many_neighbours_as_one_element():
         np.full(POINTS, noise_room.MISFIT_CORRELATION * rms2)
     )
     # Counted as elements, each still has its own variance, a twelfth as often, in units of the noise.
-    assert noise_room.log_scale(one, replace(noise, misfit={})) == pytest.approx(-POINTS)
+    assert log_determinant(one, replace(noise, misfit={}), np.zeros((POINTS, 0))) == pytest.approx(-POINTS)
     once = SIGMA**2 + rms2
     count = POINTS * once / (SIGMA**2 + noise_room.MISFIT_CORRELATION * rms2)
-    assert noise_room.log_scale(one, noise) == pytest.approx(count * (np.log(once / SIGMA**2) - 1.0))
+    by_count = count * (np.log(once / SIGMA**2) - 1.0)
+    assert log_determinant(one, noise, np.zeros((POINTS, 0))) == pytest.approx(by_count)
 
 
 def test_what_is_shared_adds_what_dense_algebra_says_and_nothing_by_a_misfit():
@@ -126,7 +132,9 @@ def test_what_is_shared_adds_what_dense_algebra_says_and_nothing_by_a_misfit():
     directions = shared(one, noise, matrix, BETA)
     variance = diagonal(one, replace(noise, misfit={}))
     dense = np.linalg.slogdet(np.diag(variance) + directions @ directions.T)[1] - np.sum(np.log(variance))
-    assert noise_room.log_shared(one, noise, directions) == pytest.approx(dense)
+    for kind in (noise, replace(noise, misfit={})):
+        added = log_determinant(one, kind, directions) - log_determinant(one, kind, np.zeros((POINTS, 0)))
+        assert added == pytest.approx(dense)
 
 
 @pytest.mark.parametrize("start", [0.0, 0.02, 0.3])

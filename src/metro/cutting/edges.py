@@ -22,7 +22,7 @@ from metro.units import Array
 
 TURN = 2.0 * math.pi
 # Worst is an arc that begins where the chip does: over a length L, n points leave 4.8e-5 L⁴ (n = 3) and
-# 2.2e-7 L⁶ (4) of the integral of sin² φ, and 2 + 4 L of them 2e-7 of a quarter of a radian; 3 + 4 L leave 5e-11.
+# 2.2e-7 L⁶ (4) of the integral of sin² φ. Of a quarter of a radian 2 + 4 L points leave 2e-7, 3 + 4 L 5e-11.
 LEAST_POINTS, POINTS_PER_RADIAN = 3, 4.0
 POINTS_OF_ROOTS = 8  # more, where the law makes roots of the chip's ends
 

@@ -40,11 +40,14 @@ def ramped(vectors: Array, ramp: float) -> Array:
     return np.stack([c * x + s * z, y, c * z - s * x], axis=1)
 
 
-def turned(vectors: Array, angle: float | Array) -> Array:
-    """Turn (n, 3, …) vectors about z, counter-clockwise, by one angle, or (n, 3) by (n,) angles, rad."""
-    c, s = np.cos(angle), np.sin(angle)
-    x, y, z = vectors[:, 0], vectors[:, 1], vectors[:, 2]
-    return np.stack([c * x - s * y, s * x + c * y, z], axis=1)
+def turn(angle: float | Array) -> Array:
+    """Matrices (…, 3, 3) that turn a vector about z, counter-clockwise, by angles (…), rad."""
+    matrix = np.zeros((*np.shape(angle), 3, 3))
+    matrix[..., 0, 0] = matrix[..., 1, 1] = np.cos(angle)
+    matrix[..., 1, 0] = np.sin(angle)
+    matrix[..., 0, 1] = -matrix[..., 1, 0]
+    matrix[..., 2, 2] = 1.0
+    return matrix
 
 
 def bottom_thrust(cutter: Cutter, helix: Helix) -> Array:
@@ -90,4 +93,4 @@ def helical_signal(
     )
     force = ramped(force, helix.ramp)
     force[:, 2] += bottom_thrust(cutter, helix) @ coefficients[6:]
-    return turned(force, direction + orbit_speed * time)
+    return np.asarray((turn(direction + orbit_speed * time) @ force[..., None])[..., 0])

@@ -126,6 +126,23 @@ class Model(Protocol):
 
 
 @runtime_checkable
+class Batched(Protocol):
+    """A model that predicts a block at many nuisances in one call."""
+
+    def predictions(self, block: Block, nuisances: Array, beta: Array) -> Array:
+        """Return the prediction (k, n) of a block at each of ``nuisances`` (k, m), SI."""
+        ...
+
+
+def predictions(model: Model, block: Block, nuisances: Array, beta: Array) -> Array:
+    """Return the prediction (k, n) of a block at each of ``nuisances`` (k, m), by any model, SI."""
+    if isinstance(model, Batched):
+        return model.predictions(block, nuisances, beta)
+    designs = [model.design(block, nuisance, beta) for nuisance in nuisances]
+    return np.array([offset + matrix @ beta for matrix, offset in designs]).reshape(-1, len(block.measured))
+
+
+@runtime_checkable
 class Limited(Protocol):
     """A model without a valid prediction for some values of its parameters, where only a search may go."""
 

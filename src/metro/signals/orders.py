@@ -62,15 +62,24 @@ def to_orders(waveform: Array, highest: int) -> Array:
     return coefficients
 
 
+def amplitudes(coefficients: Array) -> ComplexArray:
+    """Complex amplitudes (H+1, …) of the orders 0…H, of e^{+ikα}, from order coefficients (2H+1, …)."""
+    return np.concatenate([coefficients[:1].astype(complex), coefficients[1::2] - 1j * coefficients[2::2]])
+
+
+def from_amplitudes(waves: ComplexArray) -> Array:
+    """Order coefficients (2H+1, …) from complex amplitudes (H+1, …): the inverse of :func:`amplitudes`."""
+    coefficients = np.empty((2 * len(waves) - 1, *waves.shape[1:]))
+    coefficients[0] = waves[0].real
+    coefficients[1::2], coefficients[2::2] = waves[1:].real, -waves[1:].imag
+    return coefficients
+
+
 def advance(coefficients: Array, angle: float) -> Array:
     """Order coefficients of f(α + angle) from those of f(α); first axis (2H+1)."""
-    order = np.arange(1, (len(coefficients) + 1) // 2)
-    shape = (-1,) + (1,) * (coefficients.ndim - 1)
-    cosine, sine = np.cos(order * angle).reshape(shape), np.sin(order * angle).reshape(shape)
-    shifted = np.array(coefficients, dtype=float)
-    shifted[1::2] = cosine * coefficients[1::2] + sine * coefficients[2::2]
-    shifted[2::2] = cosine * coefficients[2::2] - sine * coefficients[1::2]
-    return shifted
+    waves = amplitudes(coefficients)
+    turned = np.exp(1j * angle * np.arange(len(waves))).reshape(-1, *(1,) * (coefficients.ndim - 1))
+    return from_amplitudes(waves * turned)
 
 
 def aligned(coefficients: Array, like: Array) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.noise import Noise
-from metro.observables.problem import Block, Model
+from metro.observables.problem import Block, Model, predictions
 from metro.units import Array
 
 ITERATIONS = 40
@@ -102,7 +102,7 @@ def linearised(
         whiten = noise_room.whitener(noise_room.diagonal(block, noise), directions)
         residual = whiten(block.measured - predicted)
         chi2[block.run] = float(residual @ residual)
-        determinant = noise_room.log_shared(block, noise, directions) + noise_room.log_scale(block, noise)
+        determinant = noise_room.log_determinant(block, noise, directions, whiten)
         log_likelihood[block.run] = -0.5 * (chi2[block.run] + determinant)
         if derivatives != "none":
             effect, own = sensitivities(model, moved, block, nuisance, state.beta, predicted=predicted)
@@ -128,13 +128,11 @@ def sensitivities(
     ``moved``: the model with each effect parameter moved, of :func:`moved_models`; ``predicted``: (n,) by the
     model itself.
     """
-    effect = [(_prediction(other, block, nuisance, beta) - predicted) / step for other, step in moved]
-    own = [
-        (_prediction(model, block, nuisance + NUISANCE_STEP * unit, beta) - predicted) / NUISANCE_STEP
-        for unit in np.eye(len(nuisance))
-    ]
-    n = len(predicted)
-    return np.array(effect).reshape(-1, n).T, np.array(own).reshape(-1, n).T
+    here = nuisance[None]
+    effect = [(predictions(other, block, here, beta)[0] - predicted) / step for other, step in moved]
+    places = nuisance + NUISANCE_STEP * np.eye(len(nuisance))
+    own = (predictions(model, block, places, beta) - predicted) / NUISANCE_STEP
+    return np.array(effect).reshape(-1, len(predicted)).T, own.T
 
 
 def moved_models(candidate: Candidate, theta: Array) -> list[tuple[Model, float]]:
@@ -148,11 +146,6 @@ def moved_models(candidate: Candidate, theta: Array) -> list[tuple[Model, float]
         moved[i] += step
         models.append((candidate.model(moved), step))
     return models
-
-
-def _prediction(model: Model, block: Block, nuisance: Array, beta: Array) -> Array:
-    matrix, offset = model.design(block, nuisance, beta)
-    return np.asarray(offset + matrix @ beta)
 
 
 def normal_equations(system: System) -> tuple[Array, Array]:

@@ -31,7 +31,7 @@ from metro.loop.fitting.descent import (
 )
 from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
-from metro.observables.problem import Block, Model
+from metro.observables.problem import Block, Model, predictions
 from metro.units import Array
 
 FOLLOWED = 4  # starts of new effect parameters that are followed to the end
@@ -239,11 +239,8 @@ def _search_nuisance(
 def _costs(model: Model, block: Block, noise: Noise, beta: Array, starts: Array) -> Array:
     """Weighted sum of squares that each of a block's nuisances leaves, (starts,)."""
     weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
-    costs = np.empty(len(starts))
-    for i, nuisance in enumerate(starts):
-        matrix, offset = model.design(block, nuisance, beta)
-        costs[i] = np.sum(((block.measured - offset - matrix @ beta) * weight) ** 2)
-    return costs
+    left = (block.measured - predictions(model, block, starts, beta)) * weight
+    return np.asarray(np.sum(left**2, axis=1))
 
 
 def _images(block: Block, nuisance: Array, starts: Array) -> Array:

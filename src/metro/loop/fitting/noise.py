@@ -69,11 +69,15 @@ class Noise:
 
 @dataclass(frozen=True)
 class Whitener:
-    """The inverse square root of a block's covariance, in factored form: 1 − vectors × shrink × vectorsᵀ."""
+    """The inverse square root of a block's covariance, in factored form: 1 − vectors × shrink × vectorsᵀ.
+
+    ``log_shared``: what the shared directions add to the logarithm of the covariance's determinant.
+    """
 
     inverse_sd: Array
     vectors: Array
     shrink: Array
+    log_shared: float
 
     def __call__(self, values: Array) -> Array:
         """Apply to a vector (n,) or to the columns of a matrix (n, k)."""
@@ -122,24 +126,21 @@ def all_alike(noise: Noise) -> Noise:
     return replace(noise, everywhere=float(len(noise.repeats)))
 
 
-def log_scale(block: Block, noise: Noise) -> float:
-    """Logarithm of the determinant of the unshared variance, elements counted as in :func:`diagonal`.
+def log_determinant(block: Block, noise: Noise, directions: Array, whiten: Whitener) -> float:
+    """Logarithm of the determinant of a block's covariance, in units that every model shares.
 
-    In units of the variance without a misfit, which is that of every model, and less one for each element:
-    elements that a misfit leaves uncounted must gain nothing by it, whatever the unit.
+    The unshared variance counts in units of that without a misfit, elements as in :func:`diagonal`, and less
+    one for each element: elements that a misfit leaves uncounted must gain nothing by it, whatever the unit.
+    They also say less about the errors that a whole run shares. That must gain nothing either: else a model
+    that misses a little is likelier than one that misses nothing.
     """
-    once, known = diagonal(block, noise, correlation=1.0), diagonal(block, noise.sound)
-    return float(np.sum(once / diagonal(block, noise) * (np.log(once / known) - 1.0)))
-
-
-def log_shared(block: Block, noise: Noise, directions: Array) -> float:
-    """Return what the shared directions (n, k) add to the logarithm of the determinant if nothing is missed.
-
-    Elements that a misfit leaves uncounted say less about the errors that a whole run shares. That
-    must gain nothing either: else a model that misses a little is likelier than one that misses nothing.
-    """
-    scaled = directions / np.sqrt(diagonal(block, noise.sound))[:, None]
-    return float(np.linalg.slogdet(np.eye(scaled.shape[1]) + scaled.T @ scaled)[1])
+    known = diagonal(block, noise.sound)
+    if not any(noise.misfit.values()):
+        return whiten.log_shared - len(known)
+    once, counted = diagonal(block, noise, correlation=1.0), diagonal(block, noise)
+    scaled = directions / np.sqrt(known)[:, None]
+    log_shared = np.linalg.slogdet(np.eye(scaled.shape[1]) + scaled.T @ scaled)[1]
+    return float(np.sum(once / counted * (np.log(once / known) - 1.0)) + log_shared)
 
 
 def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
@@ -160,7 +161,8 @@ def whitener(variance: Array, directions: Array) -> Whitener:
     power = np.maximum(power, 0.0)
     root = np.sqrt(1.0 + power)
     # 1 − 1/root over the power, without the loss of digits where there is next to none of it.
-    return Whitener(inverse_sd, scaled @ turn, 1.0 / (root * (1.0 + root)))
+    shrink, log_shared = 1.0 / (root * (1.0 + root)), float(np.sum(np.log1p(power)))
+    return Whitener(inverse_sd, scaled @ turn, shrink, log_shared)
 
 
 def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array:

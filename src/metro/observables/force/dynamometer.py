@@ -6,13 +6,13 @@ with the orbit and the sensor does not, so the sensor's matrix is averaged over 
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from metro.cutting.helical import turn
 from metro.units import Array, ComplexArray
 
 ORBIT_POINTS = 5  # within a time block, over which the turning frame is averaged
@@ -81,47 +81,33 @@ class Recording:
         return float(np.sinc(self.orbit * self.span / (2.0 * math.pi)))
 
 
-def read(sensor: Dynamometer, recording: Recording, orders: Array) -> Array:
-    """Order coefficients that the sensor reads of those of the force: (2H+1, 3, k) → (blocks, 2H+1, 3, k)."""
-    force = _complex(orders)
-    return _real(_transfer(sensor, recording, len(force)) @ force)
+def transfer(sensor: Dynamometer, recording: Recording, orders: int) -> ComplexArray:
+    """Map of the force to the reading at the orders 0…, in the comparison's frame: (blocks, orders, 3, 3)."""
+    by_channel = _by_channel(sensor.axes, sensor.rotation, recording)
+    gain = _gain(sensor, recording.speed, orders)
+    seen = (gain @ by_channel.reshape(len(by_channel), 3, 9)).reshape(-1, orders, 3, 3)
+    seen[:, 0] = _steady(sensor.axes, sensor.rotation, sensor.discharge, recording)
+    return np.asarray(seen)
 
 
 @lru_cache(maxsize=512)
-def _transfer(sensor: Dynamometer, recording: Recording, orders: int) -> ComplexArray:
-    """Map of the force to the reading, in the frame of the comparison, (blocks, orders, 3, 3)."""
-    blocks = []
-    for middle in recording.middles:
-        matrix = _matrix(sensor, recording, middle, orders)
-        matrix[0] = _steady(sensor, recording, middle)
-        blocks.append(matrix)
-    return np.stack(blocks)
+def _by_channel(axes: Rows, rotation: float, recording: Recording) -> Array:
+    """Share of each channel in that map, (blocks, channels, 3, 3), averaged over the turn within a block."""
+    declared, true = _rows(axes, rotation)
+    points = ORBIT_POINTS if recording.orbit else 1
+    shares = (np.arange(points) + 0.5) / points - 0.5
+    times = np.array(recording.middles)[:, None] + shares * recording.span
+    frame = turn(recording.orbit * times)
+    back = np.swapaxes(frame, -1, -2) @ np.linalg.inv(declared)
+    by_channel = np.einsum("bpic,bpcj->bcij", back, true @ frame) / points
+    by_channel.flags.writeable = False
+    return np.asarray(by_channel)
 
 
-def _complex(orders: Array) -> ComplexArray:
-    """Amplitudes of e^{+ikα}, (H+1, …), of coefficients [mean, cosine, sine, …]."""
-    return np.concatenate([orders[:1].astype(complex), orders[1::2] - 1j * orders[2::2]])
-
-
-def _real(amplitudes: ComplexArray) -> Array:
-    """Undo :func:`_complex` in every block, (blocks, H+1, …)."""
-    blocks, count = amplitudes.shape[:2]
-    orders = np.empty((blocks, 2 * count - 1, *amplitudes.shape[2:]))
-    orders[:, 0] = amplitudes[:, 0].real
-    orders[:, 1::2], orders[:, 2::2] = amplitudes[:, 1:].real, -amplitudes[:, 1:].imag
-    return orders
-
-
-def _rows(sensor: Dynamometer) -> tuple[Array, Array]:
+def _rows(axes: Rows, rotation: float) -> tuple[Array, Array]:
     """Return the declared channels, and the channels with the sensor's rotation."""
-    c, s = math.cos(sensor.rotation), math.sin(sensor.rotation)
-    declared = np.array(sensor.axes)
-    return declared, declared @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _turn(angle: float) -> Array:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    declared = np.array(axes)
+    return declared, declared @ turn(np.array(-rotation))
 
 
 def _gain(sensor: Dynamometer, speed: float, orders: int) -> ComplexArray:
@@ -133,43 +119,29 @@ def _gain(sensor: Dynamometer, speed: float, orders: int) -> ComplexArray:
     return gain
 
 
-def _matrix(sensor: Dynamometer, recording: Recording, middle: float, orders: int) -> ComplexArray:
-    """Map of the force to the reading, in the frame of the comparison, by order: (orders, 3, 3)."""
-    declared, true = _rows(sensor)
-    back = np.linalg.inv(declared)
-    gain = _gain(sensor, recording.speed, orders)
-    points = ORBIT_POINTS if recording.orbit else 1
-    shares = (np.arange(points) + 0.5) / points - 0.5
-    total = np.zeros((orders, 3, 3), complex)
-    for share in shares:
-        turn = _turn(recording.orbit * (middle + share * recording.span))
-        total += np.einsum("ic,hc,cj->hij", turn.T @ back, gain, true @ turn) / points
-    return total
-
-
-def _steady(sensor: Dynamometer, recording: Recording, middle: float) -> Array:
-    """Map (3, 3) of the mean force to its reading while the charge leaks away.
+@lru_cache(maxsize=512)
+def _steady(axes: Rows, rotation: float, discharge: Triple, recording: Recording) -> Array:
+    """Map (blocks, 3, 3) of the mean force to its reading while the charge leaks away.
 
     A channel with discharge rate 1/τ reads y' = F' − y/τ, y = 0 before the contact. A force that turns with
     the orbit is the real part of a complex one times e^{iωt}.
     """
-    declared, true = _rows(sensor)
-    orbit, since = recording.orbit, middle - recording.contact
-    rows = np.empty((3, 3))
-    for channel, (direction, rate) in enumerate(zip(true, sensor.discharge, strict=True)):
-        plane = complex(direction[0], -direction[1]) * cmath.exp(1j * orbit * recording.contact)
-        turning = _leaked(rate, orbit, since)
-        rows[channel] = (
-            (plane * turning).real,
-            (1j * plane * turning).real,
-            direction[2] * _leaked(rate, 0.0, since).real,
-        )
-    return np.asarray(_turn(orbit * middle).T @ np.linalg.inv(declared) @ rows)
+    declared, true = _rows(axes, rotation)
+    orbit, middles = recording.orbit, np.array(recording.middles)
+    rate, since = np.array(discharge), middles[:, None] - recording.contact
+    plane = (true[:, 0] - 1j * true[:, 1]) * np.exp(1j * orbit * recording.contact)
+    turning = plane * _leaked(rate, orbit, since)
+    rows = np.stack(
+        [turning.real, -turning.imag, true[:, 2] * _leaked(rate, 0.0, since).real], axis=-1
+    )  # (blocks, channels, 3)
+    steady = np.swapaxes(turn(orbit * middles), -1, -2) @ np.linalg.inv(declared) @ rows
+    steady.flags.writeable = False
+    return np.asarray(steady)
 
 
-def _leaked(rate: float, orbit: float, since: float) -> complex:
-    """Return the remaining part of e^{iωt}, applied from t = 0 on, after a discharge at ``rate``."""
-    if rate == 0.0:
-        return cmath.exp(1j * orbit * since)
-    moving = 1j * orbit * cmath.exp(1j * orbit * since)
-    return (moving + rate * math.exp(-rate * since)) / (1j * orbit + rate)
+def _leaked(rate: Array, orbit: float, since: Array) -> ComplexArray:
+    """Return the remaining part of e^{iωt}, applied from t = 0 on, after a discharge at ``rate`` (3,)."""
+    wave = np.exp(1j * orbit * since) + np.zeros_like(rate)
+    with np.errstate(divide="ignore", invalid="ignore"):  # without discharge all of it is left
+        left = (1j * orbit * wave + rate * np.exp(-rate * since)) / (1j * orbit + rate)
+    return np.asarray(np.where(rate == 0.0, wave, left))

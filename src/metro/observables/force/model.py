@@ -13,13 +13,13 @@ from metro.cutting.chipped import Chipped
 from metro.cutting.cutter import Cutter
 from metro.cutting.engagement import with_wall_proud
 from metro.cutting.force import COEFFICIENTS, Cut, force_basis
-from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped, turned
+from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped, turn
 from metro.cutting.law import EdgeLaw
 from metro.cutting.yielding_steady import NotBalancedError, yielding_basis
-from metro.observables.force.dynamometer import Dynamometer, Recording, read
+from metro.observables.force.dynamometer import Dynamometer, Recording, transfer
 from metro.observables.problem import Block, Parameter
-from metro.signals.orders import advance, to_orders
-from metro.units import N_MM, N_MM2, Array
+from metro.signals.orders import amplitudes, from_amplitudes, to_orders
+from metro.units import N_MM, N_MM2, Array, ComplexArray
 
 PHASES_PER_PITCH = 12
 ORBIT_PHASES = 12
@@ -115,24 +115,46 @@ class ForceModel:
         A tool that yields has the displacement that belongs to the coefficients ``beta``; without them it is
         rigid.
         """
-        setting = self._cutting(block.setting)
-        recording = setting.recording
-        basis = advance(self._orders(setting, beta), float(nuisance[0]))
-        basis = basis * np.repeat([setting.feed_ratio, self.law.edge(setting.cut_length)], 3)[:, None]
-        turn = setting.feed_direction
+        force = self._force(block.setting, beta)
+        return self._rows(force, block.setting, nuisance[None])[0], self._drift(block)
+
+    def predictions(self, block: Block, nuisances: Array, beta: Array) -> Array:
+        """Return the prediction (k, n) of a block at each of ``nuisances`` (k, m)."""
+        force = self._force(block.setting, beta) @ beta
+        return self._rows(force[..., None], block.setting, nuisances)[..., 0] + self._drift(block)
+
+    def _force(self, setting: ForceSetting, beta: Array | None) -> ComplexArray:
+        """Amplitudes of the force at phase 0, (feeds, H+1, 3, coefficients), with x along the feed."""
+        worn = np.repeat([setting.feed_ratio, self.law.edge(setting.cut_length)], 3)
+        force = self._orders(self._cutting(setting), beta) * worn
         if setting.helix is not None:
-            basis = ramped(basis, setting.helix.ramp)
-            turn = float(nuisance[1])
+            force = ramped(force.reshape(-1, *force.shape[2:]), setting.helix.ramp).reshape(force.shape)
         if self.bottom_edges:
-            bottom = self._bottom(setting, len(basis))[..., None]
-            basis = np.concatenate([basis, np.repeat(bottom, basis.shape[3], axis=3)], axis=2)
-        count, feeds = basis.shape[2:]
-        seen = self._seen(turned(basis, turn).reshape(len(basis), 3, -1), setting, turn)
-        if feeds > 1:
-            shares = _shares_of_feeds(recording, turn)
-            seen = np.einsum("bhapf,bf->bhap", seen.reshape(*seen.shape[:3], count, feeds), shares)
-        matrix = seen.transpose(0, 2, 1, 3).reshape(-1, count)
-        return matrix, self._drift(block, recording)
+            bottom = np.zeros((*force.shape[:3], len(self.bottom_edges)), complex)
+            bottom[:, 0, 2] = self._bottom(setting)
+            force = np.concatenate([force, bottom], axis=3)
+        return np.asarray(force)
+
+    def _rows(self, force: ComplexArray, setting: ForceSetting, nuisances: Array) -> Array:
+        """Return what the sensor reads of a force (feeds, H+1, 3, p) at nuisances (k, m): (k, n, p)."""
+        recording, orders, p = setting.recording, force.shape[1], force.shape[-1]
+        phase, direction = nuisances[:, 0], np.full(len(nuisances), setting.feed_direction)
+        if setting.helix is not None:
+            direction = nuisances[:, 1]
+        if len(force) > 1:
+            shares = _shares_of_feeds(recording, direction)
+            force = np.einsum("kbf,fhap->kbhap", shares, force)
+        elif self.sensor.ideal:
+            force = np.broadcast_to(force, (1, len(recording.middles), *force.shape[1:]))
+        turned = turn(direction)[:, None, None] @ force
+        turned *= np.exp(1j * phase[:, None] * np.arange(orders))[:, None, :, None, None]
+        seen = turned if self.sensor.ideal else transfer(self.sensor, recording, orders) @ turned
+        if setting.helix is not None and self.structure.orbit_amplitude:
+            feed = direction[:, None] + recording.orbit * np.array(recording.middles)
+            wave = recording.attenuation * np.cos(feed - self.structure.orbit_phase)
+            seen[..., 2, :] *= (1.0 + self.structure.orbit_amplitude * wave)[:, :, None, None]
+        rows = from_amplitudes(seen.transpose(2, 0, 1, 3, 4)).transpose(1, 2, 3, 0, 4)
+        return rows.reshape(len(nuisances), -1, p)
 
     def _cutting(self, setting: ForceSetting) -> ForceSetting:
         """Return the setting that an arm of this stiffness cuts: a softer arm cuts less of the wall."""
@@ -142,18 +164,18 @@ class ForceModel:
         arc = with_wall_proud(setting.cut.engagement, self.cutter.radius, more)
         return replace(setting, cut=replace(setting.cut, engagement=arc))
 
-    def _orders(self, setting: ForceSetting, beta: Array | None) -> Array:
-        """Order coefficients of the peripheral force, feed frame, (2H+1, 3, 6, feeds).
+    def _orders(self, setting: ForceSetting, beta: Array | None) -> ComplexArray:
+        """Amplitudes of the orders of the peripheral force, feed frame, (feeds, H+1, 3, 6).
 
         A tool that yields in helical milling has one for each direction of ``FEEDS``, otherwise there is one.
         """
         if self.chipped:
             sound = replace(self, chipped=())
-            return sound._orders(setting, beta) + self._lost(setting)[..., None]
+            return sound._orders(setting, beta) + self._lost(setting)
         tool, highest = (self.cutter, self.law, setting.cut), setting.highest
         if beta is None or not any(self.structure.compliance):
-            return _order_basis(*tool, highest, self.true_path)[..., None]
-        return np.stack([each.orders for each in self._yielding(setting, beta)], axis=3)
+            return _order_basis(*tool, highest, self.true_path)[None]
+        return np.stack([each.orders for each in self._yielding(setting, beta)])
 
     def _yielding(self, setting: ForceSetting, beta: Array) -> list[_Yielding]:
         """Return the force on a tool that yields, in each direction of feed that is computed."""
@@ -175,8 +197,8 @@ class ForceModel:
             return ""
         return "force and deflection find no balance: a tool this soft would not cut steadily"
 
-    def _lost(self, setting: ForceSetting) -> Array:
-        """Order coefficients of what chipped teeth change in the force, as if the tool did not yield.
+    def _lost(self, setting: ForceSetting) -> ComplexArray:
+        """Amplitudes of what chipped teeth change in the force, as if the tool did not yield.
 
         The highest chip breaks the whole tool, the next one the tool that is left, up to its own height.
         """
@@ -190,59 +212,46 @@ class ForceModel:
             tool = broken
         return np.asarray(np.sum(changes, axis=0))
 
-    def _bottom(self, setting: ForceSetting, orders: int) -> Array:
+    def _bottom(self, setting: ForceSetting) -> list[float]:
         """Thrust of the bottom edges along z over the whole revolution: it is not inclined by the ramp."""
-        columns = np.zeros((orders, 3, len(self.bottom_edges)))
-        if setting.helix is not None:
-            thrust = dict(zip(BOTTOM_EDGES, bottom_thrust(self.cutter, setting.helix), strict=True))
-            columns[0, 2] = [thrust[name] for name in self.bottom_edges]
-        return columns
+        if setting.helix is None:
+            return [0.0] * len(self.bottom_edges)
+        thrust = dict(zip(BOTTOM_EDGES, bottom_thrust(self.cutter, setting.helix), strict=True))
+        return [thrust[name] for name in self.bottom_edges]
 
-    def _seen(self, basis: Array, setting: ForceSetting, direction: float) -> Array:
-        """Return the sensor's reading of the force in each time block, (blocks, orders, 3, coefficients)."""
-        recording = setting.recording
-        if self.sensor.ideal:
-            seen = np.repeat(basis[None], len(recording.middles), axis=0)
-        else:
-            seen = read(self.sensor, recording, basis)
-        if setting.helix is not None and self.structure.orbit_amplitude:
-            feed = direction + recording.orbit * np.array(recording.middles)
-            wave = recording.attenuation * np.cos(feed - self.structure.orbit_phase)
-            seen[:, :, 2] *= (1.0 + self.structure.orbit_amplitude * wave)[:, None, None]
-        return seen
-
-    def _drift(self, block: Block, recording: Recording) -> Array:
+    def _drift(self, block: Block) -> Array:
         """Offset (n,) from the drift of the sensor since its zero was read."""
         if not any(self.sensor.slope):
             return np.zeros(len(block.zeros))
+        recording: Recording = block.setting.recording
         since = np.array(recording.middles) - recording.zero_at
         each = len(block.zeros) // len(since)
         return np.asarray(np.repeat(since, each) * (block.zeros @ self.sensor.drift))
 
 
-def _shares_of_feeds(recording: Recording, direction: float) -> Array:
-    """Shares (blocks, feeds) of ``FEEDS`` in each time block of an orbit; ``direction`` of feed at its start.
+def _shares_of_feeds(recording: Recording, direction: Array) -> Array:
+    """Shares (k, blocks, feeds) of ``FEEDS`` in each time block of an orbit, by ``direction`` (k,) of feed.
 
     A spring that does not turn with the feed changes the force nearly as a sinusoid of twice the direction of
     feed. Three directions determine this sinusoid, and the time block averages it.
     """
-    feed = direction + recording.orbit * np.array(recording.middles)
+    feed = direction[:, None] + recording.orbit * np.array(recording.middles)
     attenuation = np.sinc(recording.orbit * recording.span / math.pi)
-    wave = attenuation * np.cos(2.0 * (feed[:, None] - np.array(FEEDS)))
+    wave = attenuation * np.cos(2.0 * (feed[..., None] - np.array(FEEDS)))
     return np.asarray((1.0 + 2.0 * wave) / len(FEEDS))
 
 
 @lru_cache(maxsize=4096)
-def _order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path: bool) -> Array:
-    basis = to_orders(force_basis(cutter, law, cut, true_path), highest)
+def _order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path: bool) -> ComplexArray:
+    basis = amplitudes(to_orders(force_basis(cutter, law, cut, true_path), highest))
     basis.flags.writeable = False
     return basis
 
 
 class _Yielding(NamedTuple):
-    """Order coefficients of a tool that yields, and whether they are those of its whole compliance."""
+    """Amplitudes of the orders of a tool that yields, and whether they are those of its whole compliance."""
 
-    orders: Array
+    orders: ComplexArray
     balanced: bool
 
 
@@ -271,6 +280,6 @@ def _yielding_orders(
             compliance, balanced = 0.5 * compliance, False
         else:
             break
-    orders = to_orders(basis, highest)
+    orders = amplitudes(to_orders(basis, highest))
     orders.flags.writeable = False
     return _Yielding(orders, balanced)
