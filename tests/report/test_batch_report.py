@@ -132,6 +132,18 @@ def test_every_status_has_its_sentence(status, words):
     assert words in verdict_words("force", entry)
 
 
+def test_a_cause_that_is_not_certain_is_a_lead_and_nothing_is_traced_to_it():
+    doubtful = {**synthetic.RUNOUT, "probability": 0.63}
+    alone = verdict_words("force", synthetic.observable("explained", effects=[doubtful]))
+    assert "tool runout (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°) would account for the difference" in alone
+    assert "a lead, not a finding" in alone
+    assert "traced to" not in alone
+    beside = {**doubtful, "effect": "tool_wear"}
+    both = verdict_words("force", synthetic.observable("explained", effects=[synthetic.RUNOUT, beside]))
+    assert "traced to tool runout" in both
+    assert "tool wear (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°) would account for more of it" in both
+
+
 def test_an_error_that_did_not_change_is_said_once():
     assert "goes from" not in verdict_words("force", synthetic.observable("unexplained", 5.0, 5.0))
 

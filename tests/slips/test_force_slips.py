@@ -9,8 +9,8 @@ from slip_cuts import BETA, CUTTER, SENSOR, records, with_settings
 from metro.cutting.cutter import evenly_pitched
 from metro.slips.force import contradictions
 from metro.slips.orientation import axes_text, signed_permutations
-from metro.slips.physical import impossible, mean_chip
-from metro.slips.waveform import design, fit
+from metro.slips.physical import coefficients_text, impossible, mean_chip
+from metro.slips.waveform import Coefficients, design, fit
 
 EVERY = list(signed_permutations())
 OTHERS = [matrix for matrix in EVERY if not np.array_equal(matrix, np.eye(3))]
@@ -111,3 +111,14 @@ def test_coefficients_are_impossible_beyond_their_error_alone():
     slightly = records(beta=BETA * np.array([1.0, 1.0, -1e-3, 1.0, 1.0, -1e-3]), noise=20.0)
     for made, expected in ((given, False), (slightly, False), (records(beta=-BETA), True)):
         assert bool(impossible(fit(made, designs), chip, CUTTER.helix)) is expected
+
+
+def test_coefficients_that_one_feed_cannot_part_are_given_as_what_they_sum_to():
+    chip = 0.06e-3
+    unparted = BETA.copy()
+    unparted[1], unparted[4] = -100e6, BETA[4] + chip * (BETA[1] + 100e6)  # the same force at this chip
+    said = coefficients_text(Coefficients(unparted, np.tile(unparted, (3, 1))), chip)
+    assert "-100" not in said
+    assert f"K_rc h + K_re {chip * BETA[1] / 1e3 + BETA[4] / 1e3:.3g}" in said
+    parted = coefficients_text(Coefficients(BETA, np.tile(BETA, (3, 1))), chip)
+    assert parted == "K_tc 850.0, K_rc 320.0, K_ac 180.0 N/mm2"

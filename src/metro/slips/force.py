@@ -65,7 +65,7 @@ def contradictions(records: list[Record], cutter: Cutter, sensor: JSON) -> tuple
         return ()
     least = better[0].fitted.misfit if better else math.nan
     named = [one for one in better if one.fitted.misfit <= ALIKE * least][:MOST_NAMED]
-    return (_slip(declared, faults, named),)
+    return (_slip(declared, faults, named, chip),)
 
 
 def _hypotheses(
@@ -80,7 +80,7 @@ def _hypotheses(
     yield from run_table.exchanged(records, designs, declared)
 
 
-def _slip(declared: WaveFit, faults: tuple[str, ...], named: list[Tried]) -> Slip:
+def _slip(declared: WaveFit, faults: tuple[str, ...], named: list[Tried], chip: float) -> Slip:
     found = f"with the force as declared, the waveform error is {100 * declared.misfit:.3g} % of the signal"
     if faults:
         found = f"with the force as declared {'; '.join(faults)}. This is impossible"
@@ -90,7 +90,7 @@ def _slip(declared: WaveFit, faults: tuple[str, ...], named: list[Tried]) -> Sli
             "of the dynamometer, and the tool (a ball end or a corner radius cuts with other forces)"
         )
         return Slip(OBSERVABLES, found, remedy, column=orientation.COLUMN)
-    texts = [f"{one.hypothesis.remedy} ({_fits(one.fitted, declared)})" for one in named]
+    texts = [f"{one.hypothesis.remedy} ({_fits(one.fitted, declared, chip)})" for one in named]
     first = named[0].hypothesis
     where = "" if first.file == "batch.yaml" else f" in {first.file}"
     remedy = f"Likely{where}: {texts[0]}"
@@ -100,9 +100,9 @@ def _slip(declared: WaveFit, faults: tuple[str, ...], named: list[Tried]) -> Sli
     return Slip(OBSERVABLES, found, remedy, first.file, first.column)
 
 
-def _fits(fitted: WaveFit, declared: WaveFit) -> str:
+def _fits(fitted: WaveFit, declared: WaveFit, chip: float) -> str:
     errors = f"waveform error {100 * fitted.misfit:.3g} % against {100 * declared.misfit:.3g} %"
-    return f"with {coefficients_text(fitted.mean)} and {errors}"
+    return f"with {coefficients_text(fitted.mean, chip)} and {errors}"
 
 
 def speed_slips(batch: Batch, read: Tables) -> tuple[Slip, ...]:

@@ -74,10 +74,20 @@ def _impossible(coefficients: Coefficients, chip: float, helix: float) -> tuple[
     return tuple(filter(None, texts))
 
 
-def coefficients_text(coefficients: Coefficients) -> str:
-    """Return the shear coefficients in words: K_tc 958.8, K_rc 251.1, K_ac 146.4 N/mm2."""
-    names = zip(("K_tc", "K_rc", "K_ac"), coefficients.value[:3] / N_MM2, strict=True)
-    return f"{', '.join(f'{name} {value:.1f}' for name, value in names)} N/mm2"
+def coefficients_text(coefficients: Coefficients, chip: float) -> str:
+    """Return the shear coefficients in words: K_tc 958.8, K_rc 251.1, K_ac 146.4 N/mm2.
+
+    Where the runs do not part them from the edge coefficients (one feed alone), so that they come out as
+    nothing that can be: the sums of both at the mean ``chip``, m, which are all that is known.
+    """
+    shear = coefficients.value[:3]
+    if np.all(shear[:2] > 0.0):
+        names = zip(("K_tc", "K_rc", "K_ac"), shear / N_MM2, strict=True)
+        return f"{', '.join(f'{name} {value:.1f}' for name, value in names)} N/mm2"
+    sums = [coefficients.of(_total(place, chip))[0] / N_MM for place in range(3)]
+    named = zip(("K_tc h + K_te", "K_rc h + K_re", "K_ac h + K_ae"), sums, strict=True)
+    listed = ", ".join(f"{name} {value:.3g}" for name, value in named)
+    return f"{listed} N/mm at the mean chip h = {chip * 1e3:.2g} mm (the runs do not part shear from edge)"
 
 
 def _total(place: int, chip: float) -> Array:

@@ -7,7 +7,7 @@ from metro.report.numbers import listing, number, percent, with_interval, words
 from metro.report.parameters import effect_words
 from metro.report.phrases import plain, residual_words
 from metro.report.results import Results, heading
-from metro.report.sections.trust import HOLDS
+from metro.report.sections.trust import HOLDS, SURE
 from metro.units import JSON, printed
 
 STATUS = {
@@ -25,13 +25,12 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
     start, status = heading(observable), str(entry.get("status"))
     floor = entry.get("noise_floor")
     noise = f" (noise floor {number(floor)}{unit_after(entry)})" if floor is not None else ""
-    causes = listing([effect_words(effect) for effect in entry.get("effects") or []])
+    whole, part = _attribution(entry, "the difference"), _attribution(entry, "part of the difference")
     says = {
         "clean": f"{start}: the base model holds. What it leaves on held-out runs is within the "
         f"noise{noise} or its declared accuracy.",
-        "explained": f"{start}: the difference from the base model is traced to {causes}. {_fall(entry)} "
-        f"What is left is within the noise{noise}.",
-        "partly_explained": f"{start}: part of the difference is traced to {causes}. {_fall(entry)} "
+        "explained": f"{start}: {whole} {_fall(entry)} What is left is within the noise{noise}.",
+        "partly_explained": f"{start}: {part} {_fall(entry)} "
         f"A significant rest remains{noise}. {_residual(entry, left)}",
         "undetermined": f"{start}: something is missing from the base model; these data cannot tell what. "
         f"{_rivals(entry)}{_fall(entry)}",
@@ -42,6 +41,19 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
     if entry.get("contradicted"):
         return f"{start}: the data contradict what the batch declares; nothing is attributed. {_fall(entry)}"
     return says.get(status, f"{start}: {words(status)}.").strip()
+
+
+def _attribution(entry: JSON, what: str) -> str:
+    """Say to which causes ``what`` is traced, and which ones are only the likeliest of the library."""
+    effects = entry.get("effects") or []
+    sure = [effect_words(one) for one in effects if (one.get("probability") or 0.0) >= SURE]
+    leads = [effect_words(one) for one in effects if (one.get("probability") or 0.0) < SURE]
+    traced = f"{what} from the base model is traced to {listing(sure)}." if sure else ""
+    if not leads:
+        return traced
+    so_much = "more of it" if sure else f"{what} from the base model"
+    likeliest = f"{listing(leads)} would account for {so_much}; this is a lead, not a finding."
+    return f"{traced} {likeliest}".strip()
 
 
 def error_text(error: JSON | None, unit_name: str | None) -> str:
