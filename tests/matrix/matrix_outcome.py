@@ -14,7 +14,7 @@ import pandas as pd
 
 from metro.batch.findings import ContractError
 from metro.formats import FormatError
-from metro.report import document
+from metro.report import style
 from metro.stages import loop as loop_module
 from metro.stages.identify import identify
 from metro.stages.ingest import ingest
@@ -115,13 +115,13 @@ def light():
 
     All their steps are made all the same; figures are composed up to the drawing.
     """
-    library, to_svg = loop_module.library, document.to_svg
+    library, to_svg = loop_module.library, style.to_svg
     loop_module.library = lambda observable: library(observable)[:1]
-    document.to_svg = lambda _: EMPTY_SVG
+    style.to_svg = lambda _: EMPTY_SVG
     try:
         yield
     finally:
-        loop_module.library, document.to_svg = library, to_svg
+        loop_module.library, style.to_svg = library, to_svg
 
 
 STAGES = (

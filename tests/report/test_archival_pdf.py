@@ -7,12 +7,16 @@ import pikepdf
 import pytest
 import synthetic_results as synthetic
 
-from metro.report.batch_report import batch_report
+from metro.report.batch_report import report_pdf, report_sections
+
+
+def pdf_of(results):
+    return report_pdf(results, report_sections(results))
 
 
 @pytest.fixture(scope="module")
 def pdf():
-    with pikepdf.open(io.BytesIO(batch_report(synthetic.results()))) as document:
+    with pikepdf.open(io.BytesIO(pdf_of(synthetic.results()))) as document:
         yield document
 
 

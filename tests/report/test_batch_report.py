@@ -7,9 +7,13 @@ import pypdfium2
 import pytest
 import synthetic_results as synthetic
 
-from metro.report.batch_report import batch_report
+from metro.report.batch_report import report_pdf, report_sections
 from metro.report.parameters import parameter_name
 from metro.report.sections.verdict import verdict_words
+
+
+def pdf_of(results):
+    return report_pdf(results, report_sections(results))
 
 
 def text_of(pdf):
@@ -20,7 +24,7 @@ def text_of(pdf):
 
 @pytest.fixture(scope="module")
 def pdf():
-    return batch_report(synthetic.results())
+    return pdf_of(synthetic.results())
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +75,7 @@ def test_failed_checks_come_before_what_was_checked(pages):
 
 
 def test_the_same_results_give_the_same_bytes(pdf):
-    assert batch_report(synthetic.results()) == pdf
+    assert pdf_of(synthetic.results()) == pdf
 
 
 def test_the_file_declares_archival_and_accessible_pdf(pdf):
@@ -87,7 +91,7 @@ def test_errors_by_run_and_axis_come_from_the_comparison_table(pages):
 
 def test_a_batch_with_nothing_in_it_still_has_a_report_that_says_so():
     empty = replace(synthetic.results(), tables={}, identified={}, verdict={}, loop={}, sources={})
-    text = " ".join(text_of(batch_report(empty)))
+    text = " ".join(text_of(pdf_of(empty)))
     assert "no verdict" in text
     assert "Nothing could be identified" in text
     assert "nothing to compare" in text
@@ -98,7 +102,7 @@ def test_nothing_could_be_identified_is_not_said_of_faces_that_were():
     some = replace(
         synthetic.results(), tables={}, identified={"format": 1, "faces": faces}, verdict={}, loop={}
     )
-    text = " ".join(text_of(batch_report(some)))
+    text = " ".join(text_of(pdf_of(some)))
     assert "Nothing could be identified" not in text
     assert "in sections of its own: flatness of faces" in text
 
@@ -109,7 +113,7 @@ def test_modes_without_a_driving_point_have_no_stiffness_and_the_first_page_show
     ]
     tables = {"frf_used": synthetic.responses().assign(response="9x")}
     some = replace(synthetic.results(), tables=tables, identified={"modes": modes}, verdict={}, loop={})
-    first = text_of(batch_report(some))[0]
+    first = text_of(pdf_of(some))[0]
     assert "mode that yields most" not in first
     assert "The highest response" in first
 
@@ -159,13 +163,13 @@ def test_without_a_verdict_the_first_page_says_what_was_identified():
     silent = replace(synthetic.results(), verdict={}, loop={})
     assert (
         "Identified: 1 mode, cutting coefficients, joint stiffness and flatness of faces."
-        in text_of(batch_report(silent))[0]
+        in text_of(pdf_of(silent))[0]
     )
 
 
 def test_single_values_per_run_and_axis_are_tabulated_and_not_drawn_as_curves():
     one = synthetic.tables()["comparison"].query("observable == 'deformation'").iloc[:1]
-    text = " ".join(text_of(batch_report(replace(synthetic.results(), tables={"comparison": one}))))
+    text = " ".join(text_of(pdf_of(replace(synthetic.results(), tables={"comparison": one}))))
     assert "Errors on held-out runs, rms (mm)" in text
     assert "Parity on held-out runs" in text
     assert "residual of all held-out runs" not in text

@@ -63,7 +63,7 @@ def plots(page, place):
 def test_nothing_is_loaded_from_elsewhere_and_links_lead_to_reports_and_sections(page):
     parsed = Parsed(page)
     targets = {a["id"] for _, a in parsed.elements if "id" in a}
-    beside = ("report.pdf", "verdict.json", "identified.json", "provenance.json")
+    beside = ("report.pdf", "report.html", "verdict.json", "identified.json", "provenance.json")
     files = {"", "summary.pdf", *(f"{batch}/{file}" for batch in ("late", "early") for file in beside)}
     for name, attributes in parsed.elements:
         assert name not in {"link", "iframe", "object", "base"}

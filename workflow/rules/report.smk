@@ -11,6 +11,7 @@ rule report:
         rules.verdict.output.verdict,
     output:
         "reports/{batch}/report.pdf",
+        "reports/{batch}/report.html",
         "reports/{batch}/provenance.json",
     log:
         "logs/report/{batch}.log",

@@ -27,7 +27,7 @@ DISTRIBUTION = "metro-machining"
 # edit, and re-run all that comes after a stage even where its results come out the same.
 STAGES = ("ingest", "identify", "predict", "loop", "verdict")
 MADE = ".made.json"
-RESULTS = ("identified.json", "verdict.json", "report.pdf")
+RESULTS = ("identified.json", "verdict.json", "report.pdf", "report.html")
 
 Change = Literal["changed", "missing", "added"]
 

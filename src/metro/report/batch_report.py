@@ -1,10 +1,12 @@
-"""The report of one batch: its sections in their order."""
+"""The report of one batch: its sections in their order, and the PDF of them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from metro import __version__
+from metro.report.content import Section
 from metro.report.document import Cover, compile_pdf
 from metro.report.results import Results
 from metro.report.sections.calibration import calibration
@@ -24,8 +26,15 @@ from metro.report.sections.surface import flatness
 from metro.report.sections.terms import terms
 
 
-def batch_report(results: Results) -> bytes:
+def report_pdf(results: Results, sections: Sequence[Section]) -> bytes:
     """Return the report as a PDF; the same bytes for the same results."""
+    cover = Cover(results.title, results.batch.name, f"metro {__version__}")
+    first, second, *others = sections
+    return compile_pdf(cover, [first, replace(second, page=True), *others])
+
+
+def report_sections(results: Results) -> list[Section]:
+    """Return the sections that a batch's report has."""
     sections = [
         with_contradictions(with_flags(with_causes(summary(results), results), results), results),
         setup(results),
@@ -42,6 +51,4 @@ def batch_report(results: Results) -> bytes:
         terms(results),
         provenance(results),
     ]
-    cover = Cover(results.title, results.batch.name, f"metro {__version__}")
-    first, second, *others = (section for section in sections if section is not None)
-    return compile_pdf(cover, [first, replace(second, page=True), *others])
+    return [section for section in sections if section is not None]

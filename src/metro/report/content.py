@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -61,6 +62,13 @@ class Picture:
     figure: Figure
     caption: str
     alt: str
+
+    @cached_property
+    def svg(self) -> bytes:
+        """The figure, drawn once for the PDF and the page."""
+        from metro.report import style
+
+        return style.to_svg(self.figure)
 
 
 @dataclass(frozen=True)

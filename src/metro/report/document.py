@@ -15,7 +15,6 @@ from types import MappingProxyType
 from metro.batch.writing import writing
 from metro.report import glyphs
 from metro.report.content import Abreast, Item, Picture, Section
-from metro.report.style import to_svg
 from metro.units import JSON
 
 TEMPLATE = "report.typ"
@@ -143,6 +142,6 @@ def _item(item: Item, name: str, folder: Path) -> JSON:
         parts = [_item(part, f"{k}-{name}", folder) for k, part in enumerate(item.items)]
         return {"kind": kind, "items": parts}
     if isinstance(item, Picture):
-        (folder / name).write_bytes(to_svg(item.figure))
+        (folder / name).write_bytes(item.svg)
         return {"kind": kind, "file": name, "caption": item.caption, "alt": item.alt}
     return {"kind": kind, **asdict(item)}

@@ -1,4 +1,4 @@
-"""Report: everything that was found about a batch becomes one PDF."""
+"""Report: everything that was found about a batch becomes one PDF, and the same as a page."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from metro.observables.flatness.path_errors import path_errors
 from metro.observables.flatness.struck import struck_tables
 from metro.observables.force import metrics as force_metrics
 from metro.observables.force.mean_forces import mean_forces
-from metro.report.batch_report import batch_report
+from metro.report.batch_report import report_pdf, report_sections
+from metro.report.page.report_page import report_page
 from metro.report.results import Results
 from metro.stages.problem_file import read_problems
 from metro.units import JSON
@@ -31,9 +32,12 @@ TABLES = ("qc", "comparison", "lobes_final")
 
 
 def report(processed: Path, reports: Path, settings: JSON, code: str) -> None:
-    """Write a batch's ``report.pdf``, and ``provenance.json``: the hashes of all that it was made from."""
-    pdf = batch_report(read_results(processed, reports, settings, code))
+    """Write ``report.pdf``, the same as ``report.html``, and ``provenance.json``: what they are made from."""
+    results = read_results(processed, reports, settings, code)
+    sections = report_sections(results)
+    pdf, page = report_pdf(results, sections), report_page(results, sections)
     write_atomically(reports / "report.pdf", lambda stream: stream.write(pdf))
+    write_atomically(reports / "report.html", lambda stream: stream.write(page.encode()))
     write_json(reports / provenance.FILE, provenance.record(processed, reports, settings, code))
 
 

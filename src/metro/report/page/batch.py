@@ -55,10 +55,11 @@ def batch_section(results: Results, link: str, budget: int) -> Html:
 
 
 def _files(name: str, link: str) -> Html:
-    """Link the report of a batch, and the files next to it."""
+    """Link the report of a batch, as PDF and as a page, and the files next to it."""
     folder = link[: link.rfind("/") + 1]
+    page = tag("a", "the same as a page", href=folder + "report.html")
     beside = [joined([" · ", tag("a", file, href=folder + quote(file))]) for file in FILES]
-    return tag("p", tag("a", f"Report of {name} (PDF)", href=link), *beside, class_="files")
+    return tag("p", tag("a", f"Report of {name} (PDF)", href=link), " · ", page, *beside, class_="files")
 
 
 def _status(entry: JSON) -> str:

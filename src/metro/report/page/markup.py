@@ -10,7 +10,6 @@ from typing import Any
 
 from metro.report.content import Abreast, Bullets, Facts, Heading, Item, Paragraph, Picture, Simple, Table
 from metro.report.document import UNIT
-from metro.report.style import to_svg
 
 SHORT = 26  # most characters of a cell that is not broken into lines
 VOID = {"meta", "img", "hr"}
@@ -80,7 +79,7 @@ def _item(item: Simple, links: Mapping[str, str], level: int) -> Html:
             pairs = [tag("div", tag("dt", a), tag("dd", b, " ", tag("small", c))) for a, b, c in item.items]
             return tag("dl", *pairs)
         case Picture():
-            source = "data:image/svg+xml;base64," + base64.b64encode(to_svg(item.figure)).decode()
+            source = "data:image/svg+xml;base64," + base64.b64encode(item.svg).decode()
             return tag(
                 "figure",
                 tag("img", src=source, alt=item.alt),
