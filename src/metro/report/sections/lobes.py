@@ -179,16 +179,6 @@ def _stations(stations: pd.DataFrame) -> Table:
 def cut_items(results: Results, frame: pd.DataFrame) -> list[Item]:
     """Draw the held-out test cuts on the boundary and tabulate the probability of each."""
     tests = placed(results, frame)
-    items: list[Item] = []
-    boundary = results.tables.get("lobes_final")
-    if boundary is not None:
-        right = {k: int(((frame[k] > 0.5) == (frame["measured"] > 0.5)).sum()) for k in ("before", "after")}
-        caption = (
-            f"Stability boundary and held-out test cuts. On the right side of it: {right['before']} of "
-            f"{len(frame)} with the base model, {right['after']} with the effects found."
-        )
-        chart = figures.lobes_chart(boundary, tests, results.tables.get("lobe_islands"))
-        items.append(Picture(chart, caption, caption))
     rows = [
         [
             str(r["run"]),
@@ -210,7 +200,22 @@ def cut_items(results: Results, frame: pd.DataFrame) -> list[Item]:
     ]
     more = f" The first {LONGEST} of {len(tests)}." if len(tests) > LONGEST else ""
     caption, widths = f"Held-out test cuts.{more}", [1.4, 1, 1, 1, 1.4, 1.4]
-    return [*items, Table(header, rows, caption, widths, numeric=[1, 2, 4, 5], small=len(rows) > SHORT)]
+    table = Table(header, rows, caption, widths, numeric=[1, 2, 4, 5], small=len(rows) > SHORT)
+    return [*tested_boundary(results, frame), table]
+
+
+def tested_boundary(results: Results, frame: pd.DataFrame) -> list[Picture]:
+    """Draw the held-out test cuts on the stability boundary, where there is one."""
+    boundary = results.tables.get("lobes_final")
+    if boundary is None:
+        return []
+    right = {k: int(((frame[k] > 0.5) == (frame["measured"] > 0.5)).sum()) for k in ("before", "after")}
+    caption = (
+        f"Stability boundary and held-out test cuts. On the right side of it: {right['before']} of "
+        f"{len(frame)} with the base model, {right['after']} with the effects found."
+    )
+    chart = figures.lobes_chart(boundary, placed(results, frame), results.tables.get("lobe_islands"))
+    return [Picture(chart, caption, caption)]
 
 
 def placed(results: Results, frame: pd.DataFrame) -> pd.DataFrame:

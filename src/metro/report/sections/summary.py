@@ -12,7 +12,7 @@ from metro.report.numbers import listing, number, percent, probability, quantity
 from metro.report.phrases import sentence
 from metro.report.results import Results, heading
 from metro.report.sections import findings
-from metro.report.sections.lobes import boundary_items
+from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
 from metro.report.sections.surface import first_faces
@@ -90,7 +90,10 @@ def advice(identified: JSON) -> list[Item]:
 
 
 def _one_run(results: Results) -> list[Item]:
-    """Draw the held-out run with the base model's largest error, of the first observable with curves."""
+    """Draw the held-out run with the base model's largest error, of the first observable with curves.
+
+    Where tests of stability are all that was judged: these, on the boundary.
+    """
     for name in results.verdicts():
         frame = results.compared(name) if name != "lobes" else None
         if frame is None or not coordinate(frame):
@@ -99,7 +102,8 @@ def _one_run(results: Results) -> list[Item]:
         run = str(square.groupby(frame["run"]).mean().idxmax())
         caption = f"{heading(name)}. {findings.missed(frame, run)}"
         return [Picture(overlay(frame[frame["run"] == run], title(name)), caption, caption)]
-    return []
+    tests = results.compared("lobes")
+    return [*tested_boundary(results, tests)] if tests is not None else []
 
 
 def _identified(results: Results) -> list[Item]:
