@@ -21,11 +21,22 @@ FORCES = ("fx_n", "fy_n", "fz_n")
 
 @dataclass(frozen=True)
 class Mistake:
-    """A slip: its name, its edit, and why no data can show it ("" where they can)."""
+    """A slip.
+
+    Attributes
+    ----------
+    name : in the table. edit : what makes it.
+    undecidable : why no data can show it; "" where they can. unless : file of a batch with which they can.
+    """
 
     name: str
     edit: Edit
     undecidable: str = ""
+    unless: str = ""
+
+    def why_undecidable(self, folder: Path) -> str:
+        """Return why the data of a batch cannot show it; "" where they can."""
+        return "" if self.unless and (folder / self.unless).is_file() else self.undecidable
 
 
 def right_handed() -> Iterator[dict[str, str]]:

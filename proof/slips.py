@@ -62,8 +62,8 @@ def tried(folder: Path, slips: Sequence[Mistake], *, loop: bool) -> Iterator[Res
             if new:
                 yield Result(slip.name, folder.name, CAUGHT, new[0])
                 continue
-            if slip.undecidable:
-                yield Result(slip.name, folder.name, UNDECIDABLE, slip.undecidable)
+            if why := slip.why_undecidable(folder):
+                yield Result(slip.name, folder.name, UNDECIDABLE, why)
                 continue
             if not loop:
                 yield Result(slip.name, folder.name, "not caught by check")

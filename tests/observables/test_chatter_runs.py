@@ -1,5 +1,7 @@
 """From the records of test cuts to measured labels: what counts, where, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -88,6 +90,13 @@ def test_a_short_record_gives_no_answer_and_says_why():
     assert found["probability"].isna().all()
     assert "at least 40" in found["note"].iloc[0]
     assert measured(found.reset_index()).empty
+
+
+@pytest.mark.parametrize("manifest", [{}, {"tool": {"diameter_mm": 12}}])
+def test_without_the_number_of_teeth_there_is_no_answer_and_the_row_says_why(manifest):
+    found = observe(replace(batch(stable=["no"]), manifest=manifest), [record(2.63)])
+    assert found["probability"].isna().all()
+    assert "without tool.teeth" in found["note"].iloc[0]
 
 
 def test_runs_without_depth_record_or_trace_are_left_out():

@@ -85,9 +85,11 @@ def _observed(batch: Batch, run: str, read: Tables) -> JSON:
 
 def _detection(batch: Batch, run: str, read: Tables) -> tuple[Detection | None, str]:
     """Return the detection in a run's record, of a long one in its worst stretch, or the reason for none."""
-    teeth = int(batch.manifest["tool"]["teeth"])
+    teeth = (batch.manifest.get("tool") or {}).get("teeth")
+    if not teeth:
+        return None, "without tool.teeth in batch.yaml no frequency is known to be that of the teeth"
     try:
-        detections = [_detected(cut, teeth) for cut in _steady_cuts(batch, run, read)]
+        detections = [_detected(cut, int(teeth)) for cut in _steady_cuts(batch, run, read)]
     except ValueError as error:
         return None, str(error)
     return max(detections, key=lambda one: one[0].probability)

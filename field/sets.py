@@ -1,0 +1,167 @@
+"""The sets: their files, what a user answers when they are brought in, and what is known of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from metro.units import JSON
+
+Found = Mapping[str, JSON]
+
+
+@dataclass(frozen=True)
+class Known:
+    """A figure that is known of a set, and where ours is in the results.
+
+    Attributes
+    ----------
+    what, unit : in the table. value : what is known; None where only ours is listed. source : who says so.
+    ours : takes ``identified`` and ``verdict`` and gives a quantity (value, ci95); None where we have none.
+    half : half width of what is known, by its rounding or its own interval.
+    """
+
+    what: str
+    unit: str
+    value: float | None
+    source: str
+    ours: Callable[[Found], JSON | None]
+    half: float = 0.0
+
+
+@dataclass(frozen=True)
+class FieldSet:
+    """A set of files.
+
+    Attributes
+    ----------
+    name : of its folder. files : patterns in it, in the order of import. answers : to the questions of the
+    import, options as they are given. known : what is compared. refused : words of the refusal, where the
+    right end is one. remark : what the figures do not say.
+    """
+
+    name: str
+    files: Sequence[str]
+    answers: Sequence[str] = ()
+    known: Sequence[Known] = ()
+    refused: str = ""
+    remark: str = ""
+
+
+def mode(hz: float, key: str = "frequency") -> Callable[[Found], JSON | None]:
+    """Take the identified mode that is nearest to a frequency, within a tenth of it."""
+
+    def ours(found: Found) -> JSON | None:
+        modes = [one for one in found["identified"].get("modes") or [] if one.get("frequency")]
+        nearest = min(modes, key=lambda one: abs(one["frequency"]["value"] - hz), default=None)
+        if nearest is None or abs(nearest["frequency"]["value"] - hz) > 0.1 * hz:
+            return None
+        return dict(nearest[key])
+
+    return ours
+
+
+def at(*path: str) -> Callable[[Found], JSON | None]:
+    """Take the quantity at a path of ``identified``."""
+
+    def ours(found: Found) -> JSON | None:
+        here: JSON = found["identified"]
+        for name in path:
+            here = (here or {}).get(name) or {}
+        return here or None
+
+    return ours
+
+
+def face(key: str) -> Callable[[Found], JSON | None]:
+    """Take an index of the only face."""
+
+    def ours(found: Found) -> JSON | None:
+        faces: Mapping[str, JSON] = found["identified"].get("faces") or {}
+        return next((one.get(key) for one in faces.values()), None)
+
+    return ours
+
+
+def effect(observable: str, name: str, parameter: str) -> Callable[[Found], JSON | None]:
+    """Take a parameter of an effect that the verdict names."""
+
+    def ours(found: Found) -> JSON | None:
+        entry = (found["verdict"].get("observables") or {}).get(observable) or {}
+        effects = [one for one in entry.get("effects") or [] if one["effect"] == name]
+        return effects[0]["parameters"].get(parameter) if effects else None
+
+    return ours
+
+
+def held_out(observable: str, when: str = "after") -> Callable[[Found], JSON | None]:
+    """Take the error on held-out runs relative to the signal, in %."""
+
+    def ours(found: Found) -> JSON | None:
+        entry = (found["verdict"].get("observables") or {}).get(observable) or {}
+        error = entry.get(when)
+        if not error:
+            return None
+        scale = 100.0 * error["nrmse"] / error["rms"] if error["rms"] else 0.0
+        return {"value": 100.0 * error["nrmse"], "ci95": [scale * end for end in error["ci95"]]}
+
+    return ours
+
+
+BEAM = "mean of single-FRF fits over nine places of the hammer"
+SETS = (
+    FieldSet(
+        "force-ball-d16",
+        ("ball_d16.mat",),
+        (
+            "--set=unit.force=N",
+            "--set=rate_hz=10000",
+            "--set=tool.diameter_mm=16",
+            "--set=tool.teeth=2",
+            "--set=tool.helix_deg=25",
+            "--set=dynamometer.reads=work",
+            "--set=dynamometer.axes=none",
+            "--set=operation=slot",
+            "--set=direction=slot",
+            "--run-column=spindle_rpm=800",
+            "--run-column=feed_per_tooth_mm=0.1",
+            "--run-column=axial_depth_mm={record}",
+            "--run-column=radial_depth_mm=16",
+        ),
+        (Known("error on held-out depths, after the loop", "%", None, "", held_out("force")),),
+        remark="a ball end brought in as what the form asks for: diameter, teeth, helix",
+    ),
+    FieldSet(
+        "modal-beam",
+        ("Hxysv*.txt.gz",),
+        ("--set=reference={number}z", "--set=response=1z"),
+        tuple(
+            Known(f"mode at {hz:.0f} Hz", "Hz", hz, BEAM, mode(hz), half=0.005)
+            for hz in (111.99, 306.86, 596.37, 974.14)
+        ),
+    ),
+    FieldSet(
+        "modal-duplicated-channel",
+        ("*.txt",),
+        refused="hold the same numbers, bit for bit",
+        remark="two acceleration files are copies of each other",
+    ),
+    FieldSet(
+        "modal-poles-unv",
+        ("*.unv",),
+        ("--set=citation=GVT-Post-Processing, X-HALE",),
+        (
+            Known("first mode, damped", "Hz", 0.7621, "data set 55", mode(0.7621)),
+            Known("eleventh mode, damped", "Hz", 8.06, "data set 55", mode(8.06)),
+        ),
+    ),
+    FieldSet("profile-square", ("square.xml",)),
+    FieldSet("robot-ur10e-payload", ("*.csv",)),
+    FieldSet("scan-gocator", ("*.csv",), ("--set=work.size_mm=none",)),
+    FieldSet(
+        "scan-numbered-points",
+        ("*.csv",),
+        ("--set=unit.length=mm", "--set=work.size_mm=none"),
+        (Known("X_m", "µm", 123.3, "FlatnessScan, least squares", face("xm"), half=0.05),),
+    ),
+)
