@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from field.sets import FieldSet
 from metro.units import JSON
 
 ROOT = Path(__file__).parents[1]
+MOST = 400  # characters of a reason
 METRO = Path(sys.executable).parent / "metro"
 
 
@@ -60,11 +62,19 @@ def _brought_in(one: FieldSet, data: Path, out: Path) -> Result:
     started = time.perf_counter()
     call = [str(METRO), "import", *files, "--out", str(out / "data/raw" / one.name), *one.answers]
     done = subprocess.run(call, capture_output=True, text=True, check=False)
-    said = " ".join((done.stdout + done.stderr).split())
-    refusal = said if done.returncode else ""
+    refusal = _reason(done.stdout + done.stderr, out) if done.returncode else ""
     if done.returncode:  # what is written and does not pass its check would stop the others
         shutil.rmtree(out / "data/raw" / one.name, ignore_errors=True)
     return Result(one, len(one.answers), time.perf_counter() - started, refusal)
+
+
+def _reason(said: str, out: Path) -> str:
+    """Return the first error of what was said, or what was not used of the files, in one line."""
+    found = re.search(
+        r"^(?:error|not used)[:\s]+(.*?)(?=\n\n|\nerror|\nnote|\nwarning|\Z)", said, re.M | re.S
+    )
+    text = found[1] if found else said[-MOST:]
+    return " ".join(text.replace(f"{out}/", "").split())[:MOST]
 
 
 def _snakemake(out: Path) -> None:

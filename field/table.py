@@ -24,7 +24,7 @@ def page(results: Sequence[Result]) -> str:
     """Return the comparison in Markdown."""
     rows = [f"| {' | '.join(row)} |" for result in results for row in _rows(result)]
     remarks = [f"- `{r.set.name}`: {r.set.remark}." for r in results if r.set.remark]
-    refusals = [f"- `{r.set.name}` is refused: {_reason(r)}" for r in results if r.refusal]
+    refusals = [f"- `{r.set.name}` is refused: {r.refusal}" for r in results if r.refusal]
     return HEAD + "\n".join(rows) + "\n\n" + "\n".join([*remarks, *refusals]) + "\n"
 
 
@@ -62,10 +62,3 @@ def _agreement(known: Known, ours: JSON) -> str:
         return "within"
     half = 0.5 * (high - low) + known.half
     return f"off by {abs(known.value - ours['value']) / half:.1f} half widths"
-
-
-def _reason(result: Result) -> str:
-    """Return the part of a refusal that names the reason."""
-    text = result.refusal
-    start = max(text.rfind("error"), 0)
-    return text[start : start + 400].strip()
