@@ -13,6 +13,7 @@ from metro.observables.task import Task
 from metro.slips.force import force_slips, speed_slips
 from metro.slips.joints import joint_slips
 from metro.slips.labels import label_slips
+from metro.slips.phases import phase_slips
 from metro.slips.redundancy import stiffness_slips
 from metro.slips.scans import scan_slips
 from metro.slips.slip import Slip
@@ -45,7 +46,9 @@ def find(
 def _of_the_machine(
     batch: Batch, read: Tables, observed: Mapping[str, pd.DataFrame], identified: JSON
 ) -> Iterator[Slip]:
-    yield from stiffness_slips(read("stations"), identified.get("modes") or [])
+    modes = identified.get("modes") or []
+    yield from stiffness_slips(read("stations"), modes)
+    yield from phase_slips(observed["frf_used"], modes) if "frf_used" in observed else ()
     yield from label_slips(_labelled(batch, observed), _heard(observed))
     yield from scan_slips(batch, read)
 
