@@ -12,6 +12,7 @@ import pandas as pd
 from metro.batch.axes import signed_axes
 from metro.batch.batch import Batch
 from metro.batch.canonical import Part
+from metro.dynamics.driving import turning
 from metro.dynamics.hits import Hit, fault
 from metro.signals import plausible, quality
 from metro.signals.conversion import driving_point_sign, receptance, response_si, sensor_to_tool
@@ -211,7 +212,8 @@ def _receptance(
     size = quality.light(mass, plausible.LIGHT_KG, soft=typical > plausible.RECEPTANCE)
     checks = [quality.dead("the FRF", np.abs(values[keep])), size]
     if driving:
-        checks.append(quality.conjugated(driving_point_sign(frequency[keep], values[keep])))
+        sign = driving_point_sign(frequency[keep], values[keep])
+        checks.append(quality.conjugated(sign, turning(values[keep])))
     if not recordings.fit(file, "", "file", checks):
         return None
     coherence = {"coherence": table["coherence"].to_numpy()[keep]} if "coherence" in table else {}

@@ -9,11 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from metro.dynamics.driving import Standing
 from metro.dynamics.modal import ModalModel, identify_modes
 from metro.dynamics.modes import Mode
 from metro.dynamics.shapes import mac
 from metro.observables.stability.pickups import crossed
-from metro.observables.stability.receptance import Receptance, arranged, from_files, from_records, scatter
+from metro.observables.stability.receptance import (
+    Receptance,
+    arranged,
+    files,
+    from_files,
+    from_records,
+    scatter,
+)
 from metro.units import JSON, N_UM, Array, ComplexArray
 
 MODE_COLUMNS = (
@@ -77,7 +85,9 @@ def observe_modes(read: Read, hammer: JSON) -> ModalTest:
         diagrams.append(_diagram_rows(position, direction, model))
         shapes.append(_shape_rows(group, direction, model))
         alike.append(_alike_rows(position, direction, model))
-        notes += [f"{name}: {note}" for note in _doubts(model)]
+        notes += [
+            f"{name}: {note}" for note in [*_doubts(model), *_of_files(model), *_of_point(group, model)]
+        ]
     columns = (*MODE_COLUMNS, *_MORE_COLUMNS)
     fitted = _joined(used, ())
     return ModalTest(
@@ -159,6 +169,7 @@ def _identified(group: list[Receptance], inputs: int, decay: float) -> tuple[Mod
         inputs=inputs,
         scatter=scatter(group, keep),
         decay=decay,
+        files=files(group),
     )
     return model, keep
 
@@ -215,6 +226,39 @@ def _doubts(model: ModalModel) -> Iterator[str]:
             yield f"the mode at {_in_words(mode)}, is not resolved"
     if model.doubtful is not None:
         yield f"a further mode at {_in_words(model.doubtful)}, is not resolved and was left out"
+
+
+def _of_files(model: ModalModel) -> Iterator[str]:
+    """Say which modes differ between the files by more than the files' own errors."""
+    shifts = [
+        f"{mode.frequency:.5g} Hz by {mode.frequency * moved.frequency.scatter:.2g} Hz "
+        f"(damping by {100.0 * moved.damping.scatter:.2g} %, {moved.frequency.files} files)"
+        for mode, moved in zip(model.modes, model.moved, strict=True)
+        if moved is not None and moved.frequency.scatter > 0.0
+    ]
+    if shifts:
+        yield (
+            "the modes differ between the files by more than the noise of a file, as standard deviation: "
+            f"{'; '.join(shifts)}. Their intervals contain it. The hammer's place, the mass of a sensor that "
+            "is moved, or the temperature shift modes; to know which, repeat one place at the end of a test"
+        )
+
+
+def _of_point(group: list[Receptance], model: ModalModel) -> Iterator[str]:
+    """Say why a declared driving point is none, and what to do."""
+    point = next((item.reference for item in group if item.driving), "")
+    if model.declared is Standing.REVERSED:
+        yield (
+            f"{point} to {point} has the wrong sign in all its modes: the sensor or the hammer points the "
+            "other way, so that no stiffness is given. Turn the sign of its channel (scale: -1 under files "
+            "in batch.yaml)"
+        )
+    elif model.declared is Standing.ELSEWHERE:
+        yield (
+            f"{point} to {point} is no driving point: its modes have residues of both signs, and where a "
+            "structure is hit all have one. Sensor and hammer were at different places, so that no stiffness "
+            "is given. Correct reference or response in impacts.csv, or hit where the sensor is"
+        )
 
 
 def _in_words(mode: Mode) -> str:

@@ -153,3 +153,16 @@ def scatter(group: list[Receptance], keep: np.ndarray) -> Scatter | None:
             deviation[names.index((item.reference, name)), :, column] = own[keep]
     references = list(dict.fromkeys(reference for reference, _ in names))
     return Scatter(deviation, np.array([references.index(reference) for reference, _ in names]))
+
+
+def files(group: list[Receptance]) -> list[list[np.ndarray]]:
+    """Return the ways in which a group may have been measured piece by piece: the columns of each piece.
+
+    Hammer after hammer place, or sensor after sensor place: a table does not say which, and between either
+    something may have moved.
+    """
+    ways = []
+    for names in ([item.reference for item in group], [item.response for item in group]):
+        pieces = [np.flatnonzero([other == name for other in names]) for name in dict.fromkeys(names)]
+        ways += [pieces] if len(pieces) > 1 else []
+    return ways
