@@ -17,7 +17,7 @@ from metro.batch.sources import source
 from metro.cli import app
 from metro.formats.registry import read
 from metro.importing.look import copies, look, sparkline
-from metro.importing.propose import from_name
+from metro.importing.propose import from_name, propose
 from metro.stages.whole import check_whole
 
 FIELD = Path(os.environ.get("METRO_REAL_DATA", Path(__file__).parents[2] / "../shared/real")).parent / "field"
@@ -237,3 +237,28 @@ def test_a_place_that_is_left_out_or_is_none_is_refused_before_anything_is_writt
         assert result.exit_code == 2, result.output
         assert f'response: found "{place}", expected a' in result.output
     assert not (tmp_path / "hits").exists()
+
+
+def two_columns(path, seed):
+    values = np.random.default_rng(seed).normal(size=64)
+    path.write_text("".join(f"{k / 1000:.4f} {value:.12f}\n" for k, value in enumerate(values)))
+
+
+def test_a_hammer_record_without_its_sensor_is_named_with_both_counts(tmp_path):
+    names = ["impact_p3.txt", "impact_p8.txt", "impact_p9.txt", "accel_p3.txt"]
+    for seed, name in enumerate(names):
+        two_columns(tmp_path / name, seed)
+    proposals, unknown = propose([look(tmp_path / name) for name in names])
+    assert [row for row, _ in proposals[0].rows] == ["impact_p3.txt#3"]
+    (line,) = unknown
+    assert line.startswith("impact_p8.txt, impact_p9.txt: found 3 files of a hammer (impact_p3.txt, ")
+    assert "and 1 file of a sensor (accel_p3.txt)" in line
+    assert "Rename the files" in line
+
+
+def test_hammer_and_sensor_with_other_numbers_are_no_pair(tmp_path):
+    for seed, name in enumerate(["impact_p3.txt", "accel_p4.txt"]):
+        two_columns(tmp_path / name, seed)
+    proposals, (line,) = propose([look(tmp_path / "impact_p3.txt"), look(tmp_path / "accel_p4.txt")])
+    assert proposals == []
+    assert line.startswith("impact_p3.txt, accel_p4.txt: found 1 file of a hammer")

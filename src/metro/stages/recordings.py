@@ -145,6 +145,10 @@ def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator
         if recordings.doubt(file, plausible.clock(time, rate) or plausible.hammer_force(force_n)):
             continue
         response = response_si(table["response"].to_numpy(), unit)
+        blow = (row["test"], row["position"], row["reference"], row["replicate"])
+        channels = (("force_n", force_n), ("response", table["response"].to_numpy()))
+        if any(recordings.copied(file, name, values, blow) for name, values in channels):
+            continue
         clean = _hit(Hit(force_n, response, 1.0 / float(np.mean(np.diff(time)))))
         recordings.note(file, "", [clean])
         recordings.usable |= {file} if clean.ok else set()
