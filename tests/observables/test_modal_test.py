@@ -301,6 +301,23 @@ def test_of_a_free_structure_the_first_mode_is_above_its_mass_line():
     assert clear[frequency > 105.0].all()
 
 
+def test_a_fundamental_of_a_few_lines_is_no_drift():
+    frequency = np.arange(1.0, 1001.0)
+    ratio, other = frequency / 5.0, frequency / 400.0
+    values = 1e-4 / (1 - ratio**2 + 0.02j * ratio) + 2e-9 / (1 - other**2 + 0.02j * other)
+    assert np.abs(values).max() > 3000 * np.median(np.abs(values))
+    assert clear_of_drift(frequency, values[:, None]).all()
+
+
+def test_a_line_that_stands_out_of_the_mass_line_does_not_end_the_drift():
+    frequency = np.arange(0.25, 1000.0, 0.25)
+    ratio = frequency / 112.0
+    values = -1.0 / (5.0 * (2 * np.pi * frequency) ** 2) + 1.0 / (2e7 * (1.0 - ratio**2 + 2e-3j * ratio))
+    values[20] *= 12.0
+    first = frequency[clear_of_drift(frequency, values[:, None])][0]
+    assert 10.0 < first < 105.0
+
+
 def test_where_a_file_has_coherence_it_tells_the_lines():
     frequency = FREQUENCY
     coherence = np.where((frequency > 20.0) & (frequency < 80.0), 0.99, 0.2)

@@ -221,6 +221,7 @@ def _check_record(source: Source, mapping: FileMapping) -> None:
 
 
 def filled(text: str, record: str) -> str:
+    """Return a name of a mapping with the record's own in it."""
     return text.replace(RECORD, record)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from metro.batch.capabilities import plural
 from metro.importing.look import Column, Seen
 
 _AXIS = re.compile(
@@ -184,7 +185,7 @@ def _without_partner(hammers: Sequence[Seen], sensors: Sequence[Seen]) -> list[s
     if not single:
         return []
     counts = " and ".join(
-        f"{len(files)} file{'s' * (len(files) > 1)} of {whose} ({', '.join(seen.path.name for seen in files)})"
+        f"{plural(len(files), 'file')} of {whose} ({', '.join(seen.path.name for seen in files)})"
         for files, whose in ((hammers, "a hammer"), (sensors, "a sensor"))
     )
     return [

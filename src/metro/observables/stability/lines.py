@@ -12,7 +12,8 @@ from metro.units import Array, ComplexArray
 
 _LEAST_LINES = 40
 _QUIET_LINES = 5  # in a row, from which on a drift has ended or a response exceeds the noise
-# Of five lines of noise the mean power exceeds nine times an earlier one in fewer than one of 5000 cases.
+# The mean power of five lines of noise is hardly ever below a quarter of its long-run value, and five in a row
+# exceed nine times that in one of 75,000 cases: exp(-9/4) to the fifth power.
 _RISE = 9.0
 _CAUSED = 0.5  # share of a response's power that the force causes: a line with less is mostly noise
 _SAME_LINE = 1e-3  # of the step between lines
@@ -85,25 +86,32 @@ def clear_of_drift(frequency: Array, frf: ComplexArray) -> np.ndarray:
     """Lines above an integrated acceleration's drift, which falls from the first line on.
 
     It has ended where |H| stays below 30 times its median, and in any case where |H| rises again: before a
-    resonance, however high that is and however low in the band.
+    resonance, however high that is and however low in the band. Where |H| rises from the first line on, there
+    is none: lines may be too wide apart for a resonance low in the band to show more than its peak.
     """
     power = np.mean(np.abs(frf) ** 2, axis=1)
     low = (power < 900.0 * np.median(power)) | (frequency > 0.25 * frequency[-1])
     quiet = _in_a_row(low)
-    start = quiet[0] if len(quiet) else 0
-    return np.arange(len(frequency)) >= min(start, _fallen(power))
+    start = min(int(quiet[0]) if len(quiet) else 0, _fallen(power))
+    if start and _RISE * power[0] < np.max(power[:start]):
+        start = 0
+    return np.arange(len(frequency)) >= start
 
 
 def _fallen(power: Array) -> int:
-    """Line at which the power (n,), smoothed over a few lines, ends to fall; n where it never rises again."""
-    if len(power) < _QUIET_LINES:
+    """Line at which the power (n,) ends to fall; n where it never rises again.
+
+    It rises where each of a few lines in a row is well above the least mean of as many before them: a line
+    that stands out alone is no resonance, and narrow ones have flanks.
+    """
+    if len(power) < 2 * _QUIET_LINES:
         return len(power)
-    smooth = np.convolve(power, np.full(_QUIET_LINES, 1.0 / _QUIET_LINES), mode="valid")
-    risen = np.flatnonzero(smooth > _RISE * np.minimum.accumulate(smooth))
+    windows = np.lib.stride_tricks.sliding_window_view(power, _QUIET_LINES)
+    mean, least = windows.mean(axis=1), windows.min(axis=1)
+    risen = np.flatnonzero(least > _RISE * np.minimum.accumulate(mean))
     if not len(risen):
         return len(power)
-    # the least line itself is that in the middle of those that were smoothed; the first is kept as it is
-    lowest = int(np.argmin(smooth[: risen[0]]))
+    lowest = int(np.argmin(mean[: risen[0]]))
     return lowest + _QUIET_LINES // 2 if lowest else 0
 
 
