@@ -56,3 +56,11 @@ def test_conjugated_and_reversed_responses_are_told_apart():
     assert turning(frf) < 0.0
     assert turning(-frf) < 0.0
     assert turning(frf.conj()) > 0.0
+
+
+def test_conjugated_responses_without_a_driving_point_are_refused():
+    places = [[1.0, 0.8, 0.5], [0.3, -0.9, 0.7], [-0.6, 0.2, 0.9]]
+    frf = np.stack([response(places[0], place, seed) for seed, place in enumerate(places[1:])], axis=1)
+    assert len(identify_modes(FREQUENCY, frf).modes) == 3
+    with pytest.raises(ValueError, match=r"conjugated \(e\^\{-iωt\}\)"):
+        identify_modes(FREQUENCY, frf.conj())

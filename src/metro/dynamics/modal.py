@@ -28,6 +28,7 @@ _ORDERS = range(8, 49, 2)
 _MOST_MODES = 24
 _LARGEST_DAMPING = 0.35
 _CHANCE, _TRACE = 1e-3, 0.25
+_HALF = 0.5  # of the power: causal modes explain hardly any of conjugated FRFs
 # Two resonances whose middles are further apart than this many times the sum of their half widths are two
 # peaks in every response: no pole that moves looks so.
 _CLOSE = 4.0
@@ -90,8 +91,8 @@ def identify_modes(
     Raises
     ------
     ValueError
-        When there are fewer than 16 lines, or values that are not finite, or the declared driving point's FRF
-        is conjugated, or the window hides a mode, or the fit does not converge.
+        When there are fewer than 16 lines, or values that are not finite, or the FRFs are conjugated, or the
+        window hides a mode, or the fit does not converge.
     """
     if len(frequency) < 16:
         raise ValueError(f"{len(frequency)} lines in the band: expected 16 or more")
@@ -111,6 +112,11 @@ def identify_modes(
     start, diagram = _search(data.thinned(_SEARCH_LINES), files)
     fit = _converged(data, refine(data, start.omega, start.zeta, real=start.real))
     change = np.linalg.norm(fit.evaluate(data.omega) - frf, axis=0) / np.linalg.norm(frf, axis=0)
+    if np.min(change) ** 2 > _HALF and sum(turning(column) for column in frf.T) > 0.0:
+        raise ValueError(
+            "the phase of the FRFs rises over the resonances, and no modes explain half of their power: they "
+            "are conjugated (e^{-iωt}); export them with e^{+iωt}"
+        )
     inside = (fit.omega > data.omega[0]) & (fit.omega < data.omega[-1]) & (fit.zeta < _LARGEST_DAMPING)
     inside &= _is_there(data, fit)
     free = residues(data.omega, frf, np.sqrt(np.mean(data.weight**2, axis=1)), fit.poles)

@@ -12,17 +12,17 @@ from metro.units import Array, ComplexArray
 
 _LEAST_LINES = 40
 _QUIET_LINES = 5  # in a row, from which on a drift has ended or a response exceeds the noise
-# The mean power of five lines of noise is hardly ever below a quarter of its long-run value, and five in a row
-# exceed nine times that in one of 75,000 cases: exp(-9/4) to the fifth power.
+# The mean power of five lines of noise is hardly ever below a quarter of its long-run value, and five in a
+# row exceed nine times that in one of 75,000 cases: exp(-9/4) to the fifth power.
 _RISE = 9.0
 _CAUSED = 0.5  # share of a response's power that the force causes: a line with less is mostly noise
-_SAME_LINE = 1e-3  # of the step between lines
+_SAME_LINE = 0.05  # of the step between lines: rates read from time stamps differ by their rounding
 
 
 def on_common_lines(group: list[Receptance], notes: list[str]) -> list[Receptance]:
-    """Return receptances on the same lines: all on those that all have, or most on theirs.
+    """Return receptances on the same lines. What is left out is named.
 
-    Whichever keeps more values. What is left out is named.
+    All are kept on the lines that all have, if these are half of what most pairs have; else most pairs are.
     """
     sets = [np.round(item.frequency / (_SAME_LINE * _step(group))).astype(np.int64) for item in group]
     if all(np.array_equal(lines, sets[0]) for lines in sets):
@@ -31,10 +31,9 @@ def on_common_lines(group: list[Receptance], notes: list[str]) -> list[Receptanc
     for lines in sets[1:]:
         shared = np.intersect1d(shared, lines)
     kinds = [next(i for i, other in enumerate(sets) if np.array_equal(other, lines)) for lines in sets]
-    values = {kind: kinds.count(kind) * len(sets[kind]) for kind in kinds}
-    most = max(values, key=lambda kind: values[kind])
+    most = max(kinds, key=lambda kind: (kinds.count(kind), len(sets[kind])))
     place = f"position {group[0].position}, direction {group[0].response[-1]}"
-    if len(shared) >= _LEAST_LINES and len(shared) * len(group) >= values[most]:
+    if len(shared) >= max(_LEAST_LINES, 0.5 * len(sets[most])):
         longest = max(len(lines) for lines in sets)
         notes.append(
             f"{place}: the FRFs have {min(map(len, sets))} to {longest} lines; the {len(shared)} that all "

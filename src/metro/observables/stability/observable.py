@@ -47,11 +47,12 @@ _COLUMNS: dict[str, tuple[str, ...]] = {
 def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Identify the modes of every position and solve the lobes of the cuts that were made there.
 
-    Tables ``modes``, ``mode_notes``, ``mode_tracks``, ``mode_shapes``, ``mode_mac``, ``mode_pickups``,
-    ``mode_cross``, ``frf_used``, ``stabilisation``, ``lobes`` (diagram per position), ``lobe_runs``
-    (probability per run with a depth), ``chatter_runs`` (what the runs' own records say), ``chatter_records`` (a record of each kind),
-    those of :mod:`metro.observables.stability.methods`, ``lobes_refused`` (reasons and notes). Without modes:
-    what the records say of chatter, and why there are no lobes.
+    Tables ``modes``, ``mode_notes`` (what they leave in doubt), ``mode_tracks``, ``mode_shapes``,
+    ``mode_mac``, ``mode_pickups``, ``mode_cross``, ``frf_used``, ``stabilisation``, ``lobes`` (diagram per
+    position), ``lobe_runs`` (probability per run with a depth), ``chatter_runs`` (what the runs' own records
+    say), ``chatter_records`` (a record of each kind), those of
+    :mod:`metro.observables.stability.methods`, ``lobes_refused`` (reasons and notes). Without modes: what the
+    records say of chatter, and why there are no lobes.
     """
     test = observe_modes(read, batch.instrument("hammer"))
     modes = test.modes
