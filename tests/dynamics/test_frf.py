@@ -138,10 +138,35 @@ def test_a_record_without_a_pulse_is_no_hit():
     assert fault(Hit(rng.normal(size=4096), rng.normal(size=4096), RATE)) == "no force pulse above the noise"
 
 
-def test_records_of_different_length_are_refused():
-    short = Hit(record().force[:-1], record().response[:-1], RATE)
-    with pytest.raises(ValueError, match="one length for all"):
-        estimate_frf([record(), short], "m/s2")
+def test_records_of_different_length_are_used_together_and_named():
+    """What a gate has left of a decayed response may be continued with zeros."""
+    long, rng = record(), np.random.default_rng(6)
+    cut = round(0.7 * len(long.force))
+    short = Hit(record(rng).force[:cut], record(rng).response[:cut], RATE)
+    frf = estimate_frf([long, short, record(rng)], "m/s2")
+    assert frf.used == (0, 1, 2)
+    assert frf.notes == ("hit 2 (1.4 s) shorter than the longest record (2 s): continued with zeros",)
+    assert len(frf.frequency) == len(long.force) // 2
+    assert relative_error(frf) < 0.015  # 0.0126 of three whole records
+
+
+def test_a_record_of_another_rate_is_named():
+    rng = np.random.default_rng(7)
+    other = record(rng)
+    frf = estimate_frf([record(rng), record(rng), Hit(other.force, other.response, RATE / 2)], "m/s2")
+    assert frf.used == (0, 1)
+    assert frf.notes == ("hit 3 rejected: sampled at 1024 Hz, 2 others at 2048 Hz",)
+
+
+def test_the_band_of_a_hammer_ends_at_the_first_gap_of_its_spectrum():
+    """A soft tip leaves side lobes beyond it: a response there is not the hammer's."""
+    hit = record()
+    late = np.roll(hit.force, 3) * 0.9  # a second pulse 1.5 ms later makes a spectrum with gaps
+    frf = estimate_frf([Hit(hit.force + np.roll(late, 9), hit.response, RATE)], "m/s2")
+    band = np.flatnonzero(frf.excited)
+    strong = frf.frequency[band]
+    assert strong[-1] < 200.0
+    assert np.diff(band).max() < 6
 
 
 def test_an_unknown_unit_is_refused_with_the_known_ones():

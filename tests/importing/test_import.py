@@ -1,5 +1,6 @@
 """``metro import``: files of other programs become a batch that passes its check; the unknown is asked."""
 
+import hashlib
 import os
 import subprocess
 import sys
@@ -16,8 +17,10 @@ from metro.batch.check import check, load
 from metro.batch.sources import source
 from metro.cli import app
 from metro.formats.registry import read
+from metro.formats.uff import FRF, Function
+from metro.formats.uff_writer import universal_file
 from metro.importing.look import copies, look, sparkline
-from metro.importing.propose import from_name
+from metro.importing.propose import from_name, propose
 from metro.stages.whole import check_whole
 
 FIELD = Path(os.environ.get("METRO_REAL_DATA", Path(__file__).parents[2] / "../shared/real")).parent / "field"
@@ -237,3 +240,50 @@ def test_a_place_that_is_left_out_or_is_none_is_refused_before_anything_is_writt
         assert result.exit_code == 2, result.output
         assert f'response: found "{place}", expected a' in result.output
     assert not (tmp_path / "hits").exists()
+
+
+def two_columns(path, seed):
+    values = np.random.default_rng(seed).normal(size=64)
+    path.write_text("".join(f"{k / 1000:.4f} {value:.12f}\n" for k, value in enumerate(values)))
+
+
+def test_a_hammer_record_without_its_sensor_is_named_with_both_counts(tmp_path):
+    names = ["impact_p3.txt", "impact_p8.txt", "impact_p9.txt", "accel_p3.txt"]
+    for seed, name in enumerate(names):
+        two_columns(tmp_path / name, seed)
+    proposals, unknown = propose([look(tmp_path / name) for name in names])
+    assert [row for row, _ in proposals[0].rows] == ["impact_p3.txt#3"]
+    (line,) = unknown
+    assert line.startswith("impact_p8.txt, impact_p9.txt: found 3 files of a hammer (impact_p3.txt, ")
+    assert "and 1 file of a sensor (accel_p3.txt)" in line
+    assert "Rename the files" in line
+
+
+def test_hammer_and_sensor_with_other_numbers_are_no_pair(tmp_path):
+    for seed, name in enumerate(["impact_p3.txt", "accel_p4.txt"]):
+        two_columns(tmp_path / name, seed)
+    proposals, (line,) = propose([look(tmp_path / "impact_p3.txt"), look(tmp_path / "accel_p4.txt")])
+    assert proposals == []
+    assert line.startswith("impact_p3.txt, accel_p4.txt: found 1 file of a hammer")
+
+
+@field
+def test_the_origin_of_a_universal_file_is_kept_and_cited(tmp_path):
+    (file,) = (FIELD / "modal-poles-unv").iterdir()
+    result = called(tmp_path / "modes", file, citation="GVT")
+    assert result.exit_code == 0, result.output
+    cited = yaml.safe_load((tmp_path / "modes/batch.yaml").read_text())["citation"]
+    assert cited.startswith(f"GVT; read from {file.name} (SHA-256 ")
+    assert hashlib.sha256(file.read_bytes()).hexdigest()[:12] in cited
+    assert "written by LMS Test.Lab Rev project-15A; on 25-Oct-19 14:45:06" in cited
+    assert "11 × 55 (data at nodes, as mode shapes)" in cited
+    assert (tmp_path / "modes" / file.name).read_bytes() == file.read_bytes()
+
+
+def test_the_origin_of_measured_functions_is_kept_too(tmp_path):
+    frequency = np.arange(1.0, 101.0)
+    values = 1e-6 / (1 - (frequency / 40.0) ** 2 + 0.04j * frequency / 40.0)
+    (tmp_path / "test.unv").write_bytes(universal_file([Function(FRF, "1x", "1x", "m", frequency, values)]))
+    result = called(tmp_path / "modal", tmp_path / "test.unv", reference="1x", response="1x")
+    assert result.exit_code == 0, result.output
+    assert "read from test.unv (SHA-256 " in (tmp_path / "modal/batch.yaml").read_text()

@@ -9,7 +9,8 @@ from metro.batch.processed import read_table
 from metro.dynamics.hits import Hit, gate
 from metro.formats.uff import FRF, Function
 from metro.formats.uff_writer import universal_file
-from metro.observables.stability.modal_test import clear_of_drift, clear_of_noise, observe_modes
+from metro.observables.stability.lines import clear_of_drift, clear_of_noise
+from metro.observables.stability.modal_test import observe_modes
 from metro.observables.stability.receptance import arranged, from_files
 from metro.stages.ingest import ingest
 
@@ -269,6 +270,96 @@ def test_a_drift_is_not_sought_beyond_a_quarter_of_the_band():
     clear = clear_of_drift(frequency, level)
     assert frequency[clear][0] == 251.0
     assert clear[frequency >= 251.0].all()
+
+
+@pytest.mark.parametrize("first", [0.5, 2.0])
+def test_a_first_mode_far_above_the_others_is_no_drift(first):
+    """A fundamental at 3000 times the median of the band, on an integrated acceleration with drift below."""
+    frequency = np.arange(first, 1000.0, 0.5)
+
+    def receptance(hz, damping, stiffness):
+        ratio = frequency / hz
+        return 1.0 / (stiffness * (1.0 - ratio**2 + 2j * damping * ratio))
+
+    structure = receptance(20.0, 0.01, 1e5) + receptance(400.0, 0.01, 5e8)
+    assert np.abs(structure).max() > 3000 * np.median(np.abs(structure))
+    rng = np.random.default_rng(0)
+    drift = 3e-5 * (2.0 / frequency) ** 4 * (rng.normal(size=len(frequency)) + 1j)
+    for values in (structure, structure + drift):
+        clear = clear_of_drift(frequency, values[:, None])
+        assert clear[frequency > 17.0].all()
+    test = observed(frf_rows(structure + drift, frequency=frequency))
+    assert test.modes["frequency_hz"].iloc[0] == pytest.approx(20.0, rel=1e-3)
+
+
+def test_of_a_free_structure_the_first_mode_is_above_its_mass_line():
+    """The receptance of a free mass falls by 1/omega² from the first line on, by far above the first mode."""
+    frequency = np.arange(0.25, 1000.0, 0.25)
+    ratio = frequency / 112.0
+    values = -1.0 / (5.0 * (2 * np.pi * frequency) ** 2) + 1.0 / (2e7 * (1.0 - ratio**2 + 2e-3j * ratio))
+    clear = clear_of_drift(frequency, values[:, None])
+    assert clear[frequency > 105.0].all()
+
+
+def test_a_fundamental_of_a_few_lines_is_no_drift():
+    frequency = np.arange(1.0, 1001.0)
+    ratio, other = frequency / 5.0, frequency / 400.0
+    values = 1e-4 / (1 - ratio**2 + 0.02j * ratio) + 2e-9 / (1 - other**2 + 0.02j * other)
+    assert np.abs(values).max() > 3000 * np.median(np.abs(values))
+    assert clear_of_drift(frequency, values[:, None]).all()
+
+
+def test_a_line_that_stands_out_of_the_mass_line_does_not_end_the_drift():
+    frequency = np.arange(0.25, 1000.0, 0.25)
+    ratio = frequency / 112.0
+    values = -1.0 / (5.0 * (2 * np.pi * frequency) ** 2) + 1.0 / (2e7 * (1.0 - ratio**2 + 2e-3j * ratio))
+    values[20] *= 12.0
+    first = frequency[clear_of_drift(frequency, values[:, None])][0]
+    assert 10.0 < first < 105.0
+
+
+def test_where_a_file_has_coherence_it_tells_the_lines():
+    frequency = FREQUENCY
+    coherence = np.where((frequency > 20.0) & (frequency < 80.0), 0.99, 0.2)
+    rows = frf_rows(receptance(0)).assign(coherence=coherence)
+    test = observed(rows)
+    assert test.used["frequency_hz"].min() == pytest.approx(20.0, abs=0.1)
+    assert test.used["frequency_hz"].max() == pytest.approx(80.0, abs=0.1)
+    np.testing.assert_allclose(test.modes["frequency_hz"], NATURAL, rtol=1e-6)
+
+
+def test_frfs_that_end_at_different_lines_are_all_used():
+    short = FREQUENCY[:-500]
+    test = observed(frf_rows(receptance(0)), frf_rows(receptance(1, frequency=short), "2x", frequency=short))
+    assert set(test.used["response"]) == {"1x", "2x"}
+    assert len(test.notes) == 1
+    assert "the 3597 that all have are fitted" in test.notes[0]
+
+
+def test_an_frf_on_lines_of_its_own_is_named():
+    other = FREQUENCY[:-1] + 0.4 * np.diff(FREQUENCY)
+    rows = [frf_rows(receptance(i), f"{i + 1}x") for i in (0, 1)]
+    test = observed(*rows, frf_rows(receptance(2, frequency=other), "3x", frequency=other))
+    assert set(test.used["response"]) == {"1x", "2x"}
+    assert test.notes == [
+        "position 1, direction x: 1x to 3x: not used, on other lines than the 2 others; export all FRFs with "
+        "the same lines"
+    ]
+
+
+def test_records_of_unequal_length_are_all_used():
+    table = hits()
+    keep = (table["response"] != "2x") | (table["t_s"] < 3.0)
+    test = observed(NO_FRF, hit=table[keep])
+    assert set(test.used["response"]) == {"1x", "2x", "3x"}
+    assert any("shorter than the longest record" in note for note in test.notes)
+    np.testing.assert_allclose(test.modes["damping"], ZETA, rtol=0.01)
+
+
+def test_a_response_across_the_blow_without_one_along_it_is_named():
+    test = observed(frf_rows(receptance(0)), frf_rows(receptance(1), "2y", "3x"))
+    assert len(test.notes) == 1
+    assert test.notes[0].startswith("position 1, 3x to 2y: not used: force and response have different")
 
 
 def test_one_line_that_stands_out_of_the_noise_by_chance_does_not_open_the_band():

@@ -14,6 +14,8 @@ from metro.slips.joints import joint_slips
 from metro.slips.labels import label_slips
 from metro.slips.redundancy import stiffness_slips
 from metro.slips.scans import scan_slips
+from metro.stages.reading import Recordings
+from metro.stages.recordings import hit
 
 RNG = np.random.default_rng(5)
 
@@ -172,3 +174,25 @@ def test_hits_that_share_a_response_are_an_error_and_coarse_ones_are_not():
     assert len(list(copies(batch, Tables(hit=pd.concat([hit("a", one), hit("b", one)]))))) == 1
     flat = np.tile([0.0, 1.0], 100)
     assert list(copies(batch, Tables(hit=pd.concat([hit("a", flat), hit("b", flat)])))) == []
+
+
+def test_two_files_of_hits_with_the_same_numbers_are_refused_with_both_named(tmp_path):
+    ring = RNG.normal(size=400)
+    force = np.concatenate([np.zeros(20), np.hanning(16) * 300, np.zeros(364)]) + 1e-3 * RNG.normal(size=400)
+    for point, strength in ((3, 1.0), (8, 0.9)):
+        for name, values, digits in (("impact", strength * force, 12), ("accel", ring, 12 + point)):
+            lines = [f"{value:.{digits}e}" for value in np.round(values, 9)]
+            (tmp_path / f"{name}_p{point}.txt").write_text("\n".join(f"{k} {x}" for k, x in enumerate(lines)))
+    response = {"file": "accel_p{record}.txt", "from": 2, "unit": "m/s2"}
+    columns = {"force_n": {"from": 2, "unit": "N"}, "response": response}
+    mappings = {"impact_p*.txt": {"rate_hz": 1000, "columns": columns}}
+    recordings = Recordings(tmp_path, lambda: None, mappings)
+    rows = [
+        {"test": "", "position": "1", "reference": f"{p}z", "response": "1z", "replicate": 1.0}
+        | {"kind": "record", "file": f"impact_p{p}.txt#{p}", "response_unit": "m/s2"}
+        for p in (3, 8)
+    ]
+    assert len(list(hit(batch_of(), pd.DataFrame(rows), recordings))) == 1
+    (problem,) = recordings.problems
+    assert "accel_p8.txt has the same values as accel_p3.txt" in problem.message
+    assert problem.severity == "error"

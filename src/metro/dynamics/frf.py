@@ -12,6 +12,8 @@ from metro.units import Array, ComplexArray
 
 _INTEGRATIONS = {"m/s2": -2, "m/s": -1, "m": 0}
 _POOLED_LINES = 11
+_WEAK = 0.1  # -20 dB
+_GONE_LINES = 5  # in a row: a single one may be weak by chance
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,8 @@ class Frf:
         products is the covariance of all lines, noise of the force included, which many lines share. No rows
         for a single hit.
     coherence : (n,); NaN for a single hit.
-    excited : (n,) whether the force's spectrum is within 20 dB of its largest line.
+    excited : (n,) whether the line is in the hammer's band: where the force's spectrum is within 20 dB of its
+        largest line, and below the first few lines in a row at which it is not.
     redundancy : record length over the length kept by the gate: neighbouring lines so many apart are
         independent.
     used : which of the hits given were used.
@@ -47,12 +50,15 @@ class Frf:
     notes: tuple[str, ...]
 
 
-def estimate_frf(hits: Sequence[Hit], unit: str, decay: float = 0.0) -> Frf:
+def estimate_frf(hits: Sequence[Hit], unit: str, decay: float = 0.0, seconds: float = 0.0) -> Frf:
     """Average gated hits into a receptance.
+
+    A record that ends before ``seconds``, or before another one, is continued with zeros: after its gate it
+    holds nothing else. So records of several lengths have the same lines.
 
     Parameters
     ----------
-    hits : repeats of the same test, of one rate and length.
+    hits : repeats of the same test. Those of another sampling rate than most are rejected.
     unit : of the response: m/s2, m/s or m.
     decay : 1/s, of an exponential window that the records went through, force and response alike. The FRF is
         that of poles moved left by it (:func:`metro.dynamics.modal.identify_modes` subtracts it again).
@@ -60,13 +66,14 @@ def estimate_frf(hits: Sequence[Hit], unit: str, decay: float = 0.0) -> Frf:
     Raises
     ------
     ValueError
-        When no hit is usable, when rates or lengths differ, or when the unit is none of the three.
+        When no hit is usable, when force and response of one differ in length, or when the unit is none of
+        the three.
     """
-    if len({(hit.rate, len(hit.force), len(hit.response)) for hit in hits}) != 1:
-        raise ValueError("hits of one test: expected one sampling rate and one length for all")
+    if any(len(hit.force) != len(hit.response) for hit in hits):
+        raise ValueError("a hit's force and response: expected one length for both")
     if unit not in _INTEGRATIONS:
         raise ValueError(f"response unit {unit!r}: expected {', '.join(_INTEGRATIONS)}")
-    reasons = faults(hits)
+    reasons = _other_rates(hits, faults(hits))
     notes = [f"hit {i + 1} rejected: {reason}" for i, reason in enumerate(reasons) if reason]
     used = tuple(i for i, reason in enumerate(reasons) if not reason)
     if not used:
@@ -74,12 +81,19 @@ def estimate_frf(hits: Sequence[Hit], unit: str, decay: float = 0.0) -> Frf:
     if len(used) == 1:
         notes.append("a single hit: no coherence and no variance from repeats")
     gated = [gate(hits[i]) for i in used]
-    length, rate = len(hits[0].force), hits[0].rate
+    rate = hits[used[0]].rate
+    length = round(max(seconds, *(hits[i].seconds for i in used), 0.0) * rate)
+    short = [f"{i + 1} ({hits[i].seconds:.4g} s)" for i in used if len(hits[i].force) < 0.99 * length]
+    if short:
+        notes.append(
+            f"hit{'s' * (len(short) > 1)} {', '.join(short)} shorter than the longest record "
+            f"({length / rate:.4g} s): continued with zeros"
+        )
     omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(length, 1.0 / rate)[1:], dtype=np.float64)
     # a signal times e^{-decay t} has its spectrum at i omega + decay
     to_displacement = np.asarray(1j * omega + decay, dtype=np.complex128) ** _INTEGRATIONS[unit]
-    force = np.asarray(np.fft.rfft([f for f, _, _ in gated], axis=1)[:, 1:], dtype=np.complex128)
-    response = np.asarray(np.fft.rfft([x for _, x, _ in gated], axis=1)[:, 1:], dtype=np.complex128)
+    force = np.asarray(_spectra([f for f, _, _ in gated], length), dtype=np.complex128)
+    response = np.asarray(_spectra([x for _, x, _ in gated], length), dtype=np.complex128)
     sff, sxx = np.sum(np.abs(force) ** 2, axis=0), np.sum(np.abs(response) ** 2, axis=0)
     sfx = np.sum(force.conj() * response, axis=0)
     variance, deviation, coherence = _scatter(force, response)
@@ -92,11 +106,36 @@ def estimate_frf(hits: Sequence[Hit], unit: str, decay: float = 0.0) -> Frf:
         variance=variance * np.abs(to_displacement) ** 2,
         deviation=deviation * to_displacement,
         coherence=coherence,
-        excited=np.sqrt(sff) > 0.1 * np.sqrt(sff.max()),
+        excited=_excited(np.sqrt(sff)),
         redundancy=length / max(kept for _, _, kept in gated),
         used=used,
         notes=tuple(notes),
     )
+
+
+def _other_rates(hits: Sequence[Hit], reasons: Sequence[str]) -> list[str]:
+    """Add to the reasons those hits whose sampling rate is not that of most."""
+    rates = [hit.rate for hit in hits]
+    most = max(rates, key=rates.count)
+    others = f"{rates.count(most)} others at {most:g} Hz"
+    return [
+        reason or ("" if rate == most else f"sampled at {rate:g} Hz, {others}")
+        for rate, reason in zip(rates, reasons, strict=True)
+    ]
+
+
+def _spectra(signals: Sequence[Array], length: int) -> ComplexArray:
+    """Spectra of signals continued with zeros to ``length``, without the line at 0 Hz."""
+    return np.stack([np.fft.rfft(signal, length)[1:] for signal in signals])
+
+
+def _excited(level: Array) -> np.ndarray:
+    """Lines in the band of a hammer with the spectrum ``level`` (n,): beyond it there are only side lobes."""
+    strong = level > _WEAK * level.max()
+    after = np.convolve(~strong, np.ones(_GONE_LINES), mode="valid") == _GONE_LINES
+    gone = np.flatnonzero(after & (np.arange(len(after)) > int(level.argmax())))
+    end = int(gone[0]) if len(gone) else len(level)
+    return strong & (np.arange(len(level)) < end)
 
 
 def _scatter(force: ComplexArray, response: ComplexArray) -> tuple[Array, ComplexArray, Array]:

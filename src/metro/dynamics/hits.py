@@ -22,6 +22,11 @@ class Hit:
     response: Array
     rate: float
 
+    @property
+    def seconds(self) -> float:
+        """Length of the record, s."""
+        return len(self.force) / self.rate
+
 
 def faults(hits: Sequence[Hit]) -> list[str]:
     """Explain for each hit why it cannot be used; empty when it can.

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from metro.dynamics.by_file import Moved, explained, own_fits, with_files
+from metro.dynamics.driving import Standing, gives_out_power, standing, turning
 from metro.dynamics.modes import Mode, modal_constants
 from metro.dynamics.polefit import PoleFit, Scatter, criterion
 from metro.dynamics.refine import Data, losses, refine
 from metro.dynamics.shapes import residues
 from metro.dynamics.stabilisation import Diagram, stabilisation
 from metro.units import Array, ComplexArray
+
+Ways = Sequence[Sequence[np.ndarray]]  # to divide the columns into files
 
 # Model error as a share of an FRF's rms: what a linear model of a machine leaves, and so where adding modes
 # ends; greater where the FRF comes without its scatter, since then its systematic errors are not known
@@ -23,6 +28,10 @@ _ORDERS = range(8, 49, 2)
 _MOST_MODES = 24
 _LARGEST_DAMPING = 0.35
 _CHANCE, _TRACE = 1e-3, 0.25
+_HALF = 0.5  # of the power: causal modes explain hardly any of conjugated FRFs
+# Two resonances whose middles are further apart than this many times the sum of their half widths are two
+# peaks in every response: no pole that moves looks so.
+_CLOSE = 4.0
 # A fit has converged where a few steps more gain less than a tenth of what one parameter gains by chance.
 _FEW_STEPS, _ROUNDS, _SETTLED = 3, 20, 0.1
 
@@ -39,6 +48,8 @@ class ModalModel:
     diagram : the stabilisation diagram that it started from.
     doubtful : a further mode that lowers chi² beyond chance, but by less than its unknowns are worth; None
         without such a trace.
+    moved : how each of ``modes`` differs between the files; None where no two files see it.
+    declared : whether the declared driving point is one; None where none was declared.
     """
 
     modes: tuple[Mode, ...]
@@ -46,6 +57,8 @@ class ModalModel:
     error: Array
     diagram: Diagram
     doubtful: Mode | None
+    moved: tuple[Moved | None, ...] = ()
+    declared: Standing | None = None
 
 
 def identify_modes(
@@ -57,6 +70,7 @@ def identify_modes(
     inputs: int = 1,
     scatter: Scatter | None = None,
     decay: float = 0.0,
+    files: Ways = (),
 ) -> ModalModel:
     """Identify the modes in the band that ``frequency`` spans.
 
@@ -65,40 +79,67 @@ def identify_modes(
     frequency : (n,) Hz, above 0; independent lines (thin out what a gate made redundant).
     frf : (n, c) receptances that share their modes, m/N, the inputs of one output side by side.
     variance : (n, c) of the complex FRFs; None: estimated from the roughness between lines.
-    driving : column of the driving point (reference = response), which gives the stiffness.
+    driving : column of the declared driving point (reference = response), which gives the stiffness unless
+        its residues contradict it.
     inputs : how many columns belong to one output.
     scatter : how the repeats differ, on the same lines and columns.
     decay : 1/s, of an exponential window on force and response, which is subtracted from the damping.
+    files : ways to divide the columns into files, between which the poles may move: the columns of each. What
+        they differ by is in the errors of the modes (:mod:`metro.dynamics.by_file`), of the way that shows
+        most of it.
 
     Raises
     ------
     ValueError
-        When there are fewer than 16 lines, or values that are not finite, or none of the FRFs has a driving
-        point's sign although one is declared (conjugated or negated data), or the window hides a mode, or the
-        fit does not converge.
+        When there are fewer than 16 lines, or values that are not finite, or the FRFs are conjugated, or the
+        window hides a mode, or the fit does not converge.
     """
     if len(frequency) < 16:
         raise ValueError(f"{len(frequency)} lines in the band: expected 16 or more")
     if not (np.all(np.isfinite(frf)) and frequency[0] > 0):
         raise ValueError("FRF: found values that are not finite, or a line at 0 Hz")
-    if driving is not None and np.sum(frf[:, driving].imag * frequency) > 0:
+    point = None if driving is None else frf[:, driving]
+    if point is not None and gives_out_power(frequency, point) and turning(point) >= 0.0:
         raise ValueError(
-            "driving-point receptance: its imaginary part is positive; expected e^{+iωt} and m/N"
+            "driving-point receptance: its imaginary part is positive and its phase rises; expected e^{+iωt}"
+            " and m/N"
         )
     noise = roughness(frf) if variance is None else variance
     rms = np.sqrt(np.mean(np.abs(frf) ** 2, axis=0))
     model_error = _MODEL_ERROR_UNKNOWN_SCATTER if variance is None else _MODEL_ERROR
     weight = np.sqrt(2.0 / (noise + (model_error * rms) ** 2))  # of the real and the imaginary part
     data = Data(2 * np.pi * frequency, frf, weight, inputs, scatter)
-    start, diagram = _search(data.thinned(_SEARCH_LINES))
+    start, diagram = _search(data.thinned(_SEARCH_LINES), files)
     fit = _converged(data, refine(data, start.omega, start.zeta, real=start.real))
     change = np.linalg.norm(fit.evaluate(data.omega) - frf, axis=0) / np.linalg.norm(frf, axis=0)
+    if np.min(change) ** 2 > _HALF and sum(turning(column) for column in frf.T) > 0.0:
+        raise ValueError(
+            "the phase of the FRFs rises over the resonances, and no modes explain half of their power: they "
+            "are conjugated (e^{-iωt}); export them with e^{+iωt}"
+        )
     inside = (fit.omega > data.omega[0]) & (fit.omega < data.omega[-1]) & (fit.zeta < _LARGEST_DAMPING)
     inside &= _is_there(data, fit)
     free = residues(data.omega, frf, np.sqrt(np.mean(data.weight**2, axis=1)), fit.poles)
     order = [int(r) for r in np.argsort(fit.omega) if inside[r]]
-    modes = tuple(modal_constants(fit, r, driving, free[r], decay) for r in order)
-    return ModalModel(modes, fit, change, diagram, _doubtful(data, fit, driving, decay))
+    declared = None if driving is None else standing(fit, free, driving, order)
+    driving = driving if declared is Standing.THERE else None
+    ways = [own_fits(data, fit, way) for way in files]
+    modes, moved = [], []
+    for r in order:
+        mode = modal_constants(fit, r, driving, free[r], decay)
+        found = [with_files(mode, r, way, driving=driving, decay=decay, fit=fit) for way in ways]
+        widest, differs = max([(mode, None), *found], key=lambda each: _width(each[0]))
+        modes.append(widest)
+        moved.append(differs)
+    # what poles that move leave over is no further mode
+    alike = all(explained(data, fit, way).bic() >= fit.bic() for way in files)
+    doubtful = _doubtful(data, fit, driving, decay) if alike else None
+    return ModalModel(tuple(modes), fit, change, diagram, doubtful, tuple(moved), declared)
+
+
+def _width(mode: Mode) -> float:
+    """Error of a mode's pole, in half widths of its resonance."""
+    return float(np.hypot(mode.frequency_sd / mode.frequency, mode.damping_sd) / mode.damping)
 
 
 def roughness(frf: ComplexArray, lines: int = 15) -> Array:
@@ -110,10 +151,10 @@ def roughness(frf: ComplexArray, lines: int = 15) -> Array:
     return np.stack([np.convolve(column, window, mode="same") / count for column in second.T], axis=1)
 
 
-def _search(data: Data) -> tuple[PoleFit, Diagram]:
+def _search(data: Data, files: Ways) -> tuple[PoleFit, Diagram]:
     """Start from the stable poles, then add and remove modes while the information criterion falls.
 
-    Modes are real (normal) where that costs no more than it saves.
+    Modes are real (normal) where that costs no more than it saves, and one that moves between files is one.
     """
     orders = range(_ORDERS.start, min(_ORDERS.stop, len(data.omega) // 2), _ORDERS.step)
     diagram = stabilisation(data, orders)
@@ -121,7 +162,7 @@ def _search(data: Data) -> tuple[PoleFit, Diagram]:
     starts = starts or [_strongest(data, np.zeros_like(data.frf))]
     general = _added(data, _pruned(data, _fit(data, np.array(starts), real=False)))
     normal = _pruned(data, _fit(data, general.poles, real=True))
-    return min(normal, general, key=lambda fit: fit.bic()), diagram
+    return _merged(data, min(normal, general, key=lambda fit: fit.bic()), files), diagram
 
 
 def _fit(data: Data, poles: ComplexArray, *, real: bool) -> PoleFit:
@@ -181,6 +222,47 @@ def _added(data: Data, fit: PoleFit) -> PoleFit:
             break
         fit = longer
     return fit
+
+
+def _merged(data: Data, fit: PoleFit, files: Ways) -> PoleFit:
+    """Remove one of two close modes where poles that move from file to file explain what both do.
+
+    To poles common to all files, a mode that moves looks like two or three that nearly coincide. With poles
+    of each file's own, the files must need both modes by themselves.
+    """
+    for way in files:
+        kept = fit
+        while (shorter := _shorter(data, kept, fit, way)) is not None:
+            kept = shorter
+        fit = kept if kept.real else min(kept, _normal(data, kept), key=lambda one: _left(data, one, way))
+    return fit
+
+
+def _normal(data: Data, fit: PoleFit) -> PoleFit:
+    """Return the fit with real modes: a pole that moves makes the residue at a common one complex."""
+    return _fit(data, fit.poles, real=True)
+
+
+def _left(data: Data, fit: PoleFit, way: Sequence[np.ndarray]) -> float:
+    return min(fit.bic(), explained(data, fit, way).bic())
+
+
+def _shorter(data: Data, fit: PoleFit, common: PoleFit, way: Sequence[np.ndarray]) -> PoleFit | None:
+    """Return ``fit`` without one of two close modes, if the files do as well as ``common``, the first fit."""
+    width = fit.omega * fit.zeta
+    apart = np.abs(fit.omega[:, None] - fit.omega) / (width[:, None] + width)
+    first, second = np.triu_indices(len(fit.omega), 1)
+    close = [i for i in np.argsort(apart[first, second]) if apart[first[i], second[i]] < _CLOSE]
+    if not close:
+        return None
+    missed, both = losses(data, fit), explained(data, fit, way).bic()
+    for pair in close:
+        weaker = min(first[pair], second[pair], key=lambda r: float(missed[r]))
+        again = _fit(data, np.delete(fit.poles, weaker), real=fit.real)
+        one = explained(data, again, way)
+        if one.bic() < both and one.as_well_as(common):
+            return again
+    return None
 
 
 def _doubtful(data: Data, fit: PoleFit, driving: int | None, decay: float) -> Mode | None:

@@ -11,7 +11,7 @@ from metro.dynamics.polefit import PoleFit
 from metro.dynamics.shapes import mpc
 from metro.units import Array, ComplexArray
 
-_RESOLVED = 1.0 / 6.0
+RESOLVED = 1.0 / 6.0  # relative standard deviation: a third, at 95 %
 
 
 @dataclass(frozen=True)
@@ -104,5 +104,5 @@ def modal_constants(
         viscous_sd=2.0 * zeta * omega * mass * sd(log_mass[0] + log_omega + log_zeta, log_mass[1]),
         shape=shape / shape[int(np.abs(shape).argmax()) if driving is None else driving],
         collinearity=mpc(free),
-        resolved=damping_sd < _RESOLVED and (driving is None or stiffness_sd < _RESOLVED),
+        resolved=damping_sd < RESOLVED and (driving is None or stiffness_sd < RESOLVED),
     )

@@ -22,6 +22,12 @@ class Scatter:
     deviation: ComplexArray
     mean: np.ndarray
 
+    def of(self, columns: np.ndarray) -> Scatter:
+        """Return the repeats that have a part in ``columns`` (k,) of the responses."""
+        deviation = self.deviation[:, :, columns]
+        there = np.any(deviation != 0.0, axis=(1, 2))
+        return Scatter(deviation[there], np.unique(self.mean[there], return_inverse=True)[1])
+
 
 @dataclass(frozen=True)
 class PoleFit:

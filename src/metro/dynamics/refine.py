@@ -46,15 +46,37 @@ class Data:
         every = -(-len(self.omega) // lines)
         return Data(self.omega[::every], self.frf[::every], self.weight[::every], self.inputs)
 
+    def of(self, columns: np.ndarray) -> Data:
+        """Return some of the responses, each as an output of its own."""
+        scatter = None if self.scatter is None else self.scatter.of(columns)
+        return Data(self.omega, self.frf[:, columns], self.weight[:, columns], 1, scatter)
 
-def refine(data: Data, omega: Array, zeta: Array, *, real: bool, iterations: int = 30) -> PoleFit:
-    """Levenberg–Marquardt on (log omega, log zeta) from starting poles; ``real`` for real (normal) modes."""
+
+def refine(
+    data: Data,
+    omega: Array,
+    zeta: Array,
+    *,
+    real: bool,
+    iterations: int = 30,
+    free: np.ndarray | None = None,
+) -> PoleFit:
+    """Levenberg–Marquardt on (log omega, log zeta) from starting poles.
+
+    Parameters
+    ----------
+    real : for real (normal) modes.
+    free : (m,) whether the pole of each mode is fitted; None: all are. One that is not has no error.
+    """
     theta = np.concatenate([np.log(omega), np.log(zeta)])
+    fitted = np.arange(len(theta)) if free is None else np.flatnonzero(np.concatenate([free, free]))
     low, high = _bounds(data, len(omega))
     damping = 1e-3
     chi2, gradient, normal = _quadratic(data, theta, real)
     for _ in range(iterations):
-        step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-30), gradient)
+        curved = normal[np.ix_(fitted, fitted)]
+        step = np.zeros(len(theta))
+        step[fitted] = -np.linalg.solve(curved + damping * np.diag(np.diag(curved) + 1e-30), gradient[fitted])
         trial = np.clip(theta + np.clip(step, -0.3, 0.3), low, high)
         new, *slopes = _quadratic(data, trial, real)
         if new < chi2:
@@ -66,12 +88,14 @@ def refine(data: Data, omega: Array, zeta: Array, *, real: bool, iterations: int
             damping *= 8
             if damping > 1e8:
                 break
-    return _finish(data, theta, real)
+    return _finish(data, theta, real, fitted)
 
 
 def _bounds(data: Data, modes: int) -> tuple[Array, Array]:
+    """Return the least and the largest (log omega, log zeta); a peak may be a tenth of a step wide."""
     edges = np.log([0.7 * data.omega[0], 1.3 * data.omega[-1]])
-    zetas = np.log([1e-4, 0.4])
+    step = float(np.median(np.diff(data.omega)))
+    zetas = np.log([min(1e-4, 0.1 * step / data.omega[-1]), 0.4])
     return np.repeat([edges[0], zetas[0]], modes), np.repeat([edges[1], zetas[1]], modes)
 
 
@@ -123,12 +147,12 @@ def losses(data: Data, fit: PoleFit) -> Array:
     return total
 
 
-def _finish(data: Data, theta: Array, real: bool) -> PoleFit:
+def _finish(data: Data, theta: Array, real: bool, fitted: np.ndarray) -> PoleFit:
     chi2, _, normal = _quadratic(data, theta, real)
     m, responses = len(theta) // 2, data.frf.shape[1]
-    count = 2 * len(data.omega) * responses, 2 * m + responses * ((1 if real else 2) * m + 2)
+    count = 2 * len(data.omega) * responses, len(fitted) + responses * ((1 if real else 2) * m + 2)
     noise = chi2 / max(count[0] - count[1], 1)
-    inverse = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
+    inverse = _inverse(normal, fitted)
     x = np.empty(((1 if real else 2) * m + 2, responses))
     joint = np.empty((responses, 3 * m, 3 * m))
     for each in _fits(data, theta, real):
@@ -151,6 +175,15 @@ def _finish(data: Data, theta: Array, real: bool) -> PoleFit:
         count=count,
         real=real,
     )
+
+
+def _inverse(normal: Array, fitted: np.ndarray) -> Array:
+    """Inverse of the rows and columns ``fitted``, scaled: modes far weaker than others count; 0 elsewhere."""
+    inner = normal[np.ix_(fitted, fitted)]
+    scale = 1.0 / np.sqrt(np.diag(inner) + np.finfo(float).tiny)
+    inverse = np.zeros_like(normal)
+    inverse[np.ix_(fitted, fitted)] = np.linalg.pinv(inner * scale * scale[:, None]) * scale * scale[:, None]
+    return inverse
 
 
 def _shifts(data: Data, theta: Array, inverse: Array, *, real: bool) -> Array:

@@ -78,7 +78,7 @@ class FileMapping:
 
     def beside(self, record: str) -> list[str]:
         """Return the other files that a record is read from, relative to the folder of the named one."""
-        return list(dict.fromkeys(_filled(one.file, record) for one in self.columns.values() if one.file))
+        return list(dict.fromkeys(filled(one.file, record) for one in self.columns.values() if one.file))
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def mapped_pieces(source: Source, kind: Kind, rows: int | None, opened: Open) ->
         if key in mapping.steps and column in kind.required
     }
     files = {"": source.path} | {
-        one.file: source.path.parent / _filled(one.file, source.record) for one in asked.values() if one.file
+        one.file: source.path.parent / filled(one.file, source.record) for one in asked.values() if one.file
     }
     contents = {}
     for file, path in files.items():
@@ -220,7 +220,8 @@ def _check_record(source: Source, mapping: FileMapping) -> None:
         raise FormatError(source.path, f"{message}: write {RECORD} where the names of the columns have it")
 
 
-def _filled(text: str, record: str) -> str:
+def filled(text: str, record: str) -> str:
+    """Return a name of a mapping with the record's own in it."""
     return text.replace(RECORD, record)
 
 
@@ -228,7 +229,7 @@ def _find(source: Source, mapping: FileMapping, contents: Contents, name: str, g
     """Find the column of a file that is asked for."""
     place = f"{mapping.key}.columns.{name}"
     asked = name if given.column is None else given.column
-    file = _filled(given.file, source.record) or source.path.name
+    file = filled(given.file, source.record) or source.path.name
     if isinstance(asked, int):
         if 1 <= asked <= len(contents.columns):
             return contents.columns[asked - 1]
@@ -237,7 +238,7 @@ def _find(source: Source, mapping: FileMapping, contents: Contents, name: str, g
             source.path,
             f"batch.yaml, {place}: asks for column {asked}, {file} has {count}{_listed(contents)}",
         )
-    wanted = _filled(asked, source.record)
+    wanted = filled(asked, source.record)
     for same in (str.__eq__, lambda a, b: a.strip().lower() == b.strip().lower()):
         # the label of a column that shares its name with another is a name, too
         found = [each for each in contents.columns if same(each.name, wanted) or same(each.label, wanted)]
@@ -320,11 +321,16 @@ def _together(
         for file in contents
     }
     streams = {file: contents[file].pieces(labels, rows) for file, labels in used.items() if labels}
+    total = dict.fromkeys(streams, 0)
     for pieces in zip_longest(*streams.values()):
-        lengths = {0 if piece is None else len(piece.frame) for piece in pieces}
-        if len(lengths) > 1:
-            names = ", ".join(file or source.path.name for file in streams)
+        lengths = [0 if piece is None else len(piece.frame) for piece in pieces]
+        total = {file: total[file] + length for file, length in zip(streams, lengths, strict=True)}
+        if len(set(lengths)) > 1:
+            more = "" if rows is None else " or more"
+            each = " and ".join(f"{n}{more} in {file or source.path.name}" for file, n in total.items())
             raise FormatError(
-                source.path, f"found different numbers of rows in {names}, expected as many in all"
+                source.path,
+                f"found different numbers of rows, {each}, expected as many in all: are these files of one "
+                "record? Name those that are, or cut the longer one off where the shorter one ends",
             )
         yield dict(zip(streams, pieces, strict=True))

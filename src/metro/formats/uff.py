@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
@@ -93,15 +93,21 @@ def read_uff(path: Path, kind: Kind, rows: int | None) -> Raw:
 
 def without_frf(path: Path) -> str:
     """Say of a universal file that it has no FRF, and what it has."""
-    counts = Counter(name for name, _, _ in datasets(path, path.read_bytes()))
-    listed = ", ".join(
-        f"{count} × {name}" + (f" ({DATASETS[name]})" if name in DATASETS else "")
-        for name, count in counts.items()
-    )
+    counts, listed = counted(datasets(path, path.read_bytes()))
     modes = ": metro import makes a table of published values of the modes" if "55" in counts else ""
     return (
         f"found no function of type {FRF} among the datasets {listed or 'of the file, which has none'}{modes}"
     )
+
+
+def counted(found: Iterable[tuple[str, int, int]]) -> tuple[Counter[str], str]:
+    """Count datasets by name, and list them in words."""
+    counts = Counter(name for name, _, _ in found)
+    listed = ", ".join(
+        f"{count} × {name}" + (f" ({DATASETS[name]})" if name in DATASETS else "")
+        for name, count in counts.items()
+    )
+    return counts, listed
 
 
 def datasets(path: Path, data: bytes) -> Iterator[tuple[str, int, int]]:

@@ -14,6 +14,7 @@ from metro.formats.contents import Contents
 from metro.formats.kinds import KINDS
 from metro.formats.registry import open_contents, sniff, stated_kinds
 from metro.formats.text_layout import TextOptions
+from metro.formats.uff_header import origin
 from metro.formats.uff_modes import Mode, read_modes
 
 BARS = "▁▂▃▄▅▆▇█"
@@ -44,6 +45,7 @@ class Seen:
     columns : what it has.
     step : between values in s, where the file describes it.
     modes : of a universal file that holds modes.
+    origin : what such a file says of what wrote it, and of what is in it.
     fault : why it cannot be read at all.
     """
 
@@ -53,6 +55,7 @@ class Seen:
     columns: tuple[Column, ...] = ()
     step: float | None = None
     modes: tuple[Mode, ...] = ()
+    origin: str = ""
     fault: str = ""
 
 
@@ -62,9 +65,10 @@ def look(path: Path) -> Seen:
         stated = stated_kinds(path)
         for kind in stated:
             if _is(path, kind):
-                return _seen(path, kind, open_contents(path, kind, TextOptions()))
+                seen = _seen(path, kind, open_contents(path, kind, TextOptions()))
+                return replace(seen, origin=origin(path)) if seen.container == "universal" else seen
         if "frf" in stated and (modes := _modes(path)):
-            return Seen(path, "universal", "modes", modes=modes)
+            return Seen(path, "universal", "modes", modes=modes, origin=origin(path))
         own = next((kind for kind in KINDS if kind != "cloud" and _is(path, kind)), "")
         seen = _seen(path, own, open_contents(path, own or "force", TextOptions()))
         named = any(column.name for column in seen.columns) or path.suffix.lower() in POINTS
@@ -147,6 +151,7 @@ def described(files: Iterable[Seen]) -> list[str]:
             lines.append(
                 f"{seen.path.name}: {seen.container}, {len(seen.modes)} modes at {listed} Hz (damped)"
             )
+            lines.append(f"  {seen.origin}")
             continue
         rows = max((column.values.size for column in seen.columns), default=0)
         what = f", {KINDS[seen.kind].title} as it is" if seen.kind else ""

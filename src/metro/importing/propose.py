@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from metro.batch.capabilities import plural
 from metro.importing.look import Column, Seen
 
 _AXIS = re.compile(
@@ -57,8 +58,9 @@ def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
         group = [seen for seen in rest if seen.kind == kind]
         proposals.append(Proposal(kind, tuple((seen.path.name, _record(seen)) for seen in group)))
     rest = [seen for seen in rest if not seen.kind]
-    pairs, rest = _hammer_pairs(rest)
+    pairs, single, rest = _hammer_pairs(rest)
     proposals += pairs
+    unknown += single
     for seen in rest:
         found = _forces(seen) or _numbered(seen)
         if found is None:
@@ -134,13 +136,26 @@ def _numbered(seen: Seen) -> Proposal | None:
     return Proposal("cloud", ((seen.path.name, ""),), seen.path.name, columns, why)
 
 
-def _hammer_pairs(files: Sequence[Seen]) -> tuple[list[Proposal], list[Seen]]:
-    """Find files of a hammer and files of a sensor that share a number, each of time and value."""
+def _hammer_pairs(files: Sequence[Seen]) -> tuple[list[Proposal], list[str], list[Seen]]:
+    """Find files of a hammer and files of a sensor that share a number, each of time and value.
+
+    Returns
+    -------
+    proposals, what has no partner (one line for all), and the files that are neither of a hammer nor of a
+    sensor.
+    """
     two = [seen for seen in files if len(seen.columns) == 2]
     hammers = [seen for seen in two if re.search(r"impact|hammer|force", seen.path.name, re.IGNORECASE)]
     sensors = [seen for seen in two if re.search(r"acc|resp|vel|disp", seen.path.name, re.IGNORECASE)]
-    if not hammers or sorted(map(_record, hammers)) != sorted(map(_record, sensors)):
-        return [], list(files)
+    if not hammers or not sensors:
+        return [], [], list(files)
+    rest = [seen for seen in files if seen not in hammers and seen not in sensors]
+    single = _without_partner(hammers, sensors)
+    shared = _once(hammers) & _once(sensors)
+    hammers = [seen for seen in hammers if _record(seen) in shared]
+    sensors = [seen for seen in sensors if _record(seen) in shared]
+    if not hammers:
+        return [], single, rest
     first, other = _template(hammers[0]), _template(sensors[0])
     columns: dict[str, str | int | tuple[str, int]] = {"force_n": 2, "response": (other, 2)}
     why = {
@@ -154,7 +169,30 @@ def _hammer_pairs(files: Sequence[Seen]) -> tuple[list[Proposal], list[Seen]]:
     rows = tuple((f"{seen.path.name}#{_record(seen)}", _record(seen)) for seen in hammers)
     names = tuple(seen.path.name for seen in sensors)
     found = Proposal("record", rows, first.replace("{record}", "*"), columns, why, timed, more=names)
-    return [found], [seen for seen in files if seen not in hammers and seen not in sensors]
+    return [found], single, rest
+
+
+def _once(files: Sequence[Seen]) -> set[str]:
+    """Return the numbers that one of the files has in its name, and no other."""
+    numbers = [_record(seen) for seen in files]
+    return {number for number in numbers if numbers.count(number) == 1}
+
+
+def _without_partner(hammers: Sequence[Seen], sensors: Sequence[Seen]) -> list[str]:
+    """Say how many files of either kind there are, which cannot be paired, and what to do; [] if all can."""
+    shared = _once(hammers) & _once(sensors)
+    single = [seen.path.name for seen in (*hammers, *sensors) if _record(seen) not in shared]
+    if not single:
+        return []
+    counts = " and ".join(
+        f"{plural(len(files), 'file')} of {whose} ({', '.join(seen.path.name for seen in files)})"
+        for files, whose in ((hammers, "a hammer"), (sensors, "a sensor"))
+    )
+    return [
+        f"{', '.join(single)}: found {counts}; a record of the hammer and that of the sensor belong together "
+        "by the last number in their names, one of each with the same number. Rename the files so that their "
+        "numbers agree, or give the command those alone that belong together"
+    ]
 
 
 def _is_clock(values: np.ndarray) -> bool:

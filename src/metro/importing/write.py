@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 import re
@@ -26,6 +27,7 @@ _RUN_KEYS = (
     *("operation", "direction", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm"),
     *("cut_length_mm", "feed_direction_deg"),
 )
+_LONGEST, _DIGITS = 5000, 12  # characters of a citation, digits of a hash
 Answers = Mapping[str, str]
 
 
@@ -44,7 +46,7 @@ def write_batch(folder: Path, files: Sequence[Seen], proposals: Sequence[Proposa
         The folder cannot be written.
     """
     texts = {
-        "batch.yaml": "\n".join(_manifest(folder.name, proposals, answers)) + "\n",
+        "batch.yaml": "\n".join(_manifest(folder.name, proposals, _cited(files, answers))) + "\n",
         "runs.csv": _runs(proposals, answers),
         "impacts.csv": _impacts(proposals, answers),
         "published.csv": _published(files),
@@ -57,6 +59,25 @@ def write_batch(folder: Path, files: Sequence[Seen], proposals: Sequence[Proposa
                 (filled / name).write_text(text, encoding="utf-8")
 
 
+def _cited(files: Sequence[Seen], answers: Answers) -> Answers:
+    """Add to the citation what was read from which file, and what that says of its origin."""
+    read = [
+        f"read from {seen.path.name} (SHA-256 {_digest(seen.path)}): {seen.origin}"
+        for seen in files
+        if seen.origin
+    ]
+    if not read:
+        return answers
+    given = [answers["citation"]] if answers.get("citation") else []
+    text = "; ".join([*given, *read])
+    return {**answers, "citation": text if len(text) <= _LONGEST else f"{text[: _LONGEST - 2]} …"}
+
+
+def _digest(path: Path) -> str:
+    """Return the first digits of a file's hash, as the report prints them."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:_DIGITS]
+
+
 def _manifest(name: str, proposals: Sequence[Proposal], answers: Answers) -> Iterator[str]:
     """Yield the lines of batch.yaml; what was guessed says from what."""
     yield '# Written by metro import. Lines with a comment "guessed" are for you to check.'
@@ -65,7 +86,7 @@ def _manifest(name: str, proposals: Sequence[Proposal], answers: Answers) -> Ite
         yield f"title: {json.dumps(answers['title'], ensure_ascii=False)}"
     modes = any(each.kind == "modes" for each in proposals)
     yield f"source: {'published' if modes else 'measured'}"
-    if modes:
+    if answers.get("citation"):
         yield f"citation: {json.dumps(answers['citation'], ensure_ascii=False)}"
     yield f"cell: {answers.get('cell', 'unknown')}"
     tool = ", ".join(f"{key[5:]}: {value}" for key, value in answers.items() if key.startswith("tool."))

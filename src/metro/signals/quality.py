@@ -221,9 +221,16 @@ def missing_points(dropped: int, kept: int) -> Finding:
     return Finding("missing points", share, 0.5, share <= 0.5, message + hint)
 
 
-def conjugated(sign: float) -> Finding:
-    """Report a driving-point FRF whose imaginary part has the sign of a structure that gives out power."""
+def conjugated(sign: float, turning: float = 0.0) -> Finding:
+    """Report a driving-point FRF whose imaginary part has the sign of a structure that gives out power.
+
+    Where its phase falls over the resonances (``turning`` below zero) it is not conjugated but reversed.
+    """
     ok = sign <= 0.0
+    if not ok and turning < 0.0:
+        fault = "the driving point's imaginary part is positive, and its phase falls over the resonances"
+        message = f"{fault}: sensor or hammer points the other way, or they are at different places"
+        return Finding("FRF sign", sign, 0.0, ok, f"{message}; used without its stiffness")
     message = "the driving point takes in power, as it must"
     if not ok:
         fault = "the driving point's imaginary part is positive: the FRF is conjugated (e^{-iωt})"

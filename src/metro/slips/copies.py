@@ -32,7 +32,7 @@ def copies(batch: Batch, read: Tables) -> Iterator[Finding]:
         for run in batch.with_files(column):
             rows = _rows(read, table, run)
             for name, values in rows:
-                key = _digest(values)
+                key = digest(values)
                 other = first.setdefault(key, (run, name)) if key else (run, name)
                 if other[0] != run:
                     yield _finding(batch, run, column, name, other)
@@ -66,7 +66,7 @@ def _hits(table: pd.DataFrame) -> Iterator[Finding]:
     """Yield an error for each response of a hammer record that is that of another one."""
     first: dict[str, Sequence[object]] = {}
     for name, rows in table.groupby(list(HIT), sort=False):
-        key = _digest(rows["response_si"].to_numpy(float))
+        key = digest(rows["response_si"].to_numpy(float))
         other = first.setdefault(key, name) if key else name
         if other != name:
             here, there = (", ".join(map(str, each)) for each in (name, other))
@@ -77,7 +77,7 @@ def _hits(table: pd.DataFrame) -> Iterator[Finding]:
             yield Finding("error", "impacts.csv", message)
 
 
-def _digest(values: Array) -> str:
+def digest(values: Array) -> str:
     """Hash of values; "" where they are too few to be told apart."""
     values = values[np.isfinite(values)]
     if len(np.unique(values[: 64 * LEAST_VALUES])) < LEAST_VALUES:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,8 +11,10 @@ import pandas as pd
 from metro.batch.findings import Finding as Problem
 from metro.batch.sources import Files, source
 from metro.formats import FormatError
+from metro.formats.mapping import filled
 from metro.formats.registry import ReadFrf, read, read_frfs, read_pieces
 from metro.signals import quality
+from metro.slips.copies import digest
 from metro.units import Array
 
 # Checks that a recording must pass to be used; one that does not is left out, and the report says so.
@@ -33,6 +35,7 @@ class Recordings:
     paths : run → extents (2,) of its programmed path in x and y, mm.
     left_out : run and column of runs.csv of each recording that is not fit for use.
     usable : files of impacts.csv with at least one hit or FRF that is fit for use.
+    channels : hash of the values of each channel of a hammer record → column, name of its file, blow.
     """
 
     folder: Path
@@ -44,6 +47,7 @@ class Recordings:
     paths: dict[str, Array] = field(default_factory=dict)
     left_out: list[tuple[str, str]] = field(default_factory=list)
     usable: set[str] = field(default_factory=set)
+    channels: dict[str, tuple[str, str, Hashable]] = field(default_factory=dict)
 
     def table(self, file: str, kind: str) -> pd.DataFrame | None:
         """Read a file; None, and a problem gathered, where that is impossible."""
@@ -86,6 +90,29 @@ class Recordings:
         """Gather a problem of a file, where there is one (""); tell whether there is."""
         self.problems += [Problem("error", file, message)] if message else []
         return bool(message)
+
+    def copied(self, file: str, column: str, values: Array, blow: Hashable) -> bool:
+        """Gather a problem where a channel has the bits of one of another file; tell whether it has.
+
+        Several responses of one ``blow`` share its force.
+        """
+        key = digest(values)
+        its, other, hit = self.channels.setdefault(key, (column, file, blow)) if key else (column, file, blow)
+        shared = its == column == "force_n" and hit == blow
+        if other == file or shared:
+            return False
+        here, there = self._recorded(file, column), self._recorded(other, its)
+        return self.doubt(
+            file,
+            f"{column}: {here} has the same values as {there}, bit for bit, expected a recording of its own; "
+            "one was copied over the other: export that one again, or leave its row out of impacts.csv",
+        )
+
+    def _recorded(self, file: str, column: str) -> str:
+        """Return the name of the file that a column is read from."""
+        one = source(self.folder, file, self.files)
+        given = one.mapping.columns.get(column) if one.mapping else None
+        return filled(given.file, one.record) if given and given.file else file
 
     def fit(self, file: str, run: str, column: str, findings: list[quality.Finding]) -> bool:
         """Note findings on a run's recording; tell whether it can be used, and leave it out otherwise."""

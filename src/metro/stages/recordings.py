@@ -12,6 +12,7 @@ import pandas as pd
 from metro.batch.axes import signed_axes
 from metro.batch.batch import Batch
 from metro.batch.canonical import Part
+from metro.dynamics.driving import turning
 from metro.dynamics.hits import Hit, fault
 from metro.signals import plausible, quality
 from metro.signals.conversion import driving_point_sign, receptance, response_si, sensor_to_tool
@@ -144,6 +145,10 @@ def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator
         if recordings.doubt(file, plausible.clock(time, rate) or plausible.hammer_force(force_n)):
             continue
         response = response_si(table["response"].to_numpy(), unit)
+        blow = (row["test"], row["position"], row["reference"], row["replicate"])
+        channels = (("force_n", force_n), ("response", table["response"].to_numpy()))
+        if any(recordings.copied(file, name, values, blow) for name, values in channels):
+            continue
         clean = _hit(Hit(force_n, response, 1.0 / float(np.mean(np.diff(time)))))
         recordings.note(file, "", [clean])
         recordings.usable |= {file} if clean.ok else set()
@@ -211,7 +216,8 @@ def _receptance(
     size = quality.light(mass, plausible.LIGHT_KG, soft=typical > plausible.RECEPTANCE)
     checks = [quality.dead("the FRF", np.abs(values[keep])), size]
     if driving:
-        checks.append(quality.conjugated(driving_point_sign(frequency[keep], values[keep])))
+        sign = driving_point_sign(frequency[keep], values[keep])
+        checks.append(quality.conjugated(sign, turning(values[keep])))
     if not recordings.fit(file, "", "file", checks):
         return None
     coherence = {"coherence": table["coherence"].to_numpy()[keep]} if "coherence" in table else {}

@@ -37,7 +37,7 @@ DESCRIPTION = Description(
     shown=(
         *("lobe_methods", "lobe_islands", "lobe_stations", "chatter_runs", "chatter_records", "lobe_runs"),
         *("frf_used", "stabilisation", "mode_shapes", "mode_mac"),
-        *("modes", "mode_tracks", "mode_pickups", "mode_cross"),
+        *("modes", "mode_tracks", "mode_pickups", "mode_cross", "mode_notes"),
     ),
     drawn=("lobes", "lobe_islands", "frf_used"),
     needs=needs,

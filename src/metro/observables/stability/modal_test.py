@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,9 +12,18 @@ import pandas as pd
 from metro.dynamics.modal import ModalModel, identify_modes
 from metro.dynamics.modes import Mode
 from metro.dynamics.shapes import mac
+from metro.observables.stability.lines import clear_lines, on_common_lines
+from metro.observables.stability.modal_notes import doubts, of_files, of_point
 from metro.observables.stability.pickups import crossed
-from metro.observables.stability.receptance import Receptance, arranged, from_files, from_records, scatter
-from metro.units import JSON, N_UM, Array, ComplexArray
+from metro.observables.stability.receptance import (
+    Receptance,
+    arranged,
+    files,
+    from_files,
+    from_records,
+    scatter,
+)
+from metro.units import JSON
 
 MODE_COLUMNS = (
     *("position", "direction", "frequency_hz", "frequency_sd_hz", "damping", "damping_sd"),
@@ -22,8 +31,6 @@ MODE_COLUMNS = (
 )
 _MORE_COLUMNS = ("mass_sd", "viscous_n_s_m", "viscous_sd", "collinearity", "resolved")
 Read = Callable[..., pd.DataFrame]
-_LEAST_LINES = 40
-_QUIET_LINES = 5  # in a row, from which on a drift has ended or a response exceeds the noise
 
 
 @dataclass(frozen=True)
@@ -77,7 +84,7 @@ def observe_modes(read: Read, hammer: JSON) -> ModalTest:
         diagrams.append(_diagram_rows(position, direction, model))
         shapes.append(_shape_rows(group, direction, model))
         alike.append(_alike_rows(position, direction, model))
-        notes += [f"{name}: {note}" for note in _doubts(model)]
+        notes += [f"{name}: {note}" for note in [*doubts(model), *of_files(model), *of_point(group, model)]]
     columns = (*MODE_COLUMNS, *_MORE_COLUMNS)
     fitted = _joined(used, ())
     return ModalTest(
@@ -112,22 +119,22 @@ def _by_direction(measured: list[Receptance], notes: list[str]) -> dict[tuple[st
 
     If records and FRF files give the same pair, the records come first and are used.
     """
-    groups: dict[tuple[str, str], list[Receptance]] = {}
+    groups: dict[tuple[str, str], dict[tuple[str, str], Receptance]] = {}
+    struck = {(item.position, item.reference) for item in measured if item.driving}
     for item in measured:
+        place = f"position {item.position}, {item.pair}"
         if item.reference[-1] != item.response[-1]:
+            if (item.position, item.reference) not in struck:
+                notes.append(
+                    f"{place}: not used: force and response have different directions, and without the "
+                    f"response at {item.reference} there is nothing to compare it with"
+                )
             continue
-        group = groups.setdefault((item.position, item.response[-1]), [])
-        group.append(item)
-    return {key: _distinct(_compatible(group), notes) for key, group in groups.items()}
-
-
-def _compatible(group: list[Receptance]) -> list[Receptance]:
-    """Return the largest set of pairs on the same lines, each pair once."""
-    by_lines: dict[tuple[int, float, float], dict[tuple[str, str], Receptance]] = {}
-    for item in group:
-        lines = (len(item.frequency), float(item.frequency[0]), float(item.frequency[-1]))
-        by_lines.setdefault(lines, {}).setdefault((item.reference, item.response), item)
-    return list(max(by_lines.values(), key=len).values())
+        group = groups.setdefault((item.position, item.response[-1]), {})
+        if group.setdefault((item.reference, item.response), item) is not item:
+            notes.append(f"{place}: its FRF file is not used, as there are hammer records of the same pair")
+    distinct = {key: _distinct(list(group.values()), notes) for key, group in groups.items()}
+    return {key: on_common_lines(group, notes) for key, group in distinct.items()}
 
 
 def _distinct(group: list[Receptance], notes: list[str]) -> list[Receptance]:
@@ -148,7 +155,7 @@ def _identified(group: list[Receptance], inputs: int, decay: float) -> tuple[Mod
     known = [item.variance for item in group if item.variance is not None]
     variance = np.stack(known, axis=1) if len(known) == len(group) else None
     driving = next((i for i, item in enumerate(group) if item.driving), None)
-    clear = clear_of_drift(group[0].frequency, frf) if variance is None else clear_of_noise(frf, variance)
+    clear = clear_lines(group[0].frequency, frf, variance, [item.coherence for item in group])
     usable = np.logical_and.reduce([item.usable for item in group])
     keep = np.flatnonzero(clear & usable)[:: max(item.redundancy for item in group)]
     model = identify_modes(
@@ -159,35 +166,9 @@ def _identified(group: list[Receptance], inputs: int, decay: float) -> tuple[Mod
         inputs=inputs,
         scatter=scatter(group, keep),
         decay=decay,
+        files=files(group),
     )
     return model, keep
-
-
-def clear_of_drift(frequency: Array, frf: ComplexArray) -> np.ndarray:
-    """Lines above an integrated acceleration's drift: |H| above 30 times its median from the first line on.
-
-    A drift grows towards the first line; a resonance low in the band does not, however high it is.
-    """
-    level = np.sqrt(np.mean(np.abs(frf) ** 2, axis=1))
-    low = (level < 30.0 * np.median(level)) | (frequency > 0.25 * frequency[-1])
-    quiet = _in_a_row(low)
-    return np.arange(len(frequency)) >= (quiet[0] if len(quiet) else 0)
-
-
-def _in_a_row(lines: np.ndarray) -> np.ndarray:
-    """Return indices from which on a few lines in a row are true: a single line may be true by chance."""
-    return np.flatnonzero(np.convolve(lines, np.ones(_QUIET_LINES), mode="valid") == _QUIET_LINES)
-
-
-def clear_of_noise(frf: ComplexArray, variance: Array) -> np.ndarray:
-    """Lines from the first to the last few that exceed the scatter of the hits."""
-    level, noise = np.mean(np.abs(frf) ** 2, axis=1), np.mean(variance, axis=1)
-    clear = _in_a_row(level > 9.0 * noise)
-    lines = np.arange(len(frf))
-    if len(clear) < _LEAST_LINES:
-        return lines >= 0
-    inside: np.ndarray = (lines >= clear[0]) & (lines < clear[-1] + _QUIET_LINES)
-    return inside
 
 
 def _mode_rows(position: str, direction: str, model: ModalModel) -> pd.DataFrame:
@@ -206,31 +187,6 @@ def _mode_row(mode: Mode) -> tuple[float | bool, ...]:
 def _usable(stiffness: float, sd: float) -> bool:
     """Whether a mode can be used at all: its stiffness is known to better than half."""
     return math.isfinite(stiffness) and sd < 0.5 * stiffness
-
-
-def _doubts(model: ModalModel) -> Iterator[str]:
-    """Say which modes the data do not resolve, with their intervals."""
-    for mode in model.modes:
-        if not mode.resolved:
-            yield f"the mode at {_in_words(mode)}, is not resolved"
-    if model.doubtful is not None:
-        yield f"a further mode at {_in_words(model.doubtful)}, is not resolved and was left out"
-
-
-def _in_words(mode: Mode) -> str:
-    known = [f"{_with_interval(mode.frequency, mode.frequency_sd)} Hz"]
-    known.append(f"damping {_with_interval(100 * mode.damping, 100 * mode.damping_sd)} %")
-    if math.isfinite(mode.stiffness):
-        stiffness = _with_interval(mode.stiffness / N_UM, mode.stiffness_sd / N_UM)
-        known.append(f"stiffness {stiffness} N/µm")
-    return ", ".join(known)
-
-
-def _with_interval(value: float, sd: float) -> str:
-    """Write a value and half its 95 % interval, both to two digits of the latter, as the report does."""
-    half = 1.96 * sd
-    place = 1 - math.floor(math.log10(float(f"{half:.1e}"))) if 0 < half < math.inf else 3
-    return " ± ".join(f"{round(number, place):.{max(0, place)}f}" for number in (value, half))
 
 
 def _diagram_rows(position: str, direction: str, model: ModalModel) -> pd.DataFrame:

@@ -47,21 +47,23 @@ _COLUMNS: dict[str, tuple[str, ...]] = {
 def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Identify the modes of every position and solve the lobes of the cuts that were made there.
 
-    Tables ``modes``, ``mode_tracks``, ``mode_shapes``, ``mode_mac``, ``mode_pickups``, ``mode_cross``,
-    ``frf_used``, ``stabilisation``, ``lobes`` (diagram per position), ``lobe_runs`` (probability per run with
-    a depth), ``chatter_runs`` (what the runs' own records say), ``chatter_records`` (a record of each kind),
-    those of :mod:`metro.observables.stability.methods`, ``lobes_refused`` (reasons and notes). Without modes:
-    what the records say of chatter, and why there are no lobes.
+    Tables ``modes``, ``mode_notes`` (what they leave in doubt), ``mode_tracks``, ``mode_shapes``,
+    ``mode_mac``, ``mode_pickups``, ``mode_cross``, ``frf_used``, ``stabilisation``, ``lobes`` (diagram per
+    position), ``lobe_runs`` (probability per run with a depth), ``chatter_runs`` (what the runs' own records
+    say), ``chatter_records`` (a record of each kind), those of
+    :mod:`metro.observables.stability.methods`, ``lobes_refused`` (reasons and notes). Without modes: what the
+    records say of chatter, and why there are no lobes.
     """
     test = observe_modes(read, batch.instrument("hammer"))
-    modes, notes = test.modes, test.notes
-    if modes.empty and not notes:
+    modes = test.modes
+    notes: list[str] = []
+    if modes.empty and not test.notes:
         published = read("published")
         modes = printed_modes.printed_modes(published)
         identified = {**printed_modes.printed_coefficients(published), **identified}
         notes = [] if modes.empty else [_PRINTED]
     if modes.empty:
-        return _heard(batch, read, "; ".join(notes) or "no impacts.csv: no hammer record and no FRF")
+        return _heard(batch, read, "; ".join(test.notes) or "no impacts.csv: no hammer record and no FRF")
     cutting = stability.cutting(batch, identified)
     where = lobe_positions.places(read("stations"))
     tracks = track(modes, test.shapes, where) if len(test.shapes) else pd.DataFrame()
@@ -83,6 +85,7 @@ def observe(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFr
     modal = {"modes": modes, "frf_used": test.used, "stabilisation": test.stabilisation}
     modal |= {"mode_shapes": test.shapes, "mode_mac": test.alike, "mode_cross": test.cross}
     modal |= {"mode_tracks": tracks, "mode_pickups": pickups(test.used, read("pickups"))}
+    modal |= {"mode_notes": pd.DataFrame({"note": test.notes}, dtype=str)}
     return {
         **modal,
         **tables,

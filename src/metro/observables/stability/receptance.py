@@ -29,6 +29,7 @@ class Receptance:
     repeated : (k,) the hit of each repeat: hits of the same name on one reference may be the same blow.
     usable : (n,) lines that the force excited.
     redundancy : step between independent lines.
+    coherence : (n,) as a file has it, the mean of its repeats; None where it has none.
     """
 
     position: str
@@ -41,6 +42,7 @@ class Receptance:
     repeated: tuple[Hashable, ...]
     usable: np.ndarray
     redundancy: int = 1
+    coherence: Array | None = None
 
     @property
     def driving(self) -> bool:
@@ -55,17 +57,22 @@ class Receptance:
     def repeats(self, other: Receptance) -> bool:
         """Whether the data duplicate those of another pair, which is not the reciprocal one."""
         reciprocal = (self.reference, self.response) == (other.response, other.reference)
-        return not reciprocal and np.allclose(self.frf, other.frf, rtol=1e-9, atol=0.0)
+        alike = len(self.frf) == len(other.frf) and np.allclose(self.frf, other.frf, rtol=1e-9, atol=0.0)
+        return alike and not reciprocal
 
 
 def from_records(hits: pd.DataFrame, decay: float, notes: list[str]) -> Iterator[Receptance]:
     """Average the hits of every pair of points."""
     keys = ["position", "reference", "response", "response_unit"]
-    for (position, reference, response, unit), rows in hits.groupby(keys, sort=False):
-        records = {name: _hit(part) for name, part in rows.groupby(["test", "replicate"], sort=False)}
+    every = {
+        key: {name: _hit(part) for name, part in rows.groupby(["test", "replicate"], sort=False)}
+        for key, rows in hits.groupby(keys, sort=False)
+    }
+    longest = max((hit.seconds for records in every.values() for hit in records.values()), default=0.0)
+    for (position, reference, response, unit), records in every.items():
         name = f"position {position}, {reference} to {response}"
         try:
-            frf = estimate_frf(list(records.values()), str(unit), decay)
+            frf = estimate_frf(list(records.values()), str(unit), decay, longest)
         except ValueError as error:
             notes.append(f"{name}: {error}")
             continue
@@ -110,7 +117,15 @@ def from_files(frfs: pd.DataFrame, notes: list[str]) -> Iterator[Receptance]:
             *(str(position), str(reference), str(response), frequency[keep], mean, variance, deviation),
             tuple(same) if len(same) > 1 else (),
             np.ones(len(mean), dtype=bool),
+            coherence=_coherence(list(same.values()), keep),
         )
+
+
+def _coherence(files: list[pd.DataFrame], keep: np.ndarray) -> Array | None:
+    if not all("coherence" in file and file["coherence"].notna().all() for file in files):
+        return None
+    mean: Array = np.mean([file["coherence"].to_numpy(float) for file in files], axis=0)[keep]
+    return mean
 
 
 def _averaged(values: ComplexArray) -> tuple[ComplexArray, Array | None, ComplexArray]:
@@ -153,3 +168,16 @@ def scatter(group: list[Receptance], keep: np.ndarray) -> Scatter | None:
             deviation[names.index((item.reference, name)), :, column] = own[keep]
     references = list(dict.fromkeys(reference for reference, _ in names))
     return Scatter(deviation, np.array([references.index(reference) for reference, _ in names]))
+
+
+def files(group: list[Receptance]) -> list[list[np.ndarray]]:
+    """Return the ways in which a group may have been measured piece by piece: the columns of each piece.
+
+    Hammer after hammer place, or sensor after sensor place: a table does not say which, and between either
+    something may have moved.
+    """
+    ways = []
+    for names in ([item.reference for item in group], [item.response for item in group]):
+        pieces = [np.flatnonzero([other == name for other in names]) for name in dict.fromkeys(names)]
+        ways += [pieces] if len(pieces) > 1 else []
+    return ways

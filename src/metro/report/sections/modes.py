@@ -6,9 +6,10 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from metro.report.content import Heading, Item, Picture, Table
+from metro.report.content import Bullets, Heading, Item, Picture, Table
 from metro.report.figures import modal as figures
 from metro.report.numbers import number, percent, quantity
+from metro.report.phrases import sentence
 from metro.report.sections.measured import count_of
 from metro.report.sections.mode_positions import over_positions, reconstruction
 from metro.units import JSON
@@ -38,6 +39,9 @@ def modes(identified: list[JSON], tables: Mapping[str, pd.DataFrame]) -> list[It
     if len(rows) < len(identified):
         caption += f" The first {len(rows)} of {len(identified)} are shown; identified.json has all."
     items: list[Item] = [Heading("Modes"), Table(header, rows, caption, [0.7, 0.8, 1.3, 1.5, 1.8, 1.4])]
+    notes = tables.get("mode_notes")
+    if notes is not None and len(notes):
+        items.append(Bullets([sentence(str(note)) for note in notes["note"]]))
     drawn, diagram = _magnitudes(tables.get("frf_used")), tables.get("stabilisation")
     if drawn is not None:
         diagrams = [] if diagram is None else [_diagram(_of(diagram, positions), drawn, len(shown))]
@@ -79,7 +83,7 @@ def largest_response(tables: Mapping[str, pd.DataFrame]) -> list[Item]:
     if drawn is None:
         return []
     pair = ["position", "reference", "response"]
-    driving = drawn["reference"] == drawn["response"]
+    driving = (drawn["reference"] == drawn["response"]) & _accepted(tables.get("modes"))
     drawn = drawn[driving] if driving.any() else drawn
     highest = drawn.loc[drawn.groupby(pair)["measured_m_n"].idxmax()].nlargest(1, "measured_m_n").iloc[0]
     part = drawn[(drawn[pair] == highest[pair]).all(axis=1)]
@@ -89,6 +93,11 @@ def largest_response(tables: Mapping[str, pd.DataFrame]) -> list[Item]:
         f"{number(highest['frequency_hz'], 4)} Hz. Measured, and what the modes reconstruct."
     )
     return [Picture(figures.responses(part), about, about)]
+
+
+def _accepted(modes: pd.DataFrame | None) -> bool:
+    """Return whether a driving point was taken for one: then a mode has a stiffness."""
+    return modes is None or bool(modes["stiffness_n_m"].notna().any())
 
 
 def _shapes(residues: pd.DataFrame, alike: pd.DataFrame) -> list[Item]:
