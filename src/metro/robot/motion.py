@@ -68,6 +68,24 @@ def motion(q: Array, torque: Array, period: float, cutoff_hz: float, step: Array
     )
 
 
+def evenly(time: Array, q: Array, torque: Array, cutoff_hz: float) -> Motion:
+    """Filter a log whose clock need not be even, as :func:`motion`; gaps are bridged by straight lines.
+
+    Parameters
+    ----------
+    time : (m,) s, strictly rising. q, torque : (m, n) rad, N m.
+    """
+    even, period = even_clock(time)
+    angle, load = (np.array([np.interp(even, time, column) for column in part.T]).T for part in (q, torque))
+    return motion(angle, load, period, cutoff_hz, encoder_step(q))  # the step as it is before the bridging
+
+
+def even_clock(time: Array) -> tuple[Array, float]:
+    """Return even times over those of a log, and their step: the median of its steps, s."""
+    period = float(np.median(np.diff(time)))
+    return np.arange(time[0], time[-1], period), period
+
+
 def encoder_step(q: Array) -> Array:
     """Resolution (n,) of logged angles (m, n): the second differences that rounding or noise leaves.
 

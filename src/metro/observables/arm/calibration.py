@@ -102,13 +102,14 @@ def _payload(batch: Batch, table: pd.DataFrame) -> JSON:
         motion = (table[moved[0]].to_numpy(dtype=float) * DEG, table[moved[1]].to_numpy(dtype=float) * DEG)
     q = table[[f"q{i}_deg" for i in JOINTS]].to_numpy(dtype=float) * DEG
     torque = table[[f"tau{i}_nm" for i in JOINTS]].to_numpy(dtype=float)
-    return _carried_json(identify_payload(arm.dh, q, torque, table["loaded"].to_numpy() == "yes", motion))
+    return carried_json(identify_payload(arm.dh, q, torque, table["loaded"].to_numpy() == "yes", motion))
 
 
-def _carried_json(carried: Carried) -> JSON:
+def carried_json(carried: Carried) -> JSON:
+    """Return a load as the block ``payload`` of identified.json."""
     spread = np.sqrt(np.diag(carried.covariance))
     centre = _along("xyz", carried.centre / MM, carried.covariance[1:4, 1:4] / MM**2, "mm", carried.dof)
     block: JSON = {"mass": quantity(carried.mass, spread[0], "kg", carried.dof), "centre": centre}
     if np.isfinite(carried.inertia).all():
         block["inertia"] = _along(INERTIA, carried.inertia, carried.covariance[4:, 4:], "kg m2", carried.dof)
-    return block | {"rms": [float(left) for left in carried.rms], "dof": carried.dof}
+    return block | {"rms": [float(left) if np.isfinite(left) else None for left in carried.rms], "dof": carried.dof}

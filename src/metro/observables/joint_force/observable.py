@@ -10,7 +10,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
-from metro.observables.arm import tip_force
+from metro.observables.arm import joint_logs, tip_force
 from metro.observables.arm.clock import Clock, clock
 from metro.observables.arm.tip_force import ACTUAL, FORCE, JOINTS, TORQUE
 from metro.observables.arm.wall import wall
@@ -288,9 +288,10 @@ def report(
 
 
 def idle_friction(batch: Batch, read: Tables, _identified: JSON) -> tuple[dict[str, pd.DataFrame], JSON]:
-    """Return the friction of the joints by the idle runs."""
+    """Return the friction of the joints by the idle runs, and all that logs of a free motion say."""
     tables = friction.observe(batch, read)
-    return ({} if isinstance(tables, Refusal) else tables), friction.report(tables)
+    free, blocks = joint_logs.observe(batch, read)
+    return ({} if isinstance(tables, Refusal) else tables) | free, friction.report(tables) | blocks
 
 
 OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, beside=idle_friction)
