@@ -14,7 +14,7 @@ from metro import __version__
 from metro.batch.batch import Batch
 from metro.batch.columns import CROSS_STIFFNESS
 from metro.batch.writing import write_atomically
-from metro.formats.joint_columns import JOINT_COLUMNS
+from metro.joint_columns import JOINT_COLUMNS
 from metro.units import JSON
 
 # Every table that ingest writes, always, with these columns (no rows where the batch has no such data).

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.formats.errors import FormatError
-from metro.formats.joint_columns import JOINT_COLUMNS, fault_of
+from metro.joint_columns import JOINT_COLUMNS, fault_of
 from metro.spelling import resembling
 
 JOINTS = range(1, 7)

@@ -9,7 +9,7 @@ from pathlib import PurePath
 
 import numpy as np
 
-from metro.formats.joint_columns import MOST_AXES
+from metro.joint_columns import MOST_AXES
 from metro.formats.measures import MeasureError, measure
 from metro.importing.look import Column, Seen
 from metro.importing.propose import Proposal, is_clock

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.robot.determined import STRETCHES, solve
+from metro.robot.kinematics import Geometry
 from metro.robot.motion import Motion
 from metro.robot.payload_identification import STATIC, TELLS, Carried, carried_of
 from metro.robot.rigid_body import PARAMETERS, torque_regressor
@@ -115,7 +116,7 @@ class Evidence:
     stretch: np.ndarray
 
 
-def of_pair(dh: Array, pair: Pair, joint: int) -> list[Evidence]:
+def of_pair(dh: Geometry, pair: Pair, joint: int) -> list[Evidence]:
     """Return what two logs of one motion say: the difference of their torques.
 
     What the load changes of the joint's friction is unknown: an offset, Coulomb and viscous friction, and
@@ -137,7 +138,7 @@ def of_pair(dh: Array, pair: Pair, joint: int) -> list[Evidence]:
     return [Evidence(own[moving], others[moving], (second - first)[moving], stretch[moving])]
 
 
-def of_logs(dh: Array, logs: Sequence[Motion], loaded: Sequence[bool], joint: int) -> list[Evidence]:
+def of_logs(dh: Geometry, logs: Sequence[Motion], loaded: Sequence[bool], joint: int) -> list[Evidence]:
     """Return what logs of different motions say: the links' parameters are those of all, and are unknown.
 
     Each log has an offset, Coulomb and viscous friction of its own.

@@ -18,6 +18,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from metro.robot.determined import STRETCHES, solve
+from metro.robot.kinematics import Geometry
 from metro.robot.motion import EDGE, PER_PERIOD, Motion, evenly
 from metro.robot.rigid_body import gravity_regressor, torque_regressor
 from metro.units import Array
@@ -94,7 +95,7 @@ class Curvature:
     p: Array
 
 
-def of_idle_runs(dh: Array, runs: Sequence[tuple[Array, Array, Array]]) -> tuple[Friction, Motion]:
+def of_idle_runs(dh: Geometry, runs: Sequence[tuple[Array, Array, Array]]) -> tuple[Friction, Motion]:
     """Identify the friction of idle runs, so slow that beside it the motors only carry the arm's weight.
 
     Joints that keep their direction throughout have no Coulomb friction of their own in such logs, since it
@@ -129,13 +130,13 @@ def _settled(log: Motion) -> Motion:
     return replace(log, moving=binary_erosion(log.moving, around, border_value=1))
 
 
-def rigid_columns(dh: Array, log: Motion) -> Array:
+def rigid_columns(dh: Geometry, log: Motion) -> Array:
     """Columns (m, n, p) of rigid links and of each motor's own inertia."""
     links = torque_regressor(dh, log.angle, log.rate, log.acceleration)
     return np.concatenate([links, _of_its_own_joint(log.acceleration)], axis=-1)
 
 
-def weight_columns(dh: Array, log: Motion) -> Array:
+def weight_columns(dh: Geometry, log: Motion) -> Array:
     """Columns (m, n, p) of the links' weight: enough where an arm moves slowly."""
     return gravity_regressor(dh, log.angle)
 

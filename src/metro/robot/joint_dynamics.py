@@ -13,6 +13,7 @@ import numpy as np
 
 from metro.robot.determined import STRETCHES, Determined, solve
 from metro.robot.friction_terms import Term, further_terms
+from metro.robot.kinematics import Geometry
 from metro.robot.motion import Motion, even_clock, evenly
 from metro.robot.rigid_body import torque_regressor
 from metro.units import Array
@@ -72,7 +73,7 @@ def cutoff(time: Array, q: Array) -> float:
     return float(np.clip(ABOVE * reached, *CUTOFF_HZ))
 
 
-def fit_joints(dh: Array, log: Motion, driven: np.ndarray) -> tuple[JointFit, ...]:
+def fit_joints(dh: Geometry, log: Motion, driven: np.ndarray) -> tuple[JointFit, ...]:
     """Fit every joint of a log that has a torque and moves.
 
     Parameters

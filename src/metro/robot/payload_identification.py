@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from metro.robot.kinematics import Geometry
 from metro.robot.rigid_body import PARAMETERS, torque_regressor
 from metro.units import Array
 
@@ -39,7 +40,7 @@ class Carried:
 
 
 def identify_payload(
-    dh: Array, q: Array, torque: Array, loaded: Array, motion: tuple[Array, Array] | None = None
+    dh: Geometry, q: Array, torque: Array, loaded: Array, motion: tuple[Array, Array] | None = None
 ) -> Carried:
     """Return the load from joint torques with and without it.
 

@@ -8,7 +8,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.canonical import Part
-from metro.formats.joint_columns import JOINT_COLUMNS, positions
+from metro.joint_columns import JOINT_COLUMNS, positions
 from metro.signals import plausible, quality
 from metro.stages.reading import Recordings
 from metro.stages.recordings import files

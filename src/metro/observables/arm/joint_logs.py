@@ -14,7 +14,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
-from metro.formats.joint_columns import AXES, positions
+from metro.joint_columns import AXES, positions
 from metro.observables.arm.carried_load import payload_of_logs
 from metro.observables.quantity import quantity
 from metro.robot.drives import Drives, drives_of_cell
