@@ -26,6 +26,7 @@ FREE = (
     "drives.torque_per_ampere_nm_a",
     "drives.gear_ratio",
     "drives.uncertainty",
+    "drives.uncertainty_by_joint",
 )  # that may be given without a question
 
 

@@ -46,26 +46,26 @@ class Drives:
 def drives_of_cell(cell: JSON, count: int) -> Drives:
     """Return the drives of a cell of ``count`` joints, from its section ``drives``.
 
-    A constant belongs to the motor's shaft where ``gear_ratio`` is given, else to the joint. One
-    ``uncertainty`` for all joints is one error that they share, a list states errors of their own.
+    A constant belongs to the motor's shaft where ``gear_ratio`` is given, else to the joint. ``uncertainty``
+    is of an error that all joints share, ``uncertainty_by_joint`` of errors of their own.
     """
     given = cell.get("drives") or {}
     constant = np.full(count, np.nan)
     if given.get("torque_per_ampere_nm_a") is not None:
         ratio = np.asarray(given.get("gear_ratio", np.ones(count)), dtype=float)
         constant = np.asarray(given["torque_per_ampere_nm_a"], dtype=float) * ratio
-    stated = given.get("uncertainty")
-    if stated is None:
+    if not declared(cell):
         return Drives(constant, np.full((count, count), NOMINAL**2), ASSUMED)
-    if isinstance(stated, list):
-        covariance, shared = np.diag(np.asarray(stated, dtype=float) ** 2), "independent from joint to joint"
-    else:
-        covariance, shared = np.full((count, count), float(stated) ** 2), "shared by all joints"
-    parts = np.unique(np.sqrt(np.diag(covariance)))
-    words = " to ".join(f"{100 * part:.2g}" for part in (parts if len(parts) == 1 else parts[[0, -1]]))
-    return Drives(constant, covariance, f"{words} % standard uncertainty, {shared}, as drives.uncertainty states")
+    shared = float(given.get("uncertainty", 0.0))
+    own = np.asarray(given.get("uncertainty_by_joint", np.zeros(count)), dtype=float)
+    words = [f"{100 * shared:.2g} % standard uncertainty shared by all joints"] if shared else []
+    if own.any():
+        parts = " to ".join(f"{100 * part:.2g}" for part in np.unique([own.min(), own.max()]))
+        words.append(f"{parts} % of each joint's own")
+    source = f"{' and '.join(words) or 'no uncertainty'}, as drives of the cell states"
+    return Drives(constant, shared**2 + np.diag(own**2), source)
 
 
 def declared(cell: JSON) -> bool:
     """Return whether a cell states the uncertainty of its drives."""
-    return (cell.get("drives") or {}).get("uncertainty") is not None
+    return bool({"uncertainty", "uncertainty_by_joint"} & set(cell.get("drives") or {}))

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
+from metro.batch.arm import axes_of
 from metro.batch.batch import Batch
 from metro.batch.canonical import Part
 from metro.joint_columns import JOINT_COLUMNS, positions
@@ -49,10 +50,3 @@ def _doubt(batch: Batch, table: pd.DataFrame) -> str:
     if not doubt and own and own != len(names):
         doubt = f"has the positions of {len(names)} axes, expected {own} as the arm of the cell has"
     return doubt
-
-
-def axes_of(cell: dict[str, object]) -> int:
-    """Return how many axes the arm of a cell has; 0 where nothing is known of it."""
-    arm = cell.get("arm")
-    rows = arm.get("dh") if isinstance(arm, dict) else None
-    return len(rows) if rows else 0

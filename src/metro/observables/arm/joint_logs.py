@@ -85,7 +85,8 @@ def _log(batch: Batch, run: str, table: pd.DataFrame) -> JointLog:
     amperes = bool((by_current & ~np.isfinite(constant)).any())
     gain = np.where(by_current, 1.0 if amperes else constant, 1.0)
     drive = np.where(by_current, current * gain, torque)
-    driven = np.isfinite(drive).all(axis=0)
+    # the drive of a linear axis pulls by a force, through a transmission of which the cell says nothing
+    driven = np.isfinite(drive).all(axis=0) & np.array([name.endswith("_deg") for name in names])
     return JointLog(
         run,
         table["t_s"].to_numpy(dtype=float),
@@ -174,7 +175,7 @@ def _rows(log: JointLog, fits: tuple[JointFit, ...], arm: Arm | None, drives: Dr
 
 def _unfitted(log: JointLog, joint: int, arm: Arm | None) -> str:
     if not log.driven[joint]:
-        return "neither torque nor current was logged"
+        return "neither torque nor current was logged, or it is a linear axis"
     return NO_ARM if arm is None else "too slow for the encoder to tell which way"
 
 
