@@ -61,7 +61,7 @@ class JointFit:
 
 def free_motion(time: Array, q: Array, torque: Array) -> Motion:
     """Filter a log, (m,) s and (m, n) rad, N m or A, as low as its motion and the edges of friction allow."""
-    return evenly(time, q, torque, cutoff(time, q))
+    return evenly(time, q, torque, cutoff(time, q), filtered=True)
 
 
 def cutoff(time: Array, q: Array) -> float:
@@ -108,7 +108,7 @@ def _fit(log: Motion, links: Array, functions: tuple[Array, Array], joint: int) 
     rigid = columns[:, OWN - 1 :] @ found.value[OWN - 1 :]
     left = (torque - columns @ found.value)[moving]
     heaviest = int(np.argmax(np.abs(weight @ found.value[OWN:])))
-    terms = further_terms(columns[moving], torque[moving], stretch[moving], rigid[moving], rate[moving])
+    terms = further_terms(columns[moving], torque[moving], stretch[moving], slice(OWN - 1, columns.shape[1]), rate[moving])
     alone = np.eye(columns.shape[1])
     gravity = found.combination(np.concatenate([np.zeros(OWN), weight[heaviest]]))
     inertia = found.combination(np.concatenate([alone[OWN - 1, :OWN], turned]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.robot.joint_dynamics import cutoff
-from metro.robot.motion import EDGE, PER_PERIOD, encoder_step, even_clock
+from metro.robot.motion import BANDWIDTH, EDGE, PER_PERIOD, STEPS, encoder_step, even_clock, rate_noise
 from metro.units import Array
 
 SAME = 0.01  # rms of the difference of the angles, over that of the angles: the tracking of two repeats
@@ -60,7 +60,7 @@ def pair_of(first: Log, second: Log) -> Pair | None:
     apart = np.sqrt(np.mean((moved[:, :n] - one[at, :n]) ** 2, axis=0))
     if np.linalg.norm(apart) > SAME * np.linalg.norm(one[at, :n].std(axis=0)):
         return None
-    low = min(cutoff(*first[:2]), 0.1 / period)
+    low = min(cutoff(*first[:2]), BANDWIDTH / period)
     filter_ = butter(4, low, fs=1 / period, output="sos")
 
     def smooth(values: Array) -> Array:
@@ -68,7 +68,7 @@ def pair_of(first: Log, second: Log) -> Pair | None:
 
     angle = smooth(moved[:, :n])
     rate = np.gradient(angle, period, axis=0)
-    slowest = 10.0 * encoder_step(second[1]) / period
+    slowest = STEPS * rate_noise(encoder_step(second[1]), period, low)
     direction = smooth(np.clip(rate / slowest, -1.0, 1.0))
     edge = min(int(EDGE / (low * period)), len(at) // 4)
     keep = slice(edge, len(at) - edge, max(1, int(1 / PER_PERIOD / (low * period))))

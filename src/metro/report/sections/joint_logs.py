@@ -15,13 +15,10 @@ from metro.units import JSON, printed
 T95 = 2.045  # Student's quantile of 29 degrees of freedom: intervals are of 30 stretches
 BEYOND = {
     "load": "friction grows with the torque that the links ask of the gear, by {size} of it",
-    "speed": "friction at rest differs by {size} from the line of Coulomb and viscous friction{falls}",
+    "speed": "friction differs by {size} (rms) from the line of Coulomb and viscous friction: {shape}",
     "time": "the Coulomb level changes by {size} along the log",
 }
-FALLS = {
-    True: ", and falls off with the speed (Stribeck)",
-    False: ", since the viscous friction levels off with the speed",
-}
+SLOW = 0.12  # of the fastest speed: what changes friction below it is near standstill
 RUNS = 3  # runs whose friction is drawn
 
 
@@ -113,18 +110,30 @@ def _beyond(terms: pd.DataFrame | None, table: pd.DataFrame) -> list[Item]:
     units = table.set_index(["run", "joint"])["unit"]
     lines = []
     for _, r in terms.iterrows():
-        half = T95 * r["sd"]
         if r["name"] == "load":
             size = f"{_interval(100 * r['value'], 100 * r['sd'])} %"
         else:
-            size = f"{with_interval(r['value'], [r['value'] - half, r['value'] + half])} {units[r['run'], r['joint']]}"
-        said = BEYOND[r["name"]].format(size=size, falls=FALLS[r["value"] > 0])
+            value = abs(r["value"]) if r["name"] == "speed" else r["value"]
+            size = f"{_interval(value, r['sd'])} {units[r['run'], r['joint']]}"
+        said = BEYOND[r["name"]].format(size=size, shape=_shape(r))
         evidence = (
             f"probability of it by chance {probability(r['p'])}, error on held-out stretches "
             f"{number(r['held_out'], 2)} times that without"
         )
         lines.append(f"Run {r['run']}, joint {r['joint']}: {said} ({evidence}).")
     return [Bullets(lines, small=len(lines) > 6)]
+
+
+def _shape(term: pd.Series) -> str:
+    """Say what a term of speed looks like."""
+    if term["value"] > 0:
+        return "it falls at first as the joint gets faster (Stribeck)"
+    if term["scale"] <= SLOW:
+        return (
+            "near standstill it is less than Coulomb friction, as where gears give way before they slide, or "
+            "where angles and torques are not of one time"
+        )
+    return "viscous friction levels off as the joint gets faster"
 
 
 def _curves(results: Results, table: pd.DataFrame) -> list[Item]:
