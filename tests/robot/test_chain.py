@@ -121,7 +121,10 @@ def test_a_pendulum_on_a_carriage_as_in_the_textbook():
         pull = (carriage + mass) * a + mass * length * (b * np.cos(t) - w**2 * np.sin(t))
         turn = mass * length**2 * b + mass * length * a * np.cos(t) - mass * GRAVITY * length * np.sin(t)
         np.testing.assert_allclose(found, [pull, turn], atol=1e-10)
-    bodies = [Link(1, carriage, np.zeros(3)), Link(2, mass, np.linalg.inv(frames[0, 2])[:3, :3] @ (bob0(q[0], length) - frames[0, 2, :3, 3]))]
+    bodies = [
+        Link(1, carriage, np.zeros(3)),
+        Link(2, mass, np.linalg.inv(frames[0, 2])[:3, :3] @ (bob0(q[0], length) - frames[0, 2, :3, 3])),
+    ]
     inertia = joint_mass(arm, q[:1], bodies)[0]
     coupled = mass * length * np.cos(q[0, 1])
     np.testing.assert_allclose(inertia, [[carriage + mass, coupled], [coupled, mass * length**2]], atol=1e-10)
@@ -146,7 +149,12 @@ def test_a_seven_axis_arm_on_a_rail_has_the_torques_of_pinocchio(tmp_path):
     joints = []
     for i in range(8):
         xyz, rpy, axis, centre = (" ".join(f"{v:.6f}" for v in rng.uniform(-1, 1, 3)) for _ in range(4))
-        moments = " ".join(f"{k}='{v}'" for k, v in zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), (0.3, 0.4, 0.5, 0.02, -0.03, 0.01), strict=True))
+        moments = " ".join(
+            f"{k}='{v}'"
+            for k, v in zip(
+                ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), (0.3, 0.4, 0.5, 0.02, -0.03, 0.01), strict=True
+            )
+        )
         inertial = f"<inertial><origin xyz='{centre}' rpy='0.1 0.2 0.3'/><mass value='{i + 1}'/><inertia {moments}/></inertial>"
         unit = np.array(axis.split(), dtype=float)
         axis = " ".join(f"{v:.17g}" for v in unit / np.linalg.norm(unit))
@@ -176,8 +184,11 @@ def test_a_seven_axis_arm_on_a_rail_has_the_torques_of_pinocchio(tmp_path):
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><robot/>", "expected plain XML"),
         ("<robot xmlns:xacro='x'><xacro:arm/></robot>", "is a xacro file"),
         ("<robot/>", "found no joint"),
-        ("<robot><joint name='a' type='ball'><parent link='x'/><child link='y'/></joint></robot>", '"a": found the type "ball"'),
-        ("<robot><joint name='a' type='revolute'><child link='y'/></joint></robot>", 'has no <parent link'),
+        (
+            "<robot><joint name='a' type='ball'><parent link='x'/><child link='y'/></joint></robot>",
+            '"a": found the type "ball"',
+        ),
+        ("<robot><joint name='a' type='revolute'><child link='y'/></joint></robot>", "has no <parent link"),
         (
             "<robot><joint name='a' type='revolute'><parent link='x'/><child link='y'/><axis xyz='0 0'/></joint></robot>",
             'joint "a", axis xyz: found "0 0", expected three numbers',

@@ -70,7 +70,9 @@ def test_the_drives_of_a_cell():
     assert drives_of_cell({}, count).relative == pytest.approx(NOMINAL)
     assert np.isnan(drives_of_cell({}, count).constant).all()
     given = {"torque_per_ampere_nm_a": [0.1, 0.1, 0.05], "gear_ratio": [100, 100, -50]}
-    found = drives_of_cell({"drives": {**given, "uncertainty": 0.03, "uncertainty_by_joint": [0.04] * 3}}, count)
+    found = drives_of_cell(
+        {"drives": {**given, "uncertainty": 0.03, "uncertainty_by_joint": [0.04] * 3}}, count
+    )
     assert found.constant == pytest.approx([10, 10, -2.5])
     assert found.relative == pytest.approx(0.05)
     assert found.covariance[0, 1] == pytest.approx(0.03**2)

@@ -43,7 +43,7 @@ def read_urdf(path: Path, base: str = "", tip: str = "") -> list[UrdfJoint]:
     for joint in joints:
         child = _link(path, joint, "child")
         if child in by_child:
-            both = f'{by_child[child].get("name")} and {joint.get("name")}'
+            both = f"{by_child[child].get('name')} and {joint.get('name')}"
             raise FormatError(path, f'link "{child}" is the child of {both}, expected a tree')
         by_child[child] = joint
     parents = {_link(path, joint, "parent") for joint in joints}
@@ -62,7 +62,9 @@ def read_urdf(path: Path, base: str = "", tip: str = "") -> list[UrdfJoint]:
         raise FormatError(path, f'link "{base}" does not carry "{end}", expected one of the links that do')
     read = [_joint(path, joint) for joint in reversed(chain)]
     if not any(joint.kind != "fixed" for joint in read):
-        raise FormatError(path, f'no joint moves between "{link}" and "{end}", expected an arm: name tip_link')
+        raise FormatError(
+            path, f'no joint moves between "{link}" and "{end}", expected an arm: name tip_link'
+        )
     return read
 
 

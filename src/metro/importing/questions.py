@@ -14,8 +14,19 @@ from metro.importing.propose import Proposal, told_by_names
 
 NONE = "none"  # the answer to a question that leaves a key of batch.yaml out
 RECORD = ("{record}", "{number}")  # stand for the record's name, and the number in the file's name
-EXAMPLES = {"angle": "deg or rad", "torque": "Nm", "current": "A", "force": "N, kN or V", "length": "mm, m or inch", "time": "s or ms", "response": "m/s2, g or V"}
-OF_DRIVES = ("unit.drive", "unit.current")  # currents that are measured as such, by no sensor of something else
+EXAMPLES = {
+    "angle": "deg or rad",
+    "torque": "Nm",
+    "current": "A",
+    "force": "N, kN or V",
+    "length": "mm, m or inch",
+    "time": "s or ms",
+    "response": "m/s2, g or V",
+}
+OF_DRIVES = (
+    "unit.drive",
+    "unit.current",
+)  # currents that are measured as such, by no sensor of something else
 _SENSED = ("V", "mV", "A", "mA", "pC", "nC")
 
 

@@ -127,9 +127,7 @@ def _beyond_a_line(column: Array, sign: Array, rate: Array) -> float:
     return float(np.sqrt(np.mean(left**2)))
 
 
-def _coefficient(
-    columns: Array, column: Array, torque: Array, stretch: np.ndarray
-) -> tuple[float, float]:
+def _coefficient(columns: Array, column: Array, torque: Array, stretch: np.ndarray) -> tuple[float, float]:
     """Coefficient of one more column, and its error; NaN where it is not determined."""
     size = np.zeros(columns.shape[1] + 1)
     size[-1] = 1.0

@@ -20,8 +20,13 @@ from metro.units import Array
 
 OWN = 4  # columns beside the links: Coulomb, viscous, offset, the motor's inertia
 POWER = 0.999  # share of the speeds' power below the frequency that the motion reaches
-ABOVE = 10.0  # times that frequency: the edges of a friction that changes its sign are steeper than the motion
-CUTOFF_HZ = (2.0, 10.0)  # at least, since few periods make no spectrum; at most, since accelerations are noise
+ABOVE = (
+    10.0  # times that frequency: the edges of a friction that changes its sign are steeper than the motion
+)
+CUTOFF_HZ = (
+    2.0,
+    10.0,
+)  # at least, since few periods make no spectrum; at most, since accelerations are noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +113,9 @@ def _fit(log: Motion, links: Array, functions: tuple[Array, Array], joint: int) 
     rigid = columns[:, OWN - 1 :] @ found.value[OWN - 1 :]
     left = (torque - columns @ found.value)[moving]
     heaviest = int(np.argmax(np.abs(weight @ found.value[OWN:])))
-    terms = further_terms(columns[moving], torque[moving], stretch[moving], slice(OWN - 1, columns.shape[1]), rate[moving])
+    terms = further_terms(
+        columns[moving], torque[moving], stretch[moving], slice(OWN - 1, columns.shape[1]), rate[moving]
+    )
     alone = np.eye(columns.shape[1])
     gravity = found.combination(np.concatenate([np.zeros(OWN), weight[heaviest]]))
     inertia = found.combination(np.concatenate([alone[OWN - 1, :OWN], turned]))

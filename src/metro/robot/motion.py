@@ -88,9 +88,7 @@ def rate_noise(step: Array, period: float, cutoff_hz: float) -> Array:
     return np.asarray(step * 2 * math.pi * cutoff_hz * math.sqrt(2 * period * cutoff_hz / 36))
 
 
-def evenly(
-    time: Array, q: Array, torque: Array, cutoff_hz: float, *, filtered: bool = False
-) -> Motion:
+def evenly(time: Array, q: Array, torque: Array, cutoff_hz: float, *, filtered: bool = False) -> Motion:
     """Filter a log whose clock need not be even, as :func:`motion`; gaps are bridged by straight lines.
 
     Parameters

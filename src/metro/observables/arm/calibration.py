@@ -112,4 +112,7 @@ def carried_json(carried: Carried) -> JSON:
     block: JSON = {"mass": quantity(carried.mass, spread[0], "kg", carried.dof), "centre": centre}
     if np.isfinite(carried.inertia).all():
         block["inertia"] = _along(INERTIA, carried.inertia, carried.covariance[4:, 4:], "kg m2", carried.dof)
-    return block | {"rms": [float(left) if np.isfinite(left) else None for left in carried.rms], "dof": carried.dof}
+    return block | {
+        "rms": [float(left) if np.isfinite(left) else None for left in carried.rms],
+        "dof": carried.dof,
+    }

@@ -81,9 +81,7 @@ def _pair(one: JointLog, two: JointLog) -> Pair | None:
 def _json(load: Load, drives: Drives, pairs: list[list[str]]) -> JSON:
     block = carried_json(load.carried)
     dof = load.carried.dof
-    factors = [
-        quantity(value, sd, "1", dof) if np.isfinite(value) else None for value, sd in load.by_joint
-    ]
+    factors = [quantity(value, sd, "1", dof) if np.isfinite(value) else None for value, sd in load.by_joint]
     return block | {
         "mass_by_logs_alone": quantity(load.carried.mass, load.sd_of_logs, "kg", dof),
         "by_joint": factors,

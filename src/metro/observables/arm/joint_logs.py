@@ -125,7 +125,9 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
     return tables | more, {"joints": {**about, "runs": block}, **carried}
 
 
-def with_drives(pair: tuple[float, float], log: JointLog, fit: JointFit, drives: Drives) -> tuple[float, float]:
+def with_drives(
+    pair: tuple[float, float], log: JointLog, fit: JointFit, drives: Drives
+) -> tuple[float, float]:
     """Return a value and its standard error, that of the drive's constant in it; amperes have none."""
     relative = 0.0 if log.amperes else drives.relative[fit.joint]
     return pair[0], float(np.hypot(pair[1], relative * pair[0]))
@@ -137,7 +139,9 @@ def _block(log: JointLog, fits: tuple[JointFit, ...], drives: Drives) -> JSON:
     return {
         "joints": [fit.joint + 1 for fit in fits],
         **{
-            name: [quantity(*with_drives(getattr(fit, name), log, fit, drives), units[name], dof) for fit in fits]
+            name: [
+                quantity(*with_drives(getattr(fit, name), log, fit, drives), units[name], dof) for fit in fits
+            ]
             for name in QUANTITIES
         },
         "beyond": [

@@ -44,6 +44,7 @@ FORCE = ["fx_n", "fy_n", "fz_n"]
 BIN = 1 * MM
 LEAST_BINS = 5
 ITERATIONS = 6
+REPEATABLE = 0.1  # of the torque's noise: how well the friction of the cut is that of the idle run
 LEAST_NOISE = 1e-3  # N m: floor for a log whose digits are coarser than its noise
 
 # Relative error that all runs may share, by the source of the force: friction that differs from the idle run;

@@ -12,7 +12,8 @@ from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import joint_logs, tip_force
 from metro.observables.arm.clock import Clock, clock
-from metro.observables.arm.tip_force import ACTUAL, FORCE, JOINTS, TORQUE
+from metro.observables.arm.force_by_torques import force_without_dynamometer
+from metro.observables.arm.tip_force import ACTUAL, FORCE, JOINTS, REPEATABLE, TORQUE
 from metro.observables.arm.wall import wall
 from metro.observables.joint_force import NAME, TABLES, friction
 from metro.observables.joint_force.model import (
@@ -36,7 +37,6 @@ from metro.units import DEG, JSON, MM, MS, Array
 
 SCATTER = 0.01
 CALIBRATED = 0.01  # relative error of the torque of a joint and of an axis of the dynamometer, in all runs
-REPEATABLE = 0.1  # of the torque's noise: how well the friction of the cut is that of the idle run
 
 GRID = 5 * MS
 RATE = [f"rate{i}_deg_s" for i in JOINTS]
@@ -287,11 +287,14 @@ def report(
     }
 
 
-def idle_friction(batch: Batch, read: Tables, _identified: JSON) -> tuple[dict[str, pd.DataFrame], JSON]:
+def beside(batch: Batch, read: Tables, identified: JSON) -> tuple[dict[str, pd.DataFrame], JSON]:
     """Return the friction of the joints by the idle runs, and all that logs of a free motion say."""
     tables = friction.observe(batch, read)
     free, blocks = joint_logs.observe(batch, read)
-    return ({} if isinstance(tables, Refusal) else tables) | free, friction.report(tables) | blocks
+    if free and isinstance(tables, Refusal):
+        tables = Refusal("")  # the joint logs tell the friction
+    arm = {**friction.report(tables).get("arm", {}), **force_without_dynamometer(batch, read, identified)}
+    return ({} if isinstance(tables, Refusal) else tables) | free, {**({"arm": arm} if arm else {}), **blocks}
 
 
-OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, beside=idle_friction)
+OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, beside=beside)

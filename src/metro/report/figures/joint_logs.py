@@ -55,7 +55,9 @@ def load(course: pd.DataFrame) -> Figure:
         figure, places = _grid(sorted(course["joint"].unique()))
         for axes, joint in places:
             part = course[course["joint"] == joint]
-            axes.plot(100.0 * part["place"], part["measured_nm"], color=style.MEASURED, label="measured", lw=0.8)
+            axes.plot(
+                100.0 * part["place"], part["measured_nm"], color=style.MEASURED, label="measured", lw=0.8
+            )
             axes.plot(100.0 * part["place"], part["load_nm"], color=style.AFTER, label="of the load", lw=0.8)
             axes.set_title(f"joint {joint}", loc="left")
         _name(figure, places, "share of the motion (%)", "torque (N m)")

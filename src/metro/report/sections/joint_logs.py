@@ -105,7 +105,9 @@ def _beyond(terms: pd.DataFrame | None, table: pd.DataFrame) -> list[Item]:
     """Say what the friction has beyond Coulomb and viscous, with the evidence for it."""
     if terms is None:
         return [
-            Paragraph("No log shows friction beyond Coulomb and viscous: neither with speed, load nor time.", "note")
+            Paragraph(
+                "No log shows friction beyond Coulomb and viscous: neither with speed, load nor time.", "note"
+            )
         ]
     units = table.set_index(["run", "joint"])["unit"]
     lines = []

@@ -11,7 +11,12 @@ from metro.units import JSON
 def joint_words(identified: JSON) -> Iterator[str]:
     """Yield what was identified of joints and payload."""
     runs = ((identified.get("joints") or {}).get("runs") or {}).values()
-    known = {joint for run in runs for joint, value in zip(run["joints"], run["coulomb"], strict=True) if value["value"] is not None}
+    known = {
+        joint
+        for run in runs
+        for joint, value in zip(run["joints"], run["coulomb"], strict=True)
+        if value["value"] is not None
+    }
     if known:
         yield f"friction of {len(known)} joint{'s' if len(known) > 1 else ''}"
     payload = (identified.get("calibration") or {}).get("payload")
