@@ -46,3 +46,15 @@ def fault_of(names: Sequence[str]) -> str:
         return "tau1_nm, … (torques of the motors) or current1_a, … (their currents)"
     both = next((i for i in AXES if f"tau{i}_nm" in own and f"current{i}_a" in own), 0)
     return f"one drive signal of axis {both}: there are tau{both}_nm and current{both}_a" if both else ""
+
+
+def fault_of_six(names: Sequence[str]) -> str:
+    """Say which column the robot log of a cut lacks beside its angles; "" where it is whole."""
+    for least, whole in (("q{}_set_deg", False), ("tau{}_nm", True), ("current{}_a", True)):
+        wanted = [least.format(i) for i in range(1, 7)]
+        missing = [name for name in wanted if name not in names]
+        if 0 < len(missing) < len(wanted):
+            return f"the column {', '.join(missing)}, expected {wanted[0]} to {wanted[-1]}"
+        if whole and not missing:
+            return ""
+    return "tau1_nm to tau6_nm (torques of the motors), or current1_a to current6_a (their currents)"

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.formats.errors import FormatError
-from metro.joint_columns import JOINT_COLUMNS, fault_of
+from metro.joint_columns import JOINT_COLUMNS, fault_of, fault_of_six
 from metro.spelling import resembling
 
 JOINTS = range(1, 7)
@@ -50,11 +50,15 @@ KINDS: dict[str, Kind] = {
         "a robot log",
         (
             "t_s",
-            *(f"q{i}_set_deg" for i in JOINTS),
             *(f"q{i}_deg" for i in JOINTS),
+        ),
+        (
+            *(f"q{i}_set_deg" for i in JOINTS),
             *(f"tau{i}_nm" for i in JOINTS),
+            *(f"current{i}_a" for i in JOINTS),
         ),
         rising="t_s",
+        fault=fault_of_six,
     ),
     "joints": Kind("a joint log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of),
     "path": Kind("a path", ("point", "pass", "x_mm", "y_mm", "z_mm"), whole=("point", "pass"), least=2),

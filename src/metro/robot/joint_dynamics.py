@@ -14,7 +14,7 @@ import numpy as np
 from metro.robot.determined import STRETCHES, Determined, solve
 from metro.robot.friction_terms import Term, further_terms
 from metro.robot.kinematics import Geometry
-from metro.robot.motion import Motion, even_clock, evenly
+from metro.robot.motion import BANDWIDTH, Motion, even_clock, evenly
 from metro.robot.rigid_body import torque_regressor
 from metro.units import Array
 
@@ -23,6 +23,7 @@ POWER = 0.999  # share of the speeds' power below the frequency that the motion 
 ABOVE = (
     10.0  # times that frequency: the edges of a friction that changes its sign are steeper than the motion
 )
+SHORTEST = 32  # samples: fewer are no course to filter
 CUTOFF_HZ = (
     2.0,
     10.0,
@@ -67,6 +68,17 @@ class JointFit:
 def free_motion(time: Array, q: Array, torque: Array) -> Motion:
     """Filter a log, (m,) s and (m, n) rad, N m or A, as low as its motion and the edges of friction allow."""
     return evenly(time, q, torque, cutoff(time, q), filtered=True)
+
+
+def low_passed(time: Array, q: Array) -> Array:
+    """Angles (m, n) of a log without what lies above its motion, at its own times (m,)."""
+    from scipy.signal import butter, sosfiltfilt
+
+    even, period = even_clock(time)
+    angle = np.array([np.interp(even, time, column) for column in q.T])
+    filter_ = butter(4, min(cutoff(time, q), BANDWIDTH / period), fs=1 / period, output="sos")
+    smooth = sosfiltfilt(filter_, angle, axis=1) if len(even) > SHORTEST else angle
+    return np.array([np.interp(time, even, column) for column in smooth]).T
 
 
 def cutoff(time: Array, q: Array) -> float:

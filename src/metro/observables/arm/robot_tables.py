@@ -49,7 +49,8 @@ def robot_tables(
         solved[run] = run_force(batch, cut, idle, arm, face)
         first = "robot_aligned" not in parts and isinstance(solved[run].sensorless, Sensorless)
         tables = {"robot_aligned": _aligned(cut, idle, face, solved[run])} if first else {}
-        for name, table in (tables | tracking_tables(cut, idle, arm, face)).items():
+        tracked = tracking_tables(cut, idle, arm, face) if cut.followed else {}
+        for name, table in (tables | tracked).items():
             parts.setdefault(name, []).append(table.assign(run=run))
     parts |= force_tables(batch, read, solved)
     tables = {name: pd.concat(tables, ignore_index=True) for name, tables in parts.items()}
