@@ -82,12 +82,12 @@ def filled(frame: pd.DataFrame, manifest: JSON) -> pd.DataFrame:
 
 
 def _with_joint_logs(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return a copy of the run table in which logs of an arm that cut nothing are joint logs."""
+    """Return a copy of the run table in which logs of an arm that cut nothing are joint logs, too."""
     runs = frame.copy()
     for at, row in zip(runs.index, frame.to_dict("records"), strict=True):
         column = in_the_air(row)
         if column not in ("", "joint_log"):
-            runs.loc[at, ["joint_log", column]] = [row[column], ""]
+            runs.loc[at, "joint_log"] = row[column]
     return runs
 
 

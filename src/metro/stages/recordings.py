@@ -90,13 +90,21 @@ def robot(batch: Batch, recordings: Recordings) -> Iterator[Part]:
     places: dict[str, Array] = {}
     for column, log in (("robot_log", "cut"), ("idle_log", "idle")):
         for run, file in files(batch, column):
+            free = batch.runs["joint_log"][run] == file  # which need not have all that the log of a cut has
+            if free and not recordings.holds(file, "robot"):
+                recordings.left_out.append((run, column))
+                continue
             table = recordings.table(file, "robot")
             if table is None:
                 continue
             time, own = _from_zero(table)
             followed = SET[0] in table
             goes = table[list(SET if followed else ACTUAL)].to_numpy()
-            doubt = plausible.clock(time, rate) or _joint_doubt(table) or _with_torques(batch, table)
+            lacking = _with_torques(batch, table)
+            if free and lacking:
+                recordings.left_out.append((run, column))
+                continue
+            doubt = plausible.clock(time, rate) or _joint_doubt(table) or lacking
             if log == "idle" and run in places:
                 doubt = doubt or plausible.same_place(places[run], goes)
             if recordings.doubt(file, doubt):

@@ -59,6 +59,8 @@ def _gain(batch: Batch, identified: JSON) -> tuple[float, str]:
     low, high = gain.get("ci95") or (None, None)
     if low is not None and high is not None and not declared(batch.cell):
         value = float(gain["value"])
-        return float(np.hypot((high - low) / 3.92, value - 1.0)), "the dynamometer of other runs (torque_gain)"
+        return float(
+            np.hypot((high - low) / 3.92, value - 1.0)
+        ), "the dynamometer of other runs (torque_gain)"
     drives = drives_of_cell(batch.cell, len(JOINTS))
     return float(np.sqrt(np.mean(np.diag(drives.covariance)))), drives.source

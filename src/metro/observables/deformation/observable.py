@@ -78,7 +78,9 @@ def _observed(
     tables["tip_force"] = force if isinstance(force, Refusal) else force.assign(source=source)
     if run in batch.with_files("profile"):
         lost = len(cut.tip) and not cut.followed
-        points = Refusal(tip_force.NO_SET_POINTS) if lost else _points(batch, read("profile", run), log, face, arm)
+        points = (
+            Refusal(tip_force.NO_SET_POINTS) if lost else _points(batch, read("profile", run), log, face, arm)
+        )
         tables["profile_points"] = points
     return tables
 

@@ -28,6 +28,7 @@ from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.robot.drive_torques import TURNING
+from metro.robot.drives import declared, drives_of_cell
 from metro.robot.kinematics import Arm, arm_of_cell
 from metro.robot.statics import tip_jacobian
 from metro.signals import align, kalman
@@ -180,14 +181,20 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     model = JointForceModel(arm)
     scatter = np.zeros(len(model.parameters))
     scatter[0] = SCATTER
-    return Problem(NAME, "N", 1.0, model, (_instruments(), *blocks), scatter, notes=notes, basis_unit="N m")
+    return Problem(
+        NAME, "N", 1.0, model, (_instruments(batch), *blocks), scatter, notes=notes, basis_unit="N m"
+    )
 
 
-def _instruments() -> Block:
-    """Return what is known of the gains of joints and axes."""
+def _instruments(batch: Batch) -> Block:
+    """Return what is known of the gains of joints and axes; of joints, what the cell declares of each one."""
     count = len(JOINTS) + len(WORK)
     zeros, axis = np.zeros((count, 0)), np.array([*(f"joint {i}" for i in JOINTS), *WORK])
     known, sigma = np.zeros(count), np.full(count, CALIBRATED)
+    if declared(batch.cell):
+        drives = drives_of_cell(batch.cell, len(JOINTS)).covariance
+        own = np.diag(drives) - drives[0, 1]  # what joints share is the gain of all torques
+        sigma[: len(JOINTS)] = np.maximum(np.sqrt(np.maximum(own, 0.0)), CALIBRATED)
     return Block(
         "instruments", "instruments", "calibrate", 0, known, sigma, Instruments(), axis, zeros, known[:0], {}
     )
