@@ -42,10 +42,16 @@ def example(kind, rows=12):
     return table
 
 
+def whole(table):
+    """Return a table without the columns that a joint log can only have one in place of the other."""
+    linear = [name for name in table if name.startswith("q") and name.endswith("_mm")]
+    return table.drop(columns=[*linear, *(name for name in table if name.startswith("current"))])
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_every_kind_survives_a_round_trip(tmp_path, kind, suffix):
-    table, path = example(kind), tmp_path / f"table{suffix}"
+    table, path = whole(example(kind)), tmp_path / f"table{suffix}"
     table.to_csv(path, index=False) if suffix == ".csv" else table.to_parquet(path)
     sniff(path, kind)
     found = read(path, kind)

@@ -45,7 +45,7 @@ def batch(root):
     wave = np.sin(0.3 * np.arange(100))
     force = pd.DataFrame({"t_s": 8.0 + TIME, "fx_n": 10 + wave, "fy_n": 20 + wave, "fz_n": 30 + wave})
     force.assign(spindle_deg=np.arange(100.0)).to_csv(folder / "force.csv", index=False)
-    columns = enumerate(KINDS["robot"].required, 1)
+    columns = enumerate([name for name in KINDS["robot"].columns if not name.startswith("current")], 1)
     robot = pd.DataFrame({name: 40.0 + wave * i for i, name in columns})
     robot.assign(t_s=8.05 + TIME).to_csv(folder / "cut.csv", index=False)
     robot.assign(t_s=3.0 + TIME).to_csv(folder / "idle.csv", index=False)
@@ -123,8 +123,17 @@ def test_the_log_of_the_cut_keeps_its_offset_to_the_dynamometer_and_the_idle_log
 
 
 def test_without_a_dynamometer_the_log_of_the_cut_starts_at_zero(folder, tmp_path):
-    (folder / "runs.csv").write_text("run,robot_log\na,cut.csv\n")
+    (folder / "runs.csv").write_text("run,operation,robot_log\na,side,cut.csv\n")
     assert ingested(folder, tmp_path)["robot"]["t_s"].iloc[0] == 0.0
+
+
+def test_the_only_log_of_a_row_that_describes_no_cut_is_a_joint_log_too(folder, tmp_path):
+    (folder / "runs.csv").write_text("run,robot_log\na,cut.csv\n")
+    tables = ingested(folder, tmp_path)
+    assert len(tables["robot"]) == len(tables["joint"])
+    assert set(tables["joint"]["run"]) == {"a"}
+    assert tables["joint"][["q6_deg", "q6_set_deg", "tau6_nm"]].notna().all(axis=None)
+    assert tables["joint"][["q7_deg", "current1_a"]].isna().all(axis=None)
 
 
 def test_clouds_are_moved_to_the_work_frame(folder, tmp_path):

@@ -69,8 +69,12 @@ class Stock:
 
     def missing_arm(self) -> list[str]:
         """Return what is missing to know where the arm's tip is."""
-        needs = [] if entry(self.cell, "arm.dh") else ["arm.dh in cell.yaml"]
+        needs = [] if self.has_arm() else ["arm.dh in cell.yaml"]
         return needs + self.missing_keys(("tool_in_flange_mm",))
+
+    def has_arm(self) -> bool:
+        """Return whether the cell says where the arm's joints are."""
+        return bool(entry(self.cell, "arm.dh") or entry(self.cell, "arm.urdf"))
 
     def missing_coefficients(self) -> list[str]:
         """Return what is missing to have cutting coefficients, given or identified."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from metro.batch.arm import counts, with_joints
 from metro.batch.documents import Likeness, read_yaml, schema_findings
 from metro.batch.findings import Finding, Severity, linked_outside, misspelt
 from metro.units import JSON
@@ -15,7 +15,6 @@ from metro.units import JSON
 FILE = "cell.yaml"
 CELLS = Path("config/cells")  # unless config.yaml or the command line says otherwise
 CHECKOUT = Path(__file__).parents[3]  # where this package is used from a checkout
-SHORTEST_ARM_MM = 10.0
 ROUNDED = 0.001  # of moments of inertia that are declared with three digits
 
 
@@ -69,30 +68,20 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
         message = f'found "{content["cell"]}", expected the cell that batch.yaml names, "{name}"'
         findings.append(Finding("error", file, message, column="cell"))
     if not findings and content.get("arm"):
-        findings += [*_arm(content["arm"]["dh"], file), *_bodies(content["arm"], file)]
+        arm, more = with_joints(content["arm"], source.parent, file)
+        content = {**content, "arm": arm}
+        findings += [*more, *_bodies(arm, file)]
+    if not findings:
+        findings += counts(content, file)
     stations = content.get("stations")
     if isinstance(stations, str) and (Path(stations).is_absolute() or ".." in Path(stations).parts):
         message = f'found "{stations}", expected a table beside {source.name}'
         findings.append(Finding("error", file, message, column="stations"))
         content = {key: value for key, value in content.items() if key != "stations"}
     if content.get("joint_stiffness_nm_rad") and not content.get("arm"):
-        message = "is of no use without arm.dh, which says where the joints are"
+        message = "is of no use without arm.dh or arm.urdf, which says where the joints are"
         findings.append(Finding("warning", file, message, column="joint_stiffness_nm_rad"))
     return content, source, findings
-
-
-def _arm(rows: list[list[float]], file: str) -> list[Finding]:
-    """Check the units of an arm's rows: theta_deg, alpha_deg, d_mm, a_mm."""
-    twist = max(abs(value) for row in rows for value in row[:2])
-    length = max(abs(value) for row in rows for value in row[2:])
-    findings = []
-    if 0 < twist <= 2 * math.pi:
-        message = f"found no angle beyond {twist:g}, expected degrees: theta and alpha seem to be in radians"
-        findings.append(Finding("error", file, message, column="arm.dh"))
-    if length < SHORTEST_ARM_MM:
-        message = f"found no length beyond {length:g}, expected mm: d and a seem to be in metres"
-        findings.append(Finding("error", file, message, column="arm.dh"))
-    return findings
 
 
 def _bodies(arm: JSON, file: str) -> Iterator[Finding]:

@@ -84,6 +84,8 @@ RUNS = (
     Column("dynamometer", "file"),
     Column("robot_log", "file"),
     Column("idle_log", "file"),
+    Column("joint_log", "file"),
+    Column("loaded", choices=("yes", "no")),
     Column("path", "file"),
     Column("scan", "file"),
     Column("profile", "file"),

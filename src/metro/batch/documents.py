@@ -195,7 +195,8 @@ def _plural(rule: Mapping[str, Any]) -> str:
     """Describe in words what several of a schema's values are."""
     if rule.get("type") == "array":
         least, most = rule.get("minItems"), rule.get("maxItems", math.inf)
-        size = f"{least} " if least == most else f"at most {most} " if most < math.inf else ""
+        between = f"{least} to {most} " if (least or 0) > 1 else f"at most {most} "
+        size = f"{least} " if least == most else between if most < math.inf else ""
         return f"lists of {size}{_plural(rule.get('items', {}))}"
     kind, limits = str(rule.get("type", "value")).replace("string", "text"), bounds(rule)
     return f"{kind}s, each {limits}" if limits else f"{kind}s"

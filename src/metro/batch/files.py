@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from metro.batch.findings import Finding, shown
 from metro.batch.sources import Files, files_of, parted, source
@@ -14,12 +15,18 @@ RUN_FILES = {
     "dynamometer": "force",
     "robot_log": "robot",
     "idle_log": "robot",
+    "joint_log": "joints",
     "path": "path",
     "scan": "cloud",
     "profile": "profile",
 }
 LONGEST_NAME = 255  # bytes, of every file system
-OWN_TO_A_RUN = ("dynamometer", "robot_log", "scan", "profile")
+OWN_TO_A_RUN = ("dynamometer", "robot_log", "joint_log", "scan", "profile")
+# What describes a cut in a row of runs.csv: settings as text, as numbers, and records of it.
+OF_A_CUT = (
+    *("operation", "direction", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm"),
+    *("orbit_rpm", "dynamometer", "scan", "profile", "stable"),
+)
 
 
 def file_findings(folder: Path, runs: Table, impacts: Table, files: Files) -> Iterator[Finding]:
@@ -38,12 +45,26 @@ def file_findings(folder: Path, runs: Table, impacts: Table, files: Files) -> It
     yield from _shared(runs)
 
 
+def in_the_air(row: Mapping[Hashable, Any]) -> str:
+    """Return the column whose log is of an arm that moved and cut nothing; "" where the row has none.
+
+    It is ``joint_log``; or the only robot log of a row that describes no cut.
+    """
+    if row["joint_log"]:
+        return "joint_log"
+    logs = [name for name in ("robot_log", "idle_log") if row[name]]
+    blank = all(row[name] == "" or row[name] != row[name] for name in OF_A_CUT)
+    return logs[0] if blank and len(logs) == 1 else ""
+
+
 def _named(runs: Table, impacts: Table) -> Iterator[tuple[Table, int, str, str, str]]:
     """Yield every file that is named: table, position of the row, column, path and kind."""
+    rows = runs.frame.to_dict("records")
     for column, kind in RUN_FILES.items():
-        for position, name in enumerate(runs.frame[column]):
-            if name:
-                yield runs, position, column, name, kind
+        for position, row in enumerate(rows):
+            if row[column]:
+                free = in_the_air(row) == column
+                yield runs, position, column, row[column], RUN_FILES["joint_log"] if free else kind
     for position, (name, kind) in enumerate(zip(impacts.frame["file"], impacts.frame["kind"], strict=True)):
         if name:
             yield impacts, position, "file", name, kind or "frf"

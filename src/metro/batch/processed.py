@@ -14,6 +14,7 @@ from metro import __version__
 from metro.batch.batch import Batch
 from metro.batch.columns import CROSS_STIFFNESS
 from metro.batch.writing import write_atomically
+from metro.joint_columns import JOINT_COLUMNS
 from metro.units import JSON
 
 # Every table that ingest writes, always, with these columns (no rows where the batch has no such data).
@@ -27,6 +28,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *(f"q{i}_deg" for i in range(1, 7)),
         *(f"tau{i}_nm" for i in range(1, 7)),
     ),
+    "joint": ("run", "t_s", *JOINT_COLUMNS),
     "path": ("run", "point", "pass", "x_mm", "y_mm", "z_mm"),
     "scan": ("run", "x_mm", "y_mm", "z_mm"),
     "profile": ("run", "x_mm", "z_mm"),

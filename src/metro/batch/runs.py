@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from metro.batch.files import RUN_FILES
+from metro.batch.files import RUN_FILES, in_the_air
 from metro.batch.findings import Finding
 from metro.batch.tables import Table
 from metro.units import JSON, MM
@@ -59,9 +59,10 @@ def filled(frame: pd.DataFrame, manifest: JSON) -> pd.DataFrame:
     ``order`` is the row's place; a slot's ``direction`` and ``radial_depth_mm`` are known;
     ``feed_direction_deg`` is 0; runs of the same nominal settings are of one ``condition``, and are its
     replicates.
-    ``cut_before_m`` is added: metres cut by all rows of lower order.
+    ``cut_before_m`` is added: metres cut by all rows of lower order. The robot log of a row that describes no
+    cut is its ``joint_log``.
     """
-    runs = frame.copy()
+    runs = _with_joint_logs(frame)
     runs["order"] = runs["order"].fillna(_places(runs)).astype(int)
     runs = runs.sort_values("order", kind="stable").reset_index(drop=True)
     slots = runs["operation"].isin(["slot", "helical"])
@@ -77,6 +78,16 @@ def filled(frame: pd.DataFrame, manifest: JSON) -> pd.DataFrame:
     runs["replicate"] = runs["replicate"].fillna(place).astype(int)
     cut = runs["cut_length_mm"].fillna(0.0)
     runs["cut_before_m"] = (cut.cumsum() - cut) * MM
+    return runs
+
+
+def _with_joint_logs(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return a copy of the run table in which logs of an arm that cut nothing are joint logs, too."""
+    runs = frame.copy()
+    for at, row in zip(runs.index, frame.to_dict("records"), strict=True):
+        column = in_the_air(row)
+        if column not in ("", "joint_log"):
+            runs.loc[at, "joint_log"] = row[column]
     return runs
 
 

@@ -22,6 +22,11 @@ FREE = (
     "cut_length_mm",
     "feed_direction_deg",
     "tool.overhang_mm",
+    "cell_file",
+    "drives.torque_per_ampere_nm_a",
+    "drives.gear_ratio",
+    "drives.uncertainty",
+    "drives.uncertainty_by_joint",
 )  # that may be given without a question
 
 

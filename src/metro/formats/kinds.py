@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.formats.errors import FormatError
+from metro.joint_columns import JOINT_COLUMNS, fault_of, fault_of_six
 from metro.spelling import resembling
 
 JOINTS = range(1, 7)
@@ -26,6 +27,7 @@ class Kind:
     rising : the column that grows strictly from row to row, or "".
     whole : columns that hold whole numbers.
     least : the smallest number of rows.
+    fault : says which of its columns are lacking beyond those that are required, by the names that are there.
     """
 
     title: str
@@ -34,6 +36,7 @@ class Kind:
     rising: str = ""
     whole: tuple[str, ...] = ()
     least: int = 8
+    fault: Callable[[Sequence[str]], str] = lambda _names: ""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -47,12 +50,17 @@ KINDS: dict[str, Kind] = {
         "a robot log",
         (
             "t_s",
-            *(f"q{i}_set_deg" for i in JOINTS),
             *(f"q{i}_deg" for i in JOINTS),
+        ),
+        (
+            *(f"q{i}_set_deg" for i in JOINTS),
             *(f"tau{i}_nm" for i in JOINTS),
+            *(f"current{i}_a" for i in JOINTS),
         ),
         rising="t_s",
+        fault=fault_of_six,
     ),
+    "joints": Kind("a joint log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of),
     "path": Kind("a path", ("point", "pass", "x_mm", "y_mm", "z_mm"), whole=("point", "pass"), least=2),
     "profile": Kind("a profile", ("x_mm", "z_mm"), rising="x_mm"),
     "cloud": Kind("a point cloud", ("x_mm", "y_mm", "z_mm"), least=3),
@@ -91,6 +99,10 @@ def columns_to_read(path: Path, kind: Kind, names: Sequence[str]) -> list[str]:
         message = f"lacks the column {', '.join(missing)} of {kind.title}{hint}: found the columns {present}"
         raise FormatError(path, f"{message}, expected {', '.join(kind.required)}")
     wanted = [name for name in (*kind.required, *kind.optional) if name in names]
+    fault = kind.fault(wanted)
+    if fault:
+        present = ", ".join(name for name in names if name) or "none"
+        raise FormatError(path, f"lacks of {kind.title}: {fault}; found the columns {present}")
     for name in wanted:
         if list(names).count(name) > 1:
             raise FormatError(path, f"column {name}: found {list(names).count(name)} times, expected once")

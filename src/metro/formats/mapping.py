@@ -301,6 +301,9 @@ def _check_complete(
     source: Source, mapping: FileMapping, kind: Kind, here: Contents, there: set[str]
 ) -> None:
     missing = [name for name in kind.required if name not in there]
+    if not missing and (fault := kind.fault(sorted(there))):
+        message = f"batch.yaml, {mapping.key}: says nothing of {fault}"
+        raise FormatError(source.path, f"{message}, expected under columns for {kind.title}{_listed(here)}")
     if not missing:
         return
     step = next((key for key, (column, _) in STEPS.items() if column in missing), "")

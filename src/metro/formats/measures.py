@@ -61,6 +61,7 @@ OF_COLUMN = {
     "nm": "torque",
     "mm": "length",
     "hz": "frequency",
+    "a": "current",
 }
 # What a response of a structure may be: the contract's unit, and the factor to it from the first spelling.
 RESPONSES = {"acceleration": ("m/s2", 1.0), "velocity": ("m/s", 1.0), "length": ("m", 1e-3)}

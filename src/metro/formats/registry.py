@@ -107,8 +107,8 @@ FORMATS = (
     Format("SignalCalc text", (), signalcalc.STARTS, ("frf",), read_signalcalc, holds=signalcalc.HOLDS),
     Format("Gocator CSV", (), gocator.STARTS, ("cloud",), read_gocator),
     Format("software gauge", (), softgauge.STARTS, ("profile",), read_softgauge, holds=softgauge.HOLDS),
-    Format("KUKA RSI recording", (".rsi", ".xml"), rsi.STARTS, ("robot",), rsi.read_rsi),
-    Format("ROS 2 bag", (".mcap", ".db3"), rosbag.STARTS, ("robot",), rosbag.read_rosbag),
+    Format("KUKA RSI recording", (".rsi", ".xml"), rsi.STARTS, ("robot", "joints"), rsi.read_rsi),
+    Format("ROS 2 bag", (".mcap", ".db3"), rosbag.STARTS, ("robot", "joints"), rosbag.read_rosbag),
     replace(
         _pieces("DynoWare text export", (".txt", ".csv"), (b"DynoWare",), ("force",), dynoware_pieces),
         contents=of_text,

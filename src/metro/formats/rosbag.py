@@ -194,7 +194,7 @@ def _joined(measured: _Series, commanded: _Series, kind: Kind, *, whole: bool) -
         columns[f"q{i}_set_deg"] = np.interp(at, known, angles)
     names = [*(f"q{i}_deg" for i in JOINTS), *(f"tau{i}_nm" for i in JOINTS)]
     columns |= dict(zip(names, measured.values[keep].T, strict=True))
-    frame = pd.DataFrame(columns)[list(kind.required)]
+    frame = pd.DataFrame({name: columns[name] for name in kind.columns if name in columns})
     frame.attrs["notes"] = [*measured.notes, *commanded.notes, *_left_out(len(measured.ns) - len(keep))]
     return Raw(frame, lambda row: measured.place(int(keep[row])))
 

@@ -109,7 +109,7 @@ def read_rsi(path: Path, kind: Kind, rows: int | None) -> Raw:
     take, notes = in_order(path, "IPOC", (cycles, MS), values, recording.place)
     frame = pd.DataFrame(values[take], columns=[name for _, _, name in columns])
     frame.insert(0, "t_s", cycles[take] * MS)
-    frame = frame[list(kind.required)]
+    frame = frame[[name for name in kind.columns if name in frame]]
     frame.attrs["notes"] = [*notes, *_notes(recording.torn, late_answers, elements)]
     return Raw(frame, lambda row: recording.place(int(take[row])))
 

@@ -51,6 +51,8 @@ class Proposal:
 
 def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
     """Propose how files are read; what nothing is proposed for is in the second list, with the reason."""
+    from metro.importing import joints
+
     proposals: list[Proposal] = []
     unknown = [f"{seen.path.name}: {seen.fault}" for seen in files if seen.fault]
     rest = [seen for seen in files if not seen.fault]
@@ -62,12 +64,12 @@ def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
     proposals += pairs
     unknown += single
     for seen in rest:
-        found = _forces(seen) or _numbered(seen)
+        found = _forces(seen) or joints.joint_log(seen) or _numbered(seen)
         if found is None:
             unknown.append(_reason(seen))
         else:
             proposals.append(found)
-    return proposals, unknown
+    return list(joints.together(proposals)), unknown
 
 
 def _record(seen: Seen) -> str:
@@ -162,7 +164,7 @@ def _hammer_pairs(files: Sequence[Seen]) -> tuple[list[Proposal], list[str], lis
         "force_n": f"the file's name {hammers[0].path.name}",
         "response": f"the file's name {sensors[0].path.name}",
     }
-    timed = all(_is_clock(seen.columns[0].values) for seen in hammers)
+    timed = all(is_clock(seen.columns[0].values) for seen in hammers)
     if timed:
         columns |= {"t_s": 1}
         why |= {"t_s": "column 1, which rises by the same step from row to row"}
@@ -195,12 +197,17 @@ def _without_partner(hammers: Sequence[Seen], sensors: Sequence[Seen]) -> list[s
     ]
 
 
-def _is_clock(values: np.ndarray) -> bool:
-    """Return whether values rise by one step from row to row, as times do; a step of 1 counts the rows."""
+def is_clock(values: np.ndarray, *, uneven: bool = False) -> bool:
+    """Return whether values rise by one step from row to row, as times do; a step of 1 counts the rows.
+
+    ``uneven``: the steps may differ, as long as the values rise.
+    """
     if values.size < LEAST_RUN:
         return False
     steps = np.diff(values)
     step = float(np.median(steps))
+    if uneven:
+        return step > 0.0 and bool((steps > 0.0).all()) and not bool((steps == 1.0).all())
     return step > 0.0 and step != 1.0 and bool((np.abs(steps - step) < 0.01 * step).all())
 
 
@@ -213,8 +220,8 @@ def _reason(seen: Seen) -> str:
     listed = ", ".join(column.name for column in seen.columns[:8] if column.name)
     names = f", named {listed}" if named else " without names"
     message = f"{seen.path.name}: {len(seen.columns)} columns{names}: no dynamometer, hammer, profile or scan"
-    joints = "a robot log of a cut takes t_s, q1_set_deg …, q1_deg …, tau1_nm … (currents with 10 Nm/A)"
-    return f"{message}; {joints}: write its mapping by hand, as docs/data-contract.md says"
+    logs = "a joint log takes angles and torques or currents with numbered names; a robot log of a cut takes t_s, q1_set_deg …, q1_deg …, tau1_nm … (currents with 10 Nm/A)"
+    return f"{message}; {logs}: write its mapping by hand, as docs/data-contract.md says"
 
 
 def from_name(name: str) -> dict[str, str]:

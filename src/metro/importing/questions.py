@@ -9,11 +9,24 @@ from functools import partial
 
 from metro.batch.discover import NAME, NAME_IN_WORDS
 from metro.formats.measures import OF_COLUMN, RESPONSES, MeasureError, first_spellings, measure
+from metro.importing import joints
 from metro.importing.propose import Proposal, told_by_names
 
 NONE = "none"  # the answer to a question that leaves a key of batch.yaml out
 RECORD = ("{record}", "{number}")  # stand for the record's name, and the number in the file's name
-EXAMPLES = {"force": "N, kN or V", "length": "mm, m or inch", "time": "s or ms", "response": "m/s2, g or V"}
+EXAMPLES = {
+    "angle": "deg or rad",
+    "torque": "Nm",
+    "current": "A",
+    "force": "N, kN or V",
+    "length": "mm, m or inch",
+    "time": "s or ms",
+    "response": "m/s2, g or V",
+}
+OF_DRIVES = (
+    "unit.drive",
+    "unit.current",
+)  # currents that are measured as such, by no sensor of something else
 _SENSED = ("V", "mV", "A", "mA", "pC", "nC")
 
 
@@ -51,6 +64,12 @@ def questions(proposals: Sequence[Proposal]) -> Iterator[Question]:
     """Yield what must be asked of these files."""
     yield Question("batch", "name of the batch: small letters, digits and hyphens", _name)
     yield Question("title", "what was measured, in a line", optional=True)
+    lacking = [each for each in proposals if joints.lacks_drive(each)]
+    if lacking:
+        count = joints.axes_of(lacking[0])
+        what = f"columns of the measured currents or torques of the {count} joints, as 14-{13 + count}"
+        yield Question(joints.DRIVE, what, partial(_span, count))
+        yield _choice("unit.drive", "unit of these", ("A", "mA", "Nm", "kNm"))
     for quantity in dict.fromkeys(_quantity(column) for each in proposals for column in _without_unit(each)):
         words = f"unit of the {quantity} in the files, as {EXAMPLES[quantity]}"
         yield Question(f"unit.{quantity}", words, partial(_unit, quantity))
@@ -63,6 +82,13 @@ def questions(proposals: Sequence[Proposal]) -> Iterator[Question]:
         number = "as 1x; {number} is the number in the file's name"
         yield Question("reference", f"where the hammer struck, point and axis, {number}", _place)
         yield Question("response", f"where the sensor was, point and axis, {number}", _place)
+    if "joints" in kinds:
+        rows = [name for each in proposals if each.kind == "joints" for name, _ in each.rows]
+        named = ", ".join(rows)
+        arm = "the robot: a name of config/cells or of your own (cell_file=… copies a cell.yaml), or none"
+        yield Question("cell", arm, leaves_out=True)
+        what = f"is a load on the flange: yes or no, one for each of {named} by commas; none where it matters not"
+        yield Question("loaded", what, partial(_states, len(rows)), leaves_out=True)
     if "cloud" in kinds:
         size = "size of the scanned part as x,y,z in mm, or none where it is not known"
         yield Question("work.size_mm", size, _size, leaves_out=True)
@@ -73,7 +99,7 @@ def questions(proposals: Sequence[Proposal]) -> Iterator[Question]:
 def sensitivities(answers: dict[str, str]) -> Iterator[Question]:
     """Yield the questions that follow from answers: the sensitivity of what was recorded as a voltage."""
     for key, unit in answers.items():
-        if key.startswith("unit.") and needs_sensitivity(unit):
+        if key.startswith("unit.") and key not in OF_DRIVES and needs_sensitivity(unit):
             words = "sensitivity of the sensor, as 10.2 mV/g or 200 N/V"
             yield Question(f"sensitivity.{key[5:]}", words, _sensitivity)
 
@@ -114,6 +140,17 @@ def _quantity(column: str) -> str:
 
 def _without_unit(proposal: Proposal) -> list[str]:
     return [column for column in proposal.columns if not proposal.stated.get(column)]
+
+
+def _span(count: int, answer: str) -> str:
+    fits = len(joints.span(answer)) == count
+    return "" if fits else f"the numbers of {count} columns, as 14-{13 + count}"
+
+
+def _states(count: int, answer: str) -> str:
+    parts = [part.strip() for part in answer.split(",")]
+    fits = set(parts) <= {"yes", "no"} and len(parts) in (1, count)
+    return "" if fits else f"yes or no, or {count} of them by commas"
 
 
 def _name(answer: str) -> str:

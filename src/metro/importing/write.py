@@ -11,7 +11,10 @@ import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from metro.batch.cell import CELLS, shared_cells
 from metro.batch.whole_folder import whole_folder
+from metro.formats.measures import OF_COLUMN
+from metro.importing.joints import with_drive
 from metro.importing.look import Seen
 from metro.importing.propose import Proposal, from_name, told_by_names
 from metro.importing.questions import needs_sensitivity
@@ -19,13 +22,14 @@ from metro.importing.questions import needs_sensitivity
 RUN_COLUMN = {
     "force": "dynamometer",
     "robot": "robot_log",
+    "joints": "joint_log",
     "profile": "profile",
     "cloud": "scan",
     "path": "path",
 }
 _RUN_KEYS = (
     *("operation", "direction", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm"),
-    *("cut_length_mm", "feed_direction_deg"),
+    *("cut_length_mm", "feed_direction_deg", "loaded"),
 )
 _LONGEST, _DIGITS = 5000, 12  # characters of a citation, digits of a hash
 Answers = Mapping[str, str]
@@ -45,7 +49,9 @@ def write_batch(folder: Path, files: Sequence[Seen], proposals: Sequence[Proposa
     ContractError
         The folder cannot be written.
     """
+    proposals = [with_drive(each, answers) for each in proposals]
     texts = {
+        "cell.yaml": _cell(answers),
         "batch.yaml": "\n".join(_manifest(folder.name, proposals, _cited(files, answers))) + "\n",
         "runs.csv": _runs(proposals, answers),
         "impacts.csv": _impacts(proposals, answers),
@@ -107,6 +113,24 @@ def _manifest(name: str, proposals: Sequence[Proposal], answers: Answers) -> Ite
             yield from _mapping(each, answers)
 
 
+def _cell(answers: Answers) -> str:
+    """Return cell.yaml: that of the shared cell with the drives that were stated; "" where none were."""
+    drives = {key[7:]: value for key, value in answers.items() if key.startswith("drives.")}
+    name = answers.get("cell", "unknown")
+    shared = shared_cells(CELLS) / f"{name}.yaml"
+    given = answers.get("cell_file")
+    if not drives and not given:
+        return ""
+    if given and not Path(given).is_file():
+        raise AnswerError(f'cell_file: found "{given}", expected a file: cell.yaml of the machine')
+    source = Path(given) if given else shared
+    text = source.read_text(encoding="utf-8") if source.is_file() else f"cell: {name}\n"
+    if not drives:
+        return text
+    lines = [f"  {key}: {f'[{value}]' if ',' in value else value}" for key, value in drives.items()]
+    return "\n".join([text.rstrip(), "drives:", *lines, ""])
+
+
 def _dynamometer(answers: Answers) -> Iterator[str]:
     reads = answers.get("dynamometer.reads", "work")
     given = [
@@ -130,14 +154,14 @@ def _mapping(proposal: Proposal, answers: Answers) -> Iterator[str]:
         given = {"file": source[0], "from": source[1]} if isinstance(source, tuple) else {"from": source}
         unit = proposal.stated.get(column) or answers[f"unit.{_quantity(column)}"]
         entry: dict[str, object] = {**given, "unit": unit}
-        if needs_sensitivity(unit):
+        if needs_sensitivity(unit) and not column.startswith("current"):
             entry["sensitivity"] = answers[f"sensitivity.{_quantity(column)}"]
         text = ", ".join(f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in entry.items())
         yield f"      {column}: {{{text}}}  # guessed from {proposal.why[column]}"
 
 
 def _quantity(column: str) -> str:
-    return {"n": "force", "mm": "length", "s": "time"}.get(column.rpartition("_")[2], "response")
+    return "response" if column == "response" else OF_COLUMN.get(column.rpartition("_")[2], "response")
 
 
 def _runs(proposals: Sequence[Proposal], answers: Answers) -> str:

@@ -17,16 +17,14 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from metro.robot.motion import EDGE, PER_PERIOD, Motion, encoder_step, motion
+from metro.robot.determined import STRETCHES, solve
+from metro.robot.kinematics import Geometry
+from metro.robot.motion import EDGE, PER_PERIOD, Motion, evenly
 from metro.robot.rigid_body import gravity_regressor, torque_regressor
 from metro.units import Array
 
-STRETCHES = 30
 WEIGHINGS = 3
 LEAST_NOISE = 1e-6  # of a torque's spread: no joint outweighs the others without limit
-RANK = 1e-5
-ROUNDING = 1e-12  # a column this small beside the largest is zero but for rounding
-DETERMINED = 0.999  # length of a coefficient's direction within those that the data determine
 TERMS = ("coulomb", "viscous", "offset")
 IDLE_CUTOFF_HZ = 10.0
 
@@ -97,7 +95,7 @@ class Curvature:
     p: Array
 
 
-def of_idle_runs(dh: Array, runs: Sequence[tuple[Array, Array, Array]]) -> tuple[Friction, Motion]:
+def of_idle_runs(dh: Geometry, runs: Sequence[tuple[Array, Array, Array]]) -> tuple[Friction, Motion]:
     """Identify the friction of idle runs, so slow that beside it the motors only carry the arm's weight.
 
     Joints that keep their direction throughout have no Coulomb friction of their own in such logs, since it
@@ -118,18 +116,10 @@ def of_idle_runs(dh: Array, runs: Sequence[tuple[Array, Array, Array]]) -> tuple
     ValueError
         If no joint moves.
     """
-    logs = [_settled(_slow_motion(*run)) for run in runs]
+    logs = [_settled(evenly(*run, IDLE_CUTOFF_HZ)) for run in runs]
     parts = {f.name: np.concatenate([getattr(log, f.name) for log in logs]) for f in fields(Motion)}
     log = Motion(**parts)
     return identify(log, weight_columns(dh, log)), log
-
-
-def _slow_motion(time: Array, q: Array, torque: Array) -> Motion:
-    period = float(np.median(np.diff(time)))
-    regular = np.arange(time[0], time[-1], period)
-    columns = [np.interp(regular, time, column) for column in (*q.T, *torque.T)]
-    n, step = q.shape[1], encoder_step(q)  # before gaps are bridged by straight lines
-    return motion(np.array(columns[:n]).T, np.array(columns[n:]).T, period, IDLE_CUTOFF_HZ, step)
 
 
 def _settled(log: Motion) -> Motion:
@@ -140,13 +130,13 @@ def _settled(log: Motion) -> Motion:
     return replace(log, moving=binary_erosion(log.moving, around, border_value=1))
 
 
-def rigid_columns(dh: Array, log: Motion) -> Array:
+def rigid_columns(dh: Geometry, log: Motion) -> Array:
     """Columns (m, n, p) of rigid links and of each motor's own inertia."""
     links = torque_regressor(dh, log.angle, log.rate, log.acceleration)
     return np.concatenate([links, _of_its_own_joint(log.acceleration)], axis=-1)
 
 
-def weight_columns(dh: Array, log: Motion) -> Array:
+def weight_columns(dh: Geometry, log: Motion) -> Array:
     """Columns (m, n, p) of the links' weight: enough where an arm moves slowly."""
     return gravity_regressor(dh, log.angle)
 
@@ -236,31 +226,9 @@ def _fit(log: Motion, own: Array, others: Array) -> Estimate:
     rows = np.broadcast_to(stretch[:, None], log.moving.shape)[log.moving]
     for _ in range(WEIGHINGS):
         weighted = (columns / noise[:, None])[log.moving]
-        value, replicates, known = _solve(weighted, (log.torque / noise)[log.moving], rows)
-        residual = log.torque - columns @ value
+        found = solve(weighted, (log.torque / noise)[log.moving], rows)
+        residual = log.torque - columns @ found.value
         mean_square = np.sum(residual**2, axis=0, where=log.moving) / np.maximum(log.moving.sum(axis=0), 1)
         noise = np.maximum(np.sqrt(mean_square), LEAST_NOISE * spread)
     k = own.shape[-1]
-    return Estimate(value[:k], replicates[:, :k], known[:k], residual, noise)
-
-
-def _solve(columns: Array, torque: Array, stretch: np.ndarray) -> tuple[Array, Array, np.ndarray]:
-    """Coefficients, the same without each stretch, and which of them the data determine.
-
-    In the basis U of the singular value decomposition the normal matrix is I, and that of a stretch UᵍᵀUᵍ.
-    """
-    scale = np.linalg.norm(columns, axis=0)
-    scale[scale <= ROUNDING * scale.max()] = np.inf
-    basis, size, turn = np.linalg.svd(columns / scale, full_matrices=False)
-    rank = int(np.count_nonzero(size > RANK * size[0]))
-    basis, back = basis[:, :rank], (turn[:rank] / size[:rank, None]).T / scale[:, None]
-    known = np.linalg.norm(turn[:rank], axis=0) > DETERMINED
-    whole = basis.T @ torque
-    left_out = []
-    for each in np.unique(stretch):
-        part = basis[stretch == each]
-        left_out.append(
-            # least squares: a stretch that alone determines a coefficient leaves a singular matrix behind
-            np.linalg.lstsq(np.eye(rank) - part.T @ part, whole - part.T @ torque[stretch == each])[0]
-        )
-    return back @ whole, np.array(left_out) @ back.T, known
+    return Estimate(found.value[:k], found.replicates[:, :k], found.known[:k], residual, noise)

@@ -1,6 +1,7 @@
 """Where the flange and the tool tip of a serial arm are, and how they move with its joints.
 
-Denavit–Hartenberg parameters are standard (distal); joint angles q add to the table's θ₀ (physics.md §4).
+Denavit–Hartenberg rows are standard (distal); joint angles q add to the table's θ₀ (physics.md §4). Other
+conventions, linear axes and URDF are a :class:`metro.robot.chain.Chain` in their place.
 """
 
 from __future__ import annotations
@@ -9,7 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from metro.robot.chain import Chain, chain_of_arm
 from metro.units import DEG, JSON, MM, Array
+
+Geometry = Array | Chain
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,12 +22,12 @@ class Arm:
 
     Attributes
     ----------
-    dh : (n, 4) rows θ₀ (rad), α (rad), d (m), a (m).
+    dh : (n, 4) rows θ₀ (rad), α (rad), d (m), a (m), or the chain of its joints.
     tool : (3,) tip in the flange frame, m.
     work : (4, 4) work frame in the base frame.
     """
 
-    dh: Array
+    dh: Geometry
     tool: Array
     work: Array
 
@@ -43,18 +47,37 @@ class Arm:
 
 
 def arm_of_cell(cell: JSON, manifest: JSON) -> Arm | None:
-    """Build the arm from the contract's cell and manifest; None where the cell has no ``arm.dh``.
+    """Build the arm from the contract's cell and manifest; None where the cell has no joints.
 
     Without ``tool_in_flange_mm`` the tip is the flange, without ``work_in_base`` the work frame is the base.
     """
-    rows = (cell.get("arm") or {}).get("dh")
-    if rows is None:
+    geometry = geometry_of_cell(cell)
+    if geometry is None:
         return None
     frame = manifest.get("work_in_base") or {}
     position = np.asarray(frame.get("xyz_mm", (0.0, 0.0, 0.0)), dtype=float) * MM
     turn = np.asarray(frame.get("rpy_deg", (0.0, 0.0, 0.0)), dtype=float) * DEG
     tool = np.asarray(manifest.get("tool_in_flange_mm", (0.0, 0.0, 0.0)), dtype=float) * MM
-    return Arm(np.asarray(rows, dtype=float) * (DEG, DEG, MM, MM), tool, transform(position, rotation(*turn)))
+    return Arm(geometry, tool, transform(position, rotation(*turn)))
+
+
+def geometry_of_cell(cell: JSON) -> Geometry | None:
+    """Return the joints of a cell's arm: standard rows as they are, all else as a chain; None without any."""
+    arm = cell.get("arm") or {}
+    if not (arm.get("dh") or arm.get("chain")):
+        return None
+    base = arm.get("base") or {}
+    place = transform(
+        np.asarray(base.get("xyz_mm", (0.0, 0.0, 0.0)), dtype=float) * MM,
+        rotation(*(np.asarray(base.get("rpy_deg", (0.0, 0.0, 0.0)), dtype=float) * DEG)),
+    )
+    made = chain_of_arm(arm, place)
+    return np.asarray(arm["dh"], dtype=float) * (DEG, DEG, MM, MM) if made is None else made
+
+
+def prismatic(dh: Geometry) -> np.ndarray:
+    """Return which joints shift instead of turning, (n,) bool."""
+    return dh.prismatic if isinstance(dh, Chain) else np.zeros(len(dh), dtype=bool)
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:
@@ -76,7 +99,7 @@ def transform(position: Array, turn: Array) -> Array:
     return matrix
 
 
-def link_frames(dh: Array, q: Array) -> Array:
+def link_frames(dh: Geometry, q: Array) -> Array:
     """Frames of the base and after each joint, in the base frame.
 
     Parameters
@@ -87,8 +110,11 @@ def link_frames(dh: Array, q: Array) -> Array:
     -------
     Array
         (..., n + 1, 4, 4): T_0 = I, T_i = A_1 … A_i, with A_i = Rot_z(θ) Trans(0, 0, d) Trans(a, 0, 0)
-        Rot_x(α). (The printed eq. 2 of [K] has cosθ cosα where sinθ sinα belongs.)
+        Rot_x(α). (The printed eq. 2 of [K] has cosθ cosα where sinθ sinα belongs.) Of a chain T_0 is the frame
+        of the first joint's axis.
     """
+    if isinstance(dh, Chain):
+        return dh.frames(np.asarray(q, dtype=float))
     theta0, alpha, d, a = dh.T
     c, s = np.cos(theta0 + q), np.sin(theta0 + q)
     ca, sa, zero = np.cos(alpha) + 0 * c, np.sin(alpha) + 0 * c, 0 * c
@@ -105,12 +131,12 @@ def link_frames(dh: Array, q: Array) -> Array:
     return np.stack(frames, axis=-3)
 
 
-def forward(dh: Array, q: Array) -> Array:
+def forward(dh: Geometry, q: Array) -> Array:
     """Flange frame in the base frame, (..., 4, 4), for joint angles ``q`` (..., n) in rad."""
     return np.asarray(link_frames(dh, q)[..., -1, :, :])
 
 
-def jacobian(dh: Array, q: Array) -> Array:
+def jacobian(dh: Geometry, q: Array) -> Array:
     """Geometric Jacobian of the flange in the base frame.
 
     Returns
@@ -120,5 +146,8 @@ def jacobian(dh: Array, q: Array) -> Array:
     """
     frames = link_frames(dh, q)
     axis, origin = frames[..., :-1, :3, 2], frames[..., :-1, :3, 3]
-    linear = np.cross(axis, frames[..., -1:, :3, 3] - origin)
-    return np.moveaxis(np.concatenate([linear, axis], axis=-1), -1, -2)
+    linear, angular = np.cross(axis, frames[..., -1:, :3, 3] - origin), axis
+    if (shifts := prismatic(dh)).any():
+        linear = np.where(shifts[:, None], axis, linear)
+        angular = np.where(shifts[:, None], 0.0, axis)
+    return np.moveaxis(np.concatenate([linear, angular], axis=-1), -1, -2)

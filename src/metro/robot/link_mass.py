@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from metro.robot.kinematics import Arm, link_frames
+from metro.robot.kinematics import Arm, Geometry, link_frames, prismatic
 from metro.robot.statics import tip_jacobian
 from metro.units import JSON, MM, Array
 
@@ -52,14 +52,14 @@ def _link(joint: int, body: JSON) -> Link:
     return Link(joint, float(body["mass_kg"]), np.asarray(body["centre_mm"], dtype=float) * MM, inertia)
 
 
-def centres(dh: Array, q: Array, links: Sequence[Link]) -> Array:
+def centres(dh: Geometry, q: Array, links: Sequence[Link]) -> Array:
     """Centres of gravity of the links in the base frame, (m, len(links), 3) m, at ``q`` (m, n) rad."""
     frames = link_frames(dh, q)
     parts = [frames[:, b.joint, :3, :3] @ b.centre + frames[:, b.joint, :3, 3] for b in links]
     return np.stack(parts, axis=1)
 
 
-def joint_mass(dh: Array, q: Array, links: Sequence[Link]) -> Array:
+def joint_mass(dh: Geometry, q: Array, links: Sequence[Link]) -> Array:
     """Mass matrix M(q) of the joints, (m, n, n) kg m²: the links have the kinetic energy ½ q̇ᵀ M(q) q̇.
 
     Parameters
@@ -68,11 +68,13 @@ def joint_mass(dh: Array, q: Array, links: Sequence[Link]) -> Array:
     """
     frames, at = link_frames(dh, q), centres(dh, q, links)
     axes, origins = frames[:, :-1, :3, 2], frames[:, :-1, :3, 3]
-    total = np.zeros((len(q), len(dh), len(dh)))
+    total, shifts = np.zeros((len(q), len(dh), len(dh))), prismatic(dh)[:, None]
     for place, body in enumerate(links):
         moved = np.arange(len(dh)) < body.joint
         turn = np.where(moved[:, None], axes, 0.0)
         shift = np.cross(turn, at[:, place, None] - origins)
+        shift = np.where(shifts, turn, shift)
+        turn = np.where(shifts, 0.0, turn)
         own = frames[:, body.joint, :3, :3]
         inertia = own @ body.inertia @ np.swapaxes(own, -1, -2)
         total += body.mass * shift @ np.swapaxes(shift, -1, -2)

@@ -35,7 +35,15 @@ class Motion:
     moving: np.ndarray
 
 
-def motion(q: Array, torque: Array, period: float, cutoff_hz: float, step: Array | None = None) -> Motion:
+def motion(
+    q: Array,
+    torque: Array,
+    period: float,
+    cutoff_hz: float,
+    step: Array | None = None,
+    *,
+    filtered: bool = False,
+) -> Motion:
     """Filter a log without delay, differentiate, and keep five samples per period of the cut-off.
 
     Parameters
@@ -43,6 +51,8 @@ def motion(q: Array, torque: Array, period: float, cutoff_hz: float, step: Array
     q, torque : (m, n) measured, rad, N m, every ``period`` s.
     cutoff_hz : of the fourth-order low-pass, both ways; at most a tenth of the samples' rate.
     step : (n,) resolution of the joints' encoders, rad; else what the log shows of it.
+    filtered : whether the direction is known wherever the filtered speed shows it, else where each sample
+        does. Of an arm that turns round often, and leaves standstill at once, the first loses less.
     """
     from scipy.signal import butter, sosfiltfilt
 
@@ -54,7 +64,8 @@ def motion(q: Array, torque: Array, period: float, cutoff_hz: float, step: Array
 
     angle = smooth(q)
     rate = np.gradient(angle, period, axis=0)
-    slowest = STEPS * (encoder_step(q) if step is None else step) / period
+    steps = encoder_step(q) if step is None else step
+    slowest = STEPS * (rate_noise(steps, period, cutoff) if filtered else steps / period)
     direction = smooth(np.clip(rate / slowest, -1.0, 1.0))
     edge = min(int(EDGE / (cutoff * period)), len(q) // 4)
     keep = slice(edge, len(q) - edge, max(1, int(1 / PER_PERIOD / (cutoff * period))))
@@ -66,6 +77,34 @@ def motion(q: Array, torque: Array, period: float, cutoff_hz: float, step: Array
         smooth(torque)[keep],
         (np.abs(rate) > slowest)[keep],
     )
+
+
+def rate_noise(step: Array, period: float, cutoff_hz: float) -> Array:
+    """Standard deviation (n,), rad/s, of a low-passed speed by the rounding of angles to ``step`` (n,).
+
+    Rounding is white noise of variance step²/12, of density 2 T step²/12 up to half the samples' rate; its
+    derivative below f_c has the variance ∫ (2πf)² density df = (2π)² 2 T f_c³/3 · step²/12.
+    """
+    return np.asarray(step * 2 * math.pi * cutoff_hz * math.sqrt(2 * period * cutoff_hz / 36))
+
+
+def evenly(time: Array, q: Array, torque: Array, cutoff_hz: float, *, filtered: bool = False) -> Motion:
+    """Filter a log whose clock need not be even, as :func:`motion`; gaps are bridged by straight lines.
+
+    Parameters
+    ----------
+    time : (m,) s, strictly rising. q, torque : (m, n) rad, N m. filtered : as of :func:`motion`.
+    """
+    even, period = even_clock(time)
+    angle, load = (np.array([np.interp(even, time, column) for column in part.T]).T for part in (q, torque))
+    step = encoder_step(q)  # as it is before the bridging
+    return motion(angle, load, period, cutoff_hz, step, filtered=filtered)
+
+
+def even_clock(time: Array) -> tuple[Array, float]:
+    """Return even times over those of a log, and their step: the median of its steps, s."""
+    period = float(np.median(np.diff(time)))
+    return np.arange(time[0], time[-1], period), period
 
 
 def encoder_step(q: Array) -> Array:

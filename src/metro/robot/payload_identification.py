@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from metro.robot.kinematics import Geometry
 from metro.robot.rigid_body import PARAMETERS, torque_regressor
 from metro.units import Array
 
@@ -39,7 +40,7 @@ class Carried:
 
 
 def identify_payload(
-    dh: Array, q: Array, torque: Array, loaded: Array, motion: tuple[Array, Array] | None = None
+    dh: Geometry, q: Array, torque: Array, loaded: Array, motion: tuple[Array, Array] | None = None
 ) -> Carried:
     """Return the load from joint torques with and without it.
 
@@ -72,7 +73,7 @@ def identify_payload(
             "the poses do not tell mass and centre of gravity of the load: expected torques with and without "
             "it, in poses that tilt the flange in several directions"
         )
-    return _carried(values, covariance, left, dof)
+    return carried_of(values, covariance, left, dof)
 
 
 def _friction(rate: Array, moving: bool) -> Array:
@@ -113,7 +114,7 @@ def _span(columns: Array) -> Array:
     return np.asarray(left[:, spread > 1e-9 * spread[0]])
 
 
-def _carried(values: Array, covariance: Array, rms: Array, dof: int) -> Carried:
+def carried_of(values: Array, covariance: Array, rms: Array, dof: int) -> Carried:
     """Turn mass, first moments and inertia about the flange's origin into those about the centre."""
     count = len(values)
     found, change = about_centre(values), np.empty((count, count))

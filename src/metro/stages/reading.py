@@ -12,7 +12,7 @@ from metro.batch.findings import Finding as Problem
 from metro.batch.sources import Files, source
 from metro.formats import FormatError
 from metro.formats.mapping import filled
-from metro.formats.registry import ReadFrf, read, read_frfs, read_pieces
+from metro.formats.registry import ReadFrf, read, read_frfs, read_pieces, sniff
 from metro.signals import quality
 from metro.slips.copies import digest
 from metro.units import Array
@@ -58,6 +58,14 @@ class Recordings:
             return None
         finally:
             self.advance()
+
+    def holds(self, file: str, kind: str) -> bool:
+        """Return whether a file can be read as a kind of table, by its head."""
+        try:
+            sniff(source(self.folder, file, self.files), kind)
+        except FormatError:
+            return False
+        return True
 
     def pieces(self, file: str, kind: str, rows: int, *, again: bool = False) -> Iterator[pd.DataFrame]:
         """Read a file in pieces of so many rows; what cannot be read ends it, a problem gathered.

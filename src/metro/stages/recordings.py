@@ -14,6 +14,7 @@ from metro.batch.batch import Batch
 from metro.batch.canonical import Part
 from metro.dynamics.driving import turning
 from metro.dynamics.hits import Hit, fault
+from metro.robot.drives import drives_of_cell
 from metro.signals import plausible, quality
 from metro.signals.conversion import driving_point_sign, receptance, response_si, sensor_to_tool
 from metro.signals.record_quality import RecordQuality
@@ -25,6 +26,13 @@ POINT = ("x_mm", "y_mm", "z_mm")
 SET = tuple(f"q{i}_set_deg" for i in range(1, 7))
 ACTUAL = tuple(f"q{i}_deg" for i in range(1, 7))
 TORQUES = tuple(f"tau{i}_nm" for i in range(1, 7))
+NO_SET_POINTS = quality.Finding(
+    "set-points",
+    np.nan,
+    np.nan,
+    True,
+    "the log has no set-points: the path is that of the measured angles, how the arm follows is not known",
+)
 PIECE = 1 << 19  # samples of a force record in memory at a time
 
 
@@ -83,12 +91,21 @@ def robot(batch: Batch, recordings: Recordings) -> Iterator[Part]:
     places: dict[str, Array] = {}
     for column, log in (("robot_log", "cut"), ("idle_log", "idle")):
         for run, file in files(batch, column):
+            free = batch.runs["joint_log"][run] == file  # which need not have all that the log of a cut has
+            if free and not recordings.holds(file, "robot"):
+                recordings.left_out.append((run, column))
+                continue
             table = recordings.table(file, "robot")
             if table is None:
                 continue
             time, own = _from_zero(table)
-            goes = table[list(SET)].to_numpy()
-            doubt = plausible.clock(time, rate) or _joint_doubt(table)
+            followed = SET[0] in table
+            goes = table[list(SET if followed else ACTUAL)].to_numpy()
+            lacking = _with_torques(batch, table)
+            if free and lacking:
+                recordings.left_out.append((run, column))
+                continue
+            doubt = plausible.clock(time, rate) or _joint_doubt(table) or lacking
             if log == "idle" and run in places:
                 doubt = doubt or plausible.same_place(places[run], goes)
             if recordings.doubt(file, doubt):
@@ -97,10 +114,11 @@ def robot(batch: Batch, recordings: Recordings) -> Iterator[Part]:
             zero = recordings.zeros.get(run, own) if log == "cut" else own
             recordings.note(file, run, [_starts_at(zero), *quality.sampling(time, rate)])
             recordings.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
+            recordings.note(file, run, [] if followed else [NO_SET_POINTS])
             checks = [quality.motion(goes), *_channels(TORQUES, table[list(TORQUES)].to_numpy(), None)]
             if not recordings.fit(file, run, column, checks):
                 continue
-            angles = {str(name): table[name] for name in table.columns.drop("t_s")}
+            angles = {name: table[name] for name in (*SET, *ACTUAL, *TORQUES) if name in table}
             yield {"run": run, "log": log, "t_s": time + (own - zero), **angles}
 
 
@@ -247,9 +265,25 @@ def _force_unit(batch: Batch, run: str, largest: float) -> str:
 
 
 def _joint_doubt(table: pd.DataFrame) -> str:
-    names = [*SET, *ACTUAL]
+    followed = SET[0] in table
+    names = [*(SET if followed else ()), *ACTUAL]
     doubt = plausible.angles(names, table[names].to_numpy())
-    return doubt or plausible.following(table[list(SET)].to_numpy(), table[list(ACTUAL)].to_numpy())
+    if doubt or not followed:
+        return doubt
+    return plausible.following(table[list(SET)].to_numpy(), table[list(ACTUAL)].to_numpy())
+
+
+def _with_torques(batch: Batch, table: pd.DataFrame) -> str:
+    """Add the torques of a log of currents, by the constants of the cell; say what is missing for that."""
+    if TORQUES[0] in table:
+        return ""
+    constant = drives_of_cell(batch.cell, len(TORQUES)).constant
+    if not np.isfinite(constant).all():
+        fault = "has currents (current1_a …) and no torques (tau1_nm …)"
+        return f"{fault}, expected drives.torque_per_ampere_nm_a in the cell, to turn them into torques"
+    for k, name in enumerate(TORQUES):
+        table[name] = table[f"current{k + 1}_a"] * constant[k]
+    return ""
 
 
 def _hit(hit: Hit) -> quality.Finding:

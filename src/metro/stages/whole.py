@@ -29,8 +29,8 @@ from metro.batch.findings import Finding, errors
 from metro.batch.processed import COLUMNS, Processed, Tables
 from metro.batch.sources import SECTION, files_of, parted
 from metro.observables.catalogue import capabilities
+from metro.stages import joint_logs, scans
 from metro.stages import recordings as parts
-from metro.stages import scans
 from metro.stages.data_checks import data_findings
 from metro.stages.reading import Recordings
 from metro.units import JSON
@@ -39,6 +39,7 @@ from metro.units import JSON
 RUN_FILES = {
     "force": ("dynamometer",),
     "robot": ("robot_log", "idle_log"),
+    "joint": ("joint_log",),
     "path": ("path",),
     "scan": ("scan",),
     "profile": ("profile",),
@@ -190,6 +191,7 @@ def _tables(loaded: Loaded, recordings: Recordings) -> Iterator[tuple[str, Itera
     batch = loaded.batch
     yield "force", parts.force(batch, recordings)
     yield "robot", parts.robot(batch, recordings)
+    yield "joint", joint_logs.joint(batch, recordings)
     yield "path", parts.path(batch, recordings)
     yield "scan", scans.scan(batch, recordings)
     yield "profile", parts.profile(batch, recordings)

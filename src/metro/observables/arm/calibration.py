@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.quantity import quantity
+from metro.robot.drives import drives_of_cell
 from metro.robot.kinematics import arm_of_cell
 from metro.robot.orientation import matrix_of_euler, matrix_of_quaternion, quaternion_of_euler
 from metro.robot.payload_identification import Carried, identify_payload
@@ -102,13 +104,28 @@ def _payload(batch: Batch, table: pd.DataFrame) -> JSON:
         motion = (table[moved[0]].to_numpy(dtype=float) * DEG, table[moved[1]].to_numpy(dtype=float) * DEG)
     q = table[[f"q{i}_deg" for i in JOINTS]].to_numpy(dtype=float) * DEG
     torque = table[[f"tau{i}_nm" for i in JOINTS]].to_numpy(dtype=float)
-    return _carried_json(identify_payload(arm.dh, q, torque, table["loaded"].to_numpy() == "yes", motion))
+    carried = identify_payload(arm.dh, q, torque, table["loaded"].to_numpy() == "yes", motion)
+    drives = drives_of_cell(batch.cell, len(JOINTS))
+    return {**carried_json(with_gain(carried, float(drives.relative.max()))), "drives": drives.source}
 
 
-def _carried_json(carried: Carried) -> JSON:
+def with_gain(carried: Carried, relative: float) -> Carried:
+    """Return a load with an error in it by which all torques may be wrong alike: of mass and inertia.
+
+    The centre of gravity is a ratio of moments, which such an error leaves alone.
+    """
+    size = np.concatenate([[carried.mass], np.zeros(3), carried.inertia])
+    return replace(carried, covariance=carried.covariance + relative**2 * np.outer(size, size))
+
+
+def carried_json(carried: Carried) -> JSON:
+    """Return a load as the block ``payload`` of identified.json."""
     spread = np.sqrt(np.diag(carried.covariance))
     centre = _along("xyz", carried.centre / MM, carried.covariance[1:4, 1:4] / MM**2, "mm", carried.dof)
     block: JSON = {"mass": quantity(carried.mass, spread[0], "kg", carried.dof), "centre": centre}
     if np.isfinite(carried.inertia).all():
         block["inertia"] = _along(INERTIA, carried.inertia, carried.covariance[4:, 4:], "kg m2", carried.dof)
-    return block | {"rms": [float(left) for left in carried.rms], "dof": carried.dof}
+    return block | {
+        "rms": [float(left) if np.isfinite(left) else None for left in carried.rms],
+        "dof": carried.dof,
+    }

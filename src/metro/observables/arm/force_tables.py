@@ -8,7 +8,7 @@ in the tool's frame), ``robot_refused``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +17,8 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
-from metro.observables.arm.tip_force import FORCE, JOINTS, Log, Sensorless
+from metro.observables.arm.tip_force import FORCE, JOINTS, REPEATABLE, Log, Sensorless
 from metro.observables.arm.wall import Wall, wall
-from metro.observables.joint_force.observable import REPEATABLE
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import Arm
 from metro.robot.sensorless import (
@@ -57,6 +56,15 @@ class Common:
 
     friction: Array
     wander: Array
+
+
+def logged_cuts(batch: Batch, read: Tables, arm: Arm) -> Iterator[tuple[str, Log, Log]]:
+    """Yield the runs whose log moves, in the order of cutting: name, log of the cut, log of the idle run."""
+    logged = set(read("robot")["run"].astype(str))
+    for run in [str(r) for r in batch.runs.sort_values("order", kind="stable").index if str(r) in logged]:
+        cut, idle = tip_force.logs(read("robot", run), arm)
+        if len(cut.tip):
+            yield run, cut, idle
 
 
 def run_force(batch: Batch, cut: Log, idle: Log, arm: Arm, face: Wall) -> RunForce:

@@ -13,8 +13,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
-from metro.observables.arm import tip_force
-from metro.observables.arm.force_tables import RunForce, aligned, force_tables, run_force
+from metro.observables.arm.force_tables import RunForce, aligned, force_tables, logged_cuts, run_force
 from metro.observables.arm.tip_force import JOINTS, Log, Sensorless
 from metro.observables.arm.tracking_tables import tracking_tables
 from metro.observables.arm.wall import Wall, wall
@@ -43,18 +42,15 @@ def robot_tables(
         return {}
     parts: dict[str, list[pd.DataFrame]] = {}
     start = None
-    logged = set(read("robot")["run"].astype(str))
     solved: dict[str, RunForce] = {}
-    for run in [str(r) for r in batch.runs.sort_values("order", kind="stable").index if str(r) in logged]:
-        cut, idle = tip_force.logs(read("robot", run), arm)
-        if not len(cut.tip):
-            continue
+    for run, cut, idle in logged_cuts(batch, read, arm):
         face = wall(batch, run)
         start = cut.commanded[len(cut.commanded) // 2] if start is None else start
         solved[run] = run_force(batch, cut, idle, arm, face)
         first = "robot_aligned" not in parts and isinstance(solved[run].sensorless, Sensorless)
         tables = {"robot_aligned": _aligned(cut, idle, face, solved[run])} if first else {}
-        for name, table in (tables | tracking_tables(cut, idle, arm, face)).items():
+        tracked = tracking_tables(cut, idle, arm, face) if cut.followed else {}
+        for name, table in (tables | tracked).items():
             parts.setdefault(name, []).append(table.assign(run=run))
     parts |= force_tables(batch, read, solved)
     tables = {name: pd.concat(tables, ignore_index=True) for name, tables in parts.items()}

@@ -17,6 +17,7 @@ from metro.observables.cut import conditions as cutting_force
 from metro.observables.cut.long_record import LongRecord
 from metro.observables.problem import Refusal
 from metro.robot.drive_torques import TURNING
+from metro.robot.joint_dynamics import low_passed
 from metro.robot.kinematics import Arm
 from metro.robot.sensorless import (
     LEAST_INDEX,
@@ -41,9 +42,11 @@ SET = [f"q{i}_set_deg" for i in JOINTS]
 ACTUAL = [f"q{i}_deg" for i in JOINTS]
 TORQUE = [f"tau{i}_nm" for i in JOINTS]
 FORCE = ["fx_n", "fy_n", "fz_n"]
+NO_SET_POINTS = "the robot log has no set-points (q1_set_deg …): how far the tip strayed is not known"
 BIN = 1 * MM
 LEAST_BINS = 5
 ITERATIONS = 6
+REPEATABLE = 0.1  # of the torque's noise: how well the friction of the cut is that of the idle run
 LEAST_NOISE = 1e-3  # N m: floor for a log whose digits are coarser than its noise
 
 # Relative error that all runs may share, by the source of the force: friction that differs from the idle run;
@@ -55,7 +58,8 @@ SYSTEMATIC = {"torque": 0.05, "dynamometer": 0.01, "coefficients": 0.03}
 class Log:
     """The moving part of a robot log: joint angles (n, 6) rad, torques (n, 6) N m, commanded tip (n, 3) m.
 
-    ``time`` (n,) s by the dynamometer's clock; empty if there is none.
+    ``time`` (n,) s by the dynamometer's clock; empty if there is none. ``followed``: whether set-points were
+    logged; else ``commanded`` are the measured angles, smoothed.
     """
 
     commanded: Array
@@ -63,6 +67,7 @@ class Log:
     torque: Array
     tip: Array
     time: Array = field(default_factory=lambda: np.zeros(0))
+    followed: bool = True
 
     @property
     def interval(self) -> Array | None:
@@ -77,12 +82,15 @@ def logs(table: pd.DataFrame, arm: Arm) -> tuple[Log, Log]:
 
 
 def _log(table: pd.DataFrame, arm: Arm) -> Log:
-    commanded = table[SET].to_numpy(dtype=float) * DEG
+    commanded, given = table[SET].to_numpy(dtype=float) * DEG, True
+    if len(table) and not np.isfinite(commanded).all():
+        measured = table[ACTUAL].to_numpy(dtype=float) * DEG
+        commanded, given = low_passed(table["t_s"].to_numpy(dtype=float), measured), False
     tip = arm.tip(commanded)
     moves = align.moving(tip) if len(tip) > 2 else np.zeros(len(tip), dtype=bool)
     actual, torque = table[ACTUAL].to_numpy(dtype=float) * DEG, table[TORQUE].to_numpy(dtype=float)
     time = table["t_s"].to_numpy(dtype=float)
-    return Log(commanded[moves], actual[moves], torque[moves], tip[moves], time[moves])
+    return Log(commanded[moves], actual[moves], torque[moves], tip[moves], time[moves], given)
 
 
 @dataclass(frozen=True, eq=False)

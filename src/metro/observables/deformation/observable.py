@@ -77,7 +77,11 @@ def _observed(
         force, source = tip_force.from_coefficients(batch, run, identified, face, give), "coefficients"
     tables["tip_force"] = force if isinstance(force, Refusal) else force.assign(source=source)
     if run in batch.with_files("profile"):
-        tables["profile_points"] = _points(batch, read("profile", run), log, face, arm)
+        lost = len(cut.tip) and not cut.followed
+        points = (
+            Refusal(tip_force.NO_SET_POINTS) if lost else _points(batch, read("profile", run), log, face, arm)
+        )
+        tables["profile_points"] = points
     return tables
 
 

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
-from metro.batch.capabilities import Capability, Stock, capability, count, missing_roles
+from metro.batch.capabilities import (
+    Capability,
+    Stock,
+    capability,
+    count,
+    missing_files,
+    missing_roles,
+    plural,
+)
 from metro.observables.description import Description
-from metro.observables.joint_force import NAME, TABLES
+from metro.observables.joint_force import NAME, OF_LOGS, TABLES
 
 
 def needs(stock: Stock) -> tuple[Capability, ...]:
@@ -20,7 +28,19 @@ def needs(stock: Stock) -> tuple[Capability, ...]:
     needs = [*stock.missing_arm(), *logs]
     return (
         capability("joint force", count(logged, "robot_log and idle_log"), needs, wishes, measured=measured),
+        _of_logs(stock),
     )
+
+
+def _of_logs(stock: Stock) -> Capability:
+    """Return what is there and lacking of logs of an arm that moves freely."""
+    logs = stock.runs[stock.runs["joint_log"] != ""]
+    wishes = [] if stock.has_arm() else ["arm.dh or arm.urdf in cell.yaml, for friction and payload"]
+    states = set(logs["loaded"])
+    if "yes" in states and "no" not in states:
+        wishes.append("a joint_log with loaded: no, for the payload")
+    source = f"{plural(len(logs), 'joint log')}"
+    return capability("joints", source, missing_files(logs, "joint_log"), wishes, measured=len(logs) > 0)
 
 
 DESCRIPTION = Description(
@@ -31,7 +51,7 @@ DESCRIPTION = Description(
         "between the two runs is read as force."
     ),
     tables=TABLES,
-    shown=("joint_friction", "joint_friction_curve"),
+    shown=("joint_friction", "joint_friction_curve", *OF_LOGS),
     drawn=(),
     needs=needs,
 )

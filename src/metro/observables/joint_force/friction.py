@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.observables.arm.tip_force import ACTUAL, TORQUE
 from metro.observables.problem import Refusal
+from metro.robot.drives import declared, drives_of_cell
 from metro.robot.friction import Friction, of_idle_runs
 from metro.robot.kinematics import arm_of_cell
 from metro.robot.motion import Motion
@@ -40,12 +42,16 @@ def observe(batch: Batch, read: Read) -> dict[str, pd.DataFrame] | Refusal:
         friction, log = of_idle_runs(arm.dh, runs)
     except ValueError as error:
         return Refusal(f"idle runs: {error}")
-    return {"joint_friction": _table(friction, log), "joint_friction_curve": _curve(friction, log)}
+    drives = drives_of_cell(batch.cell, len(TORQUE))
+    relative = drives.relative if declared(batch.cell) else np.zeros(len(TORQUE))
+    return {"joint_friction": _table(friction, log, relative), "joint_friction_curve": _curve(friction, log)}
 
 
-def _table(friction: Friction, log: Motion) -> pd.DataFrame:
+def _table(friction: Friction, log: Motion, relative: Array) -> pd.DataFrame:
+    """Tabulate the friction; ``relative`` (n,) is the standard uncertainty of the torques, where declared."""
     fastest = np.where(log.moving, np.abs(log.rate), 0.0).max(axis=0)
-    interval = friction.interval()
+    drives = np.hypot(friction.sd, relative[:, None] * np.nan_to_num(friction.value))
+    interval = replace(friction, sd=drives).interval()
     half = 0.5 * np.ptp(interval, axis=-1)
     rows = []
     for j in range(len(fastest)):

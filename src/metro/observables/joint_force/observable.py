@@ -10,9 +10,10 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
-from metro.observables.arm import tip_force
+from metro.observables.arm import joint_logs, tip_force
 from metro.observables.arm.clock import Clock, clock
-from metro.observables.arm.tip_force import ACTUAL, FORCE, JOINTS, TORQUE
+from metro.observables.arm.force_by_torques import force_without_dynamometer
+from metro.observables.arm.tip_force import ACTUAL, FORCE, JOINTS, REPEATABLE, TORQUE
 from metro.observables.arm.wall import wall
 from metro.observables.joint_force import NAME, TABLES, friction
 from metro.observables.joint_force.model import (
@@ -27,6 +28,7 @@ from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.robot.drive_torques import TURNING
+from metro.robot.drives import declared, drives_of_cell
 from metro.robot.kinematics import Arm, arm_of_cell
 from metro.robot.statics import tip_jacobian
 from metro.signals import align, kalman
@@ -36,7 +38,6 @@ from metro.units import DEG, JSON, MM, MS, Array
 
 SCATTER = 0.01
 CALIBRATED = 0.01  # relative error of the torque of a joint and of an axis of the dynamometer, in all runs
-REPEATABLE = 0.1  # of the torque's noise: how well the friction of the cut is that of the idle run
 
 GRID = 5 * MS
 RATE = [f"rate{i}_deg_s" for i in JOINTS]
@@ -180,14 +181,20 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     model = JointForceModel(arm)
     scatter = np.zeros(len(model.parameters))
     scatter[0] = SCATTER
-    return Problem(NAME, "N", 1.0, model, (_instruments(), *blocks), scatter, notes=notes, basis_unit="N m")
+    return Problem(
+        NAME, "N", 1.0, model, (_instruments(batch), *blocks), scatter, notes=notes, basis_unit="N m"
+    )
 
 
-def _instruments() -> Block:
-    """Return what is known of the gains of joints and axes."""
+def _instruments(batch: Batch) -> Block:
+    """Return what is known of the gains of joints and axes; of joints, what the cell declares of each one."""
     count = len(JOINTS) + len(WORK)
     zeros, axis = np.zeros((count, 0)), np.array([*(f"joint {i}" for i in JOINTS), *WORK])
     known, sigma = np.zeros(count), np.full(count, CALIBRATED)
+    if declared(batch.cell):
+        drives = drives_of_cell(batch.cell, len(JOINTS)).covariance
+        own = np.diag(drives) - drives[0, 1]  # what joints share is the gain of all torques
+        sigma[: len(JOINTS)] = np.maximum(np.sqrt(np.maximum(own, 0.0)), CALIBRATED)
     return Block(
         "instruments", "instruments", "calibrate", 0, known, sigma, Instruments(), axis, zeros, known[:0], {}
     )
@@ -287,10 +294,14 @@ def report(
     }
 
 
-def idle_friction(batch: Batch, read: Tables, _identified: JSON) -> tuple[dict[str, pd.DataFrame], JSON]:
-    """Return the friction of the joints by the idle runs."""
+def beside(batch: Batch, read: Tables, identified: JSON) -> tuple[dict[str, pd.DataFrame], JSON]:
+    """Return the friction of the joints by the idle runs, and all that logs of a free motion say."""
     tables = friction.observe(batch, read)
-    return ({} if isinstance(tables, Refusal) else tables), friction.report(tables)
+    free, blocks = joint_logs.observe(batch, read)
+    if free and isinstance(tables, Refusal):
+        tables = Refusal("")  # the joint logs tell the friction
+    arm = {**friction.report(tables).get("arm", {}), **force_without_dynamometer(batch, read, identified)}
+    return ({} if isinstance(tables, Refusal) else tables) | free, {**({"arm": arm} if arm else {}), **blocks}
 
 
-OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, beside=idle_friction)
+OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, beside=beside)

@@ -44,6 +44,8 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
         result: Any = Refusal("no robot_log: how the tip strayed is not known")
         if not face.normal.any():
             result = Refusal("direction is neither up nor down: which wall was traced is not known")
+        elif len(cut.tip) and not cut.followed:
+            result = Refusal(tip_force.NO_SET_POINTS)
         elif len(cut.tip):
             result = wave_points(read("profile", run), cut, idle, arm, face, cutoff=_cutoff(batch))
         if isinstance(result, Refusal):

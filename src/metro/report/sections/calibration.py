@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-import numpy as np
-
-from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
-from metro.report.numbers import number, quantity
+from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Section, Table
+from metro.report.figures import joint_logs as figures
+from metro.report.numbers import listing, number, percent, quantity
 from metro.report.results import Results
 from metro.units import JSON, printed
 
@@ -37,6 +36,7 @@ def calibration(results: Results) -> Section | None:
     ):
         if rows:
             items += [Heading(title), _table(rows, said)]
+    items += _by_joint(block, results)
     quaternion = (block.get("work") or {}).get("quaternion")
     if quaternion:
         parts = ", ".join(f"{part:.6f}" for part in quaternion).replace("-", "−")
@@ -124,10 +124,41 @@ def _touching(block: JSON) -> str:
     )
 
 
+def _by_joint(block: JSON, results: Results) -> list[Item]:
+    """Say of the payload of joint logs what its interval holds, and draw what the load adds to the torques."""
+    carried, course = block.get("payload") or {}, results.tables.get("payload_course")
+    if "by_joint" not in carried:
+        return []
+    factors = [
+        f"joint {joint} {quantity(factor, with_unit=False)}"
+        for joint, factor in enumerate(carried["by_joint"], start=1)
+        if factor
+    ]
+    mass = quantity(carried["mass_by_logs_alone"])
+    text = (
+        f"By noise and friction alone the mass would be {mass}. In its interval is, besides, the error of the "
+        f"drive constants: {carried['drives']}. What they share scales every mass and moment alike, and no log "
+        "of torques or currents can show it. By how much a joint alone would make the load larger: "
+        f"{listing(factors)}; "
+        f"beyond their errors these scatter by {percent(carried['scatter_of_drives'])}, which is in the "
+        "interval, too. To measure the mass better, weigh it, or take a pair of logs with a known mass."
+    )
+    items: list[Item] = [Paragraph(text)]
+    if course is not None:
+        one, two = carried["pairs"][0]
+        caption = (
+            f"Torques of run {two} less those of run {one} at the same places, and the torque of the load that "
+            "was identified; what differs is friction that the load changes."
+        )
+        items.append(Picture(figures.load(course), caption, caption))
+    return items
+
+
 def _torques(block: JSON) -> str:
     carried = block.get("payload")
     if not carried:
         return ""
-    left = ", ".join(number(value, 2) for value in np.asarray(carried["rms"]))
+    left = ", ".join("–" if value is None else number(value, 2) for value in carried["rms"])
     inertia = "" if "inertia" in carried else " Torques at rest do not tell the moments of inertia."
-    return f"Torques with and without the load leave {left} N m at joints 1 to 6 (rms).{inertia}"
+    last = len(carried["rms"])
+    return f"Torques with and without the load leave {left} N m at joints 1 to {last} (rms).{inertia}"

@@ -34,6 +34,7 @@ FACES = {
 RUN_BLOCKS = {
     "clock_offset_s": "clock offset",
     "tip_force": "tip force",
+    "tip_force_by_torques": "tip force by the torques",
     "deformation": "deformation",
     "waviness": "waviness",
     "observability": "observability of the joints",
@@ -44,6 +45,7 @@ ELSEWHERE = {
     "study": "factors and configurations",
     "arm": "the robot arm",
     "calibration": "tool, work and payload",
+    "joints": "the joints",
 }
 OF_ROBOT = ("observability", "waviness")  # the robot's own section shows them
 LONGEST, ABREAST = 30, 3

@@ -47,6 +47,11 @@ def _planned_words(planned: list[str]) -> str:
 def _run_words(runs: pd.DataFrame) -> str:
     if runs.empty:
         return ""
+    free = runs["joint_log"] != "" if "joint_log" in runs else pd.Series(False, runs.index)
+    logs = f" {count_of(int(free.sum()), 'joint log')} of a free motion." if free.any() else ""
+    runs = runs[~free]
+    if runs.empty:
+        return logs
     operations = listing([str(o) for o in runs["operation"].dropna().unique() if str(o)])
     one = len(runs) == 1
     made = f" {count_of(len(runs), 'cutting run')} ({operations or 'operation not stated'})"
@@ -55,5 +60,6 @@ def _run_words(runs: pd.DataFrame) -> str:
     if not recorded:
         return (
             f"{made} {'was' if one else 'were'} made; no record of {'it' if one else 'them'} is in the batch."
+            f"{logs}"
         )
-    return f"{made}, {recorded} recorded, {held} of them held out: no model saw those before it was judged."
+    return f"{made}, {recorded} recorded, {held} of them held out: no model saw those before it was judged.{logs}"

@@ -11,6 +11,7 @@ from metro.report.figures import robot as figures
 from metro.report.numbers import listing, number, quantity
 from metro.report.results import Results
 from metro.report.sections.friction import friction
+from metro.report.sections.joint_logs import joint_logs
 from metro.report.sections.joint_torques import joint_torques
 from metro.report.sections.stiffness import LONGEST, arm_stiffness, band, more, stations
 from metro.report.sections.tracking import tracking
@@ -25,6 +26,7 @@ def robot(results: Results) -> Section | None:
     items = [
         *joint_torques(results),
         *friction(results),
+        *joint_logs(results),
         *_deformation(results),
         *arm_stiffness(results),
         *stations(results),

@@ -64,20 +64,43 @@ def _declared(manifest: JSON) -> list[Item]:
 
 def _arm(cell: JSON, manifest: JSON) -> list[Item]:
     """Tabulate the arm's Denavit–Hartenberg parameters, as in [K] table 1; nothing where there is no arm."""
-    dh = (cell.get("arm") or {}).get("dh")
+    arm = cell.get("arm") or {}
+    dh = arm.get("dh")
     if not dh:
-        return []
+        return _chain(arm, cell)
     names = ("θ₀ (°)", "α (°)", "d (mm)", "a (mm)")
     rows = [[name, *(f"{float(row[i]):g}".replace("-", "−") for row in dh)] for i, name in enumerate(names)]
     caption = (
-        f"Denavit–Hartenberg parameters of the arm {cell.get('cell', '')}, standard (distal) convention."
+        f"Denavit–Hartenberg parameters of the arm {cell.get('cell', '')}, "
+        f"{'modified (proximal)' if arm.get('convention') == 'modified' else 'standard (distal)'} convention."
     )
+    kinds = arm.get("joints")
+    if kinds:
+        rows.append(["joint", *kinds])
     if tip := manifest.get("tool_in_flange_mm"):
         place = ", ".join(f"{float(value):g}" for value in tip).replace("-", "−")
         caption += f" Tool tip in the flange frame: {place} mm."
     numeric = list(range(1, len(dh) + 1))
     header = ["", *(f"joint {i}" for i in numeric)]
     return [Table(header, rows, caption, [1.2, *([1.0] * len(dh))], numeric=numeric, small=True)]
+
+
+def _chain(arm: JSON, cell: JSON) -> list[Item]:
+    """Tabulate the joints of a URDF file; nothing where there is no arm."""
+    if not arm.get("chain"):
+        return []
+    rows = []
+    for joint in arm["chain"]:
+        origin = [1e3 * row[3] for row in joint["origin"][:3]]
+        place = ", ".join(f"{value:.6g}" for value in origin).replace("-", "−")
+        axis = "–" if joint["kind"] == "fixed" else ", ".join(f"{value:.4g}" for value in joint["axis"])
+        rows.append([str(joint["name"]), str(joint["kind"]), place, axis.replace("-", "−")])
+    caption = (
+        f"Joints of the arm {cell.get('cell', '')} as {arm.get('urdf')} describes them: origins in the frame "
+        "before, axes in their own."
+    )
+    header = ["joint", "kind", "origin (mm)", "axis"]
+    return [Table(header, rows, caption, [1.6, 1, 2, 1.4], small=True)]
 
 
 def _values(values: JSON) -> Iterator[str]:

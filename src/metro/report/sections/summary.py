@@ -12,6 +12,7 @@ from metro.report.numbers import listing, number, percent, probability, quantity
 from metro.report.phrases import sentence
 from metro.report.results import Results, heading
 from metro.report.sections import findings
+from metro.report.sections.joint_words import joint_words
 from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
@@ -147,6 +148,7 @@ def _identified_words(identified: JSON) -> str:
         "cutting coefficients" if identified.get("force") else "",
         "joint stiffness" if (identified.get("arm") or {}).get("joint_stiffness") else "",
         "flatness of faces" if identified.get("faces") else "",
+        *joint_words(identified),
     ]
     listed = listing([name for name in named if name])
     return f"Identified: {listed}." if listed else ""

@@ -1,0 +1,126 @@
+"""The arm of a cell: its joints from rows or a URDF file, and what its other keys must fulfil."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from metro.batch.files import in_the_air
+from metro.batch.findings import Finding, linked_outside
+from metro.batch.tables import Table
+from metro.units import JSON
+
+SHORTEST_ARM_MM = 10.0
+ROWS = ("convention", "joints")  # keys that say how rows are meant
+LINKS = ("base_link", "tip_link")  # and those that say which part of a URDF file
+MOVING = ("revolute", "prismatic")
+OF_SIX = ("robot_log", "idle_log")  # columns of runs.csv whose files have six joints
+
+
+def with_joints(arm: JSON, folder: Path, file: str) -> tuple[JSON, list[Finding]]:
+    """Return an arm whose URDF file, where it names one, has been read into ``chain``; and what is wrong.
+
+    ``folder``: that of ``file``, the cell.
+    """
+    if ("dh" in arm) == ("urdf" in arm):
+        found = "found both" if "dh" in arm else "found neither"
+        message = f"{found}, expected dh (Denavit-Hartenberg rows) or urdf (a file beside {Path(file).name})"
+        return arm, [Finding("error", file, message, column="arm.dh")]
+    useless = [key for key in (LINKS if "dh" in arm else ROWS) if key in arm]
+    if useless:
+        message = f"is of no use with arm.{'dh' if 'dh' in arm else 'urdf'}"
+        return arm, [Finding("error", file, message, column=f"arm.{useless[0]}")]
+    if "links" in arm and ("urdf" in arm or arm.get("convention") == "modified"):
+        message = "are stated in the frames of standard Denavit-Hartenberg rows, expected arm.dh of these"
+        return arm, [Finding("error", file, message, column="arm.links")]
+    if "dh" in arm:
+        return arm, [*_kinds(arm, file), *_units(arm["dh"], file)]
+    return _of_urdf(arm, folder, file)
+
+
+def _of_urdf(arm: JSON, folder: Path, file: str) -> tuple[JSON, list[Finding]]:
+    from metro.formats import FormatError
+    from metro.formats.urdf import read_urdf
+
+    name = arm["urdf"]
+    if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
+        message = f'found "{name}", expected a file beside {Path(file).name}'
+        return arm, [Finding("error", file, message, column="arm.urdf")]
+    if outside := linked_outside(folder, folder / name, f"{Path(file).name}: arm.urdf"):
+        return arm, outside
+    try:
+        joints = read_urdf(folder / name, arm.get("base_link", ""), arm.get("tip_link", ""))
+    except FormatError as error:
+        return arm, [Finding("error", file, f"{name}: {error.message}", column="arm.urdf")]
+    chain = [
+        {
+            "name": joint.name,
+            "kind": joint.kind,
+            "origin": joint.origin.tolist(),
+            "axis": joint.axis.tolist(),
+        }
+        for joint in joints
+    ]
+    return {**arm, "chain": chain}, []
+
+
+def axes_of(cell: JSON) -> int:
+    """Return how many axes of a cell's arm move; 0 where nothing is known of it."""
+    arm = cell.get("arm") or {}
+    if arm.get("chain"):
+        return sum(joint["kind"] in MOVING for joint in arm["chain"])
+    kinds = arm.get("joints") or ["revolute"] * len(arm.get("dh") or ())
+    return sum(kind in MOVING for kind in kinds)
+
+
+def counts(cell: JSON, file: str) -> Iterator[Finding]:
+    """Check that lists with an entry per joint have as many entries as the arm has joints."""
+    axes = axes_of(cell)
+    lists = {"arm.links": (cell.get("arm") or {}).get("links"), "joint_stiffness_nm_rad": None}
+    lists["joint_stiffness_nm_rad"] = cell.get("joint_stiffness_nm_rad")
+    lists |= {f"drives.{key}": value for key, value in (cell.get("drives") or {}).items()}
+    for key, values in lists.items():
+        if axes and isinstance(values, list) and len(values) != axes:
+            message = f"has {len(values)} entries, expected {axes}: one for each joint of the arm"
+            yield Finding("error", file, message, column=key)
+
+
+def six_axes(cell: JSON, tables: Mapping[str, Table]) -> Iterator[Finding]:
+    """Check that an arm has six joints where tables or logs with six joint angles are there."""
+    axes = axes_of(cell)
+    if axes in (0, 6):
+        return
+    expected = f"has six joints, expected those of an arm with {axes}, as the cell has"
+    runs = tables["runs"]
+    for position, row in enumerate(runs.frame.to_dict("records")):
+        for column in OF_SIX:
+            if row[column] and in_the_air(row) != column:
+                message = f"a {column} {expected}: name the log of a free motion under joint_log"
+                yield runs.finding(position, column, message)
+    for name in ("loads", "mass", "payload"):
+        table = tables[name]
+        if len(table.frame) and table.frame["q1_deg"].notna().any():
+            yield Finding("error", table.file, f"the table {expected}", column="q1_deg")
+
+
+def _kinds(arm: JSON, file: str) -> Iterator[Finding]:
+    """Check that every row has its kind, and that two joints or more move."""
+    kinds, rows = arm.get("joints"), len(arm["dh"])
+    if kinds is not None and len(kinds) != rows:
+        message = f"has {len(kinds)} entries, expected {rows}: one for each row of arm.dh"
+        yield Finding("error", file, message, column="arm.joints")
+    elif kinds is not None and sum(kind in MOVING for kind in kinds) < 2:
+        yield Finding("error", file, "found fewer than two joints that move", column="arm.joints")
+
+
+def _units(rows: list[list[float]], file: str) -> Iterator[Finding]:
+    """Check the units of an arm's rows: theta_deg, alpha_deg, d_mm, a_mm."""
+    twist = max(abs(value) for row in rows for value in row[:2])
+    length = max(abs(value) for row in rows for value in row[2:])
+    if 0 < twist <= 2 * math.pi:
+        message = f"found no angle beyond {twist:g}, expected degrees: theta and alpha seem to be in radians"
+        yield Finding("error", file, message, column="arm.dh")
+    if length < SHORTEST_ARM_MM:
+        message = f"found no length beyond {length:g}, expected mm: d and a seem to be in metres"
+        yield Finding("error", file, message, column="arm.dh")
