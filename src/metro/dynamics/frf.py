@@ -135,7 +135,8 @@ def _excited(level: Array) -> np.ndarray:
     after = np.convolve(~strong, np.ones(_GONE_LINES), mode="valid") == _GONE_LINES
     gone = np.flatnonzero(after & (np.arange(len(after)) > int(level.argmax())))
     end = int(gone[0]) if len(gone) else len(level)
-    return strong & (np.arange(len(level)) < end)
+    band: np.ndarray = strong & (np.arange(len(level)) < end)
+    return band
 
 
 def _scatter(force: ComplexArray, response: ComplexArray) -> tuple[Array, ComplexArray, Array]:
