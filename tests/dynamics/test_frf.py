@@ -192,3 +192,26 @@ def test_a_real_hit_gives_the_published_receptance():
         frf.frequency[band], published["frequency_hz"], published["imag"]
     )
     assert np.linalg.norm(frf.h1[band] - expected) / np.linalg.norm(expected) < 0.025
+
+
+def test_a_hit_at_another_place_is_rejected_with_the_reason():
+    rng = np.random.default_rng(8)
+    hits = [record(rng, scale) for scale in (1.0, 0.7, 1.2, 0.9)]
+    elsewhere = Hit(hits[2].force, -0.6 * hits[2].response, RATE)
+    frf = estimate_frf([*hits[:2], elsewhere, hits[3]], "m/s2")
+    assert frf.used == (0, 1, 3)
+    assert frf.notes[0].startswith("hit 3 rejected: its response differs by ")
+    assert frf.notes[0].endswith("another place or direction, or a loose sensor")
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_hits_of_one_place_are_all_used_however_hard(seed):
+    rng = np.random.default_rng(seed)
+    assert estimate_frf([record(rng, scale) for scale in (1.0, 0.25, 1.2, 0.5, 0.8)], "m/s2").notes == ()
+
+
+def test_of_three_hits_none_is_judged_by_the_two_others():
+    rng = np.random.default_rng(9)
+    hits = [record(rng) for _ in range(3)]
+    frf = estimate_frf([*hits[:2], Hit(hits[2].force, -hits[2].response, RATE)], "m/s2")
+    assert frf.used == (0, 1, 2)

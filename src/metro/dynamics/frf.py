@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.dynamics.hits import Hit, faults, gate
+from metro.dynamics.outlying import outlying
 from metro.units import Array, ComplexArray
 
 _INTEGRATIONS = {"m/s2": -2, "m/s": -1, "m": 0}
@@ -74,15 +75,22 @@ def estimate_frf(hits: Sequence[Hit], unit: str, decay: float = 0.0, seconds: fl
     if unit not in _INTEGRATIONS:
         raise ValueError(f"response unit {unit!r}: expected {', '.join(_INTEGRATIONS)}")
     reasons = _other_rates(hits, faults(hits))
-    notes = [f"hit {i + 1} rejected: {reason}" for i, reason in enumerate(reasons) if reason]
     used = tuple(i for i, reason in enumerate(reasons) if not reason)
     if not used:
-        raise ValueError("no usable hit: " + "; ".join(notes))
-    if len(used) == 1:
-        notes.append("a single hit: no coherence and no variance from repeats")
+        raise ValueError("no usable hit: " + "; ".join(_rejected(reasons)))
     gated = [gate(hits[i]) for i in used]
     rate = hits[used[0]].rate
     length = round(max(seconds, *(hits[i].seconds for i in used), 0.0) * rate)
+    force, response = (_spectra([each[part] for each in gated], length) for part in (0, 1))
+    band = _excited(np.sqrt(np.sum(np.abs(force) ** 2, axis=0)))
+    apart = outlying(force[:, band], response[:, band])
+    kept = [i for i in range(len(used)) if i not in apart]
+    reasons = [reasons[i] or apart.get(used.index(i), "") for i in range(len(hits))]
+    notes = _rejected(reasons)
+    used, gated = tuple(used[i] for i in kept), [gated[i] for i in kept]
+    force, response = force[kept], response[kept]
+    if len(used) == 1:
+        notes.append("a single hit: no coherence and no variance from repeats")
     short = [f"{i + 1} ({hits[i].seconds:.4g} s)" for i in used if len(hits[i].force) < 0.99 * length]
     if short:
         notes.append(
@@ -92,8 +100,6 @@ def estimate_frf(hits: Sequence[Hit], unit: str, decay: float = 0.0, seconds: fl
     omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(length, 1.0 / rate)[1:], dtype=np.float64)
     # a signal times e^{-decay t} has its spectrum at i omega + decay
     to_displacement = np.asarray(1j * omega + decay, dtype=np.complex128) ** _INTEGRATIONS[unit]
-    force = np.asarray(_spectra([f for f, _, _ in gated], length), dtype=np.complex128)
-    response = np.asarray(_spectra([x for _, x, _ in gated], length), dtype=np.complex128)
     sff, sxx = np.sum(np.abs(force) ** 2, axis=0), np.sum(np.abs(response) ** 2, axis=0)
     sfx = np.sum(force.conj() * response, axis=0)
     variance, deviation, coherence = _scatter(force, response)
@@ -113,6 +119,10 @@ def estimate_frf(hits: Sequence[Hit], unit: str, decay: float = 0.0, seconds: fl
     )
 
 
+def _rejected(reasons: Sequence[str]) -> list[str]:
+    return [f"hit {i + 1} rejected: {reason}" for i, reason in enumerate(reasons) if reason]
+
+
 def _other_rates(hits: Sequence[Hit], reasons: Sequence[str]) -> list[str]:
     """Add to the reasons those hits whose sampling rate is not that of most."""
     rates = [hit.rate for hit in hits]
@@ -126,7 +136,7 @@ def _other_rates(hits: Sequence[Hit], reasons: Sequence[str]) -> list[str]:
 
 def _spectra(signals: Sequence[Array], length: int) -> ComplexArray:
     """Spectra of signals continued with zeros to ``length``, without the line at 0 Hz."""
-    return np.stack([np.fft.rfft(signal, length)[1:] for signal in signals])
+    return np.stack([np.fft.rfft(signal, length)[1:] for signal in signals]).astype(np.complex128)
 
 
 def _excited(level: Array) -> np.ndarray:
@@ -135,7 +145,8 @@ def _excited(level: Array) -> np.ndarray:
     after = np.convolve(~strong, np.ones(_GONE_LINES), mode="valid") == _GONE_LINES
     gone = np.flatnonzero(after & (np.arange(len(after)) > int(level.argmax())))
     end = int(gone[0]) if len(gone) else len(level)
-    return strong & (np.arange(len(level)) < end)
+    band: np.ndarray = strong & (np.arange(len(level)) < end)
+    return band
 
 
 def _scatter(force: ComplexArray, response: ComplexArray) -> tuple[Array, ComplexArray, Array]:
