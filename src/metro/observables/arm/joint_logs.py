@@ -211,6 +211,6 @@ def _curve(fit: JointFit) -> pd.DataFrame:
     for sign in (1, -1):
         inside = sign * fit.speed > 0
         speed, torque = fit.speed[inside], fit.resists[inside]
-        for part in np.array_split(np.argsort(speed), min(BINS, len(speed))) if len(speed) else ():
-            rows.append((fit.joint + 1, speed[part].mean() / DEG, torque[part].mean(), torque[part].std()))
+        parts = np.array_split(np.argsort(speed), min(BINS, len(speed))) if len(speed) else ()
+        rows += [(fit.joint + 1, speed[p].mean() / DEG, torque[p].mean(), torque[p].std()) for p in parts]
     return pd.DataFrame(rows, columns=["joint", "speed_deg_s", "friction", "sd"])
