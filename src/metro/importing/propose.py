@@ -182,7 +182,10 @@ def _reason(seen: Seen) -> str:
     listed = ", ".join(column.name for column in seen.columns[:8] if column.name)
     names = f", named {listed}" if named else " without names"
     message = f"{seen.path.name}: {len(seen.columns)} columns{names}: no dynamometer, hammer, profile or scan"
-    logs = "a joint log takes angles and torques or currents with numbered names; a robot log of a cut takes t_s, q1_set_deg …, q1_deg …, tau1_nm … (currents with 10 Nm/A)"
+    logs = (
+        "a joint log takes angles and torques or currents with numbered names; a robot log of a cut takes "
+        "t_s, q1_deg …, tau1_nm … (or current1_a …), q1_set_deg …"
+    )
     return f"{message}; {logs}: write its mapping by hand, as docs/data-contract.md says"
 
 
