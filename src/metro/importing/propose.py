@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -55,6 +55,8 @@ def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
     proposals: list[Proposal] = []
     unknown = [f"{seen.path.name}: {seen.fault}" for seen in files if seen.fault]
     rest = [seen for seen in files if not seen.fault]
+    # columns that are named as angles and torques are no coordinates, whatever else could be read from them
+    rest = [replace(s, kind="") if s.kind == "cloud" and joints.joint_log(s) else s for s in rest]
     for kind in dict.fromkeys(seen.kind for seen in rest if seen.kind):
         group = [seen for seen in rest if seen.kind == kind]
         proposals.append(Proposal(kind, tuple((seen.path.name, _record(seen)) for seen in group)))
