@@ -1,4 +1,4 @@
-"""Joint logs of a free motion from the files to what is identified: with arm, without, in amperes, seven axes."""
+"""Joint logs of a free motion, from files to what is identified: with an arm, without, in amperes."""
 
 import os
 from pathlib import Path
@@ -26,7 +26,15 @@ PANDA = """cell: panda
 arm:
   convention: modified
   joints: [revolute, revolute, revolute, revolute, revolute, revolute, revolute, fixed]
-  dh: [[0,0,333,0],[0,-90,0,0],[0,90,316,0],[0,90,0,82.5],[0,-90,384,-82.5],[0,90,0,0],[0,90,0,88],[0,0,107,0]]
+  dh:
+  - [0, 0, 333, 0]
+  - [0, -90, 0, 0]
+  - [0, 90, 316, 0]
+  - [0, 90, 0, 82.5]
+  - [0, -90, 384, -82.5]
+  - [0, 90, 0, 0]
+  - [0, 90, 0, 88]
+  - [0, 0, 107, 0]
 """
 LOAD = np.array([1.5, 0.03, 0.02, 0.12, 0.02, 0, 0, 0.02, 0, 0.01])
 TIME = np.arange(0, 30, 0.01)
