@@ -57,7 +57,10 @@ def compared(sets: Sequence[FieldSet], data: Path, out: Path) -> list[Result]:
 
 
 def _brought_in(one: FieldSet, data: Path, out: Path) -> Result:
-    folder = data / "field" / one.name
+    folder = data / (one.folder or f"field/{one.name}")
+    if not one.files:
+        shutil.copytree(folder, out / "data/raw" / one.name)
+        return Result(one, 0, 0.0)
     files = [str(path) for pattern in one.files for path in sorted(folder.glob(pattern))]
     started = time.perf_counter()
     call = [str(METRO), "import", *files, "--out", str(out / "data/raw" / one.name), *one.answers]

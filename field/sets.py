@@ -35,17 +35,19 @@ class FieldSet:
 
     Attributes
     ----------
-    name : of its folder. files : patterns in it, in the order of import. answers : to the questions of the
-    import, options as they are given. known : what is compared. refused : words of the refusal, where the
-    right end is one. remark : what the figures do not say.
+    name : of the batch that it becomes. files : patterns in its folder, in the order of import; none where
+        the folder is a batch already. answers : to the questions of the import, options as they are given.
+    known : what is compared. refused : words of the refusal, where the right end is one.
+    remark : what the figures do not say. folder : beside the real data; "": field and its name.
     """
 
     name: str
-    files: Sequence[str]
+    files: Sequence[str] = ()
     answers: Sequence[str] = ()
     known: Sequence[Known] = ()
     refused: str = ""
     remark: str = ""
+    folder: str = ""
 
 
 def mode(hz: float, key: str = "frequency") -> Callable[[Found], JSON | None]:
@@ -108,7 +110,15 @@ def held_out(observable: str, when: str = "after") -> Callable[[Found], JSON | N
     return ours
 
 
+def coefficient(name: str) -> Callable[[Found], JSON | None]:
+    """Take a cutting coefficient by the mean forces of all runs."""
+    return at("force", "mean_all_runs", name)
+
+
 BEAM = "mean of single-FRF fits over nine places of the hammer"
+SLOTTING = "published by the recorder: mean forces, all five feeds"
+TOOL = "published: peaks picked by hand"
+ALTINTAS = "Altintas, Manufacturing Automation (2012), p. 162"
 SETS = (
     FieldSet(
         "force-ball-d16",
@@ -163,5 +173,45 @@ SETS = (
         ("*.csv",),
         ("--set=unit.length=mm", "--set=work.size_mm=none"),
         (Known("X_m", "µm", 123.3, "FlatnessScan, least squares", face("xm"), half=0.05),),
+    ),
+    FieldSet(
+        "slotting-d25",
+        known=(
+            *(
+                Known(f"{name} by mean forces", unit, value, SLOTTING, coefficient(name), half=5e-5)
+                for name, unit, value in (
+                    ("ktc", "N/mm²", 958.8599),
+                    ("krc", "N/mm²", 250.8633),
+                    ("kac", "N/mm²", 146.3614),
+                    ("kte", "N/mm", 15.7580),
+                    ("kre", "N/mm", 19.4337),
+                    ("kae", "N/mm", 18.2075),
+                )
+            ),
+            Known("error on held-out feeds, before the loop", "%", None, "", held_out("force", "before")),
+            Known("error on held-out feeds, after the loop", "%", None, "", held_out("force")),
+        ),
+        folder="real/batches/slotting-d25",
+    ),
+    FieldSet(
+        "tool-impact",
+        known=tuple(
+            Known(f"mode at {hz} Hz", "Hz", hz, TOOL, mode(hz), half=0.5) for hz in (1074.0, 1961.0, 2617.0)
+        ),
+        folder="real/batches/tool-impact",
+        remark="the published figures are peaks of a structure with nine to fifteen modes",
+    ),
+    FieldSet(
+        "granite-again",
+        ("*007.csv",),
+        ("--set=work.size_mm=none",),
+        (Known("X_m", "µm", 124.0, "largest less least height", face("xm"), half=0.5),),
+        folder="real/reference/granite",
+        remark="the same plate once more: flat to a few µm, scanned with a scatter of 20 µm",
+    ),
+    FieldSet(
+        "profile-edm",
+        ("edm.xml",),
+        folder="real/reference/profiles",
     ),
 )

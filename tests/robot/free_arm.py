@@ -1,4 +1,4 @@
-"""Logs of an arm that moves freely, whose load is point masses that virtual work moves: no regressor of it."""
+"""Logs of an arm that moves freely; its load is point masses that virtual work moves, without a regressor."""
 
 import numpy as np
 

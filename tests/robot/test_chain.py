@@ -155,7 +155,8 @@ def test_a_seven_axis_arm_on_a_rail_has_the_torques_of_pinocchio(tmp_path):
                 ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), (0.3, 0.4, 0.5, 0.02, -0.03, 0.01), strict=True
             )
         )
-        inertial = f"<inertial><origin xyz='{centre}' rpy='0.1 0.2 0.3'/><mass value='{i + 1}'/><inertia {moments}/></inertial>"
+        place = f"<origin xyz='{centre}' rpy='0.1 0.2 0.3'/><mass value='{i + 1}'/>"
+        inertial = f"<inertial>{place}<inertia {moments}/></inertial>"
         unit = np.array(axis.split(), dtype=float)
         axis = " ".join(f"{v:.17g}" for v in unit / np.linalg.norm(unit))
         joints.append(("prismatic" if i == 0 else "revolute", xyz, rpy, axis, inertial))
@@ -190,7 +191,8 @@ def test_a_seven_axis_arm_on_a_rail_has_the_torques_of_pinocchio(tmp_path):
         ),
         ("<robot><joint name='a' type='revolute'><child link='y'/></joint></robot>", "has no <parent link"),
         (
-            "<robot><joint name='a' type='revolute'><parent link='x'/><child link='y'/><axis xyz='0 0'/></joint></robot>",
+            "<robot><joint name='a' type='revolute'><parent link='x'/><child link='y'/>"
+            "<axis xyz='0 0'/></joint></robot>",
             'joint "a", axis xyz: found "0 0", expected three numbers',
         ),
         (

@@ -18,7 +18,7 @@ LARGEST = 1 << 24  # bytes: a description with all its meshes' names has less th
 
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
-    """A joint: its name, kind (revolute, prismatic, fixed), ``origin`` (4, 4) in m, ``axis`` (3,) unit vector."""
+    """A joint: name, kind (revolute, prismatic, fixed), ``origin`` (4, 4) in m, ``axis`` (3,) unit vector."""
 
     name: str
     kind: str

@@ -1,4 +1,4 @@
-"""Joint logs among unknown files: angles, torques and currents by the names of columns, or by their courses."""
+"""Joint logs among unknown files: angles, torques, currents by the names of columns, or by their courses."""
 
 from __future__ import annotations
 
@@ -9,21 +9,23 @@ from pathlib import PurePath
 
 import numpy as np
 
-from metro.joint_columns import MOST_AXES
 from metro.formats.measures import MeasureError, measure
 from metro.importing.look import Column, Seen
 from metro.importing.propose import Proposal, is_clock
+from metro.joint_columns import MOST_AXES
 
 DRIVE = "joints.drive"  # the question for the columns of currents or torques
 ANGLES = "joints.angles"
 LEAST_AXES = 2
 ALIKE = 0.98  # correlation of a column with the differences of another one, which it is the speed of
 # Names of joint logs, the number of the axis at the end: RTDE of Universal Robots, ROS, KUKA, ABB, libraries.
+_MEASURED, _SET = r"(?:actual|meas(?:ured)?|act)?_?", r"(?:target|set|cmd|command(?:ed)?|desired)_?"
+_ANGLE = r"(?:q|joint|pos(?:ition)?s?|angle)"
 _NAMES = {
-    "q{}_set_deg": r"(?:target|set|cmd|command(?:ed)?|desired)_?(?:q|joint|pos(?:ition)?s?|angle)|(?:q|joint)_?(?:set|cmd|d(?:es)?)",
-    "q{}_deg": r"(?:actual|meas(?:ured)?|act)?_?(?:q|joint|joint_?pos(?:ition)?s?|pos(?:ition)?s?|angle|axis|a)",
-    "current{}_a": r"(?:actual|meas(?:ured)?|motor|joint)?_?(?:current|i|amp)s?",
-    "tau{}_nm": r"(?:actual|meas(?:ured)?|motor|joint)?_?(?:tau|torque|effort|moment|t)s?(?:_?j)?",
+    "q{}_set_deg": rf"{_SET}{_ANGLE}|(?:q|joint)_?(?:set|cmd|d(?:es)?)",
+    "q{}_deg": rf"{_MEASURED}(?:{_ANGLE}|joint_?pos(?:ition)?s?|axis|a)",
+    "current{}_a": rf"{_MEASURED}(?:motor_?|joint_?)?(?:current|i|amp)s?",
+    "tau{}_nm": rf"{_MEASURED}(?:motor_?|joint_?)?(?:tau|torque|effort|moment|t)s?(?:_?j)?",
 }
 _NUMBERED = re.compile(r"(?P<stem>.*?)[ _\[(.]*(?P<axis>\d)[\])]?(?: *\[(?P<unit>[^\]]*)\])?")
 _TIME = re.compile(r"t|time|timestamp|zeit|stamp|t_s|time_s", re.IGNORECASE)
@@ -85,7 +87,7 @@ def _by_course(seen: Seen) -> Proposal | None:
         if all(_is_speed(a.values, s.values, time) for a, s in zip(angles, speeds, strict=True)):
             columns: dict[str, str | int | tuple[str, int]] = {"t_s": 1}
             columns |= {f"q{i}_deg": i + 1 for i in range(1, count + 1)}
-            why = {name: f"columns {2 + count} to {1 + 2 * count}, which are its speed" for name in columns}
+            why = dict.fromkeys(columns, f"columns {2 + count} to {1 + 2 * count}, which are its speed")
             why["t_s"] = "column 1, which rises like a clock"
             why |= {f"q{i}_deg": f"column {i + count + 1}, which is its speed" for i in range(1, count + 1)}
             return Proposal("joints", ((seen.path.name, ""),), seen.path.name, columns, why, True)

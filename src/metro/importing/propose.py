@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -56,6 +56,8 @@ def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
     proposals: list[Proposal] = []
     unknown = [f"{seen.path.name}: {seen.fault}" for seen in files if seen.fault]
     rest = [seen for seen in files if not seen.fault]
+    # columns that are named as angles and torques are no coordinates, whatever else could be read from them
+    rest = [replace(s, kind="") if s.kind == "cloud" and joints.joint_log(s) else s for s in rest]
     for kind in dict.fromkeys(seen.kind for seen in rest if seen.kind):
         group = [seen for seen in rest if seen.kind == kind]
         proposals.append(Proposal(kind, tuple((seen.path.name, _record(seen)) for seen in group)))
@@ -220,7 +222,10 @@ def _reason(seen: Seen) -> str:
     listed = ", ".join(column.name for column in seen.columns[:8] if column.name)
     names = f", named {listed}" if named else " without names"
     message = f"{seen.path.name}: {len(seen.columns)} columns{names}: no dynamometer, hammer, profile or scan"
-    logs = "a joint log takes angles and torques or currents with numbered names; a robot log of a cut takes t_s, q1_set_deg …, q1_deg …, tau1_nm … (currents with 10 Nm/A)"
+    logs = (
+        "a joint log takes angles and torques or currents with numbered names; a robot log of a cut takes "
+        "t_s, q1_deg …, tau1_nm … (or current1_a …), q1_set_deg …"
+    )
     return f"{message}; {logs}: write its mapping by hand, as docs/data-contract.md says"
 
 

@@ -87,7 +87,7 @@ def questions(proposals: Sequence[Proposal]) -> Iterator[Question]:
         named = ", ".join(rows)
         arm = "the robot: a name of config/cells or of your own (cell_file=… copies a cell.yaml), or none"
         yield Question("cell", arm, leaves_out=True)
-        what = f"is a load on the flange: yes or no, one for each of {named} by commas; none where it matters not"
+        what = f"is a load on the flange: yes or no, one for each of {named} by commas; none: not known"
         yield Question("loaded", what, partial(_states, len(rows)), leaves_out=True)
     if "cloud" in kinds:
         size = "size of the scanned part as x,y,z in mm, or none where it is not known"

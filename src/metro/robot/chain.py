@@ -90,8 +90,8 @@ def along(axis: Array) -> Array:
 def of_rows(rows: Array, kinds: Sequence[str], *, modified: bool = False) -> list[Motion]:
     """Return the motions of Denavit–Hartenberg rows θ₀, α (rad), d, a (m), each of a kind of joint.
 
-    Standard: Rz(θ₀ + q) Tz(d) Tx(a) Rx(α). Modified (Craig): Rx(α) Tx(a) Rz(θ₀ + q) Tz(d), α and a of the link
-    before. A prismatic joint shifts along z instead of turning; a fixed row has no joint.
+    Standard: Rz(θ₀ + q) Tz(d) Tx(a) Rx(α). Modified (Craig): Rx(α) Tx(a) Rz(θ₀ + q) Tz(d), α and a of the
+    link before. A prismatic joint shifts along z instead of turning; a fixed row has no joint.
     """
     motions: list[Motion] = []
     axis = np.array([0.0, 0.0, 1.0])

@@ -39,7 +39,7 @@ class Determined:
     @property
     def known(self) -> np.ndarray:
         """Return which coefficients the data determine, (p,) bool."""
-        return np.linalg.norm(self.axes, axis=0) > DETERMINED
+        return np.asarray(np.linalg.norm(self.axes, axis=0) > DETERMINED)
 
     @property
     def condition(self) -> float:

@@ -16,9 +16,9 @@ from metro.units import JSON, Array
 PARTS = (0.10, 0.06, 0.13)
 NOMINAL = round(math.sqrt(sum(part**2 for part in PARTS) / 3.0), 2)
 ASSUMED = (
-    f"{100 * NOMINAL:.0f} % standard uncertainty, shared by all joints: none is declared as drives.uncertainty "
-    "of the cell. Assumed are rectangular distributions of ±10 % (motor constant), ±6 % (magnets over 40 K) "
-    "and ±13 % (gear efficiency)"
+    f"{100 * NOMINAL:.0f} % standard uncertainty, shared by all joints: none is declared as "
+    "drives.uncertainty of the cell. Assumed are rectangular distributions of ±10 % (motor constant), "
+    "±6 % (magnets over 40 K) and ±13 % (gear efficiency)"
 )
 
 

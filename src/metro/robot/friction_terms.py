@@ -108,7 +108,7 @@ def _loaded(columns: Array, torque: Array, stretch: np.ndarray, links: slice) ->
 
 
 def _error_of_load(columns: Array, torque: Array, stretch: np.ndarray, links: slice) -> float:
-    """Standard error of the term of load, by a jackknife in which the torque of the links is found anew."""
+    """Return the error of the term of load, by a jackknife that finds the links' torque anew."""
     values = []
     for each in np.unique(stretch):
         kept = stretch != each

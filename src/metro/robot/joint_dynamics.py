@@ -105,7 +105,7 @@ def fit_joints(dh: Geometry, log: Motion, driven: np.ndarray) -> tuple[JointFit,
         unit = np.eye(len(driven))[[joint]]
         turned = torque_regressor(dh, middle, still, unit) - torque_regressor(dh, middle, still, still)
         functions = weight[:, joint], turned[0, joint]
-        fits.append(_fit(_one(log, joint), links[:, joint], functions, int(joint)))
+        fits.append(_fit(_one(log, int(joint)), links[:, joint], functions, int(joint)))
     return tuple(fits)
 
 
@@ -132,8 +132,10 @@ def _fit(log: Motion, links: Array, functions: tuple[Array, Array], joint: int) 
     gravity = found.combination(np.concatenate([np.zeros(OWN), weight[heaviest]]))
     inertia = found.combination(np.concatenate([alone[OWN - 1, :OWN], turned]))
     return JointFit(
-        joint,
-        *(found.combination(alone[k]) for k in range(3)),
+        joint=joint,
+        coulomb=found.combination(alone[0]),
+        viscous=found.combination(alone[1]),
+        offset=found.combination(alone[2]),
         gravity=gravity,
         inertia=inertia,
         noise=float(np.sqrt(np.mean(left**2))),

@@ -110,8 +110,8 @@ def link_frames(dh: Geometry, q: Array) -> Array:
     -------
     Array
         (..., n + 1, 4, 4): T_0 = I, T_i = A_1 … A_i, with A_i = Rot_z(θ) Trans(0, 0, d) Trans(a, 0, 0)
-        Rot_x(α). (The printed eq. 2 of [K] has cosθ cosα where sinθ sinα belongs.) Of a chain T_0 is the frame
-        of the first joint's axis.
+        Rot_x(α). (The printed eq. 2 of [K] has cosθ cosα where sinθ sinα belongs.) Of a chain T_0 is the
+        frame of the first joint's axis.
     """
     if isinstance(dh, Chain):
         return dh.frames(np.asarray(q, dtype=float))

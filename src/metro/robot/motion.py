@@ -80,7 +80,7 @@ def motion(
 
 
 def rate_noise(step: Array, period: float, cutoff_hz: float) -> Array:
-    """Standard deviation (n,), rad/s, of a low-passed speed by the rounding of angles to ``step`` (n,).
+    """Return the error (n,), rad/s, of a low-passed speed by the rounding of angles to ``step`` (n,).
 
     Rounding is white noise of variance step²/12, of density 2 T step²/12 up to half the samples' rate; its
     derivative below f_c has the variance ∫ (2πf)² density df = (2π)² 2 T f_c³/3 · step²/12.

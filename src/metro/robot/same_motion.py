@@ -21,7 +21,8 @@ class Pair:
     Attributes
     ----------
     angle, rate, acceleration : of the second log. direction : sign of its speed, filtered as the torques.
-    first, second : torques. moving : (m, n) bool. shift : s, by which the second log's clock is ahead.
+    first, second : torques. moving : (m, n) bool, away
+        from where a joint turns round. shift : s, by which the second log's clock is ahead.
     apart : (n,) rms of the difference of the angles, rad.
     """
 
@@ -79,10 +80,27 @@ def pair_of(first: Log, second: Log) -> Pair | None:
         direction[keep],
         smooth(one[at, n:])[keep],
         smooth(moved[:, n:])[keep],
-        (np.abs(rate) > slowest)[keep],
+        _settled((np.abs(rate) > slowest)[keep] & (_same_way(rate, keep))),
         float((lag + fine) * period),
         apart,
     )
+
+
+def _same_way(rate: Array, keep: slice) -> np.ndarray:
+    """Return where a joint, (m, n), turns as it did at the sample that is kept before."""
+    way = np.sign(rate[keep])
+    return np.vstack([np.ones((1, way.shape[1]), dtype=bool), way[1:] == way[:-1]])
+
+
+def _settled(moving: np.ndarray) -> np.ndarray:
+    """Leave out what lies within half a period of the filter from where a joint turns round.
+
+    Two logs sample the step of its friction there at other instants, and the filter spreads the difference.
+    """
+    from scipy.ndimage import binary_erosion
+
+    around = np.ones((2 * (PER_PERIOD // 2) + 1, 1), dtype=bool)
+    return np.asarray(binary_erosion(moving, around, border_value=1))
 
 
 def _even(log: Log, period: float) -> Array:

@@ -30,7 +30,7 @@ def joint(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         recordings.note(file, run, quality.sampling(time - time[0], rate))
         recordings.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
         drives = [name for name in table if str(name).startswith(("tau", "current"))]
-        angles = table[positions(list(table))].to_numpy()
+        angles = table[positions([str(name) for name in table.columns])].to_numpy()
         checks = [quality.motion(angles), *(quality.dead(str(n), table[n].to_numpy()) for n in drives)]
         if recordings.fit(file, run, "joint_log", checks):
             yield {"run": run, "t_s": time - time[0], **{n: table[n] for n in JOINT_COLUMNS if n in table}}
@@ -38,7 +38,7 @@ def joint(batch: Batch, recordings: Recordings) -> Iterator[Part]:
 
 def _doubt(batch: Batch, table: pd.DataFrame) -> str:
     """Check the unit of the angles, and that the arm of the cell has as many axes."""
-    names = positions(list(table))
+    names = positions([str(name) for name in table.columns])
     turning = [name for name in names if name.endswith("_deg")]
     doubt = plausible.angles(turning, table[turning].to_numpy()) if turning else ""
     pairs = [(name.replace("_", "_set_"), name) for name in turning if name.replace("_", "_set_") in table]

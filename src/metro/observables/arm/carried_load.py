@@ -32,7 +32,7 @@ def payload_of_logs(
 ) -> tuple[JSON, dict[str, pd.DataFrame]]:
     """Return the block ``calibration`` of the payload, and the tables of how the joints show it.
 
-    Tables ``payload_joints`` (of each joint the factor that fits it alone, its error, rms of the residual) and
+    Tables ``payload_joints`` (of each joint the factor that fits it alone, its error, rms of residuals) and
     ``payload_course`` (difference of the torques of two logs of one motion, measured and of the load).
     """
     bare = [log for log in logs if log.loaded == "no"]

@@ -47,8 +47,8 @@ IN_AMPERES = {
 class JointLog:
     """A joint log of n axes: ``time`` (m,) s; ``q`` (m, n) rad (m of a linear axis); ``torque`` (m, n) N m.
 
-    ``commanded`` (m, n) as ``q``, NaN where there are no set-points; ``driven`` (n,) bool, whether a torque or
-    a current was logged; ``amperes`` : whether ``torque`` is in amperes; ``loaded`` : yes, no or "".
+    ``commanded`` (m, n) as ``q``, NaN where there are no set-points; ``driven`` (n,) bool, whether a torque
+    or a current was logged; ``amperes`` : whether ``torque`` is in amperes; ``loaded`` : yes, no or "".
     """
 
     run: str
@@ -134,7 +134,7 @@ def with_drives(
 
 
 def _block(log: JointLog, fits: tuple[JointFit, ...], drives: Drives) -> JSON:
-    """Identified quantities of a run, a list over the joints that move."""
+    """Return the identified quantities of a run, a list over the joints that move."""
     units, dof = IN_AMPERES if log.amperes else UNITS, 29
     return {
         "joints": [fit.joint + 1 for fit in fits],
@@ -163,7 +163,10 @@ def _rows(log: JointLog, fits: tuple[JointFit, ...], arm: Arm | None, drives: Dr
     for j in range(log.q.shape[1]):
         off = log.q[:, j] - log.commanded[:, j]
         row: JSON = {
-            **{"run": log.run, "joint": j + 1, "loaded": log.loaded, "unit": "A" if log.amperes else "N m"},
+            "run": log.run,
+            "joint": j + 1,
+            "loaded": log.loaded,
+            "unit": "A" if log.amperes else "N m",
             "low_deg": log.q[:, j].min() / DEG,
             "high_deg": log.q[:, j].max() / DEG,
             "fastest_deg_s": float(np.quantile(np.abs(rate[:, j]), 0.999)) / DEG,
@@ -211,6 +214,6 @@ def _curve(fit: JointFit) -> pd.DataFrame:
     for sign in (1, -1):
         inside = sign * fit.speed > 0
         speed, torque = fit.speed[inside], fit.resists[inside]
-        for part in np.array_split(np.argsort(speed), min(BINS, len(speed))) if len(speed) else ():
-            rows.append((fit.joint + 1, speed[part].mean() / DEG, torque[part].mean(), torque[part].std()))
+        parts = np.array_split(np.argsort(speed), min(BINS, len(speed))) if len(speed) else ()
+        rows += [(fit.joint + 1, speed[p].mean() / DEG, torque[p].mean(), torque[p].std()) for p in parts]
     return pd.DataFrame(rows, columns=["joint", "speed_deg_s", "friction", "sd"])

@@ -31,8 +31,16 @@ def friction(curve: pd.DataFrame, table: pd.DataFrame) -> Figure:
             part = curve[curve["joint"] == joint].sort_values("speed_deg_s")
             row = table[table["joint"] == joint].iloc[0]
             speed = part["speed_deg_s"].to_numpy(float)
-            look = {"fmt": "o", "ms": 2.5, "color": style.MEASURED, "elinewidth": 0.6, "label": "measured"}
-            axes.errorbar(speed, part["friction"], part["sd"], **look)
+            axes.errorbar(
+                speed,
+                part["friction"],
+                part["sd"],
+                fmt="o",
+                ms=2.5,
+                color=style.MEASURED,
+                elinewidth=0.6,
+                label="measured",
+            )
             offset, level, slope = (np.nan_to_num(float(row[n])) for n in ("offset", "coulomb", "viscous"))
             line = offset + level * np.sign(speed) + slope * np.radians(speed)
             for way in (speed < 0, speed > 0):

@@ -125,7 +125,7 @@ def _touching(block: JSON) -> str:
 
 
 def _by_joint(block: JSON, results: Results) -> list[Item]:
-    """Say of the payload of joint logs what its interval holds, and draw what the load adds to the torques."""
+    """Say what the interval of a payload of joint logs holds, and draw what the load adds to the torques."""
     carried, course = block.get("payload") or {}, results.tables.get("payload_course")
     if "by_joint" not in carried:
         return []
@@ -136,19 +136,19 @@ def _by_joint(block: JSON, results: Results) -> list[Item]:
     ]
     mass = quantity(carried["mass_by_logs_alone"])
     text = (
-        f"By noise and friction alone the mass would be {mass}. In its interval is, besides, the error of the "
-        f"drive constants: {carried['drives']}. What they share scales every mass and moment alike, and no log "
-        "of torques or currents can show it. By how much a joint alone would make the load larger: "
+        f"By noise and friction alone the mass would be {mass}. In its interval is, besides, the error of "
+        f"the drive constants: {carried['drives']}. What they share scales every mass and moment alike: no "
+        "log of torques or currents can show it. By how much a joint alone would make the load larger: "
         f"{listing(factors)}; "
         f"beyond their errors these scatter by {percent(carried['scatter_of_drives'])}, which is in the "
-        "interval, too. To measure the mass better, weigh it, or take a pair of logs with a known mass."
+        "interval, too. To know the mass better, weigh it, or take a pair of logs with a known mass."
     )
     items: list[Item] = [Paragraph(text)]
     if course is not None:
         one, two = carried["pairs"][0]
         caption = (
-            f"Torques of run {two} less those of run {one} at the same places, and the torque of the load that "
-            "was identified; what differs is friction that the load changes."
+            f"Torques of run {two} less those of run {one} at the same places, and the torque of the load "
+            "that was identified; what differs is friction that the load changes."
         )
         items.append(Picture(figures.load(course), caption, caption))
     return items

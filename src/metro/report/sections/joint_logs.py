@@ -83,9 +83,9 @@ def _friction(table: pd.DataFrame, about: JSON) -> Table:
         cells = [_interval(r[name], r[f"{name}_sd"]) for name in ("coulomb", "viscous", "gravity", "inertia")]
         rows.append([str(r["run"]), str(r["joint"]), *cells])
     caption = (
-        "Friction of the joints, the largest torque of the links' weight in the log, and the inertia about the "
-        "joint's own axis in the middle of the motion, the motor's included, with 95 % intervals. Each joint is "
-        "fitted on its own. "
+        "Friction of the joints, the largest torque of the links' weight in the log, and the inertia about "
+        "the joint's own axis in the middle of the motion, the motor's included, with 95 % intervals. Each "
+        "joint is fitted on its own. "
     )
     if amperes:
         caption += (
@@ -145,8 +145,8 @@ def _curves(results: Results, table: pd.DataFrame) -> list[Item]:
     items: list[Item] = []
     for run in list(curve["run"].drop_duplicates())[:RUNS]:
         caption = (
-            f"Friction by speed in run {run}: means of bins with their scatter, the torque of the links taken "
-            "away, and the line of Coulomb and viscous friction."
+            f"Friction by speed in run {run}: means of bins with their scatter, the torque of the links "
+            "taken away, and the line of Coulomb and viscous friction."
         )
         drawn = figures.friction(curve[curve["run"] == run], table[table["run"] == run])
         items.append(Picture(drawn, caption, caption))

@@ -62,4 +62,5 @@ def _run_words(runs: pd.DataFrame) -> str:
             f"{made} {'was' if one else 'were'} made; no record of {'it' if one else 'them'} is in the batch."
             f"{logs}"
         )
-    return f"{made}, {recorded} recorded, {held} of them held out: no model saw those before it was judged.{logs}"
+    kept = f"{made}, {recorded} recorded, {held} of them held out"
+    return f"{kept}: no model saw those before it was judged.{logs}"

@@ -12,7 +12,7 @@ from metro.report.numbers import listing, number, percent, probability, quantity
 from metro.report.phrases import sentence
 from metro.report.results import Results, heading
 from metro.report.sections import findings
-from metro.report.sections.joint_words import joint_words
+from metro.report.sections.joint_words import joint_facts, joint_next, joint_words
 from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
@@ -63,6 +63,7 @@ def first_words(results: Results) -> list[Item]:
     lacking = (results.identified.get("not_identified") or {}).get("lobes")
     if not verdicts and lacking and results.identified.get("modes"):
         nexts = [f"For a verdict on {title('lobes')}: {lacking}"]
+    nexts += list(joint_next(results))
     measure: list[Item] = [Heading("What to measure next"), Bullets([sentence(text) for text in nexts])]
     return [
         Paragraph(measured_words(results)),
@@ -109,7 +110,12 @@ def _one_run(results: Results) -> list[Item]:
 
 def _identified(results: Results) -> list[Item]:
     """Give the most compliant mode, and the boundary or the response that shows the identification."""
-    shown = [*first_faces(results), *boundary_items(results), *largest_response(results.tables)]
+    shown = [
+        *joint_facts(results),
+        *first_faces(results),
+        *boundary_items(results),
+        *largest_response(results.tables),
+    ]
     yielding = [mode for mode in results.identified.get("modes") or [] if _peak(mode) > 0.0]
     if not yielding:
         return shown
