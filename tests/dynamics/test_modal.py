@@ -192,3 +192,16 @@ def test_the_loss_of_a_mode_is_what_a_linear_fit_without_it_leaves_more(real):
                 (both[:, -1] - both[:, :-1] @ np.linalg.lstsq(both[:, :-1], both[:, -1])[0]) ** 2
             )
         assert loss == pytest.approx(chi2 - fit.chi2, rel=1e-6)
+
+
+def test_a_mode_in_a_gap_of_the_lines_is_not_claimed_and_its_neighbours_are():
+    """The hammer's spectrum has a hole there: what the modes beside it leave over puts a pole into it."""
+    omega, zeta, stiffness = 2 * np.pi * np.array([60.0, 100.0, 140.0]), 0.01, 1e7
+    frequency = np.arange(20.0, 200.0, 0.5)
+    ratio = 2 * np.pi * frequency[:, None] / omega
+    frf = (1.0 / (stiffness * (1.0 - ratio**2 + 2j * zeta * ratio))).sum(axis=1)[:, None]
+    kept = np.abs(frequency - 100.0) > 6.0
+    whole = [mode.frequency for mode in identify_modes(frequency, frf, None, 0).modes]
+    found = [mode.frequency for mode in identify_modes(frequency[kept], frf[kept], None, 0).modes]
+    assert whole == pytest.approx([60.0, 100.0, 140.0], rel=1e-3)
+    assert found == pytest.approx([60.0, 140.0], rel=1e-2)

@@ -14,7 +14,6 @@ from metro.units import Array, ComplexArray
 _INTEGRATIONS = {"m/s2": -2, "m/s": -1, "m": 0}
 _POOLED_LINES = 11
 _WEAK = 0.1  # -20 dB
-_GONE_LINES = 5  # in a row: a single one may be weak by chance
 
 
 @dataclass(frozen=True)
@@ -30,8 +29,7 @@ class Frf:
         products is the covariance of all lines, noise of the force included, which many lines share. No rows
         for a single hit.
     coherence : (n,); NaN for a single hit.
-    excited : (n,) whether the line is in the hammer's band: where the force's spectrum is within 20 dB of its
-        largest line, and below the first few lines in a row at which it is not.
+    excited : (n,) whether the force's spectrum is within 20 dB of its largest line.
     redundancy : record length over the length kept by the gate: neighbouring lines so many apart are
         independent.
     used : which of the hits given were used.
@@ -140,13 +138,8 @@ def _spectra(signals: Sequence[Array], length: int) -> ComplexArray:
 
 
 def _excited(level: Array) -> np.ndarray:
-    """Lines in the band of a hammer with the spectrum ``level`` (n,): beyond it there are only side lobes."""
-    strong = level > _WEAK * level.max()
-    after = np.convolve(~strong, np.ones(_GONE_LINES), mode="valid") == _GONE_LINES
-    gone = np.flatnonzero(after & (np.arange(len(after)) > int(level.argmax())))
-    end = int(gone[0]) if len(gone) else len(level)
-    band: np.ndarray = strong & (np.arange(len(level)) < end)
-    return band
+    """Lines that a hammer with the spectrum ``level`` (n,) excites: those of strong side lobes as well."""
+    return np.asarray(level > _WEAK * level.max())
 
 
 def _scatter(force: ComplexArray, response: ComplexArray) -> tuple[Array, ComplexArray, Array]:

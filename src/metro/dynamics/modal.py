@@ -117,7 +117,7 @@ def identify_modes(
             "the phase of the FRFs rises over the resonances, and no modes explain half of their power: they "
             "are conjugated (e^{-iωt}); export them with e^{+iωt}"
         )
-    inside = (fit.omega > data.omega[0]) & (fit.omega < data.omega[-1]) & (fit.zeta < _LARGEST_DAMPING)
+    inside = _among(data.omega, fit.omega, fit.zeta) & (fit.zeta < _LARGEST_DAMPING)
     inside &= _is_there(data, fit)
     free = residues(data.omega, frf, np.sqrt(np.mean(data.weight**2, axis=1)), fit.poles)
     order = [int(r) for r in np.argsort(fit.omega) if inside[r]]
@@ -135,6 +135,17 @@ def identify_modes(
     alike = all(explained(data, fit, way).bic() >= fit.bic() for way in files)
     doubtful = _doubtful(data, fit, driving, decay) if alike else None
     return ModalModel(tuple(modes), fit, change, diagram, doubtful, tuple(moved), declared)
+
+
+def _among(lines: Array, omega: Array, zeta: Array) -> np.ndarray:
+    """Whether modes (k,) are among the lines (n,), rad/s: not outside of them, nor in a gap of theirs.
+
+    A gap is where the hammer's spectrum has a hole. A mode that no line within half a bandwidth saw is an
+    extrapolation from both sides of it.
+    """
+    nearest = np.abs(lines[:, None] - omega).min(axis=0)
+    inside = (omega > lines[0]) & (omega < lines[-1])
+    return np.asarray(inside & (nearest <= np.maximum(zeta * omega, np.median(np.diff(lines)))))
 
 
 def _width(mode: Mode) -> float:

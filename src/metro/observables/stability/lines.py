@@ -10,6 +10,7 @@ import numpy as np
 from metro.observables.stability.receptance import Receptance
 from metro.units import Array, ComplexArray
 
+WIDE_ENOUGH = 0.5  # share of a pair's lines that others must have for it to give up the rest
 _LEAST_LINES = 40
 _QUIET_LINES = 5  # in a row, from which on a drift has ended or a response exceeds the noise
 # The mean power of five lines of noise is hardly ever below a quarter of its long-run value, and five in a
@@ -33,7 +34,7 @@ def on_common_lines(group: list[Receptance], notes: list[str]) -> list[Receptanc
     kinds = [next(i for i, other in enumerate(sets) if np.array_equal(other, lines)) for lines in sets]
     most = max(kinds, key=lambda kind: (kinds.count(kind), len(sets[kind])))
     place = f"position {group[0].position}, direction {group[0].response[-1]}"
-    if len(shared) >= max(_LEAST_LINES, 0.5 * len(sets[most])):
+    if len(shared) >= max(_LEAST_LINES, WIDE_ENOUGH * len(sets[most])):
         longest = max(len(lines) for lines in sets)
         notes.append(
             f"{place}: the FRFs have {min(map(len, sets))} to {longest} lines; the {len(shared)} that all "
@@ -46,6 +47,11 @@ def on_common_lines(group: list[Receptance], notes: list[str]) -> list[Receptanc
         "all FRFs with the same lines"
     )
     return [item for item, kind in zip(group, kinds, strict=True) if kind == most]
+
+
+def excited_to(record: Receptance) -> float:
+    """Frequency, Hz, up to which the hammer of a record excites the structure."""
+    return float(record.frequency[record.usable].max(initial=0.0))
 
 
 def _step(group: list[Receptance]) -> float:

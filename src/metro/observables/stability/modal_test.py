@@ -12,7 +12,7 @@ import pandas as pd
 from metro.dynamics.modal import ModalModel, identify_modes
 from metro.dynamics.modes import Mode
 from metro.dynamics.shapes import mac
-from metro.observables.stability.lines import clear_lines, on_common_lines
+from metro.observables.stability.lines import WIDE_ENOUGH, clear_lines, excited_to, on_common_lines
 from metro.observables.stability.modal_notes import doubts, of_files, of_point
 from metro.observables.stability.pickups import crossed
 from metro.observables.stability.receptance import (
@@ -117,7 +117,8 @@ def _decay(hammer: JSON) -> float:
 def _by_direction(measured: list[Receptance], notes: list[str]) -> dict[tuple[str, str], list[Receptance]]:
     """Receptances that share their modes: one position, one direction of force and motion, the same lines.
 
-    If records and FRF files give the same pair, the records come first and are used.
+    If records and FRF files give the same pair, the records come first and are used, since they have a
+    scatter; not where the hammer excites less than half of the lines that the file has.
     """
     groups: dict[tuple[str, str], dict[tuple[str, str], Receptance]] = {}
     struck = {(item.position, item.reference) for item in measured if item.driving}
@@ -131,8 +132,19 @@ def _by_direction(measured: list[Receptance], notes: list[str]) -> dict[tuple[st
                 )
             continue
         group = groups.setdefault((item.position, item.response[-1]), {})
-        if group.setdefault((item.reference, item.response), item) is not item:
+        pair = item.reference, item.response
+        first = group.setdefault(pair, item)
+        if first is item:
+            continue
+        if np.mean(item.frequency <= excited_to(first)) >= WIDE_ENOUGH:
             notes.append(f"{place}: its FRF file is not used, as there are hammer records of the same pair")
+        else:
+            group[pair] = item
+            notes.append(
+                f"{place}: its hammer records are not used: the hammer excites up to "
+                f"{excited_to(first):.5g} Hz, and the FRF file of the same pair goes to "
+                f"{item.frequency[-1]:.5g} Hz"
+            )
     distinct = {key: _distinct(list(group.values()), notes) for key, group in groups.items()}
     return {key: on_common_lines(group, notes) for key, group in distinct.items()}
 
