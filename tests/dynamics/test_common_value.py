@@ -49,3 +49,9 @@ def test_files_that_differ_much_have_the_interval_of_a_mean_of_equals():
 def test_one_file_says_nothing_of_others():
     found = common_value(np.array([3.0]), np.array([0.2]))
     assert (found.value, found.sd, found.scatter, found.files) == (3.0, pytest.approx(0.2), 0.0, 1)
+    assert found.chance == 1.0
+
+
+def test_the_probability_of_chance_is_uniform_where_the_files_agree():
+    chance = np.array([common_value(values, sd).chance for values, sd in draws(5, 0.0, 600, 1)])
+    np.testing.assert_allclose([np.mean(chance < p) for p in (0.1, 0.5, 0.9)], [0.1, 0.5, 0.9], atol=0.06)

@@ -94,3 +94,38 @@ def test_the_square_wave_has_the_deviations_that_it_was_made_with():
     assert np.abs(deviation).mean() == pytest.approx(1.0, abs=1e-9)
     assert np.sqrt((deviation**2).mean()) == pytest.approx(1.0, abs=1e-9)
     assert np.ptp(z) == pytest.approx(2.0, abs=1e-9)
+
+
+def cutpro(unit="m/N", last="Imag"):
+    rows = "".join(f"{k * 0.5:14.6e}\t{k * 1e-7:.12e}\t{-k * 1e-8:.12e}\t\n" for k in range(2, 20))
+    first = (
+        f"  5.000000e-01\t1.000000000000e-07\t-1.000000000000e-08\tFreq\tHz\tReal\t{unit}\t{last}\tReal\t\n"
+    )
+    return first + rows
+
+
+@pytest.mark.parametrize(
+    ("unit", "found", "factor"), [("m/N", "m", 1.0), ("um/N", "m", 1e-6), ("g/N", "g", 1.0)]
+)
+def test_an_frf_of_cutpro_has_its_first_line_and_its_unit(tmp_path, unit, found, factor):
+    (tmp_path / "x.frf").write_text(cutpro(unit))
+    (frf,) = read_frfs(tmp_path / "x.frf")
+    assert frf.unit == found
+    np.testing.assert_allclose(frf.table["frequency_hz"], 0.5 * np.arange(1, 20))
+    np.testing.assert_allclose(frf.table["real"], factor * 1e-7 * np.arange(1, 20))
+    np.testing.assert_allclose(frf.table["imag"], -factor * 1e-8 * np.arange(1, 20))
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (cutpro(last="Phase"), "line 1: found"),
+        (cutpro(unit="V"), "line 1"),
+        (cutpro() + "1.0\tx\t2.0\n", "line 20"),
+        ("", "is empty, expected an FRF"),
+    ],
+)
+def test_an_frf_that_is_none_of_cutpro_is_refused_with_the_line(tmp_path, content, says):
+    (tmp_path / "x.frf").write_text(content)
+    with pytest.raises(FormatError, match=says):
+        read(tmp_path / "x.frf", "frf")

@@ -158,7 +158,8 @@ def _stiffness(
         by_own = modal_constants(own.fit, r, at, own.fit.residues[r], decay)
         if math.isfinite(by_own.stiffness):
             # its frequency is that of one file: what the others differ by moves the stiffness with its square
-            return by_own.stiffness, math.hypot(by_own.stiffness_sd / by_own.stiffness, 2.0 * scatter[0])
+            relative = max(by_own.stiffness_sd / by_own.stiffness, mode.stiffness_sd / mode.stiffness)
+            return by_own.stiffness, math.hypot(relative, 2.0 * scatter[0])
     # the pole of this file is not known by itself: what the poles of files differ by moves its residue
     slope = _follows(fit, r, driving)
     return mode.stiffness, math.hypot(mode.stiffness_sd / mode.stiffness, *(slope * scatter))

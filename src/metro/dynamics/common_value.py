@@ -29,12 +29,14 @@ class Common:
     sd : half of its 95 % interval over 1.96.
     scatter : tau, standard deviation between the files beyond their errors; 0 where these explain it.
     files : how many there are.
+    chance : probability that their errors alone make them differ so much (chi² about their mean).
     """
 
     value: float
     sd: float
     scatter: float
     files: int
+    chance: float
 
 
 def common_value(values: Array, sd: Array) -> Common:
@@ -54,7 +56,8 @@ def common_value(values: Array, sd: Array) -> Common:
     if scatter > 0.0:
         freedom = (len(values) - 1) / share**2
         widening = float(stats.t.ppf(0.975, freedom) / stats.norm.ppf(0.975))
-    return Common(value, math.sqrt(variance) * widening, math.sqrt(scatter), len(values))
+    chance = float(stats.chi2.sf(_spread(values, errors), len(values) - 1)) if len(values) > 1 else 1.0
+    return Common(value, math.sqrt(variance) * widening, math.sqrt(scatter), len(values), chance)
 
 
 def _between(values: Array, errors: Array) -> float:
@@ -67,8 +70,7 @@ def _between(values: Array, errors: Array) -> float:
     expected = float(stats.chi2.median(freedom)) if freedom > 1 else 1.0
 
     def excess(between: float) -> float:
-        weight = 1.0 / (errors + between)
-        return float(weight @ (values - weight @ values / weight.sum()) ** 2) - expected
+        return _spread(values, errors + between) - expected
 
     if excess(0.0) <= 0.0:
         return 0.0
@@ -79,3 +81,9 @@ def _between(values: Array, errors: Array) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
     return high
+
+
+def _spread(values: Array, variance: Array) -> float:
+    """Weighted sum of squares of values about their mean."""
+    weight = 1.0 / variance
+    return float(weight @ (values - weight @ values / weight.sum()) ** 2)

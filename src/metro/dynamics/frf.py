@@ -79,7 +79,8 @@ def estimate_frf(hits: Sequence[Hit], unit: str, decay: float = 0.0, seconds: fl
     gated = [gate(hits[i]) for i in used]
     rate = hits[used[0]].rate
     length = round(max(seconds, *(hits[i].seconds for i in used), 0.0) * rate)
-    force, response = (_spectra([each[part] for each in gated], length) for part in (0, 1))
+    force = _spectra([one for one, _, _ in gated], length)
+    response = _spectra([one for _, one, _ in gated], length)
     band = _excited(np.sqrt(np.sum(np.abs(force) ** 2, axis=0)))
     apart = outlying(force[:, band], response[:, band])
     kept = [i for i in range(len(used)) if i not in apart]

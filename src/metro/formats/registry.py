@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from metro.formats import gocator, matlab, rosbag, rsi, signalcalc, softgauge, sur, tdms
+from metro.formats import cutpro, gocator, matlab, rosbag, rsi, signalcalc, softgauge, sur, tdms
 from metro.formats.contents import Contents, of_channels, of_frame, of_text
 from metro.formats.dynoware import dynoware_pieces
 from metro.formats.e57 import SIGNATURE, e57_pieces
@@ -105,6 +105,7 @@ FORMATS = (
     _cloud("E57", (".e57",), (SIGNATURE,), e57_pieces),
     Format("universal", (".uff", ".unv", ".uf"), _UNIVERSAL, ("frf",), read_uff),
     Format("SignalCalc text", (), signalcalc.STARTS, ("frf",), read_signalcalc, holds=signalcalc.HOLDS),
+    Format("CutPro FRF", cutpro.SUFFIXES, _ANY, ("frf",), cutpro.read_cutpro),
     Format("Gocator CSV", (), gocator.STARTS, ("cloud",), read_gocator),
     Format("software gauge", (), softgauge.STARTS, ("profile",), read_softgauge, holds=softgauge.HOLDS),
     Format("KUKA RSI recording", (".rsi", ".xml"), rsi.STARTS, ("robot", "joints"), rsi.read_rsi),

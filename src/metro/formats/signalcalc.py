@@ -35,14 +35,14 @@ def read_signalcalc(path: Path, _kind: Kind, rows: int | None) -> Raw:
     at = next((k for k in range(names, len(text)) if text[k].startswith("Hz")), None)
     if at is None:
         raise FormatError(path, "found no line of units that begins with Hz")
-    unit, factor = _unit(path, at + 1, re.sub(r"^Hz\s*", "", text[at]))
+    unit, factor = response_unit(path, at + 1, re.sub(r"^Hz\s*", "", text[at]))
     (raw,) = number_pieces(path, Layout(_NAMES, SPACES, at + 1), _NAMES, None, rows)
     frame: pd.DataFrame = raw.frame * [1.0, factor, factor]
     frame.attrs["response_unit"] = unit
     return Raw(frame, raw.place)
 
 
-def _unit(path: Path, number: int, text: str) -> tuple[str, float]:
+def response_unit(path: Path, number: int, text: str) -> tuple[str, float]:
     """Return the contract's unit of the response and the factor to it; ``(m/s²)(N)`` means the ratio."""
     try:
         read = per_force(text)

@@ -13,6 +13,7 @@ from metro.units import N_UM
 
 # Of the half width of a resonance: a shift by a hundredth of it changes the response by 1 % at most.
 _WORTH_SAYING = 0.01
+_BY_CHANCE = 1e-3  # of a test of fifty modes that do not move, one in twenty has such a note
 
 
 def doubts(model: ModalModel) -> Iterator[str]:
@@ -30,7 +31,9 @@ def of_files(model: ModalModel) -> Iterator[str]:
         f"{mode.frequency:.5g} Hz by {mode.frequency * moved.frequency.scatter:.2g} Hz "
         f"(damping by {100.0 * moved.damping.scatter:.2g} %, {moved.frequency.files} files)"
         for mode, moved in zip(model.modes, model.moved, strict=True)
-        if moved is not None and moved.frequency.scatter > _WORTH_SAYING * mode.damping
+        if moved is not None
+        and moved.frequency.chance < _BY_CHANCE
+        and moved.frequency.scatter > _WORTH_SAYING * mode.damping
     ]
     if shifts:
         yield (
