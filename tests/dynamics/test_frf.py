@@ -159,7 +159,7 @@ def test_a_record_of_another_rate_is_named():
 
 
 def test_lines_in_a_hole_of_the_hammers_spectrum_are_not_used_and_those_of_a_strong_side_lobe_are():
-    """A nearly flat pulse of 6 ms: holes every 167 Hz and a first side lobe 13 dB below the top, as a sinc."""
+    """A nearly flat pulse of 6 ms: holes every 167 Hz and a first side lobe 13 dB lower, as a sinc."""
     hit = record()
     (struck,) = np.nonzero(hit.force > 0.0)
     flat = np.zeros_like(hit.force)

@@ -336,6 +336,24 @@ def test_frfs_that_end_at_different_lines_are_all_used():
     assert "the 3597 that all have are fitted" in test.notes[0]
 
 
+@pytest.mark.parametrize(
+    ("highest_hz", "left_out"), [(200.0, "its FRF file"), (1000.0, "its hammer records")]
+)
+def test_of_a_record_and_a_file_of_one_pair_the_record_is_used_unless_its_band_is_too_narrow(
+    highest_hz, left_out
+):
+    """A hammer that excites less than half of what the files have would take their modes away."""
+    record = hits()
+    record = record[record["response"] == "1x"]
+    frequency = np.arange(10.0, highest_hz, 0.25)
+    file = frf_rows(receptance(0, noise=0.002, frequency=frequency), frequency=frequency)
+    test = observed(file, hit=record)
+    (note,) = [note for note in test.notes if "of the same pair" in note]
+    assert note.startswith(f"position 1, 1x to 1x: {left_out}")
+    reached = test.used["frequency_hz"].max()
+    assert reached > 0.9 * highest_hz if left_out == "its hammer records" else reached < 400.0
+
+
 def test_an_frf_on_lines_of_its_own_is_named():
     other = FREQUENCY[:-1] + 0.4 * np.diff(FREQUENCY)
     rows = [frf_rows(receptance(i), f"{i + 1}x") for i in (0, 1)]
