@@ -23,6 +23,7 @@ from metro.units import Array
 
 ITERATIONS = 8
 MANY = 10**6  # apart are the numbers of the stretches of different pairs
+SCATTERS = np.linspace(0.0, 0.4, 81)  # no constant is wrong by more than a few of the largest
 LEAST_ERROR = 1e-6  # relative, of a drive constant: a prior of nothing has no inverse
 
 
@@ -92,7 +93,7 @@ def carried_load(evidence: Sequence[Sequence[Evidence]], drives: Array) -> Load:
         values, total = _solve(parts, noise, prior, values)
         noise = np.array([_noise(part, values) for part in parts])
         agree = np.array([_alone(part, values, s) for part, s in zip(parts, noise, strict=True)])
-        scatter = _scatter(agree, covariance)
+        scatter = _scatter(parts, noise, covariance, values)
     alone = _solve(parts, noise, LEAST_ERROR**2 * np.eye(len(parts)), values)[1]
     by_joint, rms = np.full((len(evidence), 2), np.nan), np.full(len(evidence), np.nan)
     by_joint[joints] = agree
@@ -200,8 +201,17 @@ def _solve(parts: Sequence[_Joint], noise: Array, prior: Array, about: Array) ->
     (k,), as it is known so far; of a load of nothing, not at all.
     """
     k = len(about)
+    information, score = _normal(parts, noise, about)
+    information[k:, k:] += np.linalg.inv(prior)
+    scale = np.sqrt(np.diag(information))
+    covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
+    return (covariance @ score)[:k], covariance[:k, :k]
+
+
+def _normal(parts: Sequence[_Joint], noise: Array, about: Array) -> tuple[Array, Array]:
+    """Return the normal equations of load (k,) and errors of the drives, without what is known of these."""
+    k = len(about)
     information, score = np.zeros((k + len(parts),) * 2), np.zeros(k + len(parts))
-    information[k:, k:] = np.linalg.inv(prior)
     for j, (part, s) in enumerate(zip(parts, noise, strict=True), start=k):
         pulled = part.normal @ about / s
         information[:k, :k] += part.normal / s
@@ -210,24 +220,24 @@ def _solve(parts: Sequence[_Joint], noise: Array, prior: Array, about: Array) ->
         information[j, j] += about @ pulled
         score[:k] += part.right / s
         score[j] += about @ part.right / s
-    scale = np.sqrt(np.diag(information))
-    covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
-    return (covariance @ score)[:k], covariance[:k, :k]
+    return information, score
 
 
 def _noise(part: _Joint, values: Array) -> float:
     """Variance of a joint's torque that makes independent samples of what stretches scatter by.
 
     Neighbouring residuals are not independent: the scores of stretches scatter more than white noise of the
-    residuals' size would make them, by a factor that is the mean over what the joint determines.
+    residuals' size would make them, by a factor that is the mean over what the joint determines. What the
+    drive's constant is wrong by is no noise.
     """
-    left = part.torque - part.own @ values
+    factor, _ = _alone(part, values, 1.0)
+    left = part.torque - np.nan_to_num(factor) * part.own @ values
     spread, turn = np.linalg.eigh(part.normal)
     kept = spread > 1e-9 * spread[-1]
     white = part.own @ (turn[:, kept] / np.sqrt(spread[kept]))
     scores = np.array([white[part.stretch == g].T @ left[part.stretch == g] for g in np.unique(part.stretch)])
-    factor = float(np.mean(np.sum(scores**2, axis=0))) * len(scores) / max(len(scores) - 1, 1)
-    return max(factor, float(np.mean(left**2)), np.finfo(float).tiny)
+    scattered = float(np.mean(np.sum(scores**2, axis=0))) * len(scores) / max(len(scores) - 1, 1)
+    return max(scattered, float(np.mean(left**2)), np.finfo(float).tiny)
 
 
 def _alone(part: _Joint, values: Array, noise: float) -> tuple[float, float]:
@@ -238,19 +248,24 @@ def _alone(part: _Joint, values: Array, noise: float) -> tuple[float, float]:
     return float(values @ part.right) / size, float(np.sqrt(noise / size))
 
 
-def _scatter(agree: Array, declared: Array) -> float:
-    """Return the standard deviation of the joints' factors beyond their own errors and the declared ones.
+def _scatter(parts: Sequence[_Joint], noise: Array, declared: Array, about: Array) -> float:
+    """Return the standard deviation of the drives' errors from joint to joint, beyond what is declared.
 
-    DerSimonian and Laird (Controlled Clinical Trials 7, 1986): what they share does not let them scatter.
+    It is the root of its mean square over the restricted likelihood (Patterson & Thompson, Biometrika 58,
+    1971), flat before: the load, which joints that do not agree would bend, is integrated out.
     """
-    count = len(agree)
-    contrast = np.eye(count) - 1.0 / count
-    own = np.diag(contrast @ declared @ contrast)
-    variance = agree[:, 1] ** 2 + own
-    good = np.isfinite(variance) & (variance > 0.0)
-    if good.sum() < 2:
-        return 0.0
-    weight, factor = 1.0 / variance[good], agree[good, 0]
-    mean = float(weight @ factor / weight.sum())
-    excess = float(weight @ (factor - mean) ** 2) - (int(good.sum()) - 1)
-    return float(np.sqrt(max(excess, 0.0) / (weight.sum() - (weight**2).sum() / weight.sum())))
+    information, score = _normal(parts, noise, about)
+    k, count = len(about), len(parts)
+    size = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
+    size[k:] = 1.0
+    logarithm = []
+    for spread in SCATTERS:
+        prior = declared + (spread**2 + LEAST_ERROR**2) * np.eye(count)
+        whole = information.copy()
+        whole[k:, k:] += np.linalg.inv(prior)
+        whole /= np.outer(size, size)
+        explained = (score / size) @ np.linalg.solve(whole, score / size)
+        determinants = np.linalg.slogdet(prior)[1] + np.linalg.slogdet(whole)[1]
+        logarithm.append(0.5 * (explained - determinants))
+    weight = np.exp(np.array(logarithm) - max(logarithm))
+    return float(np.sqrt(weight @ SCATTERS**2 / weight.sum()))

@@ -135,13 +135,14 @@ def _by_joint(block: JSON, results: Results) -> list[Item]:
         if factor
     ]
     mass = quantity(carried["mass_by_logs_alone"])
+    scatter = percent(carried["scatter_of_drives"])
     text = (
         f"By noise and friction alone the mass would be {mass}. In its interval is, besides, the error of "
         f"the drive constants: {carried['drives']}. What they share scales every mass and moment alike: no "
-        "log of torques or currents can show it. By how much a joint alone would make the load larger: "
-        f"{listing(factors)}; "
-        f"beyond their errors these scatter by {percent(carried['scatter_of_drives'])}, which is in the "
-        "interval, too. To know the mass better, weigh it, or take a pair of logs with a known mass."
+        "log of torques or currents can show it. Factor by which each joint alone would change the load: "
+        f"{listing(factors)}; beyond what is declared, the constants scatter from joint to joint by "
+        f"{scatter}, which is in the interval, too. To know the mass better, weigh it, or take a pair of "
+        "logs with a known mass."
     )
     items: list[Item] = [Paragraph(text)]
     if course is not None:

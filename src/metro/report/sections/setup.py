@@ -43,12 +43,17 @@ CONDITIONS = {
 
 def setup(results: Results) -> Section | None:
     """Write the declared tool, work and instruments, and the conditions with their runs; None without any."""
+    runs = results.batch.runs
+    free = pd.Series(False, runs.index)
+    if "joint_log" in runs:  # a log of a free motion is no cut, and no model is judged by it
+        free = (runs["joint_log"] != "") & (runs["operation"] == "")
     items = [
         *_declared(results.batch.manifest),
         *_arm(results.batch.cell, results.batch.manifest),
-        *_conditions(results.batch.runs),
+        *_conditions(results.batch.runs[~free]),
     ]
-    return Section("What was measured", [*items, *_plan(results)]) if items else None
+    plan = [] if len(free) and free.all() else _plan(results)
+    return Section("What was measured", [*items, *plan]) if items else None
 
 
 def _declared(manifest: JSON) -> list[Item]:
