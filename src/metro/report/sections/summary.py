@@ -16,6 +16,7 @@ from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
 from metro.report.sections.surface import first_faces
+from metro.report.sections.texture import first_traces
 from metro.report.sections.trust import static_deflection, trust
 from metro.report.sections.verdict import (
     STATUS,
@@ -108,7 +109,7 @@ def _one_run(results: Results) -> list[Item]:
 
 def _identified(results: Results) -> list[Item]:
     """Give the most compliant mode, and the boundary or the response that shows the identification."""
-    shown = [*first_faces(results), *boundary_items(results), *largest_response(results.tables)]
+    shown = [*first_faces(results), *first_traces(results), *boundary_items(results), *largest_response(results.tables)]
     yielding = [mode for mode in results.identified.get("modes") or [] if _peak(mode) > 0.0]
     if not yielding:
         return shown
