@@ -110,7 +110,9 @@ def test_narrow_hills_are_left_out_the_narrowest_first_and_their_neighbours_go_o
     assert upward_crossings(z, 5.0).tolist() == pytest.approx([32.5, 52.5])
 
 
-@pytest.mark.parametrize(("width", "section"), [(0.03, 0.08), (0.1, 0.25), (0.2, 0.8), (1.0, 2.5), (2.0, 8.0)])
+@pytest.mark.parametrize(
+    ("width", "section"), [(0.03, 0.08), (0.1, 0.25), (0.2, 0.8), (1.0, 2.5), (2.0, 8.0)]
+)
 def test_the_section_follows_from_the_width_of_the_elements(width, section):
     x = np.arange(0.0, 20 * MM, 2 * UM)
     assert section_length(sine(width * MM, x=x), 2 * UM) == pytest.approx(section * MM)

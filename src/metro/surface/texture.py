@@ -134,7 +134,7 @@ def levelled(x: Array, z: Array) -> tuple[Array, str]:
 def _parted(x: Array, primary: Array, cutoff: float) -> tuple[list[Profile], list[str]]:
     spacing = float(x[1] - x[0])
     short = next(length for most, length in SHORT if cutoff <= most)
-    fine = spacing <= short / CLOSE
+    fine = spacing <= short / CLOSE * (1.0 + 1e-9)  # 0.5 µm by its rounded places
     smooth = gaussian_filter(primary, spacing, cutoff)
     rough = (gaussian_filter(primary, spacing, short) if fine else primary) - smooth
     margin = round(0.5 * cutoff / spacing)
@@ -184,7 +184,9 @@ def stated(profile: Profile, noise: float) -> dict[str, Parameter]:
         scattered = _over_sections(profile, values)
         of = f"scatter over {count} sections"
         return {
-            name: Parameter(value, *scattered.get(name, (math.nan, math.nan)), of if name in scattered else "")
+            name: Parameter(
+                value, *scattered.get(name, (math.nan, math.nan)), of if name in scattered else ""
+            )
             for name, value in values.items()
         }
     if not noise > 0.0:
@@ -220,8 +222,16 @@ def _over_sections(profile: Profile, values: dict[str, float]) -> dict[str, tupl
         each = np.array([one.get(name, math.nan) for one in left_out])
         if name != "t" and np.isfinite(each).all():
             half = reach * float(each.std(ddof=1))
+            if name == "Sm":
+                half = math.hypot(half, _of_ends(profile, value))
             ends[name] = (_least(name, value - half), value + half)
     return ends
+
+
+def _of_ends(profile: Profile, width: float) -> float:
+    """Return how far a mean width may be off since elements begin between points: the first and the last."""
+    elements = max(round(float(np.ptp(profile.x)) / width), 1)
+    return NORMAL * profile.spacing * math.sqrt(2.0 / 12.0) / elements
 
 
 def _without(profile: Profile, sections: list[Array], gone: int) -> dict[str, float]:

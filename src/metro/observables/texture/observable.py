@@ -1,9 +1,10 @@
-"""Surface texture of the traces of a batch: P, W and R parameters of each, and the blocks of identified.json."""
+"""Surface texture of the traces of a batch: P, W and R parameters of each, with their intervals."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -16,11 +17,12 @@ from metro.surface.texture import UNITLESS, Parameter, Texture, by_repeats, para
 from metro.units import JSON, MM, UM
 
 PARAMETER_COLUMNS = ("run", "profile", "parameter", "value", "low", "high", "unit", "source", "notes")
+ROUNDING = 1e-12
 DRAWN = 1500  # points of a trace that a figure can show
 
 
 def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
-    """Return the tables of texture, and the block ``texture`` of ``identified.json``; empty without traces."""
+    """Return the tables, and the block ``texture`` of ``identified.json``; empty without traces."""
     runs = [str(run) for run in batch.with_files("profile")]
     parted = {run: _parted(batch, read("profile", run)) for run in runs}
     known = {run: each for run, each in parted.items() if isinstance(each, Texture)}
@@ -61,6 +63,8 @@ def _rows(batch: Batch, run: str, one: Texture, known: dict[str, Texture]) -> It
 def _printed(name: str, found: Parameter) -> tuple[float, float, float, str]:
     """Return value, ends and unit as they are written: lengths in µm."""
     si = 1.0 if name in UNITLESS else UM
+    if abs(found.value / si) < ROUNDING:  # as the skewness of a symmetric wave
+        found = replace(found, value=0.0)
     return found.value / si, found.low / si, found.high / si, "1" if name in UNITLESS else "um"
 
 

@@ -109,7 +109,12 @@ def _one_run(results: Results) -> list[Item]:
 
 def _identified(results: Results) -> list[Item]:
     """Give the most compliant mode, and the boundary or the response that shows the identification."""
-    shown = [*first_faces(results), *first_traces(results), *boundary_items(results), *largest_response(results.tables)]
+    shown = [
+        *first_faces(results),
+        *first_traces(results),
+        *boundary_items(results),
+        *largest_response(results.tables),
+    ]
     yielding = [mode for mode in results.identified.get("modes") or [] if _peak(mode) > 0.0]
     if not yielding:
         return shown
@@ -148,6 +153,7 @@ def _identified_words(identified: JSON) -> str:
         "cutting coefficients" if identified.get("force") else "",
         "joint stiffness" if (identified.get("arm") or {}).get("joint_stiffness") else "",
         "flatness of faces" if identified.get("faces") else "",
+        "surface texture" if set(identified.get("texture") or {}) - {"not_identified"} else "",
     ]
     listed = listing([name for name in named if name])
     return f"Identified: {listed}." if listed else ""
