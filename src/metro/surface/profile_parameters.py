@@ -3,8 +3,8 @@
 Of the whole trace they are P parameters, of its waviness W, of its roughness R parameters.
 
 A profile element is a hill and the dale behind it. What rises less than 5 % of the total height from the mean
-line is neither, nor is what is narrower than 1 % of the section length (the default discrimination of ISO 4287
-and of the NPL software gauges: "±5 % of Pz, 1 % of the sampling length").
+line is neither, nor is what is narrower than 1 % of the section length (the default of ISO 4287 and of the
+NPL software gauges: "±5 % of Pz, 1 % of the sampling length").
 """
 
 from __future__ import annotations

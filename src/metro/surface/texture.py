@@ -98,13 +98,13 @@ def texture(x: Array, z: Array, cutoff: float) -> Texture:
     profiles = [Profile("P", x, primary, length, LEAST_WIDTH * section_length(primary, spacing))]
     if spacing > cutoff / CLOSE:
         notes.append(
-            f"W and R are not stated: the points are {spacing / UM:.3g} µm apart, and λc = {cutoff / MM:g} mm "
-            f"takes {cutoff / CLOSE / UM:.3g} µm or less."
+            f"W and R are not stated: the points are {spacing / UM:.3g} µm apart, and λc = {cutoff / MM:g} "
+            f"mm takes {cutoff / CLOSE / UM:.3g} µm or less."
         )
     elif length < 2.0 * cutoff - spacing:
         notes.append(
-            f"W and R are not stated: the trace is {length / MM:.3g} mm long, and λc = {cutoff / MM:g} mm takes "
-            f"{2.0 * cutoff / MM:.3g} mm for one section with half a λc at either end."
+            f"W and R are not stated: the trace is {length / MM:.3g} mm long, and λc = {cutoff / MM:g} mm "
+            f"takes {2.0 * cutoff / MM:.3g} mm for one section with half a λc at either end."
         )
     else:
         parts, said = _parted(x, primary, cutoff)
@@ -198,7 +198,7 @@ def stated(profile: Profile, noise: float) -> dict[str, Parameter]:
         name: _under_noise(name, value, *(np.array([draw[name] for draw in of]) for of in (disturbed, alone)))
         for name, value in values.items()
     }
-    # Of a profile that noise has rounded already, more of it makes the mean deviation grow less than at first.
+    # Of a profile that noise has rounded already, more of it makes the mean deviation grow less.
     # A normal distribution is what noise makes of any other: where a/q is above that of a normal, it falls.
     least = min(found["a"].low, found["a"].value * found["q"].low / found["q"].value)
     return found | {"a": replace(found["a"], low=least)}
