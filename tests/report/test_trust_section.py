@@ -8,7 +8,7 @@ import synthetic_results as synthetic
 
 from metro.report.results import Results
 from metro.report.sections.summary import first_words, summary
-from metro.report.sections.trust import NOTHING, trust, trust_in
+from metro.report.sections.trust import IDENTIFIED, MEASURED, UNTESTED, trust, trust_in, untested
 from metro.report.sections.verdict import next_words
 
 RUNS = pd.DataFrame(
@@ -100,7 +100,13 @@ def test_the_error_of_a_probability_is_no_share_of_a_signal():
 
 
 def test_without_a_verdict_it_is_said_that_no_prediction_was_tested():
-    assert trust(results()) == [NOTHING]
+    assert trust(results()) == [IDENTIFIED]
+
+
+def test_what_was_not_identified_does_not_hold_within_an_interval():
+    assert untested({"format": 1, "arm": {"not_identified": {"waviness": "no arm"}}, "faces": {}}) == UNTESTED
+    assert untested({"faces": {"r1": {}}, "texture": {"r1": {}}, "arm": {"not_identified": {}}}) == MEASURED
+    assert untested({"faces": {"r1": {}}, "modes": [{}]}) == IDENTIFIED
 
 
 def test_what_to_measure_next_says_where_the_verdict_does_without():

@@ -12,6 +12,7 @@ from metro.batch.documents import Likeness, read_yaml, schema_findings
 from metro.batch.findings import Finding, Severity, linked_outside, misspelt
 from metro.units import JSON
 
+UNKNOWN = "unknown"  # of a batch that names no machine
 FILE = "cell.yaml"
 CELLS = Path("config/cells")  # unless config.yaml or the command line says otherwise
 CHECKOUT = Path(__file__).parents[3]  # where this package is used from a checkout
@@ -55,6 +56,8 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
     if source is None:
         near = misspelt(name, sorted(path.stem for path in cells.glob("*.yaml")))
         note = f"nothing is known of cell {name} (rigid): neither {FILE} nor {shared} is there"
+        if name == UNKNOWN:
+            note = f"no machine is named: it is taken to be rigid, and to have no arm (describe it in {FILE})"
         note += f' (did you mean "{near}"?)' if near else ""
         severity: Severity = "warning" if near else "note"
         return {"cell": name}, None, [Finding(severity, "batch.yaml", note, column="cell")]

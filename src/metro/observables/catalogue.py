@@ -12,6 +12,10 @@ from metro.batch.capabilities import Capability, Stock
 from metro.observables import PACKAGES
 from metro.observables.description import Description
 from metro.observables.published.description import PRINTED
+from metro.observables.texture.description import TEXTURE
+
+# What is found without a model, so that nothing is compared with it.
+BESIDE = (TEXTURE, PRINTED)
 
 
 @cache
@@ -44,12 +48,12 @@ def assumptions(observable: str) -> str:
 
 def observed_tables() -> tuple[str, ...]:
     """Return the names of all tables that the stage ``identify`` writes."""
-    return (*(table for each in descriptions() for table in each.tables), *PRINTED.tables)
+    return tuple(table for each in (*descriptions(), *BESIDE) for table in each.tables)
 
 
 def shown_tables() -> tuple[str, ...]:
     """Return the observed tables that a batch's report is made from."""
-    return (*(table for each in descriptions() for table in each.shown), *PRINTED.shown)
+    return tuple(table for each in (*descriptions(), *BESIDE) for table in each.shown)
 
 
 def drawn_tables() -> tuple[str, ...]:
@@ -58,6 +62,5 @@ def drawn_tables() -> tuple[str, ...]:
 
 
 def capabilities(stock: Stock) -> tuple[Capability, ...]:
-    """Say for every observable, and for printed values, whether a batch has what it needs."""
-    answers = [each for described in descriptions() for each in described.needs(stock)]
-    return (*answers, *PRINTED.needs(stock))
+    """Say for every observable, for texture and for printed values, whether a batch has what it needs."""
+    return tuple(each for described in (*descriptions(), *BESIDE) for each in described.needs(stock))

@@ -24,6 +24,7 @@ from metro.report.sections.study import study
 from metro.report.sections.summary import summary
 from metro.report.sections.surface import flatness
 from metro.report.sections.terms import terms
+from metro.report.sections.texture import texture
 
 
 def report_pdf(results: Results, sections: Sequence[Section]) -> bytes:
@@ -43,6 +44,7 @@ def report_sections(results: Results) -> list[Section]:
         calibration(results),
         identification(results),
         flatness(results),
+        texture(results),
         robot(results),
         study(results),
         comparison(results),

@@ -25,6 +25,8 @@ from metro.observables.published import TABLES as PRINTED
 from metro.observables.published import observable as published
 from metro.observables.published.study import printed_study
 from metro.observables.registry import observables
+from metro.observables.texture import TABLES as TEXTURE
+from metro.observables.texture import observable as texture
 from metro.slips.find import JUDGED, LABEL, find
 from metro.slips.slip import Slip
 from metro.stages.problem_file import Posed, write_problems
@@ -118,6 +120,9 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
         posed = {task.observable: Posed(task, state.base_model.sampled(task), printed=True) for task in tasks}
     state.add(printed_study(batch, state.observed))
     state.add(calibration(batch, state.read))
+    tables, blocks = texture.observe(batch, state.read)
+    state.observed |= tables
+    state.add(blocks)
     _write(processed, batch, state.observed)
     write_problems(processed, posed)
     write_json(processed / "identified.json", {**state.identified, "not_identified": lacking})
@@ -165,7 +170,8 @@ def _identified(
 
 def _write(processed: Path, batch: Batch, observed: dict[str, pd.DataFrame]) -> None:
     """Write every table that an observable may have, empty where it has not."""
-    names = [name for observable in observables() for name in observable.tables] + [*PRINTED]
+    names = [name for observable in observables() for name in observable.tables]
+    names += [*TEXTURE, *PRINTED]
     unknown = set(observed) - set(names)
     if unknown:
         raise KeyError(f"{batch.name}: observed tables that no observable names: {sorted(unknown)}")

@@ -16,7 +16,7 @@ from metro.observables.arm.wall import Wall, wall
 from metro.observables.arm.wall_profile import in_one_pose
 from metro.observables.deformation.model import DeformationModel
 from metro.observables.problem import Refusal
-from metro.robot.kinematics import arm_of_cell
+from metro.robot.kinematics import arm_of_cell, no_arm
 from metro.units import DEG, Array
 
 
@@ -52,7 +52,7 @@ def giving_arm(batch: Batch, read: Tables) -> GivingArm | Refusal:
     """Return the arm of a batch's cell."""
     arm = arm_of_cell(batch.cell, batch.manifest)
     if arm is None:
-        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
+        return Refusal(no_arm(batch.cell))
     model, loads = DeformationModel(arm), usable(read("loads"))
     return GivingArm(model, loads, best_compliance(batch, model, loads))
 

@@ -24,7 +24,7 @@ from metro.observables.deformation.proposals import feasible
 from metro.observables.deformation.report import arm_block
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Problem, Refusal
-from metro.robot.kinematics import Arm, arm_of_cell
+from metro.robot.kinematics import Arm, arm_of_cell, no_arm
 from metro.units import JSON, MM
 
 LOADED = 0.01  # load cell and gauge of the load tests, which all walls share
@@ -116,7 +116,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     """Walls and load tests as blocks, and the model of the arm with elastic joints."""
     arm = arm_of_cell(batch.cell, batch.manifest)
     if arm is None:
-        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
+        return Refusal(no_arm(batch.cell))
     model = DeformationModel(arm)
     softness = best_compliance(batch, model, observed["arm_loads"])
     per_newton = partial(model.per_newton, compliance=softness)

@@ -29,7 +29,7 @@ from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.robot.drive_torques import TURNING
 from metro.robot.drives import declared, drives_of_cell
-from metro.robot.kinematics import Arm, arm_of_cell
+from metro.robot.kinematics import Arm, arm_of_cell, no_arm
 from metro.robot.statics import tip_jacobian
 from metro.signals import align, kalman
 from metro.signals.intervals import uneven
@@ -54,7 +54,7 @@ def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataF
     """
     arm = arm_of_cell(batch.cell, batch.manifest)
     if arm is None:
-        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
+        return Refusal(no_arm(batch.cell))
     torques, forces, refused = [], [], []
     for run in batch.with_files("robot_log", "idle_log", "dynamometer"):
         force = _force(batch, run, read)
@@ -149,7 +149,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     """Torques per run as blocks, and the model of what the dynamometer's force makes of them."""
     arm = arm_of_cell(batch.cell, batch.manifest)
     if arm is None:
-        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
+        return Refusal(no_arm(batch.cell))
     left_out = [
         f"Run {row.run} is left out: {row.reason}." for row in observed["joint_force_refused"].itertuples()
     ]

@@ -20,7 +20,7 @@ from metro.observables.waviness.blocks import wave_block
 from metro.observables.waviness.model import WavinessModel
 from metro.observables.waviness.points import ENCODER, wave_points
 from metro.observables.waviness.report import transfer, waviness_of
-from metro.robot.kinematics import Arm, arm_of_cell
+from metro.robot.kinematics import Arm, arm_of_cell, no_arm
 from metro.units import JSON, MM, UM, Array
 
 SCATTER = 0.02
@@ -36,7 +36,7 @@ def observe(batch: Batch, read: Read, _identified: JSON) -> dict[str, pd.DataFra
     """
     arm = arm_of_cell(batch.cell, batch.manifest)
     if arm is None:
-        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
+        return Refusal(no_arm(batch.cell))
     points, facts, refused = [], [], []
     for run in batch.with_files("profile"):
         face = wall(batch, run)
@@ -70,7 +70,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     """Walls as blocks, wave by wave, and the model of the straying tip."""
     arm = arm_of_cell(batch.cell, batch.manifest)
     if arm is None:
-        return Refusal(f"cell {batch.cell.get('cell')}: no arm.dh, nothing is known of the arm")
+        return Refusal(no_arm(batch.cell))
     refused = observed["waviness_refused"].groupby("reason", sort=False)["run"]
     notes = [f"No waviness of {', '.join(runs)}: {reason}." for reason, runs in refused]
     if "waviness_points" not in observed:

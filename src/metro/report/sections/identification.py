@@ -42,6 +42,7 @@ RUN_BLOCKS = {
 ABOUT = ("format", "batch", "metro", "not_identified")  # the batch and the file, not quantities
 ELSEWHERE = {
     "faces": "flatness of faces",
+    "texture": "surface texture",
     "study": "factors and configurations",
     "arm": "the robot arm",
     "calibration": "tool, work and payload",

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import pandas as pd
 
+from metro.batch.cell import UNKNOWN
 from metro.report.numbers import listing
 from metro.report.results import Results
+
+ORIGIN = {"measured": "Measured on", "simulated": "Simulated for", "published": "Published values of"}
+OF_A_CUT = ("operation", "spindle_rpm", "dynamometer", "robot_log", "idle_log")
+UNCUT = {"scan": "scan", "profile": "traced profile"}
 
 
 def count_of(count: int, name: str) -> str:
@@ -16,9 +21,8 @@ def count_of(count: int, name: str) -> str:
 def measured_words(results: Results) -> str:
     """Describe the batch and its measurements."""
     manifest, runs = results.batch.manifest, results.batch.runs
-    origin = {"measured": "Measured on", "simulated": "Simulated for", "published": "Published values of"}
-    cell = results.batch.cell.get("cell", manifest.get("cell", "unknown"))
-    parts = [f"{origin.get(str(manifest.get('source')), 'Values of')} cell {cell}"]
+    cell = str(results.batch.cell.get("cell", manifest.get("cell", UNKNOWN)))
+    parts = [f"{ORIGIN.get(str(manifest.get('source')), 'Values of')} cell {cell}"] if cell != UNKNOWN else []
     tool, work = manifest.get("tool") or {}, manifest.get("work") or {}
     if tool.get("diameter_mm"):
         teeth = f", {tool['teeth']} teeth" if tool.get("teeth") else ""
@@ -26,8 +30,36 @@ def measured_words(results: Results) -> str:
     if work.get("material"):
         parts.append(f"work {work['material']}")
     planned = planned_runs(results)
-    text = "; ".join(parts) + "." + _run_words(runs[~runs.index.isin(planned)]) + _planned_words(planned)
-    return f"{text} Source: {manifest['citation']}" if manifest.get("citation") else text
+    made = runs[~runs.index.isin(planned)]
+    described = "; ".join(parts)
+    sentences = [
+        f"{described[0].upper()}{described[1:]}." if described else "",
+        _run_words(made[is_cut(made)]),
+        _uncut_words(made[~is_cut(made)]),
+        _planned_words(planned),
+        f"Source: {manifest['citation']}" if manifest.get("citation") else "",
+    ]
+    return " ".join(filter(None, sentences)) or "Neither the machine nor what was measured is described."
+
+
+def is_cut(runs: pd.DataFrame) -> pd.Series:
+    """Mask of the runs that were cuts: with an operation, a speed, or a record of forces or of the arm."""
+    cut = pd.Series(False, index=runs.index)
+    for column in OF_A_CUT:
+        if column in runs:
+            cut |= runs[column].notna() & ~runs[column].astype(str).isin(["", "nan"])
+    return cut
+
+
+def _uncut_words(runs: pd.DataFrame) -> str:
+    """Say what was measured of parts whose cutting is not described."""
+    counts = {
+        what: int((runs[column].fillna("").astype(str) != "").sum())
+        for column, what in UNCUT.items()
+        if column in runs
+    }
+    listed = listing([count_of(count, what) for what, count in counts.items() if count])
+    return f"{listed}, of which no cutting conditions are stated." if listed else ""
 
 
 def planned_runs(results: Results) -> list[str]:
@@ -38,7 +70,7 @@ def planned_runs(results: Results) -> list[str]:
 
 def _planned_words(planned: list[str]) -> str:
     return (
-        f" {count_of(len(planned), 'run')} {'is' if len(planned) == 1 else 'are'} planned, not cut."
+        f"{count_of(len(planned), 'run')} {'is' if len(planned) == 1 else 'are'} planned, not cut."
         if planned
         else ""
     )
@@ -54,7 +86,7 @@ def _run_words(runs: pd.DataFrame) -> str:
         return logs
     operations = listing([str(o) for o in runs["operation"].dropna().unique() if str(o)])
     one = len(runs) == 1
-    made = f" {count_of(len(runs), 'cutting run')} ({operations or 'operation not stated'})"
+    made = f"{count_of(len(runs), 'cutting run')} ({operations or 'operation not stated'})"
     recorded = int(runs["role"].isin(["identify", "validate"]).sum())
     held = int((runs["role"] == "validate").sum())
     if not recorded:

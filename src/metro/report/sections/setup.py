@@ -11,7 +11,7 @@ from metro.report.content import Heading, Item, Paragraph, Section, Table
 from metro.report.cuts import NAMES, NUMBERS
 from metro.report.numbers import listing, words
 from metro.report.results import Results
-from metro.report.sections.measured import count_of
+from metro.report.sections.measured import count_of, is_cut
 from metro.units import JSON, printed
 
 LONGEST, MOST_RUNS = 40, 8
@@ -125,6 +125,8 @@ def _values(values: JSON) -> Iterator[str]:
 def _conditions(runs: pd.DataFrame) -> list[Item]:
     """Tabulate the settings that differ, runs of one condition together; name shared settings once."""
     columns = [name for name in CONDITIONS if name in runs and _given(runs[name]).any()]
+    if not is_cut(runs).any() and columns == ["feed_direction_deg"]:  # which runs.csv need not state
+        return []
     if runs.empty or not columns:
         return []
     shared = [name for name in columns if runs[name].nunique(dropna=False) == 1]

@@ -17,6 +17,7 @@ from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
 from metro.report.sections.surface import first_faces
+from metro.report.sections.texture import first_traces
 from metro.report.sections.trust import static_deflection, trust
 from metro.report.sections.verdict import (
     STATUS,
@@ -113,6 +114,7 @@ def _identified(results: Results) -> list[Item]:
     shown = [
         *joint_facts(results),
         *first_faces(results),
+        *first_traces(results),
         *boundary_items(results),
         *largest_response(results.tables),
     ]
@@ -155,6 +157,7 @@ def _identified_words(identified: JSON) -> str:
         "joint stiffness" if (identified.get("arm") or {}).get("joint_stiffness") else "",
         "flatness of faces" if identified.get("faces") else "",
         *joint_words(identified),
+        "surface texture" if set(identified.get("texture") or {}) - {"not_identified"} else "",
     ]
     listed = listing([name for name in named if name])
     return f"Identified: {listed}." if listed else ""

@@ -13,10 +13,17 @@ from metro.units import JSON, printed
 
 SURE = 0.95  # probability from which on a cause counts as identified
 HOLDS = ("clean", "explained")
-NOTHING = (
-    "No prediction was tested here. A value that was identified, where there is one, holds within its "
-    "interval for the set-up as declared; how well it predicts a cut is not known."
+UNTESTED = "No prediction was tested here."
+IDENTIFIED = (
+    f"{UNTESTED} The identified values hold within their intervals for the set-up as declared; how well they "
+    "predict a cut is not known."
 )
+MEASURED = (
+    f"{UNTESTED} The figures describe the surface that was measured, where it was measured; their intervals "
+    "hold what is said beside them, and nothing of how it was cut."
+)
+OF_SURFACES = ("faces", "texture")
+ABOUT = ("format", "batch", "metro", "not_identified")
 
 
 def trust(results: Results) -> list[str]:
@@ -28,7 +35,22 @@ def trust(results: Results) -> list[str]:
     for name, entry in results.verdicts().items():
         said = " ".join(filter(None, [_reach(name, entry), _causes(entry)]))
         alike.setdefault(_tested(results, entry), []).append(said)
-    return [f"{' '.join(said)} {tested}".rstrip() for tested, said in alike.items()] or [NOTHING]
+    return [f"{' '.join(said)} {tested}".rstrip() for tested, said in alike.items()] or [
+        untested(results.identified)
+    ]
+
+
+def untested(identified: JSON) -> str:
+    """Say what figures are worth that no prediction was tested with: identified ones, or of a surface."""
+    found = {name for name, block in identified.items() if name not in ABOUT and _has_values(block)}
+    if not found:
+        return UNTESTED
+    return MEASURED if found <= set(OF_SURFACES) else IDENTIFIED
+
+
+def _has_values(block: JSON) -> bool:
+    """Whether a block of ``identified.json`` holds more than reasons why it is empty."""
+    return bool(set(block) - {"not_identified"}) if isinstance(block, dict) else bool(block)
 
 
 def static_deflection(results: Results) -> list[str]:
