@@ -128,8 +128,8 @@ def test_mean_forces_of_a_ball_in_a_slot_as_deep_as_its_radius_are_the_closed_fo
     expected[0, 4], expected[2, 4] = -n * R / math.pi, n * R / 2
     expected[0, 5], expected[2, 5] = n * R / math.pi, n * R / 2
     assert mean[:, :3] == pytest.approx(expected[:, :3], abs=1e-5 * n * s * R)
-    # An edge without helix is spread over a step of the table (half a degree) by its height, so that more than
-    # half of its length enters and leaves ahead of the step's middle: by a third of 0.0087 rad / π at most.
+    # An edge without helix is spread over a step of the table (half a degree) by its height, so that more
+    # than half of its length enters and leaves ahead of the step's middle: by a third of 0.0087 rad / π.
     assert mean[:, 3:] == pytest.approx(expected[:, 3:], abs=0.0087 / 3 / math.pi * n * R)
 
 
@@ -147,7 +147,7 @@ def test_the_edge_of_a_ball_has_the_length_of_its_curve():
 
 @pytest.mark.parametrize("tool", [BALL, NOSE, CONE], ids=["ball", "bull nose", "taper"])
 def test_mean_tangential_power_is_the_pressure_times_the_volume_removed(tool):
-    """The tangential force of a ring has the ring's radius as its lever: F_y of a slot is half of it × π / 2."""
+    """The tangential force of a ring has the ring's radius as its lever."""
     depths = np.linspace(0.0, 3e-3, 201)
     means = np.array([mean_basis(tool, EdgeLaw(), replace(SLOT, axial_depth=d))[1, 0] for d in depths])
     place = [meridian(tool, d, 1.0) for d in 0.5 * (depths[1:] + depths[:-1])]
