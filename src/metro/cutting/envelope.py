@@ -79,6 +79,16 @@ class Meridian:
         return np.asarray(math.cos(self.cutter.helix) * np.sqrt(1.0 + sideways**2))
 
 
+def mean_inclination(cutter: Cutter, depth: float) -> tuple[float, float]:
+    """Means of sin κ and cos κ over the height of a cut of a ``depth``, m."""
+    line = meridian(cutter, depth, 0.0)
+    places, weights = np.polynomial.legendre.leggauss(4)
+    panel = np.repeat(np.arange(len(line.length)), 4)
+    place = line.at(panel, np.tile(0.5 * (places + 1.0), len(line.length)))
+    height = np.tile(0.5 * weights, len(line.length)) * line.length[panel] * place.sine
+    return float(height @ place.sine / height.sum()), float(height @ place.cosine / height.sum())
+
+
 def meridian(cutter: Cutter, depth: float, lag: float) -> Meridian:
     """Return the meridian up to a ``depth``, m, cut into panels for a ``lag``, rad/m."""
     rc, steepest = cutter.corner, 0.5 * math.pi - cutter.taper
