@@ -151,6 +151,7 @@ def masses(a, b):
 
 # Effect → values of the first, of the second, and how both together are one; None: no values of one are.
 COMPOSED = {
+    "tool_end": ({"corner_radius_mm": 0.5}, {"corner_radius_mm": 0.7}, added),
     "charge_drift slope": ({"slope_n_s": [3.0, -2.0, 1.0]}, {"slope_n_s": [1.0, 4.0, 2.0]}, added),
     "charge_drift discharge": (
         {"time_constant_s": [2.0, 3.0, 5.0]},

@@ -18,6 +18,7 @@ from metro.batch.sources import mapping_findings
 from metro.spelling import resembling, suggestion
 from metro.units import JSON, Array
 
+ROUNDED_MM = 1e-6
 CLOSED_DEG = 0.1  # printed pitch angles are rounded
 ORTHONORMAL = 1e-3  # printed direction cosines are rounded
 
@@ -114,14 +115,37 @@ def _about_the_folder(content: JSON, folder: Path) -> list[Finding]:
 
 
 def _tool(tool: JSON) -> str | None:
-    """Check that there is a pitch angle for each tooth, and that they close the circle."""
+    """Check that there is a pitch angle for each tooth, that they close the circle, and the tool's shape."""
     pitch, teeth = tool.get("pitch_deg"), tool.get("teeth")
     if pitch is None:
-        return None
+        return _shape(tool)
     if len(pitch) != teeth:
         return f"pitch_deg has {len(pitch)} angles, expected as many as teeth ({shown(teeth)})"
     if abs(sum(pitch) - 360) > CLOSED_DEG:
         return f"pitch_deg adds up to {sum(pitch):g}, expected 360 (degrees from each tooth to the next)"
+    return _shape(tool)
+
+
+def _shape(tool: JSON) -> str | None:
+    """Check that end, corner and flank are of one tool."""
+    corner, diameter = tool.get("corner_radius_mm"), tool.get("diameter_mm")
+    if corner is not None and diameter is None:
+        return "corner_radius_mm is given without diameter_mm, expected both"
+    if tool.get("end") == "ball" and corner is not None and abs(corner - 0.5 * diameter) > ROUNDED_MM:
+        return (
+            f"corner_radius_mm is {corner:g}, expected none with end: ball, whose radius is half of "
+            f"diameter_mm ({diameter:g})"
+        )
+    if tool.get("end") == "flat" and corner:
+        return f"corner_radius_mm is {corner:g}, expected no end beside it: a tool with a corner is not flat"
+    if corner is not None and corner > 0.5 * diameter + ROUNDED_MM:
+        return f"corner_radius_mm is {corner:g}, expected at most half of diameter_mm ({diameter:g})"
+    flank, lead = tool.get("taper_deg"), tool.get("cutting_edge_angle_deg")
+    if flank is not None and lead is not None and abs(flank + lead - 90.0) > CLOSED_DEG:
+        return (
+            f"taper_deg is {flank:g} and cutting_edge_angle_deg {lead:g}, expected one of them: they are the "
+            "same angle, from the tool axis and from the plane of the feed"
+        )
     return None
 
 

@@ -12,16 +12,18 @@ from metro.units import Array
 
 @dataclass(frozen=True)
 class Cutter:
-    """A cylindrical cutter (SI).
+    """A cutter (SI): cylindrical, or with a corner radius, a ball end or an inclined flank.
 
     Attributes
     ----------
-    radius : m.
+    radius : m: of the cylinder; of a tapered tool where its flank would begin without a corner, at the tip.
     helix : rad.
     tooth_angles : angle of each tooth from tooth 0, clockwise, rad. Tooth j+1 cuts before tooth j.
     runout_radius, runout_angle : offset of the tool's axis, m, and its direction from tooth 0, clockwise,
         rad.
     reach : (N,) how much farther each tooth reaches than the radius, m; empty: none does.
+    corner : radius of the corner at the tip, m: the radius itself for a ball end.
+    taper : angle between flank and tool axis, rad: 90° less the cutting edge angle of inserts.
     """
 
     radius: float
@@ -30,6 +32,13 @@ class Cutter:
     runout_radius: float = 0.0
     runout_angle: float = 0.0
     reach: tuple[float, ...] = ()
+    corner: float = 0.0
+    taper: float = 0.0
+
+    @property
+    def cylindrical(self) -> bool:
+        """Whether the edges are on a cylinder down to the tip."""
+        return self.corner == 0.0 and self.taper == 0.0
 
     @property
     def teeth(self) -> int:

@@ -89,7 +89,7 @@ def points(cut: Pieces, law: EdgeLaw) -> tuple[Array, Array]:
     """Immersions (points, pieces), rad, and weights (points,) of a quadrature along each piece."""
     length = cut.high - cut.low
     count = LEAST_POINTS + math.ceil(POINTS_PER_RADIAN * length.max(initial=0.0))
-    places, weights = rule(count, _is_linear(law, cut.before.feed))
+    places, weights = rule(count, is_linear(law, cut.before.feed))
     return cut.low + places[:, None] * length, weights
 
 
@@ -103,7 +103,7 @@ def integrated(cut: Pieces, law: EdgeLaw, angles: int) -> Array:
     return np.stack([np.bincount(cut.angle, part, angles) for part in depths], axis=1)
 
 
-def _is_linear(law: EdgeLaw, thickness: float) -> bool:
+def is_linear(law: EdgeLaw, thickness: float) -> bool:
     """Whether the law's shear is the thickness itself: asked of it, for an effect may have replaced it."""
     some = np.linspace(0.0, thickness, 5)
     return bool(np.all(law.shear(some) == some))

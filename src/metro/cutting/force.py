@@ -13,9 +13,10 @@ from metro.cutting.corners import corners
 from metro.cutting.cutter import Cutter
 from metro.cutting.edges import TURN, Pieces, integrated, pieces
 from metro.cutting.engagement import Engagement
+from metro.cutting.general import general_basis
 from metro.cutting.law import EdgeLaw
 from metro.cutting.nearby import Edges, edges, nearby
-from metro.cutting.passes import Passes, passes
+from metro.cutting.passes import ALIKE, Passes, passes
 from metro.units import Array
 
 __all__ = [
@@ -48,12 +49,25 @@ def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False)
     """
     angle = TURN * np.arange(ANGLES) / ANGLES
     cutter = placed(cutter, cut, true_path)
+    if not cutter.cylindrical:
+        return _general_table(cutter, law, cut, true_path)
     before = passes(cutter, cut, true_path, angle)
     if before.sine[0].size == 1 and ANGLES % cutter.teeth == 0:  # all teeth are alike: one pitch of angles
         angle = angle[: ANGLES // cutter.teeth]
     along = edges(cutter, cut, angle, step=TURN / ANGLES)
     pitch = assembled(engaged(before, cut.engagement, along), law, len(angle))
     basis = np.tile(pitch, (ANGLES // len(angle), 1, 1))
+    basis.flags.writeable = False
+    return basis
+
+
+def _general_table(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool) -> Array:
+    """Table of :func:`force_basis` of a cutter that is no cylinder, with its teeth where they are."""
+    even = bool(np.ptp(cutter.pitch(1)) < ALIKE and not cutter.runout_radius and not any(cutter.reach))
+    count = ANGLES // cutter.teeth if even and ANGLES % cutter.teeth == 0 else ANGLES
+    along = edges(cutter, cut, TURN * np.arange(count) / ANGLES, step=TURN / ANGLES)
+    pitch = general_basis(cutter, law, cut, along, true_path=true_path)
+    basis = np.tile(pitch, (ANGLES // count, 1, 1))
     basis.flags.writeable = False
     return basis
 
@@ -74,8 +88,10 @@ def mean_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) 
     """Mean over a revolution of the force on the tool per unit of each coefficient, (3, 6), feed frame.
 
     Without runout every height of the edge goes through the same arc: exact, whatever the helix. With
-    runout the mean of :func:`force_basis`.
+    runout, or a corner or a taper, the mean of :func:`force_basis`.
     """
+    if not cutter.cylindrical:
+        return np.asarray(force_basis(cutter, law, cut, true_path).mean(axis=0))
     before = passes(cutter, cut, true_path, np.zeros(1))
     if before.off_sine.any() or before.off_cosine.any():
         return np.asarray(force_basis(cutter, law, cut, true_path).mean(axis=0))

@@ -2,18 +2,66 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, Values
 from metro.observables.force.model import ForceModel
+from metro.observables.problem import Problem
+from metro.units import Array
 
 CHANNELS = 3
+CERTAIN = 0.999  # that a drift is within the bounds that the records themselves set
+LEAST_WIDTH = 0.1  # N/s of these bounds
 
 
 def apply(model: ForceModel, values: Values) -> ForceModel:
     """Let the zero of each channel drift by ``slope_n_s``, counted from where it was read."""
     slope = tuple(was + more for was, more in zip(model.sensor.slope, values["slope_n_s"], strict=True))
     return replace(model, sensor=replace(model.sensor, slope=slope))
+
+
+def adapt(effect: Effect, problem: Problem) -> Effect:
+    """Let no channel drift faster than the means of revolutions do along the records.
+
+    Nothing that has another slope within the records can be a drift of so many newtons per second.
+    """
+    settings: list[Any] = [block.setting for block in problem.blocks if block.role != "calibrate"]
+    seen = [setting.recording for setting in settings if setting.recording.slope is not None]
+    if not seen:
+        return effect
+    to_channels = np.array(problem.base.sensor.axes)
+    declared = np.array(problem.base.sensor.slope)
+    slopes = np.array([each.slope for each in seen]) @ to_channels.T - declared
+    deviations = np.sqrt(np.array([each.slope_sd for each in seen]) ** 2 @ (to_channels**2).T)
+    parameters = []
+    for parameter, rate, sd in zip(effect.parameters, slopes.T, deviations.T, strict=True):
+        low, high = within(rate, sd)
+        low, high = (float(np.clip(end, parameter.lower, parameter.upper)) for end in (low, high))
+        starts = (0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high)
+        scale = min(parameter.scale, 0.25 * (high - low))
+        parameters.append(replace(parameter, lower=low, upper=high, scale=scale, starts=starts))
+    return replace(effect, parameters=tuple(parameters))
+
+
+def within(rate: Array, sd: Array) -> tuple[float, float]:
+    """Bounds, N/s, of the drift that records with slopes ``rate`` ± ``sd`` (n,) share; 0 is within.
+
+    Around the weighted mean; its deviation is that of the readings, or by the scatter of the records where
+    this is larger: other causes change the force along a record as well.
+    """
+    from scipy.stats import norm, t
+
+    weight = 1.0 / np.maximum(sd, LEAST_WIDTH) ** 2
+    mean = float(weight @ rate / weight.sum())
+    half = float(norm.ppf(0.5 + 0.5 * CERTAIN)) / math.sqrt(weight.sum())
+    if len(rate) > 1:
+        scatter = math.sqrt(float(weight @ (rate - mean) ** 2) / (len(rate) - 1) / float(weight.sum()))
+        half = max(half, scatter * float(t.ppf(0.5 + 0.5 * CERTAIN, len(rate) - 1)))
+    return min(mean - half, -LEAST_WIDTH), max(mean + half, LEAST_WIDTH)
 
 
 EFFECT = Effect(
@@ -24,6 +72,7 @@ EFFECT = Effect(
         for number in range(CHANNELS)
     ),
     apply=apply,
+    adapt=adapt,
     belongs_to=("instrument",),
     per="axis",
     signature=(

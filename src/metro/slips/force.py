@@ -56,9 +56,12 @@ def contradictions(records: list[Record], cutter: Cutter, sensor: JSON) -> tuple
     """Return the slip of straight cuts, if there is one; ``sensor``: its entry of the manifest."""
     designs = [design(cutter, record.setting) for record in records]
     declared, chip = fit(records, designs), mean_chip(records)
-    faults = impossible(declared, chip, cutter.helix)
+    # A corner or an inclined flank turns the radial force towards the axis: then what the helix does to the
+    # axial force does not decide its sign.
+    helix = cutter.helix if cutter.cylindrical else 0.0
+    faults = impossible(declared, chip, helix)
     tried = [Tried(one, one.fitted()) for one in _hypotheses(records, designs, cutter, sensor, declared)]
-    possible = [one for one in tried if not impossible(one.fitted, chip, cutter.helix)]
+    possible = [one for one in tried if not impossible(one.fitted, chip, helix)]
     limit = declared.misfit * (ALIKE if faults else BETTER)
     better = sorted((one for one in possible if one.fitted.misfit < limit), key=lambda one: one.fitted.misfit)
     if not faults and not better:

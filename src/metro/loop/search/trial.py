@@ -122,7 +122,8 @@ def unsettled(fitted: Fit) -> Statement | None:
 def _undetermined(effect: Effect, value: Array, half: Array) -> Statement | None:
     """Return why the parameters of an effect are no result; None where they are one.
 
-    The interval of each is as wide as its bounds, or an identified one is at a bound: it would be beyond.
+    The interval of each is as wide as its bounds, or an identified one is at a bound that the true value may
+    be beyond.
     """
     settled = False
     for parameter, at, width in zip(effect.parameters, value.tolist(), half.tolist(), strict=True):
@@ -130,7 +131,8 @@ def _undetermined(effect: Effect, value: Array, half: Array) -> Statement | None
             identified = 2.0 * width < parameter.period
         else:
             identified = at - width > parameter.lower or at + width < parameter.upper
-            if identified and at in {parameter.lower, parameter.upper} - {parameter.neutral}:
+            outermost = set() if parameter.all_there_is else {parameter.lower, parameter.upper}
+            if identified and at in outermost - {parameter.neutral}:
                 return Statement("implausible", {"parameter": parameter.name, "bound": at})
         settled = settled or identified
     return None if settled else Statement("undetermined")

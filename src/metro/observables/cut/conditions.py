@@ -33,12 +33,35 @@ def cutter(batch: Batch) -> Cutter | Refusal:
     angles = tuple(np.cumsum([0.0, *pitch[:-1]]) * DEG) if pitch else evenly_pitched(tool["teeth"])
     runout = (batch.manifest.get("known") or {}).get("tool_runout", {})
     runout = runout if {"radius_um", "angle_deg"} <= set(runout) else {}
+    end, inserts = tool.get("end"), "cutting_edge_angle_deg" in tool
     return Cutter(
         radius=tool["diameter_mm"] * MM / 2,
         helix=tool.get("helix_deg", 0.0) * DEG,
         tooth_angles=tuple(float(angle) for angle in angles),
         runout_radius=runout.get("radius_um", 0.0) * UM,
         runout_angle=runout.get("angle_deg", 0.0) * DEG,
+        corner=(0.5 * tool["diameter_mm"] if end == "ball" else tool.get("corner_radius_mm", 0.0)) * MM,
+        taper=(90.0 - tool["cutting_edge_angle_deg"] if inserts else tool.get("taper_deg", 0.0)) * DEG,
+    )
+
+
+def end_declared(batch: Batch) -> bool:
+    """Whether the manifest says what end the tool has: flat, ball, or a corner radius."""
+    return bool({"end", "corner_radius_mm"} & set(batch.manifest.get("tool") or {}))
+
+
+def end_note(batch: Batch, tool: Cutter) -> str:
+    """Say what shape of the tool the forces are computed with."""
+    flank = f", the flank at {tool.taper / DEG:.3g}° to the tool axis" if tool.taper else ""
+    if not end_declared(batch):
+        assumed = "A flat end of the tool is assumed: batch.yaml states neither tool.end nor a corner radius"
+        return f"{assumed}{flank}."
+    if not tool.corner:
+        return f"The tool has a flat end{flank}."
+    kind = "a ball end" if tool.corner > 0.999 * tool.radius else "a corner radius"
+    return (
+        f"The tool has {kind} of {tool.corner / MM:.3g} mm{flank}; the chip is normal to the edge, whose "
+        "lead is constant, and edge coefficients are per length of edge × cos(helix)."
     )
 
 

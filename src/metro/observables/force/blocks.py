@@ -79,7 +79,15 @@ def _recording(row: Any, middles: tuple[float, ...], spindle: Any) -> Recording:
         orbit=orbit,
         zero_at=float(spindle["zero_at_s"]),
         contact=float(spindle["contact_s"]),
+        slope=_read(spindle, "slope_{}_n_s"),
+        slope_sd=_read(spindle, "slope_{}_n_s_sd"),
     )
+
+
+def _read(spindle: Any, column: str) -> tuple[float, float, float] | None:
+    """Values of three axes of a row of the spindle table; None where they were not read."""
+    x, y, z = (float(spindle.get(column.format(axis), math.nan)) for axis in AXES)
+    return (x, y, z) if math.isfinite(x + y + z) else None
 
 
 def _slow(recording: Recording) -> dict[str, Array]:

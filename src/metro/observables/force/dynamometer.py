@@ -66,6 +66,7 @@ class Recording:
 
     ``middles`` and ``span`` of the time blocks; ``zero_at``: time at which the zero was read; ``contact``:
     start of the cut; ``speed`` of the tool against the feed; ``orbit``: rate at which the frame turns.
+    ``slope``, ``slope_sd``: of the means of revolutions along the cut, N/s, work frame; None: not read.
     """
 
     middles: tuple[float, ...]
@@ -74,6 +75,8 @@ class Recording:
     orbit: float = 0.0
     zero_at: float = 0.0
     contact: float = 0.0
+    slope: Triple | None = None
+    slope_sd: Triple | None = None
 
     @property
     def attenuation(self) -> float:

@@ -79,7 +79,7 @@ class ForceModel:
     ``true_path`` takes the chip from the trochoidal paths of the teeth; else from circles (feed × sine of the
     immersion). A block's nuisance is the angle of tooth 0 at the record's start, rad, and in helical milling
     also the direction of feed there. ``bottom_edges`` names those of K_Fac and K_Fae that the helical runs
-    can identify.
+    can identify. ``end_declared``: whether the cutter's end is that of the manifest, else it is assumed flat.
     """
 
     cutter: Cutter
@@ -89,6 +89,7 @@ class ForceModel:
     structure: Structure = field(default_factory=Structure)
     sensor: Dynamometer = field(default_factory=Dynamometer)
     chipped: tuple[Chipped, ...] = ()
+    end_declared: bool = False
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -175,14 +176,24 @@ class ForceModel:
         tool, highest = (self.cutter, self.law, setting.cut), setting.highest
         if beta is None or not any(self.structure.compliance):
             return _order_basis(*tool, highest, self.true_path)[None]
-        return np.stack([each.orders for each in self._yielding(setting, beta)])
+        yielding = np.stack([each.orders for each in self._yielding(setting, beta)])
+        if self.cutter.cylindrical:
+            return yielding
+        # What yielding changes is that of a cylinder of the same depth: a rounded end that is deflected is
+        # not modelled.
+        rigid = (_order_basis(each, *tool[1:], highest, self.true_path) for each in self._ends())
+        return np.asarray(yielding + np.subtract(*rigid))
+
+    def _ends(self) -> tuple[Cutter, Cutter]:
+        """Return the cutter, and the cylinder that it would be with a flat end."""
+        return self.cutter, replace(self.cutter, corner=0.0, taper=0.0)
 
     def _yielding(self, setting: ForceSetting, beta: Array) -> list[_Yielding]:
         """Return the force on a tool that yields, in each direction of feed that is computed."""
         worn = tuple((beta[:6] * np.repeat([1.0, self.law.edge(setting.cut_length)], 3)).tolist())
         return [
             _yielding_orders(
-                *(self.cutter, self.law, setting.cut, self.structure.seen(feed), worn),
+                *(self._ends()[1], self.law, setting.cut, self.structure.seen(feed), worn),
                 highest=setting.highest,
                 true_path=self.true_path,
             )

@@ -60,6 +60,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     notes = [
         "The chip thickness is that of the true tooth paths, the force law linear in it; "
         "tool, machine and dynamometer are rigid in the base model.",
+        cutting_force.end_note(batch, tool),
         _path_note(tool, blocks),
         *_give_note(batch, observed["spindle"]),
         f"Forces are compared per revolution up to spindle order {blocks[0].setting.highest}, "
@@ -79,6 +80,7 @@ def _base(batch: Batch, tool: Cutter, bottom: tuple[str, ...]) -> ForceModel:
         law=EdgeLaw(),
         bottom_edges=bottom,
         sensor=Dynamometer(axes=cutting_force.channels(batch)),
+        end_declared=cutting_force.end_declared(batch),
     )
 
 

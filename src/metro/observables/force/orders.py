@@ -19,6 +19,7 @@ from metro.observables.cut.long_record import LongRecord, Stretch
 from metro.observables.force.coefficients import AXES
 from metro.observables.problem import Refusal
 from metro.signals import orders, steady
+from metro.signals.slope import slope
 from metro.units import DEG, JSON, MM, RPM, Array
 
 TIME_BLOCKS = 4
@@ -82,6 +83,7 @@ def _observed(batch: Batch, run: str, read: Tables, tool: Cutter) -> tuple[pd.Da
     parts = [_part(part, zero, nominal, orbit, highest) for part in record.stretches(segments.steady)]
     first, last = parts[0], parts[-1]
     averages = _together(parts, time_blocks(first.time[0], last.time[1], nominal, orbit))
+    rate, rate_sd = _slope(turns, segments.steady, record.rate, orbit)
     share = np.array([part.time[1] - part.time[0] for part in parts])
     share /= share.sum()
     mean = share @ np.array([part.mean for part in parts])
@@ -97,10 +99,23 @@ def _observed(batch: Batch, run: str, read: Tables, tool: Cutter) -> tuple[pd.Da
         "contact_s": first.time[0] - (0.5 * settling if segments.steady.start > 0 else 0.0),
         **{f"zero_{axis}_n": float(value) for axis, value in zip(AXES, zero, strict=True)},
         **{f"mean_{axis}_n": float(value) for axis, value in zip(AXES, mean, strict=True)},
+        **{f"slope_{axis}_n_s": float(value) for axis, value in zip(AXES, rate, strict=True)},
+        **{f"slope_{axis}_n_s_sd": float(value) for axis, value in zip(AXES, rate_sd, strict=True)},
     }
     return pd.concat(
         [_long(run, i, average) for i, average in enumerate(averages)], ignore_index=True
     ), summary
+
+
+def _slope(turns: steady.Turns, cut: slice, rate: float, orbit: float) -> tuple[Array, Array]:
+    """Slope of the means of revolutions along the steady cut, and its deviation, (3,) N/s.
+
+    Not a number in helical milling, where the mean turns with the orbit.
+    """
+    if orbit:
+        return np.full(3, math.nan), np.full(3, math.nan)
+    whole = turns.mean[math.ceil(cut.start / turns.length) : cut.stop // turns.length]
+    return slope(np.arange(len(whole)) * turns.length / rate, whole)
 
 
 @dataclass(frozen=True, eq=False)

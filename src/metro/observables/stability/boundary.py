@@ -9,6 +9,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.cutting.cutter import Cutter
+from metro.cutting.envelope import mean_inclination
 from metro.dynamics.band import depth_samples, depths_anew
 from metro.dynamics.lobes import Boundary, stability_boundary
 from metro.dynamics.system import Cut, immersion
@@ -40,7 +41,7 @@ class Cutting:
 
     Attributes
     ----------
-    ktc, krc : N/m².
+    ktc, krc : N/m²; the radial one is that in the plane, of an end that is not flat its mean over the height.
     sd : (2,) standard deviations of their logarithms.
     tool : the cutter with its teeth.
     """
@@ -87,7 +88,17 @@ def cutting(batch: Batch, identified: JSON) -> Cutting | Refusal:
         interval = [end for end in (waveform.get(name) or {}).get("ci95") or () if end is not None]
         known = len(interval) == 2 and values[name] != 0
         sd.append((interval[1] - interval[0]) / (2 * 1.96 * abs(values[name])) if known else COEFFICIENT_SD)
-    return Cutting(values["ktc"] * N_MM2, values["krc"] * N_MM2, np.array(sd), tool)
+    radial = values["krc"]
+    if not tool.cylindrical:
+        along, across = mean_inclination(tool, _usual_depth(batch))
+        radial = along * radial - across * values["kac"]
+    return Cutting(values["ktc"] * N_MM2, radial * N_MM2, np.array(sd), tool)
+
+
+def _usual_depth(batch: Batch) -> float:
+    """Geometric mean of the axial depths of a batch's runs, m."""
+    depths = batch.runs["axial_depth_mm"].to_numpy(float)
+    return float(np.exp(np.mean(np.log(depths[depths > 0.0])))) * MM
 
 
 def assumptions(batch: Batch) -> list[str]:
@@ -96,6 +107,7 @@ def assumptions(batch: Batch) -> list[str]:
         f"the probability allows for a model error of {100 * MODEL_SD:.0f} % of depth (one sd): "
         "zero helix, linear regeneration, no process damping, no runout"
     ]
+    notes += _of_the_end(batch)
     if (batch.runs["operation"] == "helical").any():
         notes.append(
             "helical runs: slots whose feed direction turns; the lowest boundary over the directions counts, "
@@ -106,6 +118,20 @@ def assumptions(batch: Batch) -> list[str]:
         named = ", ".join(map(str, batch.runs.index[undirected]))
         notes.append(f"runs.csv: direction (up, down or slot) of {named} is blank: left out")
     return notes
+
+
+def _of_the_end(batch: Batch) -> list[str]:
+    """Say what the prediction takes of the tool's end."""
+    tool = cutting_force.cutter(batch)
+    if isinstance(tool, Refusal):
+        return []
+    if tool.cylindrical:
+        return [] if cutting_force.end_declared(batch) else ["a flat end of the tool is assumed"]
+    return [
+        "corner, ball end and taper: the radial coefficient is K_rc sin κ - K_ac cos κ with the means over "
+        f"the height of a cut {_usual_depth(batch) / MM:.2g} mm deep (κ: edge angle), at all depths; side "
+        "cuts have the engagement of the full radius"
+    ]
 
 
 def same_cut(runs: pd.DataFrame) -> list[pd.DataFrame]:

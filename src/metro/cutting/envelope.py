@@ -1,0 +1,111 @@
+"""The envelope of a general cutter: where its edge is along the meridian, and how the edge is inclined there.
+
+From the tip outwards the meridian is a flat bottom, the arc of the corner and a straight flank, each tangent
+to the next, as in the APT tool with five of its parameters (Engin and Altintas, Int. J. Mach. Tools Manuf. 41
+(2001) 2195). A corner radius equal to the radius is a ball end, an inclined flank a taper or an insert with a
+cutting edge angle below 90°. The edge has constant lead: its lag angle is tan(helix)/radius × height at all
+heights, on the ball and on the flank as on the cylinder (Lee and Altintas, Int. J. Mach. Tools Manuf. 36
+(1996) 1059), so that on a ball the local helix falls to nothing towards the tip.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from metro.cutting.cutter import Cutter
+from metro.units import Array
+
+# With four points of Gauss-Legendre a panel leaves 1e-7 of an integral that varies as sin² (2 κ) over it, and
+# 1e-9 of one that varies as sin² φ.
+LARGEST_TURN, LARGEST_LAG = 0.5, 0.25  # of the edge angle and of the lag angle in a panel, rad
+
+
+@dataclass(frozen=True)
+class Place:
+    """Places along the meridian, arrays of one shape.
+
+    Attributes
+    ----------
+    height, radius : m. sine, cosine : of the edge angle κ between the edge's normal and the tool axis.
+    """
+
+    height: Array
+    radius: Array
+    sine: Array
+    cosine: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Meridian:
+    """The meridian of a cutter up to a depth, in panels: of the corner first, then of the flank.
+
+    Attributes
+    ----------
+    cutter : whose meridian it is.
+    start, turn : (panels,) edge angle at the lower end, and its growth, rad: 0 on the flank.
+    bottom, bottom_radius : (panels,) height and radius at the lower end, m.
+    length : (panels,) m.
+    """
+
+    cutter: Cutter
+    start: Array
+    turn: Array
+    bottom: Array
+    bottom_radius: Array
+    length: Array
+
+    def at(self, panel: npt.NDArray[np.intp], share: Array) -> Place:
+        """Return the places at shares (0…1) of panels; the two broadcast."""
+        angle = self.start[panel] + self.turn[panel] * share
+        sine, cosine = np.sin(angle), np.cos(angle)
+        rc, straight = self.cutter.corner, (self.turn[panel] == 0.0) * share * self.length[panel]
+        on_arc = self.turn[panel] > 0.0
+        height = np.where(on_arc, rc * (1.0 - cosine), self.bottom[panel] + straight * sine)
+        of_arc = self.cutter.radius - rc + rc * sine
+        radius = np.where(on_arc, of_arc, self.bottom_radius[panel] + straight * cosine)
+        return Place(height, radius, sine, cosine)
+
+    def edge_length(self, place: Place) -> Array:
+        """Length of edge per length of the meridian, times cos(helix): 1 on a cylinder.
+
+        Edge coefficients per axial depth of a cylinder are those per length of edge over cos(helix), so that
+        this is what they multiply at every place.
+        """
+        sideways = place.radius * place.sine * self.cutter.lag_per_depth
+        return np.asarray(math.cos(self.cutter.helix) * np.sqrt(1.0 + sideways**2))
+
+
+def mean_inclination(cutter: Cutter, depth: float) -> tuple[float, float]:
+    """Means of sin κ and cos κ over the height of a cut of a ``depth``, m."""
+    line = meridian(cutter, depth, 0.0)
+    places, weights = np.polynomial.legendre.leggauss(4)
+    panel = np.repeat(np.arange(len(line.length)), 4)
+    place = line.at(panel, np.tile(0.5 * (places + 1.0), len(line.length)))
+    height = np.tile(0.5 * weights, len(line.length)) * line.length[panel] * place.sine
+    return float(height @ place.sine / height.sum()), float(height @ place.cosine / height.sum())
+
+
+def meridian(cutter: Cutter, depth: float, lag: float) -> Meridian:
+    """Return the meridian up to a ``depth``, m, cut into panels for a ``lag``, rad/m."""
+    rc, steepest = cutter.corner, 0.5 * math.pi - cutter.taper
+    top = rc * (1.0 - math.cos(steepest))  # where the corner ends
+    parts = []
+    if rc > 0.0:
+        last = steepest if depth >= top else math.acos(1.0 - depth / rc)
+        lagging = lag * rc * (1.0 - math.cos(last))
+        count = max(math.ceil(last / LARGEST_TURN), math.ceil(lagging / LARGEST_LAG))
+        angles = np.linspace(0.0, last, count + 1)
+        at = rc * (1.0 - np.cos(angles))
+        radius = cutter.radius - rc + rc * np.sin(angles)
+        parts.append((angles[:-1], np.diff(angles), at[:-1], radius[:-1], rc * np.diff(angles)))
+    if depth > top:
+        count = max(1, math.ceil(lag * (depth - top) / LARGEST_LAG))
+        at = np.linspace(top, depth, count + 1)
+        radius = cutter.radius - rc + rc * math.sin(steepest) + (at - top) / math.tan(steepest)
+        even = np.full(count, steepest)
+        parts.append((even, 0.0 * even, at[:-1], radius[:-1], np.diff(at) / math.sin(steepest)))
+    return Meridian(cutter, *(np.concatenate(each) for each in zip(*parts, strict=True)))
