@@ -25,26 +25,35 @@ def declared(frf):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_driving_point_is_taken_for_one(seed):
     model = declared(response([1.0, 0.8, -0.5], [1.0, 0.8, -0.5], seed))
-    assert model.declared is Standing.THERE
+    assert model.declared[0] is Standing.THERE
     assert all(mode.stiffness > 0.0 for mode in model.modes)
 
 
 def test_a_sensor_that_points_the_other_way_is_named():
     model = declared(-response([1.0, 0.8, -0.5], [1.0, 0.8, -0.5]))
-    assert model.declared is Standing.REVERSED
+    assert model.declared[0] is Standing.REVERSED
     np.testing.assert_allclose([mode.frequency for mode in model.modes], HZ, rtol=1e-3)
     assert np.isnan([mode.stiffness for mode in model.modes]).all()
 
 
 def test_another_place_is_named():
     model = declared(response([1.0, 0.8, -0.5], [0.9, -0.6, 0.7]))
-    assert model.declared is Standing.ELSEWHERE
+    assert model.declared[0] is Standing.ELSEWHERE
     assert np.isnan([mode.stiffness for mode in model.modes]).all()
+
+
+def test_a_second_driving_point_takes_the_place_of_a_false_one():
+    first, second = [1.0, 0.8, -0.5], [0.6, -0.9, 0.7]
+    frf = np.stack([response(first, [0.9, -0.6, 0.7]), response(second, second, 1)], axis=1)
+    model = identify_modes(FREQUENCY, frf, driving=0, others=[1])
+    assert model.declared == {0: Standing.ELSEWHERE, 1: Standing.THERE}
+    stiffness = [mode.stiffness for mode in model.modes]
+    np.testing.assert_allclose(stiffness, 1e7 / np.square(second), rtol=0.02)
 
 
 def test_a_hammer_a_little_beside_the_sensor_at_a_node_is_no_other_place():
     model = declared(response([1.0, 0.8, -0.06], [1.0, 0.8, 0.06]))
-    assert model.declared is Standing.THERE
+    assert model.declared[0] is Standing.THERE
     assert np.isfinite([mode.stiffness for mode in model.modes]).tolist() == [True, True, False]
 
 

@@ -48,5 +48,5 @@ def test_the_four_modes_have_intervals_of_the_scatter_between_files(model):
 
 def test_the_first_file_is_no_driving_point(model):
     """Its third mode moves against the first two, and the fourth hardly at all."""
-    assert model.declared is Standing.ELSEWHERE
+    assert model.declared == {0: Standing.ELSEWHERE}
     assert np.isnan([mode.stiffness for mode in model.modes]).all()

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from metro.batch.check import check, load
 from metro.batch.sources import source
 from metro.cli import app
-from metro.formats.registry import read
+from metro.formats.registry import read, read_frfs
 from metro.formats.uff import FRF, Function
 from metro.formats.uff_writer import universal_file
 from metro.importing.look import copies, look, sparkline
@@ -280,10 +280,18 @@ def test_the_origin_of_a_universal_file_is_kept_and_cited(tmp_path):
     assert (tmp_path / "modes" / file.name).read_bytes() == file.read_bytes()
 
 
-def test_the_origin_of_measured_functions_is_kept_too(tmp_path):
+def test_a_universal_file_of_many_pairs_states_its_points_and_nothing_is_asked(tmp_path):
     frequency = np.arange(1.0, 101.0)
     values = 1e-6 / (1 - (frequency / 40.0) ** 2 + 0.04j * frequency / 40.0)
-    (tmp_path / "test.unv").write_bytes(universal_file([Function(FRF, "1x", "1x", "m", frequency, values)]))
-    result = called(tmp_path / "modal", tmp_path / "test.unv", reference="1x", response="1x")
+    pairs = [Function(FRF, "1x", f"{point}x", "m", frequency, values / point) for point in (1, 2, 3)]
+    (tmp_path / "test.unv").write_bytes(universal_file(pairs))
+    result = called(tmp_path / "modal", tmp_path / "test.unv")
     assert result.exit_code == 0, result.output
     assert "read from test.unv (SHA-256 " in (tmp_path / "modal/batch.yaml").read_text()
+    impacts = load(tmp_path / "modal").impacts
+    assert impacts[["reference", "response"]].to_numpy().tolist() == [["", ""]]
+    assert [frf.response for frf in read_frfs(tmp_path / "modal" / impacts["file"].iloc[0])] == [
+        "1x",
+        "2x",
+        "3x",
+    ]

@@ -400,3 +400,14 @@ def test_a_free_mass_has_no_mode_and_the_note_says_so():
     assert test.modes.empty
     assert test.alike.empty
     assert test.notes[-1].endswith("no mode is seen in these hits: no pole recurs over the model orders")
+
+
+def test_a_reversed_sensor_gives_modes_without_stiffness_and_a_note():
+    rows = [frf_rows(-receptance(i, noise=0.003, seed=i), f"{i + 1}x") for i in range(3)]
+    test = observed(*rows)
+    np.testing.assert_allclose(test.modes["frequency_hz"], NATURAL, rtol=1e-3)
+    assert test.modes["stiffness_n_m"].isna().all()
+    assert not test.modes["used"].any()
+    (note,) = test.notes
+    assert note.startswith("position 1, direction x: 1x to 1x has the wrong sign in all its modes")
+    assert "scale: -1" in note

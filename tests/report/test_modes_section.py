@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import synthetic_results as synthetic
 
-from metro.report.content import Picture, Table
+from metro.report.content import Bullets, Picture, Table
 from metro.report.figures import modal
 from metro.report.sections.modes import largest_response, modes
 
@@ -55,6 +55,14 @@ def test_a_mode_that_is_not_resolved_is_marked():
     assert "not resolved" in table.caption
     plain = next(item for item in modes(found, {}) if isinstance(item, Table))
     assert "not resolved" not in plain.caption
+
+
+def test_what_a_test_leaves_in_doubt_is_said_under_its_modes():
+    tables = {"mode_notes": pd.DataFrame({"note": ["position 1: hit 2 rejected: double hit"]})}
+    (bullets,) = [
+        item for item in modes(synthetic.identified()["modes"], tables) if isinstance(item, Bullets)
+    ]
+    assert bullets.items == ["Position 1: hit 2 rejected: double hit."]
 
 
 def shapes():

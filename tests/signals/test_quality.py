@@ -139,3 +139,6 @@ def test_missing_points_are_reported_as_a_share():
 def test_a_driving_point_that_gives_out_power_is_conjugated():
     assert quality.conjugated(-0.5).ok
     assert "e^{+iωt}" in quality.conjugated(0.5).message
+    reversed_sensor = quality.conjugated(0.5, -0.2)
+    assert (reversed_sensor.check, reversed_sensor.ok) == ("FRF sign", False)
+    assert "points the other way" in reversed_sensor.message

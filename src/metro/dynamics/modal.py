@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -49,7 +49,7 @@ class ModalModel:
     doubtful : a further mode that lowers chi² beyond chance, but by less than its unknowns are worth; None
         without such a trace.
     moved : how each of ``modes`` differs between the files; None where no two files see it.
-    declared : whether the declared driving point is one; None where none was declared.
+    declared : column of each declared driving point → what its residues say of it.
     """
 
     modes: tuple[Mode, ...]
@@ -58,7 +58,7 @@ class ModalModel:
     diagram: Diagram
     doubtful: Mode | None
     moved: tuple[Moved | None, ...] = ()
-    declared: Standing | None = None
+    declared: Mapping[int, Standing] = field(default_factory=dict)
 
 
 def identify_modes(
@@ -67,6 +67,7 @@ def identify_modes(
     variance: Array | None = None,
     driving: int | None = None,
     *,
+    others: Sequence[int] = (),
     inputs: int = 1,
     scatter: Scatter | None = None,
     decay: float = 0.0,
@@ -81,6 +82,7 @@ def identify_modes(
     variance : (n, c) of the complex FRFs; None: estimated from the roughness between lines.
     driving : column of the declared driving point (reference = response), which gives the stiffness unless
         its residues contradict it.
+    others : columns of further ones, which are taken in turn where the first is none.
     inputs : how many columns belong to one output.
     scatter : how the repeats differ, on the same lines and columns.
     decay : 1/s, of an exponential window on force and response, which is subtracted from the damping.
@@ -121,8 +123,9 @@ def identify_modes(
     inside &= _is_there(data, fit)
     free = residues(data.omega, frf, np.sqrt(np.mean(data.weight**2, axis=1)), fit.poles)
     order = [int(r) for r in np.argsort(fit.omega) if inside[r]]
-    declared = None if driving is None else standing(fit, free, driving, order)
-    driving = driving if declared is Standing.THERE else None
+    points = [each for each in (driving, *others) if each is not None]
+    stands = {column: standing(fit, free, column, order) for column in points}
+    driving = next((column for column in points if stands[column] is Standing.THERE), None)
     ways = [own_fits(data, fit, way) for way in files]
     modes, moved = [], []
     for r in order:
@@ -134,7 +137,7 @@ def identify_modes(
     # what poles that move leave over is no further mode
     alike = all(explained(data, fit, way).bic() >= fit.bic() for way in files)
     doubtful = _doubtful(data, fit, driving, decay) if alike else None
-    return ModalModel(tuple(modes), fit, change, diagram, doubtful, tuple(moved), declared)
+    return ModalModel(tuple(modes), fit, change, diagram, doubtful, tuple(moved), stands)
 
 
 def _among(lines: Array, omega: Array, zeta: Array) -> np.ndarray:

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from metro.batch.rules import SELF_DESCRIBING
 from metro.formats import FormatError
 from metro.formats.contents import Contents
 from metro.formats.kinds import KINDS
-from metro.formats.registry import open_contents, sniff, stated_kinds
+from metro.formats.registry import open_contents, read_frfs, sniff, stated_kinds
 from metro.formats.text_layout import TextOptions
 from metro.formats.uff_header import origin
 from metro.formats.uff_modes import Mode, read_modes
@@ -46,6 +47,7 @@ class Seen:
     step : between values in s, where the file describes it.
     modes : of a universal file that holds modes.
     origin : what such a file says of what wrote it, and of what is in it.
+    placed : whether such a file says of each of its FRFs between which points it was measured.
     fault : why it cannot be read at all.
     """
 
@@ -56,6 +58,7 @@ class Seen:
     step: float | None = None
     modes: tuple[Mode, ...] = ()
     origin: str = ""
+    placed: bool = False
     fault: str = ""
 
 
@@ -66,7 +69,9 @@ def look(path: Path) -> Seen:
         for kind in stated:
             if _is(path, kind):
                 seen = _seen(path, kind, open_contents(path, kind, TextOptions()))
-                return replace(seen, origin=origin(path)) if seen.container == "universal" else seen
+                if seen.container != "universal":
+                    return seen
+                return replace(seen, origin=origin(path), placed=_placed(path))
         if "frf" in stated and (modes := _modes(path)):
             return Seen(path, "universal", "modes", modes=modes, origin=origin(path))
         own = next((kind for kind in KINDS if kind != "cloud" and _is(path, kind)), "")
@@ -83,6 +88,11 @@ def _is(path: Path, kind: str) -> bool:
     except FormatError:
         return False
     return True
+
+
+def _placed(path: Path) -> bool:
+    named = path.name.lower().endswith(SELF_DESCRIBING)  # by which impacts.csv may leave its points blank
+    return named and all(frf.reference and frf.response for frf in read_frfs(path))
 
 
 def _modes(path: Path) -> tuple[Mode, ...]:

@@ -37,6 +37,7 @@ class Proposal:
     why : what each guess is from, by column.
     rows : what the table names: the file with its record, and what is taken for ``{record}``.
     timed : whether the files have a time of their own, or need none.
+    placed : whether the files state where they were measured.
     """
 
     kind: str
@@ -47,6 +48,7 @@ class Proposal:
     timed: bool = True
     stated: dict[str, str] = field(default_factory=dict)
     more: tuple[str, ...] = ()
+    placed: bool = False
 
 
 def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
@@ -59,8 +61,10 @@ def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
     # columns that are named as angles and torques are no coordinates, whatever else could be read from them
     rest = [replace(s, kind="") if s.kind == "cloud" and joints.joint_log(s) else s for s in rest]
     for kind in dict.fromkeys(seen.kind for seen in rest if seen.kind):
-        group = [seen for seen in rest if seen.kind == kind]
-        proposals.append(Proposal(kind, tuple((seen.path.name, _record(seen)) for seen in group)))
+        for placed in (False, True):
+            group = [seen for seen in rest if seen.kind == kind and seen.placed is placed]
+            rows = tuple((seen.path.name, _record(seen)) for seen in group)
+            proposals += [Proposal(kind, rows, placed=placed)] if rows else []
     rest = [seen for seen in rest if not seen.kind]
     pairs, single, rest = _hammer_pairs(rest)
     proposals += pairs

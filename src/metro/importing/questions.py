@@ -78,7 +78,7 @@ def questions(proposals: Sequence[Proposal]) -> Iterator[Question]:
     kinds = {each.kind for each in proposals}
     if "force" in kinds:
         yield from _of_cuts([name for each in proposals if each.kind == "force" for name, _ in each.rows])
-    if kinds & {"record", "frf"}:
+    if any(each.kind in ("record", "frf") and not each.placed for each in proposals):
         number = "as 1x; {number} is the number in the file's name"
         yield Question("reference", f"where the hammer struck, point and axis, {number}", _place)
         yield Question("response", f"where the sensor was, point and axis, {number}", _place)

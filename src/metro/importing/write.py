@@ -194,10 +194,12 @@ def _impacts(proposals: Sequence[Proposal], answers: Answers) -> str:
     rows = []
     for each in proposals:
         for name, record in each.rows if each.kind in ("record", "frf") else ():
-            points = {key: _numbered(key, answers[key], record) for key in ("reference", "response")}
+            asked = () if each.placed else ("reference", "response")
+            points = {key: _numbered(key, answers[key], record) for key in asked}
             unit = answers.get("unit.response", "")
             unit = _of_sensor(answers) if needs_sensitivity(unit) else unit
-            row = {"position": "1", **points, "replicate": "1", "kind": each.kind, "file": name}
+            row = {"position": "1", **points, "kind": each.kind, "file": name}
+            row |= {} if each.placed else {"replicate": "1"}
             rows.append(row | ({"response_unit": unit} if each.kind == "record" else {}))
     return _csv(rows)
 

@@ -45,19 +45,20 @@ def of_files(model: ModalModel) -> Iterator[str]:
 
 def of_point(group: list[Receptance], model: ModalModel) -> Iterator[str]:
     """Say why a declared driving point is none, and what to do."""
-    point = next((item.reference for item in group if item.driving), "")
-    if model.declared is Standing.REVERSED:
-        yield (
-            f"{point} to {point} has the wrong sign in all its modes: the sensor or the hammer points the "
-            "other way, so that no stiffness is given. Turn the sign of its channel (scale: -1 under files "
-            "in batch.yaml)"
-        )
-    elif model.declared is Standing.ELSEWHERE:
-        yield (
-            f"{point} to {point} is no driving point: its modes have residues of both signs, and where a "
-            "structure is hit all have one. Sensor and hammer were at different places, so that no stiffness "
-            "is given. Correct reference or response in impacts.csv, or hit where the sensor is"
-        )
+    for column, standing in model.declared.items():
+        point = group[column].reference
+        if standing is Standing.REVERSED:
+            yield (
+                f"{point} to {point} has the wrong sign in all its modes: the sensor or the hammer points "
+                "the other way, so that it gives no stiffness. Turn the sign of its channel (scale: -1 under "
+                "files in batch.yaml)"
+            )
+        elif standing is Standing.ELSEWHERE:
+            yield (
+                f"{point} to {point} is no driving point: its modes have residues of both signs, and where a "
+                "structure is hit all have one. Sensor and hammer were at different places, so that it gives "
+                "no stiffness. Correct reference or response in impacts.csv, or hit where the sensor is"
+            )
 
 
 def _in_words(mode: Mode) -> str:

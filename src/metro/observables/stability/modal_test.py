@@ -166,7 +166,7 @@ def _identified(group: list[Receptance], inputs: int, decay: float) -> tuple[Mod
     frf = np.stack([item.frf for item in group], axis=1)
     known = [item.variance for item in group if item.variance is not None]
     variance = np.stack(known, axis=1) if len(known) == len(group) else None
-    driving = next((i for i, item in enumerate(group) if item.driving), None)
+    driving = [i for i, item in enumerate(group) if item.driving]
     clear = clear_lines(group[0].frequency, frf, variance, [item.coherence for item in group])
     usable = np.logical_and.reduce([item.usable for item in group])
     keep = np.flatnonzero(clear & usable)[:: max(item.redundancy for item in group)]
@@ -174,7 +174,8 @@ def _identified(group: list[Receptance], inputs: int, decay: float) -> tuple[Mod
         group[0].frequency[keep],
         frf[keep],
         None if variance is None else variance[keep],
-        driving,
+        driving[0] if driving else None,
+        others=driving[1:],
         inputs=inputs,
         scatter=scatter(group, keep),
         decay=decay,

@@ -16,6 +16,7 @@ from metro.report.sections.records import record_items
 LONGEST, MOST_NAMES, MOST_FLAGS = 40, 24, 5
 MEANING = {
     "FRF convention": "sign of the imaginary part at the resonances",
+    "FRF sign": "sign of the imaginary part at the resonances",
     "channels alike": "pairs of channels that are one signal",
     "clipping": "samples in a row at an end of the range",
     "dead channel": "span of a channel, in its unit",
