@@ -114,6 +114,24 @@ def test_without_an_arm_the_motion_is_described_and_nothing_is_called_friction(t
     assert check_whole(folder).ok
 
 
+def test_a_short_log_and_joints_that_stand_still_are_said(tmp_path):
+    tables, blocks = observed(
+        seven(tmp_path / "short", columns=lambda table: table.head(40)), tmp_path / "out"
+    )
+    assert tables["joint_log"]["remark"].str.contains("40 samples, at least 200").all()
+    assert blocks["calibration"]["not_identified"]["payload"]
+
+    def still(table):
+        table["q3_deg"] = 10.0
+        table["q3_set_deg"] = 10.0
+        return table
+
+    tables, _ = observed(seven(tmp_path / "still", columns=still), tmp_path / "out2")
+    third = tables["joint_log"].set_index(["run", "joint"]).loc[("bare", 3)]
+    assert third["remark"] == "too slow for the encoder to tell which way"
+    assert np.isnan(third["coulomb"])
+
+
 def test_a_log_whose_axes_are_not_those_of_the_cell_is_refused_by_its_numbers(tmp_path):
     folder = seven(
         tmp_path / "six", columns=lambda table: table.drop(columns=[c for c in table if "7_" in c])

@@ -35,10 +35,9 @@ def payload_of_logs(
     Tables ``payload_joints`` (of each joint the factor that fits it alone, its error, rms of residuals) and
     ``payload_course`` (difference of the torques of two logs of one motion, measured and of the load).
     """
-    bare = [log for log in logs if log.loaded == "no"]
-    loaded = [log for log in logs if log.loaded == "yes"]
-    if not loaded:
+    if not any(log.loaded == "yes" for log in logs):
         return {}, {}
+    bare, loaded = ([log for log in logs if log.loaded == state and log.long] for state in ("no", "yes"))
     missing = _missing(arm, bare, loaded)
     if missing or arm is None:
         return {"calibration": {"not_identified": {"payload": missing}}}, {}
@@ -65,8 +64,10 @@ def payload_of_logs(
 
 
 def _missing(arm: Arm | None, bare: Sequence[JointLog], loaded: Sequence[JointLog]) -> str:
+    if not loaded:
+        return "no joint log with the load has enough samples"
     if not bare:
-        return "no joint log without the load: a run with loaded: no in runs.csv"
+        return "no joint log without the load that has enough samples: a run with loaded: no in runs.csv"
     if arm is None:
         return "the cell has no arm (arm.dh or arm.urdf in cell.yaml): where the joints are is not known"
     if any(log.amperes for log in (*bare, *loaded)):

@@ -24,6 +24,7 @@ from metro.robot.motion import Motion
 from metro.robot.tracking import tracking_error
 from metro.units import DEG, JSON, MM, UM, Array
 
+LEAST_SAMPLES = 200  # some for each of the thirty stretches that the errors are from
 BINS = 12  # of speed, per direction, in the figure
 NO_ARM = "the cell has no arm (arm.dh or arm.urdf in cell.yaml): weight and friction are not told apart"
 QUANTITIES = ("coulomb", "viscous", "offset", "gravity", "inertia")
@@ -59,6 +60,11 @@ class JointLog:
     driven: np.ndarray
     amperes: bool
     loaded: str
+
+    @property
+    def long(self) -> bool:
+        """Whether it has enough samples to be filtered and fitted."""
+        return len(self.time) >= LEAST_SAMPLES
 
 
 def joint_logs(batch: Batch, read: Tables) -> list[JointLog]:
@@ -111,8 +117,10 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
     block: JSON = {}
     motions: dict[str, Motion] = {}
     for log in logs:
-        motions[log.run] = free_motion(log.time, log.q, log.torque)
-        fits = () if arm is None else fit_joints(arm.dh, motions[log.run], log.driven)
+        fits: tuple[JointFit, ...] = ()
+        if log.long:
+            motions[log.run] = free_motion(log.time, log.q, log.torque)
+            fits = () if arm is None else fit_joints(arm.dh, motions[log.run], log.driven)
         rows += _rows(log, fits, arm, drives)
         curves += [_curve(fit).assign(run=log.run) for fit in fits]
         terms += [{"run": log.run, "joint": f.joint + 1, **vars(term)} for f in fits for term in f.terms]
@@ -183,6 +191,8 @@ def _rows(log: JointLog, fits: tuple[JointFit, ...], arm: Arm | None, drives: Dr
 def _unfitted(log: JointLog, joint: int, arm: Arm | None) -> str:
     if not log.driven[joint]:
         return "neither torque nor current was logged, or it is a linear axis"
+    if not log.long:
+        return f"the log has {len(log.time)} samples, at least {LEAST_SAMPLES} are needed"
     return NO_ARM if arm is None else "too slow for the encoder to tell which way"
 
 

@@ -62,8 +62,10 @@ def joint_next(results: Results) -> Iterator[str]:
     block, table = results.identified.get("joints"), results.tables.get("joint_log")
     if not block or table is None:
         return
-    if "condition" not in table:
+    if table["remark"].str.contains("arm.dh").any():
         yield "the joints: the arm's geometry (arm.dh or arm.urdf in cell.yaml), to tell friction from weight"
+    elif "condition" not in table:
+        yield "the joints: a longer log in which every joint turns both ways at several speeds"
     elif (table["unit"] == "A").any():
         yield "the joints: drives.torque_per_ampere_nm_a in cell.yaml, to turn currents into torques"
     elif "none is declared" in str(block.get("drives")):
