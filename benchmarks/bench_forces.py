@@ -8,6 +8,8 @@ benchmarks/bench_forces.py -s``; the tests that print compare within the same ru
 
 import math
 import time
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -120,3 +122,30 @@ def test_time_grows_with_the_samples_at_most_linearly():
     exponent = np.polyfit(np.log(counts[2:]), np.log(spent[2:]), 1)[0]
     print(f"exponent from {counts[2]} samples on: {exponent:.2f}")
     assert exponent < 1.2
+
+
+def table(tool, cut, true_path):
+    force_basis.cache_clear()
+    force_basis(tool, EdgeLaw(), cut, true_path)
+
+
+def test_rounded_ends_beside_the_flat_end():
+    """On true paths, on which coefficients are identified, and on circles, where the flat end has closed forms.
+
+    The aim is twice the time of the flat end on true paths, which the corner keeps and the ball does not.
+    """
+    radius, side = TOOL.radius, math.pi - math.acos(1.0 - 0.5)
+    arcs = {"slot": Engagement(0.0, math.pi), "down": Engagement(side, math.pi)}
+    print(f"\n{'ms of a revolution':36s}{'flat':>8s}{'ball':>8s}{'corner':>8s}{'ratios':>14s}")
+    ratios: dict[bool, list[float]] = {True: [], False: []}
+    for path, teeth, runout, (name, arc) in product((True, False), (2, 4), (0.0, 8e-6), arcs.items()):
+        flat = Cutter(radius, math.radians(30), evenly_pitched(teeth), runout, 0.7)
+        cut = replace(CUT, engagement=arc)
+        ends = (flat, replace(flat, corner=radius), replace(flat, corner=0.3 * radius))
+        spent = np.array([seconds(table, end, cut, path, repeats=40) for end in ends])
+        ratios[path] += (spent[1:] / spent[0]).tolist()
+        words = f"{'true' if path else 'circular'} paths, {teeth} teeth, {name}{', runout' if runout else ''}"
+        times = "".join(f"{1e3 * each:8.2f}" for each in spent)
+        print(f"{words:36s}{times}{spent[1] / spent[0]:8.2f}{spent[2] / spent[0]:6.2f}")
+    print(f"in the median {np.median(ratios[True]):.2f} and {np.median(ratios[False]):.2f}")
+    assert np.median(ratios[True]) < 3.0  # it has become slower

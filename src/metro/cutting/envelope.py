@@ -19,9 +19,9 @@ import numpy.typing as npt
 from metro.cutting.cutter import Cutter
 from metro.units import Array
 
-# With four points of Gauss-Legendre a panel leaves 1e-7 of an integral that varies as sin² (2 κ) over it, and
-# 1e-9 of one that varies as sin² φ.
-LARGEST_TURN, LARGEST_LAG = 0.5, 0.25  # of the edge angle and of the lag angle in a panel, rad
+# With four points of Gauss-Legendre a panel leaves 1e-6 of an integral that varies as sin² (2 κ) over it, and
+# 1e-8 of one that varies as sin² φ.
+LARGEST_TURN, LARGEST_LAG = 0.65, 0.4  # of the edge angle and of the lag angle in a panel, rad
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,13 @@ class Meridian:
         of_arc = self.cutter.radius - rc + rc * sine
         radius = np.where(on_arc, of_arc, self.bottom_radius[panel] + straight * cosine)
         return Place(height, radius, sine, cosine)
+
+    def share(self, panel: npt.NDArray[np.intp], rise: Array) -> Array:
+        """Return the shares of panels at which they have risen to a share of their height."""
+        start, turn = self.start[panel], self.turn[panel]
+        low, high = np.cos(start), np.cos(start + turn)
+        angle = np.arccos(np.clip(low + (high - low) * rise, -1.0, 1.0))
+        return np.where(turn > 0.0, (angle - start) / np.where(turn > 0.0, turn, 1.0), rise)
 
     def edge_length(self, place: Place) -> Array:
         """Length of edge per length of the meridian, times cos(helix): 1 on a cylinder.

@@ -24,7 +24,8 @@ from metro.cutting.nearby import Edges
 from metro.units import Array
 
 POINTS = 4
-STEPS = 6  # of the secant method, to where a panel is cut: exact to 1e-9 of the panel
+STEPS, EXACT = 8, 1e-6  # of the secant method, to where a panel is cut; in feeds per tooth
+MARGIN = 0.05  # in feeds per tooth and pass: sin φ is 0.02 off its chord over a panel
 OUTSIDE = 0.1  # sine of the immersion behind which no tooth cuts on true paths
 SUMS = 16
 
@@ -49,7 +50,7 @@ class _Work:
 def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_path: bool) -> Array:
     """Force on a general cutter per unit of each coefficient, (angles, 3, 6), with edges ``along``.
 
-    Shear in N per N/m² of chip area; edge in N per N/m of edge × cos(helix), as on a cylinder. Exact to 1e-6
+    Shear in N per N/m² of chip area; edge in N per N/m of edge × cos(helix), as on a cylinder. Exact to 1e-5
     of the largest force on circular paths, to 1e-4 on true ones besides what ``LEAST_RADIUS`` says.
     """
     shape = along.top.shape
@@ -167,20 +168,30 @@ def _breaks(work: _Work, tooth: Indices, top: Array, panel: Indices, values: Arr
     )
     fa, fb = low[first] - low[second], high[first] - high[second]
     function, at = np.nonzero(fa * fb < 0.0)
+    if count == work.teeth.passes > 1:
+        # Most passes cross where others leave less. By chords the chips are known to less than MARGIN.
+        chord = fa[function, at] / (fa[function, at] - fb[function, at])
+        near = low[:, at] + chord * (high[:, at] - low[:, at])
+        margin = MARGIN * work.teeth.passes * work.teeth.cut.feed_per_tooth
+        matters = near[first[function], np.arange(len(at))] < near[:count].min(axis=0) + margin
+        function, at = function[matters], at[matters]
     fa, fb, a, b = fa[function, at], fb[function, at], np.zeros(len(at)), np.ones(len(at))
     first, second, every = first[function], second[function], np.arange(len(at))
-    for step in range(STEPS + 1):
+    share = b
+    for _ in range(STEPS):
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(fb == fa, b, b - fb * (b - a) / (fb - fa))
-        if step < STEPS:
-            levels = work.levels(tooth[at], top[at], panel[at], share)
-            levels = np.concatenate([levels, np.zeros((1, len(at)))])
-            value = levels[first, every] - levels[second, every]
-            crossed = value * fb < 0.0
-            a, fa = np.where(crossed, b, a), np.where(crossed, fb, 0.5 * fa)
-            b, fb = share, value
+        levels = work.levels(tooth[at], top[at], panel[at], work.line.share(panel[at], share))
+        levels = np.concatenate([levels, np.zeros((1, len(at)))])
+        value = levels[first, every] - levels[second, every]
+        if np.abs(value).max(initial=0.0) < EXACT * work.teeth.cut.feed_per_tooth:
+            break
+        crossed = value * fb < 0.0
+        a, fa = np.where(crossed, b, a), np.where(crossed, fb, 0.5 * fa)
+        b, fb = share, value
+    share = work.line.share(panel[at], np.clip(share, 0.0, 1.0))
     order = np.lexsort((share, at))
-    at, share = at[order], np.clip(share[order], 0.0, 1.0)
+    at, share = at[order], share[order]
     rank = np.arange(len(at)) - np.searchsorted(at, at)
     breaks = np.ones((rank.max(initial=-1) + 1, len(panel)))
     breaks[rank, at] = share

@@ -70,7 +70,7 @@ class Teeth:
         if off:
             angle = cutter.lag_per_depth * place.height
             lag = np.cos(angle), np.sin(angle)
-        own = self._wave(self.off[0], tooth, lag) if off and self.true_path else np.zeros(1)
+        own = self._wave(self.off[0], tooth, lag) if off else np.zeros(1)
         least = np.maximum(place.radius, LEAST_RADIUS * self.cut.feed_per_tooth)
         chips = []
         for step in range(1, self.passes + 1):
@@ -78,8 +78,8 @@ class Teeth:
             chip = (feed * pitch) * sine
             earlier = own
             if off and step < cutter.teeth:  # the last pass is the tooth's own
-                chip += self._wave(self.off[0] - self.off[step], tooth, lag)
-                earlier = self._wave(self.off[step], tooth, lag) if self.true_path else own
+                earlier = self._wave(self.off[step], tooth, lag)
+                chip += own - earlier
             if curvature:
                 chip += curve_excess(curvature, feed * pitch) * cosine
             if self.true_path:
@@ -105,7 +105,7 @@ class Teeth:
     def _wave(self, wave: Array, tooth: Indices, lag: tuple[Array, Array]) -> Array:
         """Deviations from the radius, m, of waves (3, N): along the lag's cosine and sine, and steady."""
         cosine, sine, steady = (part[tooth] for part in wave)
-        return np.asarray(cosine * lag[0] + sine * lag[1] + steady)
+        return np.asarray(cosine * lag[0] + sine * lag[1] + (steady if self.cutter.reach else 0.0))
 
     def levels(self, tooth: Indices, place: Place, sine: Array, cosine: Array) -> Array:
         """All that must be above zero where a tooth cuts, (levels, …) m: the chips first."""
