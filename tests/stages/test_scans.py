@@ -86,11 +86,10 @@ def noisy(points):
     return points + np.random.default_rng(1).normal(0, 0.02, points.shape)
 
 
-@pytest.mark.parametrize("placed", [True, False])
-def test_a_scan_of_the_part_on_its_table_is_told_what_planes_there_are(tmp_path, placed):
+def test_a_placed_scan_of_the_part_on_its_table_is_told_what_planes_there_are(tmp_path):
     table = raster(300, 200, 2.0) - np.array([100, 70, 30])
     scene = noisy(np.vstack([table, raster(100, 60)]))
-    message = problem(tmp_path, scene, batch(to_work=EYE) if placed else batch())
+    message = problem(tmp_path, scene, batch(to_work=EYE))
     assert message.endswith(
         "(instruments.scanner.extent_margin)?; the points lie on 2 planes: 298 × 198 mm "
         "(70 % of the points), 99.1 × 59.1 mm (30 % of the points); "
@@ -98,9 +97,27 @@ def test_a_scan_of_the_part_on_its_table_is_told_what_planes_there_are(tmp_path,
     )
 
 
-def test_a_scan_of_two_parts_is_told_of_two_groups(tmp_path):
-    scene = noisy(np.vstack([raster(100, 60), raster(100, 60) + np.array([300, 0, 0])]))
+def test_a_scan_of_two_parts_of_other_sizes_is_told_of_two_groups(tmp_path):
+    scene = noisy(np.vstack([raster(160, 60), raster(160, 60) + np.array([300, 0, 0])]))
     assert problem(tmp_path, scene, batch()).endswith("; the points lie in 2 groups apart")
+
+
+def said_of_a_scene(tmp_path, points, described):
+    recordings = scanned(tmp_path, points, described)[1]
+    assert recordings.problems == []
+    return next(row["message"] for row in recordings.findings if row["check"] == "scene")
+
+
+def test_of_a_scene_the_faces_of_the_parts_size_are_measured(tmp_path):
+    table = raster(300, 200, 2.0) - np.array([100, 70, 30])
+    said = said_of_a_scene(tmp_path, noisy(np.vstack([table, raster(100, 60)])), batch())
+    assert "1 face of it is measured: 99.1 × 59.1 mm (30 %)" in said
+    assert "not the size of the part: 298 × 198 mm" in said
+
+
+def test_two_parts_of_one_size_are_two_faces(tmp_path):
+    points = noisy(np.vstack([raster(100, 60), raster(100, 60) + np.array([300, 0, 0])]))
+    assert "2 faces of it are measured" in said_of_a_scene(tmp_path, points, batch())
 
 
 def test_one_plane_in_one_piece_needs_no_more_words(tmp_path):
@@ -157,13 +174,17 @@ def scene(share_on_the_face):
     return np.where(off[:, None] * [False, False, True], depth[:, None], points)
 
 
-@pytest.mark.parametrize("described", [batch(), batch(size=None)])
-def test_a_scene_that_holds_a_face_and_more_is_not_taken_for_a_face(tmp_path, described):
+@pytest.mark.parametrize("described", [batch(to_work=EYE), batch()])
+def test_a_scene_with_less_than_the_face_is_not_taken_for_the_face(tmp_path, described):
     said = problem(tmp_path, scene(0.6), described)
     assert (
-        "of one plane, expected 90 % or more of a scan of one face: keep the points of the face" in said
-        or ("is scanner.to_work in batch.yaml that of this scan?" in said)
+        "is scanner.to_work in batch.yaml that of this scan?" in said or "keep the points of the face" in said
     )
+
+
+def test_the_face_of_a_scene_that_holds_more_is_cut_out_of_it(tmp_path):
+    said = said_of_a_scene(tmp_path, scene(0.6), batch(size=None))
+    assert "1 face of it is measured: 59 × 59 mm (60 %)" in said
 
 
 def test_a_face_with_some_points_beside_it_and_a_rough_or_bowed_one_are_faces(tmp_path):
