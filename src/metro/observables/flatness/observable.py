@@ -166,7 +166,9 @@ def _limits(batch: Batch) -> list[str]:
         "share one ratio of 5 %, known to a factor of two.",
         "Scans are placed by the declared scanner-to-work transform (offset and tilts known to 10 µm)."
         if placed
-        else "No scanner-to-work transform is declared: offset and tilt are free, only the shape counts.",
+        else "No scanner-to-work transform is declared: an offset and two tilts are left out of the measured "
+        "and of the predicted heights alike, so that only the shape is compared, and what moves or tilts a "
+        "whole face cannot be found.",
     ]
 
 
