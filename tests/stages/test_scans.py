@@ -1,6 +1,7 @@
 """Scans as parts of the canonical table: their unit, their part, their size, and the memory they take."""
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -50,7 +51,7 @@ def test_a_scan_of_the_work_is_taken_as_it_is(tmp_path):
     parts, recordings = scanned(tmp_path, points, batch())
     assert recordings.problems == []
     np.testing.assert_array_equal(np.concatenate([part["x_mm"] for part in parts]), points[:, 0])
-    assert [finding["check"] for finding in recordings.findings] == ["missing points"]
+    assert [finding["check"] for finding in recordings.findings] == ["missing points", "size of the scan"]
 
 
 @pytest.mark.parametrize(
@@ -193,3 +194,27 @@ def test_a_face_with_some_points_beside_it_and_a_rough_or_bowed_one_are_faces(tm
     rough = face + [0, 0, 1] * np.random.default_rng(4).normal(0.0, 0.5, (len(face), 1))
     for points in (scene(0.95), bowed, rough):
         assert scanned(tmp_path, points, batch(size=None))[1].problems == []
+
+
+@pytest.mark.parametrize(("size", "unit"), [(25.4, "inches"), (10.0, "centimetres")])
+def test_millimetres_that_were_taken_for_another_unit_are_named(tmp_path, size, unit):
+    message = problem(tmp_path, raster(100, 60) * size, batch())
+    assert message.endswith(f"coordinates seem to be millimetres that were taken for {unit}")
+
+
+def test_the_size_of_the_points_is_shown_back(tmp_path):
+    recordings = scanned(tmp_path, raster(100, 60) + [0, 0, 0.4] * (raster(100, 60)[:, :1] > 50), batch())[1]
+    (said,) = [row["message"] for row in recordings.findings if row["check"] == "size of the scan"]
+    assert said.startswith("the points span 99 × 59 × 0.")
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(1 / 25.4, "be in inches"), (25.4, "that were taken for inches")]
+)
+def test_without_a_size_the_length_of_the_cut_tells_of_a_wrong_unit(tmp_path, factor, said):
+    runs = pd.DataFrame({"scan": ["s.ply"], "cut_length_mm": [100.0]}, index=["r"])
+    described = replace(batch(size=None), runs=runs)
+    findings = scanned(tmp_path, raster(100, 60) * factor, described)[1].findings
+    assert said in next(row["message"] for row in findings if row["check"] == "unit of length")
+    findings = scanned(tmp_path, raster(70, 60), described)[1].findings
+    assert not [row for row in findings if row["check"] == "unit of length"]
