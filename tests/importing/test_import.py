@@ -21,7 +21,6 @@ from metro.formats.uff import FRF, Function
 from metro.formats.uff_writer import universal_file
 from metro.importing.look import copies, look, sparkline
 from metro.importing.propose import from_name, propose
-from metro.stages.whole import check_whole
 
 FIELD = Path(os.environ.get("METRO_REAL_DATA", Path(__file__).parents[2] / "../shared/real")).parent / "field"
 field = pytest.mark.skipif(not FIELD.is_dir(), reason="the field files are not there")
@@ -152,30 +151,13 @@ def test_a_sparkline_rises_with_its_values():
         ("scan-numbered-points", {"unit.length": "mm", "work.size_mm": "none"}),
         ("modal-poles-unv", {"citation": "GVT"}),
         ("profile-square", {}),
+        ("scan-gocator", {"work.size_mm": "none"}),
     ],
 )
 def test_files_as_recorded_become_batches_that_pass_their_check(tmp_path, name, answers):
     result = called(tmp_path / name, *(FIELD / name).iterdir(), **answers)
     assert result.exit_code == 0, result.output
     assert check(tmp_path / name).ok
-
-
-@field
-@pytest.mark.parametrize(
-    ("name", "answers", "reason"),
-    [
-        (
-            "scan-gocator",
-            {"work.size_mm": "none"},
-            "of one plane, expected 90 % or more of a scan of one face",
-        ),
-    ],
-)
-def test_files_of_which_nothing_can_be_computed_are_refused_by_name(tmp_path, name, answers, reason):
-    result = called(tmp_path / name, *(FIELD / name).iterdir(), **answers)
-    assert result.exit_code == 1
-    assert reason in " ".join(result.output.split())
-    assert not check_whole(tmp_path / name).ok
 
 
 @field

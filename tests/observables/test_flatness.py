@@ -199,11 +199,19 @@ def test_sigma_is_that_of_the_measured_heights(plate: tuple) -> None:
     assert np.std(rest / (block.sigma * 1e3)) == pytest.approx(1.0, abs=0.25)
 
 
-def test_zeros_let_offset_and_tilt_go_where_no_transform_places_the_scan() -> None:
+def test_what_the_place_alone_tells_is_neither_measured_nor_predicted_where_none_is_declared() -> None:
     manifest = MANIFEST | {"instruments": {"scanner": {"spacing_mm": 0.5, "sigma_mm": 0.01}}}
     batch = make_batch(manifest)
     _, task = observed_problem(batch, reader(batch))
-    assert task.role("identify")[0].zero_sd == pytest.approx(1e-3)
+    block = task.role("identify")[0]
+    start = task.base.nuisance_starts(block)[0]
+    matrix, offset = task.base.design(block, start)
+    for heights in (block.measured, matrix, offset):
+        assert np.abs(block.zeros.T @ heights).max() < 1e-9 * max(np.abs(heights).max(), 1e-9) * len(
+            block.zeros
+        )
+    assert block.zero_sd == pytest.approx(0.0)  # so that it is in no noise floor
+    assert fitted(task)[1] < 3e-3
     placed = make_batch()
     task = observed_problem(placed, reader(placed))[1]
     assert task.role("identify")[0].zero_sd == pytest.approx(1e-5)

@@ -1,6 +1,7 @@
 """Scans as parts of the canonical table: their unit, their part, their size, and the memory they take."""
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -50,7 +51,7 @@ def test_a_scan_of_the_work_is_taken_as_it_is(tmp_path):
     parts, recordings = scanned(tmp_path, points, batch())
     assert recordings.problems == []
     np.testing.assert_array_equal(np.concatenate([part["x_mm"] for part in parts]), points[:, 0])
-    assert [finding["check"] for finding in recordings.findings] == ["missing points"]
+    assert [finding["check"] for finding in recordings.findings] == ["missing points", "size of the scan"]
 
 
 @pytest.mark.parametrize(
@@ -86,11 +87,10 @@ def noisy(points):
     return points + np.random.default_rng(1).normal(0, 0.02, points.shape)
 
 
-@pytest.mark.parametrize("placed", [True, False])
-def test_a_scan_of_the_part_on_its_table_is_told_what_planes_there_are(tmp_path, placed):
+def test_a_placed_scan_of_the_part_on_its_table_is_told_what_planes_there_are(tmp_path):
     table = raster(300, 200, 2.0) - np.array([100, 70, 30])
     scene = noisy(np.vstack([table, raster(100, 60)]))
-    message = problem(tmp_path, scene, batch(to_work=EYE) if placed else batch())
+    message = problem(tmp_path, scene, batch(to_work=EYE))
     assert message.endswith(
         "(instruments.scanner.extent_margin)?; the points lie on 2 planes: 298 × 198 mm "
         "(70 % of the points), 99.1 × 59.1 mm (30 % of the points); "
@@ -98,9 +98,27 @@ def test_a_scan_of_the_part_on_its_table_is_told_what_planes_there_are(tmp_path,
     )
 
 
-def test_a_scan_of_two_parts_is_told_of_two_groups(tmp_path):
-    scene = noisy(np.vstack([raster(100, 60), raster(100, 60) + np.array([300, 0, 0])]))
+def test_a_scan_of_two_parts_of_other_sizes_is_told_of_two_groups(tmp_path):
+    scene = noisy(np.vstack([raster(160, 60), raster(160, 60) + np.array([300, 0, 0])]))
     assert problem(tmp_path, scene, batch()).endswith("; the points lie in 2 groups apart")
+
+
+def said_of_a_scene(tmp_path, points, described):
+    recordings = scanned(tmp_path, points, described)[1]
+    assert recordings.problems == []
+    return next(row["message"] for row in recordings.findings if row["check"] == "scene")
+
+
+def test_of_a_scene_the_faces_of_the_parts_size_are_measured(tmp_path):
+    table = raster(300, 200, 2.0) - np.array([100, 70, 30])
+    said = said_of_a_scene(tmp_path, noisy(np.vstack([table, raster(100, 60)])), batch())
+    assert "1 face of it is measured: 99.1 × 59.1 mm (30 %)" in said
+    assert "not the size of the part: 298 × 198 mm" in said
+
+
+def test_two_parts_of_one_size_are_two_faces(tmp_path):
+    points = noisy(np.vstack([raster(100, 60), raster(100, 60) + np.array([300, 0, 0])]))
+    assert "2 faces of it are measured" in said_of_a_scene(tmp_path, points, batch())
 
 
 def test_one_plane_in_one_piece_needs_no_more_words(tmp_path):
@@ -157,13 +175,17 @@ def scene(share_on_the_face):
     return np.where(off[:, None] * [False, False, True], depth[:, None], points)
 
 
-@pytest.mark.parametrize("described", [batch(), batch(size=None)])
-def test_a_scene_that_holds_a_face_and_more_is_not_taken_for_a_face(tmp_path, described):
+@pytest.mark.parametrize("described", [batch(to_work=EYE), batch()])
+def test_a_scene_with_less_than_the_face_is_not_taken_for_the_face(tmp_path, described):
     said = problem(tmp_path, scene(0.6), described)
     assert (
-        "of one plane, expected 90 % or more of a scan of one face: keep the points of the face" in said
-        or ("is scanner.to_work in batch.yaml that of this scan?" in said)
+        "is scanner.to_work in batch.yaml that of this scan?" in said or "keep the points of the face" in said
     )
+
+
+def test_the_face_of_a_scene_that_holds_more_is_cut_out_of_it(tmp_path):
+    said = said_of_a_scene(tmp_path, scene(0.6), batch(size=None))
+    assert "1 face of it is measured: 59 × 59 mm (60 %)" in said
 
 
 def test_a_face_with_some_points_beside_it_and_a_rough_or_bowed_one_are_faces(tmp_path):
@@ -172,3 +194,27 @@ def test_a_face_with_some_points_beside_it_and_a_rough_or_bowed_one_are_faces(tm
     rough = face + [0, 0, 1] * np.random.default_rng(4).normal(0.0, 0.5, (len(face), 1))
     for points in (scene(0.95), bowed, rough):
         assert scanned(tmp_path, points, batch(size=None))[1].problems == []
+
+
+@pytest.mark.parametrize(("size", "unit"), [(25.4, "inches"), (10.0, "centimetres")])
+def test_millimetres_that_were_taken_for_another_unit_are_named(tmp_path, size, unit):
+    message = problem(tmp_path, raster(100, 60) * size, batch())
+    assert message.endswith(f"coordinates seem to be millimetres that were taken for {unit}")
+
+
+def test_the_size_of_the_points_is_shown_back(tmp_path):
+    recordings = scanned(tmp_path, raster(100, 60) + [0, 0, 0.4] * (raster(100, 60)[:, :1] > 50), batch())[1]
+    (said,) = [row["message"] for row in recordings.findings if row["check"] == "size of the scan"]
+    assert said.startswith("the points span 99 × 59 × 0.")
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(1 / 25.4, "be in inches"), (25.4, "that were taken for inches")]
+)
+def test_without_a_size_the_length_of_the_cut_tells_of_a_wrong_unit(tmp_path, factor, said):
+    runs = pd.DataFrame({"scan": ["s.ply"], "cut_length_mm": [100.0]}, index=["r"])
+    described = replace(batch(size=None), runs=runs)
+    findings = scanned(tmp_path, raster(100, 60) * factor, described)[1].findings
+    assert said in next(row["message"] for row in findings if row["check"] == "unit of length")
+    findings = scanned(tmp_path, raster(70, 60), described)[1].findings
+    assert not [row for row in findings if row["check"] == "unit of length"]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from metro.surface.indices import iso_indices, log_mean_floor, raw_indices
+from metro.surface.indices import iso_indices, log_mean_floor, lowered, raw_indices, symmetric
 
 deviations = st.lists(st.floats(-1e3, 1e3).map(lambda d: round(d, 3)), min_size=2, max_size=60).map(np.array)
 
@@ -45,3 +45,9 @@ def test_iso_peak_and_valley_add_up_to_the_total() -> None:
     found = iso_indices(np.array([-3.0, 0.0, 1.0, 2.0]))
     assert (found["fltt"], found["fltp"], found["fltv"]) == (5.0, 2.0, 3.0)
     assert found["fltq"] == pytest.approx(np.sqrt(14 / 4))
+
+
+def test_a_correction_of_noise_never_makes_an_index_larger():
+    assert symmetric(2.0, -0.5, 0.1).corrected == 2.0
+    found = lowered(2.0, 2.4, 2.2, 2.6)
+    assert (found.corrected, found.low, found.high) == (2.0, 2.0, 2.6)

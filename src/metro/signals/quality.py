@@ -213,6 +213,9 @@ def _offset(name: str, value: float, limit: float) -> Finding:
     return Finding("zero in air", value, limit, ok, message + hint)
 
 
+EXTENT = "size of the scan"  # a check that every cloud passes, and that is shown to whoever brings it in
+
+
 def missing_points(dropped: int, kept: int) -> Finding:
     """Report the points of a cloud that had no coordinates and were dropped."""
     share = dropped / max(dropped + kept, 1)

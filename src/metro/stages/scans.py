@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,18 +10,21 @@ import numpy as np
 from metro.batch.batch import Batch
 from metro.batch.canonical import Part
 from metro.batch.findings import Finding as Problem
+from metro.observables.flatness.scenes import MARGIN, SCENE, fitting
 from metro.signals import plausible, quality
 from metro.signals.conversion import moved
+from metro.signals.quality import EXTENT
 from metro.stages.reading import Recordings
 from metro.stages.recordings import POINT, files
-from metro.surface.extent import face_sides, misfit
+from metro.surface.extent import extents, face_sides, misfit, misread
 from metro.surface.points import drawn
 from metro.surface.scene import LEAST_GROUP, clusters_of, planes_of
+from metro.surface.scene_faces import scene_of
 from metro.units import Array
 
 PIECE = 1 << 18  # points in memory at a time
 SAMPLE = 1 << 12  # points of a piece that are kept to tell the extents from
-MARGIN = 0.25  # of the work's sides; scanner.extent_margin of batch.yaml
+
 SEEN = 20_000  # points that a scan which is no face is looked at with
 PART = 0.1  # of them, on a plane or in a group of its own, that a message to the user names
 THICK, APART = (
@@ -31,6 +35,9 @@ THICK, APART = (
 # machined face is flatter by far, and a scene of an open part with a face in it has half of them there.
 FACE, FLAT = 0.9, 0.05
 GROUPS = 5  # more are a cloud full of holes
+# A pass may be as short as a face is wide, or cross it in part; a unit is 10, 25.4 or 1000 times another.
+OF_A_CUT = 3.0
+UNIT = "unit of length"
 OF_A_PATH = 2.0  # a path runs past the face at both ends and stays within it across
 
 
@@ -55,8 +62,36 @@ def scan(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         if kept:
             recordings.note(file, run, [quality.missing_points(dropped, kept)])
             sample = np.concatenate(samples)
-            problem = _misfit(sample, batch, recordings.paths.get(run)) or _no_face(sample)
-            recordings.problems += [Problem("error", file, problem)] if problem else []
+            path = recordings.paths.get(run)
+            problem = _misfit(sample, batch, path) or _no_face(sample)
+            cut = _faces_alone(sample, batch, path) if problem else None
+            recordings.note(file, run, [*_size(sample, batch, run), *([cut] if cut else [])])
+            recordings.problems += [Problem("error", file, problem)] if problem and not cut else []
+
+
+def _size(points: Array, batch: Batch, run: str) -> Iterator[quality.Finding]:
+    """Yield the size of a cloud, and a doubt of its unit where the length of the cut alone tells of one."""
+    placed = "to_work" in batch.instrument("scanner")
+    try:
+        size = extents(points, placed=placed)
+    except ValueError:
+        return
+    spans = f"{' × '.join(f'{side:.4g}' for side in size)} mm"
+    yield quality.Finding(EXTENT, float(size[0]), math.nan, True, f"the points span {spans}")
+    length = float(batch.runs.loc[run].get("cut_length_mm", math.nan))
+    if not length > 0.0 or (batch.manifest.get("work") or {}).get("size_mm") is not None:
+        return
+    longest, low, high = (
+        size[:2].max(keepdims=True),
+        np.array([length / OF_A_CUT]),
+        np.array([length * OF_A_CUT]),
+    )
+    unit = misfit(longest, low, high)
+    taken = misread(longest, low, high) if unit == "" else ""
+    if unit or taken:
+        what = f"be in {unit}, not in millimetres" if unit else f"be millimetres that were taken for {taken}"
+        message = f"the points span {spans}, but the cut is {length:g} mm long: coordinates seem to {what}"
+        yield quality.Finding(UNIT, float(longest[0]), length, False, message)
 
 
 def _sample(points: Array) -> Array:
@@ -92,11 +127,37 @@ def _misfit(points: Array, batch: Batch, path: Array | None) -> str:
     spans = f"the points span {' × '.join(f'{side:.4g}' for side in sides)}, {what}"
     if unit:
         return f"{spans}: coordinates seem to be in {unit}, expected millimetres"
+    if taken := misread(sides, due / margin, due * margin):
+        return f"{spans}: coordinates seem to be millimetres that were taken for {taken}"
     least = " × ".join(f"{side:.4g}" for side in due / margin)
     most = " × ".join(f"{side:.4g}" for side in due * margin)
     hint = "is it a scan of another part, or of a part of the face (instruments.scanner.extent_margin)?"
     fits = np.sort(due / margin)[::-1], np.sort(due * margin)[::-1]
     return f"{spans}, expected {least} to {most} mm: {hint}{_scene(points, *fits)}"
+
+
+def _faces_alone(points: Array, batch: Batch, path: Array | None) -> quality.Finding | None:
+    """Say which faces are cut out of a scan of a scene; None where there are none, or a place is declared.
+
+    Of a part of known size a face must have its size; a path alone does not say what of a scene it cut.
+    """
+    size = (batch.manifest.get("work") or {}).get("size_mm")
+    if "to_work" in batch.instrument("scanner") or (size is None and path is not None):
+        return None
+    seen = scene_of(points, 1.0)
+    faces = fitting(seen.faces, batch, 1.0)
+    if not faces:
+        return None
+    each = [f"{' × '.join(f'{s:.3g}' for s in face.sides)} mm ({100 * face.share:.0f} %)" for face in faces]
+    others = [f"no face: {reason}" for reason in seen.refused]
+    others += [
+        f"not the size of the part: {' × '.join(f'{s:.3g}' for s in face.sides)} mm"
+        for face in seen.faces
+        if face not in faces
+    ]
+    count = f"{len(faces)} face{'s' if len(faces) > 1 else ''} of it"
+    said = f"the scan shows a scene, not one face; {count} {'are' if len(faces) > 1 else 'is'} measured: "
+    return quality.Finding(SCENE, len(faces), math.nan, False, said + "; ".join([", ".join(each), *others]))
 
 
 def _no_face(points: Array) -> str:

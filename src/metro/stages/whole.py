@@ -29,6 +29,7 @@ from metro.batch.findings import Finding, errors
 from metro.batch.processed import COLUMNS, Processed, Tables
 from metro.batch.sources import SECTION, files_of, parted
 from metro.observables.catalogue import capabilities
+from metro.signals.quality import EXTENT
 from metro.stages import joint_logs, scans
 from metro.stages import recordings as parts
 from metro.stages.data_checks import data_findings
@@ -157,11 +158,16 @@ def _stock(before: Stock, batch: Batch, recordings: Recordings) -> Stock:
 
 
 def _doubts(recordings: Recordings) -> list[Finding]:
-    """Return what the quality table holds that somebody should look at, the check of the tables aside."""
+    """Return what the quality table holds that somebody should look at, the check of the tables aside.
+
+    The size of a scan, which shows whether its unit is right, is a note.
+    """
     return [
-        Finding("warning", str(row["file"]), str(row["message"]), run=str(row["run"]))
+        Finding(
+            "note" if row["ok"] else "warning", str(row["file"]), str(row["message"]), run=str(row["run"])
+        )
         for row in recordings.findings
-        if not row["ok"] and row["check"] != OF_THE_TABLES
+        if (not row["ok"] or row["check"] == EXTENT) and row["check"] != OF_THE_TABLES
     ]
 
 

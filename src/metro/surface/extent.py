@@ -56,5 +56,22 @@ def misfit(sides: Array, low: Array, high: Array) -> str | None:
     return next((unit for unit, size in UNITS.items() if _within(sides * size, low, high)), "")
 
 
+def misread(sides: Array, low: Array, high: Array) -> str:
+    """Return the unit that millimetres were taken for, where that explains a wrong size; else ""."""
+    return next((unit for unit, size in UNITS.items() if _within(sides / size, low, high)), "")
+
+
+def extents(points: Array, *, placed: bool) -> Array:
+    """Return the sizes (3,) of a cloud (n, 3): its sides, and its height from the plane through it.
+
+    Raises
+    ------
+    ValueError
+        Where the points define no plane.
+    """
+    sides = face_sides(points, placed=placed)
+    return np.append(sides, np.ptp(fit_plane(points).deviations(points)))
+
+
 def _within(sides: Array, low: Array, high: Array) -> bool:
     return bool((sides >= low).all() and (sides <= high).all())

@@ -40,10 +40,16 @@ class Index:
         return max(self.high - self.corrected, self.corrected - self.low) / NORMAL
 
 
+def lowered(value: float, corrected: float, low: float, high: float) -> Index:
+    """Return an index less what noise added to it: a correction of noise never makes one larger."""
+    corrected = min(corrected, value)
+    return Index(value, corrected, min(low, corrected), max(high, corrected))
+
+
 def symmetric(value: float, bias: float, sd: float) -> Index:
     """Return an index by its bias and standard deviation."""
-    corrected = max(0.0, value - bias)
-    return Index(value, corrected, max(0.0, corrected - NORMAL * sd), corrected + NORMAL * sd)
+    middle = min(value, max(0.0, value - bias))
+    return lowered(value, middle, max(0.0, middle - NORMAL * sd), middle + NORMAL * sd)
 
 
 def log_mean_floor(step: float) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 
 from metro.surface.areal import CellSums
 from metro.surface.denoise import Modes, field, finer
-from metro.surface.indices import Index, iso_indices, raw_indices
+from metro.surface.indices import Index, iso_indices, lowered, raw_indices
 from metro.surface.minimum_zone import vertical_zone
 from metro.units import Array
 
@@ -65,7 +65,7 @@ def corrected(
             ends = _of_mean(estimate[name], plain**2 - start[0][name] ** 2)
         else:
             ends = _of_extreme(estimate[name], plain - start[0][name], level_draws - start[1][name])
-        indices[name] = Index(value, *ends)
+        indices[name] = lowered(value, *ends)
     return indices
 
 

@@ -294,6 +294,7 @@ def studied(
 ) -> JSON:
     """Return the block ``study``: the study of the measured faces, and advice on those that were not cut."""
     indices = observed["face_indices"]
+    indices = indices[indices["run"].isin(batch.runs.index)]  # several faces of one scan are no runs
     block = study(batch, indices, predicted) if indices["run"].nunique() > 1 else {}
     lacking = {**block.get("not_identified", {}), **advised.get("not_identified", {})}
     whole = {**block, **advised} | ({"not_identified": lacking} if lacking else {})

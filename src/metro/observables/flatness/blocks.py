@@ -37,7 +37,6 @@ from metro.surface.tip_stiffness import (
 from metro.units import DEG, MM, UM, Array
 
 REGISTERED_SD = 10 * UM
-UNREGISTERED_SD = 1 * MM
 GAUGE_SD = 0.1 * UM
 MOST_POINTS = 1200
 LEAST_COVERAGE, SECTORS = 0.75, 8
@@ -161,7 +160,9 @@ def face_block(
         ringing=ringing,
     )
     block = _block(batch, run, table, setting, path)
-    return replace(block, unidentified=damping_doubt(pose.field, setting)), _said(run, turn, ringing)
+    doubt = damping_doubt(pose.field, setting)
+    doubt = None if doubt is None else block.setting.shape(doubt)
+    return replace(block, unidentified=doubt), _said(run, turn, ringing)
 
 
 def _places(table: pd.DataFrame, path: Path) -> tuple[Array, Array]:
@@ -177,18 +178,23 @@ def _block(batch: Batch, run: str, table: pd.DataFrame, setting: FaceSetting, pa
     deviation = (table["z_mm"] - table["programmed_z_mm"]).to_numpy() * MM
     x, y = setting.mean(setting.x), setting.mean(setting.y)
     measured = setting.binned(deviation)
+    sigma = bin_sigma(measured, table, setting)
     placed = "to_work" in batch.instrument("scanner")
+    zeros = plane_directions(x, y)
+    if not placed:
+        setting = replace(setting, unplaced=np.linalg.qr(zeros)[0])
+        measured = setting.shape(measured)
     return Block(
         run=run,
         condition=str(row["condition"]),
         role="validate" if row["role"] == "validate" else "identify",
         order=int(batch.runs["order"].astype(int)[run]),
         measured=measured,
-        sigma=bin_sigma(measured, table, setting),
+        sigma=sigma,
         setting=setting,
         axis=np.full(len(x), "z"),
-        zeros=plane_directions(x, y),
-        zero_sd=np.full(3, REGISTERED_SD if placed else UNREGISTERED_SD),
+        zeros=zeros,
+        zero_sd=np.full(3, REGISTERED_SD if placed else 0.0),
         coordinates={
             "axis": np.full(len(x), "z"),
             "s_mm": setting.binned(table["s_mm"].to_numpy()),

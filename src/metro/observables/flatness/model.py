@@ -61,6 +61,8 @@ class FaceSetting:
     loaded : (3 · terms,) coefficients of the compliance from the load tests alone; they determine which
         passage was the lowest.
     ringing : None if the mass of the arm is not known; the tip then follows the force statically.
+    unplaced : (bins, 3) orthonormal heights of an offset and two tilts, which are left out of the measured
+        and the predicted heights, because the scan's place does not tell them; None where it does.
     """
 
     pose: str
@@ -73,6 +75,11 @@ class FaceSetting:
     force: Array
     loaded: Array
     ringing: Ringing | None
+    unplaced: Array | None = None
+
+    def shape(self, values: Array) -> Array:
+        """Return heights of the bins, (n,) or (n, k), without what the scan's place leaves open."""
+        return values if self.unplaced is None else values - self.unplaced @ (self.unplaced.T @ values)
 
     @cached_property
     def middle(self) -> Passages:
@@ -158,7 +165,7 @@ class FlatnessModel:
         terms, offset = _shaped(self, setting, self._phases(nuisance))
         columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
         parts = [_own(part, setting.pose, columns) for part in self.fields]
-        return np.hstack(parts), offset.copy()
+        return setting.shape(np.hstack(parts)), setting.shape(offset.copy())
 
     def finished(self, setting: FaceSetting, nuisance: Array) -> tuple[tuple[np.ndarray, np.ndarray], Array]:
         """Index of the passage that finished each point, and heights over the static one, (n, k) m.

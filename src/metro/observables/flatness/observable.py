@@ -22,6 +22,7 @@ from metro.observables.flatness.model import FlatnessModel
 from metro.observables.flatness.pairing import paired
 from metro.observables.flatness.repeats import cloud_of, noise_by_repeats, scanned_again
 from metro.observables.flatness.scan import FACE_TABLES, measured_run
+from metro.observables.flatness.scenes import faces_of
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.observables.quantity import quantity
@@ -53,10 +54,13 @@ def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataF
         path = path.iloc[:0] if scanned_again(batch, run) else path
         repeats = noise if isinstance(noise, Noise) else None
         with writing(Path(tempfile.gettempdir()) / "points"):  # of a cloud that does not fit in memory
-            tables, reason = measured_run(batch, run, cloud_of(read, run), path, repeats)
-        for name, table in tables.items():
-            parts[name].append(table)
-        refused += [(run, why) for why in (reason, noise) if isinstance(why, str)]
+            for name, cloud in faces_of(batch, read, run, cloud_of(read, run)):
+                of_path = path if name == run else path.iloc[:0]  # which of several faces it cut is not known
+                tables, reason = measured_run(batch, name, cloud, of_path, repeats)
+                for kind, table in tables.items():
+                    parts[kind].append(table)
+                refused += [(name, reason)] if isinstance(reason, str) else []
+        refused += [(run, noise)] if isinstance(noise, str) else []
     if not parts["face_indices"] and planned.empty:
         return Refusal("; ".join(f"run {run}: {reason}" for run, reason in refused))
     joined = {
@@ -162,7 +166,9 @@ def _limits(batch: Batch) -> list[str]:
         "share one ratio of 5 %, known to a factor of two.",
         "Scans are placed by the declared scanner-to-work transform (offset and tilts known to 10 µm)."
         if placed
-        else "No scanner-to-work transform is declared: offset and tilt are free, only the shape counts.",
+        else "No scanner-to-work transform is declared: an offset and two tilts are left out of the measured "
+        "and of the predicted heights alike, so that only the shape is compared, and what moves or tilts a "
+        "whole face cannot be found.",
     ]
 
 

@@ -24,7 +24,9 @@ MEANING = {
     "jitter": "scatter of the time step over the step",
     "missing points": "share of a scan's grid without a point",
     "motion": "travel of a joint in a cut (°)",
+    "scene": "faces that were cut out of a scan",
     "sampling rate": "rate (Hz); limit: as declared",
+    "size of the scan": "longest side (mm)",
     "time zero": "first time of a record (s)",
     "zero in air": "mean force while the tool cuts air (N)",
 }
