@@ -115,7 +115,7 @@ def test_names_that_the_contract_has_in_words_are_no_errors(batch):
 def test_the_report_says_which_effect_the_base_model_could_not_be_told_of(known, note):
     base = ForceModel(Cutter(6e-3, 0.6, evenly_pitched(4)), EdgeLaw())
     runs = tuple(
-        SimpleNamespace(role="identify", condition=str(i), setting=SimpleNamespace(helix=None, start=i))
+        SimpleNamespace(role="identify", condition=str(i), setting=SimpleNamespace(helix=None, start=i, recording=Recording((0.5,), 1.0, 50.0)))
         for i in range(2)
     )
     told = with_declared(Problem("force", "N", 1.0, base, runs, np.full(6, 0.01)), known)
