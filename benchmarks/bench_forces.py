@@ -130,7 +130,7 @@ def table(tool, cut, true_path):
 
 
 def test_rounded_ends_beside_the_flat_end():
-    """On true paths, on which coefficients are identified, and on circles, where the flat end has closed forms.
+    """On true paths, by which coefficients are identified, and on circles: closed forms of the flat end.
 
     The aim is twice the time of the flat end on true paths, which the corner keeps and the ball does not.
     """

@@ -11,6 +11,7 @@ from metro.batch.manifest import read_manifest
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.law import EdgeLaw
 from metro.effects.library import library, with_declared
+from metro.observables.force.dynamometer import Recording
 from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem
 
@@ -115,7 +116,11 @@ def test_names_that_the_contract_has_in_words_are_no_errors(batch):
 def test_the_report_says_which_effect_the_base_model_could_not_be_told_of(known, note):
     base = ForceModel(Cutter(6e-3, 0.6, evenly_pitched(4)), EdgeLaw())
     runs = tuple(
-        SimpleNamespace(role="identify", condition=str(i), setting=SimpleNamespace(helix=None, start=i))
+        SimpleNamespace(
+            role="identify",
+            condition=str(i),
+            setting=SimpleNamespace(helix=None, start=i, recording=Recording((0.5,), 1.0, 50.0)),
+        )
         for i in range(2)
     )
     told = with_declared(Problem("force", "N", 1.0, base, runs, np.full(6, 0.01)), known)

@@ -64,14 +64,12 @@ def left_out(tool, measured):
     errors = []
     for out in DEPTHS:
         others = [depth for depth in DEPTHS if depth != out]
-        alone = (turn * designs[5 if out != 5 else 4] for turn in turns)
-        reference = measured[5 if out != 5 else 4]
-        beta = min(
-            (solve(d, reference) for d in alone),
-            key=lambda b, r=reference, o=out: min(
-                error(turn * designs[5 if o != 5 else 4], r, b) for turn in turns[::6]
-            ),
-        )
+        first = others[-1]
+        alone = [solve(turn * designs[first], measured[first]) for turn in turns]
+        spans = [
+            error(turn * designs[first], measured[first], b) for turn, b in zip(turns, alone, strict=True)
+        ]
+        beta = alone[int(np.argmin(spans))]
         for _ in range(6):
             turned = {depth: best(designs[depth], measured[depth], beta) for depth in others}
             beta = solve(

@@ -10,7 +10,7 @@ from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import engagement
 from metro.cutting.entry import entry_basis
-from metro.cutting.envelope import meridian
+from metro.cutting.envelope import mean_inclination, meridian
 from metro.cutting.force import ANGLES, force_basis, mean_basis
 from metro.cutting.law import EdgeLaw
 
@@ -164,3 +164,10 @@ def test_a_ball_that_enters_a_block_meets_its_face_at_the_local_radius():
     # 3 mm above its tip a ball of 8 mm has a radius of 6.24 mm, so that nothing is inside yet
     assert np.abs(none).max() == 0.0
     assert np.abs(entry_basis(BALL, EdgeLaw(), SLOT, -0.7 * R)).max() > 0.0
+
+
+def test_the_mean_inclination_of_a_ball_is_the_closed_form():
+    sine, cosine = mean_inclination(BALL, R)
+    assert (sine, cosine) == (pytest.approx(math.pi / 4, rel=1e-6), pytest.approx(0.5, rel=1e-6))
+    assert mean_inclination(FLAT, 3e-3) == (pytest.approx(1.0), pytest.approx(0.0, abs=1e-12))
+    assert mean_inclination(replace(FLAT, taper=0.3), 3e-3)[0] == pytest.approx(math.cos(0.3))

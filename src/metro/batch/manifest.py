@@ -129,23 +129,31 @@ def _tool(tool: JSON) -> str | None:
 def _shape(tool: JSON) -> str | None:
     """Check that end, corner and flank are of one tool."""
     corner, diameter = tool.get("corner_radius_mm"), tool.get("diameter_mm")
-    if corner is not None and diameter is None:
-        return "corner_radius_mm is given without diameter_mm, expected both"
-    if tool.get("end") == "ball" and corner is not None and abs(corner - 0.5 * diameter) > ROUNDED_MM:
-        return (
-            f"corner_radius_mm is {corner:g}, expected none with end: ball, whose radius is half of "
-            f"diameter_mm ({diameter:g})"
-        )
-    if tool.get("end") == "flat" and corner:
-        return f"corner_radius_mm is {corner:g}, expected no end beside it: a tool with a corner is not flat"
-    if corner is not None and corner > 0.5 * diameter + ROUNDED_MM:
-        return f"corner_radius_mm is {corner:g}, expected at most half of diameter_mm ({diameter:g})"
+    if corner is not None:
+        if diameter is None:
+            return "corner_radius_mm is given without diameter_mm, expected both"
+        if fault := _corner(tool, corner, diameter):
+            return fault
     flank, lead = tool.get("taper_deg"), tool.get("cutting_edge_angle_deg")
     if flank is not None and lead is not None and abs(flank + lead - 90.0) > CLOSED_DEG:
         return (
             f"taper_deg is {flank:g} and cutting_edge_angle_deg {lead:g}, expected one of them: they are the "
             "same angle, from the tool axis and from the plane of the feed"
         )
+    return None
+
+
+def _corner(tool: JSON, corner: float, diameter: float) -> str | None:
+    """Check that a corner radius fits the end and the diameter, mm."""
+    if tool.get("end") == "ball" and abs(corner - 0.5 * diameter) > ROUNDED_MM:
+        return (
+            f"corner_radius_mm is {corner:g}, expected none with end: ball, whose radius is half of "
+            f"diameter_mm ({diameter:g})"
+        )
+    if tool.get("end") == "flat" and corner:
+        return f"corner_radius_mm is {corner:g}, expected no end beside it: a tool with a corner is not flat"
+    if corner > 0.5 * diameter + ROUNDED_MM:
+        return f"corner_radius_mm is {corner:g}, expected at most half of diameter_mm ({diameter:g})"
     return None
 
 

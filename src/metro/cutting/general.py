@@ -79,7 +79,7 @@ def _integrate(work: _Work, top: Array, teeth: int, total: Array) -> None:
     levels = work.teeth.levels(tooth[:, None], ends, sine[edge], cosine[edge])
     bound = levels[: work.teeth.chip_count].argmin(axis=0)
     positive = levels > 0.0
-    cutting = positive.all(axis=0)
+    cutting = np.asarray(positive.all(axis=0))
     changes = (positive[..., 1:] != positive[..., :-1]).any(axis=0) | (bound[:, 1:] != bound[:, :-1])
     changes &= (positive[..., 1:] | positive[..., :-1]).all(axis=0)
     whole = cutting[:, 1:] & ~changes

@@ -91,7 +91,7 @@ class Teeth:
 
     def _at_raw_edges(self, chips: list[Array], tip: Array, cosine: Array) -> list[Array]:
         """Return what raw edges leave of chips, of a tooth whose ``tip`` is so far from the axis, m."""
-        left = []
+        left: list[Array] = []
         for edge in self.raw:
             side = 1.0 if edge.outer != edge.begins else -1.0  # of y on which rays cross it
             crossing = side * cosine > 0.0

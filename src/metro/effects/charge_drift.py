@@ -33,8 +33,8 @@ def adapt(effect: Effect, problem: Problem) -> Effect:
     seen = [setting.recording for setting in settings if setting.recording.slope is not None]
     if not seen:
         return effect
-    to_channels = np.array(problem.base.sensor.axes)
-    declared = np.array(problem.base.sensor.slope)
+    base: Any = problem.base
+    to_channels, declared = np.array(base.sensor.axes), np.array(base.sensor.slope)
     slopes = np.array([each.slope for each in seen]) @ to_channels.T - declared
     deviations = np.sqrt(np.array([each.slope_sd for each in seen]) ** 2 @ (to_channels**2).T)
     parameters = []

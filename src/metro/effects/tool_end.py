@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
 
     At one depth the corner mixes the radial with the axial force in one ratio, as coefficients do.
     """
-    base: ForceModel = problem.base
+    base: Any = problem.base
     if base.end_declared:
         return Refusal("")
     depths = [block.setting.cut.axial_depth for block in problem.role("identify")]
