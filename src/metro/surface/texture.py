@@ -128,7 +128,7 @@ def levelled(x: Array, z: Array) -> tuple[Array, str]:
     along = x - x.mean()
     rise = float(along @ mean) / float(along @ along)
     flat = mean - rise * along
-    crossings = np.count_nonzero(np.diff(np.sign(flat)))
+    crossings = int(np.count_nonzero(np.diff(np.sign(flat))))
     chance = NORMAL * float(flat.std()) * math.sqrt(12.0 / max(crossings, 1))
     if crossings >= FEW and abs(rise) * float(np.ptp(x)) <= chance:
         return mean, "P is the trace as recorded, about its mean height: it has no tilt that can be shown."
