@@ -85,6 +85,16 @@ def face(key: str) -> Callable[[Found], JSON | None]:
     return ours
 
 
+def trace(key: str) -> Callable[[Found], JSON | None]:
+    """Take a parameter of the only trace."""
+
+    def ours(found: Found) -> JSON | None:
+        traces: Mapping[str, JSON] = found["identified"].get("texture") or {}
+        return next((one.get(key) for name, one in traces.items() if name != "not_identified"), None)
+
+    return ours
+
+
 def effect(observable: str, name: str, parameter: str) -> Callable[[Found], JSON | None]:
     """Take a parameter of an effect that the verdict names."""
 
@@ -165,9 +175,29 @@ SETS = (
             Known("eleventh mode, damped", "Hz", 8.06, "data set 55", mode(8.06)),
         ),
     ),
-    FieldSet("profile-square", ("square.xml",)),
+    FieldSet(
+        "profile-square",
+        ("square.xml",),
+        (),
+        tuple(
+            Known(name, unit, value, "software gauge, square wave", trace(name), half=half)
+            for name, unit, value, half in (
+                ("Pa", "µm", 1.0, 5e-4),
+                ("Pq", "µm", 1.0, 5e-4),
+                ("Pt", "µm", 2.0, 5e-4),
+                ("PSm", "µm", 200.0, 5e-3),
+                ("Pdq", "1", 0.2494, 5e-5),
+            )
+        ),
+    ),
     FieldSet("robot-ur10e-payload", ("*.csv",)),
-    FieldSet("scan-gocator", ("*.csv",), ("--set=work.size_mm=none",)),
+    FieldSet(
+        "scan-gocator",
+        ("*.csv",),
+        ("--set=work.size_mm=none",),
+        (Known("noise of a point", "µm", 43.0, "about, of the plane", face("sigma"), half=5.0),),
+        remark="the plane is cut out of the scene, and what is no face in it is named",
+    ),
     FieldSet(
         "scan-numbered-points",
         ("*.csv",),

@@ -54,10 +54,11 @@ def _compared(known: Known, found: dict[str, JSON] | None) -> list[str]:
 
 def _agreement(known: Known, ours: JSON) -> str:
     low, high = (ours.get("ci95") or [None, None])[:2]
-    if low is None or high is None:
-        return "no interval"
     if known.value is None:
         return "–"
+    if low is None or high is None:
+        equal = abs(known.value - ours["value"]) <= known.half
+        return "equal as far as it is known, no interval" if equal else "no interval"
     if low - known.half <= known.value <= high + known.half:
         return "within"
     half = 0.5 * (high - low) + known.half

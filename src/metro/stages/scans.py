@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -78,7 +79,8 @@ def _size(points: Array, batch: Batch, run: str) -> Iterator[quality.Finding]:
         return
     spans = f"{' × '.join(f'{side:.4g}' for side in size)} mm"
     yield quality.Finding(EXTENT, float(size[0]), math.nan, True, f"the points span {spans}")
-    length = float(batch.runs.loc[run].get("cut_length_mm", math.nan))
+    row: Any = batch.runs.loc[run]
+    length = float(row.get("cut_length_mm", math.nan))
     if not length > 0.0 or (batch.manifest.get("work") or {}).get("size_mm") is not None:
         return
     longest, low, high = (

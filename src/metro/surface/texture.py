@@ -22,7 +22,11 @@ from metro.surface.profile_parameters import (
 )
 from metro.units import MM, UM, Array
 
-SHORT = ((0.8 * MM, 2.5 * UM), (2.5 * MM, 8 * UM), (math.inf, 25 * UM))  # λs by λc: ISO 21920-3, table 1
+SHORT: tuple[tuple[float, float], ...] = (
+    (0.8 * MM, 2.5 * UM),
+    (2.5 * MM, 8 * UM),
+    (math.inf, 25 * UM),
+)  # λs by λc: ISO 21920-3, table 1
 SECTIONS = 5  # of an evaluation length, by default of ISO 21920-3
 CLOSE = 5.0  # points per λs, and per λc: fewer do not show what the filter parts
 LEAST_SECTIONS = 3  # from which their scatter gives an interval
@@ -107,9 +111,9 @@ def texture(x: Array, z: Array, cutoff: float) -> Texture:
             f"takes {2.0 * cutoff / MM:.3g} mm for one section with half a λc at either end."
         )
     else:
-        parts, said = _parted(x, primary, cutoff)
+        parts, remarks = _parted(x, primary, cutoff)
         profiles += parts
-        notes += said
+        notes += remarks
     return Texture(tuple(profiles), tuple(notes))
 
 
@@ -124,7 +128,7 @@ def levelled(x: Array, z: Array) -> tuple[Array, str]:
     along = x - x.mean()
     rise = float(along @ mean) / float(along @ along)
     flat = mean - rise * along
-    crossings = np.count_nonzero(np.diff(np.sign(flat)))
+    crossings = int(np.count_nonzero(np.diff(np.sign(flat))))
     chance = NORMAL * float(flat.std()) * math.sqrt(12.0 / max(crossings, 1))
     if crossings >= FEW and abs(rise) * float(np.ptp(x)) <= chance:
         return mean, "P is the trace as recorded, about its mean height: it has no tilt that can be shown."

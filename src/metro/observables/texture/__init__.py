@@ -4,4 +4,4 @@
 """
 
 NAME = "texture"
-TABLES = ("profile_parameters", "profile_traces", "areal_parameters")
+TABLES = ("profile_parameters", "profile_traces")
