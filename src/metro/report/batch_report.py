@@ -9,6 +9,7 @@ from metro import __version__
 from metro.report.content import Section
 from metro.report.document import Cover, compile_pdf
 from metro.report.results import Results
+from metro.report.sections.areal import areal
 from metro.report.sections.calibration import calibration
 from metro.report.sections.causes import upstream, with_causes
 from metro.report.sections.comparison import comparison
@@ -45,6 +46,7 @@ def report_sections(results: Results) -> list[Section]:
         identification(results),
         flatness(results),
         texture(results),
+        areal(results),
         robot(results),
         study(results),
         comparison(results),

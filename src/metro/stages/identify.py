@@ -17,6 +17,7 @@ from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, fit
 from metro.loop.fitting.held_out import identified_fit
 from metro.loop.fitting.noise import first_noise
+from metro.observables.areal.study import areal
 from metro.observables.arm.calibration import calibration
 from metro.observables.labelled import Labelled
 from metro.observables.observable import Observable
@@ -123,6 +124,7 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
     tables, blocks = texture.observe(batch, state.read)
     state.observed |= tables
     state.add(blocks)
+    state.add(areal(batch, state.read))
     _write(processed, batch, state.observed)
     write_problems(processed, posed)
     write_json(processed / "identified.json", {**state.identified, "not_identified": lacking})

@@ -43,6 +43,7 @@ ABOUT = ("format", "batch", "metro", "not_identified")  # the batch and the file
 ELSEWHERE = {
     "faces": "flatness of faces",
     "texture": "surface texture",
+    "areal": "areal parameters",
     "study": "factors and configurations",
     "arm": "the robot arm",
     "calibration": "tool, work and payload",

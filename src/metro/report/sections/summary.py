@@ -12,6 +12,7 @@ from metro.report.numbers import listing, number, percent, probability, quantity
 from metro.report.phrases import sentence
 from metro.report.results import Results, heading
 from metro.report.sections import findings
+from metro.report.sections.areal import first_areal
 from metro.report.sections.joint_words import joint_facts, joint_next, joint_words
 from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
@@ -114,6 +115,7 @@ def _identified(results: Results) -> list[Item]:
     shown = [
         *joint_facts(results),
         *first_faces(results),
+        *first_areal(results),
         *first_traces(results),
         *boundary_items(results),
         *largest_response(results.tables),
@@ -158,6 +160,7 @@ def _identified_words(identified: JSON) -> str:
         "flatness of faces" if identified.get("faces") else "",
         *joint_words(identified),
         "surface texture" if set(identified.get("texture") or {}) - {"not_identified"} else "",
+        "areal parameters" if identified.get("areal") else "",
     ]
     listed = listing([name for name in named if name])
     return f"Identified: {listed}." if listed else ""

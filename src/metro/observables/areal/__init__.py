@@ -1,0 +1,1 @@
+"""Areal parameters of scans that are rasters; nothing is predicted."""
