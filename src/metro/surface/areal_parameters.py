@@ -68,10 +68,10 @@ def scale_limited(raster: Raster, nesting_index: float) -> Array:
     """
     from scipy.ndimage import gaussian_filter
 
-    rows, columns = np.indices(raster.z.shape)
     seen = np.isfinite(raster.z)
+    row, column = np.nonzero(seen)
     dy, dx = raster.spacing
-    places = np.column_stack([columns[seen] * dx, rows[seen] * dy, raster.z[seen]])
+    places = np.column_stack([column * dx, row * dy, raster.z[seen]])
     height = np.full(raster.z.shape, np.nan)
     height[seen] = _about_plane(places)
     if not nesting_index:
