@@ -65,7 +65,11 @@ def _of_raster(batch: Batch, raster: Raster) -> JSON:
     block: JSON = {name: _json(name, value, sources) for name, value in values.items() if np.isfinite(value)}
     dy, dx = raster.spacing
     made = f"plane taken out, S-filter of nesting index {index / MM:.4g} mm, no L-filter"
-    lacking = [] if noise else ["the intervals do not hold the noise, which scanner.sigma_mm declares"]
+    lacking = (
+        []
+        if noise
+        else ["the intervals do not cover the noise of the scanner, since scanner.sigma_mm is not declared"]
+    )
     unknown = [name for name in ("al", "tr") if not np.isfinite(values[name])]
     if unknown:
         named = " and ".join(f"S{name}" for name in unknown)

@@ -9,7 +9,7 @@ from metro.report.results import Results
 LONGEST = 24
 TABLES = (("a", "q", "p", "v", "z"), ("sk", "ku", "dq", "dr", "al", "tr"))
 IN_UM = ("a", "q", "p", "v", "z", "al")
-SOURCES = {"place": "another place of the surface", "noise": "noise"}
+SOURCES = {"place": "the scatter over the surface", "noise": "the noise of the scanner"}
 
 
 def areal(results: Results) -> Section | None:
@@ -34,7 +34,7 @@ def areal(results: Results) -> Section | None:
             if number
             else f"Areal parameters by ISO 25178-2 of the S-F surface: {made}."
         )
-        caption += f" The 95 % intervals hold {listing(sources)}." if sources else ""
+        caption += f" The 95 % intervals cover {listing(sources)}." if sources else ""
         caption += f" The first {LONGEST} of {len(runs)} scans." if len(runs) > LONGEST else ""
         widths, numeric = [0.6, *([1.0] * len(names))], list(range(1, len(header)))
         items.append(Table(header, rows, caption, widths, numeric=numeric, small=True))
