@@ -22,6 +22,10 @@ FREE = (
     "cut_length_mm",
     "feed_direction_deg",
     "tool.overhang_mm",
+    "tool.end",
+    "tool.corner_radius_mm",
+    "tool.taper_deg",
+    "tool.cutting_edge_angle_deg",
 )  # that may be given without a question
 
 
