@@ -27,6 +27,10 @@ FREE = (
     "drives.gear_ratio",
     "drives.uncertainty",
     "drives.uncertainty_by_joint",
+    "tool.end",
+    "tool.corner_radius_mm",
+    "tool.taper_deg",
+    "tool.cutting_edge_angle_deg",
 )  # that may be given without a question
 
 
