@@ -24,8 +24,9 @@ from metro.effects import (
     tool_wear,
 )
 from metro.effects.library import library
-from metro.observables.force.dynamometer import Dynamometer, Recording, read
+from metro.observables.force.dynamometer import Dynamometer, Recording, transfer
 from metro.observables.force.model import ForceModel
+from metro.signals.orders import amplitudes, from_amplitudes
 
 MODEL = ForceModel(Cutter(6e-3, 0.5, evenly_pitched(3)), EdgeLaw())
 HIDDEN = {
@@ -111,6 +112,12 @@ def orders_of(wave):
     basis = np.zeros((5, 3, 1))
     basis[0, :, 0], basis[1, :, 0] = wave
     return basis
+
+
+def read(sensor, recording, orders):
+    """Order coefficients (blocks, 2H+1, 3, 1) that a sensor reads of those of the force."""
+    waves = amplitudes(orders)
+    return np.stack([from_amplitudes(block @ waves) for block in transfer(sensor, recording, len(waves))])
 
 
 def test_a_resonance_magnifies_by_the_response_of_one_degree_of_freedom():
