@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from metro.batch.cell import UNKNOWN
 from metro.units import DEG, JSON, MM, Array
 
 
@@ -56,14 +55,6 @@ def arm_of_cell(cell: JSON, manifest: JSON) -> Arm | None:
     turn = np.asarray(frame.get("rpy_deg", (0.0, 0.0, 0.0)), dtype=float) * DEG
     tool = np.asarray(manifest.get("tool_in_flange_mm", (0.0, 0.0, 0.0)), dtype=float) * MM
     return Arm(np.asarray(rows, dtype=float) * (DEG, DEG, MM, MM), tool, transform(position, rotation(*turn)))
-
-
-def no_arm(cell: JSON) -> str:
-    """Say why there is no arm where a cell has none."""
-    name = cell.get("cell")
-    if name == UNKNOWN:
-        return "no machine is named, and no arm is described (arm.dh in cell.yaml)"
-    return f"cell {name}: no arm.dh, nothing is known of the arm"
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:
