@@ -82,7 +82,7 @@ def test_the_base_models_do_not_depend_on_the_search(stage):
 
 
 def test_the_stage_that_words_the_findings_fits_nothing():
-    assert rooms_of("verdict") <= {"", "batch", "formats", "stages", "units", "wording"}
+    assert rooms_of("verdict") <= {"", "batch", "formats", "joint_columns", "stages", "units", "wording"}
 
 
 def test_the_wording_uses_no_package_but_the_standard_library():

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from metro.batch.cell import UNKNOWN
 from metro.robot.chain import Chain, chain_of_arm
 from metro.units import DEG, JSON, MM, Array
 
@@ -79,14 +78,6 @@ def geometry_of_cell(cell: JSON) -> Geometry | None:
 def prismatic(dh: Geometry) -> np.ndarray:
     """Return which joints shift instead of turning, (n,) bool."""
     return dh.prismatic if isinstance(dh, Chain) else np.zeros(len(dh), dtype=bool)
-
-
-def no_arm(cell: JSON) -> str:
-    """Say why there is no arm where a cell has none."""
-    name = cell.get("cell")
-    if name == UNKNOWN:
-        return "no machine is named, and no arm is described (arm.dh in cell.yaml)"
-    return f"cell {name}: no arm.dh, nothing is known of the arm"
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:

@@ -11,12 +11,13 @@ from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
 from metro.observables.arm.load_tests import ANGLES, best_compliance, usable
+from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall, wall
 from metro.observables.arm.wall_profile import in_one_pose
 from metro.observables.deformation.model import DeformationModel
 from metro.observables.problem import Refusal
-from metro.robot.kinematics import arm_of_cell, no_arm
+from metro.robot.kinematics import arm_of_cell
 from metro.units import DEG, Array
 
 

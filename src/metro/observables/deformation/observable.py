@@ -14,6 +14,7 @@ from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
 from metro.observables.arm.give import GivingArm, giving_arm
 from metro.observables.arm.load_tests import best_compliance, calibration
+from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall, wall
 from metro.observables.arm.wall_profile import wall_points
@@ -24,7 +25,7 @@ from metro.observables.deformation.proposals import feasible
 from metro.observables.deformation.report import arm_block
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Problem, Refusal
-from metro.robot.kinematics import Arm, arm_of_cell, no_arm
+from metro.robot.kinematics import Arm, arm_of_cell
 from metro.units import JSON, MM
 
 LOADED = 0.01  # load cell and gauge of the load tests, which all walls share

@@ -13,6 +13,7 @@ from metro.batch.processed import Tables
 from metro.observables.arm import joint_logs, tip_force
 from metro.observables.arm.clock import Clock, clock
 from metro.observables.arm.force_by_torques import force_without_dynamometer
+from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import ACTUAL, FORCE, JOINTS, REPEATABLE, TORQUE
 from metro.observables.arm.wall import wall
 from metro.observables.joint_force import NAME, TABLES, friction
@@ -29,7 +30,7 @@ from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.robot.drive_torques import TURNING
 from metro.robot.drives import declared, drives_of_cell
-from metro.robot.kinematics import Arm, arm_of_cell, no_arm
+from metro.robot.kinematics import Arm, arm_of_cell
 from metro.robot.statics import tip_jacobian
 from metro.signals import align, kalman
 from metro.signals.intervals import uneven

@@ -11,6 +11,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.observables.arm import tip_force
 from metro.observables.arm.load_tests import best_compliance
+from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.wall import wall
 from metro.observables.deformation.model import DeformationModel
 from metro.observables.observable import Observable
@@ -20,7 +21,7 @@ from metro.observables.waviness.blocks import wave_block
 from metro.observables.waviness.model import WavinessModel
 from metro.observables.waviness.points import ENCODER, wave_points
 from metro.observables.waviness.report import transfer, waviness_of
-from metro.robot.kinematics import Arm, arm_of_cell, no_arm
+from metro.robot.kinematics import Arm, arm_of_cell
 from metro.units import JSON, MM, UM, Array
 
 SCATTER = 0.02
