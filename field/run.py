@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import re
 import shutil
@@ -11,6 +13,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from field.sets import FieldSet
 from metro.units import JSON
@@ -92,5 +95,10 @@ def _read(result: Result, out: Path) -> Result:
     reports = out / "reports" / result.set.name
     if result.refusal or not (reports / "report.pdf").is_file():
         return replace(result, refusal=result.refusal or "no report was written: see snakemake.log")
-    found = {name: json.loads((reports / f"{name}.json").read_text()) for name in ("identified", "verdict")}
+    found: dict[str, Any] = {
+        name: json.loads((reports / f"{name}.json").read_text()) for name in ("identified", "verdict")
+    }
+    tables = out / "data/raw" / result.set.name / "published.csv"
+    with tables.open(newline="") if tables.is_file() else io.StringIO() as lines:
+        found["printed"] = list(csv.DictReader(lines))
     return replace(result, found=found)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from metro.units import JSON
 
-Found = Mapping[str, JSON]
+Found = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,30 @@ def trace(key: str) -> Callable[[Found], JSON | None]:
     return ours
 
 
+def printed(value: float) -> Callable[[Found], JSON | None]:
+    """Take the printed value of a table of published values that is nearest to one, within a hundredth."""
+
+    def ours(found: Found) -> JSON | None:
+        rows: Sequence[JSON] = found["printed"]
+        values = [float(row["measured"]) for row in rows if row["measured"]]
+        nearest = min(values, key=lambda one: abs(one - value), default=None)
+        near = nearest is not None and abs(nearest - value) <= 0.01 * abs(value)
+        return {"value": nearest} if near else None
+
+    return ours
+
+
+def friction(kind: str, joint: int) -> Callable[[Found], JSON | None]:
+    """Take the friction of a joint from the log without a load."""
+
+    def ours(found: Found) -> JSON | None:
+        runs: Mapping[str, JSON] = (found["identified"].get("joints") or {}).get("runs") or {}
+        values = (runs.get("r01") or {}).get(kind) or []
+        return dict(values[joint - 1]) if len(values) >= joint else None
+
+    return ours
+
+
 def effect(observable: str, name: str, parameter: str) -> Callable[[Found], JSON | None]:
     """Take a parameter of an effect that the verdict names."""
 
@@ -127,29 +152,44 @@ def coefficient(name: str) -> Callable[[Found], JSON | None]:
 
 BEAM = "mean of single-FRF fits over nine places of the hammer"
 SLOTTING = "published by the recorder: mean forces, all five feeds"
+BALL = "by the name of the tool, ball 16"
+UR10E = "published for this arm"
 TOOL = "published: peaks picked by hand"
-ALTINTAS = "Altintas, Manufacturing Automation (2012), p. 162"
+SWEEP = (
+    "--set=unit.force=N",
+    "--set=rate_hz=10000",
+    "--set=tool.diameter_mm=16",
+    "--set=tool.teeth=2",
+    "--set=tool.helix_deg=25",
+    "--set=dynamometer.reads=work",
+    "--set=dynamometer.axes=none",
+    "--set=operation=slot",
+    "--set=direction=slot",
+    "--run-column=spindle_rpm=800",
+    "--run-column=feed_per_tooth_mm=0.1",
+    "--run-column=axial_depth_mm={record}",
+    "--run-column=radial_depth_mm=16",
+)
 SETS = (
     FieldSet(
         "force-ball-d16",
         ("ball_d16.mat",),
+        SWEEP,
         (
-            "--set=unit.force=N",
-            "--set=rate_hz=10000",
-            "--set=tool.diameter_mm=16",
-            "--set=tool.teeth=2",
-            "--set=tool.helix_deg=25",
-            "--set=dynamometer.reads=work",
-            "--set=dynamometer.axes=none",
-            "--set=operation=slot",
-            "--set=direction=slot",
-            "--run-column=spindle_rpm=800",
-            "--run-column=feed_per_tooth_mm=0.1",
-            "--run-column=axial_depth_mm={record}",
-            "--run-column=radial_depth_mm=16",
+            Known(
+                "corner radius of the end", "mm", 8.0, BALL, effect("force", "tool_end", "corner_radius_mm")
+            ),
+            Known("error on held-out depths, after the loop", "%", None, "", held_out("force")),
         ),
+        remark="a ball end of which diameter, teeth and helix alone are declared",
+    ),
+    FieldSet(
+        "force-ball-declared",
+        ("ball_d16.mat",),
+        (*SWEEP, "--set=tool.end=ball"),
         (Known("error on held-out depths, after the loop", "%", None, "", held_out("force")),),
-        remark="a ball end brought in as what the form asks for: diameter, teeth, helix",
+        folder="field/force-ball-d16",
+        remark="the same with the end declared",
     ),
     FieldSet(
         "modal-beam",
@@ -171,8 +211,8 @@ SETS = (
         ("*.unv",),
         ("--set=citation=GVT-Post-Processing, X-HALE",),
         (
-            Known("first mode, damped", "Hz", 0.7621, "data set 55", mode(0.7621)),
-            Known("eleventh mode, damped", "Hz", 8.06, "data set 55", mode(8.06)),
+            Known("first mode", "Hz", 0.763477, "data set 55, undamped", printed(0.763477), half=5e-7),
+            Known("eleventh mode", "Hz", 8.059956, "data set 55, undamped", printed(8.059956), half=5e-7),
         ),
     ),
     FieldSet(
@@ -190,7 +230,31 @@ SETS = (
             )
         ),
     ),
-    FieldSet("robot-ur10e-payload", ("*.csv",)),
+    FieldSet(
+        "robot-ur10e-payload",
+        ("*.csv",),
+        (
+            "--set=joints.drive=14-19",
+            "--set=unit.drive=A",
+            "--set=unit.time=s",
+            "--set=unit.angle=rad",
+            "--set=loaded=no,yes",
+            "--set=cell=ur10e",
+            "--set=drives.torque_per_ampere_nm_a=10.0,10.70,8.46,9.00,9.48,10.12",
+        ),
+        (
+            Known("payload", "kg", 2.805, "weighed", at("calibration", "payload", "mass"), half=5e-4),
+            *(
+                Known(
+                    f"Coulomb friction of joint {i}", "N m", value, UR10E, friction("coulomb", i), half=half
+                )
+                for i, (value, half) in enumerate(
+                    ((12.5, 0.05), (13.3, 0.05), (5.0, 0.05), (2.0, 0.05), (2.69, 5e-3), (2.30, 5e-3)), 1
+                )
+            ),
+        ),
+        remark="with the published drive constants, which by themselves give 2.46 kg",
+    ),
     FieldSet(
         "scan-gocator",
         ("*.csv",),
@@ -242,6 +306,18 @@ SETS = (
     FieldSet(
         "profile-edm",
         ("edm.xml",),
+        (),
+        tuple(
+            Known(name, unit, value, "software gauge, EDM master", trace(name), half=half)
+            for name, unit, value, half in (
+                ("Pa", "µm", 0.46434, 5e-6),
+                ("Pq", "µm", 0.55994, 5e-6),
+                ("Psk", "1", -0.13265, 5e-6),
+                ("Pku", "1", 2.36461, 5e-6),
+                ("PSm", "µm", 46.09835, 5e-6),
+                ("Pdq", "1", 0.10536, 5e-6),
+            )
+        ),
         folder="real/reference/profiles",
     ),
 )
