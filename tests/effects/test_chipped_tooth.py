@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,11 @@ from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import force_basis
 from metro.cutting.law import EdgeLaw
-from metro.effects.chipped_tooth import apply
-from metro.observables.force.model import ForceModel
+from metro.effects.chipped_tooth import EFFECT, apply
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.descent import moved_models, sensitivities
+from metro.observables.force.dynamometer import Recording
+from metro.observables.force.model import ForceModel, ForceSetting
 
 TOOL = Cutter(5e-3, math.radians(35), evenly_pitched(4))
 CUT = Cut(0.08e-3, 3e-3, Engagement(0.0, math.pi))
@@ -80,3 +84,18 @@ def test_no_chipped_tooth_is_seen_in_a_batch_without_it():
     outcome, verdict, _ = clean(3)
     assert outcome.likeness is None
     assert verdict["status"] == "clean"
+
+
+def test_a_parameter_that_changes_nothing_has_a_derivative_of_exactly_zero():
+    """The number of the tooth: rounding as a derivative would be a direction, and the fit would follow it."""
+    setting = ForceSetting(CUT, 0.3, 24, Recording((0.2, 0.6), 0.4, 80.0), 0.0)
+    rows = 2 * 3 * 49
+    block = SimpleNamespace(setting=setting, zeros=np.zeros((rows, 3)), measured=np.zeros(rows))
+    candidate = Candidate(ForceModel(TOOL, EdgeLaw()), (EFFECT,))
+    theta = np.array([40.0, 1.0, 1.2])
+    model, moved = candidate.model(theta), moved_models(candidate, theta)
+    effect, own = sensitivities(model, moved, block, np.array([0.7]), COEFFICIENTS)
+    assert not effect[:, 1].any()
+    assert effect[:, 0].any()
+    assert effect[:, 2].any()
+    assert own.any()

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from metro.batch.files import in_the_air
 from metro.batch.findings import Finding, linked_outside
-from metro.batch.tables import Table
 from metro.units import JSON
+
+if TYPE_CHECKING:
+    from metro.batch.tables import Table
 
 SHORTEST_ARM_MM = 10.0
 ROWS = ("convention", "joints")  # keys that say how rows are meant

@@ -9,10 +9,10 @@ import numpy as np
 
 from metro.batch.arm import counts, with_joints
 from metro.batch.documents import Likeness, read_yaml, schema_findings
+from metro.batch.entries import UNKNOWN
 from metro.batch.findings import Finding, Severity, linked_outside, misspelt
 from metro.units import JSON
 
-UNKNOWN = "unknown"  # of a batch that names no machine
 FILE = "cell.yaml"
 CELLS = Path("config/cells")  # unless config.yaml or the command line says otherwise
 CHECKOUT = Path(__file__).parents[3]  # where this package is used from a checkout

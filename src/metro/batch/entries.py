@@ -6,6 +6,7 @@ from typing import Any
 
 from metro.units import JSON
 
+UNKNOWN = "unknown"  # cell of a batch that names no machine
 FILE = "batch.yaml"
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from metro.batch.findings import Finding, shown
 from metro.batch.sources import Files, files_of, parted, source
-from metro.batch.tables import Table
+
+if TYPE_CHECKING:
+    from metro.batch.tables import Table
 
 # Column of runs.csv → what kind of file it names, in the words of metro.formats.registry.
 RUN_FILES = {

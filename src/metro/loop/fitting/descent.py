@@ -105,7 +105,7 @@ def linearised(
         determinant = noise_room.log_determinant(block, noise, directions, whiten)
         log_likelihood[block.run] = -0.5 * (chi2[block.run] + determinant)
         if derivatives != "none":
-            effect, own = sensitivities(model, moved, block, nuisance, state.beta, predicted=predicted)
+            effect, own = sensitivities(model, moved, block, nuisance, state.beta)
             whitened = whiten(np.hstack([matrix, effect, own]))
             p, q = matrix.shape[1], matrix.shape[1] + effect.shape[1]
             rows.append((residual, whitened[:, :p], whitened[:, p:q], whitened[:, q:]))
@@ -120,15 +120,14 @@ def sensitivities(
     block: Block,
     nuisance: Array,
     beta: Array,
-    *,
-    predicted: Array,
 ) -> tuple[Array, Array]:
     """Return derivatives of a block's prediction by the effect parameters (n, q) and by its unknowns (n, m).
 
-    ``moved``: the model with each effect parameter moved, of :func:`moved_models`; ``predicted``: (n,) by the
-    model itself.
+    ``moved``: the model with each effect parameter moved, of :func:`moved_models`. All are predicted by one
+    way, so that a parameter that changes nothing has a derivative of exactly zero and no direction.
     """
     here = nuisance[None]
+    predicted = predictions(model, block, here, beta)[0]
     effect = [(predictions(other, block, here, beta)[0] - predicted) / step for other, step in moved]
     places = nuisance + NUISANCE_STEP * np.eye(len(nuisance))
     own = (predictions(model, block, places, beta) - predicted) / NUISANCE_STEP

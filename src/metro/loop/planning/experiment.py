@@ -206,7 +206,7 @@ def _derivatives(fitted: Fit, block: Block, nuisance: Array) -> tuple[Array, Arr
     matrix, offset = model.design(block, nuisance, fitted.beta)
     predicted = offset + matrix @ fitted.beta
     moved = moved_models(fitted.candidate, fitted.theta)
-    effect, own = sensitivities(model, moved, block, nuisance, fitted.beta, predicted=predicted)
+    effect, own = sensitivities(model, moved, block, nuisance, fitted.beta)
     return predicted, np.hstack([matrix, effect]), own
 
 

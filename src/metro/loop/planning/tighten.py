@@ -81,9 +81,8 @@ def _weighing(scored: Fit, held: Sequence[Block]) -> tuple[Array, int]:
     total, rows = np.zeros((len(scored.covariance),) * 2), 0
     for block in held:
         nuisance = scored.nuisance[block.run]
-        matrix, offset = model.design(block, nuisance, scored.beta)
-        predicted = offset + matrix @ scored.beta
-        effect, own = sensitivities(model, moved, block, nuisance, scored.beta, predicted=predicted)
+        matrix, _ = model.design(block, nuisance, scored.beta)
+        effect, own = sensitivities(model, moved, block, nuisance, scored.beta)
         columns = np.hstack([matrix, effect])
         if own.shape[1]:
             columns = columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0]

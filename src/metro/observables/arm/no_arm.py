@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from metro.batch.cell import UNKNOWN
+from metro.batch.entries import UNKNOWN
 from metro.units import JSON
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from metro.batch.cell import UNKNOWN
+from metro.batch.entries import UNKNOWN
 from metro.report.numbers import listing
 from metro.report.results import Results
 
