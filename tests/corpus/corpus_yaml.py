@@ -188,7 +188,7 @@ RADIANS = (
 STIFFNESS = "[1.0e+6, 1.1e+6, 9.0e+5, 2.0e+5, 1.8e+5, 1.5e+5]"
 CELL = {
     "another cell": ("cell: bench-arm", "cell: kr160", "kr160", "bench-arm"),
-    "five joints": (ARM, ARM.replace(",\n       [0, 0, 215, 0]", ""), "arm.dh", "expected"),
+    "five joints": (ARM, ARM.replace(",\n       [0, 0, 215, 0]", ""), "joint_stiffness_nm_rad", "expected 5"),
     "three numbers for a joint": (ARM, ARM.replace("[0, 0, 215, 0]", "[0, 0, 215]"), "arm.dh", "expected"),
     "an arm in metres": (ARM, METRES, "arm.dh", "metres"),
     "an arm in radians": (ARM, RADIANS, "arm.dh", "radians"),

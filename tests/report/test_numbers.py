@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from metro.observables.stability import modal_test
+from metro.observables.stability import modal_notes
 from metro.report.numbers import listing, number, percent, probability, quantity, with_interval
 from metro.report.parameters import parameter_name
 
@@ -80,4 +80,4 @@ def test_shares_probabilities_and_lists_read_as_one_says_them():
 )
 def test_notes_of_the_modal_test_write_an_interval_as_the_report_does(value, sd):
     half = 1.96 * sd
-    assert modal_test._with_interval(value, sd) == with_interval(value, [value - half, value + half])
+    assert modal_notes._with_interval(value, sd) == with_interval(value, [value - half, value + half])

@@ -59,3 +59,4 @@ def test_without_modes_there_or_lines_enough_nothing_is_said():
     off = 2j * np.pi * FREQUENCY * receptance()
     assert phase_slips(table(off), [{**mode, "direction": "y"} for mode in MODES]) == ()
     assert phase_slips(table(off).iloc[::50], MODES) == ()
+    assert phase_slips(pd.DataFrame(), MODES) == ()

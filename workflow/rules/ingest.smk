@@ -7,6 +7,7 @@ rule ingest:
             table=[
                 "force",
                 "robot",
+                "joint",
                 "path",
                 "scan",
                 "profile",

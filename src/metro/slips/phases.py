@@ -28,7 +28,9 @@ def phase_slips(responses: pd.DataFrame, modes: Sequence[JSON]) -> tuple[Slip, .
     responses : ``position, reference, response, frequency_hz, real_m_n, imag_m_n``. modes : of
         identified.json.
     """
-    turns = []
+    turns: list[float] = []
+    if responses.empty:
+        return ()
     for (position, _, response), rows in responses.groupby(["position", "reference", "response"], sort=False):
         own = [
             m for m in modes if str(m["position"]) == str(position) and m["direction"] == str(response)[-1]
