@@ -135,12 +135,7 @@ def _three(path: Path, name: str, what: str, text: str) -> list[float]:
 
 
 def _turn(roll: float, pitch: float, yaw: float) -> Array:
-    """Rotation Rz(yaw) Ry(pitch) Rx(roll), as URDF has it."""
-    (a, b, c), (s, t, u) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    return np.array(
-        [
-            [c * b, c * t * s - u * a, c * t * a + u * s],
-            [u * b, u * t * s + c * a, u * t * a - c * s],
-            [-t, b * s, b * a],
-        ]
-    )
+    """Rotation Rz(yaw) Ry(pitch) Rx(roll), as URDF has it; angles in rad."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_euler("xyz", [roll, pitch, yaw]).as_matrix())
