@@ -96,6 +96,11 @@ def trace(key: str) -> Callable[[Found], JSON | None]:
     return ours
 
 
+def texture(source: str, *values: tuple[str, str, float, float]) -> tuple[Known, ...]:
+    """Known parameters of a trace: name, unit, value and half width of each."""
+    return tuple(Known(name, unit, value, source, trace(name), half) for name, unit, value, half in values)
+
+
 def printed(value: float) -> Callable[[Found], JSON | None]:
     """Take the printed value of a table of published values that is nearest to one, within a hundredth."""
 
@@ -219,15 +224,13 @@ SETS = (
         "profile-square",
         ("square.xml",),
         (),
-        tuple(
-            Known(name, unit, value, "software gauge, square wave", trace(name), half=half)
-            for name, unit, value, half in (
-                ("Pa", "µm", 1.0, 5e-4),
-                ("Pq", "µm", 1.0, 5e-4),
-                ("Pt", "µm", 2.0, 5e-4),
-                ("PSm", "µm", 200.0, 5e-3),
-                ("Pdq", "1", 0.2494, 5e-5),
-            )
+        texture(
+            "software gauge, square wave",
+            ("Pa", "µm", 1.0, 5e-4),
+            ("Pq", "µm", 1.0, 5e-4),
+            ("Pt", "µm", 2.0, 5e-4),
+            ("PSm", "µm", 200.0, 5e-3),
+            ("Pdq", "1", 0.2494, 5e-5),
         ),
     ),
     FieldSet(
@@ -307,16 +310,14 @@ SETS = (
         "profile-edm",
         ("edm.xml",),
         (),
-        tuple(
-            Known(name, unit, value, "software gauge, EDM master", trace(name), half=half)
-            for name, unit, value, half in (
-                ("Pa", "µm", 0.46434, 5e-6),
-                ("Pq", "µm", 0.55994, 5e-6),
-                ("Psk", "1", -0.13265, 5e-6),
-                ("Pku", "1", 2.36461, 5e-6),
-                ("PSm", "µm", 46.09835, 5e-6),
-                ("Pdq", "1", 0.10536, 5e-6),
-            )
+        texture(
+            "software gauge, EDM master",
+            ("Pa", "µm", 0.46434, 5e-6),
+            ("Pq", "µm", 0.55994, 5e-6),
+            ("Psk", "1", -0.13265, 5e-6),
+            ("Pku", "1", 2.36461, 5e-6),
+            ("PSm", "µm", 46.09835, 5e-6),
+            ("Pdq", "1", 0.10536, 5e-6),
         ),
         folder="real/reference/profiles",
     ),
