@@ -89,6 +89,7 @@ RUNS = (
     Column("path", "file"),
     Column("scan", "file"),
     Column("profile", "file"),
+    Column("slopes", "file"),
     Column("stable", choices=("yes", "no")),
     Column("started_at", "time"),
     *_numbers("return_s", "return_s"),

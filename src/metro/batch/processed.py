@@ -32,6 +32,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "path": ("run", "point", "pass", "x_mm", "y_mm", "z_mm"),
     "scan": ("run", "x_mm", "y_mm", "z_mm"),
     "profile": ("run", "x_mm", "z_mm"),
+    "slopes": ("run", "line", "x1_mm", "y1_mm", "x2_mm", "y2_mm", "slope_urad"),
     "hit": (
         "test",
         "position",

@@ -21,6 +21,7 @@ MEASURED = {
     "robot": ("robot_log", tuple(f"tau{i}_nm" for i in range(1, 7))),
     "scan": ("scan", ("z_mm",)),
     "profile": ("profile", ("z_mm",)),
+    "slopes": ("slopes", ("slope_urad",)),
 }
 HIT = ("test", "position", "reference", "response", "replicate")
 

@@ -149,6 +149,18 @@ def profile(batch: Batch, recordings: Recordings) -> Iterator[Part]:
                 yield {"run": run, "x_mm": x, "z_mm": z}
 
 
+def slopes(batch: Batch, recordings: Recordings) -> Iterator[Part]:
+    """Yield the readings of each level or autocollimator; without lines, all are of one."""
+    for run, file in files(batch, "slopes"):
+        table = recordings.table(file, "slopes")
+        if table is None:
+            continue
+        feet = table[["x1_mm", "y1_mm", "x2_mm", "y2_mm"]].to_numpy()
+        line = table["line"].to_numpy() if "line" in table else np.zeros(len(table), np.int64)
+        if not recordings.doubt(file, plausible.slopes(feet, table["slope_urad"].to_numpy(), line)):
+            yield {"run": run, "line": line, **{name: table[name] for name in table if name != "line"}}
+
+
 def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:
     """Yield each hammer record, its response in SI."""
     rate = batch.instrument("hammer").get("rate_hz")

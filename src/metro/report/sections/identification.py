@@ -42,6 +42,7 @@ RUN_BLOCKS = {
 ABOUT = ("format", "batch", "metro", "not_identified")  # the batch and the file, not quantities
 ELSEWHERE = {
     "faces": "flatness of faces",
+    "levelling": "flatness by slopes",
     "texture": "surface texture",
     "areal": "areal parameters",
     "study": "factors and configurations",
