@@ -92,7 +92,7 @@ def test_the_two_centre_lines_are_two_closures_and_move_no_height_of_moodys_by_m
     found = level(moody())
     assert found.dof == 2
     assert (
-        0.2 < np.abs(his_heights(found)).max() < 0.8
+        0.2 < np.abs(his_heights(found)).max() < 0.5
     )  # his closure errors are 1.9 and 1.0 seconds, over 16 feet
 
 

@@ -18,7 +18,7 @@ _NAMES = {
 def slope_readings(seen: Seen) -> Proposal | None:
     """Propose how readings of slopes are read; None where a file shows none."""
     columns: dict[str, str | int | tuple[str, int]] = {}
-    stated = {}
+    stated: dict[str, str] = {}
     for column in seen.columns:
         bare, unit = parted(column.name)
         for name, pattern in _NAMES.items():

@@ -158,7 +158,7 @@ def slopes(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         feet = table[["x1_mm", "y1_mm", "x2_mm", "y2_mm"]].to_numpy()
         line = table["line"].to_numpy() if "line" in table else np.zeros(len(table), np.int64)
         if not recordings.doubt(file, plausible.slopes(feet, table["slope_urad"].to_numpy(), line)):
-            yield {"run": run, "line": line, **{name: table[name] for name in table if name != "line"}}
+            yield {"run": run, **{str(name): table[name] for name in table}, "line": line}
 
 
 def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:
