@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.joint_columns import Axes
 from metro.observables.arm.load_tests import fitted_loads, in_words, joint_observability
 from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import Wall, wall
@@ -18,7 +19,7 @@ from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.robot.kinematics import arm_of_cell
 from metro.robot.statics import deflections
-from metro.units import DEG, JSON, MM
+from metro.units import JSON, MM, Array
 
 
 def arm_block(
@@ -72,13 +73,20 @@ def _joint_observability(batch: Batch, observed: Mapping[str, pd.DataFrame]) -> 
         "unseen": identifiability.unseen.tolist(),
         "next_load": {
             "joint": load.joint + 1,
-            "q_deg": (load.joints / DEG).tolist(),
+            **_pose(load.joints, arm.axes),
             "force_n": load.force.tolist(),
             "relative_sd_before": load.before,
             "relative_sd_after": load.after,
         },
-        "sentence": in_words(identifiability, load),
+        "sentence": in_words(identifiability, load, arm.axes),
     }
+
+
+def _pose(joints: Array, axes: Axes) -> JSON:
+    """Angles of the joints that turn, and places of those that shift, where there are any."""
+    places = joints / axes.units
+    shifted = places[np.array(axes.linear)].tolist()
+    return {"q_deg": places[axes.turning].tolist()} | ({"q_mm": shifted} if shifted else {})
 
 
 def wall_figures(model: DeformationModel, block: Block, fit: BaseFit) -> JSON:
@@ -126,21 +134,20 @@ def _stiffness(
     batch: Batch, observed: Mapping[str, pd.DataFrame], fit: BaseFit | None
 ) -> list[JSON] | Refusal:
     """Joint stiffnesses k = 1/c; a joint has no value if its compliance cannot be distinguished from zero."""
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    if arm is None:
+        return Refusal("no arm.dh")
     if fit is not None:
         value, sd, dof = fit.beta, np.sqrt(np.diag(fit.covariance)), fit.dof
     else:
-        arm = arm_of_cell(batch.cell, batch.manifest)
-        tests = (
-            Refusal("no arm.dh")
-            if arm is None
-            else fitted_loads(DeformationModel(arm), observed["arm_loads"])
-        )
+        tests = fitted_loads(DeformationModel(arm), observed["arm_loads"])
         if isinstance(tests, Refusal):
             return tests
         value, sd, dof = tests.value, tests.sd, float(tests.dof)
     identified = value > 2.0 * sd
     known = np.where(identified, value, np.nan)
-    return [quantity(1.0 / c, s / c**2, "N m/rad", dof) for c, s in zip(known, sd, strict=True)]
+    units = ["N/m" if linear else "N m/rad" for linear in arm.axes.linear]
+    return [quantity(1.0 / c, s / c**2, u, dof) for c, s, u in zip(known, sd, units, strict=True)]
 
 
 def _mean_force(face: Wall, rows: pd.DataFrame) -> JSON:

@@ -77,7 +77,14 @@ def _joints(joints: pd.DataFrame) -> list[Item]:
     header = ["", *(f"joint {i}" for i in medians.index)]
     items: list[Item] = [
         Picture(figures.joints(joints, threshold), caption, caption),
-        Table(header, rows, about, [2.4, *([0.8] * len(medians))], numeric=list(range(1, 7)), small=True),
+        Table(
+            header,
+            rows,
+            about,
+            [2.4, *([0.8] * len(medians))],
+            numeric=list(range(1, len(header))),
+            small=True,
+        ),
     ]
     said = joints[joints["remark"] != ""].drop_duplicates(["run", "remark"])
     groups = said.groupby("remark", sort=False)["run"]
