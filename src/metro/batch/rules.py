@@ -89,9 +89,8 @@ def _whole_axes(table: Table) -> Iterator[Finding]:
     axes = axes_of(table.frame)
     beyond = next((name for name in stated(table.frame) if name not in axes.positions), "")
     if beyond:
-        count = len(axes)
-        fault = f"the axes are counted from 1 without a gap, and there is none of axis {count + 1}"
-        yield Finding("error", table.file, fault, column=beyond)
+        fault = f"is blank in every row, expected a number, since there is {beyond}: no axis is left out"
+        yield Finding("error", table.file, fault, column=f"q{len(axes) + 1}_{beyond.rpartition('_')[2]}")
     for position, row in table.sound():
         blank = [name for name in axes.positions if math.isnan(row[name])]
         if 0 < len(blank) < len(axes):

@@ -52,14 +52,10 @@ class RunForce:
 
 @dataclass(frozen=True, eq=False)
 class Common:
-    """What all runs of a batch share: how repeatable friction is, (k,) N m; the level of slow noise, (k,).
-
-    ``drives`` (k, k): covariance of the relative errors of the torques.
-    """
+    """What all runs of a batch share: how repeatable friction is, (k,) N m; the level of slow noise, (k,)."""
 
     friction: Array
     wander: Array
-    drives: Array
 
 
 def logged_cuts(batch: Batch, read: Tables, arm: Arm) -> Iterator[tuple[str, Log, Log]]:
@@ -87,30 +83,30 @@ def force_tables(
 
     ``drives`` (k, k): covariance of the relative errors of the torques.
     """
-    shared = common(list(solved.values()), drives)
+    shared = common(list(solved.values()))
     parts: dict[str, list[pd.DataFrame]] = {}
     for run, one in solved.items():
         if isinstance(one.sensorless, Refusal):
             tables = {"robot_refused": pd.DataFrame({"reason": [one.sensorless.reason]})}
         else:
-            tables = _tables(one.sensorless, shared, _measured(batch, run, read), one.turn)
+            tables = _tables(one, one.sensorless, shared, drives, _measured(batch, run, read))
         for name, table in tables.items():
             parts.setdefault(name, []).append(table.assign(run=run))
     return parts
 
 
-def common(runs: Sequence[RunForce], drives: Array) -> Common:
+def common(runs: Sequence[RunForce]) -> Common:
     """Return the mean levels of slow noise and friction over all runs, of which one alone says little."""
     known = [(one.noise, one.sensorless) for one in runs if isinstance(one.sensorless, Sensorless)]
     if not known:
-        return Common(np.zeros(0), np.zeros(0), drives)
+        return Common(np.zeros(0), np.zeros(0))
     wander = np.mean([sensorless.wander for _, sensorless in known], axis=0)
     least = REPEATABLE * np.sqrt(np.mean([noise**2 for noise, _ in known], axis=0))
     air = [means for _, one in known if (means := tip_force.in_the_air(one, wander)) is not None]
     if not air:
-        return Common(least, wander, drives)
+        return Common(least, wander)
     mean, variance = (np.array(values) for values in zip(*air, strict=True))
-    return Common(friction_repeatability(mean, variance, least), wander, drives)
+    return Common(friction_repeatability(mean, variance, least), wander)
 
 
 def force_of_all(one: Sensorless, shared: Common) -> TipForce:
@@ -126,7 +122,7 @@ def force_of_all(one: Sensorless, shared: Common) -> TipForce:
 
 
 def _tables(
-    one: Sensorless, shared: Common, measured: tuple[Array, Array], turn: Array | None
+    run: RunForce, one: Sensorless, shared: Common, drives: Array, measured: tuple[Array, Array]
 ) -> dict[str, pd.DataFrame]:
     """Tables of a run whose steady mean is ``measured`` (3,), covariance (3, 3), by a dynamometer."""
     joints = pd.DataFrame(
@@ -155,7 +151,7 @@ def _tables(
     mean = mean_force(solution, one.torques, one.steady, shared.friction, shared.wander)
     enough = bool((one.index >= LEAST_INDEX).sum() >= LEAST_JOINTS)
     shares = drive_shares(solution, one.torques, one.steady)
-    means = _means(mean, measured, shares @ shared.drives @ shares.T, turn).assign(
+    means = _means(mean, measured, shares @ drives @ shares.T, run.turn).assign(
         enough=enough, condition=float(solution.condition.max())
     )
     return tables | {"robot_force": course, "robot_means": means}

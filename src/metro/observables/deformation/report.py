@@ -10,6 +10,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.joint_columns import Axes
+from metro.observables.arm.force_by_torques import gain_errors
 from metro.observables.arm.load_tests import fitted_loads, in_words, joint_observability
 from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import Wall, wall
@@ -41,9 +42,6 @@ def arm_block(
         lacking["joint_observability"] = seen.reason
     else:
         block["joint_observability"] = seen
-    if "tip_force" in observed:
-        groups = observed["tip_force"].groupby("run", sort=False)
-        block["tip_force"] = {run: _mean_force(wall(batch, str(run)), rows) for run, rows in groups}
     if "observability" in observed:
         groups = observed["observability"].groupby("run", sort=False)
         block["observability"] = {run: [float(value) for value in rows["index"]] for run, rows in groups}
@@ -150,13 +148,33 @@ def _stiffness(
     return [quantity(1.0 / c, s / c**2, u, dof) for c, s, u in zip(known, sd, units, strict=True)]
 
 
-def _mean_force(face: Wall, rows: pd.DataFrame) -> JSON:
-    """Mean of the steady cut; its error is assumed constant along the wall, like a wrong zero of a torque."""
+def tip_forces(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON) -> JSON:
+    """Return the force on the tip that the deformation takes, run by run; nothing without an arm.
+
+    That of the torques holds the uncertainty of the drives.
+    """
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    if arm is None or "tip_force" not in observed:
+        return {}
+    drives = float(np.sqrt(np.mean(np.diag(gain_errors(batch, identified, arm)[0]))))
+    forces = {}
+    for run, rows in observed["tip_force"].groupby("run", sort=False):
+        relative = drives if rows["source"].iloc[0] == "torque" else 0.0
+        forces[str(run)] = _mean_force(wall(batch, str(run)), rows, relative)
+    return {"tip_force": forces}
+
+
+def _mean_force(face: Wall, rows: pd.DataFrame, relative: float) -> JSON:
+    """Mean of the steady cut; its error is assumed constant along the wall, like a wrong zero of a torque.
+
+    ``relative``: of an error of the whole force.
+    """
     steady = rows[face.steady(rows["x_mm"].to_numpy() * MM)]
-    return {
-        axis: quantity(float(steady[name].mean()), float(steady[f"sd_{name}"].mean()), "N")
-        for axis, name in zip("xyz", FORCE, strict=True)
-    }
+    block: JSON = {}
+    for axis, name in zip("xyz", FORCE, strict=True):
+        force, sd = float(steady[name].mean()), float(steady[f"sd_{name}"].mean())
+        block[axis] = quantity(force, math.hypot(sd, relative * force), "N")
+    return block
 
 
 def _deformation(model: DeformationModel, setting: CutWall, fit: BaseFit) -> JSON:
