@@ -20,6 +20,8 @@ JOINT_COLUMNS = (
     *(name.replace("_", "_set_") for name in POSITIONS),
     *TORQUES,
     *(f"current{i}_a" for i in AXES),
+    *(f"temperature{i}_c" for i in AXES),
+    "temperature_c",
 )
 MOVED = tuple(
     form.format(i, unit)
@@ -27,7 +29,7 @@ MOVED = tuple(
     for unit in ("deg", "mm")
     for i in AXES
 )
-_AXIS = re.compile(r"(?:q|tau|current)(\d)_.*")
+_AXIS = re.compile(r"(?:q|tau|current|temperature)(\d)_.*")
 
 
 def positions(names: Sequence[str]) -> list[str]:
@@ -47,7 +49,7 @@ def fault_of(names: Sequence[str]) -> str:
     count = len(positions(own))
     if count < 2:
         return "q1_deg, q2_deg, … (q1_mm of a linear axis), the positions of two axes or more"
-    beyond = next((name for name in own if int(_AXIS.sub(r"\1", name)) > count), "")
+    beyond = next((name for name in own if _AXIS.match(name) and int(_AXIS.sub(r"\1", name)) > count), "")
     if beyond:
         return f"q{count + 1}_deg, since there is {beyond}: the axes are counted from 1 without a gap"
     twice = next((i for i in AXES if f"q{i}_deg" in own and f"q{i}_mm" in own), 0)

@@ -11,7 +11,10 @@ RAIL = [("prismatic", 90, -90, 0, 0)] + [("revolute", *row) for row in (
     (0, 90, 500, 250), (90, 0, 0, 610), (-180, -90, 0, 70), (0, 90, 710, 0), (0, -90, 0, 0), (0, 0, 215, 0),
 )]  # fmt: skip
 UPRIGHT, ON_SIDE = np.eye(3), np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # the rail's z is the base's x
-START = {"seven": np.radians([10, 40, 15, -75, 20, 60, 0]), "rail": np.array([0.4, 0.1, -0.9, 0.9, 0.2, 0.9, 0.1])}
+START = {
+    "seven": np.radians([10, 40, 15, -75, 20, 60, 0]),
+    "rail": np.array([0.4, 0.1, -0.9, 0.9, 0.2, 0.9, 0.1]),
+}
 TOOL = np.array([0.06, 0.02, 0.14])
 FORCE = np.array([35.0, 110.0, -20.0])
 LOAD, CENTRE = 4.2, np.array([0.03, -0.02, 0.11])
@@ -29,7 +32,14 @@ def frames(rows, base, q):
         shift = d * 1e-3 + (value if kind == "prismatic" else 0.0)
         c, s, ca, sa = np.cos(turn), np.sin(turn), np.cos(np.radians(alpha)), np.sin(np.radians(alpha))
         along = a * 1e-3
-        step = np.array([[c, -s * ca, s * sa, along * c], [s, c * ca, -c * sa, along * s], [0, sa, ca, shift], [0, 0, 0, 1]])
+        step = np.array(
+            [
+                [c, -s * ca, s * sa, along * c],
+                [s, c * ca, -c * sa, along * s],
+                [0, sa, ca, shift],
+                [0, 0, 0, 1],
+            ]
+        )
         found.append(found[-1] @ step)
     return np.array(found)
 
@@ -105,7 +115,12 @@ def write(folder, name, *, commanded=True, profile=True, form="tau{}_nm", scale=
     for number, share in enumerate((1.0, 0.6, 0.8), start=1):
         row = {"run": f"r{number}", "condition": f"c{share:g}", "replicate": 1, "order": number}
         row |= {"operation": "side", "direction": "up", "spindle_rpm": 6000, "feed_per_tooth_mm": 0.1}
-        row |= {"axial_depth_mm": 10, "radial_depth_mm": share, "cut_length_mm": LENGTH * 1e3, "feed_direction_deg": 0}
+        row |= {
+            "axial_depth_mm": 10,
+            "radial_depth_mm": share,
+            "cut_length_mm": LENGTH * 1e3,
+            "feed_direction_deg": 0,
+        }
         for log in ("idle", "robot"):
             s = np.arange(0.0, knots[-1], FEED * PERIOD)
             q = np.stack([np.interp(s, knots, column) for column in nodes.T], axis=1)
@@ -154,11 +169,17 @@ def write(folder, name, *, commanded=True, profile=True, form="tau{}_nm", scale=
     pd.DataFrame(payload).map(lambda v: v if isinstance(v, str) else float(np.ravel(v)[0])).to_csv(
         folder / "payload.csv", index=False
     )
-    cell = {"cell": name, "arm": {"dh": [list(row[1:]) for row in arm.rows], "joints": [row[0] for row in arm.rows]}}
+    cell = {
+        "cell": name,
+        "arm": {"dh": [list(row[1:]) for row in arm.rows], "joints": [row[0] for row in arm.rows]},
+    }
     cell["arm"] |= {"base": {"rpy_deg": [0, 90, 0]}} if name == "rail" else {}
     (folder / "cell.yaml").write_text(yaml.safe_dump(cell | ({"drives": drives} if drives else {})))
     batch = {"format": 1, "batch": folder.name, "title": "Any arm", "source": "simulated", "cell": name}
-    batch |= {"tool": {"diameter_mm": 16, "teeth": 2, "helix_deg": 30}, "tool_in_flange_mm": (TOOL * 1e3).tolist()}
+    batch |= {
+        "tool": {"diameter_mm": 16, "teeth": 2, "helix_deg": 30},
+        "tool_in_flange_mm": (TOOL * 1e3).tolist(),
+    }
     batch |= {"work": {"material": "AA6061-T6", "size_mm": [LENGTH * 1e3, 50, 20]}}
     batch |= {"work_in_base": {"xyz_mm": (corner * 1e3 + [20, 0, 0]).tolist(), "rpy_deg": [0, 0, 0]}}
     batch |= {"instruments": {"robot_log": {"period_ms": PERIOD * 1e3}, "profiler": {"cutoff_mm": 8}}}

@@ -24,7 +24,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "run",
         "log",
         "t_s",
-        *(name for name in JOINT_COLUMNS if not name.startswith("current")),
+        *(name for name in JOINT_COLUMNS if not name.startswith(("current", "temperature"))),
     ),
     "joint": ("run", "t_s", *JOINT_COLUMNS),
     "path": ("run", "point", "pass", "x_mm", "y_mm", "z_mm"),

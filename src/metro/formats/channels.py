@@ -124,8 +124,8 @@ def _sample(start: int, row: int) -> str:
 def column_of(kind: Kind, name: str, unit: str = "") -> str:
     """Give the column that a channel's name denotes; the name in lower case where it is none.
 
-    Of columns that differ in their unit alone (``q1_deg``, ``q1_mm``) it is that of the channel's ``unit``, else
-    the first.
+    Of columns that differ in their unit alone (``q1_deg``, ``q1_mm``) it is that of the channel's ``unit``,
+    else the first.
     """
     key = name.strip().lower().replace(" ", "_")
     key = _ALIASES.get(key, key)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -105,7 +106,8 @@ def _payload(batch: Batch, table: pd.DataFrame) -> JSON:
     carried = identify_payload(arm.dh, joint_places(table, arm), torque, loaded, motion)
     drives = drives_of_cell(batch.cell, len(axes))
     gain = float(drives.relative[axes.turning].max())
-    return {**carried_json(with_gain(carried, gain)), "drives": drives.source}
+    joints = [place + 1 for place in axes.turning]
+    return {**carried_json(with_gain(carried, gain), joints), "drives": drives.source}
 
 
 def with_gain(carried: Carried, relative: float) -> Carried:
@@ -117,14 +119,15 @@ def with_gain(carried: Carried, relative: float) -> Carried:
     return replace(carried, covariance=carried.covariance + relative**2 * np.outer(size, size))
 
 
-def carried_json(carried: Carried) -> JSON:
-    """Return a load as the block ``payload`` of identified.json."""
+def carried_json(carried: Carried, joints: Sequence[int]) -> JSON:
+    """Return a load as the block ``payload`` of identified.json; ``joints`` are those of its residuals."""
     spread = np.sqrt(np.diag(carried.covariance))
     centre = _along("xyz", carried.centre / MM, carried.covariance[1:4, 1:4] / MM**2, "mm", carried.dof)
     block: JSON = {"mass": quantity(carried.mass, spread[0], "kg", carried.dof), "centre": centre}
     if np.isfinite(carried.inertia).all():
         block["inertia"] = _along(INERTIA, carried.inertia, carried.covariance[4:, 4:], "kg m2", carried.dof)
     return block | {
+        "joints": list(joints),
         "rms": [float(left) if np.isfinite(left) else None for left in carried.rms],
         "dof": carried.dof,
     }

@@ -49,7 +49,8 @@ class JointLog:
     """A joint log of n axes: ``time`` (m,) s; ``q`` (m, n) rad (m of a linear axis); ``torque`` (m, n) N m.
 
     ``commanded`` (m, n) as ``q``, NaN where there are no set-points; ``driven`` (n,) bool, whether a torque
-    or a current was logged; ``amperes`` : whether ``torque`` is in amperes; ``loaded`` : yes, no or "".
+    or a current was logged; ``amperes`` : whether ``torque`` is in amperes; ``warmth``
+    (m, n) °C of the joints, NaN where it was not logged; ``loaded`` : yes, no or "".
     """
 
     run: str
@@ -59,6 +60,7 @@ class JointLog:
     torque: Array
     driven: np.ndarray
     amperes: bool
+    warmth: Array
     loaded: str
 
     @property
@@ -101,8 +103,15 @@ def _log(batch: Batch, run: str, table: pd.DataFrame) -> JointLog:
         np.where(driven, drive, 0.0),
         driven,
         amperes,
+        _warmth(table, len(names)),
         str(batch.runs["loaded"].get(run, "")),
     )
+
+
+def _warmth(table: pd.DataFrame, count: int) -> Array:
+    """Temperature of each joint (m, n), °C: its own, else that of the arm; NaN where neither was logged."""
+    own = table[[f"temperature{i}_c" for i in AXES[:count]]].to_numpy(dtype=float)
+    return np.where(np.isfinite(own), own, table[["temperature_c"]].to_numpy(dtype=float))
 
 
 def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
@@ -120,7 +129,11 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
         fits: tuple[JointFit, ...] = ()
         if log.long:
             motions[log.run] = free_motion(log.time, log.q, log.torque)
-            fits = () if arm is None else fit_joints(arm.dh, motions[log.run], log.driven)
+            # temperatures are filtered and thinned as torques are
+            warmth = (
+                free_motion(log.time, log.q, log.warmth).torque if np.isfinite(log.warmth).any() else None
+            )
+            fits = () if arm is None else fit_joints(arm.dh, motions[log.run], log.driven, warmth)
         rows += _rows(log, fits, arm, drives)
         curves += [_curve(fit).assign(run=log.run) for fit in fits]
         terms += [{"run": log.run, "joint": f.joint + 1, **vars(term)} for f in fits for term in f.terms]

@@ -17,7 +17,11 @@ BEYOND = {
     "load": "friction grows with the torque that the links ask of the gear, by {size} of it",
     "speed": "friction differs by {size} (rms) from the line of Coulomb and viscous friction: {shape}",
     "time": "the Coulomb level changes by {size} along the log",
+    "viscous_time": "viscous friction changes by {size} along the log",
+    "temperature": "the Coulomb level changes by {size} with the joint's temperature",
+    "viscous_temperature": "viscous friction changes by {size} with the joint's temperature",
 }
+PER = {"viscous_time": " s/rad", "temperature": "/K", "viscous_temperature": " s/(rad K)"}
 SLOW = 0.12  # of the fastest speed: what changes friction below it is near standstill
 RUNS = 3  # runs whose friction is drawn
 
@@ -106,7 +110,9 @@ def _beyond(terms: pd.DataFrame | None, table: pd.DataFrame) -> list[Item]:
     if terms is None:
         return [
             Paragraph(
-                "No log shows friction beyond Coulomb and viscous: neither with speed, load nor time.", "note"
+                "No log shows friction beyond Coulomb and viscous: neither with speed, load, temperature nor "
+                "time.",
+                "note",
             )
         ]
     units = table.set_index(["run", "joint"])["unit"]
@@ -116,7 +122,8 @@ def _beyond(terms: pd.DataFrame | None, table: pd.DataFrame) -> list[Item]:
             size = f"{_interval(100 * r['value'], 100 * r['sd'])} %"
         else:
             value = abs(r["value"]) if r["name"] == "speed" else r["value"]
-            size = f"{_interval(value, r['sd'])} {units[r['run'], r['joint']]}"
+            unit = units[r["run"], r["joint"]] + PER.get(r["name"], "")
+            size = f"{_interval(value, r['sd'])} {unit}"
         said = BEYOND[r["name"]].format(size=size, shape=_shape(r))
         evidence = (
             f"probability of it by chance {probability(r['p'])}, error on held-out stretches "
