@@ -2,8 +2,8 @@
 
     python scripts/friction_study.py
 
-Records of a Staubli TX40 and of a UR10e, where the folder METRO_REAL_DATA of the environment and the folder
-``field`` beside it have them. Each sixth of a log is predicted by a fit to the other five, which choose the terms, too.
+Records of a Staubli TX40 and of a UR10e, where METRO_REAL_DATA (and ``field`` beside it) has them. Each sixth
+of a log is predicted by a fit to the other five, which choose the terms, too.
 """
 
 from __future__ import annotations
