@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import yaml
+from scipy.interpolate import CubicSpline
 
 # kind, theta, alpha (deg), d, a (mm): seven joints that turn; and a rail along x under six.
 SEVEN = [("revolute", 0, alpha, d, 0) for alpha, d in zip(
@@ -19,7 +20,7 @@ TOOL = np.array([0.06, 0.02, 0.14])
 FORCE = np.array([35.0, 110.0, -20.0])
 LOAD, CENTRE = 4.2, np.array([0.03, -0.02, 0.11])
 PERIOD, FEED, LENGTH = 0.012, 0.02, 0.1  # s, m/s, m
-SOFT = 4e-7  # rad/(N m) of every joint, and m/N a twentieth of it of the rail
+SOFT = 4e-7  # rad/(N m) of every joint, and a fifth of it in m/N of the rail
 
 
 def frames(rows, base, q):
@@ -51,7 +52,7 @@ class AnyArm:
         self.name, self.rows = name, {"seven": SEVEN, "rail": RAIL}[name]
         self.base = ON_SIDE if name == "rail" else UPRIGHT
         self.linear = np.array([row[0] == "prismatic" for row in self.rows])
-        self.soft = np.where(self.linear, SOFT / 20, SOFT * np.linspace(0.6, 1.4, len(self.rows)))
+        self.soft = np.where(self.linear, SOFT / 5, SOFT * np.linspace(0.6, 1.4, len(self.rows)))
 
     def point(self, q, place=TOOL):
         """Place of a point of the flange, base frame, m."""
@@ -123,9 +124,6 @@ def write(folder, name, *, commanded=True, profile=True, form="tau{}_nm", scale=
         }
         for log in ("idle", "robot"):
             s = np.arange(0.0, knots[-1], FEED * PERIOD)
-            q = np.stack([np.interp(s, knots, column) for column in nodes.T], axis=1)
-            from scipy.interpolate import CubicSpline
-
             q = CubicSpline(knots, nodes)(s)
             rate = np.gradient(q, PERIOD, axis=0)
             inside = np.clip((s - 0.02 - 0.0) / 0.005, 0, 1) * np.clip((0.02 + LENGTH - s) / 0.005, 0, 1)

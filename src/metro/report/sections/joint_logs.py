@@ -21,7 +21,6 @@ BEYOND = {
     "temperature": "the Coulomb level changes by {size} with the joint's temperature",
     "viscous_temperature": "viscous friction changes by {size} with the joint's temperature",
 }
-PER = {"viscous_time": " s/rad", "temperature": "/K", "viscous_temperature": " s/(rad K)"}
 SLOW = 0.12  # of the fastest speed: what changes friction below it is near standstill
 RUNS = 3  # runs whose friction is drawn
 
@@ -34,7 +33,7 @@ def joint_logs(results: Results) -> list[Item]:
     about = results.identified.get("joints") or {}
     items: list[Item] = [Heading("The joints by logs of free motion"), _motion(table)]
     if "coulomb" in table:
-        items += [_friction(table, about), *_beyond(results.tables.get("joint_log_terms"), table)]
+        items += [_friction(table, about), *_beyond(results.tables.get("joint_log_terms"))]
         items += _curves(results, table)
     remarks = table[table["remark"] != ""].groupby(["run", "remark"], sort=False)["joint"]
     if remarks.ngroups:
@@ -105,7 +104,7 @@ def _interval(value: float, sd: float) -> str:
     return with_interval(value, [value - T95 * sd, value + T95 * sd]) if math.isfinite(value) else "–"
 
 
-def _beyond(terms: pd.DataFrame | None, table: pd.DataFrame) -> list[Item]:
+def _beyond(terms: pd.DataFrame | None) -> list[Item]:
     """Say what the friction has beyond Coulomb and viscous, with the evidence for it."""
     if terms is None:
         return [
@@ -115,15 +114,13 @@ def _beyond(terms: pd.DataFrame | None, table: pd.DataFrame) -> list[Item]:
                 "note",
             )
         ]
-    units = table.set_index(["run", "joint"])["unit"]
     lines = []
     for _, r in terms.iterrows():
         if r["name"] == "load":
             size = f"{_interval(100 * r['value'], 100 * r['sd'])} %"
         else:
             value = abs(r["value"]) if r["name"] == "speed" else r["value"]
-            unit = units[r["run"], r["joint"]] + PER.get(r["name"], "")
-            size = f"{_interval(value, r['sd'])} {unit}"
+            size = f"{_interval(value, r['sd'])} {r['unit']}"
         said = BEYOND[r["name"]].format(size=size, shape=_shape(r))
         evidence = (
             f"probability of it by chance {probability(r['p'])}, error on held-out stretches "
