@@ -136,7 +136,7 @@ def test_a_log_whose_axes_are_not_those_of_the_cell_is_refused_by_its_numbers(tm
     folder = seven(
         tmp_path / "six", columns=lambda table: table.drop(columns=[c for c in table if "7_" in c])
     )
-    with pytest.raises(BatchError, match="positions of 6 axes, expected 7"):
+    with pytest.raises(BatchError, match="positions of 6 axes, q1_deg to q6_deg, expected q1_deg to q7_deg"):
         observed(folder, tmp_path / "out")
 
 
