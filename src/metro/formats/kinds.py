@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.formats.errors import FormatError
-from metro.joint_columns import JOINT_COLUMNS, fault_of, fault_of_six
+from metro.joint_columns import JOINT_COLUMNS, fault_of, fault_of_cut
 from metro.spelling import resembling
 
 JOINTS = range(1, 7)
@@ -46,20 +46,7 @@ class Kind:
 
 KINDS: dict[str, Kind] = {
     "force": Kind("a force record", ("t_s", "fx_n", "fy_n", "fz_n"), ("spindle_deg",), rising="t_s"),
-    "robot": Kind(
-        "a robot log",
-        (
-            "t_s",
-            *(f"q{i}_deg" for i in JOINTS),
-        ),
-        (
-            *(f"q{i}_set_deg" for i in JOINTS),
-            *(f"tau{i}_nm" for i in JOINTS),
-            *(f"current{i}_a" for i in JOINTS),
-        ),
-        rising="t_s",
-        fault=fault_of_six,
-    ),
+    "robot": Kind("a robot log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of_cut),
     "joints": Kind("a joint log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of),
     "path": Kind("a path", ("point", "pass", "x_mm", "y_mm", "z_mm"), whole=("point", "pass"), least=2),
     "profile": Kind("a profile", ("x_mm", "z_mm"), rising="x_mm"),

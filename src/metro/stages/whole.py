@@ -30,7 +30,7 @@ from metro.batch.processed import COLUMNS, Processed, Tables
 from metro.batch.sources import SECTION, files_of, parted
 from metro.observables.catalogue import capabilities
 from metro.signals.quality import EXTENT
-from metro.stages import joint_logs, scans
+from metro.stages import joint_logs, robot_logs, scans
 from metro.stages import recordings as parts
 from metro.stages.data_checks import data_findings
 from metro.stages.reading import Recordings
@@ -197,7 +197,7 @@ def _tables(loaded: Loaded, recordings: Recordings) -> Iterator[tuple[str, Itera
     """Yield every canonical table with its parts; force comes first, it sets each run's zero of time."""
     batch = loaded.batch
     yield "force", parts.force(batch, recordings)
-    yield "robot", parts.robot(batch, recordings)
+    yield "robot", robot_logs.robot(batch, recordings)
     yield "joint", joint_logs.joint(batch, recordings)
     yield "path", parts.path(batch, recordings)
     yield "scan", scans.scan(batch, recordings)
