@@ -32,7 +32,7 @@ ALIKE = 1.1  # misfit over the least: bookkeepings that the waveform does not di
 MOST_NAMED = 3
 ENDS = (0.4, 1.0)  # corner radii over the radius: a bull nose and a ball
 LEAST_RATIO = 1.2  # between depths of cut that tell a corner
-END = "end"  # kind of the hypothesis that the end alone is another one
+END, AXES_AND_END = "end", "axes and end"  # kinds: the end alone is another one, or the axes as well
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ def _with_ends(records: list[Record], ends: Sequence[Cutter], sensor: JSON) -> I
         shape = "a ball end" if end.corner == end.radius else f"a corner radius of {end.corner / MM:.3g} mm"
         yield Hypothesis(END, f"tool: {shape}", "tool.end", records, designs)
         for one in orientation.orientations(sensor, records, designs):
-            yield replace(one, remedy=f"{one.remedy} with {shape} of the tool")
+            yield replace(one, kind=AXES_AND_END, remedy=f"{one.remedy} with {shape} of the tool")
 
 
 def _hypotheses(
@@ -142,7 +142,9 @@ def _slip(declared: WaveFit, faults: tuple[str, ...], named: list[Tried], chip: 
     remedy = f"Likely{where}: {texts[0]}"
     if len(named) > 1:
         remedy += f". The records cannot distinguish this from: {'; '.join(texts[1:])}"
-        remedy += ". To decide, push the dynamometer by hand along each axis, or count the teeth"
+        ends = any(one.hypothesis.kind == AXES_AND_END for one in named)
+        how = ", count the teeth, or look at the tool's end" if ends else ", or count the teeth"
+        remedy += f". To decide, push the dynamometer by hand along each axis{how}"
     return Slip(OBSERVABLES, found, remedy, first.file, first.column)
 
 
