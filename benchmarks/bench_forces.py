@@ -132,8 +132,8 @@ def table(tool, cut, true_path):
 def test_rounded_ends_beside_the_flat_end():
     """On true paths, by which coefficients are identified, and on circles: closed forms of the flat end.
 
-    The aim is twice the time of the flat end on true paths: the corner keeps it without runout, the ball in
-    side cuts. What is left is the search for where edges enter and leave: circles of the flat end need none.
+    The aim is twice the time of the flat end on true paths, which side cuts without runout keep. What is left
+    is the search for where edges enter and leave, which circles of a flat end have as closed forms.
     """
     radius, side = TOOL.radius, math.pi - math.acos(1.0 - 0.5)
     arcs = {"slot": Engagement(0.0, math.pi), "down": Engagement(side, math.pi)}
