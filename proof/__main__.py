@@ -60,10 +60,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _make(out: Layout, options: argparse.Namespace) -> None:
-    from proof.suite import make
+    from proof.suite import Suite, make
 
-    about = options.observable
-    digest = make(out, options.batches, options.seed, options.style, options.jobs, observable=about)
+    suite = Suite(options.observable, options.batches, options.seed, options.style)
+    digest = make(out, suite, options.jobs)
     print(f"{options.batches} batches in {out.raw}; what they hide is sealed as SHA-256 {digest}")
 
 
