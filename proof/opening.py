@@ -12,21 +12,29 @@ from rich.console import Console
 from metro.units import JSON
 from proof import seal
 from proof.answers import answer, p_value
-from proof.figures import demanded
 from proof.layout import Layout
 from proof.oracles import oracles
 from proof.run import pose
 from proof.score import Score, score
 from proof.show import draw, markdown, printed
-from proof.statistics import Figure
 from proof.suite import DEFAULT
 from proof.tables import tables
 
-OURS = "metro"
+
+def about(truth: JSON) -> str:
+    """Return the observable of a suite."""
+    return str(truth.get("observable", DEFAULT))
 
 
-def opened(out: Layout, jobs: int) -> list[Figure]:
-    """Open the truth, print every table, write ``table.md`` and ``figure.svg``; return what is demanded.
+def about_suite(out: Layout) -> str:
+    """Return the observable of a sealed suite."""
+    return about(seal.unseal(out.truth, out.seal))
+
+
+def opened(out: Layout, jobs: int, limit: float | None = None) -> list[Score]:
+    """Score what this pipeline says of a suite; print every table, write ``table.md`` and ``figure.svg``.
+
+    ``limit``: of the oracle's processor time for a batch, s.
 
     Raises
     ------
@@ -35,42 +43,36 @@ def opened(out: Layout, jobs: int) -> list[Figure]:
     FileNotFoundError
         A batch has neither a verdict nor the reason why it failed.
     """
-    scores = scored(out, jobs)
-    truth = seal.unseal(out.truth, out.seal)
-    results = tables(scores, about(truth))
-    printed(results, Console())
-    draw(scores, out.root / "figure.svg")
-    (out.root / "table.md").write_text(markdown(_heading(out, truth), results))
-    return demanded(scores)
-
-
-def about(truth: JSON) -> str:
-    """Return the observable of a suite."""
-    return str(truth.get("observable", DEFAULT))
-
-
-def scored(out: Layout, jobs: int, limit: float | None = None) -> list[Score]:
-    """Score what this pipeline says of a suite; see :func:`opened`.
-
-    ``limit``: of the oracle's processor time for a batch, s.
-    """
     truth = seal.unseal(out.truth, out.seal)
     waiting = [name for name in truth["batches"] if not _finished(out, name)]
     if waiting:
         raise FileNotFoundError(
             f"{len(waiting)} batches were not run, the first is {waiting[0]}: run them first"
         )
-    return _scores(out, truth, jobs, limit, lambda name: _ours(out, name, about(truth)))
+    scores = _scores(out, truth, jobs, limit, lambda name: _ours(out, name, about(truth)))
+    _shown(out, truth, scores, "", _versions(out, truth))
+    return scores
 
 
-def scored_answers(out: Layout, answers: Path, jobs: int, limit: float | None = None) -> list[Score]:
-    """Score what another program says of a suite: one file for each batch; a batch without one has failed.
+def opened_for(
+    program: str, answers: Path, out: Layout, jobs: int, limit: float | None = None
+) -> list[Score]:
+    """Do the same with what another program says: one file for each batch; one without a file has failed.
 
     Where the pipeline has not run on the suite, its problems are posed, to know how large the effects are.
     """
     truth = seal.unseal(out.truth, out.seal)
     pose(out, jobs, limit)
-    return _scores(out, truth, jobs, limit, lambda name: answer(answers, name, about(truth)))
+    scores = _scores(out, truth, jobs, limit, lambda name: answer(answers, name, about(truth)))
+    _shown(out, truth, scores, f"-{program}", f" What {program} says of them.")
+    return scores
+
+
+def _shown(out: Layout, truth: JSON, scores: list[Score], suffix: str, words: str) -> None:
+    results = tables(scores, about(truth))
+    printed(results, Console())
+    draw(scores, out.root / f"figure{suffix}.svg")
+    (out.root / f"table{suffix}.md").write_text(markdown(_heading(out, truth) + words, results))
 
 
 def _scores(
@@ -94,7 +96,7 @@ def _finished(out: Layout, name: str) -> bool:
 
 
 def _ours(out: Layout, name: str, about: str) -> JSON | None:
-    """Return what the pipeline says of a batch, with what its files say beside the verdict; None: it failed."""
+    """Return what the pipeline says of a batch, in its verdict and beside it; None: it failed."""
     run, said = _read(out.reports / name / "run.json"), answer(out.reports / name, "verdict", about)
     if run is None or said is None:
         return None
@@ -112,11 +114,13 @@ def _read(path: Path) -> JSON | None:
 
 
 def _heading(out: Layout, truth: JSON) -> str:
-    marks = [_read(out.reports / name / "run.json") for name in truth["batches"]]
-    codes = {json.dumps(mark["code"], sort_keys=True) for mark in marks if mark}
     words = f"# Proof: {about(truth)}\n\n"
     words += f"{len(truth['batches'])} batches of style {truth['style']}, seed {truth['seed']}; "
-    words += f"sealed as SHA-256 `{out.seal.read_text().strip()}`."
-    return (
-        words if len(codes) < 2 else f"{words} **The batches were run by {len(codes)} versions of the code.**"
-    )
+    return words + f"sealed as SHA-256 `{out.seal.read_text().strip()}`."
+
+
+def _versions(out: Layout, truth: JSON) -> str:
+    """Own up to it where not all batches were run by the same code."""
+    marks = [_read(out.reports / name / "run.json") for name in truth["batches"]]
+    codes = {json.dumps(mark["code"], sort_keys=True) for mark in marks if mark}
+    return "" if len(codes) < 2 else f" **The batches were run by {len(codes)} versions of the code.**"

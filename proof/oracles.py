@@ -43,9 +43,7 @@ def oracles(out: Layout, truths: JSON, jobs: int, about: str, limit: float | Non
     hiding = [name for name, truth in truths.items() if truth["effects"]]
     waiting = [name for name in hiding if _stale(out, name)]
     with ProcessPoolExecutor(jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
-        futures = [
-            pool.submit(_ask, out, name, truths[name]["effects"], about, limit) for name in waiting
-        ]
+        futures = [pool.submit(_ask, out, name, truths[name]["effects"], about, limit) for name in waiting]
         for future in tracked(futures, "asking the oracle"):
             future.result()
     files = {name: _file(out, name) for name in hiding}

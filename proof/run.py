@@ -83,9 +83,16 @@ def run(
 
 def pose(out: Layout, jobs: int, limit: float | None = None) -> None:
     """Pose the problems of every batch that has none: what sizes of effects and baselines are made from."""
-    waiting = [replace(job, limit=limit) for job in _planned(out, STAGES[:2])]
-    waiting = [job for job in waiting if not (job.processed / FILE).is_file()]
+    missing = {name for name in out.batches if not (out.processed / name / FILE).is_file()}
+    planned = _planned(out, STAGES[:2]) if missing else []
+    waiting = [replace(job, limit=limit) for job in planned if job.folder.name in missing]
     _each(_posed, waiting, jobs, "posing problems")
+
+
+def forgotten(out: Layout) -> None:
+    """Remove the problems of all batches, which are large; they can be posed anew."""
+    for name in out.batches:
+        (out.processed / name / FILE).unlink(missing_ok=True)
 
 
 def _each(done: Callable[[Job], str | None], waiting: list[Job], jobs: int, doing: str) -> list[str | None]:
@@ -106,7 +113,15 @@ def _planned(out: Layout, stages: Sequence[str]) -> list[Job]:
     settings = {stage: json.loads(plan.settings(stage)) for stage in stages}
     code = {stage: plan.code(stage) for stage in stages}
     return [
-        Job(out.raw / name, Path(plan.cells), out.processed / name, out.reports / name, settings, code, keep=False)
+        Job(
+            out.raw / name,
+            Path(plan.cells),
+            out.processed / name,
+            out.reports / name,
+            settings,
+            code,
+            keep=False,
+        )
         for name in plan.batches
     ]
 
@@ -159,6 +174,8 @@ def _timed(job: Job, stage: str) -> float:
     function = getattr(import_module(f"metro.stages.{stage}"), stage)
     start = time.perf_counter()
     function(
-        **arguments.get(stage, {"processed": job.processed}), settings=job.settings[stage], code=job.code[stage]
+        **arguments.get(stage, {"processed": job.processed}),
+        settings=job.settings[stage],
+        code=job.code[stage],
     )
     return round(time.perf_counter() - start, 3)

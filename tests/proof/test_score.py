@@ -192,7 +192,9 @@ def test_a_batch_that_the_pipeline_could_not_run_is_right_in_nothing():
 
 def test_what_the_verdict_says_cannot_be_seen_is_read():
     hidden = truth("one", dynamometer_rotation={"angle_deg": 3.0})
-    one = scored(hidden, oracle(dynamometer_rotation=0.1), verdict("clean"), cannot_be_seen=["dynamometer_rotation"])
+    one = scored(
+        hidden, oracle(dynamometer_rotation=0.1), verdict("clean"), cannot_be_seen=["dynamometer_rotation"]
+    )
     assert one.cannot_be_seen == ("dynamometer_rotation",)
     assert not one.seen
 
