@@ -89,10 +89,10 @@ def draw(
     ]
 
 
-def sides(observable: str = DEFAULT) -> tuple[list[str], list[str]]:
+def sides(observable: str = DEFAULT, style: str = "b") -> tuple[list[str], list[str]]:
     """Name what the simulator can hide: effects of the library; others that it lacks or only resembles."""
     inside = {effect.name for effect in library(observable) if not effect.resembled}
-    names = RECIPES[observable].effects
+    names = RECIPES[observable].hides(style)
     known, unknown = ([name for name in names if (name in inside) is asked] for asked in (True, False))
     return known, unknown
 
@@ -108,7 +108,7 @@ def make(out: Layout, suite: Suite, jobs: int) -> str:
         The suite is sealed already, or the folder holds batches of another one.
     """
     _begun(out, suite)
-    drawn = draw(suite.batches, suite.seed, *sides(suite.observable), SHARES[suite.style])
+    drawn = draw(suite.batches, suite.seed, *sides(suite.observable, suite.style), SHARES[suite.style])
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
         missing = [one for one in drawn if not out.made(one.name).is_file()]
