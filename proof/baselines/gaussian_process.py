@@ -89,7 +89,7 @@ class GaussianProcess:
         known = table.loc[learnt.unique()]
         differing = [name for name in SETTINGS if known[name].std(ddof=0) > 0.0]
         scaled = (table[differing] - known[differing].mean()) / known[differing].std(ddof=0)
-        return np.asarray(scaled.loc[runs].to_numpy(float))
+        return np.asarray(scaled.loc[runs.to_list()].to_numpy(float))
 
 
 def _rows(problem: Problem, blocks: Sequence[Block], base: Fit) -> pd.DataFrame:

@@ -54,7 +54,9 @@ def forward(
     ----------
     added : the model with one more effect, fitted. bic : of a fitted model.
     """
-    model, named, candidates = base, {}, {}
+    model = base
+    named: dict[str, float] = {}
+    candidates: dict[str, float] = {}
     while len(named) < MOST:
         left = [effect for effect in effects if effect.name not in named]
         models = [model, *(added(model, effect) for effect in left)]
@@ -144,7 +146,7 @@ def bic_of_labels(model: Hypothesis, tests: int) -> float:
 
     total: Array = model.likelihood.sum(axis=2)
     best = float(np.max(logsumexp(total, axis=1))) - math.log(total.shape[1])
-    return model.theta.shape[1] * math.log(tests) - 2.0 * best
+    return float(model.theta.shape[1] * math.log(tests) - 2.0 * best)
 
 
 def _answer(chosen: Chosen[Model], rows: pd.DataFrame, found: Callable[[str], JSON]) -> JSON:
