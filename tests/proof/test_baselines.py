@@ -208,3 +208,15 @@ def test_the_fit_finds_the_noise_and_what_a_run_shares():
     signal, of_run, noise = process.parts
     assert noise == pytest.approx(0.3, rel=0.1)
     assert np.hypot(signal, of_run) == pytest.approx(0.8, rel=0.3)
+
+
+def test_repeats_that_agree_with_each_other_alone_say_nothing():
+    """Each condition has its own level, of either sign: the others are wrong about it as often as right."""
+    runs, condition = [f"r{i}" for i in range(16)], np.arange(16) // 2
+    level = np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0])[condition]
+    points = Points(np.zeros((16, 1)), np.zeros((16, 0)), np.array(runs), level)
+    alike = agreement(points, runs, condition.tolist())
+    assert alike[0, 1] == 0.0  # repeats
+    assert alike[0, 2] == pytest.approx(-1.0)
+    assert alike.sum() < 0.0
+    assert by_chance(alike, 1) > 0.3
