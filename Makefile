@@ -3,7 +3,7 @@
 export OPENBLAS_NUM_THREADS := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-.PHONY: reports test docs first-page proof-small setup lint lock clean
+.PHONY: reports test docs first-page proof proof-small setup lint lock clean
 
 reports: setup
 	snakemake
@@ -19,6 +19,15 @@ docs: setup
 # The picture on the first page of the documentation: page 1 of a report.
 first-page: reports
 	python scripts/first_page.py reports/kr160-side/report.pdf docs/figures/first-page.png
+
+# Judges the commit that is checked out, by docs/protocol.md; goes on where it was stopped.
+OBSERVABLE := force joint_force deformation waviness flatness lobes
+BATCHES := 150
+proof: setup
+	for observable in $(OBSERVABLE); do \
+	    python -m proof judge --observable $$observable --batches $(BATCHES) \
+	        $(if $(BASELINES),--baselines) || exit 1; \
+	done
 
 # Blind batches, few of them: fails where a demand is missed by more than chance.
 proof-small: setup

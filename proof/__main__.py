@@ -4,26 +4,27 @@
 does ``faces``: what is compared is the faces that are predicted with those that are scanned. ``next`` asks
 for runs where a verdict is undetermined, cuts them, and counts how often they decide; ``joint`` puts all
 observables together against each alone; ``campaign`` follows a tool that wears and a machine that gets warm.
+
+``judge`` makes, runs and opens batches for the commit that is checked out and writes down what came of it;
+``score`` does the last of this for another program, ``baseline`` is three such programs (docs/protocol.md).
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 
+from proof.baselines import BASELINES
 from proof.layout import Layout
-from proof.suite import DEFAULT
+from proof.suite import DEFAULT, FULL, SHARES
 from virtual_cell.blind import RECIPES
-from virtual_cell.recipes.force import STYLES
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line."""
     options = _parser().parse_args(arguments)
-    if options.command == "coverage":
-        _coverage(options)
-    else:
-        _COMMANDS[options.command](Layout(options.out), options)
+    _COMMANDS[options.command](Layout(options.out) if "out" in options else None, options)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -35,7 +36,7 @@ def _parser() -> argparse.ArgumentParser:
     for command in (make, coverage):
         command.add_argument("--batches", type=int, default=200)
         command.add_argument("--seed", type=int, default=1)
-        command.add_argument("--style", choices=STYLES, default="b", help="how it is measured; a: for tuning")
+        command.add_argument("--style", choices=SHARES, default="b", help="how it is measured; a: for tuning")
     run = commands.add_parser("run", help="run the pipeline on the batches; goes on where it was stopped")
     run.add_argument("--keep", action="store_true", help="keep the tables of raw signals")
     run.add_argument("--reports", action="store_true", help="write the PDF reports, too")
@@ -52,18 +53,32 @@ def _parser() -> argparse.ArgumentParser:
     joint.add_argument("--seed", type=int, default=1)
     campaign = commands.add_parser("campaign", help="whether wear and warm-up over batches are followed")
     campaign.add_argument("--seed", type=int, default=1)
-    for command in (make, run, opening, faces, planned, joint, campaign):
+    judge = commands.add_parser("judge", help="judge the commit that is checked out, and log it")
+    judge.add_argument("--observable", choices=RECIPES, required=True, help="what the batches are about")
+    judge.add_argument("--batches", type=int, default=FULL)
+    judge.add_argument("--baselines", action="store_true", help="log what baselines reach, too")
+    judge.add_argument(
+        "--out", dest="root", type=Path, default=Path("build/judged"), help="of all judgements"
+    )
+    baseline = commands.add_parser("baseline", help="let a plain program answer about a suite")
+    baseline.add_argument("name", choices=BASELINES)
+    scoring = commands.add_parser("score", help="compare the answers of another program with the truth")
+    commands.add_parser("board", help="make the page of all judgements anew")
+    for command in (make, run, opening, faces, planned, joint, campaign, baseline, scoring):
         command.add_argument("out", type=Path, help="folder of this proof")
-    for command in (make, coverage, run, opening, planned, joint, campaign):
+    scoring.add_argument("answers", type=Path, help="folder with <batch>.json for each batch")
+    scoring.add_argument("--name", required=True, help="of the program")
+    scoring.add_argument("--log", action="store_true", help="put it on the board (of a judged suite)")
+    for command in (make, coverage, run, opening, planned, joint, campaign, judge, baseline, scoring):
         command.add_argument("--jobs", type=int, default=2, help="worker processes")
     return parser
 
 
 def _make(out: Layout, options: argparse.Namespace) -> None:
-    from proof.suite import make
+    from proof.suite import Suite, make
 
-    about = options.observable
-    digest = make(out, options.batches, options.seed, options.style, options.jobs, observable=about)
+    suite = Suite(options.observable, options.batches, options.seed, options.style)
+    digest = make(out, suite, options.jobs)
     print(f"{options.batches} batches in {out.raw}; what they hide is sealed as SHA-256 {digest}")
 
 
@@ -76,9 +91,11 @@ def _run(out: Layout, options: argparse.Namespace) -> None:
 
 
 def _open(out: Layout, options: argparse.Namespace) -> None:
+    from proof.figures import demanded
     from proof.opening import opened
 
-    missed = [figure.label for figure in opened(out, options.jobs) if figure.missed_for_sure]
+    scores = opened(out, options.jobs)
+    missed = [figure.label for figure in demanded(scores) if figure.missed_for_sure]
     if options.strict and missed:
         raise SystemExit("missed by more than chance: " + "; ".join(missed))
 
@@ -119,7 +136,42 @@ def _campaign(out: Layout, options: argparse.Namespace) -> None:
     printed(tables(followed(out, options.seed, options.jobs)), Console())
 
 
-def _coverage(options: argparse.Namespace) -> None:
+def _judge(_: None, options: argparse.Namespace) -> None:
+    from proof.protocol.judge import LOG, beside, judge
+    from proof.run import forgotten
+
+    out = judge(options.root, options.observable, options.batches, options.jobs)
+    print(f"{out.root} is judged: see {LOG}")
+    if options.baselines:
+        beside(out, BASELINES, options.jobs)
+    forgotten(out)
+
+
+def _baseline(out: Layout, options: argparse.Namespace) -> None:
+    from proof.baselines.run import answered
+
+    answered(options.name, out, options.jobs)
+    print(f"its answers are in {out.answers(options.name)}")
+
+
+def _score(out: Layout, options: argparse.Namespace) -> None:
+    from proof.opening import opened_for
+    from proof.protocol.judge import listed
+
+    scores = opened_for(options.name, options.answers, out, options.jobs)
+    if options.log:
+        listed(out, options.name, scores)
+
+
+def _board(_: None, _options: argparse.Namespace) -> None:
+    from proof.protocol.board import write
+    from proof.protocol.judge import LOG, PAGE
+    from proof.run import CHECKOUT
+
+    write(CHECKOUT / LOG, CHECKOUT / PAGE)
+
+
+def _coverage(_: None, options: argparse.Namespace) -> None:
     from rich.console import Console
 
     from proof.coverage import WAYS, coverage, table
@@ -129,7 +181,7 @@ def _coverage(options: argparse.Namespace) -> None:
     printed([table(intervals, way) for way in WAYS], Console())
 
 
-_COMMANDS = {
+_COMMANDS: dict[str, Callable[..., None]] = {
     "make": _make,
     "run": _run,
     "open": _open,
@@ -137,6 +189,11 @@ _COMMANDS = {
     "next": _next,
     "joint": _joint,
     "campaign": _campaign,
+    "coverage": _coverage,
+    "judge": _judge,
+    "baseline": _baseline,
+    "score": _score,
+    "board": _board,
 }
 
 

@@ -53,7 +53,7 @@ def estimates(effect: str, truth: Mapping[str, Any], estimated: JSON, teeth: int
         one
         for name, value in truth.items()
         if name in estimated and name != "joint" and not isinstance(value, str)
-        if len(_list(value)) == len(_list(estimated[name]))
+        if len(_list(value)) == len(_list(estimated[name])) and all(map(_numeric, _list(estimated[name])))
         for one in _compared(
             effect,
             name,
@@ -63,6 +63,10 @@ def estimates(effect: str, truth: Mapping[str, Any], estimated: JSON, teeth: int
             largest=largest,
         )
     ]
+
+
+def _numeric(entry: Any) -> bool:
+    return isinstance(entry, dict) and isinstance(entry["value"], int | float)
 
 
 def _list(value: Any) -> list[Any]:
@@ -81,7 +85,7 @@ def _compared(
         true = min(turned, key=lambda order: float(np.sum((order - value) ** 2)))
     scale = 1.0 if period is not None else largest or float(np.abs(true).max())
     for right, error, entry in zip(true.tolist(), ((value - true) / scale).tolist(), estimated, strict=True):
-        low, high = entry["ci95"]
+        low, high = entry.get("ci95") or (None, None)
         covered = None if low is None or high is None else bool(low <= right <= high)
         yield Estimate(effect, name, error, covered)
 

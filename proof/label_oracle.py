@@ -30,6 +30,7 @@ from metro.loop.labels.hypotheses import LabelEvidence, hypothesis
 from metro.loop.labels.problem import every_test, tests_of
 from metro.loop.labels.search import LEAST_SPEEDS, LEAST_TESTS, predicted
 from metro.loop.labels.surprise import drawn as labels_drawn
+from metro.observables.labelled import Labelled
 from metro.observables.stability.problem import LabelProblem
 from metro.units import JSON, Array
 
@@ -71,7 +72,7 @@ def label_oracle(
     known = {effect.name: effect for effect in able}
     mine, _ = tests_of(task, "identify")
     held, _ = tests_of(task, "validate")
-    deviations = _deviations(task, SEED)
+    deviations = drawn_deviations(task, SEED)
     base = _boundary_of(task, known, {})
     counts = (len(mine.depth), len(held.depth))
     result: JSON = {"enough": min(counts) >= LEAST_TESTS and len(mine.speeds) >= LEAST_SPEEDS}
@@ -108,7 +109,7 @@ def _learnt(task: LabelProblem, effects: Sequence[Effect], held: Labels, deviati
     return predicted(learnt, held, deviations)
 
 
-def _deviations(task: LabelProblem, seed: int) -> Array:
+def drawn_deviations(task: Labelled, seed: int) -> Array:
     """(s, p) of the log depth: what modes and coefficients are uncertain of, and what all tests share."""
     shared = np.random.default_rng(seed).normal(size=(DEVIATIONS, 1)) * task.model_sd * SHARED**0.5
     return np.asarray(task.deviations(DEVIATIONS, seed) + shared)
@@ -141,7 +142,7 @@ def _drawn(task: LabelProblem, tests: Labels, truth: _Boundary, draws: int) -> l
     rng = np.random.default_rng([SEED, 2])
     heard = bool(np.isfinite(task.chatter_hz).any())
     size = len(tests.depth)
-    deviations = _deviations(task, SEED + 1)
+    deviations = drawn_deviations(task, SEED + 1)
     drawn = []
     for _ in range(draws):
         unstable = labels_drawn(tests, truth.depth + deviations[rng.integers(DEVIATIONS)], rng) > 0.5

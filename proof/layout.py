@@ -32,6 +32,19 @@ class Layout:
         return self.root / "seal.txt"
 
     @property
+    def suite(self) -> Path:
+        """File of what the suite is; it is there as soon as the first batch is being made."""
+        return self.root / "sealed" / "suite.json"
+
+    def made(self, batch: str) -> Path:
+        """File of what one batch hides; it is there once the batch is made."""
+        return self.root / "sealed" / "made" / f"{batch}.json"
+
+    def answers(self, program: str) -> Path:
+        """Folder of what another program says of the batches."""
+        return self.root / "answers" / program
+
+    @property
     def processed(self) -> Path:
         """Folder of the pipeline's tables, by batch."""
         return self.root / "processed"

@@ -43,6 +43,7 @@ class Score:
     stated, rejected : probability of every effect named, or tried and not named, and whether it was there;
         those of effects too small to be seen left out.
     cannot_be_seen : effects that these data cannot reveal, by the verdict.
+    p_value : that is stated for nothing being missing.
     seconds : the stages took.
     """
 
@@ -67,6 +68,7 @@ class Score:
     stated: tuple[Stated, ...] = ()
     rejected: tuple[Stated, ...] = ()
     cannot_be_seen: tuple[str, ...] = ()
+    p_value: float | None = None
     seconds: float | None = None
 
     @property
@@ -152,68 +154,59 @@ class Score:
         return (self.before - self.after) / (self.before - self.oracle)
 
 
-def score(
-    truth: JSON,
-    oracle: JSON | None,
-    verdict: JSON | None,
-    loop: JSON | None,
-    *,
-    teeth: int,
-    seconds: float | None,
-    observable: str = "force",
-) -> Score:
+def score(truth: JSON, oracle: JSON | None, said: JSON | None, *, teeth: int, observable: str) -> Score:
     """Score a batch.
 
     Parameters
     ----------
     truth : of the batch. oracle : what :func:`proof.oracle.oracle` found; None where nothing is hidden.
-    verdict, loop : content of verdict.json and loop.json; None where the pipeline failed.
+    said : what a program says of the observable (:func:`proof.answers.answer`); None where it failed.
     """
     hidden: JSON = truth["effects"]
     oracle = oracle or {"after": None, "floor": None, "sizes": {}}
-    entry = (verdict or {"observables": {}})["observables"].get(observable)
-    if entry is None:
+    if said is None:
         return Score(truth["batch"], truth["kind"], tuple(hidden), oracle["sizes"], FAILED, {})
-    pairs = [[_without_form(name, hidden) for name in group] for group in entry["indistinguishable"]]
+    pairs = [[_without_form(name, hidden) for name in group] for group in said["indistinguishable"]]
     groups = tuple(frozenset(group) for group in pairs)
     effects = [
-        one | {"effect": attributed(one["effect"], one["parameters"], hidden)} for one in entry["effects"]
+        one | {"effect": attributed(one["effect"], one["parameters"], hidden)} for one in said["effects"]
     ]
-    named = {effect["effect"]: effect["probability"] for effect in effects}
-    if not named and entry["status"] == "undetermined":
-        candidates = {c["effect"]: c["probability"] for c in entry["candidates"]}
+    # What is claimed without a probability is claimed for sure.
+    named = {one["effect"]: 1.0 if one["probability"] is None else one["probability"] for one in effects}
+    if not named and said["status"] == "undetermined":
+        candidates = {c["effect"]: c["probability"] for c in said["candidates"]}
         lacking = _lacking(observable)
         firsts = [group[0] for group in pairs if group[0] not in lacking]
         named = {first: candidates.get(first.split(",")[0], 0.0) for first in firsts}
-    unseen = (loop or {"observables": {}})["observables"].get(observable, {}).get("cannot_be_seen", [])
     return Score(
         batch=truth["batch"],
         kind=truth["kind"],
         hidden=tuple(hidden),
         sizes=oracle["sizes"],
-        status=entry["status"],
+        status=said["status"],
         named=named,
-        claimed=bool(entry["effects"]),
+        claimed=bool(said["effects"]),
         groups=groups,
-        unexplained=entry["unexplained"] is not None,
-        advised=bool(entry.get("next_experiment")),
+        unexplained=said["unexplained"] is not None,
+        advised=bool(said["next_experiment"]),
         enough=oracle.get("enough", True),
-        before=_rms(entry["before"]),
-        after=_rms(entry["after"]),
+        before=_rms(said["before"]),
+        after=_rms(said["after"]),
         oracle=oracle["after"],
         at_truth=oracle.get("exact"),
         floor=oracle["floor"],
-        expected=entry["noise_floor"],
+        expected=said["noise_floor"],
         estimates=tuple(
             one
             for effect in effects
             if effect["effect"] in hidden
             for one in estimates(effect["effect"], hidden[effect["effect"]], effect["parameters"], teeth)
         ),
-        stated=_stated(effects, truth["effects"], oracle["sizes"]),
-        rejected=_rejected(entry["candidates"], truth["effects"], oracle["sizes"], observable),
-        cannot_be_seen=tuple(one["effect"] for one in unseen),
-        seconds=seconds,
+        stated=_stated(effects, hidden, oracle["sizes"]),
+        rejected=_rejected(said["candidates"], hidden, oracle["sizes"], observable),
+        cannot_be_seen=tuple(said["cannot_be_seen"]),
+        p_value=said["p_value"],
+        seconds=said["seconds"],
     )
 
 

@@ -104,3 +104,21 @@ def brier(stated: Sequence[tuple[float, bool]]) -> float:
     return (
         float(np.mean([(probability - right) ** 2 for probability, right in stated])) if stated else math.nan
     )
+
+
+def calibration_error(stated: Sequence[tuple[float, bool]]) -> float:
+    """Return the expected calibration error: the mean distance of stated from came true, over the bins.
+
+    Naeini, Cooper and Hauskrecht, AAAI 2015, 2901. Few cases have a distance by chance.
+    """
+    bins = binned(stated)
+    apart = sum(one.count * abs(one.stated - one.came_true.value) for one in bins)
+    return apart / len(stated) if stated else math.nan
+
+
+def uniform(p_values: Sequence[float]) -> tuple[float, float]:
+    """Kolmogorov-Smirnov distance of p-values from the uniform distribution, and its own p-value."""
+    from scipy.stats import kstest
+
+    found = kstest(p_values, "uniform")
+    return float(found.statistic), float(found.pvalue)

@@ -73,13 +73,14 @@ NOTES = {"force": _FORCE, "flatness": _FORCE, "lobes": _LOBES, **dict.fromkeys(S
 def tabulated(title: str, figures: Iterable[Figure], note: str) -> Table:
     """Return figures as a table, each with its interval and what is demanded of it."""
     rows = [
-        (f.label, _number(f.value, f.unit), _interval(f), str(f.count), _demand(f.demand, f.unit), _met(f))
+        (f.label, number(f.value, f.unit), _interval(f), str(f.count), _demand(f.demand, f.unit), _met(f))
         for f in figures
     ]
     return Table(title, ("figure", "value", "95 % interval", "cases", "demanded", "met"), rows, note)
 
 
-def _number(value: float, unit: str) -> str:
+def number(value: float, unit: str) -> str:
+    """Return a figure as it is printed: a share in per cent, anything else with its unit."""
     if not np.isfinite(value):
         return "–"
     return f"{100 * value:.1f} %" if unit == "%" else f"{value:.3g} {unit}".strip()
@@ -88,14 +89,14 @@ def _number(value: float, unit: str) -> str:
 def _interval(figure: Figure) -> str:
     if not figure.count or not np.isfinite(figure.low) or figure.low == figure.high:
         return "–"
-    return f"{_number(figure.low, figure.unit)} to {_number(figure.high, figure.unit)}"
+    return f"{number(figure.low, figure.unit)} to {number(figure.high, figure.unit)}"
 
 
 def _demand(demand: Demand | None, unit: str) -> str:
     if demand is None:
         return ""
     bounds = [("≥", demand.least), ("≤", demand.most)]
-    return ", ".join(f"{sign} {_number(bound, unit)}" for sign, bound in bounds if bound is not None)
+    return ", ".join(f"{sign} {number(bound, unit)}" for sign, bound in bounds if bound is not None)
 
 
 def _met(figure: Figure) -> str:
@@ -199,7 +200,7 @@ def _estimates(scores: Sequence[Score]) -> Table:
         covered = share("", [one.covered for one in group if one.covered is not None])
         error = float(np.median([abs(one.error) for one in group]))
         words = f"{error:.2g}°" if key in ANGLES else f"{100 * error:.2g} %"
-        rows.append((*key, str(len(group)), words, _number(covered.value, "%"), _interval(covered)))
+        rows.append((*key, str(len(group)), words, number(covered.value, "%"), _interval(covered)))
     header = (
         "effect",
         "parameter",

@@ -10,6 +10,9 @@ PATH=":$PATH:" && PATH="${PATH//:"$PWD"\/.venv\/bin:/:}" && PATH="${PATH#:}" && 
 say() { printf 'setup: %s\n' "$*" >&2; }
 fail() { say "$*"; exit 1; }
 
+# Through a link the environment of another checkout would be emptied, while others may work in it.
+[ ! -L .venv ] || fail ".venv is a link to $(readlink .venv): set it up in the checkout that it belongs to"
+
 # --- Python ---------------------------------------------------------------------------------------------------------
 python=${PYTHON:-$(command -v python3.11 || command -v python3 || true)}
 [ -n "$python" ] || fail "Python 3.11 or newer is needed and not found (Debian: apt-get install python3 python3-venv)"

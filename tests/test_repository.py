@@ -248,7 +248,24 @@ def test_the_bundled_batches_are_small():
     assert size <= 20e6
 
 
-@pytest.mark.skipif(not (ROOT / ".venv/made-from").exists(), reason="the environment is not that of set-up")
+def test_set_up_leaves_an_environment_alone_that_is_only_linked(tmp_path):
+    """It belongs to another checkout: to make it anew would empty it under whoever works there."""
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs/package.py").write_text("")
+    (tmp_path / "ours/scripts").mkdir(parents=True)
+    (tmp_path / "ours/.venv").symlink_to(tmp_path / "theirs")
+    script = tmp_path / "ours/scripts/setup.sh"
+    script.write_text((ROOT / "scripts/setup.sh").read_text())
+    done = subprocess.run(["bash", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "the checkout that it belongs to" in done.stderr
+    assert (tmp_path / "theirs/package.py").exists()
+
+
+@pytest.mark.skipif(
+    not (ROOT / ".venv/made-from").exists() or (ROOT / ".venv").is_symlink(),
+    reason="the environment is not that of set-up",
+)
 def test_set_up_finds_everything_in_place_with_its_environment_active():
     path = f"{ROOT / '.venv/bin'}:{os.environ['PATH']}"
     done = subprocess.run(

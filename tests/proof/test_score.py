@@ -4,6 +4,7 @@ import pytest
 
 from metro.loop.labels.search import NOTHING
 from metro.loop.labels.unknown import UNKNOWN
+from proof.answers import complete
 from proof.figures import over_floor, over_stated
 from proof.score import FAILED, score
 
@@ -30,8 +31,9 @@ def verdict(status, *named, candidates=(), groups=(), rest=None, after=2.5, obse
     return {"observables": {observable: entry}}
 
 
-def scored(hidden, asked, found, told=None, observable="force"):
-    return score(hidden, asked, found, told, teeth=3, seconds=1.0, observable=observable)
+def scored(hidden, asked, found, observable="force", **told):
+    said = None if found is None else complete({**found["observables"][observable], **told})
+    return score(hidden, asked, said, teeth=3, observable=observable)
 
 
 RUNOUT = truth("one", tool_runout={"radius_um": 5.0})
@@ -189,9 +191,10 @@ def test_a_batch_that_the_pipeline_could_not_run_is_right_in_nothing():
 
 
 def test_what_the_verdict_says_cannot_be_seen_is_read():
-    told = {"observables": {"force": {"cannot_be_seen": [{"effect": "dynamometer_rotation", "why": ""}]}}}
     hidden = truth("one", dynamometer_rotation={"angle_deg": 3.0})
-    one = scored(hidden, oracle(dynamometer_rotation=0.1), verdict("clean"), told)
+    one = scored(
+        hidden, oracle(dynamometer_rotation=0.1), verdict("clean"), cannot_be_seen=["dynamometer_rotation"]
+    )
     assert one.cannot_be_seen == ("dynamometer_rotation",)
     assert not one.seen
 
@@ -261,9 +264,7 @@ def test_another_cause_is_no_name_that_could_be_wrong():
         "unexplained": {"rms": 0.5},
     }
     truth = {"batch": "b", "kind": "outside", "effects": {"tool_runout": {"radius_um": 9.0}}}
-    found = score(
-        truth, None, {"observables": {"lobes": entry}}, None, teeth=2, seconds=None, observable="lobes"
-    )
+    found = score(truth, None, complete(entry), teeth=2, observable="lobes")
     assert found.named == {}
     assert found.admitted
     assert not found.surely_wrong

@@ -135,12 +135,15 @@ class Loop:
         self.state.stories[observable] = story
 
 
-def loop(processed: Path, reports: Path, settings: JSON, code: str) -> None:
+def loop(
+    processed: Path, reports: Path, settings: JSON, code: str, only: Collection[str] | None = None
+) -> None:
     """Write ``comparison``, ``lobes_final``, ``findings.json``, and the ``identified.json`` of the reports.
 
     ``settings``: ``model_form_budget``, ``materiality``, ``false_additions``, ``held_out_gain``, ``seed``.
+    ``only``: the observables to be closed; None: all.
     """
-    state = closed(processed, Gates(**settings))
+    state = closed(processed, Gates(**settings), only)
     _write(state, reports)
     write_made(processed, "loop", settings, code)
 
