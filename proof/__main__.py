@@ -13,7 +13,7 @@ from pathlib import Path
 
 from proof.layout import Layout
 from proof.suite import DEFAULT
-from virtual_cell.blind import RECIPES
+from virtual_cell.blind import HARDER_STYLES, RECIPES
 from virtual_cell.recipes.force import STYLES
 
 
@@ -35,7 +35,12 @@ def _parser() -> argparse.ArgumentParser:
     for command in (make, coverage):
         command.add_argument("--batches", type=int, default=200)
         command.add_argument("--seed", type=int, default=1)
-        command.add_argument("--style", choices=STYLES, default="b", help="how it is measured; a: for tuning")
+        command.add_argument(
+            "--style",
+            choices=(*STYLES, *HARDER_STYLES),
+            default="b",
+            help="how it is measured; a: for tuning",
+        )
     run = commands.add_parser("run", help="run the pipeline on the batches; goes on where it was stopped")
     run.add_argument("--keep", action="store_true", help="keep the tables of raw signals")
     run.add_argument("--reports", action="store_true", help="write the PDF reports, too")

@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
 from virtual_cell.face_effects import FACE_EFFECTS
 from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Hidden, Parameters
-from virtual_cell.recipes import arm, boundary, faces, force
+from virtual_cell.recipes import arm, boundary, faces, force, force_world
 from virtual_cell.write import Row
+
+HARDER_STYLES = ("c", "d")  # for tuning and for judging
 
 
 @dataclass(frozen=True)
 class Recipe:
     """``make(folder, hidden, seed, style)`` a batch that hides some of the ``effects``; return the truth.
 
-    ``effects``: their parameters by their names, as :class:`virtual_cell.hidden.Hidden` has them.
+    ``effects``: their parameters by their names, as :class:`virtual_cell.hidden.Hidden` has them; ``harder``:
+    those of the styles of the harder world, where these are others.
     """
 
     make: Callable[[Path, Mapping[str, Parameters | None], int, str], Row]
     effects: Mapping[str, str]
+    harder: Mapping[str, str] = field(default_factory=dict)
+
+    def hides(self, style: str) -> Mapping[str, str]:
+        """Return the effects that a batch of a style can hide, with their parameters."""
+        return self.harder if self.harder and style in HARDER_STYLES else self.effects
 
 
 def _named(effects: Mapping[str, Hidden[Any]], names: Iterable[str] = ()) -> dict[str, str]:
@@ -31,7 +39,7 @@ def _named(effects: Mapping[str, Hidden[Any]], names: Iterable[str] = ()) -> dic
 
 
 RECIPES = {
-    "force": Recipe(force.make, _named(EFFECTS)),
+    "force": Recipe(force.make, _named(EFFECTS), _named(force_world.HARDER)),
     **{observable: Recipe(arm.make, _named(ARM_EFFECTS, names)) for observable, names in SHOWN.items()},
     "flatness": Recipe(faces.make, _named(FACE_EFFECTS)),
     "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS)),
