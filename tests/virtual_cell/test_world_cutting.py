@@ -24,13 +24,15 @@ METAL = Metal(np.array([850e6, 330e6, 190e6]), np.array([15e3, 18e3, 5e3]), (90e
 OMEGA, FEED, DEPTH = 500.0, 0.02, 1.5e-3
 
 
-def passed(tool=TOOL, metal=METAL, side="slot", edge=0.0, start=0.03, spindle=None, until=0.2, depth=DEPTH):
-    programmed = Straight(FEED, start, side=side, edge=edge)
+def passed(programmed=None, *, tool=TOOL, metal=METAL, spindle=None, until=0.2):
+    programmed = programmed or Straight(FEED, 0.03)
     turned = turning(spindle or Spindle(), OMEGA, until, (0.0, 9.0), rng=np.random.default_rng(0))
     motion = travelled(programmed, until, ramp_s=1e-9)
-    engagement = TrueEngagement(tool, motion, OMEGA, 0.0, depth, turning=turned, bounds=tool.bounds(depth))
+    engagement = TrueEngagement(tool, motion, OMEGA, 0.0, DEPTH, turning=turned, bounds=tool.bounds(DEPTH))
     fresh = np.ones(3), np.ones(3), np.ones(2)
-    return Pass(engagement, metal, *fresh, wear=np.zeros(3), changes=(), depth=lambda t, x: depth + 0.0 * t)
+    return Pass(
+        engagement, metal, *fresh, wear=np.zeros(3), changes=(), depth=lambda t, x: np.full_like(t + x, DEPTH)
+    )
 
 
 def times(until=0.2, rate=20000.0):
@@ -39,10 +41,11 @@ def times(until=0.2, rate=20000.0):
 
 @pytest.mark.parametrize(("side", "edge"), [("slot", 0.0), ("down", 2e-3), ("up", 2e-3)])
 def test_without_faults_the_force_is_that_of_the_idealised_cell(side, edge):
-    one, t = passed(side=side, edge=edge, start=-6.5e-3, until=0.7), times(0.7)
+    programmed = Straight(FEED, -6.5e-3, side=side, edge=edge)
+    one, t = passed(programmed, until=0.7), times(0.7)
     force = edge_force(one, t)
     tool = Tool(TOOL.radius, TOOL.helix, ANGLES)
-    ideal = Engagement(tool, Straight(FEED, -6.5e-3, side=side, edge=edge), OMEGA, one.engagement.angle(t)[0], DEPTH)
+    ideal = Engagement(tool, programmed, OMEGA, float(one.engagement.angle(t)[0]), DEPTH)
     law = Coefficients(850e6, 330e6, 190e6, 15e3, 18e3, 5e3)
     expected = forces(Cut(ideal, law), t)
     scale = np.abs(expected).max()
@@ -65,15 +68,25 @@ def test_a_spindle_that_is_slower_cuts_thicker_chips():
 
 
 def test_a_ball_is_pressed_upwards_by_what_presses_a_flat_end_inwards():
-    """Means of a slot in closed form: the chip's area is the same, its normal leans by the ball's slope."""
-    ball, chip = replace(TOOL, corner=6e-3), FEED * 2.0 * math.pi / OMEGA / 3.0
+    """Means of a slot in closed form, of chips that are thin against every radius of the ball.
+
+    Their area is that of a flat end's, their normal leans by the ball's slope.
+    """
+    slow = 0.1 * FEED
+    ball, chip = replace(TOOL, corner=6e-3), slow * 2.0 * math.pi / OMEGA / 3.0
     turn = 2.0 * math.pi / OMEGA
     t = np.arange(4000) * (turn / 4000)
     law = Metal(np.array([850e6, 330e6, 0.0]), np.zeros(3), (0.0, 0.0))
-    force = edge_force(passed(tool=ball, metal=law), t).mean(axis=0)
+    force = edge_force(passed(Straight(slow, 0.03), tool=ball, metal=law), t).mean(axis=0)
     z = (np.arange(4000) + 0.5) * (DEPTH / 4000)
-    upright, leaning = (part.mean() * DEPTH for part in (np.sqrt(1.0 - (1.0 - z / 6e-3) ** 2), 1.0 - z / 6e-3))
-    expected = [-3 * chip * 330e6 * upright / 4.0, 3 * chip * 850e6 * DEPTH / 4.0, 3 * chip * 330e6 * leaning / math.pi]
+    upright, leaning = (
+        part.mean() * DEPTH for part in (np.sqrt(1.0 - (1.0 - z / 6e-3) ** 2), 1.0 - z / 6e-3)
+    )
+    expected = [
+        -3 * chip * 330e6 * upright / 4.0,
+        3 * chip * 850e6 * DEPTH / 4.0,
+        3 * chip * 330e6 * leaning / math.pi,
+    ]
     np.testing.assert_allclose(force, expected, rtol=0.03)
 
 
@@ -100,7 +113,7 @@ def test_a_soft_holder_evens_out_an_eccentric_tool():
     """A short tooth leaves more to the next one; a tool that gives way shares it out."""
     eccentric = replace(TOOL, runout=15e-6, runout_angle=0.4)
     one, t = passed(tool=eccentric), times()
-    soft = Holder((4e6, 4e6), (5000.0, 5500.0), (0.3, 0.3), 0.0)
+    soft = Holder((2e6, 2e6), (5000.0, 5500.0), (0.5, 0.5), 0.0)
     turn = round(2.0 * math.pi / OMEGA * 20000.0)
     late = slice(-8 * turn, None)
 
@@ -109,5 +122,5 @@ def test_a_soft_holder_evens_out_an_eccentric_tool():
         return abs(np.mean(force[late, 1] * np.exp(1j * angle)))
 
     rigid, given = edge_force(one, t), swinging_force(one, t, soft, 0.0)
-    assert 0.2 < once_per_turn(given) / once_per_turn(rigid) < 0.85
+    assert 0.3 < once_per_turn(given) / once_per_turn(rigid) < 0.8
     np.testing.assert_allclose(given[late].mean(axis=0), rigid[late].mean(axis=0), rtol=0.03)

@@ -6,12 +6,14 @@ the truth states what the result comes to in the contract's terms.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from virtual_cell.hidden import Hidden, Parameters, drawn_angle, drawn_signed, drawn_size
+from virtual_cell.session import Plan
 from virtual_cell.units import DEG, MM, N_UM, UM
 from virtual_cell.world.cutter import drawn_wear, set_off, spread, uneven_pitch
 from virtual_cell.world.force_terms import orbit_waves
@@ -19,8 +21,6 @@ from virtual_cell.world.making import Making
 from virtual_cell.world.metal import length_for
 from virtual_cell.world.table import loaded
 from virtual_cell.world.yielding import Holder
-
-TRIAL = 40.0 * UM  # sway with which the wave that it makes is measured first
 
 
 def _runout(m: Making, p: Parameters) -> Making:
@@ -56,22 +56,43 @@ def _deflection(m: Making, p: Parameters) -> Making:
     frequency = (base, base * float(m.rng.uniform(1.05, 1.3)))
     # A cut of depth a stays stable where 2 ζ k > K_t a for all that the lobes may do.
     heavy = float(m.cell.metal.shear[0]) * m.cell.depth
-    damping = [float(np.clip(0.7 * heavy / k, 0.08, 0.6)) for k in stiffness]
+    damping = [max(0.7 * heavy / k, 0.08) for k in stiffness]
     skew = float(m.rng.uniform(-8.0, 8.0)) * DEG
     return m.with_(holder=Holder(stiffness, frequency, (damping[0], damping[1]), skew))
 
 
+def _helical(m: Making) -> Plan:
+    return next(plan for plan in m.plans if plan.operation == "helical")
+
+
+def _most(m: Making) -> tuple[float, float]:
+    """Return the largest sway, m, with which the tool stays on the floor, and the wave that it makes."""
+    sway = 0.9 * _helical(m).axial_depth_mm * MM / (2.0 * math.pi)
+    return sway, abs(orbit_waves(replace(m.cell, sway=sway), _helical(m))[0])
+
+
+def _orbit_drawn(rng: np.random.Generator, m: Making) -> Parameters:
+    _, most = _most(m)
+    return {"amplitude": drawn_size(rng, 0.35 * most, most), "phase_deg": drawn_angle(rng)}
+
+
 def _orbit(m: Making, p: Parameters) -> Making:
-    """Let the machine sway as it circles, as much as makes such a wave of the axial force."""
-    helical = next(plan for plan in m.plans if plan.operation == "helical")
-    sway = TRIAL
-    cell = replace(m.cell, sway=sway, sway_phase=0.0)
-    for _ in range(2):
-        wave, _ = orbit_waves(cell, helical)
-        sway *= p["amplitude"] / abs(wave)
-        phase = cell.sway_phase + p["phase_deg"] * DEG - float(np.angle(wave))
-        cell = replace(cell, sway=sway, sway_phase=phase)
-    return replace(m, cell=cell)
+    """Let the machine sway as it circles, as much as makes such a wave of the axial force.
+
+    Raises
+    ------
+    ValueError
+        The tool would lift off the floor.
+    """
+    sway, most = _most(m)
+    if p["amplitude"] > 1.01 * most:
+        raise ValueError(
+            f"a machine that sways so much that F_z varies by {p['amplitude']:g} leaves the floor"
+        )
+    sway *= p["amplitude"] / most
+    wave, _ = orbit_waves(replace(m.cell, sway=sway), _helical(m))
+    phase = p["phase_deg"] * DEG - float(np.angle(wave))
+    return m.with_(sway=sway * p["amplitude"] / abs(wave), sway_phase=phase)
 
 
 def _rotation(m: Making, p: Parameters) -> Making:
@@ -121,23 +142,23 @@ def _end_drawn(rng: np.random.Generator, m: Making) -> Parameters:
 INSIDE: Mapping[str, Hidden[Making]] = {
     "tool_runout": Hidden(
         "radius_um angle_deg",
-        lambda r, _: {"radius_um": drawn_size(r, 4.0, 40.0), "angle_deg": drawn_angle(r)},
+        lambda r, _: {"radius_um": drawn_size(r, 2.0, 14.0), "angle_deg": drawn_angle(r)},
         _runout,
     ),
     "tool_wear": Hidden(
         "edge_growth_per_m",
-        lambda r, m: {"edge_growth_per_m": drawn_size(r, 0.15, 1.5) / m.cell.metres},
+        lambda r, m: {"edge_growth_per_m": drawn_size(r, 0.2, 2.5) / m.cell.metres},
         _wear,
     ),
-    "chip_size_effect": Hidden("exponent", lambda r, _: {"exponent": drawn_size(r, 0.1, 0.4)}, _size),
+    "chip_size_effect": Hidden("exponent", lambda r, _: {"exponent": drawn_size(r, 0.12, 0.45)}, _size),
     "tool_deflection": Hidden(
         "kx_n_um ky_n_um",
-        lambda r, _: {"kx_n_um": drawn_size(r, 1.5, 9.0), "ky_n_um": drawn_size(r, 1.5, 9.0)},
+        lambda r, _: {"kx_n_um": drawn_size(r, 1.5, 10.0), "ky_n_um": drawn_size(r, 1.5, 10.0)},
         _deflection,
     ),
     "orbit_stiffness": Hidden(
         "amplitude phase_deg",
-        lambda r, _: {"amplitude": drawn_size(r, 0.05, 0.3), "phase_deg": drawn_angle(r)},
+        _orbit_drawn,
         _orbit,
     ),
     "pitch_error": Hidden("pitch_deg[]", _pitch_drawn, _pitch),
