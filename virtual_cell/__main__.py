@@ -25,7 +25,7 @@ def main(arguments: list[str] | None = None) -> None:
         bundled(options.root)
         return
     if options.command == "effects":
-        print(json.dumps({name: {**recipe.effects, **recipe.harder} for name, recipe in KINDS.items()}))
+        print(json.dumps({name: dict(recipe.effects) for name, recipe in KINDS.items()}))
         return
     recipe = KINDS[options.command]
     hidden = dict(_effect(words, recipe.hides(options.style)) for words in options.effect)

@@ -19,7 +19,7 @@ from virtual_cell.world.spindle import Spindle, turning
 from virtual_cell.world.table import single_modes
 from virtual_cell.world.travel import Circling
 
-LONG = 120.0  # s: a time constant of the discharge below it is hidden on purpose
+LONG = 150.0  # s: a time constant of the discharge below the shortest that is always on is hidden
 _PER_TURN = 48  # of the force on a helical path, to find its wave over an orbit
 
 
