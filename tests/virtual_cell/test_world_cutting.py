@@ -16,7 +16,7 @@ from virtual_cell.world.cutting import Pass, TrueEngagement, edge_force
 from virtual_cell.world.metal import Metal
 from virtual_cell.world.spindle import Spindle, turning
 from virtual_cell.world.travel import Circling, travelled
-from virtual_cell.world.yielding import Holder, swinging_force
+from virtual_cell.world.yielding import Holder, march, propagator, swinging_force
 
 ANGLES = np.arange(3) * (2.0 * math.pi / 3.0)
 TOOL = RealTool(6e-3, math.radians(35.0), ANGLES)
@@ -100,6 +100,24 @@ def test_a_helical_path_removes_the_volume_of_its_hole():
     swept = radius * (height * np.sin(phi))[ahead].sum() * (2.0 * math.pi / 20000) * 2.0 * math.pi * orbit
     expected = math.pi * pitch * ((radius + orbit) ** 2 - radius**2)
     assert swept == pytest.approx(expected, rel=0.02)
+
+
+def test_a_holder_under_a_force_that_depends_on_its_place_rests_and_swings_in_closed_form():
+    """Force f + s·x on springs K: it rests at (K − s)⁻¹ f, and each mode swings at its damped frequency."""
+    holder, dt = Holder((3e6, 8e6), (900.0, 1300.0), (0.05, 0.08), 0.4), 1.0 / 20000.0
+    rows, steps = holder.directions(0.0), [propagator(holder, mode, dt) for mode in (0, 1)]
+    slope = np.array([[-4e5, 2e5], [1e5, -6e5]])
+    force, nothing = np.array([100.0, -60.0]), np.zeros((2, 4000))
+    push, bend = np.tile(force[:, None], 4000), np.tile(slope[:, :, None], 4000)
+    moved, _ = march(push, bend, nothing, [0.0] * 4, rows=rows, steps=steps)
+    stiffness = np.linalg.inv(holder.compliance)
+    np.testing.assert_allclose(moved[:, -1], np.linalg.solve(stiffness - slope, force), rtol=1e-6)
+    free, _ = march(nothing, 0.0 * bend, nothing, [1e-6, 0.0, 0.0, 0.0], rows=rows, steps=steps)
+    t = np.arange(4000) * dt
+    omega = 2.0 * math.pi * 900.0
+    damped = omega * math.sqrt(1.0 - 0.05**2)
+    swing = np.exp(-0.05 * omega * t) * (np.cos(damped * t) + 0.05 * omega / damped * np.sin(damped * t))
+    np.testing.assert_allclose(rows[0] @ free, 1e-6 * swing, atol=1e-12)
 
 
 def test_a_stiff_holder_changes_nothing():

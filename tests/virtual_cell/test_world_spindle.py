@@ -38,6 +38,7 @@ def test_wander_has_its_deviation_and_forgets_in_its_time():
         ends.append(np.interp([0.0, 0.5], t, off))
     first, later = np.array(ends).T
     assert np.std(first) == pytest.approx(0.002, rel=0.15)
+    assert np.std(later) == pytest.approx(0.002, rel=0.15)
     assert np.mean(first * later) / 0.002**2 == pytest.approx(np.exp(-1.0), abs=0.2)
 
 

@@ -48,7 +48,7 @@ def swinging_force(one: Pass, t: Array, holder: Holder, turn: float) -> Array:
     """Return the force of the edges (n, 3), N, at even times ``t``; the tool starts at rest, undeflected."""
     engagement = one.engagement
     dt = float(t[-1] - t[0]) / (len(t) - 1)
-    rows, steps = holder.directions(turn), [_propagator(holder, mode, dt) for mode in (0, 1)]
+    rows, steps = holder.directions(turn), [propagator(holder, mode, dt) for mode in (0, 1)]
     shortest = float(lags(engagement.tool, engagement.slices).min()) / engagement.spindle
     turnaround = 2.0 * math.pi / engagement.spindle
     block = max(1, math.floor(0.9 * shortest / dt))
@@ -64,7 +64,7 @@ def swinging_force(one: Pass, t: Array, holder: Holder, turn: float) -> Array:
         guess = np.stack([np.interp(t[here] - turnaround, t, along) for along in moved])
         cut, count = traced(one, t[here], past, guess), guess.shape[1]
         push, slope = _linear(one, cut, count)
-        moved[:, here], state = _march(push, slope, guess, state, rows=rows, steps=steps)
+        moved[:, here], state = march(push, slope, guess, state, rows=rows, steps=steps)
         thickness = cut.chips.thickness + _towards(cut, moved[:, here] - guess)
         force[here] = summed(cut, on_points(one, cut, thickness), count).T
     return force
@@ -85,7 +85,7 @@ def _linear(one: Pass, cut: Traced, count: int) -> tuple[Array, Array]:
     return summed(cut, parts, count), np.stack(slope, axis=1)
 
 
-def _march(
+def march(
     push: Array,
     slope: Array,
     about: Array,
@@ -123,7 +123,7 @@ def _march(
     return rows.T @ np.array(out).T, [x, u, y, v]
 
 
-def _propagator(holder: Holder, mode: int, dt: float) -> tuple[float, ...]:
+def propagator(holder: Holder, mode: int, dt: float) -> tuple[float, ...]:
     """Exact step of (position, velocity) over ``dt``, by rows, and effect (2,) of a force held over it."""
     from scipy.linalg import expm
 
