@@ -169,13 +169,14 @@ def on_a_ramp(one: Pass, motion: Circling, t: Array, force: Array) -> Array:
     up = force[:, 2] * np.cos(lean) - along * np.sin(lean)
     shift = forward - along
     x, y = force[:, 0] + shift * np.cos(psi), force[:, 1] + shift * np.sin(psi)
-    per_tooth = drop * 2.0 * math.pi / (one.engagement.spindle * tool.teeth)
+    per_tooth = motion.cut_below(t) * 2.0 * math.pi / (one.engagement.spindle * tool.teeth)
+    down = per_tooth > 0.0
     axial = np.broadcast_to(np.asarray(tool.axial, dtype=float), (tool.teeth,))
     ahead = np.roll(axial, -1)  # tooth j + 1 cuts before tooth j
     cutting, rubbing = one.metal.bottom[0] * one.bottom[0], one.metal.bottom[1] * one.bottom[1]
     turned = one.engagement.angle(t)
     for tooth in range(tool.teeth):
-        taken = np.maximum(per_tooth + axial[tooth] - ahead[tooth], 0.0)
+        taken = np.maximum(per_tooth + axial[tooth] - ahead[tooth], 0.0) * down
         pressed = tool.radius * (cutting * taken + rubbing * (taken > 0.0))
         dragged = one.metal.bottom_drag * pressed
         phi = turned + tool.angles[tooth]

@@ -6,7 +6,6 @@ the truth states what the result comes to in the contract's terms.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -22,6 +21,8 @@ from virtual_cell.world.metal import length_for
 from virtual_cell.world.table import loaded
 from virtual_cell.world.yielding import Holder
 
+HALVINGS = 9  # in the search of a sway: to 0.2 % of half the pitch
+
 
 def _runout(m: Making, p: Parameters) -> Making:
     radius, angle = p["radius_um"] * UM, p["angle_deg"] * DEG
@@ -29,7 +30,7 @@ def _runout(m: Making, p: Parameters) -> Making:
 
 
 def _pitch_drawn(rng: np.random.Generator, m: Making) -> Parameters:
-    off = spread(m.cell.tool.teeth, rng) * drawn_size(rng, 0.6, 5.0)
+    off = spread(m.cell.tool.teeth, rng) * drawn_size(rng, 0.8, 5.0)
     return {"pitch_deg": [round(float(e), 3) for e in off]}
 
 
@@ -65,34 +66,24 @@ def _helical(m: Making) -> Plan:
     return next(plan for plan in m.plans if plan.operation == "helical")
 
 
-def _most(m: Making) -> tuple[float, float]:
-    """Return the largest sway, m, with which the tool stays on the floor, and the wave that it makes."""
-    sway = 0.9 * _helical(m).axial_depth_mm * MM / (2.0 * math.pi)
-    return sway, abs(orbit_waves(replace(m.cell, sway=sway), _helical(m))[0])
-
-
-def _orbit_drawn(rng: np.random.Generator, m: Making) -> Parameters:
-    _, most = _most(m)
-    return {"amplitude": drawn_size(rng, 0.35 * most, most), "phase_deg": drawn_angle(rng)}
-
-
 def _orbit(m: Making, p: Parameters) -> Making:
     """Let the machine sway as it circles, as much as makes such a wave of the axial force.
+
+    With a sway of about the pitch over 2π, the bottom begins to leave the floor once per orbit.
 
     Raises
     ------
     ValueError
-        The tool would lift off the floor.
+        No sway makes so large a wave.
     """
-    sway, most = _most(m)
-    if p["amplitude"] > 1.01 * most:
-        raise ValueError(
-            f"a machine that sways so much that F_z varies by {p['amplitude']:g} leaves the floor"
-        )
-    sway *= p["amplitude"] / most
-    wave, _ = orbit_waves(replace(m.cell, sway=sway), _helical(m))
-    phase = p["phase_deg"] * DEG - float(np.angle(wave))
-    return m.with_(sway=sway * p["amplitude"] / abs(wave), sway_phase=phase)
+    low, high = 0.0, 0.5 * _helical(m).axial_depth_mm * MM
+    for _ in range(HALVINGS):
+        sway = 0.5 * (low + high)
+        wave, _ = orbit_waves(replace(m.cell, sway=sway), _helical(m))
+        low, high = (sway, high) if abs(wave) < p["amplitude"] else (low, sway)
+    if abs(wave) < 0.8 * p["amplitude"]:
+        raise ValueError(f"no sway makes the axial force vary by {p['amplitude']:g} of its mean")
+    return m.with_(sway=sway, sway_phase=p["phase_deg"] * DEG - float(np.angle(wave)))
 
 
 def _rotation(m: Making, p: Parameters) -> Making:
@@ -118,7 +109,7 @@ def _resonance(m: Making, p: Parameters) -> Making:
 def _drift_drawn(rng: np.random.Generator, _: Making) -> Parameters:
     if rng.uniform() < 0.5:
         return {"time_constant_s": [drawn_size(rng, 3.0, 30.0) for _ in range(3)]}
-    return {"slope_n_s": [drawn_signed(rng, 3.0, 40.0) for _ in range(3)]}
+    return {"slope_n_s": [drawn_signed(rng, 1.5, 15.0) for _ in range(3)]}
 
 
 def _drift(m: Making, p: Parameters) -> Making:
@@ -150,15 +141,15 @@ INSIDE: Mapping[str, Hidden[Making]] = {
         lambda r, m: {"edge_growth_per_m": drawn_size(r, 0.2, 2.5) / m.cell.metres},
         _wear,
     ),
-    "chip_size_effect": Hidden("exponent", lambda r, _: {"exponent": drawn_size(r, 0.12, 0.45)}, _size),
+    "chip_size_effect": Hidden("exponent", lambda r, _: {"exponent": drawn_size(r, 0.18, 0.42)}, _size),
     "tool_deflection": Hidden(
         "kx_n_um ky_n_um",
-        lambda r, _: {"kx_n_um": drawn_size(r, 1.5, 10.0), "ky_n_um": drawn_size(r, 1.5, 10.0)},
+        lambda r, _: {"kx_n_um": drawn_size(r, 0.9, 5.0), "ky_n_um": drawn_size(r, 0.9, 5.0)},
         _deflection,
     ),
     "orbit_stiffness": Hidden(
         "amplitude phase_deg",
-        _orbit_drawn,
+        lambda r, _: {"amplitude": drawn_size(r, 0.05, 0.35), "phase_deg": drawn_angle(r)},
         _orbit,
     ),
     "pitch_error": Hidden("pitch_deg[]", _pitch_drawn, _pitch),

@@ -33,7 +33,7 @@ OUTSIDE: Mapping[str, Hidden[Making]] = {
             "axis": _axis(r),
             "sign": float(r.choice([-1.0, 1.0])),
             "preload_n": drawn_size(r, 5.0, 60.0),
-            "share": drawn_size(r, 0.08, 0.5),
+            "share": drawn_size(r, 0.04, 0.4),
         },
         lambda m, p: _caused(m, machine.LooseBolt(p["axis"], p["sign"], p["preload_n"], p["share"])),
     ),
@@ -65,7 +65,7 @@ OUTSIDE: Mapping[str, Hidden[Making]] = {
         lambda r, _: {
             "wave_mm": drawn_size(r, 4.0, 30.0),
             "share": drawn_size(r, 0.05, 0.3),
-            "dip_um": drawn_size(r, 10.0, 150.0),
+            "dip_um": drawn_size(r, 5.0, 80.0),
             "at_deg": drawn_angle(r),
         },
         lambda m, p: _caused(
@@ -120,7 +120,7 @@ OUTSIDE: Mapping[str, Hidden[Making]] = {
         "lobes size_um angle_deg",
         lambda r, _: {
             "lobes": int(r.choice([2, 3])),
-            "size_um": drawn_size(r, 4.0, 30.0),
+            "size_um": drawn_size(r, 2.0, 16.0),
             "angle_deg": drawn_angle(r),
         },
         lambda m, p: _caused(m, machine.RaceOvality(p["lobes"], p["size_um"] * UM, p["angle_deg"] * DEG)),
@@ -164,7 +164,7 @@ OUTSIDE: Mapping[str, Hidden[Making]] = {
     ),
     "filter_left_on": Hidden(
         "frequency_hz",
-        lambda r, _: {"frequency_hz": drawn_size(r, 120.0, 900.0)},
+        lambda r, _: {"frequency_hz": drawn_size(r, 250.0, 1500.0)},
         lambda m, p: _caused(m, machine.FilterLeftOn(p["frequency_hz"])),
     ),
 }

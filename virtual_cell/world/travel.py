@@ -69,6 +69,16 @@ class Circling(Orbit):
         swaying = self.sway * np.sin(self.direction(t) - self.sway_phase) * self.rate
         return np.asarray(self.pitch * abs(self.rate) / (2.0 * math.pi) + swaying)
 
+    def cut_below(self, t: Array) -> Array:
+        """Speed (n,), m/s, at which the bottom cuts at rising times ``t``: none where it was lower before."""
+        orbit = 2.0 * math.pi / abs(self.rate)
+        step = float(t[-1] - t[0]) / (len(t) - 1)
+        past = math.ceil(orbit / step)
+        times = t[0] + step * np.arange(-past, len(t))
+        height = self.too_high(self.direction(times)) - self.pitch * times / orbit
+        floor = np.minimum.accumulate(height)
+        return np.asarray(-np.gradient(floor, step)[past:])
+
     def ceiling(self, direction: Array, sine: Array, cosine: Array, reach: Array) -> Array:
         """Height (m) above the tip up to which there is material at the ends of rays from the axis.
 
