@@ -13,7 +13,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from virtual_cell.batches import bundled
-from virtual_cell.blind import KINDS
+from virtual_cell.blind import HARDER, KINDS
 from virtual_cell.hidden import Parameters
 from virtual_cell.recipes.force import STYLES
 
@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(json.dumps({name: dict(recipe.effects) for name, recipe in KINDS.items()}))
         return
     recipe = KINDS[options.command]
-    hidden = dict(_effect(words, recipe.effects) for words in options.effect)
+    hidden = dict(_effect(words, recipe.hides(options.style)) for words in options.effect)
     truth = recipe.make(options.folder, hidden, options.seed, options.style)
     path = options.truth or options.folder.parent / f"{options.folder.name}.truth.json"
     path.write_text(json.dumps(truth, indent=1) + "\n")
@@ -41,7 +41,7 @@ def _parser() -> argparse.ArgumentParser:
     every.add_argument("root", type=Path)
     commands.add_parser("effects", help="list as JSON what each kind of batch can hide, with its parameters")
     for name, recipe in KINDS.items():
-        hidden = ", ".join(recipe.effects)
+        hidden = ", ".join(dict.fromkeys([*recipe.effects, *recipe.harder]))
         one = commands.add_parser(
             name, help=f"make a {name} batch; the truth goes beside the folder, not into it"
         )
@@ -55,7 +55,7 @@ def _parser() -> argparse.ArgumentParser:
             help="hide an effect, its parameters as given or drawn; may be repeated: " + hidden,
         )
         one.add_argument("--seed", type=int, default=0)
-        one.add_argument("--style", choices=STYLES, default="a", help="how it is measured")
+        one.add_argument("--style", choices=(*STYLES, *HARDER), default="a", help="how it is measured")
         one.add_argument("--truth", type=Path, help="where to write the truth")
     return parser
 

@@ -10,7 +10,7 @@ from typing import Any
 from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
 from virtual_cell.face_effects import FACE_EFFECTS
 from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Hidden, Parameters
-from virtual_cell.recipes import arm, boundary, faces, force
+from virtual_cell.recipes import arm, boundary, faces, force, force_world
 from virtual_cell.write import Row
 
 HARDER = ("c", "d")  # styles of the harder world
@@ -39,7 +39,7 @@ def _named(effects: Mapping[str, Hidden[Any]], names: Iterable[str] = ()) -> dic
 
 
 RECIPES = {
-    "force": Recipe(force.make, _named(EFFECTS)),
+    "force": Recipe(force.make, _named(EFFECTS), _named(force_world.HARDER)),
     **{observable: Recipe(arm.make, _named(ARM_EFFECTS, names)) for observable, names in SHOWN.items()},
     "flatness": Recipe(faces.make, _named(FACE_EFFECTS)),
     "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS)),

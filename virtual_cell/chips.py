@@ -73,6 +73,14 @@ class Engagement:
     start_angle: float
     depth: float
 
+    def angle(self, t: Array) -> Array:
+        """Angle of the spindle at times ``t`` (s), clockwise, rad."""
+        return self.start_angle + self.spindle * t
+
+    def before(self, t: Array, lag: Array) -> Array:
+        """Return the times (s) at which the spindle stood by an angle ``lag`` (rad) behind that at ``t``."""
+        return t - lag / self.spindle
+
     @property
     def slices(self) -> Array:
         """Mid-heights (S,) of the slices, m."""
@@ -83,13 +91,14 @@ class Engagement:
 
 @dataclass(frozen=True)
 class Chips:
-    """Cutting points of one tooth in the front half of the tool.
+    """Cutting points of one tooth, or of all, in the front half of the tool.
 
-    ``sample`` and ``level`` index time and slice; ``t`` s; ``sin``, ``cos`` of the immersion; ``thickness``
-    of the chip, m (negative: no contact); ``radius`` of the cutting point, m.
+    ``sample``, ``tooth`` and ``level`` index time, tooth and slice; ``t`` s; ``sin``, ``cos`` of the
+    immersion; ``thickness`` of the chip, m (negative: no contact); ``radius`` of the cutting point, m.
     """
 
     sample: np.ndarray
+    tooth: np.ndarray
     level: np.ndarray
     t: Array
     sin: Array
@@ -107,31 +116,33 @@ def lags(tool: Tool, slices: Array) -> Array:
 
 
 def chips(
-    engagement: Engagement, t: Array, tooth: int, past: Path | None = None, now: Array | float = 0.0
+    engagement: Engagement, t: Array, tooth: int | None, past: Path | None = None, now: Array | float = 0.0
 ) -> Chips:
-    """Trace the chips of one tooth at times ``t`` (n,), s.
+    """Trace the chips of one tooth, or of all (None), at times ``t`` (n,), s.
 
     The axis follows the motion, displaced by ``now`` (2, n), m; in earlier passes it was at ``past(t)``
     where that is given.
     """
     slices = engagement.slices
     radius, angle = engagement.tool.points(slices)
-    lag = lags(engagement.tool, slices)[tooth]
-    phi = (engagement.start_angle + engagement.spindle * t)[:, None] + angle[tooth]
-    ahead = np.sin(phi + engagement.motion.direction(t)[:, None]) > -_BEHIND
-    sample, level = np.nonzero(ahead)
+    lag = lags(engagement.tool, slices)
+    teeth = np.arange(engagement.tool.teeth) if tooth is None else np.array([tooth])
+    phi = engagement.angle(t)[:, None, None] + angle[teeth]
+    ahead = np.sin(phi + engagement.motion.direction(t)[:, None, None]) > -_BEHIND
+    sample, which, level = np.nonzero(ahead)
+    which = teeth[which]
     sine, cosine = np.sin(phi[ahead]), np.cos(phi[ahead])
     x, y = (along[sample] for along in np.array(engagement.motion.centre(t)) + now)
     low, high = engagement.motion.block((x, y), (sine, cosine))
     for other in range(engagement.tool.teeth):
-        passed = t[sample] - lag[other][level] / engagement.spindle
+        passed = engagement.before(t[sample], lag[which, other, level])
         path = past or engagement.motion.centre
         cleared = _cleared(
             path, passed, (x, y), (sine, cosine), radius=radius[other][level], spindle=engagement.spindle
         )
         low = np.maximum(low, cleared)
-    reach = radius[tooth][level]
-    return Chips(sample, level, t[sample], sine, cosine, np.minimum(reach, high) - low, reach)
+    reach = radius[which, level]
+    return Chips(sample, which, level, t[sample], sine, cosine, np.minimum(reach, high) - low, reach)
 
 
 def _cleared(

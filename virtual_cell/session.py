@@ -81,7 +81,21 @@ class Session:
     tacho: bool = False
 
 
-def orbit_rpm(session: Session, plan: Plan) -> float:
+class Holed(Protocol):
+    """What cuts helical holes with a tool."""
+
+    @property
+    def tool(self) -> Tool:
+        """The tool."""
+        ...
+
+    @property
+    def hole_radius(self) -> float:
+        """Of the holes, m."""
+        ...
+
+
+def orbit_rpm(session: Holed, plan: Plan) -> float:
     """Orbit speed at which the tool's centre advances by the feed per tooth, rpm."""
     feed = plan.feed_per_tooth_mm * session.tool.teeth * plan.spindle_rpm
     return round(feed / (2.0 * math.pi * (session.hole_radius - session.tool.radius) / MM), 4)
@@ -167,7 +181,7 @@ def _later(session: Session, plan: Plan, share: float) -> tuple[Session, Plan]:
     return replace(session, coefficients=k), replace(plan, axial_depth_mm=depth)
 
 
-def row_of(session: Session, plan: Plan, name: str, place: int, replicate: int) -> Row:
+def row_of(session: Holed, plan: Plan, name: str, place: int, replicate: int) -> Row:
     """Row of the run table with the nominal settings of a run."""
     row: Row = {key: getattr(plan, key) for key in plan.__dataclass_fields__ if not key.endswith("_s")}
     row |= {"run": name, "replicate": replicate, "order": place}

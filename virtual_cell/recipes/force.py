@@ -20,6 +20,7 @@ from virtual_cell.chips import Tool
 from virtual_cell.dynamometer import Dynamometer
 from virtual_cell.hidden import EFFECTS, Parameters
 from virtual_cell.milling import Coefficients, in_millimetres
+from virtual_cell.recipes import force_world
 from virtual_cell.session import Plan, Session, cut_all, cut_in_order, orbit_rpm
 from virtual_cell.units import DEG, MM, N_MM, N_MM2, RPM
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_yaml
@@ -93,11 +94,15 @@ class _Drawn:
 def make(folder: Path, effects: Mapping[str, Parameters | None], seed: int, style: str = "a") -> Row:
     """Write a batch that hides ``effects`` (name → parameters, or None: drawn by the seed); return the truth.
 
+    The styles of the harder world are another recipe's.
+
     Raises
     ------
     KeyError
         For an effect that is not known.
     """
+    if style in force_world.STYLES:
+        return force_world.make(folder, effects, seed, style)
     drawn = _drawn(effects, seed, style)
     fresh_folder(folder)
     rows = cut_all(drawn.session, drawn.plans, folder, drawn.rng)
