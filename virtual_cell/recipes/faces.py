@@ -22,7 +22,7 @@ from virtual_cell.hidden import Parameters
 from virtual_cell.milling import scattered
 from virtual_cell.recipes import faces_world
 from virtual_cell.recipes.faces_draws import Case, FaceCell, Pose, drawn, eight_cases, feed_axes
-from virtual_cell.recipes.faces_world_draws import PROGRAMMES
+from virtual_cell.recipes.faces_world_programme import PROGRAMMES
 from virtual_cell.scanner import scan
 from virtual_cell.session import spread
 from virtual_cell.side_force import SideCut, SideForce, side_force

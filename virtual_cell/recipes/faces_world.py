@@ -26,7 +26,7 @@ from virtual_cell.units import DEG, MM, Array
 from virtual_cell.world import load_test, scan, structure
 from virtual_cell.world.draws import log_uniform, uniform
 from virtual_cell.world.face_causes import applied
-from virtual_cell.world.finish import FaceRun, Influence, finished, gain
+from virtual_cell.world.finish import FaceRun, Influence, Span, finished, gain
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_ply, write_yaml
 
 _HAMMER_HZ = np.arange(1.0, 55.0, 0.25)
@@ -83,7 +83,8 @@ def ordered(cell: Workshop, rng: np.random.Generator) -> list[tuple[Case, int]]:
 def planned(cell: Workshop, order: list[tuple[Case, int]], rng: np.random.Generator) -> list[FaceRun]:
     """Return the faces of a session in their order, with the force and the times of each."""
     runs: list[FaceRun] = []
-    now, metres, spans = 0.0, 0.0, []
+    spans: list[Span] = []
+    now = metres = 0.0
     for place, (case, _) in enumerate(order):
         own = rng.spawn(1)[0]
         passes, share = cell.passes(case.orientation), place / max(1, len(order) - 1)
@@ -136,7 +137,7 @@ def _scanned(cell: Workshop, run: FaceRun, placed: scan.Placing, rng: np.random.
 
     def read(points: Array) -> Array:
         z = finished(run, cell.corner, heights, influences, points)
-        return z + np.asarray(sum(one.reading(points) for one in influences if one.reading is not None))
+        return np.asarray(z + sum(one.reading(points) for one in influences if one.reading is not None))
 
     leaving = (passes.along, passes.size[passes.along])
     return scan.scanned(cell.scanner, placed, passes.size, leaving=leaving, height=read, rng=rng)

@@ -111,10 +111,12 @@ def cases(rng: np.random.Generator, programme: Programme) -> tuple[Case, ...]:
     held = max(1, round(count / 3.0))
     return tuple(
         Case(
-            *levels_of,
+            wrist,
+            location,
+            orientation,
             depth_mm=levels[i % len(levels)],
             role="validate" if i >= count - held else "identify",
             replicates=replicates,
         )
-        for i, levels_of in enumerate(chosen)
+        for i, (wrist, location, orientation) in enumerate(chosen)
     )

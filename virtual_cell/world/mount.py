@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from virtual_cell.units import DEG, MM, UM, Array
+from virtual_cell.units import DEG, MM, Array
 from virtual_cell.world.draws import log_uniform, uniform
 from virtual_cell.world.finish import Cutting, FaceRun, Influence
 
@@ -80,12 +80,7 @@ def tilted(
     turned = {wrist: angle - middle for wrist, angle in yaw.items()}
     units = [Mount(_shims(*unit, circle), circle, turned) for unit in ((1.0, 0.0), (0.0, 1.0))]
     mean = np.column_stack([np.mean([unit.tilt(wrist) for wrist in yaw], axis=0) for unit in units])
-    mount = Mount(_shims(*np.linalg.solve(mean, np.array(about)).tolist(), circle), circle, turned)
+    about_x, about_y = np.linalg.solve(mean, np.array(about)).tolist()
+    mount = Mount(_shims(about_x, about_y, circle), circle, turned)
     apart = np.array([mount.tilt(wrist) for wrist in yaw]) - np.array(about)
     return mount, float(np.linalg.norm(apart, axis=1).mean() / np.linalg.norm(about))
-
-
-def in_degrees(mount: Mount, wrist: str) -> dict[str, float]:
-    """Return the tilt at a wrist for the truth, in µrad."""
-    about_x, about_y = mount.tilt(wrist)
-    return {"about_x_urad": round(about_x / UM, 1), "about_y_urad": round(about_y / UM, 1)}

@@ -224,8 +224,8 @@ def drawn(rng: np.random.Generator, size: tuple[float, float], *, known: float, 
     spacing = max(uniform(rng, 0.5, 1.3) * MM, math.sqrt(size[0] * size[1] / _MOST))
     yaw = uniform(rng, -12.0, 12.0) if place == "sides" else uniform(rng, -180.0, 180.0)
     to_work = np.eye(4)
-    leaning = (rng.uniform(-2.5, 2.5, 2) * DEG).tolist()
-    to_work[:3, :3] = rotation_rpy(*leaning, yaw * DEG)
+    roll, pitch = (rng.uniform(-2.5, 2.5, 2) * DEG).tolist()
+    to_work[:3, :3] = rotation_rpy(roll, pitch, yaw * DEG)
     to_work[:3, 3] = rng.uniform(-350.0, 350.0, 3).round(2)
     return Scanner(
         spacing=round(spacing / MM, 2) * MM,

@@ -130,7 +130,7 @@ class Structure:
 
     def tested(self, points: Array) -> Array:
         """Return the static compliance (n, 3, 3), m/N, that load tests meet, but for the friction."""
-        return self.in_tests(points) + np.asarray(sum(mode.compliance for mode in self.modes))
+        return np.asarray(self.in_tests(points) + sum(mode.compliance for mode in self.modes))
 
     def receptance(self, at: Array, frequency: Array) -> Array:
         """Return the receptance (n, 3, 3), complex, m/N, at a point (2,), m; ``frequency`` (n,), Hz."""
@@ -153,7 +153,7 @@ def pulled(structure: Structure, points: Array, force: Array) -> Array:
         holds = friction.level * np.sign(way) * -np.expm1(-np.abs(way) / friction.length)
         left = force - holds[:, None] * friction.along
         moved = np.einsum("nij,nj->ni", compliance, left)
-    return moved
+    return np.asarray(moved)
 
 
 def heights(structure: Structure, places: Sequence[Array], loads: Sequence[Array], shown: int) -> list[Array]:

@@ -121,7 +121,7 @@ class VacuumRelease:
 
         def lifted(cutting: Cutting) -> Array:
             gone = np.clip((cutting.t - at) / 0.7, 0.0, 1.0)
-            return -self.lift * gone * bump(np.hypot(*(cutting.points - place).T), self.radius)
+            return np.asarray(-self.lift * gone * bump(np.hypot(*(cutting.points - place).T), self.radius))
 
         return Influence(height=lifted if happens else None)
 
