@@ -124,14 +124,17 @@ def test_drawn_arms_are_symmetric_passive_and_have_a_part_of_their_compliance_be
 
 
 def test_a_tracker_reads_the_compliance_and_nobody_writes_down_a_tip_that_moves_against_the_pull():
-    test = load_test.LoadTest(((10.0, 20.0), (90.0, 20.0)), (200.0, 400.0), 40, 30e-6, 0.0, 0.0, 0.01, 0.0)
+    places = ((10.0, 20.0), (90.0, 20.0))
+    test = load_test.LoadTest(places, (200.0, 400.0), 400, 30e-6, 0.0, 0.0, 0.01, 0.0)
     rows = load_test.rows(test, "A1", plain(), np.random.default_rng(1))
-    assert len(rows) == 2 * 3 * 2 * 40
+    assert len(rows) == 2 * 3 * 2 * 400
     force = np.array([[row[f"f{axis}_n"] for axis in "xyz"] for row in rows])
     read = np.array([[row[f"d{axis}_mm"] for axis in "xyz"] for row in rows]) / 1e3
     whole = plain().tested(np.zeros((1, 2)))[0]
     rest = read - 1.01 * force @ whole.T
     assert rest[:, 0].std() == pytest.approx(30e-6, rel=0.1)
+    own = np.sum(read * force, axis=1) / np.sum((force @ whole.T) * force, axis=1)
+    assert own.mean() == pytest.approx(1.01, abs=0.006)
     broken = replace(test, outliers=0.2, lost=1e-3)
     for row in load_test.rows(broken, "A1", plain(), np.random.default_rng(2)):
         axis = next(axis for axis in "xyz" if row[f"f{axis}_n"])

@@ -17,10 +17,10 @@ from virtual_cell.hidden import Parameters
 from virtual_cell.recipes.faces_world_draws import Workshop
 from virtual_cell.units import MM, UM, Array
 from virtual_cell.world import fixture, mount, servo, swing, warmth
-from virtual_cell.world.draws import log_uniform
+from virtual_cell.world.draws import either_sign, log_uniform
 from virtual_cell.world.face_troubles import TROUBLES
 from virtual_cell.world.finish import FaceRun
-from virtual_cell.world.hideable import Applied, Hideable, signed, towards, wave
+from virtual_cell.world.hideable import Applied, Hideable, sized, towards, wave
 
 _MRAD, _UM_MIN = 1e-3, UM / 60.0
 
@@ -87,36 +87,46 @@ def _middle(run: FaceRun) -> Array:
     return np.asarray(run.force(np.array([0.5 * run.passes.length]))[0])
 
 
+def _unplaced(cell: Workshop) -> bool:
+    return cell.scanner.place != "declared"
+
+
+def _tilt(rng: np.random.Generator, cell: Workshop) -> Parameters:
+    shown = (0.3 if _unplaced(cell) else 0.6) * cell.milling.tool.radius / MM
+    return towards(rng, "about_x_mrad about_y_mrad", sized(rng, cell, shown, 10.0))
+
+
+def _growth(rng: np.random.Generator, cell: Workshop) -> Parameters:
+    # Without a declared place the tilt of the whole face, which is most of a growth, is not compared.
+    return {"um_per_min": sized(rng, cell, 0.06 if _unplaced(cell) else 0.9, 150.0)}
+
+
+def _vibration(rng: np.random.Generator, cell: Workshop) -> Parameters:
+    return {"frequency_hz": wave(rng, cell, 8.0, 70.0), "amplitude_um": sized(rng, cell, 0.5, 100.0)}
+
+
+def _droop(rng: np.random.Generator, cell: Workshop) -> Parameters:
+    amplitude = either_sign(rng) * sized(rng, cell, 0.12, 350.0)
+    return {"amplitude_um": amplitude, "length_mm": log_uniform(rng, 8.0, 40.0)}
+
+
+def _factor(rng: np.random.Generator, cell: Workshop) -> Parameters:
+    size = sized(rng, cell, 12.0 if _unplaced(cell) else 90.0, 0.75)
+    return {"factor": float(round(math.exp(either_sign(rng) * size), 3))}
+
+
 LIBRARY: Mapping[str, Hideable] = {
-    "spindle_tilt": Hideable(
-        "about_x_mrad about_y_mrad",
-        lambda r, _: towards(r, "about_x_mrad about_y_mrad", 1.5, 9.0),
-        _tilted,
-    ),
-    "thermal_growth": Hideable(
-        "um_per_min", lambda r, _: {"um_per_min": log_uniform(r, 10.0, 100.0)}, _warming
-    ),
+    "spindle_tilt": Hideable("about_x_mrad about_y_mrad", _tilt, _tilted),
+    "thermal_growth": Hideable("um_per_min", _growth, _warming),
     "fixture_bow": Hideable(
-        "xx_um xy_um yy_um", lambda r, _: towards(r, "xx_um xy_um yy_um", 20.0, 200.0), _bowed
+        "xx_um xy_um yy_um",
+        lambda r, c: towards(r, "xx_um xy_um yy_um", sized(r, c, 0.33, 300.0)),
+        _bowed,
     ),
-    "path_vibration": Hideable(
-        "frequency_hz amplitude_um",
-        lambda r, c: {"frequency_hz": wave(r, c, 8.0, 70.0), "amplitude_um": log_uniform(r, 10.0, 80.0)},
-        _swinging,
-    ),
-    "entry_transient": Hideable(
-        "amplitude_um length_mm",
-        lambda r, _: {"amplitude_um": signed(r, 40.0, 300.0), "length_mm": log_uniform(r, 7.0, 40.0)},
-        _drooping,
-    ),
-    "stiffness_scale": Hideable(
-        "factor",
-        lambda r, _: {"factor": float(round(math.exp(signed(r, 0.15, 0.8)), 3))},
-        _softened,
-    ),
+    "path_vibration": Hideable("frequency_hz amplitude_um", _vibration, _swinging),
+    "entry_transient": Hideable("amplitude_um length_mm", _droop, _drooping),
+    "stiffness_scale": Hideable("factor", _factor, _softened),
 }
-
-
 FACE_CAUSES: Mapping[str, Hideable] = {**LIBRARY, **TROUBLES}
 
 

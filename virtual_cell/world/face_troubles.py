@@ -13,7 +13,7 @@ from virtual_cell.units import MM, UM
 from virtual_cell.world import machine_troubles, work_troubles
 from virtual_cell.world.draws import either_sign, log_uniform, uniform
 from virtual_cell.world.finish import Cause, FaceRun
-from virtual_cell.world.hideable import Applied, Hideable, signed, wave
+from virtual_cell.world.hideable import Applied, Hideable, sized, wave
 
 
 def _trouble(
@@ -37,13 +37,16 @@ def _share(rng: np.random.Generator) -> float:
 TROUBLES: Mapping[str, Hideable] = {
     "heated_side": _trouble(
         "rise_um time_s",
-        lambda r, _: {"rise_um": signed(r, 40.0, 250.0), "time_s": log_uniform(r, 40.0, 250.0)},
+        lambda r, c: {
+            "rise_um": either_sign(r) * sized(r, c, 0.13, 400.0),
+            "time_s": log_uniform(r, 40.0, 250.0),
+        },
         lambda p, _: work_troubles.HeatedSide(p["rise_um"] * UM, p["time_s"]),
     ),
     "coolant_switched": _trouble(
         "shrink_um time_s share",
-        lambda r, _: {
-            "shrink_um": signed(r, 12.0, 90.0),
+        lambda r, c: {
+            "shrink_um": either_sign(r) * sized(r, c, 0.5, 120.0),
             "time_s": log_uniform(r, 3.0, 15.0),
             "share": _share(r),
         },
@@ -51,8 +54,8 @@ TROUBLES: Mapping[str, Hideable] = {
     ),
     "creeping_shim": _trouble(
         "sinks_um u v time_s",
-        lambda r, _: {
-            "sinks_um": log_uniform(r, 60.0, 350.0),
+        lambda r, c: {
+            "sinks_um": sized(r, c, 0.15, 400.0),
             "u": either_sign(r),
             "v": either_sign(r),
             "time_s": log_uniform(r, 100.0, 1500.0),
@@ -61,8 +64,8 @@ TROUBLES: Mapping[str, Hideable] = {
     ),
     "chip_under_clamp": _trouble(
         "height_um radius_mm share",
-        lambda r, _: {
-            "height_um": log_uniform(r, 25.0, 250.0),
+        lambda r, c: {
+            "height_um": sized(r, c, 0.2, 350.0),
             "radius_mm": log_uniform(r, 25.0, 50.0),
             "share": _share(r),
         },
@@ -70,8 +73,8 @@ TROUBLES: Mapping[str, Hideable] = {
     ),
     "vacuum_release": _trouble(
         "lift_um radius_mm at_u at_v share",
-        lambda r, _: {
-            "lift_um": log_uniform(r, 25.0, 250.0),
+        lambda r, c: {
+            "lift_um": sized(r, c, 0.2, 350.0),
             "radius_mm": log_uniform(r, 25.0, 55.0),
             "at_u": uniform(r, 0.25, 0.75),
             "at_v": uniform(r, 0.25, 0.75),
@@ -95,19 +98,22 @@ TROUBLES: Mapping[str, Hideable] = {
         lambda r, c: {
             "frequency_hz": wave(r, c, 8.0, 35.0),
             "drop": uniform(r, 0.05, 0.25),
-            "size_um": log_uniform(r, 20.0, 120.0),
+            "size_um": sized(r, c, 0.2, 150.0),
         },
         lambda p, _: work_troubles.ThinPlate(p["frequency_hz"], p["drop"], p["size_um"] * UM),
     ),
     "corner_blending": _trouble(
         "dip_um way_mm",
-        lambda r, _: {"dip_um": signed(r, 20.0, 250.0), "way_mm": log_uniform(r, 25.0, 60.0)},
+        lambda r, c: {
+            "dip_um": either_sign(r) * sized(r, c, 0.15, 350.0),
+            "way_mm": log_uniform(r, 25.0, 60.0),
+        },
         lambda p, _: machine_troubles.CornerBlending(p["dip_um"] * UM, p["way_mm"] * MM),
     ),
     "worn_way": _trouble(
         "dip_um half_mm first second",
-        lambda r, _: {
-            "dip_um": signed(r, 12.0, 120.0),
+        lambda r, c: {
+            "dip_um": either_sign(r) * sized(r, c, 0.2, 150.0),
             "half_mm": log_uniform(r, 15.0, 45.0),
             "first": uniform(r, 0.2, 0.5),
             "second": uniform(r, 0.5, 0.8),
@@ -135,14 +141,14 @@ TROUBLES: Mapping[str, Hideable] = {
     "snagging_hose": _trouble(
         "pull_um wrist=A|B",
         lambda r, c: {
-            "pull_um": signed(r, 20.0, 150.0),
+            "pull_um": either_sign(r) * sized(r, c, 0.25, 200.0),
             "wrist": str(r.choice(sorted({case.wrist for case in c.cases}))),
         },
         lambda p, _: machine_troubles.SnaggingHose(p["pull_um"] * UM, p["wrist"]),
     ),
     "scanner_wheel": _trouble(
         "size_um length_mm",
-        lambda r, _: {"size_um": log_uniform(r, 8.0, 60.0), "length_mm": log_uniform(r, 25.0, 110.0)},
+        lambda r, c: {"size_um": sized(r, c, 0.6, 80.0), "length_mm": log_uniform(r, 25.0, 110.0)},
         lambda p, c: machine_troubles.ScannerWheel(
             p["size_um"] * UM, p["length_mm"] * MM, c.scanner.direction
         ),
