@@ -11,7 +11,17 @@ from scipy.integrate import solve_ivp
 
 from virtual_cell.face import Passes, Surroundings, surface
 from virtual_cell.units import MM, UM
-from virtual_cell.world import fixture, machine_troubles, mount, scan, servo, swing, warmth, work_troubles
+from virtual_cell.world import (
+    fixture,
+    machine_troubles,
+    mount,
+    path,
+    scan,
+    servo,
+    swing,
+    warmth,
+    work_troubles,
+)
 from virtual_cell.world.finish import Cutting, FaceRun, Influence, finished, gain
 
 PASSES = Passes((0.12, 0.06), 0, 0.01, 0.008, 0.04, 0.014)
@@ -328,3 +338,21 @@ def test_each_trouble_of_the_machine_is_where_and_when_it_should_be():
     wheel = machine_troubles.ScannerWheel(10e-6, 0.04, math.pi / 2.0).in_face(run(), RNG(0)).reading
     np.testing.assert_allclose(wheel(POINTS), wheel(POINTS + np.array([0.3, 0.04])), atol=1e-12)
     assert np.ptp(wheel(POINTS)) > 18e-6
+
+
+def test_raw_stock_that_is_no_plane_changes_the_depth_over_a_face_by_its_slope():
+    rises = []
+    for seed in range(300):
+        deeper = path.Stock(40e-6).in_face(run(), RNG(seed)).gain
+        ends = deeper(0, np.array([0.0, 0.12]), np.zeros(2))
+        rises.append((ends[1] - ends[0]) * 2e-3)
+    assert np.std(rises) == pytest.approx(40e-6, rel=0.12)
+
+
+def test_gears_wave_by_their_size_alike_in_all_faces_of_a_pose():
+    gears = path.GearWave(1e-6, (0.02, 0.033), (0.3, 1.9))
+    one, again, other = (gears.in_face(run(wrist=wrist), RNG(i)).height for i, wrist in enumerate("AAB"))
+    places = at(RNG(5).uniform(0.0, 0.5, (5000, 2)))
+    np.testing.assert_array_equal(one(places), again(places))
+    assert np.abs(one(places) - other(places)).max() > 0.5e-6
+    assert one(places).std() == pytest.approx(1e-6, rel=0.05)

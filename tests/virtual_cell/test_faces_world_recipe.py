@@ -166,3 +166,8 @@ def test_the_truth_says_what_the_world_was(clean, tmp_path):
     np.testing.assert_allclose(tilts, [asked["about_x_mrad"], asked["about_y_mrad"]], atol=1e-3)
     loads = pd.read_csv(clean / "loads.csv")
     assert loads.groupby(["pose", "point"]).ngroups >= 9
+
+
+def test_a_study_is_not_made_in_the_harder_world(tmp_path):
+    with pytest.raises(ValueError, match="styles a and b"):
+        faces.make_study(tmp_path / "study", {}, 1, "c")

@@ -65,7 +65,14 @@ def make_study(folder: Path, hidden: Mapping[str, Parameters | None], seed: int,
     """Write the whole study of Iglesias et al. 2025 (tables 1, 2): eight configurations, each cut nine times.
 
     The 72 scans are as coarse as the heights at the points of the path allow, so that the batch is small.
+
+    Raises
+    ------
+    ValueError
+        For a style of the harder world, which has programmes of its own.
     """
+    if style in PROGRAMMES:
+        raise ValueError(f"a study is made in the styles a and b, not in {style}")
     rng = np.random.default_rng([seed, 45])
     cell = drawn(rng, style, eight_cases(_REPEATS))
     cell = replace(cell, scanner=replace(cell.scanner, spacing=max(cell.scanner.spacing, _COARSE)))
