@@ -171,3 +171,17 @@ def test_the_truth_says_what_the_world_was(clean, tmp_path):
 def test_a_study_is_not_made_in_the_harder_world(tmp_path):
     with pytest.raises(ValueError, match="styles a and b"):
         faces.make_study(tmp_path / "study", {}, 1, "c")
+
+
+def test_the_run_table_says_how_long_returns_take(clean):
+    """With the way of the path file it gives the period of the passes to the hundredth of a second."""
+    one = small()
+    rng = np.random.default_rng([5, 47])
+    runs = pd.read_csv(clean / "runs.csv")
+    path = pd.read_csv(clean / runs.path[0])
+    first = path[path["pass"] == 1]
+    way = np.hypot(np.ptp(first.x_mm), np.ptp(first.y_mm)) / 1e3
+    session = faces_world.planned(one, faces_world.ordered(one, rng), rng)
+    for run, back in zip(session, runs.return_s, strict=True):
+        assert way / run.passes.speed + back == pytest.approx(np.diff(run.begun).mean(), abs=0.006)
+        assert back > way / 0.2 + 0.55

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from virtual_cell.face_files import face_manifest, face_row, write_frf
-from virtual_cell.face_tables import mass_row, path_rows
+from virtual_cell.face_tables import PATH_STEP, mass_row, path_rows
 from virtual_cell.hidden import Parameters
 from virtual_cell.recipes.faces_draws import Case, feed_axes
 from virtual_cell.recipes.faces_world_draws import Workshop, drawn, side_cut
@@ -52,10 +52,11 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
         name = f"r{run.order + 1:02d}"
         write_ply(folder / f"scan/{name}.ply", _scanned(cell, run, placed, rng.spawn(1)[0]))
         place = run.order + 1
-        rows.append(face_row(cell.milling, cell.size, case, run=name, place=place, replicate=replicate))
+        row = face_row(cell.milling, cell.size, case, run=name, place=place, replicate=replicate)
+        rows.append(row | {"return_s": _back(run)})
     for orientation in sorted({case.orientation for case in cell.cases}):
         write_csv(folder / f"path/{orientation}.csv", path_rows(cell.passes(orientation)))
-    write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
+    write_csv(folder / "runs.csv", rows, (*RUN_COLUMNS, "return_s"))
     _write_tests(folder, cell, rng)
     write_yaml(folder / "cell.yaml", {"cell": "milling-arm"})
     write_yaml(
@@ -115,6 +116,12 @@ def planned(cell: Workshop, order: list[tuple[Case, int]], rng: np.random.Genera
         now += run.duration + cell.pauses.pause(own)
         metres += len(passes.axes) * passes.length
     return [replace(run, whole=max(runs[-1].started, 1.0)) for run in runs]
+
+
+def _back(run: FaceRun) -> float:
+    """Return the time from the end of a pass of the path file to the next one, s, as a stopwatch reads it."""
+    way = round(run.way / PATH_STEP) * PATH_STEP
+    return round(float(np.diff(run.begun).mean()) - way / run.passes.speed, 2)
 
 
 class _OfPass:

@@ -55,7 +55,7 @@ PROGRAMMES = {
         clumped=0.3,
         struck=0.25,
         known=0.7,
-        sides=0.2,
+        sides=0.1,
         many_loads=False,
     ),
     "d": Programme(
@@ -70,7 +70,7 @@ PROGRAMMES = {
         clumped=0.5,
         struck=0.35,
         known=0.65,
-        sides=0.25,
+        sides=0.12,
         many_loads=True,
     ),
 }

@@ -102,7 +102,7 @@ def _growth(rng: np.random.Generator, cell: Workshop) -> Parameters:
 
 
 def _vibration(rng: np.random.Generator, cell: Workshop) -> Parameters:
-    return {"frequency_hz": wave(rng, cell, 8.0, 70.0), "amplitude_um": sized(rng, cell, 0.5, 100.0)}
+    return {"frequency_hz": wave(rng, cell, 8.0, 70.0), "amplitude_um": sized(rng, cell, 0.4, 100.0)}
 
 
 def _droop(rng: np.random.Generator, cell: Workshop) -> Parameters:
@@ -111,7 +111,7 @@ def _droop(rng: np.random.Generator, cell: Workshop) -> Parameters:
 
 
 def _factor(rng: np.random.Generator, cell: Workshop) -> Parameters:
-    size = sized(rng, cell, 12.0 if _unplaced(cell) else 90.0, 0.75)
+    size = sized(rng, cell, 10.0 if _unplaced(cell) else 30.0, 0.75)
     return {"factor": float(round(math.exp(either_sign(rng) * size), 3))}
 
 

@@ -87,8 +87,8 @@ TROUBLES: Mapping[str, Hideable] = {
     "hard_inclusion": _trouble(
         "more radius_mm share",
         lambda r, _: {
-            "more": log_uniform(r, 2.0, 9.0),
-            "radius_mm": log_uniform(r, 8.0, 20.0),
+            "more": log_uniform(r, 3.0, 10.0),
+            "radius_mm": log_uniform(r, 10.0, 22.0),
             "share": _share(r),
         },
         lambda p, _: work_troubles.HardInclusion(p["more"], p["radius_mm"] * MM, p["share"]),
@@ -123,9 +123,9 @@ TROUBLES: Mapping[str, Hideable] = {
     "power_sag": _trouble(
         "loss lasts_s per_min",
         lambda r, _: {
-            "loss": log_uniform(r, 0.2, 0.55),
+            "loss": uniform(r, 0.3, 0.6),
             "lasts_s": log_uniform(r, 4.0, 15.0),
-            "per_min": log_uniform(r, 1.0, 4.0),
+            "per_min": log_uniform(r, 1.5, 5.0),
         },
         lambda p, _: machine_troubles.PowerSag(p["loss"], p["lasts_s"], p["per_min"]),
     ),
