@@ -11,6 +11,7 @@ from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
 from virtual_cell.face_effects import FACE_EFFECTS
 from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Hidden, Parameters
 from virtual_cell.recipes import arm, boundary, faces, force, force_world
+from virtual_cell.world.face_causes import FACE_CAUSES
 from virtual_cell.write import Row
 
 HARDER = ("c", "d")  # styles of the harder world
@@ -41,7 +42,7 @@ def _named(effects: Mapping[str, Hidden[Any]], names: Iterable[str] = ()) -> dic
 RECIPES = {
     "force": Recipe(force.make, _named(EFFECTS), _named(force_world.HARDER)),
     **{observable: Recipe(arm.make, _named(ARM_EFFECTS, names)) for observable, names in SHOWN.items()},
-    "flatness": Recipe(faces.make, _named(FACE_EFFECTS)),
+    "flatness": Recipe(faces.make, _named(FACE_EFFECTS), _named(FACE_CAUSES)),
     "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS)),
 }
 # What can be made: a batch of each observable, and a factorial study of faces.

@@ -10,13 +10,14 @@ from virtual_cell.face import Passes
 from virtual_cell.units import MM, Array
 from virtual_cell.write import Row
 
+PATH_STEP = 2.0 * MM  # of the programmed path
 _MASS = {"mxx": (0, 0), "mxy": (0, 1), "mxz": (0, 2), "myy": (1, 1), "myz": (1, 2), "mzz": (2, 2)}
 
 
 def path_rows(passes: Passes) -> list[Row]:
     """Programmed tip path, a point every 2 mm."""
-    count = round((passes.length + 2.0 * passes.lead) / (2.0 * MM)) + 1
-    s = -passes.lead + np.arange(count) * 2.0 * MM
+    count = round((passes.length + 2.0 * passes.lead) / PATH_STEP) + 1
+    s = -passes.lead + np.arange(count) * PATH_STEP
     rows: list[Row] = []
     for number in range(len(passes.axes)):
         for x, y in passes.points(s, number) / MM:

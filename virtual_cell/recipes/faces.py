@@ -16,20 +16,22 @@ import numpy as np
 
 from virtual_cell.face import surface
 from virtual_cell.face_effects import applied, pass_gains, pass_levels
+from virtual_cell.face_files import face_manifest, face_row, write_frf
 from virtual_cell.face_tables import load_rows, mass_row, path_rows
 from virtual_cell.hidden import Parameters
 from virtual_cell.milling import scattered
-from virtual_cell.recipes.faces_draws import Case, FaceCell, Pose, drawn, eight_cases
+from virtual_cell.recipes import faces_world
+from virtual_cell.recipes.faces_draws import Case, FaceCell, Pose, drawn, eight_cases, feed_axes
+from virtual_cell.recipes.faces_world_programme import PROGRAMMES
 from virtual_cell.scanner import scan
 from virtual_cell.session import spread
 from virtual_cell.side_force import SideCut, SideForce, side_force
 from virtual_cell.tip import Tip, tip_heights
-from virtual_cell.units import DEG, MM, Array
+from virtual_cell.units import MM, Array
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_ply, write_yaml
 
 Listener = Callable[[str, Case, SideForce], Row]
 _SCATTER, _SPEED_ERROR = 0.01, 0.003
-_THICK_MM = 10.0
 _REPEATS, _COARSE = 9, 1.1 * MM  # of a study: faces of each configuration, and pitch of their scans
 _HAMMER_HZ, _HAMMER_NOISE = np.arange(0.5, 60.0, 0.125), 0.01
 
@@ -37,11 +39,15 @@ _HAMMER_HZ, _HAMMER_NOISE = np.arange(0.5, 60.0, 0.125), 0.01
 def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style: str = "a") -> Row:
     """Write a batch that hides effects (name → parameters, or None: drawn by the seed); return the truth.
 
+    Styles ``c`` and ``d`` are of the harder world, :mod:`virtual_cell.recipes.faces_world`.
+
     Raises
     ------
     KeyError
         For an effect that is not known.
     """
+    if style in PROGRAMMES:
+        return faces_world.make(folder, hidden, seed, style)
     rng = np.random.default_rng([seed, 41])
     truth = _made(folder, drawn(rng, style), hidden, rng)
     return {**truth, "seed": seed, "style": style}
@@ -59,7 +65,14 @@ def make_study(folder: Path, hidden: Mapping[str, Parameters | None], seed: int,
     """Write the whole study of Iglesias et al. 2025 (tables 1, 2): eight configurations, each cut nine times.
 
     The 72 scans are as coarse as the heights at the points of the path allow, so that the batch is small.
+
+    Raises
+    ------
+    ValueError
+        For a style of the harder world, which has programmes of its own.
     """
+    if style in PROGRAMMES:
+        raise ValueError(f"a study is made in the styles a and b, not in {style}")
     rng = np.random.default_rng([seed, 45])
     cell = drawn(rng, style, eight_cases(_REPEATS))
     cell = replace(cell, scanner=replace(cell.scanner, spacing=max(cell.scanner.spacing, _COARSE)))
@@ -101,7 +114,9 @@ def mill_all(
         force = _force(worn, case, settings)
         write_ply(folder / f"scan/{run}.ply", _cut(worn, case, force, hiding, scanning))
         heard = listen(run, case, force) if listen else {}
-        rows.append(_row(cell, case, run, place, replicate) | heard)
+        rows.append(
+            face_row(cell.milling, cell.size, case, run=run, place=place, replicate=replicate) | heard
+        )
         metres += rows[-1]["cut_length_mm"] * MM
     for orientation in sorted({case.orientation for case in cell.cases}):
         write_csv(folder / f"path/{orientation}.csv", path_rows(cell.passes(orientation)))
@@ -130,13 +145,6 @@ def _cut(
     return scan(cell.scanner, cell.size, lambda at: surface(passes, heights, around, at), scanning)
 
 
-def feed_axes(case: Case) -> Array:
-    """Axes of the feed frame in the work frame, as rows (3, 3)."""
-    if case.orientation == "L":
-        return np.eye(3)
-    return np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-
-
 def _force(cell: FaceCell, case: Case, rng: np.random.Generator) -> SideForce:
     """Mean force along a pass; the metal and the spindle are a little different in every face."""
     mill = cell.milling
@@ -144,30 +152,6 @@ def _force(cell: FaceCell, case: Case, rng: np.random.Generator) -> SideForce:
     rpm, axial = mill.spindle_rpm, case.depth_mm * MM
     cut = SideCut(mill.tool, metal, rpm, mill.speed, axial, mill.width, "down", length)
     return side_force(cut, lambda _: 0.0, speed_error=_SPEED_ERROR * rng.uniform(-1.0, 1.0), phase=0.0)
-
-
-def _row(cell: FaceCell, case: Case, run: str, place: int, replicate: int) -> Row:
-    return {
-        "run": run,
-        "role": case.role,
-        "condition": case.condition,
-        "replicate": replicate,
-        "order": place,
-        "operation": "face",
-        "spindle_rpm": cell.milling.spindle_rpm,
-        "feed_per_tooth_mm": cell.milling.feed / MM,
-        "axial_depth_mm": case.depth_mm,
-        "radial_depth_mm": cell.milling.width / MM,
-        "direction": "down",
-        "feed_direction_deg": 0 if case.orientation == "L" else 90,
-        "cut_length_mm": cell.size[0] * cell.size[1] / cell.milling.width / MM,
-        "wrist": case.wrist,
-        "location": case.location,
-        "orientation": case.orientation,
-        "pose": case.pose,
-        "path": f"path/{case.orientation}.csv",
-        "scan": f"scan/{run}.ply",
-    }
 
 
 def tested(folder: Path, cell: FaceCell, rng: np.random.Generator) -> list[Row]:
@@ -201,23 +185,7 @@ def _struck(folder: Path, name: str, pose: Pose, at: Array, rng: np.random.Gener
         true = seen[:, axis, axis]
         noise = rng.standard_normal((len(true), 2)) @ np.array([1.0, 1j]) * math.sqrt(0.5)
         read = true + _HAMMER_NOISE * np.abs(true).mean() * noise
-        file = f"frf/{name}-{word}.csv"
-        columns = {"frequency_hz": _HAMMER_HZ, "real": read.real, "imag": read.imag}
-        write_csv(
-            folder / file,
-            [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
-        )
-        point = {"reference": f"1{word}", "response": f"1{word}", "replicate": 1}
-        rows.append(
-            {
-                "test": f"tip-{name}",
-                "position": name,
-                **point,
-                "kind": "frf",
-                "file": file,
-                "response_unit": "m",
-            }
-        )
+        rows.append(write_frf(folder, name, word, _HAMMER_HZ, read))
     return rows
 
 
@@ -231,26 +199,10 @@ def receptance(pose: Pose, at: Array, frequency: Array) -> Array:
 
 def manifest(name: str, cell: FaceCell) -> Row:
     """Return batch.yaml of a batch of faces."""
-    tool, scanner = cell.milling.tool, cell.scanner
-    return {
-        "format": 1,
-        "batch": name,
-        "title": f"Faces milled by an arm, {tool.teeth}-tooth {2.0 * tool.radius / MM:g} mm cutter",
-        "source": "simulated",
-        "cell": "milling-arm",
-        "tool": {
-            "diameter_mm": round(2.0 * tool.radius / MM, 6),
-            "teeth": tool.teeth,
-            "helix_deg": round(tool.helix / DEG, 6),
-            "pitch_deg": [round(360 / tool.teeth)] * tool.teeth,
-        },
-        "work": {"material": "AW-5013", "size_mm": [*(round(v / MM, 6) for v in cell.size), _THICK_MM]},
-        "coefficients": dict(cell.milling.declared),
-        "instruments": {
-            "scanner": {
-                "spacing_mm": round(scanner.spacing / MM, 6),
-                "sigma_mm": round(scanner.sigma / MM, 6),
-                "to_work": [[round(float(v), 9) for v in row] for row in scanner.to_work],
-            }
-        },
+    scanner = cell.scanner
+    seen = {
+        "spacing_mm": round(scanner.spacing / MM, 6),
+        "sigma_mm": round(scanner.sigma / MM, 6),
+        "to_work": [[round(float(v), 9) for v in row] for row in scanner.to_work],
     }
+    return face_manifest(name, cell.milling, cell.size, seen)

@@ -50,6 +50,13 @@ class Case:
         return f"{self.wrist}{self.location}"
 
 
+def feed_axes(case: Case) -> Array:
+    """Axes of the feed frame in the work frame, as rows (3, 3)."""
+    if case.orientation == "L":
+        return np.eye(3)
+    return np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
 @dataclass(frozen=True)
 class Pose:
     """The arm at a pose: ``compliance`` (n, 2) → (n, 3, 3) m/N; ``mass`` (3, 3) kg; C = a0 M + a1 K."""

@@ -21,7 +21,7 @@ from virtual_cell.dynamometer import record
 from virtual_cell.hidden import Parameters, drawn_angle, drawn_signed, drawn_size
 from virtual_cell.recipes import arm, faces
 from virtual_cell.recipes.arm_draws import Bench, drawn
-from virtual_cell.recipes.faces_draws import Case, FaceCell, Milling, Pose, load_tests, scanner_of
+from virtual_cell.recipes.faces_draws import Case, FaceCell, Milling, Pose, feed_axes, load_tests, scanner_of
 from virtual_cell.recipes.irb6640 import DAMPING, MASS
 from virtual_cell.session import write_force
 from virtual_cell.side_force import SideForce
@@ -151,7 +151,7 @@ class _Listener:
         """Record the first pass of a face that is held out."""
         if case.role != "validate":
             return {}
-        passes, feed = self.plates.passes(case.orientation), faces.feed_axes(case)
+        passes, feed = self.plates.passes(case.orientation), feed_axes(case)
         sensor, gain = self.bench.sensor, 1.0 + self.bench.calibration[:3]
 
         def in_work(t: Array) -> Array:
