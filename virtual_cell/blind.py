@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
 from virtual_cell.face_effects import FACE_EFFECTS
 from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Hidden, Parameters
 from virtual_cell.recipes import arm, boundary, faces, force
+from virtual_cell.world.boundary_effects import HARDER_EFFECTS
 from virtual_cell.write import Row
 
 
@@ -19,10 +20,16 @@ class Recipe:
     """``make(folder, hidden, seed, style)`` a batch that hides some of the ``effects``; return the truth.
 
     ``effects``: their parameters by their names, as :class:`virtual_cell.hidden.Hidden` has them.
+    ``harder``: those that styles ``c`` and ``d`` can hide, where they are others.
     """
 
     make: Callable[[Path, Mapping[str, Parameters | None], int, str], Row]
     effects: Mapping[str, str]
+    harder: Mapping[str, str] = field(default_factory=dict)
+
+    def hides(self, style: str) -> Mapping[str, str]:
+        """Return what batches of a style can hide."""
+        return self.harder if style in {"c", "d"} and self.harder else self.effects
 
 
 def _named(effects: Mapping[str, Hidden[Any]], names: Iterable[str] = ()) -> dict[str, str]:
@@ -34,7 +41,7 @@ RECIPES = {
     "force": Recipe(force.make, _named(EFFECTS)),
     **{observable: Recipe(arm.make, _named(ARM_EFFECTS, names)) for observable, names in SHOWN.items()},
     "flatness": Recipe(faces.make, _named(FACE_EFFECTS)),
-    "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS)),
+    "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS), _named(HARDER_EFFECTS)),
 }
 # What can be made: a batch of each observable, and a factorial study of faces.
 KINDS = {**RECIPES, "study": Recipe(faces.make_study, _named(FACE_EFFECTS))}

@@ -1,0 +1,1 @@
+"""What real cells do, always on in styles ``c`` and ``d``: one module for each thing of the world."""

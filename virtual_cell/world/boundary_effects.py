@@ -1,0 +1,266 @@
+"""What tests on either side of the boundary hide in the harder world, made as things are made.
+
+An effect of the contract is asked for by the contract's parameters and built from the machine: a wear land of
+some width, bearings whose balls are thrown outwards, blows along the flats of a housing that is turned, a
+resonance of the fixture. What was built is then told back in the contract's terms, with the error of that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from virtual_cell.hidden import Hidden, Parameters, drawn_angle, drawn_signed, drawn_size
+from virtual_cell.units import DEG, N_MM, N_UM, UM, Array
+from virtual_cell.world.cutting_cell import Cell
+
+Told = tuple[Parameters, dict[str, float]]  # parameters of the contract, and the relative error of each
+_ASTRAY = 7.0  # degrees, by which a resonance of a fixture is off the axis that it is drawn for
+
+
+def _missing(rng: np.random.Generator, cell: Cell) -> Parameters:
+    r = cell.resonances
+    return {
+        "frequency_hz": drawn_size(rng, 0.55 * r.hz.min(), 1.15 * r.hz.max()),
+        "damping": drawn_size(rng, 0.012, 0.04),
+        "stiffness_n_um": drawn_size(rng, 0.25 * r.stiffness.min() / N_UM, 1.6 * r.stiffness.min() / N_UM),
+        "axis": str(rng.choice(["x", "y"])),
+    }
+
+
+def _fixture(cell: Cell, p: Parameters) -> Cell:
+    """Let the work stand on springs: as stiff along the axis as is asked for, and a little off it."""
+    side = 1.0 if cell.tool.runout_angle > math.pi else -1.0
+    heading = side * _ASTRAY * DEG
+    stiffness = p["stiffness_n_um"] * N_UM * math.cos(heading) ** 2
+    turned = heading + (0.5 * math.pi if p["axis"] == "y" else 0.0)
+    return replace(
+        cell, resonances=cell.resonances.with_one(p["frequency_hz"], p["damping"], stiffness, turned)
+    )
+
+
+def _worn_flank(cell: Cell, p: Parameters) -> Cell:
+    land = cell.flank.with_viscous(p["coefficient_n_mm"] * N_MM)
+    return replace(cell, flank=replace(cell.flank, land=land))
+
+
+def _turned_housing(cell: Cell, p: Parameters) -> Cell:
+    angle = p["angle_deg"] * DEG
+    return replace(cell, resonances=cell.resonances.turned(angle), flats=cell.flats + angle)
+
+
+def _loaded_bearings(cell: Cell, p: Parameters) -> Cell:
+    """Let balls be thrown outwards (softer), or the preload grow with heat (stiffer)."""
+    asked = p["change_per_krpm"] / 1000.0
+    bent = 2.0 if asked < 0.0 else 1.4
+    unit = replace(cell, spindle=replace(cell.spindle, bearing=1.0, bent=bent))
+    per_unit, _ = _slope(unit, _speeds(cell))
+    return replace(cell, spindle=replace(cell.spindle, bearing=asked / per_unit, bent=bent))
+
+
+def _speeds(cell: Cell) -> Array:
+    return np.linspace(0.4, 1.0, 13) * cell.fast
+
+
+def _slope(cell: Cell, rpm: Array) -> tuple[float, float]:
+    """Slope, per rev/min, nearest to how the stiffness of all modes changes; relative rms of the rest."""
+    r = cell.resonances
+    known = r.struck
+    weight = (1.0 / r.stiffness[known]) / np.sum(1.0 / r.stiffness[known])
+    change = np.outer(cell.bearings(rpm), r.bearing[known])
+    slope = float((rpm @ change @ weight) / (rpm @ rpm))
+    rest = float(np.sqrt(np.mean((change - slope * rpm[:, None]) ** 2 @ weight)))
+    return slope, rest / max(abs(slope) * float(np.sqrt(np.mean(rpm**2))), 1e-12)
+
+
+def _spread_of_headings(cell: Cell) -> float:
+    """Return the standard deviation, rad, of resonances off the flats, weighed by their compliance."""
+    r = cell.resonances
+    known = r.struck
+    off = np.mod(r.heading[known] - cell.flats + math.pi / 4.0, math.pi / 2.0) - math.pi / 4.0
+    weight = (1.0 / r.stiffness[known]) / np.sum(1.0 / r.stiffness[known])
+    return float(np.sqrt(weight @ off**2))
+
+
+def told(name: str, cell: Cell, asked: Parameters, rpm: Array) -> Told:
+    """Return what was built in the contract's terms, and the relative error of that.
+
+    Parameters
+    ----------
+    asked : parameters that it was built from. rpm : (n,) speeds that are tested.
+    """
+    if name == "process_damping":
+        worn = 1.0 + 0.5 * cell.flank.growth  # on the average over the programme
+        value = cell.flank.viscous * worn**2
+        steep = 0.3 * cell.feed * 2.0 * math.pi * float(cell.resonances.hz.min())
+        slope = steep / (float(np.median(rpm)) * 2.0 * math.pi / 60.0 * 0.5 * cell.tool.diameter)
+        off = math.hypot(1.0 - cell.flank.effective(slope), cell.flank.friction)
+        return {"coefficient_n_mm": round(value / N_MM, 2)}, {"coefficient_n_mm": round(off, 3)}
+    if name == "spindle_speed_softening":
+        slope, rest = _slope(cell, rpm)
+        return {"change_per_krpm": float(f"{1000.0 * slope:.4g}")}, {"change_per_krpm": round(rest, 3)}
+    if name == "mode_coupling":
+        spread = _spread_of_headings(cell)
+        return dict(asked), {"angle_deg": round(spread / max(abs(asked["angle_deg"]) * DEG, 1e-9), 3)}
+    if name == "missing_mode":
+        return dict(asked), {"stiffness_n_um": round(math.tan(_ASTRAY * DEG), 3)}
+    return dict(asked), {}
+
+
+def _odd(cell: Cell, **changes: float) -> Cell:
+    return replace(cell, mishap=replace(cell.mishap, **changes))
+
+
+def _later(rng: np.random.Generator) -> float:
+    return float(round(rng.uniform(0.3, 0.6), 2))
+
+
+def _spacing(rng: np.random.Generator, cell: Cell) -> Parameters:
+    """Teeth out of their even places by whole steps of the march."""
+    by = 6.0 * float(rng.integers(1, 4))
+    off = by * np.sin(2.0 * math.pi * (np.arange(cell.tool.teeth) + 0.3) / cell.tool.teeth)
+    return {"pitch_deg": [6.0 * round(float(e) / 6.0) for e in off - off[0]]}
+
+
+def _short_tooth(cell: Cell, p: Parameters) -> Cell:
+    reach = cell.tool.unequal.copy()
+    reach[p["tooth"] % cell.tool.teeth] -= p["length_um"] * UM
+    return replace(cell, tool=replace(cell.tool, unequal=reach))
+
+
+Draw = Callable[[np.random.Generator, Cell], Parameters]
+Apply = Callable[[Cell, Parameters], Cell]
+
+
+def _outside(parameters: str, draw: Draw, apply: Apply) -> Hidden[Cell]:
+    return Hidden(parameters, draw, apply)
+
+
+HARDER_EFFECTS: Mapping[str, Hidden[Cell]] = {
+    "missing_mode": Hidden("frequency_hz damping stiffness_n_um axis=x|y", _missing, _fixture),
+    "process_damping": Hidden(
+        "coefficient_n_mm", lambda r, _: {"coefficient_n_mm": drawn_size(r, 150.0, 4000.0)}, _worn_flank
+    ),
+    "mode_coupling": Hidden(
+        "angle_deg", lambda r, _: {"angle_deg": drawn_signed(r, 12.0, 75.0)}, _turned_housing
+    ),
+    "spindle_speed_softening": Hidden(
+        "change_per_krpm",
+        lambda r, c: {"change_per_krpm": drawn_signed(r, 120.0 / c.fast, 650.0 / c.fast)},
+        _loaded_bearings,
+    ),
+    # outside of any library
+    "speed_dependence": _outside(
+        "exponent",
+        lambda r, _: {"exponent": drawn_signed(r, 0.5, 2.0)},
+        lambda c, p: _odd(c, speed_exponent=p["exponent"]),
+    ),
+    "speed_damping": _outside(
+        "growth_at_fastest",
+        lambda r, _: {"growth_at_fastest": drawn_size(r, 0.6, 4.0)},
+        lambda c, p: replace(c, spindle=replace(c.spindle, damped=p["growth_at_fastest"])),
+    ),
+    "whirling_spindle": _outside(
+        "rate",
+        lambda r, _: {"rate": drawn_size(r, 0.3, 2.0)},
+        lambda c, p: replace(c, spindle=replace(c.spindle, whirl=p["rate"])),
+    ),
+    "spindle_sags": _outside(
+        "loss",
+        lambda r, _: {"loss": drawn_size(r, 0.03, 0.15)},
+        lambda c, p: replace(c, spindle=replace(c.spindle, sag=p["loss"])),
+    ),
+    "spindle_warms": _outside(
+        "change",
+        lambda r, _: {"change": drawn_signed(r, 0.15, 0.5)},
+        lambda c, p: replace(c, session=replace(c.session, warming=p["change"])),
+    ),
+    "work_gets_thinner": _outside(
+        "loss", lambda r, _: {"loss": drawn_size(r, 0.4, 0.85)}, lambda c, p: _thin(c, p["loss"])
+    ),
+    "tool_breaks_down": _outside(
+        "from_share harder duller",
+        lambda r, _: {
+            "from_share": _later(r),
+            "harder": drawn_size(r, 1.3, 2.0),
+            "duller": drawn_size(r, 2.0, 6.0),
+        },
+        lambda c, p: _odd(c, from_share=p["from_share"], harder=p["harder"], duller=p["duller"]),
+    ),
+    "another_bar": _outside(
+        "from_share harder",
+        lambda r, _: {"from_share": _later(r), "harder": drawn_size(r, 1.4, 2.5)},
+        lambda c, p: _odd(c, from_share=p["from_share"], harder=p["harder"]),
+    ),
+    "coolant_on": _outside(
+        "from_share wetter",
+        lambda r, _: {"from_share": _later(r), "wetter": drawn_size(r, 0.2, 0.6)},
+        lambda c, p: _odd(c, from_share=p["from_share"], wetter=p["wetter"]),
+    ),
+    "clamped_anew": _outside(
+        "stiffness",
+        lambda r, _: {"stiffness": float(r.choice([drawn_size(r, 0.35, 0.7), drawn_size(r, 1.4, 2.5)]))},
+        lambda c, p: _odd(c, clamped=p["stiffness"]),
+    ),
+    "loose_holder": _outside(
+        "gap_um loose",
+        lambda r, _: {"gap_um": drawn_size(r, 3.0, 40.0), "loose": float(round(r.uniform(0.3, 0.65), 2))},
+        lambda c, p: _odd(c, play=0.5 * p["gap_um"] * UM, loose=p["loose"]),
+    ),
+    "dry_friction": _outside(
+        "force_n",
+        lambda r, _: {"force_n": drawn_size(r, 10.0, 80.0)},
+        lambda c, p: _odd(c, friction=p["force_n"]),
+    ),
+    "chips_cut_again": _outside(
+        "growth", lambda r, _: {"growth": drawn_size(r, 0.5, 3.0)}, lambda c, p: _odd(c, clogging=p["growth"])
+    ),
+    "wavy_stock": _outside(
+        "height waves_per_turn",
+        lambda r, _: {
+            "height": drawn_size(r, 0.15, 0.8),
+            "waves_per_turn": float(round(r.uniform(0.15, 0.45), 3)),
+        },
+        lambda c, p: _odd(c, wavy=p["height"], waves=p["waves_per_turn"]),
+    ),
+    "short_tooth": _outside(
+        "tooth length_um",
+        lambda r, c: {
+            "tooth": int(r.integers(c.tool.teeth)),
+            "length_um": drawn_size(r, 0.5 * c.feed / UM, 2.5 * c.feed / UM),
+        },
+        _short_tooth,
+    ),
+    "tool_runout": _outside(
+        "radius_um angle_deg",
+        lambda r, c: {
+            "radius_um": drawn_size(r, 0.4 * c.feed / UM, 2.0 * c.feed / UM),
+            "angle_deg": drawn_angle(r),
+        },
+        lambda c, p: replace(
+            c, tool=replace(c.tool, runout=p["radius_um"] * UM, runout_angle=p["angle_deg"] * DEG)
+        ),
+    ),
+    "uneven_pitch": _outside(
+        "pitch_deg[]",
+        _spacing,
+        lambda c, p: replace(c, tool=replace(c.tool, uneven=tuple(angle * DEG for angle in p["pitch_deg"]))),
+    ),
+    "wrong_labels": _outside(
+        "share",
+        lambda r, _: {"share": drawn_size(r, 0.1, 0.35)},
+        lambda c, p: replace(c, mistaken=p["share"]),
+    ),
+}
+
+
+def _thin(cell: Cell, loss: float) -> Cell:
+    """Let the softest resonance near y be that of the work."""
+    r = cell.resonances
+    across = np.where(np.abs(np.sin(r.heading)) > 0.5, r.stiffness, np.inf)
+    bearing = r.bearing.copy()
+    bearing[int(np.argmin(across))] = 0.0
+    return _odd(replace(cell, resonances=replace(r, bearing=bearing)), thinner=loss)
