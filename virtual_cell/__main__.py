@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(json.dumps({name: dict(recipe.effects) for name, recipe in KINDS.items()}))
         return
     recipe = KINDS[options.command]
-    hidden = dict(_effect(words, recipe.effects) for words in options.effect)
+    hidden = dict(_effect(words, recipe.hides(options.style)) for words in options.effect)
     truth = recipe.make(options.folder, hidden, options.seed, options.style)
     path = options.truth or options.folder.parent / f"{options.folder.name}.truth.json"
     path.write_text(json.dumps(truth, indent=1) + "\n")

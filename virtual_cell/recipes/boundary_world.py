@@ -141,7 +141,7 @@ def climbed(cell: Cell, programme: Programme, rng: np.random.Generator) -> Ladde
         teeth=cell.tool.teeth,
         feed=cell.feed,
     )
-    loud = np.where(course.broken, np.inf, loud)
+    loud = np.where(course.stopped, np.inf, loud)
     return Ladder(plan, course, climb, step, np.array([climbs[i][2] for i in climb]), loud)
 
 
@@ -167,15 +167,16 @@ def _kept(ladder: Ladder, programme: Programme) -> tuple[np.ndarray, np.ndarray]
 
 def _row(cell: Cell, programme: Programme, ladder: Ladder, test: int) -> Row:
     rpm, kind = float(ladder.plan.rpm[test]), ladder.plan.direction[test]
+    depth = round(float(ladder.plan.depth[test]) / MM, 3)
     return {
         "role": "validate" if rpm in programme.held_out else "identify",
-        "condition": f"{rpm:g}-{kind}" if len(programme.kinds) > 1 else f"{rpm:g}",
+        "condition": f"{rpm:g}-{kind}-{depth:g}",
         "replicate": int(ladder.replicate[test]),
         "operation": "slot" if kind == "slot" else "side",
         "spindle_rpm": rpm,
         "feed_per_tooth_mm": round(cell.feed / MM, 6),
-        "axial_depth_mm": round(float(ladder.plan.depth[test]) / MM, 3),
-        "radial_depth_mm": round(cell.radial / MM, 6),
+        "axial_depth_mm": depth,
+        "radial_depth_mm": round((cell.tool.diameter if kind == "slot" else cell.radial) / MM, 6),
         "direction": kind,
         "feed_direction_deg": 0.0,
         "cut_length_mm": round(cell.feed / MM * cell.tool.teeth * programme.turns, 1),
@@ -191,7 +192,8 @@ def _recorded(
     seconds, per_turn = course.seconds[test], programme.per_turn
     at = np.concatenate([[0.0], np.cumsum(np.repeat(seconds / per_turn, per_turn))])[:-1]
     force = course.force[test]
-    first = at[(programme.turns - _RECORDED) * per_turn]
+    end = int(course.made[test])
+    first = at[max(0, end - _RECORDED) * per_turn]
     sensor = Dynamometer(
         programme.rate, "work", programme.crosstalk, noise=programme.noise, resonance=programme.resonance
     )
@@ -199,7 +201,7 @@ def _recorded(
     def on_tool(t: Array) -> Array:
         return np.stack([np.interp(t + first, at, force[:, axis]) for axis in range(3)], axis=1)
 
-    time, read = record(sensor, on_tool, float(at[-1] - first) - 0.03, rng)
+    time, read = record(sensor, on_tool, float(at[end * per_turn - 1] - first), rng)
     hum = np.sin(2.0 * math.pi * programme.mains_hz * time[:, None] + rng.uniform(0.0, 6.3, 3))
     return time, read + programme.mains * hum
 

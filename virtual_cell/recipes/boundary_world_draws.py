@@ -78,8 +78,7 @@ def drawn_cell(rng: np.random.Generator) -> Cell:
     metal[:5] *= np.exp(rng.normal(0.0, 0.1, 5))
     diameter = float(rng.choice([8.0, 10.0, 12.0, 16.0, 20.0, 25.0])) * MM
     teeth = int(rng.choice([2, 3, 4, 5], p=[0.3, 0.3, 0.3, 0.1]))
-    direction = str(rng.choice(["down", "up", "slot"], p=[0.45, 0.35, 0.2]))
-    swept = 180.0 if direction == "slot" else _CELL_DEG * int(rng.integers(7, 21))
+    swept = _CELL_DEG * int(rng.integers(7, 21))
     law = Law(*(metal[:3] * N_MM2).tolist(), *(metal[3:5] * N_MM).tolist(), between(rng, 2.0, 8.0) * UM)
     pressure, viscous = float(metal[5]), between(rng, 1.0, 15.0) * N_MM
     flank = Flank(
@@ -102,7 +101,7 @@ def drawn_cell(rng: np.random.Generator) -> Cell:
         _session(rng),
         feed=round(float(rng.uniform(0.04, 0.1)), 3) * MM,
         radial=0.5 * diameter * (1.0 - math.cos(swept * DEG)),
-        direction=direction,
+        direction=str(rng.choice(["down", "up", "slot"], p=[0.45, 0.4, 0.15])),
         fast=60.0 * float(resonances.hz.max()) / 5.0,
     )
 
@@ -160,18 +159,17 @@ def _resonances(rng: np.random.Generator) -> Resonances:
     bearing = rng.uniform(0.3, 0.95, m)
     if rng.random() < 0.5:  # the least soft one is of the work or its fixture
         bearing[int(np.argmax(stiffness))] = 0.0
-    shared = np.eye(m)
-    upper = np.triu_indices(m, 1)
-    apart = np.abs(np.subtract.outer(heading, heading))[upper]
-    shared[upper] = rng.uniform(-0.3, 0.3, len(apart)) * np.abs(np.cos(apart * DEG))
-    shared = shared + shared.T - np.eye(m)
+    apart = np.subtract.outer(heading, heading) * DEG
+    joint = np.triu(rng.uniform(-0.3, 0.3, (m, m)) * np.abs(np.cos(apart)), 1)
+    joint = joint + joint.T
+    joint *= min(1.0, 0.8 / max(float(-np.linalg.eigvalsh(joint).min()), 1e-9))  # no motion gains energy
     damping = np.array([between(rng, 0.015, 0.05) for _ in range(m)])
     return Resonances(
         np.array(hz),
         damping,
         np.array(stiffness),
         np.array(heading) * DEG,
-        shared,
+        np.eye(m) + joint,
         bearing,
         np.ones(m, dtype=bool),
     )
@@ -194,8 +192,8 @@ def drawn_programme(rng: np.random.Generator, cell: Cell, style: str) -> Program
         apart = np.sort(np.concatenate([apart[: count - 2], rng.uniform(apart[0], apart[-1], 2)]))
     speeds = np.unique(10.0 * np.round(np.interp(apart, [apart[0], apart[-1]], ends) / 10.0))
     held = 1 + rng.permutation(len(speeds) - 2)[: round(len(speeds) / (4.0 if other else 3.5))]
-    both = cell.direction != "slot" and rng.random() < (0.4 if other else 0.5)
-    kinds = (cell.direction, {"up": "down", "down": "up"}[cell.direction]) if both else (cell.direction,)
+    second = {"up": "down", "down": "up", "slot": str(rng.choice(["up", "down"]))}[cell.direction]
+    kinds = (cell.direction, second) if rng.random() < 0.65 else (cell.direction,)
     ratio = float(rng.uniform(1.12, 1.28))
     shallow = cell.level * float(rng.uniform(0.35, 0.55))
     steps = math.ceil(math.log(16.0) / math.log(ratio))

@@ -90,14 +90,20 @@ class Cuts:
 class Course:
     """What happened: tip (n, steps, 2), m, over the last turns; force on the tool (n, steps, 3), N, or None.
 
-    ``seconds``: (n, turns) each turn took. ``broken``: (n,) whether the test was stopped, since the tip
-    strayed by many feeds: nobody goes on with such a cut, and no law of the force holds for it.
+    ``seconds``: (n, turns) each turn took. ``made``: (n,) turns until the test was stopped, all where it was
+    not: nobody goes on when the tip strays by many feeds, and no law of the force holds for it.
     """
 
     tip: Array
     force: Array | None
     seconds: Array
-    broken: np.ndarray
+    made: np.ndarray
+
+    @property
+    def stopped(self) -> np.ndarray:
+        """(n,) whether a test was stopped."""
+        stopped: np.ndarray = self.made < self.seconds.shape[1]
+        return stopped
 
 
 def march(cuts: Cuts, per_turn: int, last: int, rng: np.random.Generator, *, forces: bool = False) -> Course:
@@ -119,15 +125,16 @@ def march(cuts: Cuts, per_turn: int, last: int, rng: np.random.Generator, *, for
     kept = np.zeros((n, turns * per_turn, 3), dtype=np.float32) if forces else None
     before = np.zeros((n, 2))
     surface_speed = cuts.rpm * RPM * cuts.radius
-    broken = np.zeros(n, dtype=bool)
+    going, made = np.ones(n, dtype=bool), np.zeros(n, dtype=int)
     for turn in range(turns):
         slower = -cuts.speed[:, turn]  # a slower turn takes longer
         step, pushed = _stretched(exact, push, rated, slower)
         into_slope = 1.0 / (surface_speed * (1.0 + cuts.speed[:, turn]))
         factor = cuts.strength * cuts.clog[:, turn, None]
-        broken |= np.abs(state[:, :m] @ lines).max(axis=1) > _MOST_FEEDS * cuts.feed
-        state[broken] = 0.0
-        entered = np.where(broken, 0.0, cuts.depth * cuts.wave[:, turn])
+        going &= np.abs(state[:, :m] @ lines).max(axis=1) < _MOST_FEEDS * cuts.feed
+        made += going
+        state[~going] = 0.0
+        entered = np.where(going, cuts.depth * cuts.wave[:, turn], 0.0)
         rough = 1.0 + cuts.grain * rng.standard_normal((per_turn, n))
         for k in range(per_turn):
             i = turn * per_turn + k
@@ -150,7 +157,7 @@ def march(cuts: Cuts, per_turn: int, last: int, rng: np.random.Generator, *, for
             before = load
             state = np.matmul(step, state[:, :, None])[:, :, 0] + np.matmul(pushed, held[:, :, None])[:, :, 0]
     seconds = 60.0 / (cuts.rpm[:, None] * (1.0 + cuts.speed))
-    return Course(tips, kept, seconds, broken)
+    return Course(tips, kept, seconds, made)
 
 
 def _held(cuts: Cuts, dt: Array) -> tuple[Array, Array]:

@@ -15,6 +15,9 @@ from virtual_cell.world.chatter import Cuts, Law
 from virtual_cell.world.flank import Flank
 from virtual_cell.world.resonances import Resonances, state_matrices
 
+_SLIDING = 3e-4  # m/s, from which on dry friction is full
+_CLOGGED = 0.25  # of the turns in which chips are cut again, where they are
+
 
 @dataclass(frozen=True)
 class Spindle:
@@ -134,8 +137,10 @@ class Cell:
 
     Attributes
     ----------
-    feed, radial : m. direction : up, down or slot, of the first kind of cut. fast : about the fastest speed
-        tested, rev/min. flats : rad, by which the directions that were struck are turned from x and y.
+    feed, radial : m, radial of cuts that are no slots.
+    direction : up, down or slot, of the first kind of cut. fast : about the fastest speed tested, rev/min.
+    flats : rad, by which the directions that were struck are turned from x and y.
+    mistaken : share of labels that are exchanged.
     """
 
     resonances: Resonances
@@ -217,7 +222,7 @@ def made(cell: Cell, plan: Plan, turns: int, rng: np.random.Generator) -> Cuts:
     entry, leave = np.array([cell.immersion(direction) for direction in plan.direction]).T
     softest = [float(cell.resonances.stiffness[near].min()) for near in _near_axes(cell.resonances)]
     clog = 1.0 + np.where(
-        rng.random((n, turns)) < 0.25,
+        rng.random((n, turns)) < _CLOGGED,
         odd.clogging * true_depth[:, None] / level * rng.random((n, turns)) * 2.0,
         0.0,
     )
@@ -234,7 +239,7 @@ def made(cell: Cell, plan: Plan, turns: int, rng: np.random.Generator) -> Cuts:
         play=odd.play,
         play_force=(odd.loose * softest[0], odd.loose * softest[1]),
         friction=(odd.friction, odd.friction),
-        sliding=2e-4,
+        sliding=_SLIDING,
     )
 
 
