@@ -41,7 +41,7 @@ def _parser() -> argparse.ArgumentParser:
     every.add_argument("root", type=Path)
     commands.add_parser("effects", help="list as JSON what each kind of batch can hide, with its parameters")
     for name, recipe in KINDS.items():
-        hidden = ", ".join(recipe.effects)
+        hidden = ", ".join({**recipe.effects, **recipe.harder})
         one = commands.add_parser(
             name, help=f"make a {name} batch; the truth goes beside the folder, not into it"
         )

@@ -14,13 +14,15 @@ from virtual_cell.recipes import arm, boundary, faces, force
 from virtual_cell.world.boundary_effects import HARDER_EFFECTS
 from virtual_cell.write import Row
 
+HARDER = ("c", "d")  # styles of the harder world
+
 
 @dataclass(frozen=True)
 class Recipe:
     """``make(folder, hidden, seed, style)`` a batch that hides some of the ``effects``; return the truth.
 
-    ``effects``: their parameters by their names, as :class:`virtual_cell.hidden.Hidden` has them.
-    ``harder``: those that styles ``c`` and ``d`` can hide, where they are others.
+    ``effects``: their parameters by their names, as :class:`virtual_cell.hidden.Hidden` has them; ``harder``:
+    those of the harder world, where it hides others.
     """
 
     make: Callable[[Path, Mapping[str, Parameters | None], int, str], Row]
@@ -28,8 +30,8 @@ class Recipe:
     harder: Mapping[str, str] = field(default_factory=dict)
 
     def hides(self, style: str) -> Mapping[str, str]:
-        """Return what batches of a style can hide."""
-        return self.harder if style in {"c", "d"} and self.harder else self.effects
+        """Return what a batch of a style can hide, with its parameters."""
+        return self.harder if style in HARDER and self.harder else self.effects
 
 
 def _named(effects: Mapping[str, Hidden[Any]], names: Iterable[str] = ()) -> dict[str, str]:

@@ -22,8 +22,8 @@ from virtual_cell.world.cutting_cell import Cell, Plan, made
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, impact_row, write_csv, write_signal, write_yaml
 
 STYLES = ("c", "d")
-_LAST = 20  # turns that are listened to
-_WITHIN = 0.7  # of the speeds: a boundary within the ladder
+_LAST = 22  # turns that are listened to
+_WITHIN = 0.72  # of the speeds: a boundary within the ladder
 _RECORDED = 45  # turns
 
 
@@ -219,7 +219,7 @@ def _impacts(folder: Path, cell: Cell, programme: Programme, rng: np.random.Gene
                 rows.append(impact_row(f"1{axis}", file, "record", "m/s2", i))
             continue
         frequency, frf, coherence = hammer.averaged(records, used.rate)
-        inside = frequency < 1.1 * used.tip_hz
+        inside = frequency < 1.07 * used.tip_hz
         file = f"impacts/1{axis}.parquet"
         columns = {"frequency_hz": frequency, "real": frf.real, "imag": frf.imag, "coherence": coherence}
         write_signal(folder / file, {name: values[inside] for name, values in columns.items()})

@@ -19,7 +19,7 @@ from virtual_cell.world.resonances import Resonances
 
 # Tangential, radial and axial chip force in N/mm², ploughing in N/mm, force of a squeezed volume in N/m³.
 _METALS = (
-    (760.0, 210.0, 180.0, 16.0, 18.0, 1.5e14),  # AA7075
+    (760.0, 210.0, 180.0, 16.0, 17.5, 1.5e14),  # AA7075
     (560.0, 240.0, 120.0, 9.0, 10.0, 1.2e14),  # AlMgSi
     (1750.0, 700.0, 350.0, 26.0, 38.0, 1.9e14),  # Ti6Al4V
     (2050.0, 1150.0, 300.0, 22.0, 34.0, 4.0e14),  # carbon steel
@@ -115,7 +115,7 @@ def _spindle(rng: np.random.Generator) -> Spindle:
         wander_s=between(rng, 0.2, 5.0),
         droop=between(rng, 5e-4, 5e-3),
         bearing=between(rng, 2e-3, 3e-2) * (-1.0 if softer else 1.0),
-        bent=2.0 if softer else float(rng.uniform(1.0, 1.6)),
+        bent=2.0 if softer else float(rng.uniform(1.0, 1.55)),
         damped=between(rng, 0.01, 0.1),
     )
 
@@ -142,10 +142,10 @@ def _resonances(rng: np.random.Generator) -> Resonances:
     for axis in (0.0, 90.0):
         count = int(rng.choice([1, 2, 3], p=[0.45, 0.35, 0.2]))
         hz += (
-            first * rng.uniform(0.85, 1.2) * np.cumprod([1.0, *rng.uniform(1.18, 1.5, count - 1)])
+            first * rng.uniform(0.85, 1.18) * np.cumprod([1.0, *rng.uniform(1.18, 1.5, count - 1)])
         ).tolist()
         stiffness += (
-            soft * rng.uniform(0.8, 1.6) * np.array([1.0, *rng.uniform(0.9, 3.0, count - 1)])
+            soft * rng.uniform(0.8, 1.65) * np.array([1.0, *rng.uniform(0.9, 3.0, count - 1)])
         ).tolist()
         heading += (
             axis + rng.choice([-1.0, 1.0], count) * [between(rng, 0.5, 5.0) for _ in range(count)]
@@ -156,7 +156,7 @@ def _resonances(rng: np.random.Generator) -> Resonances:
         stiffness.append(stiffness[twin] * between(rng, 1.5, 5.0))
         heading.append(heading[twin] + float(rng.normal(0.0, 5.0)))
     m = len(hz)
-    bearing = rng.uniform(0.3, 0.95, m)
+    bearing = rng.uniform(0.3, 0.93, m)
     if rng.random() < 0.5:  # the least soft one is of the work or its fixture
         bearing[int(np.argmax(stiffness))] = 0.0
     apart = np.subtract.outer(heading, heading) * DEG
@@ -186,14 +186,14 @@ def drawn_programme(rng: np.random.Generator, cell: Cell, style: str) -> Program
     highest = float(cell.resonances.hz.max())
     count = int(rng.integers(10, 19)) if other else int(rng.integers(12, 17))
     lowest = 60.0 * highest / rng.uniform(7.0, 11.5)  # more waves per turn are more than the march can
-    ends = (lowest, min(lowest * rng.uniform(1.8, 3.2), cell.fast * 1.3))
+    ends = (lowest, min(lowest * rng.uniform(1.8, 3.2), cell.fast * 1.27))
     apart = np.cumsum(rng.uniform(0.5, 1.5, count))
     if other:  # people like to look where a lobe is high: some speeds lie close together
         apart = np.sort(np.concatenate([apart[: count - 2], rng.uniform(apart[0], apart[-1], 2)]))
     speeds = np.unique(10.0 * np.round(np.interp(apart, [apart[0], apart[-1]], ends) / 10.0))
     held = 1 + rng.permutation(len(speeds) - 2)[: round(len(speeds) / (4.0 if other else 3.5))]
     second = {"up": "down", "down": "up", "slot": str(rng.choice(["up", "down"]))}[cell.direction]
-    kinds = (cell.direction, second) if rng.random() < 0.65 else (cell.direction,)
+    kinds = (cell.direction, second) if rng.random() < 0.78 else (cell.direction,)
     ratio = float(rng.uniform(1.12, 1.28))
     shallow = cell.level * float(rng.uniform(0.35, 0.55))
     steps = math.ceil(math.log(16.0) / math.log(ratio))
@@ -219,7 +219,7 @@ def drawn_programme(rng: np.random.Generator, cell: Cell, style: str) -> Program
         mains_hz=float(rng.choice([50.0, 60.0])),
         crosstalk=crosstalk,
         noise=between(rng, 0.3, 3.0),
-        resonance=tuple((between(rng, 1200.0, 4000.0), between(rng, 0.02, 0.06)) for _ in range(3)),
+        resonance=tuple((between(rng, 1150.0, 4000.0), between(rng, 0.02, 0.06)) for _ in range(3)),
         impact_files=str(rng.choice(["frf", "record"])) if other else "frf",
         hammer=hammer.drawn(rng, highest),
         ears=ears.drawn(rng),

@@ -26,7 +26,7 @@ def _missing(rng: np.random.Generator, cell: Cell) -> Parameters:
     return {
         "frequency_hz": drawn_size(rng, 0.55 * r.hz.min(), 1.15 * r.hz.max()),
         "damping": drawn_size(rng, 0.012, 0.04),
-        "stiffness_n_um": drawn_size(rng, 0.2 * r.stiffness.min() / N_UM, r.stiffness.min() / N_UM),
+        "stiffness_n_um": drawn_size(rng, 0.3 * r.stiffness.min() / N_UM, 1.5 * r.stiffness.min() / N_UM),
         "axis": str(rng.choice(["x", "y"])),
     }
 
@@ -158,14 +158,14 @@ def _short_tooth(cell: Cell, p: Parameters) -> Cell:
 HARDER_EFFECTS: Mapping[str, Hidden[Cell]] = {
     "missing_mode": Hidden("frequency_hz damping stiffness_n_um axis=x|y", _missing, _fixture),
     "process_damping": Hidden(
-        "coefficient_n_mm", lambda r, _: {"coefficient_n_mm": drawn_size(r, 250.0, 4000.0)}, _worn_flank
+        "coefficient_n_mm", lambda r, _: {"coefficient_n_mm": drawn_size(r, 200.0, 3000.0)}, _worn_flank
     ),
     "mode_coupling": Hidden(
-        "angle_deg", lambda r, _: {"angle_deg": drawn_signed(r, 10.0, 70.0)}, _turned_housing
+        "angle_deg", lambda r, _: {"angle_deg": drawn_signed(r, 12.0, 70.0)}, _turned_housing
     ),
     "spindle_speed_softening": Hidden(
         "change_per_krpm",
-        lambda r, c: {"change_per_krpm": drawn_signed(r, 50.0 / c.fast, 400.0 / c.fast)},
+        lambda r, c: {"change_per_krpm": drawn_signed(r, 60.0 / c.fast, 350.0 / c.fast)},
         _loaded_bearings,
     ),
     # outside of any library
@@ -201,7 +201,7 @@ HARDER_EFFECTS: Mapping[str, Hidden[Cell]] = {
         "from_share harder duller",
         lambda r, _: {
             "from_share": _later(r),
-            "harder": drawn_size(r, 1.3, 2.0),
+            "harder": drawn_size(r, 1.35, 2.0),
             "duller": drawn_size(r, 2.0, 6.0),
         },
         lambda c, p: _odd(c, from_share=p["from_share"], harder=p["harder"], duller=p["duller"]),
@@ -223,7 +223,7 @@ HARDER_EFFECTS: Mapping[str, Hidden[Cell]] = {
     ),
     "loose_holder": Hidden(
         "gap_um loose",
-        lambda r, _: {"gap_um": drawn_size(r, 3.0, 40.0), "loose": float(round(r.uniform(0.3, 0.65), 2))},
+        lambda r, _: {"gap_um": drawn_size(r, 3.0, 40.0), "loose": float(round(r.uniform(0.3, 0.62), 2))},
         lambda c, p: _odd(c, play=0.5 * p["gap_um"] * UM, loose=p["loose"]),
     ),
     "dry_friction": Hidden(

@@ -16,7 +16,7 @@ from virtual_cell.world.flank import Flank
 from virtual_cell.world.resonances import Resonances, state_matrices
 
 _SLIDING = 3e-4  # m/s, from which on dry friction is full
-_CLOGGED = 0.25  # of the turns in which chips are cut again, where they are
+_CLOGGED = 0.22  # of the turns in which chips are cut again, where they are
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,8 @@ class Tool:
     @property
     def reach(self) -> Array:
         """(N,) by which each tooth cuts further than nominal, m."""
-        return self.unequal + self.runout * np.cos(self.angles - self.runout_angle)
+        reach: Array = self.unequal + self.runout * np.cos(self.angles - self.runout_angle)
+        return reach
 
 
 @dataclass(frozen=True)
@@ -182,8 +183,8 @@ class Cell:
         r = self.resonances
         of_spindle = 1.0 + self.bearings(rpm)[:, None] * r.bearing
         of_work = 1.0 - self.mishap.thinner * progress[:, None] * (r.bearing == 0.0)
-        whole: Array = of_spindle * of_work * (1.0 + self.session.warming * progress[:, None])
-        return np.maximum(whole * self.mishap.clamped, 0.1)
+        whole = of_spindle * of_work * (1.0 + self.session.warming * progress[:, None])
+        return np.asarray(np.maximum(whole * self.mishap.clamped, 0.1))
 
 
 @dataclass(frozen=True)

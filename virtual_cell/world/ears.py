@@ -66,7 +66,7 @@ def loudness(
 
 def scatter_for(ears: Ears, loud: Array) -> float:
     """Scatter of the logarithm of the loudness at which the two differ on so many of these tests (n,)."""
-    low, high = 1e-3, 30.0
+    low, high = 7e-4, 30.0
     for _ in range(60):
         middle = math.sqrt(low * high)
         low, high = (middle, high) if disagreement(ears, loud, middle) < ears.disagreement else (low, middle)

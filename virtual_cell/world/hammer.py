@@ -15,7 +15,7 @@ from virtual_cell.noise import sensor_noise
 from virtual_cell.units import DEG, Array
 from virtual_cell.world.resonances import Resonances
 
-_PRE, _LONGER = 0.03, 3  # s before the blow; length that is computed over the one recorded
+_PRE, _LONGER = 0.023, 3  # s before the blow; length that is computed over the one recorded
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class Hammer:
 
     @property
     def pulse(self) -> float:
-        """Width of the half-sine, s: the spectrum of one of width T falls to a tenth at 1.30 / T."""
-        return 1.30 / self.tip_hz
+        """Width of the half-sine, s: the spectrum of one of width T falls to a tenth at 1.304 / T."""
+        return 1.304 / self.tip_hz
 
 
 def drawn(rng: np.random.Generator, highest: float) -> Hammer:
@@ -62,7 +62,7 @@ def drawn(rng: np.random.Generator, highest: float) -> Hammer:
         seconds=float(rng.choice([1.0, 2.0])),
         hits=int(rng.integers(3, 8)),
         peak=_between(rng, 80.0, 600.0),
-        tip_hz=_between(rng, max(1000.0, 1.25 * highest), 3000.0),
+        tip_hz=_between(rng, max(1000.0, 1.23 * highest), 3000.0),
         astray=tuple((signs * [_between(rng, 2.0, 10.0) * DEG for _ in range(2)]).tolist()),
         scatter=_between(rng, 0.5, 3.0) * DEG,
         sensor_astray=tuple((rng.normal(0.0, 1.5, 2) * DEG).tolist()),
@@ -89,7 +89,7 @@ def struck(
     count = round(hammer.seconds * hammer.rate)
     frequency = np.fft.rfftfreq(count * _LONGER, 1.0 / hammer.rate)
     accelerance = -((2.0 * math.pi * frequency[:, None, None]) ** 2) * felt.receptance(frequency, hammer.mass)
-    records = []
+    records: list[dict[str, Array]] = []
     for _ in range(hammer.hits):
         along = aimed + hammer.astray[axis] + hammer.scatter * rng.standard_normal()
         force, spectrum = _blow(hammer, count, frequency, rng)
@@ -104,7 +104,7 @@ def struck(
 def _blow(hammer: Hammer, count: int, frequency: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Force (count,) of a blow, behind its anti-alias filter, and its spectrum over the longer time."""
     width = hammer.pulse * rng.uniform(0.85, 1.15)
-    pulses = [(_PRE + rng.uniform(0.0, 0.01), hammer.peak * rng.uniform(0.5, 1.3))]
+    pulses = [(_PRE + rng.uniform(0.0, 0.01), hammer.peak * rng.uniform(0.5, 1.4))]
     if rng.random() < hammer.double:
         pulses.append((pulses[0][0] + rng.uniform(0.01, 0.06), pulses[0][1] * rng.uniform(0.05, 0.4)))
     omega = 2.0 * math.pi * frequency
