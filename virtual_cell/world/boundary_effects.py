@@ -161,7 +161,7 @@ HARDER_EFFECTS: Mapping[str, Hidden[Cell]] = {
         "coefficient_n_mm", lambda r, _: {"coefficient_n_mm": drawn_size(r, 200.0, 3000.0)}, _worn_flank
     ),
     "mode_coupling": Hidden(
-        "angle_deg", lambda r, _: {"angle_deg": drawn_signed(r, 12.0, 70.0)}, _turned_housing
+        "angle_deg", lambda r, _: {"angle_deg": drawn_signed(r, 20.0, 70.0)}, _turned_housing
     ),
     "spindle_speed_softening": Hidden(
         "change_per_krpm",
