@@ -79,7 +79,9 @@ def drawn_cell(rng: np.random.Generator) -> Cell:
     diameter = float(rng.choice([8.0, 10.0, 12.0, 16.0, 20.0, 25.0])) * MM
     teeth = int(rng.choice([2, 3, 4, 5], p=[0.3, 0.3, 0.3, 0.1]))
     swept = _CELL_DEG * int(rng.integers(7, 21))
-    law = Law(*(metal[:3] * N_MM2).tolist(), *(metal[3:5] * N_MM).tolist(), between(rng, 2.0, 8.0) * UM)
+    ktc, krc, kac = (metal[:3] * N_MM2).tolist()
+    kte, kre = (metal[3:5] * N_MM).tolist()
+    law = Law(ktc, krc, kac, kte, kre, thin=between(rng, 2.0, 8.0) * UM)
     pressure, viscous = float(metal[5]), between(rng, 1.0, 15.0) * N_MM
     flank = Flank(
         land=math.sqrt(2.0 * viscous / pressure),
