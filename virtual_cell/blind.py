@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
 from virtual_cell.face_effects import FACE_EFFECTS
-from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Hidden, Parameters
+from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Parameters
 from virtual_cell.recipes import arm, boundary, faces, force, force_world
+from virtual_cell.world.boundary_effects import HARDER_EFFECTS
 from virtual_cell.world.face_causes import FACE_CAUSES
 from virtual_cell.write import Row
 
@@ -34,7 +35,16 @@ class Recipe:
         return self.harder if style in HARDER and self.harder else self.effects
 
 
-def _named(effects: Mapping[str, Hidden[Any]], names: Iterable[str] = ()) -> dict[str, str]:
+class Parametrised(Protocol):
+    """What can be hidden: it names its parameters."""
+
+    @property
+    def parameters(self) -> str:
+        """As :class:`virtual_cell.hidden.Hidden` has them."""
+        ...
+
+
+def _named(effects: Mapping[str, Parametrised], names: Iterable[str] = ()) -> dict[str, str]:
     """Return the parameters of some effects, or of all."""
     return {name: effects[name].parameters for name in names or effects}
 
@@ -43,7 +53,7 @@ RECIPES = {
     "force": Recipe(force.make, _named(EFFECTS), _named(force_world.HARDER)),
     **{observable: Recipe(arm.make, _named(ARM_EFFECTS, names)) for observable, names in SHOWN.items()},
     "flatness": Recipe(faces.make, _named(FACE_EFFECTS), _named(FACE_CAUSES)),
-    "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS)),
+    "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS), _named(HARDER_EFFECTS)),
 }
 # What can be made: a batch of each observable, and a factorial study of faces.
 KINDS = {**RECIPES, "study": Recipe(faces.make_study, _named(FACE_EFFECTS))}

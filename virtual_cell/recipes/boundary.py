@@ -21,6 +21,7 @@ from virtual_cell.hammer import receptance
 from virtual_cell.hidden import BOUNDARY_EFFECTS, Parameters
 from virtual_cell.milling import in_millimetres
 from virtual_cell.modes import Modes
+from virtual_cell.recipes import boundary_world
 from virtual_cell.recipes.boundary_draws import drawn_machine, drawn_programme
 from virtual_cell.regeneration import History, Trials, march
 from virtual_cell.session import write_force
@@ -146,7 +147,7 @@ def make(
     ----------
     hidden : effects by name, with their parameters; None: drawn by the seed.
     seed : of machine and tests. None: those that are always the same.
-    style : in which the tests are drawn.
+    style : in which the tests are drawn; ``c`` and ``d`` are those of the harder world.
     records : write the record of every test, whatever is drawn. A label that a record shows cannot be wrong:
         where labels are wrong, none is drawn.
 
@@ -155,6 +156,8 @@ def make(
     KeyError
         For an effect that is not known.
     """
+    if style in boundary_world.STYLES:
+        return boundary_world.make(folder, hidden or {}, seed or 0, style, records=records)
     if seed is None:
         machine, programme = MACHINE, replace(PROGRAMME, records=records)
         rng = np.random.default_rng(1911)
