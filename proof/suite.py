@@ -65,10 +65,10 @@ def draw(batches: int, seed: int, known: Sequence[str], unknown: Sequence[str]) 
     ]
 
 
-def sides(observable: str = DEFAULT) -> tuple[list[str], list[str]]:
+def sides(observable: str = DEFAULT, style: str = "b") -> tuple[list[str], list[str]]:
     """Name what the simulator can hide: effects of the library; others that it lacks or only resembles."""
     inside = {effect.name for effect in library(observable) if not effect.resembled}
-    names = RECIPES[observable].effects
+    names = RECIPES[observable].hides(style)
     known, unknown = ([name for name in names if (name in inside) is asked] for asked in (True, False))
     return known, unknown
 
@@ -83,7 +83,7 @@ def make(out: Layout, batches: int, seed: int, style: str, jobs: int, *, observa
     """
     if out.batches:
         raise FileExistsError(f"{out.raw} holds batches already: give another folder")
-    drawn = draw(batches, seed, *sides(observable))
+    drawn = draw(batches, seed, *sides(observable, style))
     out.raw.mkdir(parents=True, exist_ok=True)
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:

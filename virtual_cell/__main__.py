@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(json.dumps({name: dict(recipe.effects) for name, recipe in KINDS.items()}))
         return
     recipe = KINDS[options.command]
-    hidden = dict(_effect(words, recipe.effects) for words in options.effect)
+    hidden = dict(_effect(words, recipe.hides(options.style)) for words in options.effect)
     truth = recipe.make(options.folder, hidden, options.seed, options.style)
     path = options.truth or options.folder.parent / f"{options.folder.name}.truth.json"
     path.write_text(json.dumps(truth, indent=1) + "\n")
@@ -41,7 +41,7 @@ def _parser() -> argparse.ArgumentParser:
     every.add_argument("root", type=Path)
     commands.add_parser("effects", help="list as JSON what each kind of batch can hide, with its parameters")
     for name, recipe in KINDS.items():
-        hidden = ", ".join(recipe.effects)
+        hidden = ", ".join({**recipe.effects, **recipe.harder})
         one = commands.add_parser(
             name, help=f"make a {name} batch; the truth goes beside the folder, not into it"
         )

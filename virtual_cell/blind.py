@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +11,28 @@ from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
 from virtual_cell.face_effects import FACE_EFFECTS
 from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Hidden, Parameters
 from virtual_cell.recipes import arm, boundary, faces, force
+from virtual_cell.world.arm_causes import ARM_CAUSES
+from virtual_cell.world.arm_causes import SHOWN as WORLD_SHOWN
 from virtual_cell.write import Row
+
+HARDER = ("c", "d")  # styles of the harder world
 
 
 @dataclass(frozen=True)
 class Recipe:
     """``make(folder, hidden, seed, style)`` a batch that hides some of the ``effects``; return the truth.
 
-    ``effects``: their parameters by their names, as :class:`virtual_cell.hidden.Hidden` has them.
+    ``effects``: their parameters by their names, as :class:`virtual_cell.hidden.Hidden` has them; ``harder``:
+    those of the harder world, where it hides others.
     """
 
     make: Callable[[Path, Mapping[str, Parameters | None], int, str], Row]
     effects: Mapping[str, str]
+    harder: Mapping[str, str] = field(default_factory=dict)
+
+    def hides(self, style: str) -> Mapping[str, str]:
+        """Return what a batch of a style can hide, with its parameters."""
+        return self.harder if style in HARDER and self.harder else self.effects
 
 
 def _named(effects: Mapping[str, Hidden[Any]], names: Iterable[str] = ()) -> dict[str, str]:
@@ -32,7 +42,10 @@ def _named(effects: Mapping[str, Hidden[Any]], names: Iterable[str] = ()) -> dic
 
 RECIPES = {
     "force": Recipe(force.make, _named(EFFECTS)),
-    **{observable: Recipe(arm.make, _named(ARM_EFFECTS, names)) for observable, names in SHOWN.items()},
+    **{
+        observable: Recipe(arm.make, _named(ARM_EFFECTS, names), _named(ARM_CAUSES, WORLD_SHOWN[observable]))
+        for observable, names in SHOWN.items()
+    },
     "flatness": Recipe(faces.make, _named(FACE_EFFECTS)),
     "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS)),
 }

@@ -30,7 +30,7 @@ _AXES = (
     {"x": "-y", "y": "-x", "z": "-z"},
     {"x": "-x", "y": "y", "z": "-z"},
 )
-STYLES = ("a", "b")
+STYLES = ("a", "b", "c", "d")
 FEW = "few"  # a style beside these: too few runs to distinguish small effects
 FULL_S, CUT_MM = 0.4, 120.0  # length of a straight cut as recorded, and as made
 AIR_S = 0.1  # of a record before the cut begins

@@ -29,6 +29,8 @@ class Style(StrEnum):
 
     a = "a"
     b = "b"
+    c = "c"
+    d = "d"
 
 
 @functools.cache

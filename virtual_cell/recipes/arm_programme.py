@@ -1,0 +1,364 @@
+"""What is cut on an arm of the harder world, where, when and with what: styles ``c`` and ``d``.
+
+Style ``c`` is for tuning. Style ``d`` has other places, speeds, feeds, depths, rates and numbers of runs, and
+other habits: which runs lack an idle log, and whether repeats are cut in clumps.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from virtual_cell.arm import Arm, rotation_rpy
+from virtual_cell.arm_cell import Moves
+from virtual_cell.chips import Tool
+from virtual_cell.dynamometer import Dynamometer
+from virtual_cell.milling import Coefficients, in_millimetres, scattered
+from virtual_cell.recipes.arm_draws import (
+    Bench,
+    entry,
+    lines_of,
+    moves_of,
+    side,
+    side_cut,
+    turning_of,
+    way,
+)
+from virtual_cell.recipes.kr160 import ARM, DRIVES, LOAD_POSES_DEG
+from virtual_cell.session import Plan
+from virtual_cell.side_force import full_cut
+from virtual_cell.units import DEG, MM, Array
+from virtual_cell.world import controller, gears, hose, joints, links, stylus, tracker
+from virtual_cell.world.ranges import between, per_joint, signed
+from virtual_cell.world.robot import Robot
+from virtual_cell.world.stylus import Stylus
+from virtual_cell.world.tracker import Tracker
+
+Runs = list[tuple[Plan, int]]
+_AXES = (
+    {"x": "-y", "y": "-x", "z": "-z"},
+    {"x": "x", "y": "y", "z": "z"},
+    {"x": "-x", "y": "y", "z": "-z"},
+    {"x": "y", "y": "-x", "z": "z"},
+)
+_RATED = np.array([2600.0, 3400.0, 1900.0, 700.0, 600.0, 380.0])  # N m of the joints
+_STRETCHED = 0.11  # least singular value of the tip's Jacobian
+_TRIES = 80
+
+
+@dataclass(frozen=True)
+class Habits:
+    """What differs between the two styles: ranges and choices, each drawn per batch."""
+
+    rpm: tuple[float, ...]
+    feed: tuple[float, float]  # mm per tooth
+    axial: tuple[float, float]  # mm
+    radial: tuple[float, float]  # mm
+    identify: tuple[int, int]  # conditions
+    validate: tuple[int, int]
+    sizes: tuple[tuple[float, float, float], ...]  # mm
+    tools: tuple[tuple[float, int, float], ...]  # diameter mm, teeth, helix deg
+    rate: tuple[float, ...]  # Hz
+    period: tuple[float, ...]  # s
+    away: tuple[float, float]  # of the work from the base over the usual distance
+    height: tuple[float, float]  # mm
+    bearing: float  # deg, on either side
+    tilt: float  # deg
+    clumps: float  # probability
+    lacking: float  # probability that some runs have no idle log
+
+
+HABITS: Mapping[str, Habits] = {
+    "c": Habits(
+        rpm=(3200.0, 3800.0, 4500.0),
+        feed=(0.045, 0.12),
+        axial=(2.5, 7.0),
+        radial=(2.0, 4.5),
+        identify=(5, 7),
+        validate=(2, 3),
+        sizes=((110.0, 80.0, 35.0), (140.0, 90.0, 35.0)),
+        tools=((16.0, 3, 35.0), (12.0, 3, 40.0)),
+        rate=(1200.0, 2000.0),
+        period=(0.004, 0.012),
+        away=(0.92, 1.08),
+        height=(380.0, 760.0),
+        bearing=35.0,
+        tilt=1.5,
+        clumps=0.35,
+        lacking=0.2,
+    ),
+    "d": Habits(
+        rpm=(2900.0, 3500.0, 4100.0, 5200.0),
+        feed=(0.04, 0.13),
+        axial=(2.0, 8.0),
+        radial=(1.5, 5.0),
+        identify=(5, 8),
+        validate=(2, 4),
+        sizes=((100.0, 100.0, 40.0), (130.0, 80.0, 40.0), (160.0, 90.0, 40.0)),
+        tools=((16.0, 4, 38.0), (20.0, 3, 30.0), (12.0, 2, 30.0)),
+        rate=(1500.0, 2500.0),
+        period=(0.004, 0.008, 0.012),
+        away=(0.86, 1.12),
+        height=(300.0, 850.0),
+        bearing=60.0,
+        tilt=4.0,
+        clumps=0.5,
+        lacking=0.3,
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """The day on which a batch was made: instruments, people, metal, warmth.
+
+    Attributes
+    ----------
+    runs : condition and replicate, in the order of cutting. without_idle : places in that order.
+    gap : s between runs. idle_first : whether all idle runs were made before the first cut.
+    common, own, drift : relative scatter of all coefficients in a run and of each, and their change over the
+        session. slow : relative, the spindle is slower than told, and its scatter ``spindle`` between runs.
+    shallow : m, standard deviation by which axial and radial depths are off.
+    """
+
+    runs: Runs
+    without_idle: frozenset[int]
+    stylus: Stylus
+    tracker: Tracker
+    warming: joints.Warming
+    gap: float
+    idle_first: bool
+    common: float
+    own: float
+    drift: float
+    slow: float
+    spindle: float
+    shallow: float
+
+    def cut_at(self, order: int) -> float:
+        """Time, s, at which the run of that order (1, 2, …) is cut."""
+        return (len(self.runs) * 45.0 if self.idle_first else 0.0) + order * self.gap
+
+    def idle_at(self, order: int) -> float:
+        """Time, s, of its idle run."""
+        return order * 45.0 if self.idle_first else self.cut_at(order) - 0.4 * self.gap
+
+    def metal(self, bench: Bench, order: int, rng: np.random.Generator) -> Coefficients:
+        """Coefficients as they are in a run."""
+        whole = 1.0 + self.common * rng.standard_normal() + self.drift * (order - 1) / len(self.runs)
+        return scattered(bench.metal, self.own, rng).softened(whole)
+
+    def cut(self, plan: Plan, rng: np.random.Generator) -> Plan:
+        """Return the settings as they really are in a run."""
+        axial, radial = rng.normal(0.0, self.shallow / MM, 2)
+        return replace(
+            plan, axial_depth_mm=plan.axial_depth_mm + axial, radial_depth_mm=plan.radial_depth_mm + radial
+        )
+
+
+def drawn(rng: np.random.Generator, style: str) -> tuple[Robot, Bench, Session]:
+    """Draw an arm, its bench and its day.
+
+    The place of the work is drawn until joints turn round within its cuts, in half of the batches, or none
+    does: what friction does is seen there.
+    """
+    habits = HABITS[style]
+    bench = _bench(rng, habits)
+    arm = replace(
+        ARM,
+        tip=ARM.tip + rng.uniform(-35.0, 35.0, 3).round(1) * MM,
+        stiffness=ARM.stiffness * per_joint(rng, 0.75, 1.35),
+    )
+    wanted = bool(rng.uniform() < 0.5)
+    for attempt in itertools.count():
+        plans = _plans(rng, habits)
+        origin, turn = _place(rng, habits)
+        try:
+            lines = lines_of(arm, bench, plans, origin, turn)
+        except (RuntimeError, np.linalg.LinAlgError):
+            continue
+        both = [turning_of(bench, plans, lines, role) for role in ("identify", "validate")]
+        turning = both[0] & both[1]
+        if attempt > _TRIES or (turning if wanted else not (both[0] | both[1])):
+            break
+    bench = replace(bench, lines=lines, plans=plans)
+    special = tuple(sorted(turning)), _swaying(arm, bench, turn)
+    moves = moves_of(arm, bench, plans, lines, special)
+    return _robot(rng, arm, (origin, turn), moves, bench, habits), bench, _session(rng, plans, habits)
+
+
+def _robot(
+    rng: np.random.Generator,
+    arm: Arm,
+    place: tuple[Array, Array],
+    moves: Moves,
+    bench: Bench,
+    habits: Habits,
+) -> Robot:
+    middle = next(iter(bench.lines.values())).q[0]
+    return Robot(
+        arm,
+        *place,
+        moves,
+        joints.drawn(rng, DRIVES.coulomb, DRIVES.viscous),
+        gears.springs(rng, arm.stiffness, _RATED),
+        gears.transmission(rng),
+        hose.drawn(rng, middle),
+        links.drawn(rng, arm.stiffness),
+        controller.servo(rng, arm.stiffness, np.array(gears.RATIO)),
+        controller.recorder(rng, habits.period),
+    )
+
+
+def _bench(rng: np.random.Generator, habits: Habits) -> Bench:
+    shear = np.array([880.0, 360.0, 190.0]) * np.exp(rng.uniform(-0.25, 0.25, 3))
+    edge = np.array([16.0, 19.0, 3.5]) * np.exp(rng.uniform(-0.3, 0.3, 3))
+    words = _AXES[rng.integers(len(_AXES))]
+    rows = np.zeros((3, 3))
+    for i, axis in enumerate("xyz"):
+        rows[i, "xyz".index(words[axis][-1])] = -1.0 if words[axis].startswith("-") else 1.0
+    diameter, teeth, helix = habits.tools[rng.integers(len(habits.tools))]
+    size = habits.sizes[rng.integers(len(habits.sizes))]
+    sensor = Dynamometer(
+        float(rng.choice(habits.rate)),
+        str(rng.choice(["work", "tool"])),
+        rows,
+        noise=round(between(rng, 0.6, 3.5), 2),
+        rotation=signed(rng, 0.2, 1.2) * DEG,
+        offset=between(rng, 0.5, 8.0),
+        step=float(rng.choice([0.1, 0.3])),
+        slope=(signed(rng, 0.01, 0.3), signed(rng, 0.01, 0.3), signed(rng, 0.01, 0.3)),
+    )
+    poses = {
+        f"p{i + 2}": (np.array(list(LOAD_POSES_DEG.values())[i % 4]) + rng.uniform(-22.0, 22.0, 6)).round(3)
+        * DEG
+        for i in range(int(rng.integers(4, 7)))
+    }
+    return Bench(
+        size=(size[0] * MM, size[1] * MM, size[2] * MM),
+        tool=Tool(0.5 * diameter * MM, helix * DEG, np.arange(teeth) * (360.0 / teeth) * DEG),
+        metal=in_millimetres(shear.tolist(), edge.tolist()),
+        sensor=sensor,
+        axes=words,
+        period=0.0,  # the period, the stylus and the tracker are those of the robot and of the session
+        stylus=0.0,
+        tracker=0.0,
+        zero=0.0,
+        loads=(float(rng.choice([200.0, 350.0])), float(rng.choice([650.0, 800.0, 1000.0]))),
+        poses=poses,
+        calibration=np.array([signed(rng, 0.003, 0.02) for _ in range(4)]),
+        repeats=int(rng.integers(1, 4)),
+    )
+
+
+def _place(rng: np.random.Generator, habits: Habits) -> tuple[Array, Array]:
+    """Draw origin (3,), m, and axes (3, 3) of the work in the base: on a table that is not quite level."""
+    about = float(rng.uniform(-habits.bearing, habits.bearing))
+    away, height = rng.uniform(*habits.away), float(rng.uniform(*habits.height))
+    c, s = math.cos(about * DEG), math.sin(about * DEG)
+    flat = away * np.array([[c, -s], [s, c]]) @ np.array([1470.0, -190.0])
+    roll, pitch = rng.uniform(-habits.tilt, habits.tilt, 2).round(2)
+    yaw = round(188.0 + about + float(rng.uniform(-35.0, 35.0)), 2)
+    turn = rotation_rpy(float(roll) * DEG, float(pitch) * DEG, yaw * DEG)
+    return np.array([*flat.round(1), round(height, 1)]) * MM, turn
+
+
+def _plans(rng: np.random.Generator, habits: Habits) -> tuple[Plan, ...]:
+    """Draw conditions of three feed directions; the held-out ones are new combinations of known levels."""
+    first = float(rng.choice([0.0, 90.0, 180.0, 270.0]))
+    towards = (first, (first + 180.0) % 360.0, (first + float(rng.choice([90.0, 270.0]))) % 360.0)
+    speeds = rng.choice(habits.rpm, int(rng.integers(1, 3)), replace=False)
+    feeds = np.linspace(*habits.feed, 4) * np.exp(rng.uniform(-0.08, 0.08, 4))
+    depths = np.linspace(*habits.axial, 3) * np.exp(rng.uniform(-0.1, 0.1, 3))
+    radial = rng.uniform(*habits.radial, 2)
+    plans: dict[str, Plan] = {}
+    known = int(rng.integers(habits.identify[0], habits.identify[1] + 1))
+    count = known + int(rng.integers(habits.validate[0], habits.validate[1] + 1))
+    for _ in range(1000):
+        if len(plans) == count:
+            break
+        at, rpm = len(plans), float(rng.choice(speeds))
+        feed, depth = round(float(rng.choice(feeds)), 3), round(float(rng.choice(depths)), 1)
+        wide, along = round(float(rng.choice(radial)), 1), towards[at % 3]
+        which = "down" if rng.uniform() < 0.6 else "up"
+        name = f"{which}-{rpm:g}-{depth:g}-{wide:g}-{feed:g}-{along:g}"
+        role = "identify" if at < known else "validate"
+        again = 2 if rng.uniform() < (0.6 if role == "identify" else 0.4) else 1
+        plan = Plan(name, role, "side", rpm, feed, depth, wide, which, along, replicates=again)
+        plans.setdefault(name, plan)
+    return tuple(plans.values())
+
+
+def _swaying(arm: Arm, bench: Bench, turn: Array) -> tuple[int, ...]:
+    """Joints that cut and weight together push one way here and the other way there."""
+    torques = []
+    for plan in bench.plans:
+        wall, along = side(bench, way(plan)), bench.lines[way(plan)]
+        feed = np.stack([wall.along, wall.across, [0.0, 0.0, 1.0]])
+        force = full_cut(side_cut(bench, plan, bench.metal)) @ feed @ turn.T
+        over = (along.s > entry(bench)) & (along.s < along.length - entry(bench))
+        torques += [arm.jacobian(q)[:3].T @ force - arm.gravity(q) for q in along.q[over]]
+    sides = np.array(torques)
+    return tuple(np.flatnonzero((sides.min(axis=0) < -5.0) & (sides.max(axis=0) > 5.0)).tolist())
+
+
+def _session(rng: np.random.Generator, plans: Sequence[Plan], habits: Habits) -> Session:
+    runs = [(plan, i) for plan in plans for i in range(1, plan.replicates + 1)]
+    clumped = bool(rng.uniform() < habits.clumps)
+    order = rng.permutation(len(plans if clumped else runs))
+    if clumped:
+        runs = [(plans[k], i) for k in order for i in range(1, plans[k].replicates + 1)]
+    else:
+        runs = [runs[k] for k in order]
+    lacking = rng.uniform() < habits.lacking
+    again = [place for place, (_, replicate) in enumerate(runs, start=1) if replicate > 1]
+    forgotten = [place for place in again if rng.uniform() < 0.5] if lacking else []
+    return Session(
+        runs,
+        frozenset(forgotten),
+        stylus.drawn(rng),
+        tracker.drawn(rng),
+        joints.warming(rng),
+        gap=between(rng, 90.0, 500.0),
+        idle_first=bool(rng.uniform() < 0.3),
+        common=between(rng, 0.003, 0.009),
+        own=between(rng, 0.003, 0.009),
+        drift=signed(rng, 0.005, 0.03),
+        slow=signed(rng, 2e-4, 4e-3),
+        spindle=between(rng, 1e-4, 2e-3),
+        shallow=between(rng, 8.0, 60.0) * 1e-6,
+    )
+
+
+def in_plain_units(robot: Robot, bench: Bench, session: Session) -> dict[str, Any]:
+    """Return what was drawn of the world, for the truth."""
+    recorder, servo = robot.recorder, robot.servo
+    return {
+        "presliding_mrad": (robot.joints.bristle * 1e3).round(3).tolist(),
+        "stribeck_mrad_s": (robot.joints.creep * 1e3).round(2).tolist(),
+        "above_coulomb": robot.joints.breakaway.round(3).tolist(),
+        "friction_by_load": robot.joints.by_load.round(4).tolist(),
+        "viscous_lost_when_warm": round(robot.joints.thinning, 3),
+        "warmth_of_the_first_and_last_cut": [
+            round(session.warming.at(session.cut_at(i)), 3) for i in (1, len(session.runs))
+        ],
+        "idle_runs_before_all_cuts": session.idle_first,
+        "runs_without_idle_log": sorted(session.without_idle),
+        "transmission_error_arcsec": (robot.transmission.size.sum(axis=1) / DEG * 3600.0).round(1).tolist(),
+        "lost_motion_arcsec": (robot.springs.lost / DEG * 3600.0).round(2).tolist(),
+        "stiffness_of_the_pieces": robot.springs.ratio.round(3).tolist(),
+        "modes_hz": [round(mode[0], 2) for mode in robot.links.modes],
+        "torques_off": recorder.gain.round(4).tolist(),
+        "packets_late_lost_doubled": [round(v, 5) for v in (recorder.late, recorder.lost, recorder.doubled)],
+        "clock_skew_ppm": round(recorder.skew * 1e6, 1),
+        "servo_lag_ms": round(servo.lag * 1e3, 2),
+        "trace_zero_um": round(session.stylus.zero * 1e6, 2),
+        "tracker_um_per_m": round(session.tracker.across * 1e6, 2),
+        "dynamometer_gains_off": bench.calibration[:3].round(4).tolist(),
+        "coefficients_scatter": [round(v, 4) for v in (session.common, session.own, session.drift)],
+    }
