@@ -318,6 +318,7 @@ def moves_of(
     lines: Mapping[Way, Line],
     special: tuple[tuple[int, ...], tuple[int, ...]],
 ) -> Moves:
+    """How the joints move in the cuts; ``special``: those that turn round, those whose torque sways."""
     travel = np.mean(
         [np.abs(np.diff(one.q, axis=0)).sum(axis=0) / one.length for one in lines.values()], axis=0
     )

@@ -71,6 +71,7 @@ class Habits:
     tilt: float  # deg
     clumps: float  # probability
     lacking: float  # probability that some runs have no idle log
+    entries: float  # probability that holes were milled before
 
 
 HABITS: Mapping[str, Habits] = {
@@ -91,6 +92,7 @@ HABITS: Mapping[str, Habits] = {
         tilt=1.5,
         clumps=0.35,
         lacking=0.2,
+        entries=0.2,
     ),
     "d": Habits(
         rpm=(2900.0, 3500.0, 4100.0, 5200.0),
@@ -109,6 +111,7 @@ HABITS: Mapping[str, Habits] = {
         tilt=4.0,
         clumps=0.5,
         lacking=0.3,
+        entries=0.4,
     ),
 }
 
@@ -119,7 +122,8 @@ class Session:
 
     Attributes
     ----------
-    runs : condition and replicate, in the order of cutting. without_idle : places in that order.
+    runs : condition and replicate, in the order of cutting. without_idle : places in that order. entries : so
+        many holes were milled on a helix before, which nobody recorded.
     gap : s between runs. idle_first : whether all idle runs were made before the first cut.
     common, own, drift : relative scatter of all coefficients in a run and of each, and their change over the
         session. slow : relative, the spindle is slower than told, and its scatter ``spindle`` between runs.
@@ -128,6 +132,7 @@ class Session:
 
     runs: Runs
     without_idle: frozenset[int]
+    entries: int
     stylus: Stylus
     tracker: Tracker
     warming: joints.Warming
@@ -189,18 +194,20 @@ def drawn(rng: np.random.Generator, style: str) -> tuple[Robot, Bench, Session]:
     bench = replace(bench, lines=lines, plans=plans)
     special = tuple(sorted(turning)), _swaying(arm, bench, turn)
     moves = moves_of(arm, bench, plans, lines, special)
-    return _robot(rng, arm, (origin, turn), moves, bench, habits), bench, _session(rng, plans, habits)
+    near = next(iter(lines.values())).q[0]
+    robot = _robot(rng, arm, moves, habits, place=(origin, turn), near=near)
+    return robot, bench, _session(rng, plans, habits)
 
 
 def _robot(
     rng: np.random.Generator,
     arm: Arm,
-    place: tuple[Array, Array],
     moves: Moves,
-    bench: Bench,
     habits: Habits,
+    *,
+    place: tuple[Array, Array],
+    near: Array,
 ) -> Robot:
-    middle = next(iter(bench.lines.values())).q[0]
     return Robot(
         arm,
         *place,
@@ -208,7 +215,7 @@ def _robot(
         joints.drawn(rng, DRIVES.coulomb, DRIVES.viscous),
         gears.springs(rng, arm.stiffness, _RATED),
         gears.transmission(rng),
-        hose.drawn(rng, middle),
+        hose.drawn(rng, near),
         links.drawn(rng, arm.stiffness),
         controller.servo(rng, arm.stiffness, np.array(gears.RATIO)),
         controller.recorder(rng, habits.period),
@@ -321,6 +328,7 @@ def _session(rng: np.random.Generator, plans: Sequence[Plan], habits: Habits) ->
     return Session(
         runs,
         frozenset(forgotten),
+        int(rng.integers(1, 4)) if rng.uniform() < habits.entries else 0,
         stylus.drawn(rng),
         tracker.drawn(rng),
         joints.warming(rng),
@@ -349,6 +357,7 @@ def in_plain_units(robot: Robot, bench: Bench, session: Session) -> dict[str, An
         ],
         "idle_runs_before_all_cuts": session.idle_first,
         "runs_without_idle_log": sorted(session.without_idle),
+        "helical_entries_not_recorded": session.entries,
         "transmission_error_arcsec": (robot.transmission.size.sum(axis=1) / DEG * 3600.0).round(1).tolist(),
         "lost_motion_arcsec": (robot.springs.lost / DEG * 3600.0).round(2).tolist(),
         "stiffness_of_the_pieces": robot.springs.ratio.round(3).tolist(),

@@ -29,12 +29,13 @@ from virtual_cell.world.robot import Course, Done, Robot, Way, done, logged
 from virtual_cell.world.robot import way as statics
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_signal, write_yaml
 
+_ORBIT = 0.5  # radius of the orbit of a helical entry over that of the tool
 _BEGIN = (10.5 * MM, 14.0 * MM)  # of the line, where the records begin
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A cut as it is told (``plan``) and as it is made (``real``), its wall, its line, its place in the session."""
+    """A cut as it is told (``plan``) and as it is made (``real``), its wall, its line, its place."""
 
     plan: Plan
     real: Plan
@@ -98,13 +99,13 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
     fresh_folder(folder)
     day = _Day(robot, bench, session, seed)
     lines = {wall: statics(robot, along) for wall, along in bench.lines.items()}
-    rows, cuts = [], []
+    rows, cuts = _entries(day), []
     for order, (plan, replicate) in enumerate(session.runs, start=1):
         own = rng.spawn(5)
         wall = side(bench, way(plan))
         run = _Run(plan, session.cut(plan, own[0]), wall, lines[way(plan)], order)
         row, during = _made(day, run, folder, own)
-        rows.append(_row(run, replicate) | row)
+        rows.append(_row(run, replicate, session.entries) | row)
         cuts.append(during)
     write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
     write_csv(folder / "loads.csv", tested(day, rng))
@@ -127,10 +128,33 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
     }
 
 
-def _row(run: _Run, replicate: int) -> Row:
+def _entries(day: _Day) -> list[Row]:
+    """Rows of the holes that were milled on a helix before the runs: no file, but they count as cut."""
+    tool, orbit = day.bench.tool, 2.0 * math.pi * _ORBIT * day.bench.tool.radius
+    first = day.session.runs[0][0]
+    feed = first.feed_per_tooth_mm * MM * tool.teeth * first.spindle_rpm
+    return [
+        {
+            "run": f"h{order:02d}",
+            "condition": "entry",
+            "replicate": order,
+            "order": order,
+            "operation": "helical",
+            "spindle_rpm": first.spindle_rpm,
+            "feed_per_tooth_mm": first.feed_per_tooth_mm,
+            "axial_depth_mm": 0.5,
+            "direction": "slot",
+            "orbit_rpm": round(feed / orbit, 3),
+            "cut_length_mm": round(12.0 * orbit / MM, 2),
+        }
+        for order in range(1, day.session.entries + 1)
+    ]
+
+
+def _row(run: _Run, replicate: int, before: int) -> Row:
     plan = run.plan
     row: Row = {key: getattr(plan, key) for key in plan.__dataclass_fields__ if not key.endswith("_s")}
-    row |= {"run": run.name, "replicate": replicate, "order": run.order, "pose": "p1"}
+    row |= {"run": run.name, "replicate": replicate, "order": before + run.order, "pose": "p1"}
     return row | {"cut_length_mm": round(run.wall.length / MM, 3)}
 
 
@@ -145,7 +169,7 @@ def _made(day: _Day, run: _Run, folder: Path, own: list[np.random.Generator]) ->
     begin = cutting.uniform(*_BEGIN)
     course = day.course(run, begin, cutting=True, start=cutting.uniform(-1.0, 1.0, 6))
     cut = done(robot, course, in_base)
-    late = robot.clock_offset + session_slip(robot, cutting)
+    late = robot.clock_offset + cutting.normal(0.0, robot.recorder.slip)
     files = {"robot_log": f"robot/{run.name}-cut.parquet"}
     write_signal(folder / files["robot_log"], logged(robot, cut, course.warmth, logging, late=late))
     if run.order not in session.without_idle:
@@ -153,15 +177,10 @@ def _made(day: _Day, run: _Run, folder: Path, own: list[np.random.Generator]) ->
         free = day.course(run, idling.uniform(*_BEGIN), cutting=False, start=idling.uniform(-1.0, 1.0, 6))
         air = done(robot, free, None)
         write_signal(folder / files["idle_log"], logged(robot, air, free.warmth, idling, late=0.0))
-    files["dynamometer"] = _sensed(day, run, force, cut.during, folder, sensing)
+    files["dynamometer"] = write_force(folder, run.name, *_sensed(day, run, force, cut.during, sensing))
     files["profile"] = f"profile/{run.name}.parquet"
     write_signal(folder / files["profile"], _traced(day, run, cut, tracing))
     return dict(files), cut.during
-
-
-def session_slip(robot: Robot, rng: np.random.Generator) -> float:
-    """By how much the clock of one log is later than that of the others, s."""
-    return float(rng.normal(0.0, robot.recorder.slip))
 
 
 def _force(day: _Day, run: _Run, rng: np.random.Generator) -> SideForce:
@@ -179,9 +198,9 @@ def _force(day: _Day, run: _Run, rng: np.random.Generator) -> SideForce:
 
 
 def _sensed(
-    day: _Day, run: _Run, force: SideForce, during: During, folder: Path, rng: np.random.Generator
-) -> str:
-    """Record the force on the dynamometer; return the file."""
+    day: _Day, run: _Run, force: SideForce, during: During, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Return times (n,), s, and readings (n, 3), N, of the dynamometer."""
     sensor, first = day.bench.sensor, float(during.x[0] - during.t[0] * during.feed)
 
     def in_work(t: Array) -> Array:
@@ -191,8 +210,7 @@ def _sensed(
                 acting = cause.sensed(during, t, acting)
         return np.asarray(acting * (1.0 + day.bench.calibration[:3]))
 
-    time, read = record(sensor, in_work, float(during.t[-1]), rng)
-    return write_force(folder, run.name, time, read)
+    return record(sensor, in_work, float(during.t[-1]), rng)
 
 
 def _traced(day: _Day, run: _Run, cut: Done, rng: np.random.Generator) -> dict[str, Array]:
@@ -220,7 +238,7 @@ def tested(day: _Day, rng: np.random.Generator) -> list[Row]:
                 force = sign * level * np.eye(3)[axis]
                 real = robot.turn @ force * (1.0 + day.bench.calibration[3])
                 moved = robot.gives(q, real, in_cut=False)
-                read = day.session.tracker.read(place, moved, rng) @ robot.turn
+                read = _looked_at(day, place, moved, rng) @ robot.turn
                 row: Row = {"pose": pose, "point": "tip"}
                 row |= {f"q{i}_deg": float(q[i - 1] / DEG) for i in range(1, 7)}
                 row |= {f"{name}_mm": round(float(at[i] / MM), 3) for i, name in enumerate("xyz")}
@@ -230,9 +248,19 @@ def tested(day: _Day, rng: np.random.Generator) -> list[Row]:
     return rows
 
 
+def _looked_at(day: _Day, place: Array, moved: Array, rng: np.random.Generator) -> Array:
+    """Read a displacement (3,), m, again where it is not at all what it must be: people look at it."""
+    for _ in range(20):
+        read = day.session.tracker.read(place, moved, rng)
+        if read @ moved > 0.25 * moved @ moved:
+            break
+    return read
+
+
 def manifest(name: str, day: _Day) -> Row:
     """Return batch.yaml: what the people who measured say."""
     robot, bench, tool, sensor = day.robot, day.bench, day.bench.tool, day.bench.sensor
+    hole = round(2.0 * (1.0 + _ORBIT) * tool.radius / MM, 6)
     pitch = -math.asin(robot.turn[2, 0])
     roll = math.atan2(robot.turn[2, 1], robot.turn[2, 2])
     yaw = math.atan2(robot.turn[1, 0], robot.turn[0, 0])
@@ -255,6 +283,7 @@ def manifest(name: str, day: _Day) -> Row:
             "xyz_mm": [round(float(v) / MM, 6) for v in robot.origin],
             "rpy_deg": [round(angle / DEG, 6) for angle in (roll, pitch, yaw)],
         },
+        **({"hole_diameter_mm": hole} if day.session.entries else {}),
         "instruments": {
             "dynamometer": {
                 "rate_hz": sensor.rate,

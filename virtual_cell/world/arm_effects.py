@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -143,8 +144,8 @@ def _wheel(rng: np.random.Generator, robot: Robot) -> Parameters:
 def _eccentric(robot: Robot, p: Parameters) -> Robot:
     """Let a wheel whose pitch circle is eccentric be squeezed in its mesh by the load of the cut.
 
-    The mesh stores U = ½ k (c + e cos θ)², whose slope is a torque: sin θ, and half of e/c of that at twice the
-    order. ``squeezed`` is e/c.
+    The mesh stores U = ½ k (c + e cos θ)², whose slope is a torque: sin θ, and half of e/c of that at
+    twice the order. ``squeezed`` is e/c.
     """
     joint, order = p["joint"], p["order"]
     twice = 0.5 * p.get("squeezed", 0.3)
@@ -207,7 +208,7 @@ def _worn(robot: Robot, p: Parameters) -> Robot:
     return replace(robot, springs=replace(robot.springs, gap=gap))
 
 
-def _preload(rng: np.random.Generator, robot: Robot) -> Parameters:
+def _preload(rng: np.random.Generator, _: Robot) -> Parameters:
     """Draw a loss (or a gain) of preload, of every joint or of one that gives way along the walls."""
     every = rng.uniform() < 0.6
     size = drawn_signed(rng, 0.03, 0.5) if every else drawn_signed(rng, 0.08, 0.8)
@@ -260,16 +261,14 @@ def _hard(rng: np.random.Generator, robot: Robot) -> Parameters:
 
 
 def _hardened(robot: Robot, p: Parameters) -> Robot:
-    """Let a flexspline come to bear in three pieces that follow the cubic over the range of the load tests."""
+    """Let a flexspline come to bear in three pieces that follow the cubic over the loads of the tests."""
     joint = p["joint"] - 1
     k, most = float(robot.springs.stiffness[joint]), 600.0 * robot.moves.lever[joint]
     x = np.linspace(0.0, 1.0, 200) * most / k
     torque = k * x + p["cubic"] * x**3
     x, torque = x[torque <= 1.3 * most], torque[torque <= 1.3 * most]
     ends = [0, len(x) // 3, 2 * len(x) // 3, len(x) - 1]
-    slopes = [
-        float(np.polyfit(x[a : b + 1], torque[a : b + 1], 1)[0]) for a, b in zip(ends, ends[1:], strict=False)
-    ]
+    slopes = [float(np.polyfit(x[a : b + 1], torque[a : b + 1], 1)[0]) for a, b in pairwise(ends)]
     springs = replace(
         robot.springs,
         stiffness=_put(robot.springs.stiffness, p["joint"], slopes[1]),
@@ -280,7 +279,7 @@ def _hardened(robot: Robot, p: Parameters) -> Robot:
 
 
 def _hard_read(robot: Robot, _: Sequence[During], p: Parameters) -> Translated:
-    """T = k x + c x³ closest to the three pieces; its error by how far c goes with the range of the torque."""
+    """T = k x + c x³ closest to the three pieces; its error: how far c goes with the range of torque."""
     joint = p["joint"] - 1
     found = []
     for share in (0.8, 1.0, 1.25):

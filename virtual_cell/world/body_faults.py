@@ -43,7 +43,7 @@ def _belt(rng: np.random.Generator, robot: Robot) -> Parameters:
 
 
 def _stretched(robot: Robot, p: Parameters) -> Robot:
-    """Let the belt of an encoder stretch and creep: the joint runs ahead by its speed and by its last seconds."""
+    """Let the belt of an encoder stretch and creep: the joint runs ahead by speed and by way."""
     joint = p["joint"] - 1
 
     def tip(during: During) -> Array:
@@ -113,7 +113,7 @@ def _slip(rng: np.random.Generator, _: Robot) -> Parameters:
 
 
 def _slipping(robot: Robot, p: Parameters) -> Robot:
-    """Let the work slip in its clamps, once or twice in a run, at no certain place; it is set back after it."""
+    """Let the work slip in its clamps, once or twice in a run, anywhere; it is set back after it."""
 
     def tip(during: During) -> Array:
         own = during.own()
@@ -225,7 +225,7 @@ def _knock(rng: np.random.Generator, _: Robot) -> Parameters:
 
 
 def _knocking(robot: Robot, p: Parameters) -> Robot:
-    """Let the valve of a clamp knock every so often, a little unevenly: the tip rings once after each knock."""
+    """Let the valve of a clamp knock every so often, a little unevenly: the tip rings after each."""
 
     def tip(during: During) -> Array:
         own = during.own()

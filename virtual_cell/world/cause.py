@@ -69,8 +69,8 @@ class Cause:
     ----------
     load : torque (n, 6), N m, that resists at the links: drives carry it, and springs are twisted by it.
     drive : torque (n, 6), N m, that resists at the motors.
-    logged : torques (n, 6) as logged, of what they are. sensed : force (n, 3), as the dynamometer feels it, of
-        what acts on the tool at times (n,) of its record: given (run, t, force).
+    logged : torques (n, 6) as logged, of what they are. sensed : force (n, 3), as the dynamometer feels it,
+        of what acts on the tool at times (n,) of its record: given (run, t, force).
     tip : motion (n, 3), m, of the tip, base frame. traced : heights (k,), m, as traced, of what they are at
         places (k,): given (run, x, z).
     """

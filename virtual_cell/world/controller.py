@@ -1,8 +1,8 @@
 """The controller of an arm: how its servos stray, and what arrives of what it logs.
 
-Torques are currents times constants that are off by 1 to 5 % and fall as motors warm (0.1 to 0.2 % per kelvin
-of NdFeB magnets), in the steps of the current loop. Packets over UDP come late, twice or not at all, by a clock
-of its own.
+Torques are currents times constants that are off by 1 to 5 % and fall as motors warm (0.1 to 0.2 % per
+kelvin of NdFeB magnets), in the steps of the current loop. Packets over UDP come late, twice or not at all,
+by a clock of its own.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _HANDED = 4e-5  # s between packets that come out of a queue
 
 @dataclass(frozen=True, eq=False)
 class Servo:
-    """Position loops: ``stiffness`` (6,) N m/rad at once; ``reset`` s of the integral; ``band`` Hz; ``lag`` s.
+    """Position loops: ``stiffness`` (6,) N m/rad; ``reset`` s of the integral; ``band`` Hz; ``lag`` s.
 
     ``interpolation`` (6,) rad: error of the encoders, ``periods`` (6,) per turn of the joint; the loop makes
     the joint follow it, and the log does not show it.
@@ -81,7 +81,7 @@ class Recorder:
     slip: float
 
     def arrivals(self, duration: float, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Times (n,), s, of what the packets hold, and of their stamps; both from the start of the log."""
+        """Return times (n,), s, of what packets hold, and of their stamps, from the start of the log."""
         due = np.arange(int(duration / self.period)) * self.period
         delay = rng.exponential(self.jitter, len(due))
         delay += (rng.uniform(size=len(due)) < self.late) * rng.uniform(1.0, 4.0, len(due)) * self.period

@@ -1,9 +1,9 @@
 """Hysteresis that depends on the path and not on the time: Dahl's state, integrated exactly over each step.
 
-P. Dahl, A solid friction model, Aerospace Corp. TOR-0158 (1968): dF/du = (L/w) (1 − F/L sgn u'), with the level
-L and the width w over which the state turns round. Over a step in which L and w stay, F tends to ±L by
-exp(−|Δu|/w). With a level that depends on the speed it is the presliding of the LuGre model (Canudas de Wit et
-al., IEEE Trans. Autom. Control 40 (1995) 419).
+P. Dahl, A solid friction model, Aerospace Corp. TOR-0158 (1968): dF/du = (L/w) (1 − F/L sgn u'), with the
+level L and the width w over which the state turns round. Over a step in which L and w stay, F tends to ±L by
+exp(−|Δu|/w). With a level that depends on the speed it is the presliding of the LuGre model (Canudas de Wit
+et al., IEEE Trans. Autom. Control 40 (1995) 419).
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ def _bracket(rng: np.random.Generator, robot: Robot) -> Parameters:
 
 
 def _torn(robot: Robot, p: Parameters) -> Robot:
-    """Let the hoses, whose bracket is torn, catch on a corner of the arm: they pull one way beyond an angle."""
+    """Let the hoses, whose bracket is torn, catch on a corner of the arm: a pull one way beyond an angle."""
     joint = p["joint"]
 
     def load(during: During) -> Array:
@@ -87,7 +87,7 @@ def _brake(rng: np.random.Generator, robot: Robot) -> Parameters:
 
 
 def _dragging(robot: Robot, p: Parameters) -> Robot:
-    """Let a brake whose coil is failing close in the middle of a run, for some seconds, at no certain time."""
+    """Let a brake whose coil is failing close in the middle of a run, for some seconds, at any time."""
     joint = p["joint"]
 
     def drive(during: During) -> Array:
@@ -123,7 +123,7 @@ def _jet(rng: np.random.Generator, _: Robot) -> Parameters:
 
 
 def _jetted(robot: Robot, p: Parameters) -> Robot:
-    """Switch a jet of coolant on in mid-run: it pushes the spindle's housing, not the tool, against the feed."""
+    """Switch a jet of coolant on in mid-run: it pushes the spindle's housing, not the tool."""
 
     def pushed(during: During) -> Array:
         on = smooth_step(during.x, p["from_share"] * during.length, 0.004) * during.cutting

@@ -2,8 +2,8 @@
 
 Ranges: 2 to 30 arcsec of transmission error in all, most of it once and twice per turn of the joint and per
 turn of the motor, little at the teeth's order, part of which changes its sign with the direction; harmonic
-drives a half softer below a tenth of their torque than above, with a lost motion below one arcmin at a few per
-cent of it (Tuttle and Seering, IEEE Trans. Robot. Autom. 12 (1996) 368; Taghirad and Belanger, J. Dyn. Sys.
+drives up to a half softer below a tenth of their torque than above, with a lost motion below one arcmin at a
+few per cent of it (Tuttle and Seering, IEEE Trans. Robot. Autom. 12 (1996) 368; Taghirad and Belanger, J. Dyn. Sys.
 Meas. Control 120 (1998) 496; makers' catalogues).
 """
 
@@ -42,7 +42,7 @@ class Transmission:
         return np.asarray((wave * sides).sum(axis=-1))
 
     def slope(self, q: Array) -> Array:
-        """Derivative (n, 6) of the error by the angle: by virtual work, the share of torque it adds."""
+        """Return the slope (n, 6) of the error by the angle: by virtual work, the share of torque that it adds."""
         return np.asarray((self.size * self.order * np.cos(self._angle(q))).sum(axis=-1))
 
     def _angle(self, q: Array) -> Array:
@@ -114,7 +114,7 @@ class Springs:
 
 
 def transmission(rng: np.random.Generator) -> Transmission:
-    """Draw errors of the gears; the teeth are those of the motor's pinion, the poles those of its resolver."""
+    """Draw errors of the gears; the teeth are those of the motor's pinion."""
     teeth, ratio = rng.integers(17, 41, 6), np.array(RATIO)
     ones = np.ones(6)
     order = np.stack([ones, 2.0 * ones, ratio, 2.0 * ratio, 4.0 * ratio, teeth * ratio / 3.0], axis=1)

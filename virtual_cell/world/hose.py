@@ -15,7 +15,10 @@ _CARRIED = np.array([0.5, 0.0, 0.3, 1.0, 1.0, 1.0])  # how much of it each joint
 
 @dataclass(frozen=True, eq=False)
 class Hose:
-    """``pull`` (6,) N m/rad about ``rest`` (6,) rad; ``drag`` (6,) N m, turned round over ``width`` (6,) rad."""
+    """A package: ``pull`` (6,) N m/rad about ``rest`` (6,) rad; ``drag`` (6,) N m.
+
+    The drag turns round over ``width`` (6,) rad.
+    """
 
     pull: Array
     rest: Array

@@ -1,9 +1,9 @@
 """A cutting arm of the harder world: what it does on a line, in the air or in the cut, and under a load.
 
 Its joints, gears, hoses, links and controller are modules of their own; here they act on one another. The
-links feel gravity, the cut, and a small part of the friction; springs and gaps give way to that; motors carry
-it through gears whose errors modulate it, with most of the friction; the servos stray by what changes; and the
-tip follows all of it through the modes of the structure.
+links feel gravity, the cut, and a small part of the friction; springs and gaps give way to that; motors
+carry it through gears whose errors modulate it, with most of the friction; the servos stray by what changes;
+and the tip follows all of it through the modes of the structure.
 """
 
 from __future__ import annotations

@@ -19,9 +19,9 @@ from virtual_cell.world.ranges import between
 class Stylus:
     """The instrument; lengths in m.
 
-    ``noise`` of the pick-up; ``form`` amplitude of the traverse's bow over ``stroke``; ``level`` rad, standard
-    deviation of the slope of a trace; ``zero`` that of its height, ``slide`` that of its start along the wall;
-    ``dust`` grains per metre, of heights about ``grain``; ``step`` between readings.
+    ``noise`` of the pick-up; ``form`` amplitude of the traverse's bow over ``stroke``; ``level`` rad,
+    standard deviation of the slope of a trace; ``zero`` that of its height, ``slide`` that of its start along
+    the wall; ``dust`` grains per metre, of heights about ``grain``; ``step`` between readings.
     """
 
     noise: float

@@ -33,7 +33,7 @@ def _traverse(rng: np.random.Generator, _: Robot) -> Parameters:
 
 
 def _worn(robot: Robot, p: Parameters) -> Robot:
-    """Let the way of the traverse be worn: a hollow at one place, and waves of its screw that fade from it."""
+    """Let the way of the traverse be worn: a hollow at one place, and waves of its screw about it."""
 
     def traced(during: During, x: Array, z: Array) -> Array:
         del during

@@ -18,8 +18,8 @@ from virtual_cell.world.ranges import between, towards
 class Tracker:
     """``station`` (3,) m in the base. ``along`` m; ``across`` rad: noise of one reading.
 
-    ``air`` relative, by which distances change within a test. ``outliers`` share of the readings that a broken
-    beam shifted by about ``jump`` m.
+    ``air`` relative, by which distances change within a test. ``outliers`` share of the readings that a
+    broken beam shifted by about ``jump`` m.
     """
 
     station: Array
