@@ -302,16 +302,19 @@ def _plans(rng: np.random.Generator, habits: Habits) -> tuple[Plan, ...]:
 
 
 def _swaying(arm: Arm, bench: Bench, turn: Array) -> tuple[int, ...]:
-    """Joints that cut and weight together push one way here and the other way there."""
-    torques = []
+    """Joints that the cut, which outweighs the arm there, pushes one way here and the other way there."""
+    torques, weights = [], []
     for plan in bench.plans:
         wall, along = side(bench, way(plan)), bench.lines[way(plan)]
         feed = np.stack([wall.along, wall.across, [0.0, 0.0, 1.0]])
         force = full_cut(side_cut(bench, plan, bench.metal)) @ feed @ turn.T
         over = (along.s > entry(bench)) & (along.s < along.length - entry(bench))
-        torques += [arm.jacobian(q)[:3].T @ force - arm.gravity(q) for q in along.q[over]]
-    sides = np.array(torques)
-    return tuple(np.flatnonzero((sides.min(axis=0) < -5.0) & (sides.max(axis=0) > 5.0)).tolist())
+        torques += [arm.jacobian(q)[:3].T @ force for q in along.q[over]]
+        weights += [arm.gravity(q) for q in along.q[over]]
+    cut, weight = np.array(torques), np.array(weights)
+    sides = cut - weight
+    light = np.median(np.abs(weight), axis=0) < 0.5 * np.median(np.abs(cut), axis=0)
+    return tuple(np.flatnonzero(light & (sides.min(axis=0) < 0.0) & (sides.max(axis=0) > 0.0)).tolist())
 
 
 def _session(rng: np.random.Generator, plans: Sequence[Plan], habits: Habits) -> Session:

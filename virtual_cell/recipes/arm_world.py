@@ -238,7 +238,7 @@ def tested(day: _Day, rng: np.random.Generator) -> list[Row]:
                 force = sign * level * np.eye(3)[axis]
                 real = robot.turn @ force * (1.0 + day.bench.calibration[3])
                 moved = robot.gives(q, real, in_cut=False)
-                read = _looked_at(day, place, moved, rng) @ robot.turn
+                read = _looked_at(day, (place, moved, real), rng) @ robot.turn
                 row: Row = {"pose": pose, "point": "tip"}
                 row |= {f"q{i}_deg": float(q[i - 1] / DEG) for i in range(1, 7)}
                 row |= {f"{name}_mm": round(float(at[i] / MM), 3) for i, name in enumerate("xyz")}
@@ -248,11 +248,15 @@ def tested(day: _Day, rng: np.random.Generator) -> list[Row]:
     return rows
 
 
-def _looked_at(day: _Day, place: Array, moved: Array, rng: np.random.Generator) -> Array:
-    """Read a displacement (3,), m, again where it is not at all what it must be: people look at it."""
+def _looked_at(day: _Day, test: tuple[Array, Array, Array], rng: np.random.Generator) -> Array:
+    """Read a displacement (3,), m, once more where it goes against its load: people look at that.
+
+    ``test``: place of the tip, how it moved, and the force, each (3,) in the base.
+    """
+    place, moved, force = test
     for _ in range(20):
         read = day.session.tracker.read(place, moved, rng)
-        if read @ moved > 0.25 * moved @ moved:
+        if read @ force > 0.25 * moved @ force:
             break
     return read
 

@@ -73,7 +73,7 @@ def _clock_read(robot: Robot, _: Sequence[During], p: Parameters) -> Translated:
 def _seal(rng: np.random.Generator, robot: Robot) -> Parameters:
     joint = _likely(rng, robot)
     level = float(robot.joints.coulomb[joint - 1])
-    return {"joint": joint, "torque_nm": drawn_signed(rng, 0.05 * level, 0.6 * level)}
+    return {"joint": joint, "torque_nm": drawn_signed(rng, 0.2 * level, 1.2 * level)}
 
 
 def _sealed(robot: Robot, p: Parameters) -> Robot:
@@ -199,8 +199,8 @@ def _elsewhere(robot: Robot, p: Parameters) -> Robot:
 
 
 def _gap(rng: np.random.Generator, robot: Robot) -> Parameters:
-    joint = drawn_joint(rng, robot.moves.swaying if rng.uniform() < 0.85 else moving(robot))
-    return {"joint": joint, "angle_mdeg": drawn_size(rng, 2.0, 50.0)}
+    joint = drawn_joint(rng, robot.moves.swaying or (0,))
+    return {"joint": joint, "angle_mdeg": drawn_size(rng, 1.5, 30.0)}
 
 
 def _worn(robot: Robot, p: Parameters) -> Robot:

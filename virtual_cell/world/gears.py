@@ -2,9 +2,9 @@
 
 Ranges: 2 to 30 arcsec of transmission error in all, most of it once and twice per turn of the joint and per
 turn of the motor, little at the teeth's order, part of which changes its sign with the direction; harmonic
-drives up to a half softer below a tenth of their torque than above, with a lost motion below one arcmin at a
-few per cent of it (Tuttle and Seering, IEEE Trans. Robot. Autom. 12 (1996) 368; Taghirad and Belanger, J. Dyn. Sys.
-Meas. Control 120 (1998) 496; makers' catalogues).
+drives up to a third softer below a tenth of their torque than above, in series with shafts and bearings that
+are linear, with a lost motion of some arcsec at a few per cent of it (Tuttle and Seering, IEEE Trans. Robot. Autom. 12 (1996) 368; Taghirad and Belanger, J. Dyn.
+Sys. Meas. Control 120 (1998) 496; makers' catalogues).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Transmission:
         return np.asarray((wave * sides).sum(axis=-1))
 
     def slope(self, q: Array) -> Array:
-        """Return the slope (n, 6) of the error by the angle: by virtual work, the share of torque that it adds."""
+        """Return the slope (n, 6) of the error by the angle: by virtual work, the torque it adds."""
         return np.asarray((self.size * self.order * np.cos(self._angle(q))).sum(axis=-1))
 
     def _angle(self, q: Array) -> Array:
@@ -132,9 +132,10 @@ def transmission(rng: np.random.Generator) -> Transmission:
 def springs(rng: np.random.Generator, stiffness: Array, rated: Array) -> Springs:
     """Draw the springs of six joints, three of them with harmonic drives; ``rated`` (6,) N m."""
     wrist = np.arange(6) >= 3
-    soft = np.where(wrist, per_joint(rng, 0.6, 0.9), per_joint(rng, 0.9, 1.0))
-    hard = np.where(wrist, per_joint(rng, 1.05, 1.4), per_joint(rng, 1.0, 1.1))
-    lost = np.where(wrist, per_joint(rng, 1.0, 8.0), per_joint(rng, 0.5, 4.0)) * _ARCSEC
+    share = np.where(wrist, rng.uniform(0.2, 0.5, 6), rng.uniform(0.05, 0.2, 6))  # of the gear in the twist
+    soft = 1.0 / (1.0 - share + share / per_joint(rng, 0.65, 0.9))
+    hard = 1.0 / (1.0 - share + share / per_joint(rng, 1.1, 1.4))
+    lost = np.where(wrist, per_joint(rng, 0.8, 5.0), per_joint(rng, 0.4, 2.5)) * _ARCSEC
     return Springs(
         stiffness,
         knees=np.outer(rated, [0.12, 0.4]) * np.exp(rng.uniform(-0.3, 0.3, (6, 1))),

@@ -160,7 +160,7 @@ def done(robot: Robot, course: Course, force: Callable[[Array], Array] | None) -
     twist = robot.springs.in_cut(links) if during.cutting else robot.springs.elastic(links)
     twist = twist + robot.springs.hysteresis(links) + robot.springs.rattle(links, during.dt)
     error = robot.transmission.error(during.q, sliding) - robot.servo.misread(during.q)
-    # The work was touched off in mid-wall, with the arm at rest under its own weight.
+    # The work was touched off in mid-wall, under the arm's own weight and from both sides of any gap.
     middle = int(np.argmin(np.abs(during.x - 0.5 * during.length)))
     weight = robot.springs.in_cut(-gravity) if during.cutting else robot.springs.elastic(-gravity)
     joints = twist - weight[middle] + error - error[middle] + strayed
