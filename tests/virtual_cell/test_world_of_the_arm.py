@@ -1,4 +1,4 @@
-"""Things of the arm's world against closed forms and limits: friction, gears, hoses, links, servos, gauges."""
+"""Things of the arm's world against closed forms: friction, gears, hoses, links, servos, gauges."""
 
 from dataclasses import replace
 
@@ -88,7 +88,8 @@ def test_friction_lies_in_the_published_ranges():
         ("by_load", 3e-3, 2e-2),
     ):
         values = np.array([getattr(one, name) for one in drawn])
-        assert low <= values.min() < 1.4 * low and high / 1.4 < values.max() <= high
+        assert low <= values.min() < 1.4 * low
+        assert high / 1.4 < values.max() <= high
         assert np.median(values) == pytest.approx(np.sqrt(low * high), rel=0.25)
 
 
@@ -114,7 +115,9 @@ def test_part_of_the_error_of_a_gear_changes_its_sign_with_the_direction():
     of_waves = np.sqrt(np.sum((gear.size * gear.flank) ** 2, axis=1) * 2.0)
     np.testing.assert_allclose(shifted, of_waves, rtol=0.2)
     arcsec = np.array([one.size.sum(axis=1) for one in many(gears.transmission)]) * 180.0 / np.pi * 3600.0
-    assert 1.0 < np.quantile(arcsec, 0.05) and np.quantile(arcsec, 0.95) < 45.0
+    low, high = np.quantile(arcsec, [0.05, 0.95])
+    assert low > 1.0
+    assert high < 45.0
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +158,8 @@ def test_hoses_take_energy_as_they_bend_to_and_fro():
     torque = one.torque(q, np.zeros(6))
     round_ = slice(2000, 4001)
     work = np.einsum("ni,ni->i", torque[round_][1:], np.diff(q[round_], axis=0))
-    assert (work[[0, 2, 3, 4, 5]] > 0.0).all() and abs(work[1]) < 1e-12
+    assert (work[[0, 2, 3, 4, 5]] > 0.0).all()
+    assert abs(work[1]) < 1e-12
     assert (work <= 0.8 * one.drag + 1e-9).all()
 
 
@@ -198,7 +202,8 @@ def test_packets_come_late_twice_or_not_at_all_but_one_after_another():
     rng = np.random.default_rng(1)
     one = replace(controller.recorder(rng, (0.004,)), late=0.02, lost=0.01, doubled=0.005, jitter=1e-4)
     due, stamp = one.arrivals(400.0, rng)
-    assert (np.diff(stamp) > 0.0).all() and (stamp >= due).all()
+    assert (np.diff(stamp) > 0.0).all()
+    assert (stamp >= due).all()
     numbers = np.round(due / one.period).astype(int)
     assert len(np.unique(numbers)) / 100_000 == pytest.approx(0.99, abs=0.002)
     assert np.mean(np.diff(np.sort(numbers)) == 0) == pytest.approx(0.005, abs=0.001)
@@ -229,7 +234,8 @@ def test_a_stylus_reads_the_wall_where_it_is_perfect_and_else_about_it():
     assert np.std([one.mean() for one in reads]) == pytest.approx(6e-6, rel=0.15)
     assert np.std([np.polyfit(x, one, 1)[0] for one in reads]) == pytest.approx(2e-5, rel=0.15)
     grains = replace(perfect, dust=200.0).specks(x, np.random.default_rng(3))
-    assert grains.min() >= 0.0 and grains.max() > 0.0
+    assert grains.min() >= 0.0
+    assert grains.max() > 0.0
 
 
 def test_a_tracker_reads_worse_from_further_away_and_better_along_its_beam():

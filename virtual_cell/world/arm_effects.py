@@ -49,7 +49,7 @@ def moving(robot: Robot) -> list[int]:
 def _likely(rng: np.random.Generator, robot: Robot) -> int:
     """Draw a joint that moves, mostly one that turns round in the cuts, where there is any."""
     turning = robot.moves.turning
-    return drawn_joint(rng, turning if turning and rng.uniform() < 0.75 else moving(robot))
+    return drawn_joint(rng, turning if turning and rng.uniform() < 0.9 else moving(robot))
 
 
 def _put(values: Array, joint: int, value: float | Array) -> Array:
@@ -59,7 +59,7 @@ def _put(values: Array, joint: int, value: float | Array) -> Array:
 
 
 def _clock(rng: np.random.Generator, _: Robot) -> Parameters:
-    return {"offset_ms": drawn_signed(rng, 12.0, 300.0)}
+    return {"offset_ms": drawn_signed(rng, 25.0, 300.0)}
 
 
 def _late(robot: Robot, p: Parameters) -> Robot:
@@ -130,7 +130,7 @@ def _warmth_read(robot: Robot, cuts: Sequence[During], p: Parameters) -> Transla
 
 def _wheel(rng: np.random.Generator, robot: Robot) -> Parameters:
     joint = drawn_joint(rng, moving(robot))
-    wave = drawn_size(rng, 2.5, 10.0) * MM * robot.moves.travel[joint - 1]
+    wave = drawn_size(rng, 2.0, 7.5) * MM * robot.moves.travel[joint - 1]
     level = float(robot.joints.coulomb[joint - 1])
     return {
         "joint": joint,

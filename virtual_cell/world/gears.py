@@ -3,8 +3,8 @@
 Ranges: 2 to 30 arcsec of transmission error in all, most of it once and twice per turn of the joint and per
 turn of the motor, little at the teeth's order, part of which changes its sign with the direction; harmonic
 drives up to a third softer below a tenth of their torque than above, in series with shafts and bearings that
-are linear, with a lost motion of some arcsec at a few per cent of it (Tuttle and Seering, IEEE Trans. Robot. Autom. 12 (1996) 368; Taghirad and Belanger, J. Dyn.
-Sys. Meas. Control 120 (1998) 496; makers' catalogues).
+are linear, with a lost motion of some arcsec at a few per cent of it (Tuttle and Seering, IEEE Trans. Robot.
+Autom. 12 (1996) 368; Taghirad and Belanger, J. Dyn. Sys. Meas. Control 120 (1998) 496; makers' catalogues).
 """
 
 from __future__ import annotations
