@@ -111,7 +111,8 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
     write_csv(folder / "loads.csv", tested(day, rng))
     write_yaml(folder / "cell.yaml", {"cell": "cutting-arm", "arm": {"dh": [list(row) for row in DH]}})
     write_yaml(folder / "batch.yaml", manifest(folder.name, day))
-    effects, errors = {}, {}
+    effects: Row = {}
+    errors: Row = {}
     for name, values in given.items():
         cause = ARM_CAUSES[name]
         translate = cause.translate if isinstance(cause, Made) else None
@@ -204,7 +205,7 @@ def _sensed(
     sensor, first = day.bench.sensor, float(during.x[0] - during.t[0] * during.feed)
 
     def in_work(t: Array) -> Array:
-        acting = force.at(t, first + t * during.feed, sensor.rate) @ run.feed
+        acting: Array = force.at(t, first + t * during.feed, sensor.rate) @ run.feed
         for cause in day.robot.causes:
             if cause.sensed is not None:
                 acting = cause.sensed(during, t, acting)
@@ -217,7 +218,7 @@ def _traced(day: _Day, run: _Run, cut: Done, rng: np.random.Generator) -> dict[s
     """Trace of the wall: what the tip left, marks of the teeth, and what the instrument makes of it."""
     stylus = day.session.stylus
     x = stylus.places(run.wall.length)
-    z = cut.height(x) + feed_marks(x, run.plan.feed_per_tooth_mm * MM, day.bench.tool, rng.uniform())
+    z: Array = cut.height(x) + feed_marks(x, run.plan.feed_per_tooth_mm * MM, day.bench.tool, rng.uniform())
     for cause in day.robot.causes:
         if cause.traced is not None:
             z = cause.traced(cut.during, x, z)

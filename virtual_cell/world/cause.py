@@ -56,6 +56,10 @@ class During:
         """Where the run is in the session, 0 … 1."""
         return (self.order - 1) / max(self.runs - 1, 1)
 
+    def resisting(self, force: Array) -> Array:
+        """Torque (n, 6), N m, that resists at the links where a force (n, 3), N, acts on the tip besides."""
+        return np.asarray(-np.einsum("nai,na->ni", self.jacobian, force))
+
     def own(self) -> np.random.Generator:
         """Return the generator of what differs between runs, the same at every call."""
         return np.random.default_rng([self.seed, self.order, int(self.cutting)])

@@ -131,7 +131,7 @@ def _jetted(robot: Robot, p: Parameters) -> Robot:
         return np.outer(p["force_n"] * on * flutter, 0.6 * during.normal - 0.8 * during.along)
 
     def load(during: During) -> Array:
-        return -np.einsum("nai,na->ni", during.jacobian, pushed(during))
+        return during.resisting(pushed(during))
 
     return robot.with_cause(Cause(load=load))
 
@@ -153,7 +153,7 @@ def _taut(robot: Robot, p: Parameters) -> Robot:
         place = (during.x - 0.5 * during.length) * float(during.along @ away)
         beyond = np.maximum(place + (0.5 - p["free_share"]) * during.length, 0.0)
         pull = np.outer(-p["n_mm"] * 1e3 * beyond * during.cutting, 0.8 * away + 0.6 * robot.turn[:, 2])
-        return -np.einsum("nai,na->ni", during.jacobian, pull)
+        return during.resisting(pull)
 
     return robot.with_cause(Cause(load=load))
 
@@ -209,7 +209,7 @@ def _swinging(robot: Robot, p: Parameters) -> Robot:
         wave = wave * (0.6 + 0.4 * np.sin(2.0 * math.pi * since / own.uniform(4.0, 9.0)))
         across = math.cos(own.uniform(0.0, math.pi)) * robot.turn[:, 0] + 0.7 * robot.turn[:, 1]
         pull = np.outer(p["force_n"] * wave * during.cutting, across)
-        return -np.einsum("nai,na->ni", during.jacobian, pull)
+        return during.resisting(pull)
 
     return robot.with_cause(Cause(drive=drive))
 
