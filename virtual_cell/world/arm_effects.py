@@ -135,7 +135,7 @@ def _wheel(rng: np.random.Generator, robot: Robot) -> Parameters:
     return {
         "joint": joint,
         "order": float(round(2.0 * math.pi / wave)),
-        "torque_nm": drawn_size(rng, 0.04 * level, 0.5 * level),
+        "torque_nm": drawn_size(rng, 0.05 * level, 0.5 * level),
         "phase_deg": drawn_angle(rng),
         "squeezed": round(float(rng.uniform(0.15, 0.6)), 2),
     }
@@ -200,7 +200,7 @@ def _elsewhere(robot: Robot, p: Parameters) -> Robot:
 
 def _gap(rng: np.random.Generator, robot: Robot) -> Parameters:
     joint = drawn_joint(rng, robot.moves.swaying or (0,))
-    return {"joint": joint, "angle_mdeg": drawn_size(rng, 1.5, 30.0)}
+    return {"joint": joint, "angle_mdeg": drawn_size(rng, 0.8, 12.0)}
 
 
 def _worn(robot: Robot, p: Parameters) -> Robot:
@@ -295,7 +295,7 @@ def _pump(rng: np.random.Generator, robot: Robot) -> Parameters:
     ends = sorted((fast / (6.5 * MM), slow / (1.0 * MM)))
     return {
         "frequency_hz": drawn_size(rng, *ends),
-        "amplitude_um": drawn_size(rng, 0.6, 10.0),
+        "amplitude_um": drawn_size(rng, 0.5, 8.0),
         "phase_deg": drawn_angle(rng),
         "unsteady": round(float(rng.uniform(0.02, 0.2)), 3),
     }

@@ -64,7 +64,7 @@ def _magnets(rng: np.random.Generator, robot: Robot) -> Parameters:
 
 def _leak(rng: np.random.Generator, robot: Robot) -> Parameters:
     del robot
-    return {"torque_nm": drawn_signed(rng, 6.0, 150.0), "minutes": drawn_size(rng, 3.0, 40.0)}
+    return {"torque_nm": drawn_signed(rng, 15.0, 180.0), "minutes": drawn_size(rng, 3.0, 40.0)}
 
 
 def _leaking(robot: Robot, p: Parameters) -> Robot:
@@ -196,7 +196,7 @@ def _coupled(robot: Robot, p: Parameters) -> Robot:
 
 
 def _swing(rng: np.random.Generator, _: Robot) -> Parameters:
-    return {"force_n": drawn_size(rng, 4.0, 80.0), "frequency_hz": drawn_size(rng, 0.35, 1.2)}
+    return {"force_n": drawn_size(rng, 15.0, 150.0), "frequency_hz": drawn_size(rng, 0.35, 1.2)}
 
 
 def _swinging(robot: Robot, p: Parameters) -> Robot:
@@ -235,7 +235,7 @@ DRIVE_FAULTS: Mapping[str, Hidden[Robot]] = {
     ),
     "wrist_coupling": Hidden(
         "joint=4|5 share",
-        lambda r, _: {"joint": int(r.integers(4, 6)), "share": drawn_size(r, 0.05, 0.6)},
+        lambda r, _: {"joint": int(r.integers(4, 6)), "share": drawn_size(r, 0.15, 0.9)},
         _coupled,
     ),
     "swinging_hoses": Hidden("force_n frequency_hz", _swing, _swinging),

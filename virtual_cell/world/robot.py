@@ -157,12 +157,13 @@ def done(robot: Robot, course: Course, force: Callable[[Array], Array] | None) -
     motors = motors + (1.0 - robot.joints.behind) * friction + robot.hose.torque(during.q, course.start)
     motors = motors + robot.total("drive", during)
     strayed = robot.servo.strayed(motors, during.rate, during.dt)
-    twist = robot.springs.in_cut(links) if during.cutting else robot.springs.elastic(links)
-    twist = twist + robot.springs.hysteresis(links) + robot.springs.rattle(links, during.dt)
+    twist = (
+        robot.springs.in_cut(links) + robot.springs.hysteresis(links) + robot.springs.rattle(links, during.dt)
+    )
     error = robot.transmission.error(during.q, sliding) - robot.servo.misread(during.q)
     # The work was touched off in mid-wall, under the arm's own weight and from both sides of any gap.
     middle = int(np.argmin(np.abs(during.x - 0.5 * during.length)))
-    weight = robot.springs.in_cut(-gravity) if during.cutting else robot.springs.elastic(-gravity)
+    weight = robot.springs.in_cut(-gravity)
     joints = twist - weight[middle] + error - error[middle] + strayed
     tip = np.einsum("nai,ni->na", during.jacobian, joints) + np.einsum("nab,nb->na", rest, during.force)
     tip = robot.links.followed(tip, during.dt) + robot.total("tip", during)
