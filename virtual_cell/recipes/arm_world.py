@@ -15,16 +15,17 @@ import numpy as np
 
 from virtual_cell.dynamometer import record
 from virtual_cell.hidden import Parameters
+from virtual_cell.recipes.arm_day import Session, in_plain_units
 from virtual_cell.recipes.arm_draws import Bench, Side, entry, side, side_cut, speed, way
-from virtual_cell.recipes.arm_programme import Session, drawn, in_plain_units
+from virtual_cell.recipes.arm_programme import drawn
 from virtual_cell.recipes.kr160 import DH, NEAR_DEG, TOOL_AXES
 from virtual_cell.session import Plan, write_force
 from virtual_cell.side_force import SideForce, side_force
 from virtual_cell.units import DEG, MM, Array
 from virtual_cell.wall import feed_marks
 from virtual_cell.world.arm_causes import ARM_CAUSES
-from virtual_cell.world.arm_effects import Made
 from virtual_cell.world.cause import During
+from virtual_cell.world.made import Made
 from virtual_cell.world.robot import Course, Done, Robot, Way, done, logged
 from virtual_cell.world.robot import way as statics
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_signal, write_yaml

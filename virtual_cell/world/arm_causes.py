@@ -27,6 +27,6 @@ SHOWN: Mapping[str, tuple[str, ...]] = {
         *("friction_reversal", "gear_ripple", "joint_backlash", "path_vibration"),
         *("slipping_work", "lighter_work_rings", "fluttering_wall", "hard_bands", "sticking_joint"),
         *("knocking_valve", "beating_belt", "torn_hose_bracket"),
-        *("skid_beside_the_stylus", "worn_traverse", "welded_chips"),
+        *("worn_traverse", "welded_chips"),
     ),
 }

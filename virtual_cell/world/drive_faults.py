@@ -9,8 +9,8 @@ import numpy as np
 
 from virtual_cell.hidden import JOINT, Hidden, Parameters, drawn_angle, drawn_signed, drawn_size
 from virtual_cell.units import DEG, MS, Array
-from virtual_cell.world.arm_effects import drawn_joint, moving
 from virtual_cell.world.cause import Cause, During, on_joint, smooth_step
+from virtual_cell.world.made import drawn_joint, moving
 from virtual_cell.world.robot import Robot
 
 _LOADED = (0, 1, 2, 4)  # joints on which the cut puts much torque
