@@ -108,7 +108,7 @@ def test_a_mistake_is_told_in_one_line(folder, arguments, told):
 def test_a_style_that_is_none_is_refused_before_the_simulator_is_called(folder):
     result = simulate("try", "--style", "e")
     assert result.exit_code == 2
-    assert "'e' is not one of 'a', 'b', 'c', 'd'" in result.stderr
+    assert "'e' is not one of 'a', 'b', 'c'" in result.stderr
 
 
 @pytest.mark.parametrize(
