@@ -97,7 +97,7 @@ def session(
         common=between(rng, 0.003, 0.009),
         own=between(rng, 0.003, 0.009),
         drift=signed(rng, 0.005, 0.03),
-        slow=signed(rng, 2e-4, 4e-3),
+        slow=signed(rng, 1.8e-4, 4e-3),
         spindle=between(rng, 1e-4, 2e-3),
         shallow=between(rng, 8.0, 60.0) * 1e-6,
     )

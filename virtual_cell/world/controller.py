@@ -141,5 +141,5 @@ def recorder(rng: np.random.Generator, periods: tuple[float, ...]) -> Recorder:
         lost=between(rng, 1e-4, 4e-3),
         doubled=between(rng, 5e-5, 2e-3),
         skew=signed(rng, 2e-6, 1e-4),
-        slip=between(rng, 2e-4, 3e-3),
+        slip=between(rng, 1.5e-4, 3e-3),
     )

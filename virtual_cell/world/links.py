@@ -2,7 +2,7 @@
 
 Joints make 50 to 80 % of the compliance of an arm, links and base the rest (Klimchik et al., Robot.
 Comput.-Integr. Manuf. 35 (2015); Abele et al., Prod. Eng. 1 (2007) 387). The first modes of heavy arms lie at
-6 to 25 Hz, with 3 to 10 % of critical damping (Schneider et al., Prod. Eng. 8 (2014) 59).
+6 to 25 Hz, with 2 to 12 % of critical damping (Schneider et al., Prod. Eng. 8 (2014) 59).
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ def drawn(rng: np.random.Generator, stiffness: Array) -> Links:
     first = between(rng, 6.5, 15.0)
     share = float(rng.uniform(0.55, 0.85))
     modes = (
-        (first, between(rng, 0.03, 0.1), share),
-        (first * rng.uniform(1.3, 1.8), between(rng, 0.03, 0.1), 1.0 - share),
+        (first, between(rng, 0.05, 0.12), share),
+        (first * rng.uniform(1.3, 1.8), between(rng, 0.05, 0.12), 1.0 - share),
     )
     return Links(
         soft[:3] * np.exp(rng.uniform(math.log(0.02), math.log(0.12), 3)),

@@ -71,7 +71,7 @@ def drawn(rng: np.random.Generator) -> Stylus:
         level=between(rng, 4e-6, 4e-5),
         zero=between(rng, 1.5, 12.0) * UM,
         slide=between(rng, 0.02, 0.2) * MM,
-        dust=between(rng, 2.0, 60.0),
-        grain=between(rng, 0.5, 8.0) * UM,
-        step=float(rng.choice([0.02, 0.04, 0.1])) * MM,
+        dust=between(rng, 1.0, 12.0),
+        grain=between(rng, 0.4, 3.0) * UM,
+        step=float(rng.choice([0.01, 0.02])) * MM,
     )
