@@ -43,7 +43,7 @@ def _clock_read(robot: Robot, _: Sequence[During], p: Parameters) -> Translated:
 def _seal(rng: np.random.Generator, robot: Robot) -> Parameters:
     joint = _likely(rng, robot)
     level = float(robot.joints.coulomb[joint - 1])
-    return {"joint": joint, "torque_nm": drawn_signed(rng, 0.2 * level, 1.2 * level)}
+    return {"joint": joint, "torque_nm": drawn_signed(rng, 0.3 * level, 1.4 * level)}
 
 
 def _sealed(robot: Robot, p: Parameters) -> Robot:
@@ -100,7 +100,7 @@ def _warmth_read(robot: Robot, cuts: Sequence[During], p: Parameters) -> Transla
 
 def _wheel(rng: np.random.Generator, robot: Robot) -> Parameters:
     joint = drawn_joint(rng, moving(robot))
-    wave = drawn_size(rng, 2.0, 7.5) * MM * robot.moves.travel[joint - 1]
+    wave = drawn_size(rng, 3.5, 7.5) * MM * robot.moves.travel[joint - 1]
     level = float(robot.joints.coulomb[joint - 1])
     return {
         "joint": joint,

@@ -72,7 +72,7 @@ def _blended(robot: Robot, p: Parameters) -> Robot:
 
 def _sun(rng: np.random.Generator, _: Robot) -> Parameters:
     return {
-        "um": drawn_size(rng, 15.0, 300.0),
+        "um": drawn_size(rng, 10.0, 120.0),
         "bearing_deg": drawn_angle(rng),
         "clouds": int(rng.integers(2, 5)),
     }
@@ -109,7 +109,7 @@ def _creeping(robot: Robot, p: Parameters) -> Robot:
 
 
 def _slip(rng: np.random.Generator, _: Robot) -> Parameters:
-    return {"um": drawn_size(rng, 4.0, 120.0)}
+    return {"um": drawn_size(rng, 7.0, 100.0)}
 
 
 def _slipping(robot: Robot, p: Parameters) -> Robot:
@@ -148,7 +148,7 @@ def _resonant(rng: np.random.Generator, robot: Robot) -> Parameters:
     return {
         "frequency_hz": drawn_size(rng, *sorted((fast / (5.0 * MM), slow / (1.3 * MM)))),
         "rise": round(float(rng.uniform(0.25, 0.7)), 2),
-        "amplitude_um": drawn_size(rng, 0.6, 10.0),
+        "amplitude_um": drawn_size(rng, 0.5, 6.0),
     }
 
 
@@ -180,7 +180,7 @@ def _thin(robot: Robot, p: Parameters) -> Robot:
 
 
 def _bands(rng: np.random.Generator, _: Robot) -> Parameters:
-    return {"um": drawn_size(rng, 1.5, 25.0), "place_seed": int(rng.integers(1000))}
+    return {"um": drawn_size(rng, 2.5, 25.0), "place_seed": int(rng.integers(1000))}
 
 
 def _banded(robot: Robot, p: Parameters) -> Robot:
@@ -199,7 +199,7 @@ def _banded(robot: Robot, p: Parameters) -> Robot:
 def _stuck(rng: np.random.Generator, _: Robot) -> Parameters:
     return {
         "joint": int(rng.integers(1, 7)),
-        "um": drawn_size(rng, 2.5, 40.0),
+        "um": drawn_size(rng, 5.0, 60.0),
         "pitch_mm": drawn_size(rng, 1.5, 5.0),
     }
 
@@ -221,7 +221,7 @@ def _sticking(robot: Robot, p: Parameters) -> Robot:
 
 
 def _knock(rng: np.random.Generator, _: Robot) -> Parameters:
-    return {"um": drawn_size(rng, 2.5, 40.0), "period_s": drawn_size(rng, 0.5, 2.2)}
+    return {"um": drawn_size(rng, 5.0, 60.0), "period_s": drawn_size(rng, 0.5, 2.2)}
 
 
 def _knocking(robot: Robot, p: Parameters) -> Robot:

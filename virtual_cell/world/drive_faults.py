@@ -119,7 +119,7 @@ def _sagging(robot: Robot, p: Parameters) -> Robot:
 
 
 def _jet(rng: np.random.Generator, _: Robot) -> Parameters:
-    return {"force_n": drawn_size(rng, 8.0, 120.0), "from_share": round(float(rng.uniform(0.25, 0.7)), 2)}
+    return {"force_n": drawn_size(rng, 5.0, 70.0), "from_share": round(float(rng.uniform(0.25, 0.7)), 2)}
 
 
 def _jetted(robot: Robot, p: Parameters) -> Robot:

@@ -78,12 +78,12 @@ TRACE_FAULTS: Mapping[str, Hidden[Robot]] = {
     "worn_traverse": Hidden("um at_mm lead_mm", _traverse, _worn),
     "warming_pickup": Hidden(
         "um length_mm",
-        lambda r, _: {"um": drawn_signed(r, 12.0, 250.0), "length_mm": drawn_size(r, 10.0, 50.0)},
+        lambda r, _: {"um": drawn_signed(r, 12.0, 150.0), "length_mm": drawn_size(r, 10.0, 50.0)},
         _warming,
     ),
     "welded_chips": Hidden(
         "um per_m",
-        lambda r, _: {"um": drawn_size(r, 2.0, 25.0), "per_m": drawn_size(r, 60.0, 300.0)},
+        lambda r, _: {"um": drawn_size(r, 2.5, 25.0), "per_m": drawn_size(r, 60.0, 300.0)},
         _chips,
     ),
 }
