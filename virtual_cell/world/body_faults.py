@@ -238,7 +238,7 @@ def _knocking(robot: Robot, p: Parameters) -> Robot:
 
 
 def _beat(rng: np.random.Generator, _: Robot) -> Parameters:
-    return {"share_of_turn": drawn_size(rng, 0.05, 0.16), "um": drawn_size(rng, 0.6, 10.0)}
+    return {"share_of_turn": drawn_size(rng, 0.05, 0.16), "um": drawn_size(rng, 0.5, 6.0)}
 
 
 def _beating(robot: Robot, p: Parameters) -> Robot:

@@ -138,7 +138,7 @@ def _jetted(robot: Robot, p: Parameters) -> Robot:
 
 def _rope(rng: np.random.Generator, _: Robot) -> Parameters:
     return {
-        "n_mm": drawn_size(rng, 0.6, 8.0),
+        "n_mm": drawn_size(rng, 0.25, 4.0),
         "free_share": round(float(rng.uniform(0.2, 0.6)), 2),
         "bearing_deg": drawn_angle(rng),
     }
