@@ -11,6 +11,8 @@ from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
 from virtual_cell.face_effects import FACE_EFFECTS
 from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Parameters
 from virtual_cell.recipes import arm, boundary, faces, force, force_world
+from virtual_cell.world.arm_causes import ARM_CAUSES
+from virtual_cell.world.arm_causes import SHOWN as WORLD_SHOWN
 from virtual_cell.world.boundary_effects import HARDER_EFFECTS
 from virtual_cell.world.face_causes import FACE_CAUSES
 from virtual_cell.write import Row
@@ -51,7 +53,10 @@ def _named(effects: Mapping[str, Parametrised], names: Iterable[str] = ()) -> di
 
 RECIPES = {
     "force": Recipe(force.make, _named(EFFECTS), _named(force_world.HARDER)),
-    **{observable: Recipe(arm.make, _named(ARM_EFFECTS, names)) for observable, names in SHOWN.items()},
+    **{
+        observable: Recipe(arm.make, _named(ARM_EFFECTS, names), _named(ARM_CAUSES, WORLD_SHOWN[observable]))
+        for observable, names in SHOWN.items()
+    },
     "flatness": Recipe(faces.make, _named(FACE_EFFECTS), _named(FACE_CAUSES)),
     "lobes": Recipe(boundary.make, _named(BOUNDARY_EFFECTS), _named(HARDER_EFFECTS)),
 }

@@ -22,7 +22,9 @@ from virtual_cell.arm_wall import height
 from virtual_cell.dynamometer import record
 from virtual_cell.hidden import Parameters
 from virtual_cell.milling import scattered
+from virtual_cell.recipes import arm_world
 from virtual_cell.recipes.arm_draws import Bench, Side, drawn, entry, side, side_cut, speed, way
+from virtual_cell.recipes.arm_programme import HABITS
 from virtual_cell.recipes.kr160 import DH, NEAR_DEG, TOOL_AXES
 from virtual_cell.session import Plan, spread, write_force
 from virtual_cell.side_force import SideForce, side_force
@@ -62,11 +64,15 @@ class _Run:
 def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style: str = "a") -> Row:
     """Write a batch that hides effects (name → parameters, or None: drawn by the seed); return the truth.
 
+    Styles ``c`` and ``d`` are of the harder world, :mod:`virtual_cell.recipes.arm_world`.
+
     Raises
     ------
     KeyError
         For an effect that is not known.
     """
+    if style in HABITS:
+        return arm_world.make(folder, hidden, seed, style)
     rng = np.random.default_rng([seed, 23])
     cell, bench = drawn(rng, style)
     effects = {name: given or ARM_EFFECTS[name].draw(rng, cell) for name, given in hidden.items()}

@@ -95,15 +95,15 @@ def drawn(rng: np.random.Generator, style: str) -> tuple[ArmCell, Bench]:
         plans = _plans(rng, style)
         origin, turn = _place(rng, style)
         try:
-            lines = _lines(arm, bench, plans, origin, turn)
+            lines = lines_of(arm, bench, plans, origin, turn)
         except (RuntimeError, np.linalg.LinAlgError):
             continue
-        by_role = {role: _turning(bench, plans, lines, role) for role in ("identify", "validate")}
+        by_role = {role: turning_of(bench, plans, lines, role) for role in ("identify", "validate")}
         turning = by_role["identify"] & by_role["validate"]
         if attempt > _TRIES or (turning if wanted else not (by_role["identify"] | by_role["validate"])):
             break
     swaying = _swaying(arm, bench, plans, lines, turn)
-    moves = _moves(arm, bench, plans, lines, (tuple(sorted(turning)), swaying))
+    moves = moves_of(arm, bench, plans, lines, (tuple(sorted(turning)), swaying))
     gains = rng.spawn(1)[0].normal(0.0, _CALIBRATION, 6) if style == "b" else np.zeros(6)
     cell = ArmCell(arm, drives, origin, turn, moves, torque_gain=tuple(gains.tolist()))
     return cell, replace(bench, lines=lines, plans=plans)
@@ -261,7 +261,7 @@ def entry(bench: Bench) -> float:
     return LEAD + bench.tool.radius
 
 
-def _lines(arm: Arm, bench: Bench, plans: Sequence[Plan], origin: Array, turn: Array) -> Mapping[Way, Line]:
+def lines_of(arm: Arm, bench: Bench, plans: Sequence[Plan], origin: Array, turn: Array) -> Mapping[Way, Line]:
     """Lines of all walls.
 
     Raises
@@ -283,7 +283,7 @@ def _lines(arm: Arm, bench: Bench, plans: Sequence[Plan], origin: Array, turn: A
     return lines
 
 
-def _turning(bench: Bench, plans: Sequence[Plan], lines: Mapping[Way, Line], role: str) -> set[int]:
+def turning_of(bench: Bench, plans: Sequence[Plan], lines: Mapping[Way, Line], role: str) -> set[int]:
     """Joints that turn round where the tool is over the block, in a run of a role."""
     joints = set()
     for plan in plans:
@@ -311,13 +311,14 @@ def _swaying(
     return tuple(sorted(joints))
 
 
-def _moves(
+def moves_of(
     arm: Arm,
     bench: Bench,
     plans: Sequence[Plan],
     lines: Mapping[Way, Line],
     special: tuple[tuple[int, ...], tuple[int, ...]],
 ) -> Moves:
+    """How the joints move in the cuts; ``special``: those that turn round, those whose torque sways."""
     travel = np.mean(
         [np.abs(np.diff(one.q, axis=0)).sum(axis=0) / one.length for one in lines.values()], axis=0
     )

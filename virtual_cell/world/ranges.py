@@ -1,0 +1,30 @@
+"""Draws over published ranges: log-uniform where a range spans much, one value for each joint."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from virtual_cell.units import Array
+
+
+def between(rng: np.random.Generator, low: float, high: float) -> float:
+    """Log-uniform between two positive numbers."""
+    return float(math.exp(rng.uniform(math.log(low), math.log(high))))
+
+
+def per_joint(rng: np.random.Generator, low: float, high: float) -> Array:
+    """Log-uniform, (6,)."""
+    return np.exp(rng.uniform(math.log(low), math.log(high), 6))
+
+
+def signed(rng: np.random.Generator, low: float, high: float) -> float:
+    """Log-uniform, of either sign."""
+    return between(rng, low, high) * float(rng.choice([-1.0, 1.0]))
+
+
+def towards(rng: np.random.Generator) -> Array:
+    """Direction (3,), evenly drawn."""
+    drawn = rng.standard_normal(3)
+    return np.asarray(drawn / np.linalg.norm(drawn))
