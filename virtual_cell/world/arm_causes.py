@@ -24,7 +24,7 @@ SHOWN: Mapping[str, tuple[str, ...]] = {
         *("torn_hose_bracket", "worn_traverse", "warming_pickup", "skid_beside_the_stylus"),
     ),
     "waviness": (
-        *("friction_reversal", "gear_ripple", "joint_backlash", "path_vibration"),
+        *("friction_reversal", "gear_ripple", "path_vibration"),
         *("slipping_work", "lighter_work_rings", "fluttering_wall", "hard_bands", "sticking_joint"),
         *("knocking_valve", "beating_belt", "torn_hose_bracket"),
         *("worn_traverse", "welded_chips"),

@@ -13,9 +13,9 @@ from virtual_cell.session import Plan, orbit_rpm
 from virtual_cell.units import DEG, MM, RPM, Array
 from virtual_cell.world import amplifier as amplifying
 from virtual_cell.world.amplifier import Amplifier
-from virtual_cell.world.cause import Cause, Moment
 from virtual_cell.world.cutter import RealTool, Wear
 from virtual_cell.world.cutting import Pass, TrueEngagement, edge_force, on_a_ramp
+from virtual_cell.world.force_cause import Cause, Moment
 from virtual_cell.world.metal import Metal, factors
 from virtual_cell.world.people import SHORT, Habits
 from virtual_cell.world.pickup import Pickup, picked_up

@@ -14,7 +14,7 @@ from virtual_cell.hidden import Hidden, drawn_angle, drawn_signed, drawn_size
 from virtual_cell.units import DEG, MM, RPM, UM
 from virtual_cell.world import outside_machine as machine
 from virtual_cell.world import outside_work as work
-from virtual_cell.world.cause import Cause
+from virtual_cell.world.force_cause import Cause
 from virtual_cell.world.making import Making
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from virtual_cell.units import Array
-from virtual_cell.world.cause import Cause, Moment
 from virtual_cell.world.cutting import Change
+from virtual_cell.world.force_cause import Cause, Moment
 from virtual_cell.world.spindle import Turning
 from virtual_cell.world.travel import Wobble
 

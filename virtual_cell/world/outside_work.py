@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from virtual_cell.units import MM, Array
-from virtual_cell.world.cause import Cause, Moment
 from virtual_cell.world.cutter import RealTool
 from virtual_cell.world.cutting import Change, Points
+from virtual_cell.world.force_cause import Cause, Moment
 
 _SPOTS, _CHIPS, _EDGE = 1, 2, 3  # streams of a run's random numbers
 
