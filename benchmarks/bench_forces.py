@@ -132,7 +132,8 @@ def table(tool, cut, true_path):
 def test_rounded_ends_beside_the_flat_end():
     """On true paths, by which coefficients are identified, and on circles: closed forms of the flat end.
 
-    The aim is twice the time of the flat end on true paths, which the corner keeps and the ball does not.
+    The aim is twice the time of the flat end on true paths, which side cuts without runout keep. What is left
+    is the search for where edges enter and leave, which circles of a flat end have as closed forms.
     """
     radius, side = TOOL.radius, math.pi - math.acos(1.0 - 0.5)
     arcs = {"slot": Engagement(0.0, math.pi), "down": Engagement(side, math.pi)}

@@ -20,7 +20,7 @@ way, so that no effect is taken for it, but the model is never corrected by it: 
 resembles.
 
 A parameter is sought between the two bounds; several effects move them to what a batch can show. *Per joint*
-means that each of the six joints of an arm is tried by itself, and the verdict names the joint. [K] is one of
+means that each of the joints of an arm is tried by itself, and the verdict names the joint. [K] is one of
 the [three publications](errata.md#the-publications).
 """
 EFFECTS, LIKENESSES = "## Effects", "## Likenesses"

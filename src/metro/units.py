@@ -20,6 +20,7 @@ UM = 1e-6
 MS = 1e-3
 DEG = math.pi / 180.0
 MRAD = 1e-3
+URAD = 1e-6
 RPM = 2.0 * math.pi / 60.0
 N_MM2 = 1e6
 N_MM = 1e3
@@ -30,6 +31,7 @@ PRINTED = {
     "um": "µm",
     "deg": "°",
     "mdeg": "m°",
+    "urad": "µrad",
     "N/mm2": "N/mm²",
     "N mm2": "N mm²",
     "kg m2": "kg m²",

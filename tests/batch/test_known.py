@@ -56,7 +56,10 @@ def test_an_effect_with_all_of_its_parameters_has_no_findings(batch, known):
         ),
         ("{tool_runout: {radius_um: yes, angle_deg: 40}}", "radius_um: found true, expected a number"),
         ("{tool_runout: {radius_um: [], angle_deg: 40}}", "radius_um: found [], expected a number"),
-        ("{friction_reversal: {joint: 7, torque_nm: 5}}", "joint: found 7, expected a joint, 1 to 6, or all"),
+        (
+            "{friction_reversal: {joint: 10, torque_nm: 5}}",
+            "joint: found 10, expected a joint, 1 to 9, or all",
+        ),
         (
             "{missing_mode: {frequency_hz: 40, damping: 0.02, stiffness_n_um: 5, axis: z}}",
             'axis: found "z", expected x or y',

@@ -42,6 +42,15 @@ def test_what_is_shown_is_read_and_what_is_shown_without_its_first_column_is_not
             sniff(tmp_path / name, kind)
 
 
+def test_the_readings_that_are_shown_are_slopes_and_without_a_foot_they_are_not(tmp_path):
+    (text,) = samples("Faces: levels and autocollimators", "csv")
+    (tmp_path / "plate.csv").write_text(text, encoding="utf-8")
+    sniff(tmp_path / "plate.csv", "slopes")
+    (tmp_path / "plate.csv").write_text(text.replace("x2_mm", "x"), encoding="utf-8")
+    with pytest.raises(FormatError):
+        sniff(tmp_path / "plate.csv", "slopes")
+
+
 @pytest.fixture
 def batch(tmp_path):
     """A batch of the tables that the page shows, with the files that they name."""

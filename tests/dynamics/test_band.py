@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from metro.dynamics.band import depth_samples, depths_anew
+from metro.dynamics.band import depth_samples
+from metro.dynamics.by_depth import depths_anew
 from metro.dynamics.lobes import stability_boundary
 from metro.dynamics.system import Cut, Structure
 

@@ -8,17 +8,18 @@ import pytest
 
 from metro.batch.processed import Processed, read_batch
 from metro.effects.library import library
+from metro.joint_columns import Axes
 from metro.loop.fitting.held_out import identified_fit
 from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
-from metro.observables.arm.tip_force import ACTUAL, FORCE, TORQUE
+from metro.observables.arm.tip_force import FORCE
 from metro.observables.joint_force import observable as joint_force
-from metro.observables.joint_force.observable import RATE
 from metro.robot.kinematics import arm_of_cell, forward
 from metro.stages.identify import base_fit
 from metro.stages.ingest import ingest
 
 ROOT = Path(__file__).parents[2]
+AXES = Axes((False,) * 6)
 GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
 
 
@@ -51,13 +52,13 @@ def found(cell, torque=None, *, force=None, manifest=None):
 def torques(cell, joint, extra):
     """The torques of a joint (1 … 6) with something added, by the table's rows."""
     table = cell[1]["joint_torque"].copy()
-    table[TORQUE[joint - 1]] += extra(table)
+    table[AXES.torques[joint - 1]] += extra(table)
     return table
 
 
 def turning(table, joint):
     """Direction of a joint, softened where it turns round."""
-    return np.tanh(np.radians(table[RATE[joint - 1]].to_numpy()) / 2e-4)
+    return np.tanh(np.radians(table[AXES.rates[joint - 1]].to_numpy()) / 2e-4)
 
 
 def test_nothing_is_found_where_nothing_is_hidden(cell):
@@ -83,7 +84,7 @@ def test_instruments_that_are_a_percent_off_are_no_effect_and_their_gains_are_to
     rng = np.random.default_rng(seed)
     joints, axes = rng.normal(0.0, 0.01, 6), rng.normal(0.0, 0.01, 3)
     torque, force = cell[1]["joint_torque"].copy(), cell[1]["tool_force"].copy()
-    torque[TORQUE] *= 1.0 + joints
+    torque[AXES.torques] *= 1.0 + joints
     force[FORCE] *= 1.0 + axes
     assert found(cell, torque, force=force) == []
     observed = cell[1] | {"joint_torque": torque, "tool_force": force}
@@ -113,7 +114,7 @@ def test_friction_that_grows_along_the_log_is_found_with_its_slope(cell):
 
 def test_a_gear_that_ripples_is_found_with_its_order(cell):
     ((name, where, values),) = found(
-        cell, torques(cell, 1, lambda t: 6.0 * np.sin(800.0 * np.radians(t[ACTUAL[0]]) + 1.0))
+        cell, torques(cell, 1, lambda t: 6.0 * np.sin(800.0 * np.radians(t[AXES.positions[0]]) + 1.0))
     )
     assert (name, where) == ("gear_ripple", {"joint": 1})
     assert values["order"] == pytest.approx(800.0, abs=5.0)
@@ -132,7 +133,7 @@ def test_a_clock_that_is_late_is_found_to_a_few_milliseconds(cell):
 def test_a_weight_on_the_flange_is_found_with_its_place(cell):
     batch, observed = cell
     arm, table = arm_of_cell(batch.cell, batch.manifest), observed["joint_torque"].copy()
-    q, centre, step = np.radians(table[ACTUAL].to_numpy()), np.array([0.1, 0.05, 0.2]), 1e-6
+    q, centre, step = np.radians(table[AXES.positions].to_numpy()), np.array([0.1, 0.05, 0.2]), 1e-6
 
     def energy(angles):  # potential: its slope by an angle is the torque that holds the weight
         flange = forward(arm.dh, angles)
@@ -140,7 +141,7 @@ def test_a_weight_on_the_flange_is_found_with_its_place(cell):
 
     for joint in range(6):
         move = step * np.eye(6)[joint]
-        table[TORQUE[joint]] += (energy(q + move) - energy(q - move)) / (2.0 * step)
+        table[AXES.torques[joint]] += (energy(q + move) - energy(q - move)) / (2.0 * step)
     ((name, _, values),) = found(cell, table)
     assert name == "payload_error"
     assert values["mass_kg"] == pytest.approx(4.0, abs=0.3)
@@ -159,7 +160,7 @@ def test_a_tip_that_is_not_where_it_was_declared_is_found(cell):
 
 def speeds(table, joint):
     """Speed of a joint, rad/s."""
-    return np.radians(table[RATE[joint - 1]].to_numpy())
+    return np.radians(table[AXES.rates[joint - 1]].to_numpy())
 
 
 def test_a_joint_with_stiffer_grease_is_taken_for_no_effect_of_the_library(cell):

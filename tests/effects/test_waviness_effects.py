@@ -31,7 +31,7 @@ def test_the_transfer_is_found():
 
 def test_more_friction_is_found_in_the_joint_that_turns_round():
     torque = -40.0
-    truth = WavinessModel(drives=DriveTorques().with_friction(3, reversal=torque))
+    truth = WavinessModel(tuple(range(6)), drives=DriveTorques().with_friction(3, reversal=torque))
     outcome = search(problem(truth, seed=1), LIBRARY, GATES)
     assert [(e.name, e.form) for e in outcome.final.candidate.effects] == [("friction_reversal", "joint 4")]
     found = parameters(outcome.final, "friction_reversal")["torque_nm"]
@@ -41,14 +41,17 @@ def test_more_friction_is_found_in_the_joint_that_turns_round():
 
 def test_friction_of_a_joint_that_turns_one_way_makes_no_waves():
     blocks = problem(seed=1).role("identify")
-    friction = WavinessModel(drives=DriveTorques().with_friction(5, reversal=30.0))
+    friction = WavinessModel(tuple(range(6)), drives=DriveTorques().with_friction(5, reversal=30.0))
     for block in blocks:
-        waves = friction.design(block, np.zeros(0))[1] - WavinessModel().design(block, np.zeros(0))[1]
+        waves = (
+            friction.design(block, np.zeros(0))[1]
+            - WavinessModel(tuple(range(6))).design(block, np.zeros(0))[1]
+        )
         assert np.abs(waves).max() < 0.2 * block.sigma[0]
 
 
 def test_a_gap_is_found_where_the_torque_of_its_joint_changes_sign():
-    truth = WavinessModel(torsion=Torsion().with_joint(4, gap=6.0 * MDEG))
+    truth = WavinessModel(tuple(range(6)), torsion=Torsion().with_joint(4, gap=6.0 * MDEG))
     outcome = search(problem(truth, seed=2), LIBRARY, GATES)
     assert [(e.name, e.form) for e in outcome.final.candidate.effects] == [("joint_backlash", "joint 5")]
     found = parameters(outcome.final, "joint_backlash")["angle_mdeg"]
@@ -57,7 +60,7 @@ def test_a_gap_is_found_where_the_torque_of_its_joint_changes_sign():
 
 def test_a_vibration_is_found_by_its_frequency_in_time():
     frequency, amplitude = 8.7, 0.8
-    truth = WavinessModel(vibration=(Vibration(frequency, amplitude * 1e-6, 1.0),))
+    truth = WavinessModel(tuple(range(6)), vibration=(Vibration(frequency, amplitude * 1e-6, 1.0),))
     outcome = search(problem(truth, seed=3), LIBRARY, GATES)
     assert outcome.names == ("path_vibration",)
     found = parameters(outcome.final, "path_vibration")

@@ -55,7 +55,7 @@ def problem(truth=None, *, seed=0, transfer=1.0):
     """Three paths at two feeds each, twice, and a run of each at the third feed held out."""
     rng = np.random.default_rng(seed)
     shape = rng.normal(size=(3, 6, len(X)))
-    blocks, truth = [], truth or WavinessModel()
+    blocks, truth = [], truth or WavinessModel(tuple(range(6)))
     plan = [(p, f, "identify") for p in range(3) for _ in range(2) for f in (0, 2)]
     plan += [(p, 1, "validate") for p in range(3)]
     for order, (path, feed, role) in enumerate(plan, start=1):
@@ -74,4 +74,4 @@ def problem(truth=None, *, seed=0, transfer=1.0):
         matrix, offset = truth.design(blank, np.zeros(0))
         made = matrix[:, 0] * transfer * (1 + 0.01 * rng.normal()) + offset + SIGMA * rng.normal(size=count)
         blocks.append(replace(blank, measured=made))
-    return Problem("waviness", "um", 1e-6, WavinessModel(), tuple(blocks), np.array([0.02]))
+    return Problem("waviness", "um", 1e-6, WavinessModel(tuple(range(6))), tuple(blocks), np.array([0.02]))

@@ -217,6 +217,21 @@ def test_what_the_place_alone_tells_is_neither_measured_nor_predicted_where_none
     assert task.role("identify")[0].zero_sd == pytest.approx(1e-5)
 
 
+@pytest.mark.parametrize("place_known", [True, False])
+def test_an_effect_changes_a_face_of_unknown_place_by_no_offset_and_no_tilt(place_known: bool) -> None:
+    """Materiality is judged by this change: growth of the tool is a tilt, but for the returns in its time."""
+    scanner = {"spacing_mm": 0.5, "sigma_mm": 0.01}
+    batch = make_batch() if place_known else make_batch(MANIFEST | {"instruments": {"scanner": scanner}})
+    _, task = observed_problem(batch, reader(batch))
+    block = task.role("identify")[0]
+    grown = replace(task.base, setup=replace(task.base.setup, growth=1e-7))
+    start = task.base.nuisance_starts(block)[0]
+    change = grown.design(block, start)[1] - task.base.design(block, start)[1]
+    plane = np.abs(block.zeros.T @ change).max()
+    assert np.abs(change).max() > 1e-8
+    assert (plane > 1e-7) == place_known
+
+
 def test_a_scan_that_lies_elsewhere_has_indices_but_is_not_paired() -> None:
     manifest = MANIFEST | {"instruments": {"scanner": {"spacing_mm": 0.5, "sigma_mm": 0.01}}}
     batch = make_batch(manifest)

@@ -136,14 +136,23 @@ def test_a_log_whose_axes_are_not_those_of_the_cell_is_refused_by_its_numbers(tm
     folder = seven(
         tmp_path / "six", columns=lambda table: table.drop(columns=[c for c in table if "7_" in c])
     )
-    with pytest.raises(BatchError, match="positions of 6 axes, expected 7"):
+    with pytest.raises(BatchError, match="positions of 6 axes, q1_deg to q6_deg, expected q1_deg to q7_deg"):
         observed(folder, tmp_path / "out")
 
 
-def test_the_log_of_a_cut_of_an_arm_with_seven_axes_is_refused_with_the_way_out(tmp_path):
-    runs = "run,operation,robot_log\na,side,bare.csv\n"
-    problems = check_whole(seven(tmp_path / "cut", runs=runs)).problems
-    assert any("name the log of a free motion under joint_log" in each.message for each in problems)
+def test_friction_that_falls_as_a_joint_warms_has_its_size_and_unit_in_identified_json(tmp_path):
+    def warm(table):
+        warmth = 30.0 + 8.0 * np.sin(2 * np.pi * TIME / 22.0)
+        torque = table["tau1_nm"] - 0.15 * (warmth - 30.0) * np.gradient(np.radians(table["q1_deg"]), TIME)
+        return table.assign(temperature1_c=warmth, tau1_nm=torque)
+
+    _, blocks = observed(seven(tmp_path / "warm", columns=warm), tmp_path / "out")
+    for run in ("bare", "load"):
+        [found] = blocks["joints"]["runs"][run]["beyond"]
+        assert (found["joint"], found["by"]) == (1, "viscous_temperature")
+        assert found["value"]["unit"] == "N m s/(rad K)"
+        low, high = found["value"]["ci95"]
+        assert low < -0.15 < high
 
 
 @pytest.mark.skipif(not PAIR.is_dir(), reason="the field files are not there")

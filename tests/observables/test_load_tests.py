@@ -117,7 +117,7 @@ def test_what_the_loads_do_not_see_is_named_with_the_load_that_would():
     assert load.joint == 0
     assert load.before == pytest.approx(1.0)
     assert load.after < 0.05
-    sentence = in_words(told, load)
+    sentence = in_words(told, load, MODEL.arm.axes)
     assert "do not see joint 1 " in sentence
     assert "would tell joint 1 to" in sentence
 
@@ -128,14 +128,14 @@ def test_loads_that_tell_every_joint_name_the_one_they_tell_least():
     found = fitted_loads(MODEL, loads)
     np.testing.assert_allclose(told.relative, found.sd / found.value, rtol=1e-6)
     assert load.joint == told.worst
-    assert f"joint {told.worst + 1} least" in in_words(told, load)
+    assert f"joint {told.worst + 1} least" in in_words(told, load, MODEL.arm.axes)
     blocks, notes = calibration(batch(), MODEL, loads)
-    assert in_words(told, load) in notes
+    assert in_words(told, load, MODEL.arm.axes) in notes
     assert len(blocks) == 5
 
 
 def test_no_usable_load_is_a_refusal_with_its_reason():
     loads = table([0.002]).assign(q3_deg=np.nan)
-    refused = joint_observability(MODEL, usable(loads))
+    refused = joint_observability(MODEL, usable(loads, MODEL.arm))
     assert isinstance(refused, Refusal)
     assert "loads.csv" in refused.reason

@@ -200,8 +200,8 @@ def test_the_waves_of_tip_and_idle_run_are_those_of_their_joints_together(idle):
     x = np.arange(0.0, 60.0, SPACING / MM)
     wave = 4.0 * np.sin(2 * np.pi * x / 3.0)  # the profile's filter keeps nine tenths of it
     points = pd.DataFrame({"run": "a", "x_mm": x, "waviness_um": wave, "kept": (x > 15.0) & (x < 45.0)})
-    points[STRAYED] = np.outer(wave, np.ones(6)) / 6.0
-    points[IDLE] = idle * np.outer(wave, np.ones(6)) / 6.0
+    points[[STRAYED.format(i) for i in range(1, 7)]] = np.outer(wave, np.ones(6)) / 6.0
+    points[[IDLE.format(i) for i in range(1, 7)]] = idle * np.outer(wave, np.ones(6)) / 6.0
     made = Batch("b", {"instruments": {"profiler": {"cutoff_mm": 8.0}}}, {}, pd.DataFrame(), {})
     found = _waves(made, points)
     inner = found["x_mm"].between(20.0, 40.0)

@@ -33,7 +33,9 @@ def means(turn=None):
             "dynamometer_n": [48.0, -160.0, -31.0] @ axes,
         }
         parts.append(pd.DataFrame({"frame": name, "axis": list("xyz"), **columns}))
-    frame = pd.concat(parts).assign(run="r1", sensorless_sd_n=2.0, enough=True, condition=4.2)
+    frame = pd.concat(parts).assign(
+        run="r1", sensorless_sd_n=2.0, drives_sd_n=1.5, enough=True, condition=4.2
+    )
     return pd.concat([frame, frame.assign(run="r2", dynamometer_n=np.nan, enough=False)])
 
 
@@ -126,7 +128,7 @@ def test_the_steady_means_stand_beside_the_dynamometers_with_their_error_and_joi
     table = table_with(items, "beside the dynamometer")
     assert table.rows[0][:2] + table.rows[0][5:8] == ["r1", "1 3 5 6", "−160", "−170.0 ± 3.9", "6.2"]
     assert "Mean of the absolute errors: 4.3 N (x 2.0, y 10, z 1.0)" in table.caption
-    assert table.rows[1][:5] == ["r2", "1–6 *", "–", "50.0 ± 3.9", "–"]
+    assert table.rows[1][:5] == ["r2", "1–6 *", "–", "50.0 ± 4.9", "–"]  # the drives in it: 1.96 √(2² + 1.5²)
     assert "by the rule of [K] there is no estimate" in table.caption
 
 
@@ -145,7 +147,7 @@ def test_frames_that_differ_have_a_table_each_and_frames_that_are_one_share_it()
 def test_without_a_dynamometer_there_is_a_column_per_axis():
     items = content(robot_means=means().query("run == 'r2'"), robot_joints=joints())
     table = table_with(items, "Mean force on the tool in the steady cut")
-    assert table.rows == [["r2", "1–6 *", "50.0 ± 3.9", "−170.0 ± 3.9", "−30.0 ± 3.9"]]
+    assert table.rows == [["r2", "1–6 *", "50.0 ± 4.9", "−170.0 ± 4.9", "−30.0 ± 4.9"]]
     assert list(table.header) == ["run", "joints", "x (N)", "y (N)", "z (N)"]
 
 

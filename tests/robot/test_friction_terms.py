@@ -12,11 +12,12 @@ Q, RATE, LINKS, PLAIN = bare(TIME)
 NAMES = ("speed", "load", "time")
 
 
-def fits(beyond, seed=0, joints=(1,), noise=1.0):
+def fits(beyond, seed=0, joints=(1,), noise=1.0, warmth=None):
     rng = np.random.default_rng(seed)
     torque = LINKS + PLAIN + beyond + noise * NOISE * rng.normal(size=Q.shape)
     log = free_motion(TIME, np.round(Q / 1e-4) * 1e-4, torque)
-    return fit_joints(DH, log, np.isin(range(6), joints))
+    warm = None if warmth is None else free_motion(TIME, Q, np.tile(warmth[:, None], (1, 6))).torque
+    return fit_joints(DH, log, np.isin(range(6), joints), warm)
 
 
 def claimed(beyond, **how):
@@ -63,6 +64,28 @@ def test_the_size_of_a_load_that_the_poses_do_not_determine_is_not_claimed():
 def test_friction_that_warms_up_by_an_exponential_is_seen_as_falling_with_time():
     found = claimed(0.5 * COULOMB * np.exp(-TIME / 20)[:, None] * np.sign(RATE))
     assert found["time"].value < 0
+
+
+def test_grease_that_warms_is_told_by_temperature_where_that_was_logged():
+    """Up and down again, so that no trend in time is like it."""
+    warmth = 30.0 + 8.0 * np.sin(2 * np.pi * TIME / 45.0)
+    beyond = -0.02 * VISCOUS * (warmth - 30.0)[:, None] * RATE
+    found = claimed(beyond, warmth=warmth)["viscous_temperature"]
+    assert abs(found.value + 0.02 * VISCOUS[1]) < 3 * found.sd
+    assert found.sd < 0.005 * VISCOUS[1]
+    level = claimed(-0.02 * COULOMB * (warmth - 30.0)[:, None] * np.sign(RATE), warmth=warmth)["temperature"]
+    assert abs(level.value + 0.02 * COULOMB[1]) < 3 * level.sd
+    assert "viscous_temperature" not in claimed(beyond)
+
+
+def test_a_temperature_that_has_nothing_to_do_with_friction_is_not_claimed():
+    warmth = 30.0 + 8.0 * np.sin(2 * np.pi * TIME / 45.0)
+    assert not [term for fit in fits(0 * Q, joints=range(6), warmth=warmth) for term in fit.terms]
+
+
+def test_viscous_friction_that_falls_as_the_log_goes_on_is_seen():
+    found = claimed(-6.0 * (TIME / TIME[-1])[:, None] * RATE)["viscous_time"]
+    assert abs(found.value + 6.0) < 3 * found.sd
 
 
 def test_the_drives_of_a_cell():

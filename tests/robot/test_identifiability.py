@@ -13,6 +13,7 @@ from metro.robot.stiffness import joint_compliances
 ARM = arm_with_tool()
 TRUE = 1 / np.array([1.8e6, 2.1e6, 1.3e6, 3.1e5, 3.9e5, 2.3e5])
 NEAR = np.radians([-20.3, -13.9, -4.4, -61.7, 34.9, 56.7])
+TURNING = np.zeros(6, dtype=bool)
 SIGMA = 5e-6
 FORCES = 300 * np.eye(3)
 
@@ -84,7 +85,7 @@ def test_repeats_halve_the_variance():
 def test_the_next_load_is_the_best_for_the_worst_joint_of_all_that_could_be_made():
     rows, measured = loads_of(some_poses(2), force=300 * np.eye(3)[:2])
     matrix = identifiability.information(rows, measured, SIGMA, TRUE)
-    poses = identifiability.around(NEAR[None])
+    poses = identifiability.around(NEAR[None], TURNING)
     found = identifiability.next_load(ARM, matrix, poses, newton=300.0, sigma=SIGMA, size=TRUE)
     before = np.linalg.inv(matrix + np.eye(6))
     assert found.joint == int(np.argmax(np.diag(before)))
@@ -113,7 +114,7 @@ def test_a_joint_that_was_not_seen_is_seen_by_the_load_that_is_proposed():
     matrix = identifiability.information(rows, np.ones((4, 3), dtype=bool), SIGMA, TRUE)
     assert np.isinf(identifiability.assess(matrix).relative[axis])
     found = identifiability.next_load(
-        ARM, matrix, identifiability.around(q[:1]), newton=300.0, sigma=SIGMA, size=TRUE
+        ARM, matrix, identifiability.around(q[:1], TURNING), newton=300.0, sigma=SIGMA, size=TRUE
     )
     assert found.joint == axis
     assert found.before == pytest.approx(1.0, rel=1e-3)
@@ -121,8 +122,14 @@ def test_a_joint_that_was_not_seen_is_seen_by_the_load_that_is_proposed():
 
 
 def test_poses_around_one_turn_each_joint_both_ways():
-    found = identifiability.around(NEAR[None], (-0.1, 0.2))
+    found = identifiability.around(NEAR[None], TURNING)
     assert found.shape == (13, 6)
     moved = found - NEAR
     assert (np.count_nonzero(moved, axis=1) <= 1).all()
-    np.testing.assert_allclose(moved.sum(axis=0), 0.1)
+    np.testing.assert_allclose(moved.max(axis=0), np.radians(30.0))
+    np.testing.assert_allclose(moved.min(axis=0), -np.radians(30.0))
+
+
+def test_a_linear_axis_is_shifted_and_not_turned():
+    moved = identifiability.around(NEAR[None], np.arange(6) == 0) - NEAR
+    np.testing.assert_allclose(np.abs(moved).max(axis=0), [0.5, *[np.radians(30.0)] * 5])

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slip_cuts import BETA, CUTTER, SENSOR, records, with_settings
+from slip_cuts import BETA, CUTTER, SENSOR, records, setting, with_settings
 
 from metro.cutting.cutter import evenly_pitched
 from metro.slips.force import contradictions
 from metro.slips.orientation import axes_text, signed_permutations
 from metro.slips.physical import coefficients_text, impossible, mean_chip
-from metro.slips.waveform import Coefficients, design, fit
+from metro.slips.waveform import Coefficients, Record, design, fit
 
 EVERY = list(signed_permutations())
 OTHERS = [matrix for matrix in EVERY if not np.array_equal(matrix, np.eye(3))]
@@ -122,3 +122,39 @@ def test_coefficients_that_one_feed_cannot_part_are_given_as_what_they_sum_to():
     assert f"K_rc h + K_re {chip * BETA[1] / 1e3 + BETA[4] / 1e3:.3g}" in said
     parted = coefficients_text(Coefficients(BETA, np.tile(BETA, (3, 1))), chip)
     assert parted == "K_tc 850.0, K_rc 320.0, K_ac 180.0 N/mm2"
+
+
+def depth_sweep(cutter, beta):
+    """Slots at five depths, their starts at any phase, with a little noise."""
+    rng, made = np.random.default_rng(4), []
+    for i, depth in enumerate((1e-3, 2e-3, 3e-3, 4e-3, 5e-3)):
+        cut = setting("slot", "slot", 0.1)
+        cut = replace(cut, cut=replace(cut.cut, axial_depth=depth))
+        basis = design(cutter, cut).basis @ beta
+        turned = basis * np.exp(1j * rng.uniform(0.0, 2.0 * np.pi) * np.arange(len(basis)))[:, None]
+        turned = turned + 0.5 * (rng.normal(size=basis.shape) + 1j * rng.normal(size=basis.shape))
+        turned[0] = turned[0].real
+        made.append(Record(f"r{i + 1}", cut, turned))
+    return made
+
+
+# Along the meridian of a ball the chip may slide towards the tip: of its axial force nothing is asked.
+SLIDING = np.array([850e6, 320e6, -180e6, 15e3, 18e3, -4e3])
+BALL = replace(CUTTER, corner=CUTTER.radius)
+
+
+def test_an_end_that_nobody_declared_is_no_slip_of_the_axes():
+    """A ball is pressed upwards by more than the little helix of a flat end can do."""
+    flat = replace(CUTTER, helix=np.radians(8.0))
+    ball = replace(flat, corner=flat.radius)
+    given = depth_sweep(ball, np.array([850e6, 500e6, 50e6, 15e3, 18e3, 2e3]))
+    assert contradictions(given, flat, SENSOR)
+    assert not contradictions(given, flat, SENSOR, (ball,))
+
+
+@pytest.mark.parametrize("matrix", FEW[:3], ids=axes_text)
+def test_wrong_axes_of_a_ball_end_that_nobody_declared_are_found_with_the_end(matrix):
+    given = [record.mapped(matrix) for record in depth_sweep(BALL, SLIDING)]
+    (slip,) = contradictions(given, CUTTER, SENSOR, (BALL,))
+    assert true_axes(matrix).removeprefix("Likely: ") in slip.text
+    assert "with a ball end of the tool" in slip.text

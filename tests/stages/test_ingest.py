@@ -14,7 +14,7 @@ import yaml
 from metro.batch.findings import BatchError
 from metro.batch.processed import COLUMNS, read_batch, read_table
 from metro.batch.provenance import made_by
-from metro.formats.kinds import KINDS
+from metro.joint_columns import Axes
 from metro.stages.ingest import ingest
 
 REAL = Path(os.environ.get("METRO_REAL_DATA", Path(__file__).parents[2] / "../shared/real")) / "batches"
@@ -45,7 +45,8 @@ def batch(root):
     wave = np.sin(0.3 * np.arange(100))
     force = pd.DataFrame({"t_s": 8.0 + TIME, "fx_n": 10 + wave, "fy_n": 20 + wave, "fz_n": 30 + wave})
     force.assign(spindle_deg=np.arange(100.0)).to_csv(folder / "force.csv", index=False)
-    columns = enumerate([name for name in KINDS["robot"].columns if not name.startswith("current")], 1)
+    six = Axes((False,) * 6)
+    columns = enumerate([*six.commanded, *six.positions, *six.torques], 2)
     robot = pd.DataFrame({name: 40.0 + wave * i for i, name in columns})
     robot.assign(t_s=8.05 + TIME).to_csv(folder / "cut.csv", index=False)
     robot.assign(t_s=3.0 + TIME).to_csv(folder / "idle.csv", index=False)

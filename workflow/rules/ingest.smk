@@ -11,6 +11,7 @@ rule ingest:
                 "path",
                 "scan",
                 "profile",
+                "slopes",
                 "hit",
                 "frf",
                 "loads",

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from metro.batch.files import in_the_air
 from metro.batch.findings import Finding, linked_outside
+from metro.joint_columns import Axes, axes_of
 from metro.units import JSON
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ SHORTEST_ARM_MM = 10.0
 ROWS = ("convention", "joints")  # keys that say how rows are meant
 LINKS = ("base_link", "tip_link")  # and those that say which part of a URDF file
 MOVING = ("revolute", "prismatic")
-OF_SIX = ("robot_log", "idle_log")  # columns of runs.csv whose files have six joints
 
 
 def with_joints(arm: JSON, folder: Path, file: str) -> tuple[JSON, list[Finding]]:
@@ -68,18 +67,19 @@ def _of_urdf(arm: JSON, folder: Path, file: str) -> tuple[JSON, list[Finding]]:
     return {**arm, "chain": chain}, []
 
 
-def axes_of(cell: JSON) -> int:
-    """Return how many axes of a cell's arm move; 0 where nothing is known of it."""
+def linear_axes(cell: JSON) -> tuple[bool, ...]:
+    """Return of each axis of a cell's arm that moves whether it is linear; () without an arm."""
     arm = cell.get("arm") or {}
     if arm.get("chain"):
-        return sum(joint["kind"] in MOVING for joint in arm["chain"])
-    kinds = arm.get("joints") or ["revolute"] * len(arm.get("dh") or ())
-    return sum(kind in MOVING for kind in kinds)
+        kinds = [joint["kind"] for joint in arm["chain"]]
+    else:
+        kinds = arm.get("joints") or ["revolute"] * len(arm.get("dh") or ())
+    return tuple(kind == "prismatic" for kind in kinds if kind in MOVING)
 
 
 def counts(cell: JSON, file: str) -> Iterator[Finding]:
     """Check that lists with an entry per joint have as many entries as the arm has joints."""
-    axes = axes_of(cell)
+    axes = len(linear_axes(cell))
     lists = {"arm.links": (cell.get("arm") or {}).get("links"), "joint_stiffness_nm_rad": None}
     lists["joint_stiffness_nm_rad"] = cell.get("joint_stiffness_nm_rad")
     lists |= {f"drives.{key}": value for key, value in (cell.get("drives") or {}).items()}
@@ -89,22 +89,24 @@ def counts(cell: JSON, file: str) -> Iterator[Finding]:
             yield Finding("error", file, message, column=key)
 
 
-def six_axes(cell: JSON, tables: Mapping[str, Table]) -> Iterator[Finding]:
-    """Check that an arm has six joints where tables or logs with six joint angles are there."""
-    axes = axes_of(cell)
-    if axes in (0, 6):
-        return
-    expected = f"has six joints, expected those of an arm with {axes}, as the cell has"
-    runs = tables["runs"]
-    for position, row in enumerate(runs.frame.to_dict("records")):
-        for column in OF_SIX:
-            if row[column] and in_the_air(row) != column:
-                message = f"a {column} {expected}: name the log of a free motion under joint_log"
-                yield runs.finding(position, column, message)
+def tables_agree(cell: JSON, tables: Mapping[str, Table]) -> Iterator[Finding]:
+    """Check that tables with positions of joints have those of the arm's."""
+    linear = linear_axes(cell)
     for name in ("loads", "mass", "payload"):
         table = tables[name]
-        if len(table.frame) and table.frame["q1_deg"].notna().any():
-            yield Finding("error", table.file, f"the table {expected}", column="q1_deg")
+        own = axes_of(table.frame)
+        if linear and len(own) and own.linear != linear:
+            expected = Axes(linear).positions
+            message = (
+                f"the table has {listed(own.positions)}, expected {listed(expected)}: one for each joint of "
+                "the arm that moves"
+            )
+            yield Finding("error", table.file, message, column=own.positions[0])
+
+
+def listed(names: Sequence[str]) -> str:
+    """Write the columns of an arm's axes, from the first to the last."""
+    return " to ".join(dict.fromkeys((names[0], names[-1])))
 
 
 def _kinds(arm: JSON, file: str) -> Iterator[Finding]:

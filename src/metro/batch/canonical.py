@@ -21,7 +21,7 @@ _TEXT = {
     *("table", "row", "observable", "quantity", "axis", "unit", "note", "file", "check", "message"),
     *("touched", "loaded"),
 }
-_WHOLE = {("path", "point"), ("path", "pass"), ("hit", "replicate"), ("frf", "replicate")}
+_WHOLE = {("path", "point"), ("path", "pass"), ("hit", "replicate"), ("frf", "replicate"), ("slopes", "line")}
 
 
 def schema(table: str) -> Any:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from metro.batch.ranges import number_in_words, range_of
+from metro.joint_columns import MOVED, SHIFTS, TORQUES, TURNS
 
 Kind = Literal["text", "number", "integer", "file", "time"]
 
@@ -63,6 +65,9 @@ def _numbers(quantity: str, *names: str, required: bool = False) -> tuple[Column
 _REPLICATE = Column("replicate", "integer", quantity="replicate")
 _POINT_AXIS = r"[A-Za-z0-9_.]+[+-]?[xyz]"
 
+_POSITIONS = (*_numbers("joint_deg", *TURNS), *_numbers("place_mm", *SHIFTS))
+_MOVED = tuple(Column(name, "number", quantity=re.sub(r"\d", "", name, count=1)) for name in MOVED)
+
 RUNS = (
     Column("run", required=True),
     Column("role", choices=("identify", "validate")),
@@ -89,6 +94,7 @@ RUNS = (
     Column("path", "file"),
     Column("scan", "file"),
     Column("profile", "file"),
+    Column("slopes", "file"),
     Column("stable", choices=("yes", "no")),
     Column("started_at", "time"),
     *_numbers("return_s", "return_s"),
@@ -110,7 +116,7 @@ IMPACTS = (
 LOADS = (
     Column("pose"),
     Column("point"),
-    *_numbers("joint_deg", *(f"q{i}_deg" for i in range(1, 7))),
+    *_POSITIONS,
     *_numbers("place_mm", "x_mm", "y_mm", "z_mm"),
     *_numbers("force_n", "fx_n", "fy_n", "fz_n", required=True),
     *_numbers("displacement_mm", "dx_mm", "dy_mm", "dz_mm"),
@@ -127,7 +133,7 @@ MASS = (
     *_numbers("mass_kg", "myy", required=True),
     *_numbers("mass_between_kg", "myz", required=True),
     *_numbers("mass_kg", "mzz", required=True),
-    *_numbers("joint_deg", *(f"q{i}_deg" for i in range(1, 7))),
+    *_POSITIONS,
 )
 
 PUBLISHED = (
@@ -152,10 +158,9 @@ TOUCHES = (
 
 PAYLOAD = (
     Column("loaded", required=True, choices=("yes", "no")),
-    *_numbers("joint_deg", *(f"q{i}_deg" for i in range(1, 7)), required=True),
-    *_numbers("torque_nm", *(f"tau{i}_nm" for i in range(1, 7)), required=True),
-    *_numbers("rate_deg_s", *(f"rate{i}_deg_s" for i in range(1, 7))),
-    *_numbers("acceleration_deg_s2", *(f"acceleration{i}_deg_s2" for i in range(1, 7))),
+    *_POSITIONS,
+    *_numbers("torque_nm", *TORQUES),
+    *_MOVED,
 )
 
 # Force along the first axis over deflection along the second; one of a pair that is blank is as the other.

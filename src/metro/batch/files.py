@@ -21,13 +21,14 @@ RUN_FILES = {
     "path": "path",
     "scan": "cloud",
     "profile": "profile",
+    "slopes": "slopes",
 }
 LONGEST_NAME = 255  # bytes, of every file system
-OWN_TO_A_RUN = ("dynamometer", "robot_log", "joint_log", "scan", "profile")
+OWN_TO_A_RUN = ("dynamometer", "robot_log", "joint_log", "scan", "profile", "slopes")
 # What describes a cut in a row of runs.csv: settings as text, as numbers, and records of it.
 OF_A_CUT = (
     *("operation", "direction", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm"),
-    *("orbit_rpm", "dynamometer", "scan", "profile", "stable"),
+    *("orbit_rpm", "dynamometer", "scan", "profile", "slopes", "stable"),
 )
 
 

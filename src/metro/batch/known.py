@@ -17,13 +17,14 @@ from typing import Any, Protocol
 from metro.batch.documents import Likeness, likeness, without_comma
 from metro.batch.findings import Finding, Severity, shown
 from metro.batch.ranges import expected_for, range_of, within
+from metro.joint_columns import AXES, MOST_AXES
 from metro.spelling import suggestion
 from metro.units import JSON
 
 REGISTRY = "schemas/known.json"
 # The contract describes the parameters of these in words: a name of another program is no misspelt one.
 UNNAMED = {"entry_transient", "flange_rotation", "spindle_speed_softening"}
-JOINTS = (1, 2, 3, 4, 5, 6, "all")
+JOINTS = (*AXES, "all")
 
 
 class Parameter(Protocol):
@@ -152,7 +153,9 @@ def _of_effect(effect: str, values: JSON, can: JSON, file: str) -> Iterator[Find
 def _fault(name: str, value: Any, choices: list[str]) -> str | None:
     """Say what is wrong with the value of a parameter."""
     if name == "joint":
-        expected = "" if value in JOINTS and not isinstance(value, bool) else "a joint, 1 to 6, or all"
+        expected = (
+            "" if value in JOINTS and not isinstance(value, bool) else f"a joint, 1 to {MOST_AXES}, or all"
+        )
     elif choices:
         expected = "" if value in choices else " or ".join(choices)
     else:

@@ -14,7 +14,7 @@ from metro import __version__
 from metro.batch.batch import Batch
 from metro.batch.columns import CROSS_STIFFNESS
 from metro.batch.writing import write_atomically
-from metro.joint_columns import JOINT_COLUMNS
+from metro.joint_columns import JOINT_COLUMNS, MOVED, POSITIONS, TORQUES
 from metro.units import JSON
 
 # Every table that ingest writes, always, with these columns (no rows where the batch has no such data).
@@ -24,14 +24,13 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "run",
         "log",
         "t_s",
-        *(f"q{i}_set_deg" for i in range(1, 7)),
-        *(f"q{i}_deg" for i in range(1, 7)),
-        *(f"tau{i}_nm" for i in range(1, 7)),
+        *(name for name in JOINT_COLUMNS if not name.startswith(("current", "temperature"))),
     ),
     "joint": ("run", "t_s", *JOINT_COLUMNS),
     "path": ("run", "point", "pass", "x_mm", "y_mm", "z_mm"),
     "scan": ("run", "x_mm", "y_mm", "z_mm"),
     "profile": ("run", "x_mm", "z_mm"),
+    "slopes": ("run", "line", "x1_mm", "y1_mm", "x2_mm", "y2_mm", "slope_urad"),
     "hit": (
         "test",
         "position",
@@ -58,25 +57,19 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "loads": (
         "pose",
         "point",
-        *(f"q{i}_deg" for i in range(1, 7)),
+        *POSITIONS,
         *("x_mm", "y_mm", "z_mm", "fx_n", "fy_n", "fz_n", "dx_mm", "dy_mm", "dz_mm", "replicate"),
         "sigma_mm",
     ),
     "mass": (
         *("pose", "point", "x_mm", "y_mm", "z_mm", "mxx", "mxy", "mxz", "myy", "myz", "mzz"),
-        *(f"q{i}_deg" for i in range(1, 7)),
+        *POSITIONS,
     ),
     "touches": (
         *("touched", "x_mm", "y_mm", "z_mm", "q1", "q2", "q3", "q4", "rx_deg", "ry_deg", "rz_deg"),
         "sigma_mm",
     ),
-    "payload": (
-        "loaded",
-        *(f"q{i}_deg" for i in range(1, 7)),
-        *(f"tau{i}_nm" for i in range(1, 7)),
-        *(f"rate{i}_deg_s" for i in range(1, 7)),
-        *(f"acceleration{i}_deg_s2" for i in range(1, 7)),
-    ),
+    "payload": ("loaded", *POSITIONS, *TORQUES, *MOVED),
     "stations": (
         *("position", "x_mm", "y_mm", "z_mm", "kx_n_um", "ky_n_um", "kz_n_um"),
         *CROSS_STIFFNESS,

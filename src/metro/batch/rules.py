@@ -11,6 +11,7 @@ import numpy as np
 
 from metro.batch.findings import Finding
 from metro.batch.tables import Table
+from metro.joint_columns import POSITIONS, TURNS, axes_of, stated
 
 STIFFNESS_N_MM = (10.0, 2e5)  # softer than any arm … stiffer than any machine tool
 CLOSEST_MM = 1.0
@@ -35,13 +36,11 @@ def impact_findings(table: Table) -> Iterator[Finding]:
 
 def load_findings(table: Table) -> Iterator[Finding]:
     """Check that a load test has a place, a load and an answer."""
+    yield from _whole_axes(table)
     for position, row in table.sound():
-        joints = [math.isfinite(row[f"q{i}_deg"]) for i in range(1, 7)]
-        if any(joints) and not all(joints):
-            yield table.finding(
-                position, f"q{joints.index(False) + 1}_deg", "is blank, expected all six joint angles"
-            )
-        if not any(joints) and not all(math.isfinite(row[name]) for name in ("x_mm", "y_mm", "z_mm")):
+        if not any(math.isfinite(row[name]) for name in POSITIONS) and not all(
+            math.isfinite(row[name]) for name in ("x_mm", "y_mm", "z_mm")
+        ):
             message = (
                 "neither joint angles nor x_mm, y_mm, z_mm: the row tells nothing of where it was loaded"
             )
@@ -85,12 +84,27 @@ def _load_units(table: Table) -> Iterator[Finding]:
         yield Finding("error", table.file, fault, column="x_mm")
 
 
+def _whole_axes(table: Table) -> Iterator[Finding]:
+    """Check that rows that state positions of joints state those of all, counted from 1 without a gap."""
+    axes = axes_of(table.frame)
+    beyond = next((name for name in stated(table.frame) if name not in axes.positions), "")
+    if beyond:
+        fault = f"is blank in every row, expected a number, since there is {beyond}: no axis is left out"
+        yield Finding("error", table.file, fault, column=f"q{len(axes) + 1}_{beyond.rpartition('_')[2]}")
+    for position, row in table.sound():
+        blank = [name for name in axes.positions if math.isnan(row[name])]
+        if 0 < len(blank) < len(axes):
+            yield table.finding(
+                position, blank[0], f"is blank, expected the positions of all {len(axes)} axes"
+            )
+
+
 def _radians(table: Table) -> Iterator[Finding]:
     """Report joint angles that seem to be in radians."""
-    angles = np.array([[row[f"q{i}_deg"] for i in range(1, 7)] for _, row in table.sound()]).reshape(-1, 6)
-    known = angles[np.isfinite(angles).all(axis=1)]
-    if known.size and 0 < np.abs(known).max() <= 2 * math.pi:
-        fault = f"no angle is beyond {np.abs(known).max():g}: they seem to be in radians, expected degrees"
+    angles = np.array([[row[name] for name in TURNS] for _, row in table.sound()]).reshape(-1, len(TURNS))
+    largest = float(np.nanmax(np.abs(angles))) if np.isfinite(angles).any() else 0.0
+    if 0 < largest <= 2 * math.pi:
+        fault = f"no angle is beyond {largest:g}: they seem to be in radians, expected degrees"
         yield Finding("error", table.file, fault, column="q1_deg")
 
 
@@ -102,6 +116,7 @@ def _odd(table: Table, column: str, typical: float, hint: str) -> Finding:
 
 def mass_findings(table: Table) -> Iterator[Finding]:
     """Check that a reduced mass matrix is one: positive definite."""
+    yield from _whole_axes(table)
     for position, row in table.sound():
         xx, xy, xz, yy, yz, zz = (row[name] for name in ("mxx", "mxy", "mxz", "myy", "myz", "mzz"))
         if np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])[0] <= 0:
@@ -140,6 +155,12 @@ def touch_findings(table: Table) -> Iterator[Finding]:
 def payload_findings(table: Table) -> Iterator[Finding]:
     """Check the units of the angles, and that there are torques with and without the load."""
     yield from _radians(table)
+    yield from _whole_axes(table)
+    axes = axes_of(table.frame)
+    for position, row in table.sound():
+        lacking = [name for name in [*(axes.positions or TURNS[:1]), *axes.torques] if math.isnan(row[name])]
+        if lacking:
+            yield table.finding(position, lacking[0], "is blank, expected a number for each axis of the arm")
     states = {row["loaded"] for _, row in table.sound()}
     if len(states) == 1:
         fault = f'every row has "{states.pop()}", expected torques with and without the load'

@@ -19,9 +19,9 @@ import numpy.typing as npt
 from metro.cutting.cutter import Cutter
 from metro.units import Array
 
-# With four points of Gauss-Legendre a panel leaves 1e-6 of an integral that varies as sin² (2 κ) over it, and
+# With four points of Gauss-Legendre a panel leaves 5e-6 of an integral that varies as sin² (2 κ) over it, and
 # 1e-8 of one that varies as sin² φ.
-LARGEST_TURN, LARGEST_LAG = 0.65, 0.4  # of the edge angle and of the lag angle in a panel, rad
+LARGEST_TURN, LARGEST_LAG = 0.79, 0.4  # of the edge angle and of the lag angle in a panel, rad
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,10 @@ class Place:
     radius: Array
     sine: Array
     cosine: Array
+
+    def shaped(self, shape: tuple[int, ...]) -> Place:
+        """Return the places as arrays of another shape."""
+        return Place(*(each.reshape(shape) for each in (self.height, self.radius, self.sine, self.cosine)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +73,6 @@ class Meridian:
         radius = np.where(on_arc, of_arc, self.bottom_radius[panel] + straight * cosine)
         return Place(height, radius, sine, cosine)
 
-    def share(self, panel: npt.NDArray[np.intp], rise: Array) -> Array:
-        """Return the shares of panels at which they have risen to a share of their height."""
-        start, turn = self.start[panel], self.turn[panel]
-        low, high = np.cos(start), np.cos(start + turn)
-        angle = np.arccos(np.clip(low + (high - low) * rise, -1.0, 1.0))
-        return np.where(turn > 0.0, (angle - start) / np.where(turn > 0.0, turn, 1.0), rise)
-
     def edge_length(self, place: Place) -> Array:
         """Length of edge per length of the meridian, times cos(helix): 1 on a cylinder.
 
@@ -96,8 +93,13 @@ def mean_inclination(cutter: Cutter, depth: float) -> tuple[float, float]:
     return float(height @ place.sine / height.sum()), float(height @ place.cosine / height.sum())
 
 
-def meridian(cutter: Cutter, depth: float, lag: float) -> Meridian:
-    """Return the meridian up to a ``depth``, m, cut into panels for a ``lag``, rad/m."""
+def meridian(cutter: Cutter, depth: float, lag: float, feed: float = 0.0) -> Meridian:
+    """Return the meridian up to a ``depth``, m, cut into panels for a ``lag``, rad/m.
+
+    On true paths a ``feed`` per tooth, m, apart, a tooth leaves the cut by feed/(2 r) later than half a turn
+    after it entered, and lags by lag × z: with the height it leaves ever earlier at first, then ever later.
+    The corner is cut where that turns, so that in no panel an edge leaves the cut and comes back to it.
+    """
     rc, steepest = cutter.corner, 0.5 * math.pi - cutter.taper
     top = rc * (1.0 - math.cos(steepest))  # where the corner ends
     parts = []
@@ -106,6 +108,10 @@ def meridian(cutter: Cutter, depth: float, lag: float) -> Meridian:
         lagging = lag * rc * (1.0 - math.cos(last))
         count = max(math.ceil(last / LARGEST_TURN), math.ceil(lagging / LARGEST_LAG))
         angles = np.linspace(0.0, last, count + 1)
+        turning = _turning(cutter, feed / (2.0 * lag)) if feed else last
+        if turning < last:
+            rest = math.ceil((last - turning) / last * count)
+            angles = np.append(0.0, np.linspace(turning, last, rest + 1))
         at = rc * (1.0 - np.cos(angles))
         radius = cutter.radius - rc + rc * np.sin(angles)
         parts.append((angles[:-1], np.diff(angles), at[:-1], radius[:-1], rc * np.diff(angles)))
@@ -116,3 +122,12 @@ def meridian(cutter: Cutter, depth: float, lag: float) -> Meridian:
         even = np.full(count, steepest)
         parts.append((even, 0.0 * even, at[:-1], radius[:-1], np.diff(at) / math.sin(steepest)))
     return Meridian(cutter, *(np.concatenate(each) for each in zip(*parts, strict=True)))
+
+
+def _turning(cutter: Cutter, square: float) -> float:
+    """Edge angle κ at which radius² × tan κ is ``square``, m²: to first order in κ, by Newton's method."""
+    inner, rc, angle = cutter.radius - cutter.corner, cutter.corner, 1.0
+    for _ in range(12):
+        radius = inner + rc * angle
+        angle -= (radius**2 * angle - square) / (radius * (radius + 2.0 * rc * angle))
+    return angle

@@ -10,23 +10,26 @@ Raw edges and faces of the work are met at the local radius.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from metro.cutting.chip import Cut, feed_per_radian
 from metro.cutting.cutter import Cutter
 from metro.cutting.edges import is_linear, rule
-from metro.cutting.envelope import Meridian, meridian
+from metro.cutting.envelope import Meridian, Place, meridian
 from metro.cutting.general_teeth import Indices, Teeth, teeth_in
 from metro.cutting.law import EdgeLaw
 from metro.cutting.nearby import Edges
 from metro.units import Array
 
 POINTS = 4
-STEPS, EXACT = 8, 1e-6  # of the secant method, to where a panel is cut; in feeds per tooth
+CELLS = np.array([0.0, 0.2, 0.55, 1.0])  # shares of a panel between which changes are looked for
+STEPS, NEAR = 20, 1e-5  # to where a panel is cut; a share of the meridian
 MARGIN = 0.05  # in feeds per tooth and pass: sin φ is 0.02 off its chord over a panel
-OUTSIDE = 0.1  # sine of the immersion behind which no tooth cuts on true paths
 SUMS = 16
 
 
@@ -41,17 +44,40 @@ class _Work:
     places: Array
     weights: Array
 
-    def levels(self, tooth: Indices, top: Array, panel: Indices, share: Array) -> Array:
-        """Return the levels of teeth at shares of panels, all (n,): (levels, n)."""
-        place = self.line.at(panel, share)
+    def levels(self, tooth: Indices, top: Array, place: Place) -> Array:
+        """Return the levels of teeth at places, all (n,): (levels, n)."""
         return self.teeth.levels(tooth, place, *_immersed(top, self.lag, place.height))
+
+    def differences(self, first: Indices, second: Indices, tooth: Indices, top: Array, place: Place) -> Array:
+        """Return levels ``first`` less levels ``second``, all (n,); one level more is zero."""
+        sine, cosine = _immersed(top, self.lag, place.height)
+        if self.teeth.only_passes:
+            other = second < self.teeth.passes
+            chips = self.teeth.after(np.stack([first, other * second]), tooth, place, sine, cosine)
+            return np.asarray(chips[0] - other * chips[1])
+        levels = np.concatenate([self.teeth.levels(tooth, place, sine, cosine), np.zeros((1, len(tooth)))])
+        every = np.arange(len(tooth))
+        return np.asarray(levels[first, every] - levels[second, every])
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """Cells in which something changes: of which ``panel`` in a list (n,), which ``cell`` of it, (n,).
+
+    ``values`` (2, levels, n) are the levels at both ends.
+    """
+
+    panel: Indices
+    cell: Indices
+    values: Array
 
 
 def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_path: bool) -> Array:
     """Force on a general cutter per unit of each coefficient, (angles, 3, 6), with edges ``along``.
 
     Shear in N per N/m² of chip area; edge in N per N/m of edge × cos(helix), as on a cylinder. Exact to 1e-5
-    of the largest force on circular paths, to 1e-4 on true ones besides what ``LEAST_RADIUS`` says.
+    of the largest force on circular paths, to 1e-4 on true ones besides what ``LEAST_RADIUS`` says; but where
+    an edge only just touches the end of the cut, the length that is cut is known to a few per cent.
     """
     shape = along.top.shape
     if cut.axial_depth <= 0.0:
@@ -60,7 +86,7 @@ def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_
     work = _Work(
         teeth_in(cutter, cut, true_path=true_path),
         law,
-        meridian(cutter, cut.axial_depth, lag),
+        meridian(cutter, cut.axial_depth, lag, cut.feed_per_tooth if true_path else 0.0),
         lag,
         *rule(POINTS, is_linear(law, feed_per_radian(cutter, cut))),
     )
@@ -71,24 +97,52 @@ def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_
 
 def _integrate(work: _Work, top: Array, teeth: int, total: Array) -> None:
     """Add to ``total`` (edges, SUMS) what edges with leading ends at immersions ``top`` (edges,) give."""
-    last = len(work.line.length) - 1
-    ends = work.line.at(np.append(np.arange(last + 1), last), np.append(np.zeros(last + 1), 1.0))
-    sine, cosine = _immersed(top[:, None], work.lag, ends.height)
-    (edge,) = np.nonzero((sine > (-OUTSIDE if work.teeth.true_path else 0.0)).any(axis=1))
+    panels, cells = len(work.line.length), len(CELLS) - 1
+    at = np.append(np.repeat(np.arange(panels), cells), panels - 1)
+    nodes = work.line.at(at, np.append(np.tile(CELLS[:-1], panels), 1.0))
+    sine, cosine = _immersed(top[:, None], work.lag, nodes.height)
+    (edge,) = np.nonzero((sine > -work.teeth.outside).any(axis=1))
     tooth = edge % teeth
-    levels = work.teeth.levels(tooth[:, None], ends, sine[edge], cosine[edge])
-    bound = levels[: work.teeth.chip_count].argmin(axis=0)
+    levels = work.teeth.levels(tooth[:, None], nodes, sine[edge], cosine[edge])
     positive = levels > 0.0
     cutting = np.asarray(positive.all(axis=0))
-    changes = (positive[..., 1:] != positive[..., :-1]).any(axis=0) | (bound[:, 1:] != bound[:, :-1])
-    changes &= (positive[..., 1:] | positive[..., :-1]).all(axis=0)
-    whole = cutting[:, 1:] & ~changes
-    (some,) = np.nonzero(whole.any(axis=1))
-    total[edge[some]] = _whole(work, tooth[some], top[edge[some]], whole[some])
-    row, panel = np.nonzero(changes)
+    bound = _least(levels[: work.teeth.chip_count])
+    left, right = positive[..., :-1], positive[..., 1:]
+    changes = (left != right).any(axis=0) | (bound[:, 1:] != bound[:, :-1])
+    changes &= (left | right).all(axis=0)
+    changed = changes.reshape(-1, panels, cells).any(axis=2)
+    whole = cutting[:, :-1:cells] & ~changed
+    # What is left of a chip at a raw edge is bounded by several functions: it goes with the panels to be cut.
+    plain = bound[:, :-1:cells] < work.teeth.passes
+    (some,) = np.nonzero((whole & plain).any(axis=1))
+    after = np.where(plain, bound[:, :-1:cells], 0)[some]
+    total[edge[some]] = _whole(work, tooth[some], top[edge[some]], (whole & plain)[some], after)
+    row, panel = np.nonzero(changed | (whole & ~plain))
     if len(row):
-        values = np.stack([levels[:, row, panel], levels[:, row, panel + 1]])
-        np.add.at(total, edge[row], _cut(work, tooth[row], top[edge[row]], panel, values))
+        crossing = _crossing(levels, changes, row, panel, changed.shape)
+        np.add.at(total, edge[row], _cut(work, tooth[row], top[edge[row]], panel, crossing))
+
+
+def _crossing(
+    levels: Array, changes: npt.NDArray[np.bool_], row: Indices, panel: Indices, shape: tuple[int, ...]
+) -> _Cells:
+    """Return the cells with ``changes`` (edges, cells) of the panels (row, panel)."""
+    number = np.zeros(shape, dtype=np.intp)
+    number[row, panel] = np.arange(len(row))
+    edge, cell = np.nonzero(changes)
+    count = len(CELLS) - 1
+    values = np.stack([levels[:, edge, cell], levels[:, edge, cell + 1]])
+    return _Cells(number[edge, cell // count], cell % count, values)
+
+
+def _least(values: Array) -> Indices:
+    """Return which of the few values along the first axis is the least: so, much faster than argmin."""
+    bound, least = np.zeros(values.shape[1:], dtype=np.intp), values[0]
+    for which in range(1, len(values)):
+        less = values[which] < least
+        bound[less] = which
+        least = np.minimum(least, values[which])
+    return bound
 
 
 def _immersed(top: Array, lag: float, height: Array) -> tuple[Array, Array]:
@@ -100,14 +154,16 @@ def _immersed(top: Array, lag: float, height: Array) -> tuple[Array, Array]:
     return s * lc - c * ls, c * lc + s * ls
 
 
-def _whole(work: _Work, tooth: Indices, top: Array, whole: Array) -> Array:
-    """Return sums (edges, SUMS) over the panels (edges, panels) that are ``whole``."""
+def _whole(work: _Work, tooth: Indices, top: Array, whole: npt.NDArray[np.bool_], after: Indices) -> Array:
+    """Return sums (edges, SUMS) over the panels (edges, panels) that are ``whole``, cut ``after`` a pass."""
     count, line = len(work.places), work.line
     panel = np.repeat(np.arange(whole.shape[1]), count)
     place = line.at(panel, np.tile(work.places, whole.shape[1]))
     sine, cosine = _immersed(top[:, None], work.lag, place.height)
-    chips = work.teeth.chips(tooth[:, None], place, sine, cosine)
-    chip = np.maximum(chips[0] if len(chips) == 1 else chips.min(axis=0), 0.0)
+    shape = (len(top), whole.shape[1], count)
+    waves = sine.reshape(shape), cosine.reshape(shape)
+    chip = work.teeth.after(after[:, :, None], tooth[:, None, None], place.shaped(shape[1:]), *waves)
+    chip = np.maximum(chip, 0.0).reshape(sine.shape)
     width = np.tile(work.weights, whole.shape[1]) * line.length[panel]
     length = width * line.edge_length(place)
     there = np.repeat(whole, count, axis=1)
@@ -119,26 +175,26 @@ def _whole(work: _Work, tooth: Indices, top: Array, whole: Array) -> Array:
     return np.concatenate(sums, axis=1)
 
 
-def _cut(work: _Work, tooth: Indices, top: Array, panel: Indices, values: Array) -> Array:
-    """Return sums (panels, SUMS) over the parts of panels that are cut in part or after several passes.
-
-    ``values`` (2, levels, panels) are the levels at both ends.
-    """
-    breaks = _breaks(work, tooth, top, panel, values)
+def _cut(work: _Work, tooth: Indices, top: Array, panel: Indices, cells: _Cells) -> Array:
+    """Return sums (panels, SUMS) over the parts of panels that are cut in part or after several passes."""
+    breaks = _breaks(work, tooth, top, panel, cells)
     bounds = np.concatenate([np.zeros((1, len(panel))), breaks, np.ones((1, len(panel)))])
     part, at = np.nonzero(np.diff(bounds, axis=0) > 0.0)
     low, size = bounds[part, at], bounds[part + 1, at] - bounds[part, at]
-    middle = work.levels(tooth[at], top[at], panel[at], low + 0.5 * size)
+    middle = work.levels(tooth[at], top[at], work.line.at(panel[at], low + 0.5 * size))
     kept = (middle > 0.0).all(axis=0)
-    at, low, size = at[kept], low[kept], size[kept]
+    at, low, size, middle = at[kept], low[kept], size[kept], middle[:, kept]
     share = low + work.places[:, None] * size
     place = work.line.at(panel[at], share)
     sine, cosine = _immersed(np.broadcast_to(top[at], share.shape).ravel(), work.lag, place.height.ravel())
     sine, cosine = sine.reshape(share.shape), cosine.reshape(share.shape)
-    chip = np.maximum(work.teeth.chips(tooth[at], place, sine, cosine).min(axis=0), 0.0)
+    if work.teeth.only_passes:
+        chip = work.teeth.after(_least(middle), tooth[at], place, sine, cosine)
+    else:
+        chip = work.teeth.chips(tooth[at], place, sine, cosine).min(axis=0)
     width = work.weights[:, None] * size * work.line.length[panel[at]]
     length = width * work.line.edge_length(place)
-    shear = work.law.shear(chip * place.sine) * width
+    shear = work.law.shear(np.maximum(chip, 0.0) * place.sine) * width
     alone = np.ones_like(share)
     sums = []
     for amount in (shear, length):
@@ -150,52 +206,77 @@ def _cut(work: _Work, tooth: Indices, top: Array, panel: Indices, values: Array)
     return result
 
 
-def _breaks(work: _Work, tooth: Indices, top: Array, panel: Indices, values: Array) -> Array:
-    """Shares (breaks, panels), rising, at which a level vanishes or two chips are equal.
-
-    0 where there is none. By the Illinois form of false position from the ``values`` (2, levels, panels) at
-    the ends, of all functions that change their sign in a panel at once.
-    """
+def _breaks(work: _Work, tooth: Indices, top: Array, panel: Indices, cells: _Cells) -> Array:
+    """Shares (breaks, panels), rising, at which a level vanishes or two chips are equal; 1 where none is."""
     count = work.teeth.chip_count
-    low, high = np.concatenate([values, np.zeros((2, 1, values.shape[2]))], axis=1)
-    first, second = (
-        np.append(each, one)
-        for each, one in zip(
-            np.triu_indices(count, 1),
-            (np.arange(len(low) - 1), np.full(len(low) - 1, len(low) - 1)),
-            strict=True,
-        )
-    )
+    low, high = np.concatenate([cells.values, np.zeros((2, 1, cells.values.shape[2]))], axis=1)
+    first, second = _functions(count, len(low) - 1)
     fa, fb = low[first] - low[second], high[first] - high[second]
-    function, at = np.nonzero(fa * fb < 0.0)
+    function, cell = np.nonzero(fa * fb < 0.0)
+    fa, fb = fa[function, cell], fb[function, cell]
     if count == work.teeth.passes > 1:
         # Most passes cross where others leave less. By chords the chips are known to less than MARGIN.
-        chord = fa[function, at] / (fa[function, at] - fb[function, at])
-        near = low[:, at] + chord * (high[:, at] - low[:, at])
+        near = low[:, cell] + fa / (fa - fb) * (high[:, cell] - low[:, cell])
         margin = MARGIN * work.teeth.passes * work.teeth.cut.feed_per_tooth
-        matters = near[first[function], np.arange(len(at))] < near[:count].min(axis=0) + margin
-        function, at = function[matters], at[matters]
-    fa, fb, a, b = fa[function, at], fb[function, at], np.zeros(len(at)), np.ones(len(at))
-    first, second, every = first[function], second[function], np.arange(len(at))
-    share = b
-    for _ in range(STEPS):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(fb == fa, b, b - fb * (b - a) / (fb - fa))
-        levels = work.levels(tooth[at], top[at], panel[at], work.line.share(panel[at], share))
-        levels = np.concatenate([levels, np.zeros((1, len(at)))])
-        value = levels[first, every] - levels[second, every]
-        if np.abs(value).max(initial=0.0) < EXACT * work.teeth.cut.feed_per_tooth:
-            break
-        crossed = value * fb < 0.0
-        a, fa = np.where(crossed, b, a), np.where(crossed, fb, 0.5 * fa)
-        b, fb = share, value
-    share = work.line.share(panel[at], np.clip(share, 0.0, 1.0))
+        matters = near[first[function], np.arange(len(cell))] < near[:count].min(axis=0) + margin
+        function, cell, fa, fb = function[matters], cell[matters], fa[matters], fb[matters]
+    first, second = first[function], second[function]
+    at, which = cells.panel[cell], cells.cell[cell]
+    start, size = CELLS[which], CELLS[which + 1] - CELLS[which]
+    teeth, tops, panels = tooth[at], top[at], panel[at]
+
+    def value(share: Array, some: Indices | slice) -> Array:
+        place = work.line.at(panels[some], start[some] + size[some] * share)
+        return work.differences(first[some], second[some], teeth[some], tops[some], place)
+
+    near = NEAR * work.line.length.sum() / (work.line.length[panels] * size)
+    share = start + size * _roots(value, fa, fb, near)
     order = np.lexsort((share, at))
     at, share = at[order], share[order]
     rank = np.arange(len(at)) - np.searchsorted(at, at)
     breaks = np.ones((rank.max(initial=-1) + 1, len(panel)))
     breaks[rank, at] = share
     return breaks
+
+
+@lru_cache(maxsize=64)
+def _functions(chips: int, levels: int) -> tuple[Indices, Indices]:
+    """Levels whose difference vanishes where something changes: two chips, or any and zero, the last."""
+    first, second = np.triu_indices(chips, 1)
+    return np.append(first, np.arange(levels)), np.append(second, np.full(levels, levels))
+
+
+def _roots(
+    value: Callable[[Array, Indices | slice], Array], at_zero: Array, at_one: Array, near: Array
+) -> Array:
+    """Where functions (n,) vanish between 0 and 1, at which their values have unlike signs.
+
+    By inverse quadratic interpolation through the ends of the bracket and the point that it lost last, or at
+    the bracket's middle where that leads out of it. Near the root the error of a step is of the order of the
+    product of the errors of the three points, so that one after a step of less than ``near`` (n,) is much
+    less. ``value`` takes places and which of the functions.
+    """
+    root = at_zero / (at_zero - at_one)
+    some: Indices | slice = slice(None)
+    a, b, fa, fb = np.zeros_like(root), np.ones_like(root), at_zero, at_one
+    for _ in range(STEPS):
+        x = root[some].copy()
+        fx = value(x, some)
+        crossed = fx * fb < 0.0
+        c, fc = np.where(crossed, a, b), np.where(crossed, fa, fb)
+        a, fa, b, fb = np.where(crossed, b, a), np.where(crossed, fb, fa), x, fx
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = fb / (fa - fc) * ((a - b) * fc / (fa - fb) - (c - b) * fa / (fc - fb))
+        inside = (step * (a - b) >= 0.0) & (np.abs(step) <= np.abs(a - b))
+        step = np.where(fb == 0.0, 0.0, np.where(inside, step, 0.5 * (a - b)))
+        root[some] = b + step
+        left = np.abs(step) >= near[some]
+        if not left.any():
+            break
+        if 2 * np.count_nonzero(left) < len(left):
+            some = np.arange(len(root))[some][left]
+            a, fa, b, fb = a[left], fa[left], b[left], fb[left]
+    return root
 
 
 def _assembled(sums: Array) -> Array:

@@ -38,8 +38,9 @@ class Teeth:
     Attributes
     ----------
     passes : number of earlier passes that may bound a chip. pitch : (passes, N) to the tooth of each, rad.
-    off : (N, 3, N) deviation from the radius of the tooth some places ahead of each, m: shares of the cosine
-        and of the sine of the lag angle, and what is steady. raw : the raw edges.
+    off : (3, N + 1, N) deviation from the radius of the tooth some places ahead of each, m: shares of the
+        cosine and of the sine of the lag angle, and what is steady; (3, 0, 0) where there is none.
+    raw : the raw edges.
     """
 
     cutter: Cutter
@@ -58,38 +59,58 @@ class Teeth:
         outer = sum(edge.outer for edge in self.raw)
         return self.passes * (1 + len(self.raw) - outer) + outer
 
+    @property
+    def only_passes(self) -> bool:
+        """Whether nothing but passes, several of them, bounds what a tooth cuts."""
+        arc = self.cut.engagement
+        return self.passes > 1 and not (self.raw or arc.entry_face or arc.exit_face)
+
+    @property
+    def outside(self) -> float:
+        """Sine of the immersion behind which no tooth cuts: on true paths half the feed over the radius.
+
+        Of the pass a turn ago where teeth deviate, for that one is the tooth's own.
+        """
+        inner = np.array(self.cutter.radius - self.cutter.corner)
+        return (
+            0.5 * self.passes * self.cut.feed_per_tooth / float(self.least(inner)) if self.true_path else 0.0
+        )
+
+    def least(self, radius: Array) -> Array:
+        """Return the radius at which paths are taken as true ones, m."""
+        return np.sqrt(np.sqrt(radius**4 + (LEAST_RADIUS * self.cut.feed_per_tooth) ** 4))
+
+    def after(self, passed: Indices, tooth: Indices, place: Place, sine: Array, cosine: Array) -> Array:
+        """Chips in the plane that passes 0… leave to teeth at places, m; all broadcast."""
+        feed = feed_per_radian(self.cutter, self.cut)
+        pitch = self.pitch[passed, tooth]
+        travel = feed * pitch
+        chip = np.asarray(travel * sine)
+        earlier: Array | float = 0.0
+        if self.off.size:
+            lag = self._lag(place)
+            earlier = self._wave(passed + 1, tooth, lag)
+            chip += self._wave(np.intp(0), tooth, lag) - earlier
+        if self.true_path:
+            chip += path_excess(feed, pitch, self.least(place.radius) + earlier, sine, cosine)
+            if self.cut.curvature:
+                chip += curve_excess(self.cut.curvature, travel) * cosine
+        return chip
+
     def chips(self, tooth: Indices, place: Place, sine: Array, cosine: Array) -> Array:
         """Chips in the plane of which the least counts, (chips, …) m, of teeth at places; all broadcast.
 
         Each pass leaves one. On true paths a raw edge leaves of them what is beyond it, or before it: where
         it is between a tooth's tip and what was cleared, only that part of the chip is there.
         """
-        cutter, feed = self.cutter, feed_per_radian(self.cutter, self.cut)
-        curvature = self.cut.curvature if self.true_path else 0.0
-        off = bool(cutter.runout_radius or any(cutter.reach))
-        if off:
-            angle = cutter.lag_per_depth * place.height
-            lag = np.cos(angle), np.sin(angle)
-        own = self._wave(self.off[0], tooth, lag) if off else np.zeros(1)
-        least = np.maximum(place.radius, LEAST_RADIUS * self.cut.feed_per_tooth)
-        chips = []
-        for step in range(1, self.passes + 1):
-            pitch = self.pitch[step - 1][tooth]
-            chip = (feed * pitch) * sine
-            earlier = own
-            if off and step < cutter.teeth:  # the last pass is the tooth's own
-                earlier = self._wave(self.off[step], tooth, lag)
-                chip += own - earlier
-            if curvature:
-                chip += curve_excess(curvature, feed * pitch) * cosine
-            if self.true_path:
-                chip += path_excess(feed, pitch, least + earlier, sine, cosine)
-            chips.append(chip)
-        if self.true_path:
-            chips += self._at_raw_edges(chips, place.radius + own, cosine)
-        return np.stack(chips) if len(chips) > 1 else chips[0][None]
+        passed = np.arange(self.passes).reshape(-1, *(1,) * sine.ndim)
+        chips = self.after(passed, tooth, place, sine, cosine)
+        if not (self.true_path and self.raw):
+            return chips
+        own = self._wave(np.intp(0), tooth, self._lag(place)) if self.off.size else 0.0
+        return np.concatenate([chips, *self._at_raw_edges(chips, place.radius + own, cosine)])
 
-    def _at_raw_edges(self, chips: list[Array], tip: Array, cosine: Array) -> list[Array]:
+    def _at_raw_edges(self, chips: Array, tip: Array, cosine: Array) -> list[Array]:
         """Return what raw edges leave of chips, of a tooth whose ``tip`` is so far from the axis, m."""
         left: list[Array] = []
         for edge in self.raw:
@@ -99,13 +120,18 @@ class Teeth:
                 crossing, tip - edge.line / np.where(crossing, cosine, 1.0), -self.cutter.radius
             )
             np.maximum(beyond, -self.cutter.radius, out=beyond)
-            left += [beyond] if edge.outer else [chip - beyond for chip in chips]
+            left.append(np.broadcast_to(beyond, chips.shape[1:])[None] if edge.outer else chips - beyond)
         return left
 
-    def _wave(self, wave: Array, tooth: Indices, lag: tuple[Array, Array]) -> Array:
-        """Deviations from the radius, m, of waves (3, N): along the lag's cosine and sine, and steady."""
-        cosine, sine, steady = (part[tooth] for part in wave)
-        return np.asarray(cosine * lag[0] + sine * lag[1] + (steady if self.cutter.reach else 0.0))
+    def _lag(self, place: Place) -> tuple[Array, Array]:
+        angle = self.cutter.lag_per_depth * place.height
+        return np.cos(angle), np.sin(angle)
+
+    def _wave(self, ahead: Indices | np.intp, tooth: Indices, lag: tuple[Array, Array]) -> Array:
+        """Deviations from the radius, m, of the teeth so many places ``ahead``, where the lag is so."""
+        cosine, sine, steady = self.off[:, ahead, tooth]
+        wave = cosine * lag[0] + sine * lag[1]
+        return np.asarray(wave + steady if self.cutter.reach else wave)
 
     def levels(self, tooth: Indices, place: Place, sine: Array, cosine: Array) -> Array:
         """All that must be above zero where a tooth cuts, (levels, …) m: the chips first."""
@@ -131,8 +157,8 @@ class Teeth:
 
 def teeth_in(cutter: Cutter, cut: Cut, *, true_path: bool) -> Teeth:
     """Return the teeth of a cutter in a cut."""
-    curved = bool(cut.curvature) and true_path
-    passes = cutter.teeth if curved or cutter.runout_radius or any(cutter.reach) else 1
+    wobbles = bool(cutter.runout_radius or any(cutter.reach))
+    passes = cutter.teeth if wobbles or (cut.curvature and true_path) else 1
     pitch = np.stack([cutter.pitch(step) for step in range(1, passes + 1)])
     arc = cut.engagement
     ends = [(arc.entry, True)] * (arc.entry > 0.0 and not arc.entry_face)
@@ -141,8 +167,14 @@ def teeth_in(cutter: Cutter, cut: Cut, *, true_path: bool) -> Teeth:
         RawEdge(cutter.radius * math.cos(end), (math.cos(end) < 0.0) == begins, begins)
         for end, begins in ends
     ]
+    off = _deviations(cutter) if wobbles else np.zeros((3, 0, 0))
+    return Teeth(cutter, cut, true_path, passes, pitch, off, tuple(raw))
+
+
+def _deviations(cutter: Cutter) -> Array:
+    """Deviations (3, N + 1, N) from the radius of the teeth 0…N places ahead of each, m."""
     towards = cutter.runout_angle - np.asarray(cutter.tooth_angles)
     reach = np.array(cutter.reach or np.zeros(cutter.teeth))
     wave = np.stack([*(cutter.runout_radius * np.array([np.cos(towards), -np.sin(towards)])), reach])
-    off = np.stack([np.roll(wave, -step, axis=1) for step in range(cutter.teeth)])
-    return Teeth(cutter, cut, true_path, passes, pitch, off, tuple(raw))
+    ahead = np.arange(cutter.teeth + 1)[:, None] + np.arange(cutter.teeth)
+    return np.asarray(wave[:, ahead % cutter.teeth])

@@ -13,7 +13,7 @@ import numpy as np
 
 from metro.dynamics import crossings
 from metro.dynamics.crossings import Candidates
-from metro.dynamics.lobes import Boundary, fine_kernel, groups, stability_boundary
+from metro.dynamics.lobes import Boundary, fine_kernel, groups
 from metro.dynamics.system import Cut, Structure
 from metro.units import Array
 
@@ -42,22 +42,6 @@ def depth_samples(structure: Structure, cut: Cut, boundary: Boundary, deviations
             column = depths[:, mine.speed[j]]
             np.minimum(column, np.exp(values[:, j]), out=column)
     return depths
-
-
-def depths_anew(structure: Structure, cut: Cut, rpm: Array, deviations: Array) -> Array:
-    """Depths (s, k) of the same samples solved from scratch, to see what first order is worth."""
-    m = len(structure.omega)
-    depths = []
-    for factor in np.exp(deviations):
-        changed = replace(
-            structure,
-            omega=structure.omega * factor[:m],
-            zeta=structure.zeta * factor[m : 2 * m],
-            stiffness=structure.stiffness * factor[2 * m : 3 * m],
-        )
-        harder = replace(cut, ktc=cut.ktc * factor[3 * m], krc=cut.krc * factor[3 * m + 1])
-        depths.append(stability_boundary(changed, harder, rpm).depth)
-    return np.stack(depths)
 
 
 def _log_slopes(structure: Structure, cut: Cut, rpm: Array, at: Candidates) -> Array:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from metro.dynamics.lobes import stability_boundary
+from metro.dynamics.by_depth import boundary_of_edge
 from metro.dynamics.system import Cut, Structure
 from metro.dynamics.zero_order import zero_order_boundary
 from metro.units import Array
@@ -61,11 +61,12 @@ class StabilityModel:
 
     def _at(self, rpm: Array, factor: Array) -> tuple[Array, Array]:
         """Return the boundary (k,) at speeds (k,) with ``factor`` (k,) times the stiffness."""
-        boundaries = [stability_boundary(self.structure, cut, rpm / np.sqrt(factor)) for cut in self.cuts]
+        slowed = rpm / np.sqrt(factor)
+        boundaries = [boundary_of_edge(self.structure, cut, slowed, factor) for cut in self.cuts]
         depth = np.stack([one.depth for one in boundaries])
         least = (depth.argmin(axis=0), np.arange(depth.shape[1]))
         chatter = np.stack([one.chatter_hz for one in boundaries])[least]
-        return factor * depth[least], np.sqrt(factor) * chatter
+        return depth[least], np.sqrt(factor) * chatter
 
     def _factor(self, rpm: Array) -> Array:
         factor: Array = 1.0 + self.softening * np.asarray(rpm, dtype=float)

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from metro.cutting.cutter import Cutter
+from metro.cutting.envelope import mean_inclination
 from metro.units import Array, ComplexArray
 
 
@@ -75,6 +77,28 @@ class Structure:
 
 
 @dataclass(frozen=True)
+class Edge:
+    """Edge of an end that is not flat: it presses along the normal of its envelope and along the meridian.
+
+    With κ between that normal and the tool axis, and without helix, the tangential force per height is that
+    of a flat end, and the radial one ``krc sin κ - kac cos κ`` takes the place of ``krc``.
+
+    Attributes
+    ----------
+    tool : whose meridian it is. krc, kac : coefficients along the normal and along the meridian, N/m².
+    """
+
+    tool: Cutter
+    krc: float
+    kac: float
+
+    def radial(self, depth: float) -> float:
+        """Mean radial coefficient over the height of a cut of a depth, m: N/m²."""
+        along, across = mean_inclination(self.tool, depth)
+        return along * self.krc - across * self.kac
+
+
+@dataclass(frozen=True)
 class Cut:
     """Engagement and cutting coefficients.
 
@@ -83,6 +107,8 @@ class Cut:
     teeth : number of equally spaced teeth.
     entry, exit : immersion angles between which a tooth cuts, rad.
     ktc, krc : tangential and radial cutting coefficients, N/m².
+    edge : of an end that is not flat: what of the coefficients acts along the radius at each depth of cut.
+        The mean at one depth is ``krc``, for what takes one coefficient.
     damping : of the process, coefficient over the tool's radius, N/m²: a tooth that moves into the work at a
         speed v is pushed back by ``damping * depth * v / spindle's angular speed``.
     """
@@ -93,6 +119,16 @@ class Cut:
     ktc: float
     krc: float
     damping: float = 0.0
+    edge: Edge | None = None
+
+    def at_depth(self, depth: float) -> Cut:
+        """Return the cut with the mean radial coefficient of an axial depth, m, at all depths."""
+        return self if self.edge is None else replace(self, krc=self.edge.radial(depth), edge=None)
+
+    def harder(self, tangential: float, radial: float) -> Cut:
+        """Return the cut with so many times the tangential and the radial coefficient."""
+        edge = self.edge and replace(self.edge, krc=self.edge.krc * radial, kac=self.edge.kac * radial)
+        return replace(self, ktc=self.ktc * tangential, krc=self.krc * radial, edge=edge)
 
     @property
     def pitch(self) -> float:

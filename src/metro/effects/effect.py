@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
+from metro.joint_columns import MOST_AXES
 from metro.observables.problem import Refusal
 from metro.units import Array
 
 Values = Mapping[str, Any]
 Owner = Literal["cell", "tool", "work", "instrument"]
 Per = Literal["", "axis", "joint", "tooth"]
-JOINTS = 6  # of an arm
 
 
 @dataclass(frozen=True)
@@ -165,16 +165,15 @@ class Effect:
 
 
 def per_joint(of_joint: Callable[[int], Effect]) -> tuple[Effect, ...]:
-    """Return the forms of an effect of one joint, for each joint (0 … 5) of an arm: ``of_joint(joint)``."""
+    """Return the forms of an effect of one joint, ``of_joint(joint)``, for each (from 0) of any arm."""
     return tuple(
         replace(
             of_joint(joint),
             form=f"joint {joint + 1}",
             where={"joint": joint + 1},
-            prior=1.0 / JOINTS,
             per="joint",
         )
-        for joint in range(JOINTS)
+        for joint in range(MOST_AXES)
     )
 
 
@@ -197,7 +196,7 @@ def fitted_to(
     """
     able: list[Effect] = []
     unable: dict[str, str] = {}
-    for effect in effects:
+    for effect in _of_its_joints(effects, getattr(problem.base, "joints", ())):
         if effect.part and not hasattr(problem.base, effect.part):
             unable[effect.name] = f"what is predicted here has no {effect.part}"
             continue
@@ -207,3 +206,15 @@ def fitted_to(
         else:
             able.append(adapted)
     return tuple(able), {name: why for name, why in unable.items() if name not in {e.name for e in able}}
+
+
+def _of_its_joints(effects: tuple[Effect, ...], joints: Sequence[int]) -> tuple[Effect, ...]:
+    """Return effects without those of joints that an arm lacks; which one it is, is as likely of each.
+
+    ``joints`` : of the arm of a model, from 0; none of a model that has no joints.
+    """
+    return tuple(
+        replace(effect, prior=effect.prior / len(joints)) if effect.per == "joint" and joints else effect
+        for effect in effects
+        if effect.per != "joint" or not joints or effect.where["joint"] in {joint + 1 for joint in joints}
+    )

@@ -92,7 +92,7 @@ def channel_pieces(path: Path, kind: Kind, channels: Sequence[Channel], rows: in
         Naming the channel: a column missing or found twice, a unit missing, unknown or at odds with the name,
         values that are no vector of numbers, or not as many as in the first column.
     """
-    named = [(column_of(kind, each.name), each) for each in channels]
+    named = [(column_of(kind, each.name, each.unit), each) for each in channels]
     columns = [column for column, _ in named]
     if "t_s" in kind.required and "t_s" not in columns:
         timed = [each for column, each in named if column in kind.required]
@@ -121,13 +121,20 @@ def _sample(start: int, row: int) -> str:
     return f"sample {start + row + 1}"
 
 
-def column_of(kind: Kind, name: str) -> str:
-    """Give the column that a channel's name denotes; the name in lower case where it is none."""
+def column_of(kind: Kind, name: str, unit: str = "") -> str:
+    """Give the column that a channel's name denotes; the name in lower case where it is none.
+
+    Of columns that differ in their unit alone (``q1_deg``, ``q1_mm``) it is that of the channel's ``unit``,
+    else the first.
+    """
     key = name.strip().lower().replace(" ", "_")
     key = _ALIASES.get(key, key)
     columns = (*kind.required, *kind.optional)
-    bare = {column.rpartition("_")[0]: column for column in columns if unit_of(column)}
-    return key if key in columns else bare.get(key, key)
+    if key in columns:
+        return key
+    alike = [column for column in columns if unit_of(column) and column.rpartition("_")[0] == key]
+    fitting = [column for column in alike if unit.strip(" []()") in UNITS[unit_of(column)]]
+    return next(iter(fitting or alike), key)
 
 
 def unit_of(column: str) -> str:
@@ -161,7 +168,7 @@ def automatic(
             yield at, plain, factor(path, plain, label, name, unit) if unit else 1.0
             continue
         bare, stated = parted(name)
-        column = column_of(kind, bare)
+        column = column_of(kind, bare, unit or stated)
         if column not in wanted or column in exact:
             continue
         if unit or stated or (column in kind.required and unit_of(column)):

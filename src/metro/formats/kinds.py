@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.formats.errors import FormatError
-from metro.joint_columns import JOINT_COLUMNS, fault_of, fault_of_six
+from metro.joint_columns import JOINT_COLUMNS, fault_of, fault_of_cut
 from metro.spelling import resembling
 
 JOINTS = range(1, 7)
@@ -46,23 +46,17 @@ class Kind:
 
 KINDS: dict[str, Kind] = {
     "force": Kind("a force record", ("t_s", "fx_n", "fy_n", "fz_n"), ("spindle_deg",), rising="t_s"),
-    "robot": Kind(
-        "a robot log",
-        (
-            "t_s",
-            *(f"q{i}_deg" for i in JOINTS),
-        ),
-        (
-            *(f"q{i}_set_deg" for i in JOINTS),
-            *(f"tau{i}_nm" for i in JOINTS),
-            *(f"current{i}_a" for i in JOINTS),
-        ),
-        rising="t_s",
-        fault=fault_of_six,
-    ),
+    "robot": Kind("a robot log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of_cut),
     "joints": Kind("a joint log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of),
     "path": Kind("a path", ("point", "pass", "x_mm", "y_mm", "z_mm"), whole=("point", "pass"), least=2),
     "profile": Kind("a profile", ("x_mm", "z_mm"), rising="x_mm"),
+    "slopes": Kind(
+        "slope readings",
+        ("x1_mm", "y1_mm", "x2_mm", "y2_mm", "slope_urad"),
+        ("line",),
+        whole=("line",),
+        least=4,
+    ),
     "cloud": Kind("a point cloud", ("x_mm", "y_mm", "z_mm"), least=3),
     "record": Kind("a hammer record", ("t_s", "force_n", "response"), rising="t_s"),
     "frf": Kind("an FRF", ("frequency_hz", "real", "imag"), ("coherence",), rising="frequency_hz"),
@@ -132,12 +126,13 @@ def checked(path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf
     at_least(path, kind, len(frame), least)
     if kind.rising:
         _check_rising(path, frame, kind.rising, raw.place, after)
-    for name in kind.whole:
+    whole = [name for name in kind.whole if name in frame]
+    for name in whole:
         _check_whole(path, frame, name, raw.place)
     for name, (low, high) in RANGES.items():
         if name in frame:
             _check_range(path, frame, name, (low, high), raw.place)
-    return frame.astype(dict.fromkeys(kind.whole, np.int64)) if kind.whole else frame
+    return frame.astype(dict.fromkeys(whole, np.int64)) if whole else frame
 
 
 def at_least(path: Path, kind: Kind, rows: int, least: int) -> None:

@@ -117,7 +117,7 @@ def factor_to(column: str, given: From) -> tuple[float, str]:
     if column in ("real", "imag"):
         read = per_force(given.unit) if given.unit else Measure("", 1.0, "")
     else:
-        read = measure(given.unit)
+        read = measure(given.unit, _asked(column))
     if given.sensitivity:
         read = by_sensitivity(read, given.sensitivity)
     if column in ("response", "real", "imag"):
@@ -130,10 +130,15 @@ def factor_to(column: str, given: From) -> tuple[float, str]:
             raise MeasureError(_of_another(column, read, tuple(RESPONSES)))
         unit, to_unit = RESPONSES[read.quantity]
         return given.scale * (read.factor * to_unit), unit
-    asked = OF_COLUMN.get(column.rpartition("_")[2], "") if "_" in column else ""
+    asked = _asked(column)
     if read.quantity and read.quantity != asked:
         raise MeasureError(_of_another(column, read, (asked,) if asked else ()))
     return given.scale * read.factor, ""
+
+
+def _asked(column: str) -> str:
+    """Return the quantity that the unit in a column's name is of; "" where it has none."""
+    return OF_COLUMN.get(column.rpartition("_")[2], "") if "_" in column else ""
 
 
 def _of_another(column: str, read: Measure, asked: Sequence[str]) -> str:

@@ -12,6 +12,20 @@ UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60.0},
     "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "lbf": 4.4482216152605},
     "angle": {"deg": 1.0, "°": 1.0, "rad": math.degrees(1.0), "mrad": math.degrees(1e-3)},
+    "slope": {
+        "urad": 1.0,
+        "µrad": 1.0,
+        "μrad": 1.0,
+        "um/m": 1.0,
+        "µm/m": 1.0,
+        "μm/m": 1.0,
+        "arcsec": math.pi / 0.648,
+        '"': math.pi / 0.648,
+        "mm/m": 1e3,
+        "mrad": 1e3,
+        "rad": 1e6,
+        "deg": math.pi / 180e-6,
+    },
     "torque": {
         "Nm": 1.0,
         "N m": 1.0,
@@ -58,6 +72,7 @@ OF_COLUMN = {
     "s": "time",
     "n": "force",
     "deg": "angle",
+    "urad": "slope",
     "nm": "torque",
     "mm": "length",
     "hz": "frequency",
@@ -88,8 +103,10 @@ class Measure:
     unit: str
 
 
-def measure(unit: str) -> Measure:
+def measure(unit: str, asked: str = "") -> Measure:
     """Find what a unit measures; brackets around it do not matter.
+
+    ``asked``: the quantity that it should be of, where it may be of several: mrad of an angle and of a slope.
 
     Raises
     ------
@@ -99,7 +116,8 @@ def measure(unit: str) -> Measure:
     text = stripped(unit)
     if text in ("", "1", "-"):
         return Measure("", 1.0, "")
-    for quantity, spellings in UNITS.items():
+    for quantity in sorted(UNITS, key=lambda each: each != asked):
+        spellings = UNITS[quantity]
         if text in spellings:
             return Measure(quantity, spellings[text], text)
     raise MeasureError(f"found the unit {unit!r}, expected one of {', '.join(first_spellings())}")

@@ -54,12 +54,15 @@ class Proposal:
 def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
     """Propose how files are read; what nothing is proposed for is in the second list, with the reason."""
     from metro.importing import joints
+    from metro.importing.slopes import slope_readings
 
     proposals: list[Proposal] = []
     unknown = [f"{seen.path.name}: {seen.fault}" for seen in files if seen.fault]
     rest = [seen for seen in files if not seen.fault]
-    # columns that are named as angles and torques are no coordinates, whatever else could be read from them
-    rest = [replace(s, kind="") if s.kind == "cloud" and joints.joint_log(s) else s for s in rest]
+    # columns that are named as angles and torques, or as feet and slopes, are no coordinates, whatever else
+    # could be read from them
+    named = {s.path for s in rest if s.kind == "cloud" and (joints.joint_log(s) or slope_readings(s))}
+    rest = [replace(s, kind="") if s.path in named else s for s in rest]
     for kind in dict.fromkeys(seen.kind for seen in rest if seen.kind):
         for placed in (False, True):
             group = [seen for seen in rest if seen.kind == kind and seen.placed is placed]
@@ -70,7 +73,7 @@ def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
     proposals += pairs
     unknown += single
     for seen in rest:
-        found = _forces(seen) or joints.joint_log(seen) or _numbered(seen)
+        found = _forces(seen) or joints.joint_log(seen) or slope_readings(seen) or _numbered(seen)
         if found is None:
             unknown.append(_reason(seen))
         else:
@@ -225,7 +228,8 @@ def _reason(seen: Seen) -> str:
     named = sum(bool(column.name) for column in seen.columns)
     listed = ", ".join(column.name for column in seen.columns[:8] if column.name)
     names = f", named {listed}" if named else " without names"
-    message = f"{seen.path.name}: {len(seen.columns)} columns{names}: no dynamometer, hammer, profile or scan"
+    none = "no dynamometer, hammer, profile, slopes or scan"
+    message = f"{seen.path.name}: {len(seen.columns)} columns{names}: {none}"
     logs = (
         "a joint log takes angles and torques or currents with numbered names; a robot log of a cut takes "
         "t_s, q1_deg …, tau1_nm … (or current1_a …), q1_set_deg …"

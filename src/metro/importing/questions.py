@@ -20,6 +20,7 @@ EXAMPLES = {
     "current": "A",
     "force": "N, kN or V",
     "length": "mm, m or inch",
+    "slope": "um/m, arcsec or mrad",
     "time": "s or ms",
     "response": "m/s2, g or V",
 }

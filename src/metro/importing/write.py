@@ -26,6 +26,7 @@ RUN_COLUMN = {
     "profile": "profile",
     "cloud": "scan",
     "path": "path",
+    "slopes": "slopes",
 }
 _RUN_KEYS = (
     *("operation", "direction", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm"),
@@ -165,7 +166,7 @@ def _quantity(column: str) -> str:
 
 
 def _runs(proposals: Sequence[Proposal], answers: Answers) -> str:
-    """Return runs.csv: a row for each record of a cut, a scan or a profile; "" where there is none."""
+    """Return runs.csv: a row for each record of a cut or of a face; "" where there is none."""
     used = [each for each in proposals if each.kind in RUN_COLUMN]
     rows: list[dict[str, str]] = []
     for each in used:

@@ -11,11 +11,12 @@ from importlib import import_module
 from metro.batch.capabilities import Capability, Stock
 from metro.observables import PACKAGES
 from metro.observables.description import Description
+from metro.observables.levelling.description import LEVELLING
 from metro.observables.published.description import PRINTED
 from metro.observables.texture.description import TEXTURE
 
 # What is found without a model, so that nothing is compared with it.
-BESIDE = (TEXTURE, PRINTED)
+BESIDE = (LEVELLING, TEXTURE, PRINTED)
 
 
 @cache
@@ -62,5 +63,5 @@ def drawn_tables() -> tuple[str, ...]:
 
 
 def capabilities(stock: Stock) -> tuple[Capability, ...]:
-    """Say for every observable, for texture and for printed values, whether a batch has what it needs."""
+    """Say for every observable, for what is found beside them, whether a batch has what it needs."""
     return tuple(each for described in (*descriptions(), *BESIDE) for each in described.needs(stock))

@@ -15,6 +15,7 @@ from metro.report.sections.causes import upstream, with_causes
 from metro.report.sections.comparison import comparison
 from metro.report.sections.contradictions import with_contradictions
 from metro.report.sections.identification import identification
+from metro.report.sections.levelling import levelling
 from metro.report.sections.loop import loop
 from metro.report.sections.provenance import provenance
 from metro.report.sections.published import published
@@ -45,6 +46,7 @@ def report_sections(results: Results) -> list[Section]:
         calibration(results),
         identification(results),
         flatness(results),
+        levelling(results),
         texture(results),
         areal(results),
         robot(results),

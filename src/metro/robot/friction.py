@@ -18,7 +18,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from metro.robot.determined import STRETCHES, solve
-from metro.robot.kinematics import Geometry
+from metro.robot.kinematics import Geometry, prismatic
 from metro.robot.motion import EDGE, PER_PERIOD, Motion, evenly
 from metro.robot.rigid_body import gravity_regressor, torque_regressor
 from metro.units import Array
@@ -119,6 +119,8 @@ def of_idle_runs(dh: Geometry, runs: Sequence[tuple[Array, Array, Array]]) -> tu
     logs = [_settled(evenly(*run, IDLE_CUTOFF_HZ)) for run in runs]
     parts = {f.name: np.concatenate([getattr(log, f.name) for log in logs]) for f in fields(Motion)}
     log = Motion(**parts)
+    # The drive of a linear axis is not evaluated: it counts as one that stands still.
+    log = replace(log, moving=log.moving & ~prismatic(dh))
     return identify(log, weight_columns(dh, log)), log
 
 

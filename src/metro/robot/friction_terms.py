@@ -1,9 +1,9 @@
-"""What the friction of a joint has beyond Coulomb and viscous: by speed, by load, by time.
+"""What the friction of a joint has beyond Coulomb and viscous: by speed, load, and temperature or time.
 
 Candidates are added one at a time, that with the largest statistic first, and only where two things agree:
 the statistic of its coefficient (jackknife) is beyond chance for as many candidates as were tried, and
-stretches of the log that were held out are predicted better with it. What passes is claimed as a change of
-the torque, with its error; what does not is not mentioned.
+parts of the log that were held out agree that they are predicted better with it. What passes is claimed as a
+change of the torque, with its error; what does not is not mentioned.
 """
 
 from __future__ import annotations
@@ -18,8 +18,11 @@ from metro.units import Array
 LEVEL = 0.01  # probability by chance of any one further term in a joint without them
 SPEEDS = (0.03, 0.06, 0.12, 0.25, 0.5)  # of the joint's fastest, at which a Stribeck curve may have fallen
 FOLDS = 6  # parts of the log, each held out once
-MOST = 3
+MOST = 4
+WARMING = 1.0  # K that a joint must have warmed by, to tell more than the time does
 TURNS = 6  # of the torque of the links and the friction that it makes
+
+Key = tuple[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +31,13 @@ class Term:
 
     Attributes
     ----------
-    name : speed (falls off as exp(−|q̇|/v)), load (grows with the torque of the links), time (along the log).
+    name : speed (falls off as exp(−|q̇|/v)), load (grows with the torque of the links), time (Coulomb level
+        along the log), temperature (Coulomb level by that of the joint), and viscous_time and
+        viscous_temperature (viscous friction likewise).
     value, sd : of speed, rms of what differs from the line of Coulomb and viscous friction, above zero where
-        friction at rest is above that line; of load, torque per torque of the links; of time, change of the
-        Coulomb level over the log. scale : v over the joint's fastest speed, of the term of speed, else NaN.
+        friction at rest is above that line; of load, torque per torque of the links; of time, change over
+        the log; of temperature, per kelvin.
+    scale : v over the joint's fastest speed, of the term of speed, else NaN.
     p : probability of its statistic by chance, candidates counted.
     held_out : rms of held-out stretches with it over that without.
     """
@@ -44,30 +50,60 @@ class Term:
     held_out: float
 
 
-def further_terms(
-    columns: Array, torque: Array, stretch: np.ndarray, links: slice, rate: Array
-) -> tuple[Term, ...]:
-    """Return the terms that the moving samples (m,) of a joint show.
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The moving samples (m,) of a joint.
 
-    Parameters
+    Attributes
     ----------
-    columns : (m, p) of the fit; the first is the sign of the speed. stretch : (m,) int.
-    links : which of the columns are the links'. rate : (m,) rad/s.
+    columns : (m, p) of the fit; the first is the sign of the speed. torque : (m,). stretch : (m,) int.
+    links : which of the columns are the links'. rate : (m,) rad/s. warmth : (m,) °C of the joint; None where
+        it was not logged.
     """
+
+    columns: Array
+    torque: Array
+    stretch: np.ndarray
+    links: slice
+    rate: Array
+    warmth: Array | None = None
+
+    @property
+    def candidates(self) -> list[Key]:
+        """Return the terms that may be there: name and, of a curve of speed, its v in rad/s.
+
+        Grease gets thinner as it warms, which changes both levels; without a temperature it warms with time.
+        """
+        by = "time" if self.warmth is None or np.ptp(self.warmth) < WARMING else "temperature"
+        fastest = float(np.abs(self.rate).max())
+        curves = [("speed", share * fastest) for share in SPEEDS]
+        return [*curves, ("load", np.nan), (by, np.nan), (f"viscous_{by}", np.nan)]
+
+    def column(self, key: Key, more: Array) -> Array:
+        """Return the column (m,) of a term beside ``more`` (m, k), the columns of those that were found."""
+        name, scale = key
+        sign = self.columns[:, 0]
+        if name == "speed":
+            return np.asarray(sign * np.exp(-np.abs(self.rate) / scale))
+        if name == "load":
+            return _loaded(np.column_stack([self.columns, more]), self.torque, self.stretch, self.links)
+        by = self.warmth if name.endswith("temperature") else self.stretch / STRETCHES - 0.5
+        assert by is not None  # else there were no such candidate
+        return np.asarray((self.rate if name.startswith("viscous") else sign) * (by - np.mean(by)))
+
+
+def further_terms(joint: Samples) -> tuple[Term, ...]:
+    """Return the terms that the moving samples of a joint show."""
     from scipy.stats import t as student
 
-    sign, time = columns[:, 0], stretch / STRETCHES - 0.5
-    fastest = float(np.abs(rate).max())
-    candidates = {("speed", s * fastest): sign * np.exp(-np.abs(rate) / (s * fastest)) for s in SPEEDS}
-    candidates |= {("load", np.nan): sign, ("time", np.nan): sign * time}
-    tried = len(candidates)
-    found: list[Term] = []
+    candidates, tried = joint.candidates, len(joint.candidates)
+    more, found = np.zeros((len(joint.torque), 0)), list[Term]()
     while candidates and len(found) < MOST:
-        best: tuple[float, tuple[str, float], Array] | None = None
-        if ("load", np.nan) in candidates:
-            candidates["load", np.nan] = _loaded(columns, torque, stretch, links)
-        for key, column in candidates.items():
-            value, sd = _coefficient(columns, column, torque, stretch)
+        best: tuple[float, Key, Array] | None = None
+        columns = np.column_stack([joint.columns, more])
+        for key in candidates:
+            column = joint.column(key, more)
+            value, sd = _coefficient(columns, column, joint.torque, joint.stretch)
             if key[0] == "load" and value < 0.0:
                 continue  # a gear loses power, and never gives any
             if np.isfinite(value) and sd > 0.0 and (best is None or abs(value) / sd > best[0]):
@@ -75,20 +111,21 @@ def further_terms(
         if best is None:
             break
         name, scale = best[1]
-        value, sd = _coefficient(columns, best[2], torque, stretch)
+        value, sd = _coefficient(columns, best[2], joint.torque, joint.stretch)
         if name == "load":
-            sd = _error_of_load(columns, torque, stretch, links)
+            sd = _error_of_load(columns, joint.torque, joint.stretch, joint.links)
         p = min(1.0, tried * 2.0 * float(student.sf(abs(value) / sd, STRETCHES - 1)))
-        ratio = _held_out(columns, best[2], torque, stretch)
-        rest = {key: column for key, column in candidates.items() if key[0] != name}
-        if p > LEVEL or ratio >= 1.0:
+        ratio, agreed = _held_out(columns, best[2], joint.torque, joint.stretch)
+        rest = [key for key in candidates if key[0] != name]
+        if p > LEVEL or not agreed:
             if name != "load":
                 break
             candidates = rest  # what it is cannot be said: others may still be seen
             continue
-        size = _beyond_a_line(best[2], sign, rate) if name == "speed" else 1.0
+        size = _beyond_a_line(best[2], columns[:, 0], joint.rate) if name == "speed" else 1.0
+        fastest = float(np.abs(joint.rate).max())
         found.append(Term(name, value * size, sd * size, scale / fastest, p, ratio))
-        columns, candidates = np.column_stack([columns, best[2]]), rest
+        more, candidates = np.column_stack([more, best[2]]), rest
     return tuple(found)
 
 
@@ -134,16 +171,28 @@ def _coefficient(columns: Array, column: Array, torque: Array, stretch: np.ndarr
     return solve(np.column_stack([columns, column]), torque, stretch).combination(size)
 
 
-def _held_out(columns: Array, column: Array, torque: Array, stretch: np.ndarray) -> float:
-    """Rms of held-out parts of the log with one more column, over that without."""
+def _held_out(columns: Array, column: Array, torque: Array, stretch: np.ndarray) -> tuple[float, bool]:
+    """Rms of held-out parts of the log with one more column over that without, and whether they agree on it.
+
+    They do where their mean gain is more than its standard error (Breiman, Friedman, Olshen & Stone,
+    Classification and Regression Trees, 1984, 3.4.3): else one part of the log may have made all of it.
+    """
     fold = stretch * FOLDS // STRETCHES
-    square = []
-    for some in (columns, np.column_stack([columns, column])):
-        scale = np.maximum(np.linalg.norm(some, axis=0), np.finfo(float).tiny)
-        left = 0.0
-        for part in np.unique(fold):
-            out = fold == part
-            value = np.linalg.lstsq(some[~out] / scale, torque[~out], rcond=1e-6)[0]
-            left += float(np.sum((torque[out] - some[out] / scale @ value) ** 2))
-        square.append(left)
-    return float(np.sqrt(square[1] / square[0])) if square[0] > 0.0 else 1.0
+    square = np.array(
+        [
+            [_missed(some, torque, fold == part) for part in np.unique(fold)]
+            for some in (columns, np.column_stack([columns, column]))
+        ]
+    )
+    gain, (before, after) = square[0] - square[1], square.sum(axis=1)
+    if len(gain) < 2 or not before > 0.0:
+        return 1.0, False
+    agreed = gain.mean() > gain.std(ddof=1) / np.sqrt(len(gain))
+    return float(np.sqrt(after / before)), bool(agreed)
+
+
+def _missed(columns: Array, torque: Array, out: np.ndarray) -> float:
+    """Sum of the squares that a fit to the other samples leaves in those held ``out``."""
+    scale = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    value = np.linalg.lstsq(columns[~out] / scale, torque[~out], rcond=1e-6)[0]
+    return float(np.sum((torque[out] - columns[out] / scale @ value) ** 2))

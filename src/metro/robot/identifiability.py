@@ -17,7 +17,7 @@ from metro.units import DEG, Array
 
 LEAST_SHARE = 1e-6  # eigenvalue of the information, over the largest, below which it counts as zero
 ANYTHING = 1.0  # relative standard deviation of a joint of which nothing is known
-STEPS = (-30.0 * DEG, 30.0 * DEG)  # of one joint at a time, around the poses that were measured
+TURN, SHIFT = 30.0 * DEG, 0.5  # rad, m: steps of one joint at a time around the poses that were measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +90,13 @@ def assess(matrix: Array) -> Identifiability:
     return Identifiability(relative, singular, vector, vector[~seen])
 
 
-def around(poses: Array, steps: tuple[float, ...] = STEPS) -> Array:
-    """Poses (p, n) and those with one joint turned by a step, (p (1 + n k), n), rad."""
-    turns = [np.zeros((1, poses.shape[1])), *(step * np.eye(poses.shape[1]) for step in steps)]
+def around(poses: Array, linear: np.ndarray) -> Array:
+    """Poses (p, n) and those with one joint moved by a step to either side, (p (1 + 2 n), n), rad or m.
+
+    ``linear`` (n,) bool: whether a joint shifts.
+    """
+    step = np.diag(np.where(linear, SHIFT, TURN))
+    turns = [np.zeros((1, poses.shape[1])), -step, step]
     return np.asarray((poses[:, None, :] + np.vstack(turns)).reshape(-1, poses.shape[1]))
 
 

@@ -7,12 +7,12 @@ constants says as much, in amperes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from metro.robot.determined import STRETCHES, Determined, solve
-from metro.robot.friction_terms import Term, further_terms
+from metro.robot.friction_terms import Samples, Term, further_terms
 from metro.robot.kinematics import Geometry
 from metro.robot.motion import BANDWIDTH, Motion, even_clock, evenly
 from metro.robot.rigid_body import torque_regressor
@@ -90,12 +90,15 @@ def cutoff(time: Array, q: Array) -> float:
     return float(np.clip(ABOVE * reached, *CUTOFF_HZ))
 
 
-def fit_joints(dh: Geometry, log: Motion, driven: np.ndarray) -> tuple[JointFit, ...]:
+def fit_joints(
+    dh: Geometry, log: Motion, driven: np.ndarray, warmth: Array | None = None
+) -> tuple[JointFit, ...]:
     """Fit every joint of a log that has a torque and moves.
 
     Parameters
     ----------
     dh : geometry of the arm. driven : (n,) bool, the joints whose torque was logged.
+    warmth : (m, n) °C of the joints, NaN of one whose temperature was not logged; None without any.
     """
     links = torque_regressor(dh, log.angle, log.rate, log.acceleration)
     weight = torque_regressor(dh, log.angle, 0 * log.rate, 0 * log.rate)
@@ -105,29 +108,31 @@ def fit_joints(dh: Geometry, log: Motion, driven: np.ndarray) -> tuple[JointFit,
         unit = np.eye(len(driven))[[joint]]
         turned = torque_regressor(dh, middle, still, unit) - torque_regressor(dh, middle, still, still)
         functions = weight[:, joint], turned[0, joint]
-        fits.append(_fit(_one(log, int(joint)), links[:, joint], functions, int(joint)))
+        fits.append(_fit(log, samples(log, links, int(joint), warmth), functions, int(joint)))
     return tuple(fits)
 
 
-def _one(log: Motion, joint: int) -> Motion:
-    """Return the log of one joint, (m, 1) each."""
-    parts = {name: getattr(log, name)[:, [joint]] for name in log.__dataclass_fields__}
-    return replace(log, **parts)
-
-
-def _fit(log: Motion, links: Array, functions: tuple[Array, Array], joint: int) -> JointFit:
-    weight, turned = functions
-    moving = log.moving[:, 0]
-    rate, sign, torque = log.rate[:, 0], log.direction[:, 0], log.torque[:, 0]
-    columns = np.column_stack([sign, rate, np.ones_like(rate), log.acceleration[:, 0], links])
+def samples(log: Motion, links: Array, joint: int, warmth: Array | None = None) -> Samples:
+    """Return the moving samples of a joint of a log; ``links`` (m, n, p) are the columns of the links."""
+    moving = log.moving[:, joint]
+    rate = log.rate[:, joint]
+    own = [log.direction[:, joint], rate, np.ones_like(rate), log.acceleration[:, joint]]
+    columns = np.column_stack([*own, links[:, joint]])
     stretch = np.arange(len(columns)) * STRETCHES // len(columns)
-    found = solve(columns[moving], torque[moving], stretch[moving])
-    rigid = columns[:, OWN - 1 :] @ found.value[OWN - 1 :]
-    left = (torque - columns @ found.value)[moving]
+    warm = None if warmth is None or not np.isfinite(warmth[:, joint]).all() else warmth[moving, joint]
+    of_links = slice(OWN - 1, columns.shape[1])
+    torque = log.torque[moving, joint]
+    return Samples(columns[moving], torque, stretch[moving], of_links, rate[moving], warm)
+
+
+def _fit(log: Motion, of: Samples, functions: tuple[Array, Array], joint: int) -> JointFit:
+    weight, turned = functions
+    columns, torque, rate = of.columns, of.torque, of.rate
+    found = solve(columns, torque, of.stretch)
+    rigid = columns[:, of.links] @ found.value[of.links]
+    left = torque - columns @ found.value
     heaviest = int(np.argmax(np.abs(weight @ found.value[OWN:])))
-    terms = further_terms(
-        columns[moving], torque[moving], stretch[moving], slice(OWN - 1, columns.shape[1]), rate[moving]
-    )
+    terms = further_terms(of)
     alone = np.eye(columns.shape[1])
     gravity = found.combination(np.concatenate([np.zeros(OWN), weight[heaviest]]))
     inertia = found.combination(np.concatenate([alone[OWN - 1, :OWN], turned]))
@@ -139,15 +144,15 @@ def _fit(log: Motion, links: Array, functions: tuple[Array, Array], joint: int) 
         gravity=gravity,
         inertia=inertia,
         noise=float(np.sqrt(np.mean(left**2))),
-        swing=float(np.ptp(torque)),
-        fastest=float(np.abs(rate[moving]).max()),
-        moving=float(moving.mean()),
+        swing=float(np.ptp(log.torque[:, joint])),
+        fastest=float(np.abs(rate).max()),
+        moving=float(log.moving[:, joint].mean()),
         determined=max(len(found.spread) - _own_rank(found), 0),
         condition=found.condition,
-        ways=(bool((rate[moving] > 0).any()), bool((rate[moving] < 0).any())),
+        ways=(bool((rate > 0).any()), bool((rate < 0).any())),
         terms=terms,
-        speed=rate[moving],
-        resists=(torque - rigid)[moving],
+        speed=rate,
+        resists=torque - rigid,
     )
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from metro.joint_columns import Axes
 from metro.robot.chain import Chain, chain_of_arm
 from metro.units import DEG, JSON, MM, Array
 
@@ -36,6 +37,11 @@ class Arm:
         flange = forward(self.dh, q)
         in_base = flange[..., :3, :3] @ self.tool + flange[..., :3, 3]
         return (in_base - self.work[:3, 3]) @ self.work[:3, :3]
+
+    @property
+    def axes(self) -> Axes:
+        """Columns of its joints in tables."""
+        return axes(self.dh)
 
     def flange_axes(self, q: Array) -> Array:
         """Axes of the flange in the work frame, columns of (..., 3, 3)."""
@@ -78,6 +84,11 @@ def geometry_of_cell(cell: JSON) -> Geometry | None:
 def prismatic(dh: Geometry) -> np.ndarray:
     """Return which joints shift instead of turning, (n,) bool."""
     return dh.prismatic if isinstance(dh, Chain) else np.zeros(len(dh), dtype=bool)
+
+
+def axes(dh: Geometry) -> Axes:
+    """Return the columns of the joints of an arm."""
+    return Axes(tuple(bool(shifts) for shifts in prismatic(dh)))
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:

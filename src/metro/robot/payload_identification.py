@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from metro.robot.kinematics import Geometry
+from metro.robot.kinematics import Geometry, prismatic
 from metro.robot.rigid_body import PARAMETERS, torque_regressor
 from metro.units import Array
 
@@ -46,8 +46,9 @@ def identify_payload(
 
     Parameters
     ----------
-    dh : (n, 4). q, torque : (m, n) rad, N m: of the motors, at the joints; rest, or motion with ``rate`` and
-        ``acceleration`` (m, n) rad/s, rad/s². loaded : (m,) whether the load is on the flange.
+    dh : of n joints. q : (m, n) rad (m of a linear axis). torque : (m, k) N m, of the motors of the k joints
+        that turn, at the joints. loaded : (m,) whether the load is on the flange. motion : ``rate`` and
+        ``acceleration``, (m, n) each, rad/s and rad/s²; None at rest.
 
     Raises
     ------
@@ -61,9 +62,10 @@ def identify_payload(
     """
     still, moving = np.zeros_like(q), motion is not None
     rate, acceleration = motion or (still, still)
-    regressor = torque_regressor(dh, q, rate, acceleration)
+    driven = ~prismatic(dh)
+    regressor = torque_regressor(dh, q, rate, acceleration)[:, driven]
     own = regressor[..., -PARAMETERS:] * loaded[:, None, None]
-    nuisance = np.concatenate([regressor, _friction(rate, moving)], axis=-1)
+    nuisance = np.concatenate([regressor, _friction(rate[:, driven], moving)], axis=-1)
     own = own if moving else own[..., :STATIC]
     values, covariance, left, dof = _weighted(own, nuisance, torque)
     if moving and values is None:

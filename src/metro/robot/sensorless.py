@@ -225,6 +225,14 @@ def friction_repeatability(air: Array, variance: Array, least: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(square, least**2)))
 
 
+def drive_shares(tip_force: TipForce, torques: Torques, steady: np.ndarray) -> Array:
+    """Return what the torque of each joint adds to the mean force over bins ``steady``, (3, n) N.
+
+    Drive constants that are off by the relative errors e move the mean by these times e.
+    """
+    return np.asarray(np.einsum("mai,mi->mai", tip_force.solve, torques.level)[steady].mean(axis=0))
+
+
 def mean_force(
     tip_force: TipForce,
     torques: Torques,

@@ -33,6 +33,11 @@ def tip_jacobian(arm: Arm, q: Array) -> Array:
     return np.asarray(arm.work[:3, :3].T @ in_base)
 
 
+def driven_jacobian(arm: Arm, q: Array) -> Array:
+    """Jacobian of the tip (..., 3, k) of the k joints whose torques are evaluated: those that turn."""
+    return tip_jacobian(arm, q)[..., arm.axes.turning]
+
+
 def flange_jacobian(arm: Arm, q: Array) -> Array:
     """Velocity of the flange's origin in the work frame per joint rate, (..., 3, n): a tip with no lever."""
     return np.asarray(arm.work[:3, :3].T @ jacobian(arm.dh, q)[..., :3, :])

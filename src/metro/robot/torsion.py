@@ -6,14 +6,13 @@ bearings are); on top of it the joint passes half of its gap towards the side th
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from metro.robot.by_joint import of_joints, raised, scaled
 from metro.units import Array
 
-ZEROS, ONES = (0.0,) * 6, (1.0,) * 6
 TURNING = 0.02  # of the largest torque: below it a joint is between the two ends of its gap
 
 
@@ -21,42 +20,47 @@ TURNING = 0.02  # of the largest torque: below it a joint is between the two end
 class Torsion:
     """What the joints of an arm do beyond the linear springs of their compliances.
 
+    Joints beyond an entry have no gap and no hardening, and the stiffness of static loads.
+
     Attributes
     ----------
-    gap : (6,) whole gap, rad, in the cut alone (a static load has passed it before anything is read).
-    cubic : (6,) hardening, N m/rad³, in the cut and under static loads.
-    factor : (6,) stiffness in the cut relative to static loads.
+    gap : whole gap, rad, in the cut alone (a static load has passed it before anything is read).
+    cubic : hardening, N m/rad³, in the cut and under static loads.
+    factor : stiffness in the cut relative to static loads.
     """
 
-    gap: tuple[float, ...] = ZEROS
-    cubic: tuple[float, ...] = ZEROS
-    factor: tuple[float, ...] = ONES
+    gap: tuple[float, ...] = ()
+    cubic: tuple[float, ...] = ()
+    factor: tuple[float, ...] = ()
 
     def with_joint(self, joint: int, *, gap: float = 0.0, cubic: float = 0.0, factor: float = 1.0) -> Torsion:
-        """Return this with more gap and hardening of one joint (0 … 5), its stiffness times ``factor``."""
-        by = np.arange(6) == joint
+        """Return this with more gap and hardening of one joint, from 0, its stiffness times ``factor``."""
         return replace(
             self,
-            gap=_tuple(np.array(self.gap) + gap * by),
-            cubic=_tuple(np.array(self.cubic) + cubic * by),
-            factor=_tuple(np.where(by, np.array(self.factor) * factor, self.factor)),
+            gap=raised(self.gap, joint, gap),
+            cubic=raised(self.cubic, joint, cubic),
+            factor=scaled(self.factor, joint, factor),
         )
 
     def in_cut(self, torque: Array, compliance: Array) -> tuple[Array, Array]:
-        """Torsion (..., 6), rad, in the cut, and its derivative by the compliances, N m.
+        """Torsion (..., n), rad, in the cut, and its derivative by the compliances, N m.
 
         Parameters
         ----------
-        torque : (m, 6) on the links, N m, along one cut. compliance : (6,) of static loads, rad/(N m).
+        torque : (m, n) on the links, N m, along one cut. compliance : (n,) of static loads, rad/(N m).
         """
-        twist, slope = self.at_rest(torque / np.array(self.factor), compliance)
-        return twist + passed(torque, np.array(self.gap)), slope
+        twist, slope = self.at_rest(torque / self.factors(torque.shape[-1]), compliance)
+        return twist + passed(torque, of_joints(self.gap, torque.shape[-1])), slope
+
+    def factors(self, count: int) -> Array:
+        """Stiffness in the cut relative to static loads, of ``count`` joints, (n,)."""
+        return of_joints(self.factor, count, 1.0)
 
     def at_rest(self, torque: Array, compliance: Array) -> tuple[Array, Array]:
-        """Torsion (..., 6), rad, under static loads, and its derivative by the compliances, N m."""
+        """Torsion (..., n), rad, under static loads, and its derivative by the compliances, N m."""
         if not any(self.cubic):
             return torque * compliance, torque
-        cubic = np.array(self.cubic)
+        cubic = of_joints(self.cubic, torque.shape[-1])
         twist = spring(torque, compliance, cubic)
         return twist, spring_slope(torque, twist, compliance, cubic)
 
@@ -85,17 +89,13 @@ def spring_slope(torque: Array, twist: Array, compliance: Array, cubic: Array) -
 
 
 def passed(torque: Array, gap: Array) -> Array:
-    """How much of its gap each joint has passed, (m, 6), rad: half of it, to the side that the torque pushes.
+    """How much of its gap each joint has passed, (m, n), rad: half of it, to the side that the torque pushes.
 
     Parameters
     ----------
-    torque : (m, 6) N m along one cut. gap : (6,) rad.
+    torque : (m, n) N m along one cut. gap : (n,) rad.
     """
     if not gap.any():
         return np.zeros_like(torque)
     largest = np.abs(torque).max(axis=0, initial=0.0)
     return np.asarray(0.5 * gap * np.tanh(torque / np.where(largest > 0.0, TURNING * largest, 1.0)))
-
-
-def _tuple(values: Iterable[float]) -> tuple[float, ...]:
-    return tuple(float(value) for value in values)

@@ -14,6 +14,7 @@ CLOCKS = {"milliseconds": 1e3, "microseconds": 1e6, "minutes": 1 / 60}
 SPECIFIC_N_MM2 = (20.0, 2e5)  # peak force over chip section: plastics … steel at the thinnest chips
 ABOUT_KNOWN = (1 / 50, 500.0)  # of ktc where it is declared; thin chips are all edge force
 HEIGHTS_MM = (1e-4, 5.0)  # peak to valley of a milled trace: finer than any roughness … coarser than any wave
+STEEPEST_URAD = 2e4  # 20 µm on a millimetre, ten times the range of an autocollimator: no level reads that
 TURN = 2.0 * np.pi
 FOLLOWS_DEG = 5.0  # a joint that is further from its set-point is not the joint of that set-point
 RECEPTANCE = 2e-5  # m/N, 50 N/mm: the middle line of a band is stiffer than that on any robot
@@ -114,6 +115,25 @@ def trace(x_mm: Array, z_mm: Array, cut_mm: float | None) -> str:
     unit = "metres" if height < low else "micrometres"
     fault = f"column z_mm: peak to valley is {height:.4g}, expected {low:g} to {high:g} mm"
     return f"{fault}: the heights seem to be in {unit}"
+
+
+def slopes(feet_mm: Array, slope_urad: Array, line: np.ndarray) -> str:
+    """Look at readings (n,) between the feet x1, y1, x2, y2 (n, 4): each a step of a flat surface."""
+    step = np.hypot(feet_mm[:, 2] - feet_mm[:, 0], feet_mm[:, 3] - feet_mm[:, 1])
+    if not step.all():
+        at = int(np.argmin(step)) + 1
+        return f"reading {at}: starts and ends at the same place, expected two feet at a distance"
+    for number in np.unique(line):
+        values = slope_urad[line == number]
+        off = np.abs(values - np.median(values))
+        if off.max() > STEEPEST_URAD:
+            at = int(np.flatnonzero(line == number)[off.argmax()]) + 1
+            return (
+                f"column slope_urad: reading {at} differs by {off.max():.3g} µrad from the median of its "
+                f"line, expected less than {STEEPEST_URAD:g} of a flat surface: state the unit under files "
+                "in batch.yaml (um/m, arcsec, mrad …)"
+            )
+    return ""
 
 
 def tip_path(points_mm: Array, size_mm: Array) -> str:

@@ -11,6 +11,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.findings import Finding
 from metro.batch.processed import Tables
+from metro.joint_columns import TORQUES
 from metro.units import Array
 
 LEAST_VALUES = 16  # different ones: fewer can be alike by chance, or be a coarse converter's
@@ -18,9 +19,10 @@ LEAST_VALUES = 16  # different ones: fewer can be alike by chance, or be a coars
 # programmed path, and an arm its set-points; noise never repeats.
 MEASURED = {
     "force": ("dynamometer", ("fx_n", "fy_n", "fz_n")),
-    "robot": ("robot_log", tuple(f"tau{i}_nm" for i in range(1, 7))),
+    "robot": ("robot_log", TORQUES),
     "scan": ("scan", ("z_mm",)),
     "profile": ("profile", ("z_mm",)),
+    "slopes": ("slopes", ("slope_urad",)),
 }
 HIT = ("test", "position", "reference", "response", "replicate")
 
@@ -50,7 +52,8 @@ def _rows(read: Tables, table: str, run: str) -> Iterator[tuple[str, Array]]:
     if "log" in rows:
         rows = rows[rows["log"] == "cut"]
     for name in channels:
-        yield name, rows[name].to_numpy(float)
+        if rows[name].notna().any():
+            yield name, rows[name].to_numpy(float)
 
 
 def _finding(batch: Batch, run: str, column: str, name: str, other: tuple[str, str]) -> Finding:

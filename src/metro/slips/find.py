@@ -9,10 +9,12 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.problem import Problem
+from metro.observables.stability.modal_test import receptances
 from metro.observables.task import Task
 from metro.slips.force import force_slips, speed_slips
 from metro.slips.joints import joint_slips
 from metro.slips.labels import label_slips
+from metro.slips.pairs import pair_slips
 from metro.slips.phases import phase_slips
 from metro.slips.redundancy import stiffness_slips
 from metro.slips.scans import scan_slips
@@ -49,6 +51,8 @@ def _of_the_machine(
     modes = identified.get("modes") or []
     yield from stiffness_slips(read("stations"), modes)
     yield from phase_slips(observed["frf_used"], modes) if "frf_used" in observed else ()
+    if not read("hit").empty and not read("frf").empty:
+        yield from pair_slips(receptances(read, batch.instrument("hammer"), []))
     yield from label_slips(_labelled(batch, observed), _heard(observed))
     yield from scan_slips(batch, read)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -22,7 +22,7 @@ from metro.slips.physical import coefficients_text, impossible, mean_chip
 from metro.slips.slip import Slip
 from metro.slips.speed import period, repeats_per_revolution, turns_as_declared
 from metro.slips.waveform import Design, Record, WaveFit, design, fit, record_of
-from metro.units import JSON
+from metro.units import JSON, MM
 
 OBSERVABLES = ("force", "joint_force", "deformation", "waviness", "flatness", "lobes")
 # Misfit of another bookkeeping with possible coefficients over that of the declared one. Of 40 simulated
@@ -30,6 +30,9 @@ OBSERVABLES = ("force", "joint_force", "deformation", "waviness", "flatness", "l
 BETTER = 0.8
 ALIKE = 1.1  # misfit over the least: bookkeepings that the waveform does not distinguish
 MOST_NAMED = 3
+ENDS = (0.4, 1.0)  # corner radii over the radius: a bull nose and a ball
+LEAST_RATIO = 1.2  # between depths of cut that tell a corner
+END, AXES_AND_END = "end", "axes and end"  # kinds: the end alone is another one, or the axes as well
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,27 +51,67 @@ def force_slips(batch: Batch, problem: Problem) -> tuple[Slip, ...]:
     they begin is not known.
     """
     records = [record_of(block) for block in problem.blocks if block.setting.helix is None]
-    cutter = cast("ForceModel", problem.base).cutter
-    return contradictions(records, cutter, batch.instrument("dynamometer")) if records else ()
+    base = cast("ForceModel", problem.base)
+    ends = () if base.end_declared else _ends(base.cutter, records)
+    return contradictions(records, base.cutter, batch.instrument("dynamometer"), ends) if records else ()
 
 
-def contradictions(records: list[Record], cutter: Cutter, sensor: JSON) -> tuple[Slip, ...]:
-    """Return the slip of straight cuts, if there is one; ``sensor``: its entry of the manifest."""
+def _ends(cutter: Cutter, records: Sequence[Record]) -> tuple[Cutter, ...]:
+    """Return what the end may be that nobody declared; nothing where the runs are of one depth.
+
+    At one depth a corner mixes the radial with the axial force as wrong coefficients do.
+    """
+    depths = [record.setting.cut.axial_depth for record in records]
+    if not records or max(depths) < LEAST_RATIO * min(depths):
+        return ()
+    return tuple(replace(cutter, corner=share * cutter.radius) for share in ENDS)
+
+
+def contradictions(
+    records: list[Record], cutter: Cutter, sensor: JSON, ends: Sequence[Cutter] = ()
+) -> tuple[Slip, ...]:
+    """Return the slip of straight cuts, if there is one.
+
+    An end of the tool that explains the records with the axes as declared is no slip: the loop looks for it.
+
+    Parameters
+    ----------
+    sensor : its entry of the manifest. ends : the cutter with the ends that it may have instead.
+    """
     designs = [design(cutter, record.setting) for record in records]
     declared, chip = fit(records, designs), mean_chip(records)
-    # A corner or an inclined flank turns the radial force towards the axis: then what the helix does to the
-    # axial force does not decide its sign.
-    helix = cutter.helix if cutter.cylindrical else 0.0
-    faults = impossible(declared, chip, helix)
+    faults = impossible(declared, chip, _deciding(cutter))
     tried = [Tried(one, one.fitted()) for one in _hypotheses(records, designs, cutter, sensor, declared)]
-    possible = [one for one in tried if not impossible(one.fitted, chip, helix)]
+    possible = [one for one in tried if not impossible(one.fitted, chip, _deciding(cutter))]
+    others = [Tried(one, one.fitted()) for one in _with_ends(records, ends, sensor)]
+    possible += [one for one in others if not impossible(one.fitted, chip, 0.0)]
     limit = declared.misfit * (ALIKE if faults else BETTER)
     better = sorted((one for one in possible if one.fitted.misfit < limit), key=lambda one: one.fitted.misfit)
     if not faults and not better:
         return ()
     least = better[0].fitted.misfit if better else math.nan
-    named = [one for one in better if one.fitted.misfit <= ALIKE * least][:MOST_NAMED]
-    return (_slip(declared, faults, named, chip),)
+    named = [one for one in better if one.fitted.misfit <= ALIKE * least]
+    if any(one.hypothesis.kind == END for one in named):
+        return ()
+    return (_slip(declared, faults, named[:MOST_NAMED], chip),)
+
+
+def _deciding(cutter: Cutter) -> float:
+    """Return the helix, rad, where it decides the sign of the axial force, else 0.
+
+    A corner or an inclined flank turns the radial force towards the axis.
+    """
+    return cutter.helix if cutter.cylindrical else 0.0
+
+
+def _with_ends(records: list[Record], ends: Sequence[Cutter], sensor: JSON) -> Iterator[Hypothesis]:
+    """Yield the orientations, the declared one first, of a tool with each of other ends."""
+    for end in ends:
+        designs = [design(end, record.setting) for record in records]
+        shape = "a ball end" if end.corner == end.radius else f"a corner radius of {end.corner / MM:.3g} mm"
+        yield Hypothesis(END, f"tool: {shape}", "tool.end", records, designs)
+        for one in orientation.orientations(sensor, records, designs):
+            yield replace(one, kind=AXES_AND_END, remedy=f"{one.remedy} with {shape} of the tool")
 
 
 def _hypotheses(
@@ -99,7 +142,9 @@ def _slip(declared: WaveFit, faults: tuple[str, ...], named: list[Tried], chip: 
     remedy = f"Likely{where}: {texts[0]}"
     if len(named) > 1:
         remedy += f". The records cannot distinguish this from: {'; '.join(texts[1:])}"
-        remedy += ". To decide, push the dynamometer by hand along each axis, or count the teeth"
+        ends = any(one.hypothesis.kind == AXES_AND_END for one in named)
+        how = ", count the teeth, or look at the tool's end" if ends else ", or count the teeth"
+        remedy += f". To decide, push the dynamometer by hand along each axis{how}"
     return Slip(OBSERVABLES, found, remedy, first.file, first.column)
 
 

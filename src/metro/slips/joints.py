@@ -17,7 +17,6 @@ from metro.slips.slip import Slip
 from metro.units import Array
 
 OBSERVABLES = ("joint_force", "deformation", "waviness")
-JOINTS = 6
 CLEAR = 10.0  # signal over noise, rms over all runs, from which on a joint's torque shows whose it is
 BETTER = 0.7  # residual over that of the declared order, over the joints that show; the limit of the force
 GAINS = (0.5, 2.0)  # of all torques together: a drive's torque constant is known far better than that
@@ -28,8 +27,8 @@ DEVIATIONS = 3.0
 class _Moments:
     """Sums over all waves of all runs, each channel in units of its noise.
 
-    ``across`` (6, 6): channel i with the prediction of joint j; ``own`` (6,): power of each channel;
-    ``predicted`` (6, 6): power of the prediction of joint j in the noise of channel i; ``count`` of waves.
+    ``across`` (k, k): channel i with the prediction of joint j; ``own`` (k,): power of each channel;
+    ``predicted`` (k, k): power of the prediction of joint j in the noise of channel i; ``count`` of waves.
     """
 
     across: Array
@@ -54,23 +53,26 @@ def joint_slips(problem: Problem) -> tuple[Slip, ...]:
     cost = sums.own[:, None] - 2.0 * np.abs(sums.across) + sums.predicted
     place = linear_sum_assignment(cost)[1]
     declared = sums.own - 2.0 * np.diag(sums.across) + np.diag(sums.predicted)
-    joints = np.arange(JOINTS)
+    joints = np.arange(len(place))
     moved = ((place != joints) | (sign[joints, place] < 0.0)) & (strong | strong[place])
     best = np.where(moved, cost[joints, place], declared)
     before, after = (float(np.sqrt(each.sum() / max(sums.own.sum(), 1e-300))) for each in (declared, best))
     if moved.any() and after < BETTER * before:
-        return (_moved(place, sign[joints, place], moved, before, after),)
+        return (_moved(np.array(model.joints) + 1, place, sign[joints, place], moved, (before, after)),)
     return _gain(sums)
 
 
-def _moved(place: Array, sign: Array, moved: Array, before: float, after: float) -> Slip:
+def _moved(
+    number: np.ndarray, place: Array, sign: Array, moved: Array, residual: tuple[float, float]
+) -> Slip:
+    before, after = residual
     found = (
         "the torques of the joints are not those that the dynamometer's force asks for: residual "
         f"{100 * before:.3g} % of the torque as declared, {100 * after:.3g} % otherwise"
     )
-    turned = [f"tau{i + 1}_nm" for i in np.flatnonzero(moved) if place[i] == i]
+    turned = [f"tau{number[i]}_nm" for i in np.flatnonzero(moved) if place[i] == i]
     other = [
-        f"tau{i + 1}_nm holds {'minus ' if sign[i] < 0 else ''}the torque of joint {place[i] + 1}"
+        f"tau{number[i]}_nm holds {'minus ' if sign[i] < 0 else ''}the torque of joint {number[place[i]]}"
         for i in np.flatnonzero(moved)
         if place[i] != i
     ]
@@ -96,17 +98,18 @@ def _gain(sums: _Moments) -> tuple[Slip, ...]:
         f"the torques of the joints are {gain:.3g} ± {1.96 * deviation:.2g} times those that the "
         f"dynamometer's force asks for; a gain beyond {low:g} to {high:g} is none of a drive"
     )
-    remedy = "Likely: the unit of tau1_nm … tau6_nm (motor torque before the gear, N mm) or of the force"
+    remedy = "Likely: the unit of tau1_nm … (motor torque before the gear, N mm) or of the force"
     return (Slip(OBSERVABLES, found, remedy, "runs.csv", "robot_log"),)
 
 
 def _moments(model: JointForceModel, blocks: list[Block]) -> _Moments:
-    across, own, predicted = np.zeros((JOINTS, JOINTS)), np.zeros(JOINTS), np.zeros((JOINTS, JOINTS))
+    joints = len(model.joints)
+    across, own, predicted = np.zeros((joints, joints)), np.zeros(joints), np.zeros((joints, joints))
     count = 0
     for block in blocks:
-        measured = _by_joint(block.measured)
-        asked = _by_joint(carried(model.arm, block.setting, model.offset)[:, 0])
-        sigma = _by_joint(block.sigma)
+        measured = _by_joint(block.measured, joints)
+        asked = _by_joint(carried(model.arm, block.setting, model.offset)[:, 0], joints)
+        sigma = _by_joint(block.sigma, joints)
         across += (measured / sigma**2) @ asked.T
         own += np.sum((measured / sigma) ** 2, axis=1)
         predicted += (1.0 / sigma**2) @ (asked**2).T
@@ -114,6 +117,6 @@ def _moments(model: JointForceModel, blocks: list[Block]) -> _Moments:
     return _Moments(across, own, predicted, count)
 
 
-def _by_joint(values: Array) -> Array:
-    """Waves (6, m - 1) without the first one, which holds the friction's change."""
-    return np.asarray(values.reshape(JOINTS, -1)[:, 1:])
+def _by_joint(values: Array, joints: int) -> Array:
+    """Waves (k, m - 1) without the first one, which holds the friction's change."""
+    return np.asarray(values.reshape(joints, -1)[:, 1:])

@@ -51,10 +51,11 @@ def stiffness_slips(stations: pd.DataFrame, modes: Iterable[JSON]) -> tuple[Slip
         f"{1e-6 * static[position, axis]:.3g} N/µm; their ratio is {ratio:.3g}"
     )
     more = f", and alike in {len(off) - 1} more" if len(off) > 1 else ""
-    return (Slip(OBSERVABLES, found + more, _likely(ratio), "impacts.csv", "response_unit"),)
+    return (Slip(OBSERVABLES, found + more, likely_gain(ratio), "impacts.csv", "response_unit"),)
 
 
-def _likely(ratio: float) -> str:
+def likely_gain(ratio: float) -> str:
+    """Name the slips that make a receptance or a stiffness wrong by a factor, or what else to check."""
     factor = max(ratio, 1.0 / ratio)
     near = sorted(GAINS, key=lambda gain: abs(math.log(gain / factor)))
     named = [GAINS[gain] for gain in near if max(gain / factor, factor / gain) < NEAR]

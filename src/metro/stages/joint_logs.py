@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import pandas as pd
-
-from metro.batch.arm import axes_of
 from metro.batch.batch import Batch
 from metro.batch.canonical import Part
 from metro.joint_columns import JOINT_COLUMNS, positions
 from metro.signals import plausible, quality
 from metro.stages.reading import Recordings
 from metro.stages.recordings import files
+from metro.stages.robot_logs import joint_doubt
 from metro.units import MS
 
 
@@ -25,7 +23,7 @@ def joint(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         if table is None:
             continue
         time = table["t_s"].to_numpy()
-        if recordings.doubt(file, plausible.clock(time, rate) or _doubt(batch, table)):
+        if recordings.doubt(file, plausible.clock(time, rate) or joint_doubt(batch, table)):
             continue
         recordings.note(file, run, quality.sampling(time - time[0], rate))
         recordings.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
@@ -34,19 +32,3 @@ def joint(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         checks = [quality.motion(angles), *(quality.dead(str(n), table[n].to_numpy()) for n in drives)]
         if recordings.fit(file, run, "joint_log", checks):
             yield {"run": run, "t_s": time - time[0], **{n: table[n] for n in JOINT_COLUMNS if n in table}}
-
-
-def _doubt(batch: Batch, table: pd.DataFrame) -> str:
-    """Check the unit of the angles, and that the arm of the cell has as many axes."""
-    names = positions([str(name) for name in table.columns])
-    turning = [name for name in names if name.endswith("_deg")]
-    doubt = plausible.angles(turning, table[turning].to_numpy()) if turning else ""
-    pairs = [(name.replace("_", "_set_"), name) for name in turning if name.replace("_", "_set_") in table]
-    if not doubt and pairs:
-        doubt = plausible.following(
-            table[[name for name, _ in pairs]].to_numpy(), table[[name for _, name in pairs]].to_numpy()
-        )
-    own = axes_of(batch.cell)
-    if not doubt and own and own != len(names):
-        doubt = f"has the positions of {len(names)} axes, expected {own} as the arm of the cell has"
-    return doubt

@@ -14,25 +14,14 @@ from metro.batch.batch import Batch
 from metro.batch.canonical import Part
 from metro.dynamics.driving import turning
 from metro.dynamics.hits import Hit, fault
-from metro.robot.drives import drives_of_cell
 from metro.signals import plausible, quality
 from metro.signals.conversion import driving_point_sign, receptance, response_si, sensor_to_tool
 from metro.signals.record_quality import RecordQuality
 from metro.stages.reading import Recordings
-from metro.units import MS, Array
+from metro.units import Array
 
 FORCES = ("fx_n", "fy_n", "fz_n")
 POINT = ("x_mm", "y_mm", "z_mm")
-SET = tuple(f"q{i}_set_deg" for i in range(1, 7))
-ACTUAL = tuple(f"q{i}_deg" for i in range(1, 7))
-TORQUES = tuple(f"tau{i}_nm" for i in range(1, 7))
-NO_SET_POINTS = quality.Finding(
-    "set-points",
-    np.nan,
-    np.nan,
-    True,
-    "the log has no set-points: the path is that of the measured angles, how the arm follows is not known",
-)
 PIECE = 1 << 19  # samples of a force record in memory at a time
 
 
@@ -77,49 +66,8 @@ def _fit_force(batch: Batch, recordings: Recordings, run: str, file: str, record
     unit = plausible.clock_of(record.step, rate) or _force_unit(batch, run, record.largest)
     if recordings.doubt(file, unit):
         return False
-    recordings.note(file, run, [_starts_at(record.zero), *record.sampling(rate), *record.air_offset()])
+    recordings.note(file, run, [starts_at(record.zero), *record.sampling(rate), *record.air_offset()])
     return recordings.fit(file, run, "dynamometer", record.channels())
-
-
-def robot(batch: Batch, recordings: Recordings) -> Iterator[Part]:
-    """Yield each robot log: ``cut`` on the clock of the run's dynamometer, where there is one, and ``idle``.
-
-    The offset of the two clocks of a cut is something to be found: the cut's log keeps it.
-    """
-    period_ms = batch.instrument("robot_log").get("period_ms")
-    rate = None if period_ms is None else 1.0 / (period_ms * MS)
-    places: dict[str, Array] = {}
-    for column, log in (("robot_log", "cut"), ("idle_log", "idle")):
-        for run, file in files(batch, column):
-            free = batch.runs["joint_log"][run] == file  # which need not have all that the log of a cut has
-            if free and not recordings.holds(file, "robot"):
-                recordings.left_out.append((run, column))
-                continue
-            table = recordings.table(file, "robot")
-            if table is None:
-                continue
-            time, own = _from_zero(table)
-            followed = SET[0] in table
-            goes = table[list(SET if followed else ACTUAL)].to_numpy()
-            lacking = _with_torques(batch, table)
-            if free and lacking:
-                recordings.left_out.append((run, column))
-                continue
-            doubt = plausible.clock(time, rate) or _joint_doubt(table) or lacking
-            if log == "idle" and run in places:
-                doubt = doubt or plausible.same_place(places[run], goes)
-            if recordings.doubt(file, doubt):
-                continue
-            places |= {run: goes} if log == "cut" else {}
-            zero = recordings.zeros.get(run, own) if log == "cut" else own
-            recordings.note(file, run, [_starts_at(zero), *quality.sampling(time, rate)])
-            recordings.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
-            recordings.note(file, run, [] if followed else [NO_SET_POINTS])
-            checks = [quality.motion(goes), *_channels(TORQUES, table[list(TORQUES)].to_numpy(), None)]
-            if not recordings.fit(file, run, column, checks):
-                continue
-            angles = {name: table[name] for name in (*SET, *ACTUAL, *TORQUES) if name in table}
-            yield {"run": run, "log": log, "t_s": time + (own - zero), **angles}
 
 
 def path(batch: Batch, recordings: Recordings) -> Iterator[Part]:
@@ -145,8 +93,20 @@ def profile(batch: Batch, recordings: Recordings) -> Iterator[Part]:
             cut = float(batch.runs["cut_length_mm"][run])
             recordings.doubt(file, plausible.trace(x, z, None if np.isnan(cut) else cut))
             recordings.note(file, run, [quality.sampling(x)[-1]])
-            if recordings.fit(file, run, "profile", _channels(("z",), z[:, None], None)):
+            if recordings.fit(file, run, "profile", channels(("z",), z[:, None], None)):
                 yield {"run": run, "x_mm": x, "z_mm": z}
+
+
+def slopes(batch: Batch, recordings: Recordings) -> Iterator[Part]:
+    """Yield the readings of each level or autocollimator; without lines, all are of one."""
+    for run, file in files(batch, "slopes"):
+        table = recordings.table(file, "slopes")
+        if table is None:
+            continue
+        feet = table[["x1_mm", "y1_mm", "x2_mm", "y2_mm"]].to_numpy()
+        line = table["line"].to_numpy() if "line" in table else np.zeros(len(table), np.int64)
+        if not recordings.doubt(file, plausible.slopes(feet, table["slope_urad"].to_numpy(), line)):
+            yield {"run": run, **{str(name): table[name] for name in table}, "line": line}
 
 
 def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:
@@ -157,8 +117,8 @@ def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator
         table = recordings.table(file, "record")
         if table is None or recordings.doubt(file, _unit_at_odds(table, unit)):
             continue
-        time, zero = _from_zero(table)
-        recordings.note(file, "", [_starts_at(zero), *quality.sampling(time, rate)])
+        time, zero = from_zero(table)
+        recordings.note(file, "", [starts_at(zero), *quality.sampling(time, rate)])
         force_n = table["force_n"].to_numpy()
         if recordings.doubt(file, plausible.clock(time, rate) or plausible.hammer_force(force_n)):
             continue
@@ -248,7 +208,7 @@ def _place(row: Mapping[Hashable, Any]) -> dict[str, np.ndarray | pd.Series | st
     return {**texts, "replicate": 1 if np.isnan(row["replicate"]) else int(row["replicate"])}
 
 
-def _channels(names: tuple[str, ...], values: Array, full_scale: float | None) -> list[quality.Finding]:
+def channels(names: tuple[str, ...], values: Array, full_scale: float | None) -> list[quality.Finding]:
     """Check channels (n, k): each moves, none is clipped, and no two are the same."""
     columns = list(zip(names, values.T, strict=True))
     checks = [
@@ -264,40 +224,19 @@ def _force_unit(batch: Batch, run: str, largest: float) -> str:
     return plausible.cutting_force(largest, chip, batch.manifest["coefficients"].get("ktc_n_mm2"))
 
 
-def _joint_doubt(table: pd.DataFrame) -> str:
-    followed = SET[0] in table
-    names = [*(SET if followed else ()), *ACTUAL]
-    doubt = plausible.angles(names, table[names].to_numpy())
-    if doubt or not followed:
-        return doubt
-    return plausible.following(table[list(SET)].to_numpy(), table[list(ACTUAL)].to_numpy())
-
-
-def _with_torques(batch: Batch, table: pd.DataFrame) -> str:
-    """Add the torques of a log of currents, by the constants of the cell; say what is missing for that."""
-    if TORQUES[0] in table:
-        return ""
-    constant = drives_of_cell(batch.cell, len(TORQUES)).constant
-    if not np.isfinite(constant).all():
-        fault = "has currents (current1_a …) and no torques (tau1_nm …)"
-        return f"{fault}, expected drives.torque_per_ampere_nm_a in the cell, to turn them into torques"
-    for k, name in enumerate(TORQUES):
-        table[name] = table[f"current{k + 1}_a"] * constant[k]
-    return ""
-
-
 def _hit(hit: Hit) -> quality.Finding:
     reason = fault(hit)
     message = f"{reason}: the hit is left out; hit again" if reason else "one clean hit"
     return quality.Finding("hit", np.nan, np.nan, not reason, message)
 
 
-def _from_zero(table: pd.DataFrame) -> tuple[Array, float]:
+def from_zero(table: pd.DataFrame) -> tuple[Array, float]:
     """Return the time from the record's start, and the time stamp at its start."""
     time = table["t_s"].to_numpy()
     return time - time[0], float(time[0])
 
 
-def _starts_at(zero: float) -> quality.Finding:
+def starts_at(zero: float) -> quality.Finding:
+    """Note where on the file's clock a record starts."""
     message = f"t_s is counted from {zero:.6g} s of the file's clock"
     return quality.Finding("time zero", zero, np.nan, True, message)

@@ -30,7 +30,7 @@ from metro.batch.processed import COLUMNS, Processed, Tables
 from metro.batch.sources import SECTION, files_of, parted
 from metro.observables.catalogue import capabilities
 from metro.signals.quality import EXTENT
-from metro.stages import joint_logs, scans
+from metro.stages import joint_logs, robot_logs, scans
 from metro.stages import recordings as parts
 from metro.stages.data_checks import data_findings
 from metro.stages.reading import Recordings
@@ -44,6 +44,7 @@ RUN_FILES = {
     "path": ("path",),
     "scan": ("scan",),
     "profile": ("profile",),
+    "slopes": ("slopes",),
 }
 
 OF_THE_TABLES = "contract"  # the check, in the quality table, that findings on the batch's tables are of
@@ -196,11 +197,12 @@ def _tables(loaded: Loaded, recordings: Recordings) -> Iterator[tuple[str, Itera
     """Yield every canonical table with its parts; force comes first, it sets each run's zero of time."""
     batch = loaded.batch
     yield "force", parts.force(batch, recordings)
-    yield "robot", parts.robot(batch, recordings)
+    yield "robot", robot_logs.robot(batch, recordings)
     yield "joint", joint_logs.joint(batch, recordings)
     yield "path", parts.path(batch, recordings)
     yield "scan", scans.scan(batch, recordings)
     yield "profile", parts.profile(batch, recordings)
+    yield "slopes", parts.slopes(batch, recordings)
     yield "hit", parts.hit(batch, loaded.impacts, recordings)
     yield "frf", parts.frf(loaded.impacts, recordings)
     yield "pickups", _whole(_pickups(loaded.impacts))

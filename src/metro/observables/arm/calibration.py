@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
+from metro.observables.arm.load_tests import joint_places
 from metro.observables.quantity import quantity
 from metro.robot.drives import drives_of_cell
 from metro.robot.kinematics import arm_of_cell
@@ -18,7 +20,6 @@ from metro.robot.payload_identification import Carried, identify_payload
 from metro.robot.touched import Placed, Touches, calibrate
 from metro.units import DEG, JSON, MM, Array
 
-JOINTS = range(1, 7)
 ANGLES = ("rx", "ry", "rz")
 INERTIA = ("xx", "xy", "xz", "yy", "yz", "zz")
 
@@ -95,18 +96,18 @@ def _payload(batch: Batch, table: pd.DataFrame) -> JSON:
     arm = arm_of_cell(batch.cell, batch.manifest)
     if arm is None:
         raise ValueError("the cell has no arm.dh: where the joints are is not known")
-    moved = [
-        [f"{name}{i}_{unit}" for i in JOINTS]
-        for name, unit in (("rate", "deg_s"), ("acceleration", "deg_s2"))
-    ]
-    motion = None
-    if table[moved[0] + moved[1]].notna().all(axis=None):
-        motion = (table[moved[0]].to_numpy(dtype=float) * DEG, table[moved[1]].to_numpy(dtype=float) * DEG)
-    q = table[[f"q{i}_deg" for i in JOINTS]].to_numpy(dtype=float) * DEG
-    torque = table[[f"tau{i}_nm" for i in JOINTS]].to_numpy(dtype=float)
-    carried = identify_payload(arm.dh, q, torque, table["loaded"].to_numpy() == "yes", motion)
-    drives = drives_of_cell(batch.cell, len(JOINTS))
-    return {**carried_json(with_gain(carried, float(drives.relative.max()))), "drives": drives.source}
+    axes, motion = arm.axes, None
+    moved = [table[names] for names in (axes.rates, axes.accelerations)]
+    if all(part.notna().all(axis=None) for part in moved):
+        rate, acceleration = (part.to_numpy(dtype=float) * axes.units for part in moved)
+        motion = rate, acceleration
+    torque = table[axes.torques].to_numpy(dtype=float)
+    loaded = table["loaded"].to_numpy() == "yes"
+    carried = identify_payload(arm.dh, joint_places(table, arm), torque, loaded, motion)
+    drives = drives_of_cell(batch.cell, len(axes))
+    gain = float(drives.relative[axes.turning].max())
+    joints = [place + 1 for place in axes.turning]
+    return {**carried_json(with_gain(carried, gain), joints), "drives": drives.source}
 
 
 def with_gain(carried: Carried, relative: float) -> Carried:
@@ -118,14 +119,15 @@ def with_gain(carried: Carried, relative: float) -> Carried:
     return replace(carried, covariance=carried.covariance + relative**2 * np.outer(size, size))
 
 
-def carried_json(carried: Carried) -> JSON:
-    """Return a load as the block ``payload`` of identified.json."""
+def carried_json(carried: Carried, joints: Sequence[int]) -> JSON:
+    """Return a load as the block ``payload`` of identified.json; ``joints`` are those of its residuals."""
     spread = np.sqrt(np.diag(carried.covariance))
     centre = _along("xyz", carried.centre / MM, carried.covariance[1:4, 1:4] / MM**2, "mm", carried.dof)
     block: JSON = {"mass": quantity(carried.mass, spread[0], "kg", carried.dof), "centre": centre}
     if np.isfinite(carried.inertia).all():
         block["inertia"] = _along(INERTIA, carried.inertia, carried.covariance[4:, 4:], "kg m2", carried.dof)
     return block | {
+        "joints": list(joints),
         "rms": [float(left) if np.isfinite(left) else None for left in carried.rms],
         "dof": carried.dof,
     }

@@ -80,7 +80,7 @@ def _pair(one: JointLog, two: JointLog) -> Pair | None:
 
 
 def _json(load: Load, drives: Drives, pairs: list[list[str]]) -> JSON:
-    block = carried_json(load.carried)
+    block = carried_json(load.carried, range(1, len(load.carried.rms) + 1))
     dof = load.carried.dof
     factors = [quantity(value, sd, "1", dof) if np.isfinite(value) else None for value, sd in load.by_joint]
     return block | {

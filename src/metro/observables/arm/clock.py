@@ -9,7 +9,7 @@ import numpy as np
 from metro.observables.joint_force.model import TorqueRun, in_waves
 from metro.observables.problem import Block
 from metro.robot.kinematics import Arm
-from metro.robot.statics import joint_torque, tip_jacobian
+from metro.robot.statics import driven_jacobian, joint_torque
 from metro.units import MS, Array
 
 WIDEST, COARSE = 1.0, 20 * MS  # s, range and step of the offsets that are tried first
@@ -39,7 +39,7 @@ def clock(block: Block, arm: Arm, gain: float) -> Clock:
     block : of the joint force. gain : of the torques.
     """
     run: TorqueRun = block.setting
-    weight, jacobian = 1.0 / block.sigma, gain * tip_jacobian(arm, run.q)
+    weight, jacobian = 1.0 / block.sigma, gain * driven_jacobian(arm, run.q)
     zeros, _ = np.linalg.qr(block.zeros * weight[:, None])
     middle, length = float(run.t.mean()), max(float(np.ptp(run.t)), STEP)
 

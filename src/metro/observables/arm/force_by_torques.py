@@ -9,12 +9,11 @@ import numpy as np
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm.force_tables import RunForce, force_tables, logged_cuts, run_force
-from metro.observables.arm.tip_force import JOINTS
 from metro.observables.arm.wall import wall
 from metro.observables.quantity import quantity
 from metro.robot.drives import declared, drives_of_cell
-from metro.robot.kinematics import arm_of_cell
-from metro.units import JSON
+from metro.robot.kinematics import Arm, arm_of_cell
+from metro.units import JSON, Array
 
 
 def force_without_dynamometer(batch: Batch, read: Tables, identified: JSON) -> JSON:
@@ -33,8 +32,8 @@ def force_without_dynamometer(batch: Batch, read: Tables, identified: JSON) -> J
         run: run_force(batch, cut, idle, arm, wall(batch, run))
         for run, cut, idle in logged_cuts(batch, read, arm)
     }
-    tables = force_tables(batch, read, solved)
-    relative, source = _gain(batch, identified)
+    drives, source = gain_errors(batch, identified, arm)
+    tables = force_tables(batch, read, solved, drives)
     found: JSON = {}
     about: JSON = {"gain_from": source, "condition": {}, "refused": {}}
     for means in tables.get("robot_means", []):
@@ -42,10 +41,7 @@ def force_without_dynamometer(batch: Batch, read: Tables, identified: JSON) -> J
         if run in alone:
             rows: Any = means[means["frame"] == "work"].set_index("axis")
             about["condition"][run] = float(rows["condition"].iloc[0])
-            found[run] = {}
-            for axis in "xyz":
-                force, sd = (float(rows.loc[axis, f"sensorless_{name}n"]) for name in ("", "sd_"))
-                found[run][axis] = quantity(force, float(np.hypot(sd, relative * force)), "N")
+            found[run] = {axis: _quantity(rows.loc[axis]) for axis in "xyz"}
     for refused in tables.get("robot_refused", []):
         run = str(refused["run"].iloc[0])
         if run in alone:
@@ -53,14 +49,19 @@ def force_without_dynamometer(batch: Batch, read: Tables, identified: JSON) -> J
     return {"tip_force_by_torques": found, "tip_force_by_torques_about": about}
 
 
-def _gain(batch: Batch, identified: JSON) -> tuple[float, str]:
-    """Relative standard uncertainty of all torques, and where it is from."""
+def _quantity(row: Any) -> JSON:
+    """Return the force along an axis, the errors of noise and friction and those of the drives in it."""
+    return quantity(row["sensorless_n"], float(np.hypot(row["sensorless_sd_n"], row["drives_sd_n"])), "N")
+
+
+def gain_errors(batch: Batch, identified: JSON, arm: Arm) -> tuple[Array, str]:
+    """Return the covariance (k, k) of the relative errors of the torques, and where it is from."""
+    joints = arm.axes.turning
     gain = (identified.get("arm") or {}).get("torque_gain") or {}
     low, high = gain.get("ci95") or (None, None)
     if low is not None and high is not None and not declared(batch.cell):
-        value = float(gain["value"])
-        return float(
-            np.hypot((high - low) / 3.92, value - 1.0)
-        ), "the dynamometer of other runs (torque_gain)"
-    drives = drives_of_cell(batch.cell, len(JOINTS))
-    return float(np.sqrt(np.mean(np.diag(drives.covariance)))), drives.source
+        relative = np.hypot((high - low) / 3.92, float(gain["value"]) - 1.0)
+        shared = np.full((len(joints), len(joints)), relative**2)
+        return shared, "the dynamometer of other runs (torque_gain)"
+    drives = drives_of_cell(batch.cell, len(arm.axes))
+    return drives.covariance[np.ix_(joints, joints)], drives.source

@@ -17,7 +17,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
-from metro.observables.arm.tip_force import FORCE, JOINTS, REPEATABLE, Log, Sensorless
+from metro.observables.arm.tip_force import FORCE, REPEATABLE, Log, Sensorless
 from metro.observables.arm.wall import Wall, wall
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import Arm
@@ -26,6 +26,7 @@ from metro.robot.sensorless import (
     LEAST_JOINTS,
     TipForce,
     beyond_noise,
+    drive_shares,
     friction_repeatability,
     mean_force,
 )
@@ -35,12 +36,11 @@ from metro.signals.segmentation import knees
 from metro.units import MM, Array
 
 CALIBRATED = tip_force.SYSTEMATIC["dynamometer"]
-COUNT = len(JOINTS)
 
 
 @dataclass(frozen=True, eq=False)
 class RunForce:
-    """Torques of a run, or why there are none; the level of their noise, (6,) N m; the tool's axes.
+    """Torques of a run, or why there are none; the level of their noise, (k,) N m; the tool's axes.
 
     ``turn`` (3, 3): columns are the tool's axes in the work frame; None if the batch does not state them.
     """
@@ -52,7 +52,7 @@ class RunForce:
 
 @dataclass(frozen=True, eq=False)
 class Common:
-    """What all runs of a batch share: how repeatable friction is, (6,) N m; the level of slow noise, (6,)."""
+    """What all runs of a batch share: how repeatable friction is, (k,) N m; the level of slow noise, (k,)."""
 
     friction: Array
     wander: Array
@@ -76,15 +76,20 @@ def run_force(batch: Batch, cut: Log, idle: Log, arm: Arm, face: Wall) -> RunFor
     return RunForce(tip_force.sensorless(cut, idle, arm, face, 0.0), noise, turn)
 
 
-def force_tables(batch: Batch, read: Tables, solved: Mapping[str, RunForce]) -> dict[str, list[pd.DataFrame]]:
-    """Return the tables of all runs together, which share the level of slow noise and of friction."""
+def force_tables(
+    batch: Batch, read: Tables, solved: Mapping[str, RunForce], drives: Array
+) -> dict[str, list[pd.DataFrame]]:
+    """Return the tables of all runs together, which share the level of slow noise and of friction.
+
+    ``drives`` (k, k): covariance of the relative errors of the torques.
+    """
     shared = common(list(solved.values()))
     parts: dict[str, list[pd.DataFrame]] = {}
     for run, one in solved.items():
         if isinstance(one.sensorless, Refusal):
             tables = {"robot_refused": pd.DataFrame({"reason": [one.sensorless.reason]})}
         else:
-            tables = _tables(one.sensorless, shared, _measured(batch, run, read), one.turn)
+            tables = _tables(one, one.sensorless, shared, drives, _measured(batch, run, read))
         for name, table in tables.items():
             parts.setdefault(name, []).append(table.assign(run=run))
     return parts
@@ -94,7 +99,7 @@ def common(runs: Sequence[RunForce]) -> Common:
     """Return the mean levels of slow noise and friction over all runs, of which one alone says little."""
     known = [(one.noise, one.sensorless) for one in runs if isinstance(one.sensorless, Sensorless)]
     if not known:
-        return Common(np.zeros(COUNT), np.zeros(COUNT))
+        return Common(np.zeros(0), np.zeros(0))
     wander = np.mean([sensorless.wander for _, sensorless in known], axis=0)
     least = REPEATABLE * np.sqrt(np.mean([noise**2 for noise, _ in known], axis=0))
     air = [means for _, one in known if (means := tip_force.in_the_air(one, wander)) is not None]
@@ -117,12 +122,12 @@ def force_of_all(one: Sensorless, shared: Common) -> TipForce:
 
 
 def _tables(
-    one: Sensorless, shared: Common, measured: tuple[Array, Array], turn: Array | None
+    run: RunForce, one: Sensorless, shared: Common, drives: Array, measured: tuple[Array, Array]
 ) -> dict[str, pd.DataFrame]:
     """Tables of a run whose steady mean is ``measured`` (3,), covariance (3, 3), by a dynamometer."""
     joints = pd.DataFrame(
         {
-            "joint": list(JOINTS),
+            "joint": one.joints,
             "index": one.index,
             "threshold": LEAST_INDEX,
             "used": False,
@@ -145,7 +150,10 @@ def _tables(
     course[[f"sd_{name}" for name in FORCE]] = np.sqrt(np.einsum("maa->ma", solution.covariance))
     mean = mean_force(solution, one.torques, one.steady, shared.friction, shared.wander)
     enough = bool((one.index >= LEAST_INDEX).sum() >= LEAST_JOINTS)
-    means = _means(mean, measured, turn).assign(enough=enough, condition=float(solution.condition.max()))
+    shares = drive_shares(solution, one.torques, one.steady)
+    means = _means(mean, measured, shares @ drives @ shares.T, run.turn).assign(
+        enough=enough, condition=float(solution.condition.max())
+    )
     return tables | {"robot_force": course, "robot_means": means}
 
 
@@ -154,8 +162,8 @@ def _torques(sensorless: Sensorless) -> pd.DataFrame:
     count = len(sensorless.x)
     return pd.DataFrame(
         {
-            "joint": np.repeat(list(JOINTS), count),
-            "x_mm": np.tile(sensorless.x / MM, COUNT),
+            "joint": np.repeat(sensorless.joints, count),
+            "x_mm": np.tile(sensorless.x / MM, len(sensorless.joints)),
             "bin_nm": sensorless.difference.T.ravel(),
             "level_nm": sensorless.torques.level.T.ravel(),
             "level_sd_nm": np.sqrt(sensorless.torques.variance).T.ravel(),
@@ -173,8 +181,13 @@ def _measured(batch: Batch, run: str, read: Tables) -> tuple[Array, Array]:
     return mean, np.diag(own**2 + (CALIBRATED * mean) ** 2)
 
 
-def _means(estimated: tuple[Array, Array], measured: tuple[Array, Array], turn: Array | None) -> pd.DataFrame:
-    """Mean force of the steady cut with standard errors, by frame and axis, as estimated and as measured."""
+def _means(
+    estimated: tuple[Array, Array], measured: tuple[Array, Array], drives: Array, turn: Array | None
+) -> pd.DataFrame:
+    """Mean force of the steady cut with standard errors, by frame and axis, as estimated and as measured.
+
+    ``drives`` (3, 3) N²: what the drives' constants add to the covariance of the estimate.
+    """
     frames = {"work": np.eye(3)} | ({} if turn is None else {"tool": turn})
     parts = []
     for name, axes in frames.items():
@@ -182,12 +195,16 @@ def _means(estimated: tuple[Array, Array], measured: tuple[Array, Array], turn: 
         for source, (mean, covariance) in (("sensorless", estimated), ("dynamometer", measured)):
             table[f"{source}_n"] = mean @ axes
             table[f"{source}_sd_n"] = np.sqrt(np.diag(axes.T @ covariance @ axes))
+        table["drives_sd_n"] = np.sqrt(np.diag(axes.T @ drives @ axes))
         parts.append(table)
     return pd.concat(parts, ignore_index=True)
 
 
-def aligned(cut: Log, idle: Log, face: Wall, joint: int) -> pd.DataFrame:
-    """Return the torque of one joint (1 … 6) in both logs over time and over the place along the wall."""
+def aligned(cut: Log, idle: Log, face: Wall, joint: int, place: int) -> pd.DataFrame:
+    """Return the torque of a joint in both logs over time and over the place along the wall.
+
+    ``place``: of the joint among those with a torque, from 0.
+    """
     return pd.concat(
         [
             pd.DataFrame(
@@ -196,7 +213,7 @@ def aligned(cut: Log, idle: Log, face: Wall, joint: int) -> pd.DataFrame:
                     "joint": joint,
                     "t_s": log.time - cut.time[0],
                     "x_mm": (log.tip @ face.along - face.start) / MM,
-                    "torque_nm": log.torque[:, joint - 1],
+                    "torque_nm": log.torque[:, place],
                 }
             )
             for name, log in (("cut", cut), ("idle", idle))

@@ -10,7 +10,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
-from metro.observables.arm.load_tests import ANGLES, best_compliance, usable
+from metro.observables.arm.load_tests import best_compliance, joint_places, usable
 from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall, wall
@@ -18,12 +18,12 @@ from metro.observables.arm.wall_profile import in_one_pose
 from metro.observables.deformation.model import DeformationModel
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import arm_of_cell
-from metro.units import DEG, Array
+from metro.units import Array
 
 
 @dataclass(frozen=True, eq=False)
 class GivingArm:
-    """An arm as it is known before any cut: its model, load tests, and joint compliances (6,) rad/(N m)."""
+    """An arm as it is known before any cut: its model, load tests, and joint compliances (n,) rad/(N m)."""
 
     model: DeformationModel
     loads: pd.DataFrame
@@ -33,10 +33,10 @@ class GivingArm:
         """Return the log of the arm in a cut; without a log, the pose is that of the run's load tests."""
         if len(cut.tip):
             return cut
-        rows = self.loads[self.loads["pose"] == batch.runs.loc[run, "pose"]].dropna(subset=ANGLES)
+        rows = self.loads[self.loads["pose"] == batch.runs.loc[run, "pose"]]
         if rows.empty:
             return Refusal("no robot_log, and no load test in its pose: where the arm stood is not known")
-        return in_one_pose(rows[ANGLES].to_numpy(dtype=float)[0] * DEG, face, self.model.arm)
+        return in_one_pose(joint_places(rows, self.model.arm)[0], face, self.model.arm)
 
     def give(self, log: Log | Refusal, face: Wall, force: Array) -> float:
         """Height by which the wall is proud under a force on the tip (3,) N, in the middle of the cut, m.
@@ -54,7 +54,7 @@ def giving_arm(batch: Batch, read: Tables) -> GivingArm | Refusal:
     arm = arm_of_cell(batch.cell, batch.manifest)
     if arm is None:
         return Refusal(no_arm(batch.cell))
-    model, loads = DeformationModel(arm), usable(read("loads"))
+    model, loads = DeformationModel(arm), usable(read("loads"), arm)
     return GivingArm(model, loads, best_compliance(batch, model, loads))
 
 

@@ -49,7 +49,8 @@ class JointLog:
     """A joint log of n axes: ``time`` (m,) s; ``q`` (m, n) rad (m of a linear axis); ``torque`` (m, n) N m.
 
     ``commanded`` (m, n) as ``q``, NaN where there are no set-points; ``driven`` (n,) bool, whether a torque
-    or a current was logged; ``amperes`` : whether ``torque`` is in amperes; ``loaded`` : yes, no or "".
+    or a current was logged; ``amperes`` : whether ``torque`` is in amperes; ``warmth``
+    (m, n) °C of the joints, NaN where it was not logged; ``loaded`` : yes, no or "".
     """
 
     run: str
@@ -59,6 +60,7 @@ class JointLog:
     torque: Array
     driven: np.ndarray
     amperes: bool
+    warmth: Array
     loaded: str
 
     @property
@@ -101,8 +103,24 @@ def _log(batch: Batch, run: str, table: pd.DataFrame) -> JointLog:
         np.where(driven, drive, 0.0),
         driven,
         amperes,
+        _warmth(table, len(names)),
         str(batch.runs["loaded"].get(run, "")),
     )
+
+
+def term_unit(name: str, level: str) -> str:
+    """Return the unit of a further term of friction; ``level`` is that of Coulomb friction."""
+    per_speed = f"{level} s" if name.startswith("viscous") else level
+    by_warmth = "(rad K)" if name.startswith("viscous") else "K"
+    if name.endswith("temperature"):
+        return f"{per_speed}/{by_warmth}"
+    return {"load": "1", "viscous_time": f"{per_speed}/rad"}.get(name, level)
+
+
+def _warmth(table: pd.DataFrame, count: int) -> Array:
+    """Temperature of each joint (m, n), °C: its own, else that of the arm; NaN where neither was logged."""
+    own = table[[f"temperature{i}_c" for i in AXES[:count]]].to_numpy(dtype=float)
+    return np.where(np.isfinite(own), own, table[["temperature_c"]].to_numpy(dtype=float))
 
 
 def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
@@ -120,10 +138,19 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
         fits: tuple[JointFit, ...] = ()
         if log.long:
             motions[log.run] = free_motion(log.time, log.q, log.torque)
-            fits = () if arm is None else fit_joints(arm.dh, motions[log.run], log.driven)
+            # temperatures are filtered and thinned as torques are
+            warmth = (
+                free_motion(log.time, log.q, log.warmth).torque if np.isfinite(log.warmth).any() else None
+            )
+            fits = () if arm is None else fit_joints(arm.dh, motions[log.run], log.driven, warmth)
         rows += _rows(log, fits, arm, drives)
         curves += [_curve(fit).assign(run=log.run) for fit in fits]
-        terms += [{"run": log.run, "joint": f.joint + 1, **vars(term)} for f in fits for term in f.terms]
+        level = (IN_AMPERES if log.amperes else UNITS)["coulomb"]
+        terms += [
+            {"run": log.run, "joint": f.joint + 1, **vars(term), "unit": term_unit(term.name, level)}
+            for f in fits
+            for term in f.terms
+        ]
         block[log.run] = _block(log, fits, drives)
     tables = {"joint_log": pd.DataFrame(rows)}
     tables |= {"joint_log_curve": pd.concat(curves, ignore_index=True)} if curves else {}
@@ -153,7 +180,12 @@ def _block(log: JointLog, fits: tuple[JointFit, ...], drives: Drives) -> JSON:
             for name in QUANTITIES
         },
         "beyond": [
-            {"joint": fit.joint + 1, "by": t.name, "value": quantity(t.value, t.sd, "", dof), "p": t.p}
+            {
+                "joint": fit.joint + 1,
+                "by": t.name,
+                "value": quantity(t.value, t.sd, term_unit(t.name, units["coulomb"]), dof),
+                "p": t.p,
+            }
             for fit in fits
             for t in fit.terms
         ],

@@ -10,12 +10,12 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
+from metro.observables.arm.load_tests import joint_places
 from metro.robot.kinematics import arm_of_cell
 from metro.robot.link_mass import links_of_cell, mass_about_base, tip_mass
 from metro.units import JSON, Array
 
 ENTRIES = {"mxx": (0, 0), "mxy": (0, 1), "mxz": (0, 2), "myy": (1, 1), "myz": (1, 2), "mzz": (2, 2)}
-ANGLES = [f"q{i}_deg" for i in range(1, 7)]
 
 
 def link_masses(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.DataFrame]:
@@ -30,10 +30,10 @@ def link_masses(batch: Batch, read: Tables, identified: JSON) -> dict[str, pd.Da
     arm, links = arm_of_cell(batch.cell, batch.manifest), links_of_cell(batch.cell)
     if arm is None or not links:
         return {}
-    mass = read("mass").dropna(subset=ANGLES)
+    mass = read("mass").dropna(subset=arm.axes.positions)
     if mass.empty:
         return {}
-    q = np.radians(mass[ANGLES].to_numpy(dtype=float))
+    q = joint_places(mass, arm)
     compliance = _joint_compliance(batch, identified)
     ways = {"declared": _declared(mass)}
     try:

@@ -6,22 +6,28 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.joint_columns import Axes
 from metro.observables.deformation.model import DeformationModel, KnownJoints, LoadTest
 from metro.observables.problem import Block, Refusal
 from metro.robot import identifiability
 from metro.robot.identifiability import Identifiability, NextLoad
+from metro.robot.kinematics import Arm, prismatic
 from metro.robot.stiffness import Compliances, joint_compliances
-from metro.units import DEG, MM, UM, Array
+from metro.units import MM, UM, Array
 
 KNOWN = 0.02  # assumed relative uncertainty of joint stiffnesses that the cell file states without one
 GAUGE = 0.1 * UM
-ANGLES = [f"q{i}_deg" for i in range(1, 7)]
 LOAD_FORCE, MOVED = ["fx_n", "fy_n", "fz_n"], ["dx_mm", "dy_mm", "dz_mm"]
 
 
-def usable(loads: pd.DataFrame) -> pd.DataFrame:
-    """Return the load tests that an arm's model can use: with joint angles and the whole force."""
-    return loads.dropna(subset=[*ANGLES, *LOAD_FORCE]).reset_index(drop=True)
+def usable(loads: pd.DataFrame, arm: Arm) -> pd.DataFrame:
+    """Return the load tests that a model can use: with the place of every joint and the whole force."""
+    return loads.dropna(subset=[*arm.axes.positions, *LOAD_FORCE]).reset_index(drop=True)
+
+
+def joint_places(table: pd.DataFrame, arm: Arm) -> Array:
+    """Return where the joints are in the rows of a table, (m, n) rad, or m of a linear axis."""
+    return table[arm.axes.positions].to_numpy(dtype=float) * arm.axes.units
 
 
 def calibration(
@@ -41,12 +47,12 @@ def calibration(
         return [_known_block(np.arange(len(value)), value, KNOWN * value)], (note,)
     sigma = max(tests.scatter, GAUGE) * _relative(loads)
     blocks = [
-        _load_block(str(pose), loads.iloc[at], sigma[at])
+        _load_block(str(pose), loads.iloc[at], sigma[at], model.arm)
         for pose, at in loads.groupby("pose", sort=False, dropna=False).indices.items()
     ]
     notes = [f"Load tests scatter by {tests.scatter / UM:.2g} µm about linear joints ({tests.dof} dof)."]
     seen = joint_observability(model, loads)
-    notes += [] if isinstance(seen, Refusal) else [in_words(*seen)]
+    notes += [] if isinstance(seen, Refusal) else [in_words(*seen, model.arm.axes)]
     weak = np.flatnonzero(tests.sd > tests.value.max())
     if len(weak):
         names = ", ".join(str(i + 1) for i in weak)
@@ -64,7 +70,7 @@ def calibration(
 
 
 def best_compliance(batch: Batch, model: DeformationModel, loads: pd.DataFrame) -> Array:
-    """Joint compliances (6,) before any cut: from the load tests, else the cell file, else of a rigid arm."""
+    """Joint compliances (n,) before any cut: from the load tests, else the cell file, else of a rigid arm."""
     tests = fitted_loads(model, loads)
     if not isinstance(tests, Refusal):
         return tests.value
@@ -76,7 +82,7 @@ def fitted_loads(model: DeformationModel, loads: pd.DataFrame) -> Compliances | 
     """Joint compliances from the load tests alone."""
     if loads.empty:
         return Refusal("loads.csv has no test with joint angles and force")
-    joints, force, moved = _load_arrays(loads)
+    joints, force, moved = _load_arrays(loads, model.arm)
     try:
         return joint_compliances(model.contributions(joints, force), moved, _relative(loads))
     except ValueError as error:
@@ -88,26 +94,27 @@ def joint_observability(
 ) -> tuple[Identifiability, NextLoad] | Refusal:
     """Return how well the load tests identify each joint, and the test that is best for the worst joint.
 
-    The next test has the largest force so far, in a pose of the tests or with one joint turned by 30° from
-    it. A joint that no test sees is taken to be as soft as the softest.
+    The next test has the largest force so far, in a pose of the tests or with one joint turned by 30° (a
+    linear axis shifted by half a metre) from it. A joint that no test sees is taken to be as soft as the
+    softest, a linear axis as a joint with a lever of one metre.
     """
     tests = fitted_loads(model, loads)
     if isinstance(tests, Refusal):
         return tests
-    joints, force, moved = _load_arrays(loads)
+    joints, force, moved = _load_arrays(loads, model.arm)
     softest = float(tests.value.max())
     size = np.where(tests.value > 0.01 * softest, tests.value, softest)
     sigma = max(tests.scatter, GAUGE)
     rows = model.contributions(joints, force)
     matrix = identifiability.information(rows, np.isfinite(moved), sigma * _relative(loads), size)
     newton = float(np.linalg.norm(force, axis=1).max())
-    poses = identifiability.around(np.unique(joints, axis=0))
+    poses = identifiability.around(np.unique(joints, axis=0), prismatic(model.arm.dh))
     return identifiability.assess(matrix), identifiability.next_load(
         model.arm, matrix, poses, newton=newton, sigma=sigma, size=size
     )
 
 
-def in_words(joints: Identifiability, load: NextLoad) -> str:
+def in_words(joints: Identifiability, load: NextLoad, axes: Axes) -> str:
     """Describe how well load tests identify the joints, and which load to apply next."""
     unseen = [str(i + 1) for i in np.flatnonzero(~np.isfinite(joints.relative))]
     if unseen:
@@ -117,17 +124,20 @@ def in_words(joints: Identifiability, load: NextLoad) -> str:
             f"The load tests tell every joint; joint {joints.worst + 1} least, "
             f"to {100 * joints.relative[joints.worst]:.2g} %."
         )
-    angles = ", ".join(f"{value:.0f}" for value in load.joints / DEG)
+    places = [f"{value:.0f}" for value in load.joints / axes.units]
+    turning = f"({', '.join(places[place] for place in axes.turning)})°"
+    shifted = [f"axis {i + 1} at {place} mm" for i, place in enumerate(places) if axes.linear[i]]
     pull = ", ".join(f"{value:.0f}" for value in load.force)
     return (
-        f"{known} A load of ({pull}) N on the tip in the pose ({angles})° would tell joint {load.joint + 1} "
+        f"{known} A load of ({pull}) N on the tip in the pose {', '.join([turning, *shifted])} would tell "
+        f"joint {load.joint + 1} "
         f"to {100 * load.after:.2g} %."
     )
 
 
-def _load_arrays(loads: pd.DataFrame) -> tuple[Array, Array, Array]:
-    angles, force, moved = (loads[names].to_numpy(dtype=float) for names in (ANGLES, LOAD_FORCE, MOVED))
-    return angles * DEG, force, moved * MM
+def _load_arrays(loads: pd.DataFrame, arm: Arm) -> tuple[Array, Array, Array]:
+    force, moved = (loads[names].to_numpy(dtype=float) for names in (LOAD_FORCE, MOVED))
+    return joint_places(loads, arm), force, moved * MM
 
 
 def _relative(loads: pd.DataFrame) -> Array:
@@ -141,8 +151,8 @@ def _relative(loads: pd.DataFrame) -> Array:
     return np.asarray(np.where(np.isfinite(stated), stated / np.nanmean(stated), 1.0)[:, None])
 
 
-def _load_block(pose: str, loads: pd.DataFrame, sigma: Array) -> Block:
-    joints, force, moved = _load_arrays(loads)
+def _load_block(pose: str, loads: pd.DataFrame, sigma: Array, arm: Arm) -> Block:
+    joints, force, moved = _load_arrays(loads, arm)
     measured = np.isfinite(moved)
     axis = np.broadcast_to(["load x", "load y", "load z"], moved.shape)[measured]
     name = f"load tests {pose}"

@@ -13,8 +13,11 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
+from metro.joint_columns import numbered
+from metro.observables.arm.force_by_torques import gain_errors
 from metro.observables.arm.force_tables import RunForce, aligned, force_tables, logged_cuts, run_force
-from metro.observables.arm.tip_force import JOINTS, Log, Sensorless
+from metro.observables.arm.load_tests import joint_places
+from metro.observables.arm.tip_force import Log, Sensorless
 from metro.observables.arm.tracking_tables import tracking_tables
 from metro.observables.arm.wall import Wall, wall
 from metro.observables.waviness.points import GRID as SPACING
@@ -52,7 +55,7 @@ def robot_tables(
         tracked = tracking_tables(cut, idle, arm, face) if cut.followed else {}
         for name, table in (tables | tracked).items():
             parts.setdefault(name, []).append(table.assign(run=run))
-    parts |= force_tables(batch, read, solved)
+    parts |= force_tables(batch, read, solved, gain_errors(batch, identified, arm)[0])
     tables = {name: pd.concat(tables, ignore_index=True) for name, tables in parts.items()}
     if points is not None:
         tables["robot_waves"] = _waves(batch, points)
@@ -62,7 +65,8 @@ def robot_tables(
 def _aligned(cut: Log, idle: Log, face: Wall, one: RunForce) -> pd.DataFrame:
     """Return the logs of the joint whose torque the cut changes most."""
     assert isinstance(one.sensorless, Sensorless)
-    return aligned(cut, idle, face, int(np.argmax(one.sensorless.index)) + 1)
+    place = int(np.argmax(one.sensorless.index))
+    return aligned(cut, idle, face, int(one.sensorless.joints[place]), place)
 
 
 def _waves(batch: Batch, points: pd.DataFrame) -> pd.DataFrame:
@@ -70,7 +74,8 @@ def _waves(batch: Batch, points: pd.DataFrame) -> pd.DataFrame:
     cutoff = float(batch.instrument("profiler").get("cutoff_mm", 8.0)) * MM
     parts = []
     for run, rows in points.groupby("run", sort=False):
-        strayed = np.column_stack([rows[STRAYED].sum(axis=1), rows[IDLE].sum(axis=1, skipna=False)])
+        sums = [rows[numbered(form, rows)].sum(axis=1, skipna=False) for form in (STRAYED, IDLE)]
+        strayed = np.column_stack(sums)
         tip, idle = part(strayed, SPACING, cutoff).waviness.T
         columns = {"x_mm": rows["x_mm"], "wall_um": rows["waviness_um"], "tip_um": tip, "idle_um": idle}
         parts.append(pd.DataFrame({"run": run, **columns})[rows["kept"].to_numpy(dtype=bool)])
@@ -84,10 +89,9 @@ def _stiffness(
     compliance, covariance = _compliance(batch, identified)
     if compliance is None:
         return {}
-    loads = read("loads").dropna(subset=[f"q{i}_deg" for i in JOINTS])
+    loads = read("loads").dropna(subset=arm.axes.positions)
     poses = {
-        f"load tests {name}": np.radians(rows[[f"q{i}_deg" for i in JOINTS]].to_numpy(dtype=float)[0])
-        for name, rows in loads.groupby("pose", sort=False)
+        f"load tests {name}": joint_places(rows, arm)[0] for name, rows in loads.groupby("pose", sort=False)
     }
     if start is not None:
         poses = {"cut": start, **poses}
@@ -130,7 +134,7 @@ def _map(batch: Batch, arm: Arm, q: Array, compliance: Array) -> pd.DataFrame:
 
 
 def _compliance(batch: Batch, identified: JSON) -> tuple[Array | None, Array]:
-    """Joint compliances (6,) and their covariance: identified, else from the cell file; None if unknown.
+    """Joint compliances (n,) and their covariance: identified, else from the cell file; None if unknown.
 
     A joint that could not be distinguished from a rigid one is rigid.
     """
@@ -142,8 +146,8 @@ def _compliance(batch: Batch, identified: JSON) -> tuple[Array | None, Array]:
         sd = np.nan_to_num((value - low) / 1.96 / value**2)
         return np.nan_to_num(1.0 / value), np.diag(sd**2)
     if known is None:
-        return None, np.zeros((len(JOINTS), len(JOINTS)))
-    return 1.0 / np.asarray(known, dtype=float), np.zeros((len(JOINTS), len(JOINTS)))
+        return None, np.zeros((0, 0))
+    return 1.0 / np.asarray(known, dtype=float), np.zeros((len(known), len(known)))
 
 
 def _number(value: object) -> float:

@@ -28,19 +28,15 @@ from metro.robot.sensorless import (
     smoothed_torque,
     tip_force,
 )
-from metro.robot.statics import tip_jacobian
+from metro.robot.statics import driven_jacobian
 from metro.signals import align, steady
 from metro.signals.intervals import uneven
 from metro.signals.kalman import noise_variance
 from metro.signals.path_match import match
 from metro.signals.waves import wandering, waves
-from metro.units import DEG, JSON, MM, Array
+from metro.units import JSON, MM, Array
 
 Read = Callable[..., pd.DataFrame]
-JOINTS = range(1, 7)
-SET = [f"q{i}_set_deg" for i in JOINTS]
-ACTUAL = [f"q{i}_deg" for i in JOINTS]
-TORQUE = [f"tau{i}_nm" for i in JOINTS]
 FORCE = ["fx_n", "fy_n", "fz_n"]
 NO_SET_POINTS = "the robot log has no set-points (q1_set_deg …): how far the tip strayed is not known"
 BIN = 1 * MM
@@ -56,10 +52,11 @@ SYSTEMATIC = {"torque": 0.05, "dynamometer": 0.01, "coefficients": 0.03}
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """The moving part of a robot log: joint angles (n, 6) rad, torques (n, 6) N m, commanded tip (n, 3) m.
+    """The moving part of a robot log of m samples: commanded tip (m, 3) m, and what the joints did.
 
-    ``time`` (n,) s by the dynamometer's clock; empty if there is none. ``followed``: whether set-points were
-    logged; else ``commanded`` are the measured angles, smoothed.
+    ``commanded``, ``actual`` (m, n): of all joints, rad, or m of a linear axis. ``torque`` (m, k) N m: of
+    the k joints that turn. ``time`` (m,) s by the dynamometer's clock; empty if there is none. ``followed``:
+    whether set-points were logged; else ``commanded`` are the measured angles, smoothed.
     """
 
     commanded: Array
@@ -82,13 +79,14 @@ def logs(table: pd.DataFrame, arm: Arm) -> tuple[Log, Log]:
 
 
 def _log(table: pd.DataFrame, arm: Arm) -> Log:
-    commanded, given = table[SET].to_numpy(dtype=float) * DEG, True
+    axes = arm.axes
+    actual = table[axes.positions].to_numpy(dtype=float) * axes.units
+    commanded, given = table[axes.commanded].to_numpy(dtype=float) * axes.units, True
     if len(table) and not np.isfinite(commanded).all():
-        measured = table[ACTUAL].to_numpy(dtype=float) * DEG
-        commanded, given = low_passed(table["t_s"].to_numpy(dtype=float), measured), False
+        commanded, given = low_passed(table["t_s"].to_numpy(dtype=float), actual), False
     tip = arm.tip(commanded)
     moves = align.moving(tip) if len(tip) > 2 else np.zeros(len(tip), dtype=bool)
-    actual, torque = table[ACTUAL].to_numpy(dtype=float) * DEG, table[TORQUE].to_numpy(dtype=float)
+    torque = table[axes.torques].to_numpy(dtype=float)
     time = table["t_s"].to_numpy(dtype=float)
     return Log(commanded[moves], actual[moves], torque[moves], tip[moves], time[moves], given)
 
@@ -101,10 +99,11 @@ class Sensorless:
     ----------
     s, x : (m,) along the path, and along the wall from its start, m.
     steady, air : (m,) bool, where the tool is wholly in the work, and where it touches nothing.
-    difference : (m, 6) N m, torque of the cut less that of the idle run, by bins; ``torques``: smoothed.
-    moves : (m, 3, 6) Jacobian of the tip, m/rad.
-    wander : (6,) level of the slow noise, N² m² (:mod:`metro.signals.waves`), estimated from the idle run.
-    index : (6,) observability.
+    joints : (k,) that turn, from 1; their torques are those that follow.
+    difference : (m, k) N m, torque of the cut less that of the idle run, by bins; ``torques``: smoothed.
+    moves : (m, 3, k) Jacobian of the tip, m/rad.
+    wander : (k,) level of the slow noise, N² m² (:mod:`metro.signals.waves`), estimated from the idle run.
+    index : (k,) observability.
     solution : force; None if it could not be solved for, and ``refusal`` gives the reason. remarks : in which
         ways the idle run and the cut differ.
     """
@@ -113,6 +112,7 @@ class Sensorless:
     x: Array
     steady: np.ndarray
     air: np.ndarray
+    joints: np.ndarray
     difference: Array
     moves: Array
     torques: Torques
@@ -139,7 +139,9 @@ def sensorless(
     steps = [float(np.median(np.abs(np.diff(place[np.isfinite(place)])))) for place in places]
     width = max(BIN, 3 * max(steps))
     channels = [
-        np.column_stack([log.torque, log.commanded, log.tip @ wall.along - wall.start, _turning(log)])
+        np.column_stack(
+            [log.torque, log.commanded, log.tip @ wall.along - wall.start, turning_round(log, arm)]
+        )
         for log in (cut, idle)
     ]
     clocks = cut.interval, idle.interval
@@ -148,37 +150,51 @@ def sensorless(
         pair = align.align(places[0], channels[0], places[1], channels[1], width, gaps=gaps)
     except ValueError as error:
         return Refusal(str(error))
-    x, joints = pair.first[:, 12], pair.first[:, 6:12]
+    count, driven = len(arm.axes), len(arm.axes.turning)
+    torque, turning = (slice(0, driven), slice(driven + count + 1, None))
+    joints, x = pair.first[:, driven : driven + count], pair.first[:, driven + count]
     steady = wall.steady(x)
     if steady.sum() < LEAST_BINS:
         return Refusal(f"the logs hold {int(steady.sum())} mm of the cut; at least {LEAST_BINS} are needed")
     samples = (width / steps[0], width / steps[1])
-    noise = noise_of_bins(cut.torque, idle.torque, samples, _turning(idle), clocks)
+    noise = noise_of_bins(cut.torque, idle.torque, samples, turning_round(idle, arm), clocks)
     noise = np.maximum(noise, LEAST_NOISE**2)
     white = np.maximum(noise_variance(idle.torque, clocks[1]), LEAST_NOISE**2) / samples[1]
     # The slow noise of the idle run is as large in the cut, where the force conceals it.
     interval = uneven(pair.s) if gaps else None
-    wander = 2.0 * wandering(pair.second[:, :6], white, pair.second[:, 13:], interval)
-    phase, difference = wall.phase(x, width), pair.first[:, :6] - pair.second[:, :6]
+    wander = 2.0 * wandering(pair.second[:, torque], white, pair.second[:, turning], interval)
+    phase, difference = wall.phase(x, width), (pair.first - pair.second)[:, torque]
     air = (phase % 2 == 0) & ~steady
     torques = smoothed_torque(difference, noise, phase, pair.s if gaps else None)
-    index = observability(difference[steady], pair.second[steady, :6])
+    index = observability(difference[steady], pair.second[steady, torque])
     remarks = tuple(alike.remarks(np.gradient(cut.commanded, cut.time, axis=0)))
-    moves = tip_jacobian(arm, joints)
+    moves = driven_jacobian(arm, joints)
     solution, refusal = None, ""
     try:
         solution = tip_force(torques.level, torques.variance, moves, index, least_index)
     except ValueError as error:
         refusal = str(error)
     return Sensorless(
-        pair.s, x, steady, air, difference, moves, torques, wander, index, solution, refusal, remarks
+        pair.s,
+        x,
+        steady,
+        air,
+        np.array(arm.axes.turning) + 1,
+        difference,
+        moves,
+        torques,
+        wander,
+        index,
+        solution,
+        refusal,
+        remarks,
     )
 
 
 def in_the_air(one: Sensorless, wander: Array) -> tuple[Array, Array] | None:
-    """Mean (6,) of the torques in the air, N m, and its variance by the noise; None if no air was logged.
+    """Mean (k,) of the torques in the air, N m, and its variance by the noise; None if no air was logged.
 
-    ``wander`` (6,) is the level of the slow noise.
+    ``wander`` (k,) is the level of the slow noise.
     """
     if not one.air.any():
         return None
@@ -188,9 +204,10 @@ def in_the_air(one: Sensorless, wander: Array) -> tuple[Array, Array] | None:
     return weights @ one.difference, noise
 
 
-def _turning(log: Log) -> Array:
-    """Which way the joints turn, (n, 6): the shape of their Coulomb friction."""
-    return np.asarray(np.tanh(np.gradient(log.commanded, log.time, axis=0) / TURNING))
+def turning_round(log: Log, arm: Arm) -> Array:
+    """Which way the joints turn, (m, k): the shape of the Coulomb friction of those with a torque."""
+    rate = np.gradient(log.commanded[:, arm.axes.turning], log.time, axis=0)
+    return np.asarray(np.tanh(rate / TURNING))
 
 
 def from_torques(
@@ -211,7 +228,7 @@ def from_torques(
     solution = solved.solution
     per_joint = pd.DataFrame(
         {
-            "joint": list(JOINTS),
+            "joint": solved.joints,
             "index": solved.index,
             "used": solved.index >= LEAST_INDEX if solution is None else solution.used,
             "noise_nm": np.sqrt(solved.torques.noise),

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from metro.observables.arm.tip_force import BIN, JOINTS, Log
+from metro.joint_columns import numbered
+from metro.observables.arm.tip_force import BIN, Log
 from metro.observables.arm.wall import Wall
 from metro.observables.waviness.report import joint_share
 from metro.robot.kinematics import Arm
@@ -19,10 +20,7 @@ from metro.signals import align
 from metro.signals.path_spectrum import FINER, even_samples, spectrum
 from metro.units import MM, UM, Array
 
-BY_JOINT = [f"joint{i}_um" for i in JOINTS]
-ERROR = [f"error{i}_urad" for i in JOINTS]
-TORQUE = [f"torque{i}_nm" for i in JOINTS]
-RATE = [f"rate{i}_rad_s" for i in JOINTS]
+BY_JOINT, ERROR, TORQUE, RATE = "joint{}_um", "error{}_urad", "torque{}_nm", "rate{}_rad_s"
 UPWARD = np.array([0.0, 0.0, 1.0])
 
 
@@ -49,7 +47,9 @@ def _course(log: Log, cut: Log, arm: Arm, face: Wall) -> pd.DataFrame:
     step = float(np.median(np.abs(np.diff(place[np.isfinite(place)]))))
     edges: Array = np.arange(np.nanmin(place), np.nanmax(place), max(BIN, 3 * step))
     x = (log.tip @ face.along - face.start) / MM
-    columns = ["x_mm", "flange_um", "tip_um", *BY_JOINT, *ERROR, *TORQUE, *RATE]
+    joints = range(1, len(arm.axes) + 1)
+    columns = ["x_mm", "flange_um", "tip_um", *(BY_JOINT.format(i) for i in joints)]
+    columns += [ERROR.format(i) for i in joints] + arm.axes.driven(TORQUE) + [RATE.format(i) for i in joints]
     values = np.column_stack(
         [
             x,
@@ -71,13 +71,14 @@ def _sizes(courses: dict[str, pd.DataFrame]) -> pd.DataFrame:
         for what in ("flange", "tip"):
             row[f"{what}_{name}_um"] = 0.5 * float(np.ptp(course[f"{what}_um"]))
     course = courses["cut"]
-    by_joint = course[BY_JOINT].to_numpy()
+    by_joint = course[numbered(BY_JOINT, course)].to_numpy()
     share = joint_share(by_joint - by_joint.mean(axis=0))
     first = int(np.argmax(share))
     row |= {"joint": first + 1, "share": float(share[first])}
     row["joint_um"] = 0.5 * float(np.ptp(by_joint[:, first]))
-    pair = course[[ERROR[first], TORQUE[first]]].to_numpy()
-    varies = bool((pair.std(axis=0) > 0.0).all())
+    error, torque = ERROR.format(first + 1), TORQUE.format(first + 1)
+    pair = course[[error, torque]].to_numpy() if torque in course else np.zeros((0, 2))
+    varies = len(pair) > 1 and bool((pair.std(axis=0) > 0.0).all())
     row["correlation"] = float(np.corrcoef(pair.T)[0, 1]) if varies else np.nan
     return pd.DataFrame([row])
 

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pandas as pd
 
-from metro.observables.arm.tip_force import ACTUAL, SET, Log
+from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import Arm
 from metro.signals.align import bin_means
 from metro.surface.profile import Bands, even, gaussian_filter, noise_gain, part
-from metro.units import DEG, MM, Array
+from metro.units import MM, Array
 
 SPACING = 1 * MM
 ASIDE = 1 * MM  # a log's sample further than this from the line of the cut belongs to another move
@@ -55,7 +55,8 @@ def wall_points(
     bands = part(z, spacing, cutoff)
     points = SPACING * np.arange(math.ceil(x[0] / SPACING - 1e-6), math.floor(x[-1] / SPACING + 1e-6) + 1)
     edges = np.append(points - SPACING / 2, points[-1] + SPACING / 2)
-    joints = _filled(points, bin_means(place, np.hstack([commanded, actual]) / DEG, edges))
+    axes = arm.axes
+    joints = _filled(points, bin_means(place, np.hstack([commanded, actual]) / (2 * axes.units), edges))
     columns = {
         "x_mm": points / MM,
         "deformation_mm": np.interp(points, x, bands.deformation) / MM,
@@ -64,17 +65,18 @@ def wall_points(
         "tracking_mm": np.interp(points, x, tracking.deformation) / MM,
         "tracking_waviness_mm": np.interp(points, x, tracking.waviness) / MM,
     }
-    return pd.DataFrame({**columns, **dict(zip([*SET, *ACTUAL], joints.T, strict=True))})
+    names = [*axes.commanded, *axes.positions]
+    return pd.DataFrame({**columns, **dict(zip(names, joints.T, strict=True))})
 
 
 def in_one_pose(joints: Array, wall: Wall, arm: Arm) -> Log:
-    """Replace a log that was not kept: one pose (6,) rad all along the wall, without tracking error."""
+    """Replace a log that was not kept: one pose (n,) rad all along the wall, without tracking error."""
     length = wall.length if math.isfinite(wall.length) else 1.0
     x = np.arange(0.0, length + SPACING, SPACING / 4)
     still = np.tile(joints, (len(x), 1))
     tip = arm.tip(joints)
     on_line = tip + np.outer(x + wall.start - tip @ wall.along, wall.along)
-    return Log(still, still, np.zeros_like(still), on_line)
+    return Log(still, still, np.zeros_like(still[:, arm.axes.turning]), on_line)
 
 
 def in_the_cut(tip: Array, place: Array, wall: Wall) -> np.ndarray:

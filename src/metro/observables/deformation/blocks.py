@@ -9,14 +9,15 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.joint_columns import axes_of
 from metro.observables.arm import tip_force
-from metro.observables.arm.tip_force import ACTUAL, FORCE, SET
+from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import wall
 from metro.observables.arm.wall_profile import SPACING
 from metro.observables.cut.conditions import feed
 from metro.observables.deformation.model import CutWall
 from metro.observables.problem import Block
-from metro.units import DEG, MM, UM, Array
+from metro.units import MM, UM, Array
 
 # Relative error of the force of a run, and of the error that all runs share, by the source of the force. The
 # force from a repeat with a dynamometer is as accurate as repeats agree.
@@ -76,7 +77,8 @@ def _wall_block(
         return None
     along = force.sort_values("x_mm")
     at_points = np.stack([np.interp(x / MM, along["x_mm"], along[name]) for name in FORCE], axis=1)
-    commanded, actual = points[SET].to_numpy() * DEG, points[ACTUAL].to_numpy() * DEG
+    axes = axes_of(points)
+    commanded, actual = (points[names].to_numpy() * axes.units for names in (axes.commanded, axes.positions))
     count = len(kept)
     # Without a feed in the run table the rate is zero, and no effect that depends on it is predicted.
     rate = np.gradient(commanded, SPACING, axis=0) * np.nan_to_num(feed(batch, run))

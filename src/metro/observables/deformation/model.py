@@ -31,7 +31,7 @@ class CutWall:
 
     Attributes
     ----------
-    commanded, actual : (m, 6) joint angles of the log of the cut, rad. rate : (m, 6) their speeds, rad/s.
+    commanded, actual : (m, n) joint angles of the log of the cut, rad. rate : (m, n) their speeds, rad/s.
     force : (m, 3) on the tool, work frame, N. normal : (3,) of the wall, out of the material.
     spacing, cutoff : of the points and of the profile's filter, m. kept : (n,) points that are compared.
     """
@@ -48,7 +48,7 @@ class CutWall:
 
 @dataclass(frozen=True, eq=False)
 class LoadTest:
-    """Static loads: joint angles (m, 6) rad, forces (m, 3) N, which displacements (m, 3) were measured."""
+    """Static loads: joint angles (m, n) rad, forces (m, 3) N, which displacements (m, 3) were measured."""
 
     joints: Array
     force: Array
@@ -89,7 +89,13 @@ class DeformationModel:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Compliances of the joints, from the base up."""
-        return tuple(Parameter(f"joint_compliance_{i + 1}", "rad/(N m)") for i in range(len(self.arm.dh)))
+        units = ["m/N" if linear else "rad/(N m)" for linear in self.arm.axes.linear]
+        return tuple(Parameter(f"joint_compliance_{i + 1}", unit) for i, unit in enumerate(units))
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Joints that effects of one joint may belong to."""
+        return tuple(range(len(self.arm.dh)))
 
     def nuisance_starts(self, _block: Block) -> Array:
         """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
@@ -108,21 +114,21 @@ class DeformationModel:
         return rows, np.zeros(len(rows))
 
     def torques(self, joints: Array, force: Array) -> Array:
-        """Torque on the link of each joint that a force on the tip makes, (m, 6), N m."""
+        """Torque on the link of each joint that a force on the tip makes, (m, n), N m."""
         return -joint_torque(tip_jacobian(self.arm, joints), force)
 
     def contributions(self, joints: Array, force: Array) -> Array:
-        """Deflection of the tip per joint compliance, (m, 3, 6), work frame, by the load tests' stiffness."""
+        """Deflection of the tip per joint compliance, (m, 3, n), work frame, by the load tests' stiffness."""
         moved = moving_jacobian(self.arm, joints, self.flange_rotation)
         return moved * self.torques(joints, force)[..., None, :]
 
     def deflection(self, setting: CutWall, compliance: Array) -> Array:
-        """Deflection of the tip in the cut, (m, 3) m, work frame, for joint compliances (6,)."""
+        """Deflection of the tip in the cut, (m, 3) m, work frame, for joint compliances (n,)."""
         moved, _ = _static(self.arm, self.flange_rotation, setting)
         return np.asarray(np.einsum("mai,mi->ma", moved, self.twists(setting, compliance)))
 
     def twists(self, setting: CutWall, compliance: Array) -> Array:
-        """Twist of the joints in the cut, (m, 6) rad."""
+        """Twist of the joints in the cut, (m, n) rad."""
         _, torque = _static(self.arm, self.flange_rotation, setting)
         return self.torsion.in_cut(self.structure.in_cut(torque), compliance)[0]
 
@@ -140,7 +146,7 @@ class DeformationModel:
         return np.asarray(_filter(len(size), setting.spacing, setting.cutoff)[setting.kept] @ columns)
 
     def largest_twists(self, blocks: Sequence[Block]) -> tuple[Array, Array]:
-        """Approximate compliance of each joint, (6,) rad/(N m), and its largest torsion in a batch, (6,) rad.
+        """Approximate compliance of each joint, (n,) rad/(N m), and its largest torsion in a batch, (n,) rad.
 
         Linear springs are fitted to the evidence on the joints alone. A joint without evidence is taken to
         have at least a hundredth of the largest compliance.
@@ -168,9 +174,9 @@ class DeformationModel:
         return smooth @ (out * slope), smooth @ constant
 
     def _held(self, setting: CutWall) -> Array:
-        """Torque (m, 6), N m, that friction keeps off the springs in the cut, at load-test stiffness."""
+        """Torque (m, n), N m, that friction keeps off the springs in the cut, at load-test stiffness."""
         friction = self.drives.at(setting.commanded, setting.rate, np.zeros(len(setting.rate)))
-        return np.asarray(self.structure.in_cut(friction) / np.array(self.torsion.factor))
+        return np.asarray(self.structure.in_cut(friction) / self.torsion.factors(friction.shape[1]))
 
     def _loaded(self, setting: LoadTest, compliance: Array) -> tuple[Array, Array]:
         moved, torque = _static(self.arm, self.flange_rotation, setting)
@@ -185,7 +191,7 @@ def _calibrating(blocks: Sequence[Block]) -> list[Block]:
 
 @lru_cache(maxsize=1024)
 def _static(arm: Arm, flange_rotation: float, setting: CutWall | LoadTest) -> tuple[Array, Array]:
-    """Displacement of the tip per turn of each joint (m, 3, 6), and the torques of the force on it (m, 6)."""
+    """Displacement of the tip per turn of each joint (m, 3, n), and the torques of the force on it (m, n)."""
     joints = setting.commanded if isinstance(setting, CutWall) else setting.joints
     torque = -joint_torque(tip_jacobian(arm, joints), setting.force)
     return moving_jacobian(arm, joints, flange_rotation), torque
@@ -193,7 +199,7 @@ def _static(arm: Arm, flange_rotation: float, setting: CutWall | LoadTest) -> tu
 
 @lru_cache(maxsize=1024)
 def _outwards(arm: Arm, flange_rotation: float, setting: CutWall) -> tuple[Array, Array]:
-    """Displacement of the tip out of the wall per turn of each joint (m, 6), and the torques of the force."""
+    """Displacement of the tip out of the wall per turn of each joint (m, n), and the torques of the force."""
     moved, torque = _static(arm, flange_rotation, setting)
     return np.einsum("a,mai->mi", setting.normal, moved), torque
 

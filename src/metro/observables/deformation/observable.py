@@ -22,7 +22,7 @@ from metro.observables.deformation import NAME, TABLES
 from metro.observables.deformation.blocks import SYSTEMATIC, cutoff, wall_blocks
 from metro.observables.deformation.model import DeformationModel
 from metro.observables.deformation.proposals import feasible
-from metro.observables.deformation.report import arm_block
+from metro.observables.deformation.report import arm_block, tip_forces
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.robot.kinematics import Arm, arm_of_cell
@@ -149,12 +149,12 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
 def report(
     batch: Batch,
     observed: Mapping[str, pd.DataFrame],
-    _identified: JSON,
+    identified: JSON,
     task: Problem | Refusal,
     fit: BaseFit | None,
 ) -> JSON:
     """Return the ``arm`` block: joint stiffnesses, and what is known of each run."""
-    return {"arm": arm_block(batch, observed, task, fit)}
+    return {"arm": arm_block(batch, observed, task, fit) | tip_forces(batch, observed, identified)}
 
 
 OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, observed_with_coefficients=True)

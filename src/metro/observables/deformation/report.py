@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.joint_columns import Axes
+from metro.observables.arm.force_by_torques import gain_errors
 from metro.observables.arm.load_tests import fitted_loads, in_words, joint_observability
 from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import Wall, wall
@@ -18,7 +20,7 @@ from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.robot.kinematics import arm_of_cell
 from metro.robot.statics import deflections
-from metro.units import DEG, JSON, MM
+from metro.units import JSON, MM, Array
 
 
 def arm_block(
@@ -40,9 +42,6 @@ def arm_block(
         lacking["joint_observability"] = seen.reason
     else:
         block["joint_observability"] = seen
-    if "tip_force" in observed:
-        groups = observed["tip_force"].groupby("run", sort=False)
-        block["tip_force"] = {run: _mean_force(wall(batch, str(run)), rows) for run, rows in groups}
     if "observability" in observed:
         groups = observed["observability"].groupby("run", sort=False)
         block["observability"] = {run: [float(value) for value in rows["index"]] for run, rows in groups}
@@ -72,13 +71,20 @@ def _joint_observability(batch: Batch, observed: Mapping[str, pd.DataFrame]) -> 
         "unseen": identifiability.unseen.tolist(),
         "next_load": {
             "joint": load.joint + 1,
-            "q_deg": (load.joints / DEG).tolist(),
+            **_pose(load.joints, arm.axes),
             "force_n": load.force.tolist(),
             "relative_sd_before": load.before,
             "relative_sd_after": load.after,
         },
-        "sentence": in_words(identifiability, load),
+        "sentence": in_words(identifiability, load, arm.axes),
     }
+
+
+def _pose(joints: Array, axes: Axes) -> JSON:
+    """Angles of the joints that turn, and places of those that shift, where there are any."""
+    places = joints / axes.units
+    shifted = places[np.array(axes.linear)].tolist()
+    return {"q_deg": places[axes.turning].tolist()} | ({"q_mm": shifted} if shifted else {})
 
 
 def wall_figures(model: DeformationModel, block: Block, fit: BaseFit) -> JSON:
@@ -126,30 +132,49 @@ def _stiffness(
     batch: Batch, observed: Mapping[str, pd.DataFrame], fit: BaseFit | None
 ) -> list[JSON] | Refusal:
     """Joint stiffnesses k = 1/c; a joint has no value if its compliance cannot be distinguished from zero."""
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    if arm is None:
+        return Refusal("no arm.dh")
     if fit is not None:
         value, sd, dof = fit.beta, np.sqrt(np.diag(fit.covariance)), fit.dof
     else:
-        arm = arm_of_cell(batch.cell, batch.manifest)
-        tests = (
-            Refusal("no arm.dh")
-            if arm is None
-            else fitted_loads(DeformationModel(arm), observed["arm_loads"])
-        )
+        tests = fitted_loads(DeformationModel(arm), observed["arm_loads"])
         if isinstance(tests, Refusal):
             return tests
         value, sd, dof = tests.value, tests.sd, float(tests.dof)
     identified = value > 2.0 * sd
     known = np.where(identified, value, np.nan)
-    return [quantity(1.0 / c, s / c**2, "N m/rad", dof) for c, s in zip(known, sd, strict=True)]
+    units = ["N/m" if linear else "N m/rad" for linear in arm.axes.linear]
+    return [quantity(1.0 / c, s / c**2, u, dof) for c, s, u in zip(known, sd, units, strict=True)]
 
 
-def _mean_force(face: Wall, rows: pd.DataFrame) -> JSON:
-    """Mean of the steady cut; its error is assumed constant along the wall, like a wrong zero of a torque."""
+def tip_forces(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON) -> JSON:
+    """Return the force on the tip that the deformation takes, run by run; nothing without an arm.
+
+    That of the torques holds the uncertainty of the drives.
+    """
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    if arm is None or "tip_force" not in observed:
+        return {}
+    drives = float(np.sqrt(np.mean(np.diag(gain_errors(batch, identified, arm)[0]))))
+    forces = {}
+    for run, rows in observed["tip_force"].groupby("run", sort=False):
+        relative = drives if rows["source"].iloc[0] == "torque" else 0.0
+        forces[str(run)] = _mean_force(wall(batch, str(run)), rows, relative)
+    return {"tip_force": forces}
+
+
+def _mean_force(face: Wall, rows: pd.DataFrame, relative: float) -> JSON:
+    """Mean of the steady cut; its error is assumed constant along the wall, like a wrong zero of a torque.
+
+    ``relative``: of an error of the whole force.
+    """
     steady = rows[face.steady(rows["x_mm"].to_numpy() * MM)]
-    return {
-        axis: quantity(float(steady[name].mean()), float(steady[f"sd_{name}"].mean()), "N")
-        for axis, name in zip("xyz", FORCE, strict=True)
-    }
+    block: JSON = {}
+    for axis, name in zip("xyz", FORCE, strict=True):
+        force, sd = float(steady[name].mean()), float(steady[f"sd_{name}"].mean())
+        block[axis] = quantity(force, math.hypot(sd, relative * force), "N")
+    return block
 
 
 def _deformation(model: DeformationModel, setting: CutWall, fit: BaseFit) -> JSON:

@@ -23,7 +23,7 @@ from metro.surface.footprint import RADIUS
 from metro.surface.ranking import posterior_draws, probability_best
 from metro.units import JSON, MM, UM, Array
 
-LEFT_BY_A_CUT = ("dynamometer", "robot_log", "idle_log", "scan", "profile", "stable", "started_at")
+LEFT_BY_A_CUT = ("dynamometer", "robot_log", "idle_log", "scan", "profile", "slopes", "stable", "started_at")
 DRAWS = 2000
 SEED = 1
 MANY = 1000  # points that a disc on the face would hold

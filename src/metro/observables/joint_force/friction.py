@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
-from metro.observables.arm.tip_force import ACTUAL, TORQUE
+from metro.joint_columns import Axes
+from metro.observables.arm.load_tests import joint_places
 from metro.observables.problem import Refusal
 from metro.robot.drives import declared, drives_of_cell
 from metro.robot.friction import Friction, of_idle_runs
@@ -19,6 +20,7 @@ from metro.units import DEG, JSON, Array
 
 Read = Callable[..., pd.DataFrame]
 UNITS = {"coulomb": "N m", "viscous": "N m s/rad"}
+LINEAR = "a linear axis, whose drive is not evaluated"
 BINS = 12  # of speed, per direction, in the figure
 LEAST_SAMPLES = 100
 
@@ -37,17 +39,28 @@ def observe(batch: Batch, read: Read) -> dict[str, pd.DataFrame] | Refusal:
     idle = [rows for _, rows in table[table["log"] == "idle"].groupby("run") if len(rows) >= LEAST_SAMPLES]
     if not idle:
         return Refusal("no run has an idle_log")
-    runs = [(r["t_s"].to_numpy(), r[ACTUAL].to_numpy() * DEG, r[TORQUE].to_numpy()) for r in idle]
+    axes = arm.axes
+    runs = [(r["t_s"].to_numpy(), joint_places(r, arm), _torques(r, axes)) for r in idle]
     try:
         friction, log = of_idle_runs(arm.dh, runs)
     except ValueError as error:
         return Refusal(f"idle runs: {error}")
-    drives = drives_of_cell(batch.cell, len(TORQUE))
-    relative = drives.relative if declared(batch.cell) else np.zeros(len(TORQUE))
-    return {"joint_friction": _table(friction, log, relative), "joint_friction_curve": _curve(friction, log)}
+    drives = drives_of_cell(batch.cell, len(axes))
+    relative = drives.relative if declared(batch.cell) else np.zeros(len(axes))
+    return {
+        "joint_friction": _table(friction, log, relative, axes),
+        "joint_friction_curve": _curve(friction, log),
+    }
 
 
-def _table(friction: Friction, log: Motion, relative: Array) -> pd.DataFrame:
+def _torques(log: pd.DataFrame, axes: Axes) -> Array:
+    """Torques of all joints (m, n), N m; zero of a linear axis, whose drive is not evaluated."""
+    torque = np.zeros((len(log), len(axes)))
+    torque[:, axes.turning] = log[axes.torques].to_numpy(dtype=float)
+    return torque
+
+
+def _table(friction: Friction, log: Motion, relative: Array, axes: Axes) -> pd.DataFrame:
     """Tabulate the friction; ``relative`` (n,) is the standard uncertainty of the torques, where declared."""
     fastest = np.where(log.moving, np.abs(log.rate), 0.0).max(axis=0)
     drives = np.hypot(friction.sd, relative[:, None] * np.nan_to_num(friction.value))
@@ -63,7 +76,8 @@ def _table(friction: Friction, log: Motion, relative: Array) -> pd.DataFrame:
         for i, name in enumerate(UNITS):
             low, high = interval[j, i] if np.isfinite(value[i]) else (np.nan, np.nan)
             row |= {name: value[i], f"{name}_low": low, f"{name}_high": high}
-        rows.append(row | {"remark": _remark(friction, j, value)})
+        remark = LINEAR if axes.linear[j] else _remark(friction, j, value)
+        rows.append(row | {"remark": remark})
     return pd.DataFrame(rows)
 
 
@@ -96,7 +110,7 @@ def _curve(friction: Friction, log: Motion) -> pd.DataFrame:
 
 
 def report(observed: dict[str, pd.DataFrame] | Refusal) -> JSON:
-    """Return the part of the ``arm`` block: six quantities each of ``coulomb`` and ``viscous`` friction.
+    """Return the part of the ``arm`` block: ``coulomb`` and ``viscous`` friction, a quantity per joint.
 
     A value that the idle runs do not identify is null, with the reason under ``not_identified``.
     """

@@ -19,11 +19,11 @@ from metro.observables.problem import Block, Parameter
 from metro.robot.drive_torques import DriveTorques
 from metro.robot.kinematics import Arm
 from metro.robot.payload import Payload, gravity_torque
-from metro.robot.statics import joint_torque, tip_jacobian
+from metro.robot.statics import driven_jacobian, joint_torque
 from metro.signals.waves import waves
 from metro.units import Array
 
-JOINTS, AXES = range(1, 7), "xyz"
+AXES = "xyz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +56,9 @@ class TorqueRun:
 
     Attributes
     ----------
-    q, rate : (m, 6) joint angles, rad, and speeds, rad/s. t, width : (m,) middle and length of the bin's
-        time, s, by the dynamometer's clock. since : (m,) the same from the start of the log.
+    q, rate : (m, n) of all joints: angles, rad, and speeds, rad/s; m and m/s of a linear axis.
+    t, width : (m,) middle and length of the bin's time, s, by the dynamometer's clock. since : (m,) the same
+        from the start of the log.
     force : the dynamometer's record.
     """
 
@@ -93,41 +94,48 @@ class JointForceModel:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """One gain error that all torques share, and one for each joint and each axis."""
-        names = ["torque_gain", *(f"gain_of_joint_{i}" for i in JOINTS), *(f"gain_of_{a}" for a in AXES)]
+        """One gain error that all torques share, and one for each joint that turns and each axis."""
+        names = ["torque_gain", *(f"gain_of_joint_{i + 1}" for i in self.joints)]
+        names += [f"gain_of_{a}" for a in AXES]
         return tuple(Parameter(name, "1") for name in names)
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Joints whose torques are compared, from 0: those that turn."""
+        return tuple(self.arm.axes.turning)
 
     def nuisance_starts(self, _block: Block) -> Array:
         """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
         return np.zeros((1, 0))
 
     def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
-        """Torque (6 m, 10) per gain, and the torque without a force (6 m,), N m, as waves along the path.
+        """Torque (k m, k + 4) per gain, and that without a force (k m,), N m, as waves along the path.
 
-        For :class:`Instruments` they are the gains (9, 10) themselves.
+        For :class:`Instruments` they are the gains (k + 3, k + 4) themselves; k joints turn.
         """
         run: Any = block.setting
         if isinstance(run, Instruments):
-            return np.eye(10)[1:], np.zeros(9)
+            gains = len(self.parameters)
+            return np.eye(gains)[1:], np.zeros(gains - 1)
         other = self.drives.at(run.q, run.rate, run.since, run.width)
         for mass in self.payload:
             other = other + gravity_torque(self.arm, run.q, mass)
-        return carried(self.arm, run, self.offset), in_waves(other)
+        return carried(self.arm, run, self.offset), in_waves(other[:, list(self.joints)])
 
 
 @lru_cache(maxsize=256)
 def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
-    """Waves (6 m, 10), N m, of the torque that balances the force: whole, of each joint, of each axis.
+    """Waves (k m, k + 4), N m, of the torque that balances the force: whole, of each joint, of each axis.
 
     The log stamps it ``offset`` s later than the dynamometer.
     """
-    force, jacobian = run.force.mean(run.t - offset, run.width), tip_jacobian(arm, run.q)
+    force, jacobian = run.force.mean(run.t - offset, run.width), driven_jacobian(arm, run.q)
     by_axis = [in_waves(joint_torque(jacobian, force * axis)) for axis in np.eye(3)]
     whole = np.sum(by_axis, axis=0)
-    by_joint = np.kron(np.eye(6), np.ones((len(force), 1))) * whole[:, None]
+    by_joint = np.kron(np.eye(jacobian.shape[-1]), np.ones((len(force), 1))) * whole[:, None]
     return np.column_stack([whole, by_joint, *by_axis])
 
 
 def in_waves(torque: Array) -> Array:
-    """Return torques (m, 6) as waves along the path (6 m,), joint after joint."""
+    """Return torques (m, k) as waves along the path (k m,), joint after joint."""
     return waves(torque).T.ravel()

@@ -10,11 +10,12 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
+from metro.joint_columns import axes_of
 from metro.observables.arm import joint_logs, tip_force
 from metro.observables.arm.clock import Clock, clock
 from metro.observables.arm.force_by_torques import force_without_dynamometer
 from metro.observables.arm.no_arm import no_arm
-from metro.observables.arm.tip_force import ACTUAL, FORCE, JOINTS, REPEATABLE, TORQUE
+from metro.observables.arm.tip_force import FORCE, REPEATABLE
 from metro.observables.arm.wall import wall
 from metro.observables.joint_force import NAME, TABLES, friction
 from metro.observables.joint_force.model import (
@@ -31,19 +32,17 @@ from metro.observables.quantity import quantity
 from metro.robot.drive_torques import TURNING
 from metro.robot.drives import declared, drives_of_cell
 from metro.robot.kinematics import Arm, arm_of_cell
-from metro.robot.statics import tip_jacobian
+from metro.robot.statics import driven_jacobian
 from metro.signals import align, kalman
 from metro.signals.intervals import uneven
 from metro.signals.waves import variance, wandering, waves
-from metro.units import DEG, JSON, MM, MS, Array
+from metro.units import JSON, MM, MS, Array
 
 SCATTER = 0.01
 CALIBRATED = 0.01  # relative error of the torque of a joint and of an axis of the dynamometer, in all runs
 
 GRID = 5 * MS
-RATE = [f"rate{i}_deg_s" for i in JOINTS]
-NOISE = [f"noise{i}_nm" for i in JOINTS]
-WANDER = [f"wander{i}_nm" for i in JOINTS]
+NOISE, WANDER = "noise{}_nm", "wander{}_nm"
 WORK = ("x", "y", "z")
 LONG, SHORT = 50.0, 5.0  # mm, of waves along the path as the report names them
 
@@ -116,7 +115,7 @@ def _torque(
     time = cut.time if meet else cut.time - begun
     channels = [
         np.column_stack([cut.torque, cut.actual, rate, time, cut.tip @ wall(batch, run).along]),
-        np.column_stack([idle.torque, np.zeros((len(idle.torque), 14))]),
+        np.column_stack([idle.torque, np.zeros((len(idle.torque), 2 * len(arm.axes) + 2))]),
     ]
     places = [align.along_path(log.tip, cut.tip) for log in (cut, idle)]
     width = max(tip_force.BIN, 3 * step)
@@ -132,17 +131,20 @@ def _torque(
         for log in (cut, idle)
     ]
     # what wanders in the idle run wanders as much in the cut, where the force hides it
-    turning = np.tanh(pair.first[:, 12:18] / TURNING)
-    idling = wandering(pair.second[:, :6], white[1] / samples, turning, uneven(pair.s) if gaps else None)
+    axes, parts = arm.axes, np.cumsum([len(arm.axes.turning), len(arm.axes), len(arm.axes)])
+    torque, actual, rates, rest = np.split(pair.first, parts, axis=1)
+    idle_torque = pair.second[:, : parts[0]]
+    turning = np.tanh(rates[:, axes.turning] / TURNING)
+    idling = wandering(idle_torque, white[1] / samples, turning, uneven(pair.s) if gaps else None)
     start = wall(batch, run).start
-    columns = {"s_mm": pair.s / MM, "x_mm": (pair.first[:, 19] - start) / MM, "t_s": pair.first[:, 18]}
+    columns = {"s_mm": pair.s / MM, "x_mm": (rest[:, 1] - start) / MM, "t_s": rest[:, 0]}
     columns |= {"since_s": columns["t_s"] - (begun if meet else 0.0), "meet": np.full(len(pair.s), meet)}
     columns |= {"width_s": np.full(len(pair.s), samples * period), "samples": np.full(len(pair.s), samples)}
-    columns |= dict(zip(TORQUE, (pair.first[:, :6] - pair.second[:, :6]).T, strict=True))
-    columns |= dict(zip(ACTUAL, pair.first[:, 6:12].T / DEG, strict=True))
-    columns |= dict(zip(RATE, pair.first[:, 12:18].T / DEG, strict=True))
-    columns |= dict(zip(NOISE, np.sqrt(white[0] + white[1]), strict=True))
-    columns |= dict(zip(WANDER, np.sqrt(2.0 * idling), strict=True))
+    columns |= dict(zip(axes.torques, (torque - idle_torque).T, strict=True))
+    columns |= dict(zip(axes.positions, (actual / axes.units).T, strict=True))
+    columns |= dict(zip(axes.rates, (rates / axes.units).T, strict=True))
+    columns |= dict(zip(axes.driven(NOISE), np.sqrt(white[0] + white[1]), strict=True))
+    columns |= dict(zip(axes.driven(WANDER), np.sqrt(2.0 * idling), strict=True))
     return pd.DataFrame(columns)
 
 
@@ -159,7 +161,8 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     forces = dict(tuple(observed["tool_force"].groupby("run")))
     roles = batch.runs["role"].to_dict()
     # one run tells little of its slow noise: all of them together do
-    wander = np.sqrt((observed["joint_torque"].groupby("run")[WANDER].first() ** 2).mean().to_numpy())
+    levels = observed["joint_torque"].groupby("run")[arm.axes.driven(WANDER)].first()
+    wander = np.sqrt((levels**2).mean().to_numpy())
     blocks = tuple(
         _block(batch.runs.loc[str(run)], table, forces[run], arm, wander)
         for run, table in observed["joint_torque"].groupby("run", sort=False)
@@ -183,19 +186,20 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     scatter = np.zeros(len(model.parameters))
     scatter[0] = SCATTER
     return Problem(
-        NAME, "N", 1.0, model, (_instruments(batch), *blocks), scatter, notes=notes, basis_unit="N m"
+        NAME, "N", 1.0, model, (_instruments(batch, arm), *blocks), scatter, notes=notes, basis_unit="N m"
     )
 
 
-def _instruments(batch: Batch) -> Block:
+def _instruments(batch: Batch, arm: Arm) -> Block:
     """Return what is known of the gains of joints and axes; of joints, what the cell declares of each one."""
-    count = len(JOINTS) + len(WORK)
-    zeros, axis = np.zeros((count, 0)), np.array([*(f"joint {i}" for i in JOINTS), *WORK])
+    joints, names = arm.axes.turning, arm.axes.driven("joint {}")
+    count = len(joints) + len(WORK)
+    zeros, axis = np.zeros((count, 0)), np.array([*names, *WORK])
     known, sigma = np.zeros(count), np.full(count, CALIBRATED)
     if declared(batch.cell):
-        drives = drives_of_cell(batch.cell, len(JOINTS)).covariance
-        own = np.diag(drives) - drives[0, 1]  # what joints share is the gain of all torques
-        sigma[: len(JOINTS)] = np.maximum(np.sqrt(np.maximum(own, 0.0)), CALIBRATED)
+        drives = drives_of_cell(batch.cell, len(arm.axes)).covariance
+        own = np.diag(drives)[joints] - drives[0, 1]  # what joints share is the gain of all torques
+        sigma[: len(joints)] = np.maximum(np.sqrt(np.maximum(own, 0.0)), CALIBRATED)
     return Block(
         "instruments", "instruments", "calibrate", 0, known, sigma, Instruments(), axis, zeros, known[:0], {}
     )
@@ -203,13 +207,13 @@ def _instruments(batch: Batch) -> Block:
 
 def _block(row: Any, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander: Array) -> Block:
     """Torques of the run whose row of the run table is ``row``, in waves along its path."""
-    setting, count = torque_run(table, force), len(table)
-    noise = table[NOISE].to_numpy()[0]
+    setting, count, axes = torque_run(table, force), len(table), arm.axes
+    noise = table[axes.driven(NOISE)].to_numpy()[0]
     white = noise**2 / table["samples"].iloc[0]
-    turning = np.tanh(setting.rate / TURNING)
-    zeros = np.stack([in_waves(turning * joint) for joint in np.eye(6)], axis=1)
+    turning = np.tanh(setting.rate[:, axes.turning] / TURNING)
+    zeros = np.stack([in_waves(turning * joint) for joint in np.eye(len(axes.turning))], axis=1)
     solve = _least_squares(arm, setting, np.sqrt(white))
-    torque = table[TORQUE].to_numpy()
+    torque = table[axes.torques].to_numpy()
     known = setting.force.mean(setting.t, setting.width)
     return Block(
         run=str(row.name),
@@ -219,10 +223,10 @@ def _block(row: Any, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander:
         measured=in_waves(torque),
         sigma=np.sqrt(variance(count, white, wander**2)).T.ravel(),
         setting=setting,
-        axis=np.repeat([f"joint {i}" for i in JOINTS], count),
+        axis=np.repeat(axes.driven("joint {}"), count),
         zeros=zeros,
         zero_sd=REPEATABLE * noise,
-        labels=np.tile(_lengths(table["s_mm"].to_numpy()), 6),
+        labels=np.tile(_lengths(table["s_mm"].to_numpy()), len(axes.turning)),
         synthesis=-solve,
         anchor=known.T.ravel() + solve @ in_waves(torque),
         coordinates={
@@ -237,7 +241,8 @@ def _block(row: Any, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander:
 def torque_run(table: pd.DataFrame, force: pd.DataFrame) -> TorqueRun:
     """Return what the model needs of a run's rows of ``joint_torque`` and ``tool_force``."""
     record = running(force["t_s"].to_numpy(), force[FORCE].to_numpy())
-    q, rate = table[ACTUAL].to_numpy() * DEG, table[RATE].to_numpy() * DEG
+    axes = axes_of(table)
+    q, rate = (table[names].to_numpy() * axes.units for names in (axes.positions, axes.rates))
     time, since, width = (table[name].to_numpy() for name in ("t_s", "since_s", "width_s"))
     return TorqueRun(q, rate, time, since, width, record)
 
@@ -250,15 +255,15 @@ def _lengths(s_mm: Array) -> np.ndarray:
 
 
 def _least_squares(arm: Arm, setting: TorqueRun, sigma: Array) -> Array:
-    """Map (3 m, 6 m) from waves of the torques to the force on the tip: weighted least squares in each bin.
+    """Map (3 m, k m) from waves of the torques to the force on the tip: weighted least squares in each bin.
 
-    ``sigma`` (6,) of the joints, N m.
+    ``sigma`` (k,) of the joints that turn, N m.
     """
     count = len(setting.q)
-    system = -np.swapaxes(tip_jacobian(arm, setting.q), 1, 2) / sigma[:, None]
+    system = -np.swapaxes(driven_jacobian(arm, setting.q), 1, 2) / sigma[:, None]
     solve = np.linalg.pinv(system) / sigma
     back = waves(np.eye(count)).T  # orthonormal: its transpose makes series of waves
-    return np.asarray(np.einsum("mai,mw->amiw", solve, back).reshape(3 * count, 6 * count))
+    return np.asarray(np.einsum("mai,mw->amiw", solve, back).reshape(3 * count, -1))
 
 
 def report(

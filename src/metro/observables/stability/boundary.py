@@ -9,10 +9,9 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.cutting.cutter import Cutter
-from metro.cutting.envelope import mean_inclination
-from metro.dynamics.band import depth_samples, depths_anew
-from metro.dynamics.lobes import Boundary, stability_boundary
-from metro.dynamics.system import Cut, immersion
+from metro.dynamics.by_depth import boundary_of_edge, depths_anew
+from metro.dynamics.lobes import Boundary
+from metro.dynamics.system import Cut, Edge, immersion
 from metro.dynamics.teeth import equal_teeth, mean_directional_factors
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.problem import Refusal
@@ -44,12 +43,14 @@ class Cutting:
     ktc, krc : N/m²; the radial one is that in the plane, of an end that is not flat its mean over the height.
     sd : (2,) standard deviations of their logarithms.
     tool : the cutter with its teeth.
+    edge : of an end that is not flat.
     """
 
     ktc: float
     krc: float
     sd: Array
     tool: Cutter
+    edge: Edge | None = None
 
 
 @dataclass(frozen=True)
@@ -88,11 +89,11 @@ def cutting(batch: Batch, identified: JSON) -> Cutting | Refusal:
         interval = [end for end in (waveform.get(name) or {}).get("ci95") or () if end is not None]
         known = len(interval) == 2 and values[name] != 0
         sd.append((interval[1] - interval[0]) / (2 * 1.96 * abs(values[name])) if known else COEFFICIENT_SD)
-    radial = values["krc"]
+    radial, edge = values["krc"] * N_MM2, None
     if not tool.cylindrical:
-        along, across = mean_inclination(tool, _usual_depth(batch))
-        radial = along * radial - across * values["kac"]
-    return Cutting(values["ktc"] * N_MM2, radial * N_MM2, np.array(sd), tool)
+        edge = Edge(tool, radial, values["kac"] * N_MM2)
+        radial = edge.radial(_usual_depth(batch))
+    return Cutting(values["ktc"] * N_MM2, radial, np.array(sd), tool, edge)
 
 
 def _usual_depth(batch: Batch) -> float:
@@ -128,9 +129,9 @@ def _of_the_end(batch: Batch) -> list[str]:
     if tool.cylindrical:
         return [] if cutting_force.end_declared(batch) else ["a flat end of the tool is assumed"]
     return [
-        "corner, ball end and taper: the radial coefficient is K_rc sin κ - K_ac cos κ with the means over "
-        f"the height of a cut {_usual_depth(batch) / MM:.2g} mm deep (κ: edge angle), at all depths; side "
-        "cuts have the engagement of the full radius"
+        "corner, ball end and taper: the radial coefficient is K_rc sin κ - K_ac cos κ (κ: edge angle) with "
+        "the means over the height of the cut at each depth of the boundary; other methods and islands take "
+        f"them at {_usual_depth(batch) / MM:.2g} mm; side cuts have the engagement of the full radius"
     ]
 
 
@@ -162,7 +163,8 @@ def _cut(first: pd.Series, cutting: Cutting, turn: float) -> Cut:
     diameter = 2 * cutting.tool.radius
     radial = diameter if pd.isna(first["radial_depth_mm"]) else first["radial_depth_mm"] * MM
     entry, leave = immersion(direction, radial, diameter)
-    return Cut(len(cutting.tool.tooth_angles), entry - turn, leave - turn, cutting.ktc, cutting.krc)
+    teeth = len(cutting.tool.tooth_angles)
+    return Cut(teeth, entry - turn, leave - turn, cutting.ktc, cutting.krc, edge=cutting.edge)
 
 
 def _distinct(turned: list[tuple[float, Cut]]) -> tuple[tuple[float, ...], tuple[Cut, ...]]:
@@ -205,10 +207,9 @@ def solve(tip: Tip, cutting: Cutting, first: pd.Series, rpm: Array, *, check: bo
     turns, cuts = cuts_of(first, cutting)
     sd = np.concatenate([tip.sd, cutting.sd])
     deviations = np.random.default_rng(1).normal(size=(SAMPLES, len(sd))) * np.where(np.isfinite(sd), sd, 0.0)
-    boundaries = [stability_boundary(tip.structure, cut, rpm) for cut in cuts]
-    samples = [
-        depth_samples(tip.structure, cut, one, deviations) for cut, one in zip(cuts, boundaries, strict=True)
-    ]
+    found = [boundary_of_edge(tip.structure, cut, rpm) for cut in cuts]
+    boundaries = [one.boundary() for one in found]
+    samples = [one.samples(tip.structure, deviations) for one in found]
     which = np.argmin([one.depth for one in boundaries], axis=0)
     lobes = Lobes(tip, cuts, turns, _lowest(boundaries, which), which, np.min(samples, axis=0))
     if not check:

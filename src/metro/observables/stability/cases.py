@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from metro.dynamics.band import depth_samples
-from metro.dynamics.lobes import stability_boundary
+from metro.dynamics.by_depth import boundary_of_edge
 from metro.dynamics.stability_model import StabilityModel, estimated
 from metro.observables.stability import boundary as stability
 from metro.observables.stability.boundary import Cutting
@@ -50,9 +49,10 @@ class Case:
         """Draws (draws, k) of the depth's logarithm from the errors of modes and coefficients."""
         rng = np.random.default_rng(seed)
         normal = rng.normal(size=(draws, len(self.sd))) * np.where(np.isfinite(self.sd), self.sd, 0.0)
-        solved = [(cut, stability_boundary(self.model.structure, cut, self.rpm)) for cut in self.model.cuts]
-        samples = [depth_samples(self.model.structure, cut, one, normal) for cut, one in solved]
-        lowest, sampled = np.min([one.depth for _, one in solved], axis=0), np.min(samples, axis=0)
+        structure = self.model.structure
+        solved = [boundary_of_edge(structure, cut, self.rpm) for cut in self.model.cuts]
+        lowest = np.min([one.depth for one in solved], axis=0)
+        sampled = np.min([one.samples(structure, normal) for one in solved], axis=0)
         known = np.isfinite(lowest) & np.isfinite(sampled)
         return np.log(np.where(known, sampled, 1.0) / np.where(known, lowest, 1.0))
 

@@ -15,8 +15,8 @@ import pandas as pd
 
 from metro.cutting.cutter import Cutter
 from metro.dynamics import cdsem, semidiscretisation
+from metro.dynamics.by_depth import boundary_of_edge
 from metro.dynamics.islands import all_crossings
-from metro.dynamics.lobes import stability_boundary
 from metro.dynamics.system import Cut, Structure
 from metro.dynamics.teeth import Engagement, eccentric_teeth, equal_teeth
 from metro.observables.stability.boundary import Lobes
@@ -167,6 +167,6 @@ def _interpolation_error(own: Lobes, interpolated: Tip | None) -> tuple[float, f
     if interpolated is None:
         return np.nan, np.nan
     rpm = own.boundary.rpm
-    depth = np.min([stability_boundary(interpolated.structure, cut, rpm).depth for cut in own.cuts], axis=0)
+    depth = np.min([boundary_of_edge(interpolated.structure, cut, rpm).depth for cut in own.cuts], axis=0)
     ratio = np.abs(np.log(depth / own.boundary.depth))
     return float(depth.min()) / MM, 100.0 * float(np.median(ratio[np.isfinite(ratio)]))

@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
-from metro.observables.arm.tip_force import FORCE, SET
+from metro.joint_columns import numbered
+from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import wall
 from metro.observables.problem import Block
 from metro.observables.waviness.model import WavyCut
@@ -19,7 +20,7 @@ from metro.robot.kinematics import Arm
 from metro.robot.statics import joint_torque, tip_jacobian
 from metro.surface.profile import part, transmission
 from metro.surface.waves import signal_share, wave_basis
-from metro.units import DEG, MM, UM, Array
+from metro.units import MM, UM, Array
 
 LEAST = 0.6  # of the shortest wavelength: the filter passes less than a seventh of shorter waves
 NYQUIST = 2.0  # samples of the log per shortest wave that it can resolve
@@ -43,7 +44,7 @@ def wave_block(
     Parameters
     ----------
     points, facts : the run's rows of ``waviness_points`` and ``waviness_runs``. force : on the tip along the
-        path (table ``tip_force``); None if it is not known. compliance : (6,) of the joints, rad/(N m).
+        path (table ``tip_force``); None if it is not known. compliance : (n,) of the joints, rad/(N m).
 
     Notes
     -----
@@ -61,13 +62,15 @@ def wave_block(
     waves, length = waves[free], length[free]
     band = part(np.eye(len(points)), GRID, cutoff, shortest).waviness[kept]
     passes = transmission(length, shortest) - transmission(length, cutoff)
-    by_joint = waves @ band @ (points[STRAYED].to_numpy() * UM)
-    coded = (np.array([facts[name] for name in ENCODER], dtype=float) * UM) ** 2 * step / GRID
+    strayed = points[numbered(STRAYED, points)].to_numpy() * UM
+    by_joint = waves @ band @ strayed
+    coded = (
+        (np.array([facts[name] for name in numbered(ENCODER, facts)], dtype=float) * UM) ** 2 * step / GRID
+    )
     profile = points.loc[kept, "waviness_um"].to_numpy() * UM
     profiler = float(batch.instrument("profiler").get("sigma_mm", 0.0005)) * MM
     traced = profiler**2 * facts["profile_step_mm"] * MM / GRID
     share, missed, passed = signal_share(by_joint / passes[:, None], coded, waves @ profile / passes, traced)
-    strayed = points[STRAYED].to_numpy() * UM
     longer, _ = wave_basis(int(kept.sum()), GRID, cutoff, np.inf)
     place, axis = points.loc[kept, "x_mm"].to_numpy(), np.full(int(kept.sum()), "z")
     return Block(
@@ -80,7 +83,7 @@ def wave_block(
         alike=passes * np.sqrt(missed),
         setting=WavyCut(
             by_joint=by_joint,
-            idle=_known(waves @ band @ (points[IDLE].to_numpy() * UM)),
+            idle=_known(waves @ band @ (points[numbered(IDLE, points)].to_numpy() * UM)),
             share=share,
             longer=np.stack([longer @ profile, longer @ (band @ strayed.sum(axis=1))]) @ longer,
             filtered=waves @ band,
@@ -102,7 +105,7 @@ def _known(waves: Array) -> Array | None:
 
 def _joints(points: pd.DataFrame, force: pd.DataFrame | None, arm: Arm, normal: Array) -> dict[str, Array]:
     """Angles, speeds, times, motion of the tip, and torques of the cut at the points."""
-    q, t = points[SET].to_numpy() * DEG, points["t_s"].to_numpy()
+    q, t = points[arm.axes.commanded].to_numpy() * arm.axes.units, points["t_s"].to_numpy()
     jacobian = tip_jacobian(arm, q)
     load = np.zeros_like(q)
     if force is not None:  # mean of the steady cut: its noise along the path is no wave of the wall

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from metro.observables.problem import Block, Parameter
+from metro.robot.by_joint import of_joints
 from metro.robot.drive_torques import DriveTorques
 from metro.robot.torsion import Torsion, passed
 from metro.units import Array
@@ -26,13 +27,13 @@ class WavyCut:
 
     Attributes
     ----------
-    by_joint : (n, 6) tracking error of the tip along the wall's normal by the encoders, joint by joint,
-        filtered as the profile is, m. idle : (n, 6) that of the idle run; None if there is none.
-    share : (n, 6) share of each joint's waves that is not noise of its encoder.
-    q, rate : (m, 6) joint angles, rad, and speeds, rad/s. t : (m,) from the start of the log of the cut, s.
-    moves : (m, 6) displacement of the tip along the wall's normal per turn of each joint, m/rad.
-    load : (m, 6) torque of the steady cut on the link of each joint, N m; zero if no force is known.
-    compliance : (6,) of the joints, rad/(N m).
+    by_joint : (k, n) tracking error of the tip along the wall's normal by the encoders, joint by joint,
+        filtered as the profile is, m. idle : (k, n) that of the idle run; None if there is none.
+    share : (k, n) share of each joint's waves that is not noise of its encoder.
+    q, rate : (m, n) joint angles, rad, and speeds, rad/s. t : (m,) from the start of the log of the cut, s.
+    moves : (m, n) displacement of the tip along the wall's normal per turn of each joint, m/rad.
+    load : (m, n) torque of the steady cut on the link of each joint, N m; zero if no force is known.
+    compliance : (n,) of the joints, rad/(N m).
     filtered : (n, m) map from heights at the points to waves, filtered as the profile is.
     longer : (2, rows) longer waves that pass the filter, of the profile and of the tracking error, m. They
         belong to the deformation too, so they are not compared.
@@ -75,11 +76,13 @@ class WavinessModel:
 
     Attributes
     ----------
+    joints : that effects of one joint may belong to, from 0.
     drives : torques of friction and gears that the idle run does not have.
     torsion : of the joints; only its gaps make waves.
     vibration : waves that are functions of time alone, not of the place.
     """
 
+    joints: tuple[int, ...]
     drives: DriveTorques = field(default_factory=DriveTorques)
     torsion: Torsion = field(default_factory=Torsion)
     vibration: tuple[Vibration, ...] = ()
@@ -97,7 +100,7 @@ class WavinessModel:
         """Waves (n, 1), m per unit of transfer, and the waves that no encoder sees (n,), m."""
         run: Any = block.setting
         torque = run.load - self.drives.at(run.q, run.rate, run.t)
-        twist = run.compliance * torque + passed(run.load, np.array(self.torsion.gap))
+        twist = run.compliance * torque + passed(run.load, of_joints(self.torsion.gap, len(run.compliance)))
         unseen = (run.moves * twist).sum(axis=1)
         for swing in self.vibration:
             unseen = unseen + swing.at(run.t)

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.joint_columns import numbered
 from metro.observables.arm import tip_force
 from metro.observables.arm.load_tests import best_compliance
 from metro.observables.arm.no_arm import no_arm
@@ -103,14 +104,16 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         f"{_cutoff(batch) / MM:g} mm (ISO 16610-21); one cut-off is left out at both ends. Waves longer than "
         "the cut-off, and those as long as the feed marks, are not compared.",
         "The encoders' noise is "
-        f"{np.sqrt((used[ENCODER] ** 2).sum(axis=1)).median():.2g} µm at the tip, every "
+        f"{np.sqrt((used[numbered(ENCODER, used)] ** 2).sum(axis=1)).median():.2g} µm at the tip, every "
         f"{used['log_step_mm'].median():.2g} mm: each wave of each joint counts by what of it may be more.",
         *_said_of_shifts(used),
         *([] if compliance.any() else ["No joint compliance is known: torques twist no joint here."]),
         *([] if forces else ["No force on the tip is known: no joint passes a gap here."]),
         *notes,
     )
-    return Problem(NAME, "um", UM, WavinessModel(), blocks, np.array([SCATTER]), SYSTEMATIC, said)
+    return Problem(
+        NAME, "um", UM, WavinessModel(tuple(arm.axes.turning)), blocks, np.array([SCATTER]), SYSTEMATIC, said
+    )
 
 
 def _said_of_shifts(facts: pd.DataFrame) -> list[str]:
@@ -126,7 +129,7 @@ def _said_of_shifts(facts: pd.DataFrame) -> list[str]:
 
 
 def _compliance(batch: Batch, arm: Arm, observed: Mapping[str, pd.DataFrame]) -> Array:
-    """Joint compliances (6,) before any cut: of the load tests, else of the cell file, else none."""
+    """Joint compliances (n,) before any cut: of the load tests, else of the cell file, else none."""
     return best_compliance(batch, DeformationModel(arm), observed.get("arm_loads", pd.DataFrame()))
 
 

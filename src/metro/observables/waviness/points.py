@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pandas as pd
 
-from metro.observables.arm.tip_force import JOINTS, SET, Log
+from metro.joint_columns import numbered
+from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall
 from metro.observables.arm.wall_profile import in_the_cut
 from metro.observables.problem import Refusal
@@ -17,7 +18,7 @@ from metro.robot.statics import tip_jacobian
 from metro.surface.profile import ROUGHNESS_CUTOFF, even, part
 from metro.surface.shift import Shift, shift_between
 from metro.surface.waves import white_noise
-from metro.units import DEG, MM, UM, Array
+from metro.units import MM, UM, Array
 
 GRID = 0.16 * MM  # five points per shortest wave of the waviness
 SAMPLES = 3.0  # of the log per shortest wave that can be compared
@@ -26,9 +27,7 @@ ALIGNED = (
 )  # shorter waves are not used to align profile and log, because they contain the encoders' noise
 LEAST_LENGTH = 3  # cut-offs: one is omitted at either end, at least one is compared
 LEAST_SAMPLES = 16
-STRAYED = [f"strayed{i}_um" for i in JOINTS]
-IDLE = [f"strayed_idle{i}_um" for i in JOINTS]
-ENCODER = [f"encoder{i}_um" for i in JOINTS]
+STRAYED, IDLE, ENCODER = "strayed{}_um", "strayed_idle{}_um", "encoder{}_um"
 
 Points = tuple[pd.DataFrame, dict[str, object]]
 
@@ -74,7 +73,9 @@ def wave_points(
             return points
     back = _way(idle, arm, wall) if len(idle.tip) else None
     place = points["x_mm"].to_numpy() * MM - shift.value * shift.detected
-    points[IDLE] = np.full((len(points), len(IDLE)), np.nan) if back is None else back.strayed_at(place) / UM
+    numbers = range(1, len(arm.axes) + 1)
+    strayed = np.full((len(points), len(numbers)), np.nan) if back is None else back.strayed_at(place) / UM
+    points[[IDLE.format(i) for i in numbers]] = strayed
     facts: dict[str, object] = {
         "shift_mm": shift.value / MM,
         "shift_sd_mm": shift.sd / MM,
@@ -84,16 +85,17 @@ def wave_points(
         "profile_step_mm": (x[1] - x[0]) / MM,
         "log_step_mm": step / MM,
         "idle_speed": math.nan if back is None else back.speed / way.speed,
-        **{name: math.sqrt(white_noise(one)) / UM for name, one in zip(ENCODER, way.strayed.T, strict=True)},
+        **{ENCODER.format(i): math.sqrt(white_noise(way.strayed[:, i - 1])) / UM for i in numbers},
     }
     return points, facts
 
 
 class _Way:
-    """The log of a pass along a wall, by place: ``strayed`` (n, 6) m along the wall's normal by joint."""
+    """The log of a pass along a wall, by place: ``strayed`` (m, n) m along the wall's normal by joint."""
 
     def __init__(self, place: Array, log: Log, arm: Arm, wall: Wall) -> None:
         self.place, first = np.unique(place, return_index=True)
+        self.axes = arm.axes
         self.commanded, self.time = log.commanded[first], log.time[first]
         moves = np.einsum("a,mai->mi", wall.normal, tip_jacobian(arm, self.commanded))
         self.strayed = moves * (log.actual[first] - self.commanded)
@@ -101,7 +103,7 @@ class _Way:
         self.speed = self.step / float(np.median(np.diff(np.sort(self.time))))
 
     def strayed_at(self, place: Array) -> Array:
-        """Tracking error (m, 6) at places (m,), the mean over one grid spacing; NaN beyond the log.
+        """Tracking error (m, n) at places (m,), the mean over one grid spacing; NaN beyond the log.
 
         The mean removes noise that is finer than the grid.
         """
@@ -148,8 +150,8 @@ def _on_grid(
         "t_s": np.interp(place, way.place, way.time),
         "waviness_um": np.interp(grid, x, waves) / UM,
         "kept": kept,
-        **dict(zip(SET, joints.T / DEG, strict=True)),
-        **dict(zip(STRAYED, way.strayed_at(place).T / UM, strict=True)),
+        **dict(zip(way.axes.commanded, (joints / way.axes.units).T, strict=True)),
+        **{STRAYED.format(i + 1): one / UM for i, one in enumerate(way.strayed_at(place).T)},
     }
     return pd.DataFrame(columns)
 
@@ -159,14 +161,14 @@ def _shift(points: pd.DataFrame, wall: Wall, arm: Arm, cutoff: float) -> Shift:
 
     A joint that reverses may leave a step that is no tracking error; the fit includes such steps.
     """
-    joints, t = points[SET].to_numpy() * DEG, points["t_s"].to_numpy()
+    joints, t = points[arm.axes.commanded].to_numpy() * arm.axes.units, points["t_s"].to_numpy()
     rate = np.gradient(joints, t, axis=0)
     turns = (rate.max(axis=0) > TURNING) & (rate.min(axis=0) < -TURNING)
     moves = np.einsum("a,mai->mi", wall.normal, tip_jacobian(arm, joints))
     shapes = np.column_stack(
         [
             points["waviness_um"].to_numpy() * UM,
-            points[STRAYED].to_numpy().sum(axis=1) * UM,
+            points[numbered(STRAYED, points)].to_numpy().sum(axis=1) * UM,
             (moves * np.tanh(rate / TURNING))[:, turns],
         ]
     )

@@ -29,7 +29,7 @@ def waviness_of(block: Block, predicted: Array) -> JSON:
     JSON
         Quantities ``wa_…, wq_…, wt_…`` of ``measured``, ``predicted`` and, if there is an idle run,
         ``idle`` (µm); ``correlation`` with the wall of prediction and idle run, ``coherence`` by band of
-        wavelength, and ``joint_share`` of the tracking error's variance (six, their sum is one).
+        wavelength, and ``joint_share`` of the tracking error's variance (their sum is one).
     """
     run = block.setting
     profiles = {
@@ -55,7 +55,7 @@ def waviness_of(block: Block, predicted: Array) -> JSON:
 
 
 def joint_share(by_joint: Array) -> Array:
-    """Share (6,) of each joint in the variance of their sum: cov(joint, sum)/var(sum); they add up to one.
+    """Share (n,) of each joint in the variance of their sum: cov(joint, sum)/var(sum); they add up to one.
 
     A joint that moves against the others has a share below zero.
     """

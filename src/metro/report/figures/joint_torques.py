@@ -75,7 +75,8 @@ def torques(together: pd.DataFrame, table: pd.DataFrame, joints: pd.DataFrame) -
     together : ``robot_aligned``. table, joints : rows of ``robot_torques`` and ``robot_joints`` of that run.
     """
     with style.style():
-        figure, grid = style.new_figure(2.5, 2, 4)
+        across = 1 + -(-table["joint"].nunique() // 2)
+        figure, grid = style.new_figure(2.5, 2, across)
         for axes, (column, label) in zip(
             (grid[0][0], grid[1][0]), (("t_s", "time (s)"), ("x_mm", "along the wall (mm)")), strict=True
         ):
@@ -87,12 +88,14 @@ def torques(together: pd.DataFrame, table: pd.DataFrame, joints: pd.DataFrame) -
         grid[1][0].set_title(f"joint {together['joint'].iloc[0]}, by place", loc="left")
         used = joints.set_index("joint")["used"]
         panels = [*grid[0][1:], *grid[1][1:]]
-        for axes, (joint, part) in zip(panels, table.groupby("joint"), strict=True):
+        for axes, (joint, part) in zip(panels, table.groupby("joint"), strict=False):
             axes.plot(part["x_mm"], part["bin_nm"], ".", ms=1.5, color=style.GREY, label="cut less idle run")
             low, high = (part["level_nm"] + side * NORMAL * part["level_sd_nm"] for side in (-1.0, 1.0))
             axes.fill_between(part["x_mm"], low, high, color=style.BEFORE, alpha=0.25, lw=0)
             axes.plot(part["x_mm"], part["level_nm"], color=style.BEFORE, lw=0.9, label="filtered")
             axes.set_title(f"joint {joint}" + ("" if used[joint] else ", not used"), loc="left")
+        for axes in panels[table["joint"].nunique() :]:
+            axes.set_visible(False)
         for axes in grid[1][1:]:
             axes.set_xlabel("along the wall (mm)")
         handles = [*grid[0][0].get_lines(), *panels[0].get_lines()]

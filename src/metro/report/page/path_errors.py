@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from metro.joint_columns import numbered
 from metro.report.numbers import percent
 from metro.report.page.curves import HELP
 from metro.report.page.packing import THINNED, fitting, gaps, kept, left_out, notes, packed
 from metro.report.results import Results
 from metro.units import JSON, Array
-
-JOINTS = range(1, 7)
 
 
 def path_errors(results: Results, budget: int) -> JSON | None:
@@ -24,8 +23,8 @@ def path_errors(results: Results, budget: int) -> JSON | None:
     blocks: JSON = (results.identified.get("arm") or {}).get("waviness") or {}
     curves, sizes, thinned = [], [], False
     for run, rows in table.groupby("run", sort=False):
-        by_joint = rows[[f"strayed{i}_um" for i in JOINTS]].to_numpy(float)
-        idle: Array = rows[[f"strayed_idle{i}_um" for i in JOINTS]].to_numpy(float).sum(axis=1)
+        by_joint = rows[numbered("strayed{}_um", rows)].to_numpy(float)
+        idle: Array = rows[numbered("strayed_idle{}_um", rows)].to_numpy(float).sum(axis=1)
         tip = by_joint.sum(axis=1)
         lines, said = [("tip in the cut", "measured", tip)], str(run)
         if share := blocks.get(str(run), {}).get("joint_share"):

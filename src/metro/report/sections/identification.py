@@ -42,6 +42,7 @@ RUN_BLOCKS = {
 ABOUT = ("format", "batch", "metro", "not_identified")  # the batch and the file, not quantities
 ELSEWHERE = {
     "faces": "flatness of faces",
+    "levelling": "flatness by slopes",
     "texture": "surface texture",
     "areal": "areal parameters",
     "study": "factors and configurations",
@@ -49,7 +50,7 @@ ELSEWHERE = {
     "calibration": "tool, work and payload",
     "joints": "the joints",
 }
-OF_ROBOT = ("observability", "waviness")  # the robot's own section shows them
+OF_ROBOT = ("observability", "waviness", "tip_force_by_torques")  # the robot's own section shows them
 LONGEST, ABREAST = 30, 3
 PLANE = ("xx", "xy", "yx", "yy")
 
@@ -216,12 +217,20 @@ def _arm(arm: JSON) -> list[Item]:
     tables = []
     joints = arm.get("joint_stiffness") or []
     if joints:
-        rows = [[str(i), quantity(q, with_unit=False) if q else "–"] for i, q in enumerate(joints, start=1)]
-        about = "Joint stiffness with 95 % intervals."
-        tables.append(Table(["joint", "stiffness (N m/rad)"], rows, about, [1, 3], small=True))
+        shown = [(str(i), q) for i, q in enumerate(joints, start=1)]
+        linear = any(q and q["unit"] == "N/m" for q in joints)  # of a linear axis: units differ
+        rows = [[i, quantity(q, with_unit=linear) if q else "–"] for i, q in shown]
+        head = "stiffness" if linear else "stiffness (N m/rad)"
+        tables.append(
+            Table(["joint", head], rows, "Joint stiffness with 95 % intervals.", [1, 3], small=True)
+        )
+    # The force by the torques alone is in the section of the robot, and there only.
+    by_torques = arm.get("tip_force_by_torques") or {}
+    measured = {run: one for run, one in (arm.get("tip_force") or {}).items() if run not in by_torques}
     for key, name in RUN_BLOCKS.items():
-        if arm.get(key) and key not in OF_ROBOT:
-            tables.append(_by_run(arm[key], name, f"{name.capitalize()}, run by run.", half=True))
+        block = measured if key == "tip_force" else arm.get(key)
+        if block and key not in OF_ROBOT:
+            tables.append(_by_run(block, name, f"{name.capitalize()}, run by run.", half=True))
     return [Heading("Robot"), *abreast(tables)] if tables else []
 
 

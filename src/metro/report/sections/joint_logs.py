@@ -17,6 +17,9 @@ BEYOND = {
     "load": "friction grows with the torque that the links ask of the gear, by {size} of it",
     "speed": "friction differs by {size} (rms) from the line of Coulomb and viscous friction: {shape}",
     "time": "the Coulomb level changes by {size} along the log",
+    "viscous_time": "viscous friction changes by {size} along the log",
+    "temperature": "the Coulomb level changes by {size} with the joint's temperature",
+    "viscous_temperature": "viscous friction changes by {size} with the joint's temperature",
 }
 SLOW = 0.12  # of the fastest speed: what changes friction below it is near standstill
 RUNS = 3  # runs whose friction is drawn
@@ -30,7 +33,7 @@ def joint_logs(results: Results) -> list[Item]:
     about = results.identified.get("joints") or {}
     items: list[Item] = [Heading("The joints by logs of free motion"), _motion(table)]
     if "coulomb" in table:
-        items += [_friction(table, about), *_beyond(results.tables.get("joint_log_terms"), table)]
+        items += [_friction(table, about), *_beyond(results.tables.get("joint_log_terms"))]
         items += _curves(results, table)
     remarks = table[table["remark"] != ""].groupby(["run", "remark"], sort=False)["joint"]
     if remarks.ngroups:
@@ -101,22 +104,23 @@ def _interval(value: float, sd: float) -> str:
     return with_interval(value, [value - T95 * sd, value + T95 * sd]) if math.isfinite(value) else "–"
 
 
-def _beyond(terms: pd.DataFrame | None, table: pd.DataFrame) -> list[Item]:
+def _beyond(terms: pd.DataFrame | None) -> list[Item]:
     """Say what the friction has beyond Coulomb and viscous, with the evidence for it."""
     if terms is None:
         return [
             Paragraph(
-                "No log shows friction beyond Coulomb and viscous: neither with speed, load nor time.", "note"
+                "No log shows friction beyond Coulomb and viscous: neither with speed, load, temperature nor "
+                "time.",
+                "note",
             )
         ]
-    units = table.set_index(["run", "joint"])["unit"]
     lines = []
     for _, r in terms.iterrows():
         if r["name"] == "load":
             size = f"{_interval(100 * r['value'], 100 * r['sd'])} %"
         else:
             value = abs(r["value"]) if r["name"] == "speed" else r["value"]
-            size = f"{_interval(value, r['sd'])} {units[r['run'], r['joint']]}"
+            size = f"{_interval(value, r['sd'])} {r['unit']}"
         said = BEYOND[r["name"]].format(size=size, shape=_shape(r))
         evidence = (
             f"probability of it by chance {probability(r['p'])}, error on held-out stretches "

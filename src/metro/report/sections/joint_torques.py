@@ -25,7 +25,8 @@ def joint_torques(results: Results) -> list[Item]:
     if joints is not None:
         items += [*_torques(results, joints), *_joints(joints)]
     if means is not None and joints is not None:
-        items += _means(means, joints)
+        about = (results.identified.get("arm") or {}).get("tip_force_by_torques_about") or {}
+        items += _means(means, joints, str(about.get("gain_from") or ""))
         items += _course(results, means)
     if refused is not None:
         groups = refused.groupby("reason", sort=False)["run"]
@@ -77,7 +78,14 @@ def _joints(joints: pd.DataFrame) -> list[Item]:
     header = ["", *(f"joint {i}" for i in medians.index)]
     items: list[Item] = [
         Picture(figures.joints(joints, threshold), caption, caption),
-        Table(header, rows, about, [2.4, *([0.8] * len(medians))], numeric=list(range(1, 7)), small=True),
+        Table(
+            header,
+            rows,
+            about,
+            [2.4, *([0.8] * len(medians))],
+            numeric=list(range(1, len(header))),
+            small=True,
+        ),
     ]
     said = joints[joints["remark"] != ""].drop_duplicates(["run", "remark"])
     groups = said.groupby("remark", sort=False)["run"]
@@ -86,22 +94,26 @@ def _joints(joints: pd.DataFrame) -> list[Item]:
     return items
 
 
-def _means(means: pd.DataFrame, joints: pd.DataFrame) -> list[Item]:
-    """Tabulate the steady means run by run, as in [K] table 7, in the frames of work and tool."""
+def _means(means: pd.DataFrame, joints: pd.DataFrame, gain_from: str) -> list[Item]:
+    """Tabulate the steady means run by run, as in [K] table 7, in the frames of work and tool.
+
+    ``gain_from``: where the uncertainty of the drives is from, which runs without a dynamometer have.
+    """
+    drives = f", and by the drives' constants where no dynamometer read it ({gain_from})" if gain_from else ""
     frames = dict(tuple(means.groupby("frame", sort=False)))
     work, tool = frames["work"], frames.get("tool")
     if tool is None:
-        return [_mean_table(work, joints, "the work's axes")]
+        return [_mean_table(work, joints, drives, "the work's axes")]
     off = np.abs(tool["sensorless_n"].to_numpy() - work["sensorless_n"].to_numpy()).max()
     if off <= SAME * np.abs(work["sensorless_n"]).max():
-        return [_mean_table(work, joints, "the work's axes, which are the tool's")]
+        return [_mean_table(work, joints, drives, "the work's axes, which are the tool's")]
     return [
-        _mean_table(work, joints, "the work's axes"),
-        _mean_table(tool, joints, "the tool's axes"),
+        _mean_table(work, joints, drives, "the work's axes"),
+        _mean_table(tool, joints, drives, "the tool's axes"),
     ]
 
 
-def _mean_table(means: pd.DataFrame, joints: pd.DataFrame, axes: str) -> Table:
+def _mean_table(means: pd.DataFrame, joints: pd.DataFrame, drives: str, axes: str) -> Table:
     beside = means[means["dynamometer_n"].notna()]
     used = joints[joints["used"]].groupby("run", sort=False)["joint"].apply(_numbers)
     rows = []
@@ -111,7 +123,7 @@ def _mean_table(means: pd.DataFrame, joints: pd.DataFrame, axes: str) -> Table:
         rows.append([str(run), str(used.get(run, "–")) + star, *cells])
     caption = (
         f"Mean force on the tool in the steady cut by the torques of the joints (N), in {axes}, with its "
-        "95 % interval by noise and friction, and the joints that it is solved from"
+        f"95 % interval by noise and friction{drives}, and the joints that it is solved from"
     )
     if len(beside):
         off = (beside["sensorless_n"] - beside["dynamometer_n"]).abs()
@@ -138,14 +150,17 @@ def _mean_table(means: pd.DataFrame, joints: pd.DataFrame, axes: str) -> Table:
 
 
 def _numbers(joints: pd.Series) -> str:
-    """Write the numbers of joints: 1–6 for all, else 1 3 5."""
+    """Write the numbers of joints: 1–6 where none between is left out, else 1 3 5."""
     known = sorted(int(joint) for joint in joints)
-    return "1–6" if known == list(range(1, 7)) else " ".join(map(str, known))
+    whole = len(known) > 2 and known == list(range(known[0], known[-1] + 1))
+    return f"{known[0]}–{known[-1]}" if whole else " ".join(map(str, known))
 
 
 def _mean(row: pd.Series, beside: bool) -> list[str]:
-    text = band(row["sensorless_n"], row["sensorless_sd_n"])
-    measured = float(row["dynamometer_n"])
+    measured, sd = float(row["dynamometer_n"]), float(row["sensorless_sd_n"])
+    if math.isnan(measured):
+        sd = math.hypot(sd, float(row["drives_sd_n"]))
+    text = band(row["sensorless_n"], sd)
     if not beside:
         return [text]
     error = number(100 * (row["sensorless_n"] / measured - 1), 2) if measured else "–"

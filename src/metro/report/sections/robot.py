@@ -150,8 +150,9 @@ def _shares(blocks: JSON) -> list[Item]:
         f"Share of each joint in the variance of the tip's waves, over {len(known)} runs; below zero: it "
         "works against the others."
     )
-    header = ["", *(f"joint {i}" for i in range(1, 7))]
-    widths, numeric = [0.7, *([1.0] * 6)], [1, 2, 3, 4, 5, 6]
+    count = shares.shape[1]
+    header = ["", *(f"joint {i + 1}" for i in range(count))]
+    widths, numeric = [0.7, *([1.0] * count)], list(range(1, count + 1))
     return [Table(header, rows, caption, widths, numeric=numeric, small=True)]
 
 

@@ -14,6 +14,7 @@ from metro.report.results import Results, heading
 from metro.report.sections import findings
 from metro.report.sections.areal import first_areal
 from metro.report.sections.joint_words import joint_facts, joint_next, joint_words
+from metro.report.sections.levelling import first_levelled
 from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
@@ -115,6 +116,7 @@ def _identified(results: Results) -> list[Item]:
     shown = [
         *joint_facts(results),
         *first_faces(results),
+        *first_levelled(results),
         *first_areal(results),
         *first_traces(results),
         *boundary_items(results),
@@ -159,6 +161,7 @@ def _identified_words(identified: JSON) -> str:
         "joint stiffness" if (identified.get("arm") or {}).get("joint_stiffness") else "",
         "flatness of faces" if identified.get("faces") else "",
         *joint_words(identified),
+        "flatness by slopes" if set(identified.get("levelling") or {}) - {"not_identified"} else "",
         "surface texture" if set(identified.get("texture") or {}) - {"not_identified"} else "",
         "areal parameters" if identified.get("areal") else "",
     ]

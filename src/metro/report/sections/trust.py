@@ -22,7 +22,7 @@ MEASURED = (
     f"{UNTESTED} The figures describe the surface that was measured, where it was measured; their intervals "
     "hold what is said beside them, and nothing of how it was cut."
 )
-OF_SURFACES = ("faces", "texture", "areal")
+OF_SURFACES = ("faces", "levelling", "texture", "areal")
 ABOUT = ("format", "batch", "metro", "not_identified")
 
 

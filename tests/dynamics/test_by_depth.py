@@ -1,0 +1,105 @@
+"""Lobes of ball ends and lead angles: against a march in time over slices of the edge, and limits."""
+
+import math
+
+import numpy as np
+import pytest
+from machines import TWO
+
+from metro.cutting.cutter import Cutter, evenly_pitched
+from metro.dynamics.by_depth import boundary_of_edge, depths_anew
+from metro.dynamics.lobes import stability_boundary
+from metro.dynamics.system import Cut, Edge
+
+R = 5e-3
+KTC, KRC, KAC = 9e8, 5e8, 4e8
+FLAT = Cutter(R, 0.0, evenly_pitched(2))
+BALL = Cutter(R, 0.0, evenly_pitched(2), corner=R)
+NOSE = Cutter(R, 0.0, evenly_pitched(2), corner=1e-3)
+RPM = np.linspace(2500.0, 6000.0, 8)
+
+
+def slot(tool, krc=KRC, kac=KAC):
+    edge = Edge(tool, krc, kac)
+    return Cut(2, 0.0, math.pi, KTC, edge.radial(1e-3), edge=edge)
+
+
+def marched_growth(structure, corner, rpm, depth):
+    """Growth of a small vibration per tooth period, of a tool with a corner in a slot, without helix.
+
+    The edge is summed over slices of equal height: chip normal to the edge, three forces of it, their parts
+    in the plane; each mode is integrated by Störmer's rule.
+    """
+    periods, steps = 160, 300
+    z = depth * (np.arange(200) + 0.5) / 200
+    kappa = np.where(z < corner, np.arccos(np.clip(1.0 - z / corner, -1.0, 1.0)), math.pi / 2)
+    width = depth / 200 / np.sin(kappa)
+    chip = np.sin(kappa)  # normal to the edge, per chip in the plane
+    tangential = KTC * np.sum(chip * width)
+    inward = np.sum((KRC * np.sin(kappa) - KAC * np.cos(kappa)) * chip * width)
+    along = structure.directions[structure.axis]
+    damping, square = 2.0 * structure.zeta * structure.omega, structure.omega**2
+    per_force = square / structure.stiffness
+    period = 60.0 / (2 * rpm)
+    dt = period / steps
+    q, v = np.full(len(square), 1e-6), np.zeros(len(square))
+    tip = np.zeros((periods * steps, 2))
+    for n in range(periods * steps):
+        tip[n] = q @ along
+        phi = math.pi * (n % steps) / steps
+        s, c = math.sin(phi), math.cos(phi)
+        change = tip[n] - (tip[n - steps] if n >= steps else 0.0)
+        h = change @ [s, c]
+        force = h * np.array([-tangential * c - inward * s, tangential * s - inward * c])
+        v = v + dt * (per_force * (along @ force) - damping * v - square * q)
+        q = q + dt * v
+    size = np.linalg.norm(tip.reshape(periods, steps, 2), axis=(1, 2))
+    return (size[-1] / size[periods // 2]) ** (1.0 / (periods - 1 - periods // 2))
+
+
+@pytest.mark.parametrize("tool", [BALL, NOSE], ids=["ball", "bull nose"])
+def test_a_vibration_dies_below_the_boundary_and_grows_above_it(tool):
+    rpm = RPM[[1, 5]]
+    found = boundary_of_edge(TWO, slot(tool), rpm)
+    for speed, depth in zip(rpm, found.depth, strict=True):
+        assert marched_growth(TWO, tool.corner, speed, 0.96 * depth) < 1.0
+        assert marched_growth(TWO, tool.corner, speed, 1.04 * depth) > 1.0
+
+
+def test_of_a_flat_end_nothing_changes():
+    cut = Cut(2, 0.3, 2.0, KTC, KRC)
+    plain, found = stability_boundary(TWO, cut, RPM), boundary_of_edge(TWO, cut, RPM)
+    edged = boundary_of_edge(TWO, Cut(2, 0.3, 2.0, KTC, KRC, edge=Edge(FLAT, KRC, KAC)), RPM)
+    assert np.array_equal(found.depth, plain.depth)
+    assert found.boundary() is found.solved[0]
+    assert edged.depth == pytest.approx(plain.depth, rel=1e-9)
+
+
+def test_a_lead_angle_has_the_radial_coefficient_of_its_one_inclination():
+    kappa = math.radians(45)
+    leading = Cutter(R, 0.0, evenly_pitched(2), taper=math.pi / 2 - kappa)
+    found = boundary_of_edge(TWO, slot(leading), RPM)
+    same = Cut(2, 0.0, math.pi, KTC, KRC * math.sin(kappa) - KAC * math.cos(kappa))
+    assert found.depth == pytest.approx(stability_boundary(TWO, same, RPM).depth, rel=1e-9)
+
+
+def test_the_boundary_of_a_ball_is_that_of_the_coefficients_at_its_own_depth():
+    """Of a ball the means over the height are closed forms: with κ at the top, h = R (1 − cos κ)."""
+    found = boundary_of_edge(TWO, slot(BALL), RPM)
+    for rpm, depth in zip(RPM, found.depth, strict=True):
+        top = math.acos(1.0 - depth / R)
+        sine = (top / 2 - math.sin(2 * top) / 4) / (1.0 - math.cos(top))
+        cosine = math.sin(top) ** 2 / 2 / (1.0 - math.cos(top))
+        same = Cut(2, 0.0, math.pi, KTC, KRC * sine - KAC * cosine)
+        alone = stability_boundary(TWO, same, np.array([rpm])).depth[0]
+        assert depth == pytest.approx(alone, rel=5e-3)
+    one_inclination = stability_boundary(TWO, slot(BALL).at_depth(1e-4), RPM).depth
+    assert np.abs(np.log(found.depth / one_inclination)).max() > 0.05
+
+
+def test_the_samples_of_a_ball_follow_its_coefficients():
+    deviations = 0.01 * np.random.default_rng(3).normal(size=(5, 3 * len(TWO.omega) + 2))
+    found = boundary_of_edge(TWO, slot(BALL), RPM)
+    exact = depths_anew(TWO, slot(BALL), RPM, deviations)
+    ratio = found.samples(TWO, deviations) / exact
+    assert np.median(np.abs(np.log(ratio))) < 0.02
