@@ -7,12 +7,11 @@ import pytest
 from scipy import stats
 from toy import BEND, GATES, SIGMA, Wave, problem
 
-from metro.loop.checks.floor import against_floor
+from metro.loop.checks.floor import ABOVE, AgainstFloor, against_floor
 from metro.loop.checks.left_out import left_out, parameter_errors, unseen
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import fit
+from metro.loop.fitting.fit import fit, score
 from metro.loop.fitting.noise import first_noise
-from metro.loop.verdict.residual import ABOVE
 
 
 def fitted(task, *effects):
@@ -92,3 +91,30 @@ def test_one_condition_is_left_out_run_by_run_and_one_run_not_at_all():
     alone = replace(whole, blocks=whole.blocks[:1])
     assert list(left_out(alone, prior).values()) == [()]
     assert SIGMA > 0
+
+
+def test_the_noise_is_scaled_by_what_left_out_conditions_show_of_it_and_not_by_what_is_missing():
+    few, many = (AgainstFloor(0.5, freedom, 0.9, 0.0, "c") for freedom in (1.0, 400.0))
+    assert few.scale == pytest.approx(np.sqrt((4 + 0.25) / 5))  # the declared noise is worth four values
+    assert many.scale == pytest.approx(0.5, abs=0.01)
+    assert AgainstFloor(1.0, 9.0, 0.4, 0.0, "c").scale == 1.0
+    assert AgainstFloor(4.0, 9.0, ABOVE / 2, 0.1, "c").scale == 1.0
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_floor_that_is_declared_wrong_comes_out_right_on_the_runs_that_verify(factor):
+    """The noise of every sample is that many times as large as declared."""
+    over = []
+    for seed in range(12):
+        task = problem(seed, phased=False)
+        whole, prior = fitted(replace(task, blocks=tuple(wrongly_declared(b, factor) for b in task.blocks)))
+        error = against_floor(unseen(whole, prior))
+        held = tuple(wrongly_declared(b, factor) for b in task.role("validate"))
+        found = against_floor([score(whole, (block,)) for block in held])
+        over.append(found.ratio / error.scale)
+    assert np.median(over) == pytest.approx(1.0, abs=0.2)
+
+
+def wrongly_declared(block, factor):
+    """The block with a declared noise that is ``factor`` times too small."""
+    return replace(block, sigma=block.sigma / factor)

@@ -31,6 +31,7 @@ from metro.loop.statement import to_json
 from metro.loop.verdict.believable import believable, contradicted, with_share
 from metro.loop.verdict.story import story
 from metro.loop.verdict.verdict import judge
+from metro.loop.verdict.verification import noise_scale
 from metro.observables.labelled import Labelled
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Problem, Refusal
@@ -112,7 +113,9 @@ class Loop:
         outcome = search(problem, state.effects(problem.observable), state.gates, base=self.base)
         outcome = believable(outcome)
         final = comparison(problem, held_out(problem, outcome.final))
-        rows = final.assign(after=final["before"], before=state.before(problem.observable)["before"])
+        before = state.before(problem.observable)["before"]
+        sigma = final["sigma"] * noise_scale(outcome)
+        rows = final.assign(after=final["before"], before=before, sigma=sigma)
         verdict = state.without_causes(problem.observable, judge(problem, outcome, rows, state.gates))
         self._keep(problem.observable, rows, verdict, story(problem, outcome, verdict, state.gates))
         return Closure(outcome)

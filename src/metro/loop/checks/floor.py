@@ -19,6 +19,10 @@ from metro.loop.fitting.fit import Fit
 from metro.observables.problem import Block
 from metro.units import Array
 
+# Chance of an error as far above the floor if there were nothing but noise: in so many observables something
+# is said to be missing although nothing is.
+ABOVE = 0.01
+
 
 @dataclass(frozen=True)
 class AgainstFloor:
@@ -37,6 +41,19 @@ class AgainstFloor:
     relative: float
     condition: str
 
+    @property
+    def scale(self) -> float:
+        """Factor by which the noise differs from what is declared of it, as these errors have it.
+
+        The declared noise counts as much as :data:`metro.loop.fitting.noise.PRIOR_RUNS` independent values,
+        the errors as much as they are worth. Where they are beyond chance something is missing, and they say
+        nothing of the noise.
+        """
+        if self.p_value < ABOVE:
+            return 1.0
+        known = noise_room.PRIOR_RUNS
+        return math.sqrt((known + self.freedom * self.ratio**2) / (known + self.freedom))
+
 
 @dataclass(frozen=True)
 class _Sums:
@@ -48,11 +65,14 @@ class _Sums:
     signal: float
 
 
-def against_floor(scored: Sequence[Fit]) -> AgainstFloor | None:
+def against_floor(scored: Sequence[Fit], scale: float = 1.0) -> AgainstFloor | None:
     """Compare the errors of fits on runs that they have not seen with the noise; None without such runs.
 
-    ``scored`` : fits on the runs that they lack, those of one condition each
-    (:func:`metro.loop.checks.left_out.unseen`).
+    Parameters
+    ----------
+    scored : fits on the runs that they lack, those of one condition each
+        (:func:`metro.loop.checks.left_out.unseen`).
+    scale : factor on the noise, where it is known better than declared (:attr:`AgainstFloor.scale`).
     """
     from scipy.stats import f
 
@@ -67,6 +87,7 @@ def against_floor(scored: Sequence[Fit]) -> AgainstFloor | None:
     )
     runs = sum(len(fitted.blocks) for fitted in scored)
     freedom = expected**2 / squared
+    expected *= scale**2
     return AgainstFloor(
         ratio=math.sqrt(error / expected),
         freedom=freedom,

@@ -73,6 +73,7 @@ def most_missed(others: Fit, whole: Noise) -> Fit:
     return replace(others, noise=replace(others.noise, misfit=misfit))
 
 
+@lru_cache(maxsize=64)
 def unseen(fitted: Fit, prior: Noise) -> tuple[Fit, ...]:
     """Return the fit of all others on each part that was left out: only the runs' own unknowns are fitted.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from metro.effects.effect import Effect
-from metro.loop.checks.floor import against_floor
+from metro.loop.checks.floor import ABOVE, against_floor
 from metro.loop.checks.left_out import unseen
 from metro.loop.checks.signature import Line, places, unseen_signature
 from metro.loop.fitting.fit import Fit
@@ -16,9 +16,6 @@ from metro.observables.problem import Block, Problem
 from metro.units import JSON, Array
 
 LEAST_RUNS = 2  # to identify on
-# Chance of an error on left-out conditions as far above the floor if there were nothing but noise: so many
-# observables are called unexplained although nothing is missing.
-ABOVE = 0.01
 
 
 @dataclass(frozen=True)

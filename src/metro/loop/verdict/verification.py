@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from metro.loop.checks.floor import against_floor
+from metro.loop.checks.floor import ABOVE, against_floor
+from metro.loop.checks.left_out import unseen
 from metro.loop.fitting.fit import score
 from metro.loop.search.outcome import Outcome
 from metro.loop.search.trial import beyond
@@ -16,7 +17,6 @@ from metro.loop.statement import Statement
 from metro.observables.problem import Block, Problem
 from metro.units import JSON
 
-CONTRADICTED = 0.01  # chance of errors as large, if there were nothing but noise, below which that is stated
 WORSE = 1.1  # times the error without effects: a run that is predicted worse with them by more is named
 
 
@@ -33,9 +33,10 @@ def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON
     groups: dict[str, list[Block]] = {}
     for block in problem.role("validate"):
         groups.setdefault(block.condition, []).append(block)
-    error = against_floor([score(outcome.final, blocks) for blocks in groups.values()])
+    scored = [score(outcome.final, blocks) for blocks in groups.values()]
+    error = against_floor(scored, noise_scale(outcome))
     assert error is not None  # there are rows
-    holds = error.p_value >= CONTRADICTED
+    holds = error.p_value >= ABOVE
     worse = _worse(rows) if outcome.names else []
     without = beyond(outcome.final, problem.role("validate"))
     values = {
@@ -56,6 +57,12 @@ def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON
         "worse_runs": worse,
         "words": Statement("verification", values),
     }
+
+
+def noise_scale(outcome: Outcome) -> float:
+    """Return the factor on the declared noise that the left-out conditions of the identification show."""
+    error = against_floor(unseen(outcome.final, outcome.prior))
+    return error.scale if error else 1.0
 
 
 def _worse(rows: pd.DataFrame) -> list[JSON]:
