@@ -53,18 +53,19 @@ class Made:
     notes: tuple = ()
     model_sd: float = 0.15
     label_error: float = 0.005
+    moved: float = 0.0  # of the base model's boundary, in log depth
 
     @property
     def point_tooth_hz(self):
         return 3 * self.point_rpm / 60.0
 
     def boundaries(self, change):
-        model = change(Line())
+        model = change(Line(shift=self.moved))
         return model.boundary(self.point_rpm), np.full(len(self.point_rpm), model.hz)
 
     def estimates(self, changes):
         """In error by a little that differs from speed to speed and grows with the change."""
-        models = [change(Line()) for change in changes]
+        models = [change(Line(shift=self.moved)) for change in changes]
         depth = np.stack([model.boundary(self.point_rpm) for model in models])
         error = 0.2 * np.cos(self.point_rpm / 700.0) * (1.0 + depth - np.log(1e-3))
         return depth + error, np.outer([model.hz for model in models], np.ones(len(self.point_rpm)))

@@ -1,11 +1,12 @@
 """Labels against predicted probabilities."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
-from label_toy import GATES, SHIFT, SLOPE, TWIN, Line, Made, problem
+from label_toy import GATES, SHIFT, SLOPE, TWIN, Line, problem
 from scipy.stats import norm
 from worded import in_words
 
@@ -48,19 +49,6 @@ def test_an_undecided_prediction_is_never_surprised():
 
 
 CAUSE = [{"effect": "tool_runout", "probability": 1.0, "parameters": {}}]
-LABEL = np.tile([0.0, 1.0], 6)
-RIGHT, WRONG = np.where(LABEL > 0.5, 0.95, 0.05), np.where(LABEL > 0.5, 0.05, 0.95)
-
-
-def judged(before, after, tests=12):
-    rows = pd.DataFrame(
-        {"run": [f"c{i}" for i in range(12)], "measured": LABEL, "before": before, "after": after}
-    )
-    nowhere = Made(
-        tuple(rows["run"]), ("validate",) * 12, LABEL > 0, np.ones(12), np.full(12, -1), np.full(12, np.nan),
-        np.zeros(0),
-    )  # fmt: skip
-    return in_words(judge_labels(nowhere, rows.head(tests), CAUSE, (SHIFT,), GATES)[1])
 
 
 def closed(true, effects, seed=1, **more):
@@ -80,26 +68,54 @@ def closed(true, effects, seed=1, **more):
     return judged_rows, in_words(verdict), in_words(story), change
 
 
+def shifted(task, by):
+    """The problem with its base model's boundary moved by ``by`` in log depth: that of other coefficients."""
+    return replace(task, moved=by)
+
+
+def with_upstream(first_by, now_by, seed=1):
+    """Verdict where the effects of the force move the base boundary from one place to another."""
+    task = problem(Line(), seed)
+    held = np.array(task.roles) == "validate"
+    rows = pd.DataFrame({"run": np.array(task.runs)[held], "measured": task.unstable[held].astype(float)})
+    for name, by in (("before", first_by), ("after", now_by)):
+        boundary = Line().boundary(task.point_rpm)[task.point] + by
+        rows[name] = norm.cdf((np.log(task.depth) - boundary) / 0.15)[held]
+    given = shifted(task, now_by), rows, CAUSE, (), GATES
+    return in_words(judge_labels(*given, first=shifted(task, first_by))[1])
+
+
 @pytest.mark.parametrize(
-    ("before", "after", "tests", "status", "effects"),
-    [
-        (RIGHT, RIGHT, 12, "clean", []),
-        (WRONG, RIGHT, 12, "explained", CAUSE),
-        (WRONG, WRONG, 12, "unexplained", []),
-        (RIGHT, RIGHT, 4, "insufficient", []),
-    ],
+    ("first", "now", "status", "effects"),
+    [(0.0, 0.0, "clean", []), (1.5, 0.0, "explained", CAUSE), (1.5, 1.5, "unexplained", [])],
 )
 def test_force_effects_explain_labels_that_only_the_refitted_coefficients_predict(
-    before, after, tests, status, effects
+    first, now, status, effects
 ):
-    verdict = judged(before, after, tests)
+    verdict = with_upstream(first, now)
     assert (verdict["status"], verdict["effects"]) == (status, effects)
+    assert verdict["verification"]["holds"] is (now == 0.0)
 
 
-def test_labels_that_nothing_predicts_are_named():
-    verdict = judged(WRONG, WRONG)
-    assert "12 of 12 tests: c0, c1" in verdict["unexplained"]["signature"]
-    assert judged(WRONG, RIGHT)["after"]["rms"] < judged(WRONG, RIGHT)["before"]["rms"]
+def test_labels_that_nothing_predicts_are_named_of_the_tests_that_decide():
+    verdict = with_upstream(1.5, 1.5)
+    task = problem(Line(), 1)
+    held = {run for run, role in zip(task.runs, task.roles, strict=True) if role == "validate"}
+    named = set(re.findall(r"[a-z]+\d+", verdict["unexplained"]["signature"]))
+    assert named
+    assert not named & held
+
+
+def test_tests_of_verification_alone_decide_nothing():
+    task = problem(Line(shift=1.8), 1)
+    task = replace(task, roles=("validate",) * len(task.roles))
+    rows = pd.DataFrame({"run": task.runs, "measured": task.unstable.astype(float)})
+    rows["before"] = norm.cdf((np.log(task.depth) - Line().boundary(task.point_rpm)[task.point]) / 0.15)
+    verdict = in_words(judge_labels(task, rows.assign(after=rows["before"]), [], (SHIFT,), GATES)[1])
+    assert verdict["status"] == "insufficient"
+    assert verdict["effects"] == []
+    assert verdict["verification"]["holds"] is False
+    assert "Verification contradicts the boundary" in verdict["verification"]["words"]
 
 
 def test_an_effect_found_is_told_with_its_size_and_mends_the_held_out_prediction():
@@ -118,21 +134,23 @@ def test_an_effect_found_is_told_with_its_size_and_mends_the_held_out_prediction
     assert change(Line()).slope == pytest.approx(0.9, abs=0.3)
 
 
-def test_what_the_held_out_tests_speak_against_is_not_claimed():
+def test_held_out_tests_that_speak_against_an_effect_are_told_of_and_decide_nothing():
     """On whole speeds that no fit has seen, the boundary is that of the base model after all."""
     task = problem(Line(slope=0.9), 1)
     held = np.array(task.roles) == "validate"
     base = Line().boundary(task.point_rpm)[task.point]
-    task = replace(task, unstable=np.where(held, np.log(task.depth) > base, task.unstable))
+    against = replace(task, unstable=np.where(held, np.log(task.depth) > base, task.unstable))
     before = norm.cdf((np.log(task.depth) - base) / 0.15)[held]
-    rows = pd.DataFrame(
-        {"run": np.array(task.runs)[held], "measured": task.unstable[held].astype(float), "before": before}
-    ).assign(after=before)
-    after, verdict, _, change = judge_labels(task, rows, [], (SHIFT, SLOPE), GATES)
-    assert verdict["status"] == "undetermined"
-    assert not verdict["effects"]
-    assert change is None
-    assert (after["after"] == after["before"]).all()
+    verdicts = []
+    for one in (task, against):
+        rows = pd.DataFrame(
+            {"run": np.array(one.runs)[held], "measured": one.unstable[held].astype(float), "before": before}
+        ).assign(after=before)
+        verdicts.append(in_words(judge_labels(one, rows, [], (SHIFT, SLOPE), GATES)[1]))
+    for key in ("status", "effects", "candidates", "indistinguishable"):
+        assert verdicts[0][key] == verdicts[1][key]
+    assert verdicts[0]["status"] == "explained"
+    assert [one["verification"]["holds"] for one in verdicts] == [True, False]
 
 
 def test_twins_are_undetermined_and_a_next_test_is_named():
@@ -161,4 +179,4 @@ def test_labels_that_contradict_every_hypothesis_are_unexplained():
 def test_too_few_tests_are_insufficient_for_effects():
     _, verdict, story, _ = closed(Line(), (SHIFT, SLOPE), seed=3, rpm=np.array([4000.0, 5000.0]))
     assert verdict["candidates"] == []
-    assert "Effects of the boundary need" in story["noise"]["words"]
+    assert "effects of the boundary need" in story["noise"]["words"]

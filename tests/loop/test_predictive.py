@@ -8,11 +8,11 @@ from scipy import stats
 from scipy.special import logsumexp
 from toy import BEND, GATES, RIPPLE, Wave, block, problem
 
-from metro.loop.checks.evidence import leave_out, refit
+from metro.loop.checks.evidence import leave_out
 from metro.loop.checks.predictive import estimated, predictive
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import fit, score
+from metro.loop.fitting.fit import fit, refit, score
 from metro.loop.fitting.noise import first_noise
 
 

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy import stats
 from toy import ANGLE, BEND, BETA, GATES, POINTS, RIPPLE, SIGMA, TWIN, Wave, problem
 from worded import in_words
@@ -16,9 +18,8 @@ from metro.loop.checks.signature import Line, share_left
 from metro.loop.fitting.held_out import COMPARISON, comparison, held_out, identified_fit, run_dof
 from metro.loop.search.search import search
 from metro.loop.statement import Statement
-from metro.loop.verdict import verdict as verdicts
 from metro.loop.verdict.story import story
-from metro.loop.verdict.verdict import bounded, error, judge, validated
+from metro.loop.verdict.verdict import bounded, error, judge
 from metro.wording.batch import STATUSES as SENTENCES
 from metro.wording.batch import verdict_in_words
 
@@ -97,19 +98,55 @@ def with_spike_where_unseen(task):
     return replace(task, blocks=blocks)
 
 
-@pytest.mark.parametrize(("truth", "status"), [(Wave(), "unexplained"), (Wave(bend=0.2), "partly_explained")])
-def test_a_rest_on_runs_that_no_fit_has_seen_is_said_and_the_condition_named(truth, status):
+@pytest.mark.parametrize(("truth", "status"), [(Wave(), "clean"), (Wave(bend=0.2), "explained")])
+def test_runs_that_verify_are_told_of_and_decide_nothing(truth, status):
     task = problem(2, truth=truth, phased=False)
     before = closed(task, (BEND,))[2]
-    assert before["unexplained"] is None
-    *_, verdict = closed(with_spike_where_unseen(task), (BEND,))
-    assert verdict["status"] == status
-    assert [found["effect"] for found in verdict["effects"]] == [
-        found["effect"] for found in before["effects"]
+    after = closed(with_spike_where_unseen(task), (BEND,))[2]
+    told = ("noise_floor", "before", "after", "verification", "candidates")
+    decided = [
+        {name: value for name, value in verdict.items() if name not in told} for verdict in (before, after)
     ]
-    assert verdict["unexplained"]["signature"].startswith("only on runs that no fit has seen: ")
-    assert verdict["unexplained"]["rms"] == pytest.approx(0.3 * BETA[1] / np.sqrt(2), rel=0.1)
-    assert "condition validate-" in verdict["next_experiment"]
+    assert decided[0] == decided[1]
+    assert decided[0]["status"] == status
+    for verdict, holds in ((before, True), (after, False)):
+        assert verdict["verification"]["holds"] is holds
+        assert ("contradicts the model" in verdict["verification"]["words"]) is not holds
+        check_entry(verdict)
+    assert after["verification"]["ratio"] > 5.0 * before["verification"]["ratio"]
+    assert after["after"]["rms"] == pytest.approx(0.3 * BETA[1] / np.sqrt(2), rel=0.1)
+
+
+@given(st.permutations(range(4)), st.floats(-3.0, 3.0))
+@settings(max_examples=8, deadline=None)
+def test_permuted_data_of_the_runs_that_verify_change_no_fit_no_search_and_no_status(order, factor):
+    task = problem(12, truth=Wave(bend=0.15), held=(2.5, 3.5, 2.2, 3.2), phased=False)
+    held = task.role("validate")
+    exchanged = {
+        block.run: factor * held[place].measured[::-1] for block, place in zip(held, order, strict=True)
+    }
+    moved = replace(
+        task,
+        blocks=tuple(
+            replace(block, measured=exchanged.get(block.run, block.measured)) for block in task.blocks
+        ),
+    )
+    outcomes, _, verdicts = zip(*(closed(one, (BEND, RIPPLE)) for one in (task, moved)), strict=True)
+    assert outcomes[0].names == outcomes[1].names == ("bend",)
+    np.testing.assert_array_equal(outcomes[0].final.theta, outcomes[1].final.theta)
+    np.testing.assert_array_equal(outcomes[0].final.beta, outcomes[1].final.beta)
+    for key in ("status", "effects", "indistinguishable", "next_experiment"):
+        assert verdicts[0][key] == verdicts[1][key]
+
+
+def test_a_residual_that_only_conditions_left_out_of_the_fit_show_is_stated():
+    task = problem(5, truth=Wave(spike=0.3), phased=False)
+    outcome = search(task, (BEND,), GATES)
+    blind = replace(outcome, lines=(), between=None, restless=None, step=None)
+    rows = comparison(task, held_out(task, blind.base), held_out(task, blind.final))
+    verdict = in_words(judge(task, blind, rows, GATES))
+    assert verdict["status"] == "unexplained"
+    assert verdict["unexplained"]["signature"].startswith("only where a condition is left out of the fit: ")
     check_entry(verdict)
 
 
@@ -241,28 +278,17 @@ def test_the_identified_fit_hands_over_the_base_parameters_and_every_runs_phase(
     assert set(found.nuisance) == {block.run for block in task.blocks}
 
 
-def test_an_effect_that_held_out_runs_speak_against_is_withdrawn():
-    """The runs of the fit bend their wave, those held out do not: whatever it was, it does not predict."""
+def test_runs_that_the_effects_make_worse_are_named():
+    """The runs of the fit bend their wave, those held out do not: the effect stays, its cost is said."""
     bent, straight = problem(9, truth=Wave(bend=0.1)), problem(9)
     mixed = replace(bent, blocks=(*bent.role("identify"), *straight.role("validate")))
-    found = search(mixed, (BEND,), GATES)
-    assert found.names == ("bend",)
-    assert validated(bent, search(bent, (BEND,), GATES)).names == ("bend",)
-    refuted = validated(mixed, found)
-    assert refuted.names == ()
-    rows = comparison(mixed, held_out(mixed, refuted.base), held_out(mixed, refuted.final))
-    verdict = in_words(judge(mixed, refuted, rows, GATES))
-    assert verdict["status"] == "unexplained"
-    assert verdict["candidates"][0]["why_not"] == in_words(Statement("refuted"))
-
-
-def test_what_is_unlikelier_but_no_worse_predicted_is_not_withdrawn(monkeypatch):
-    """A likelihood alone may fall because the fit's noise is smaller: it takes a worse prediction, too."""
-    bent, straight = problem(9, truth=Wave(bend=0.1)), problem(9)
-    mixed = replace(bent, blocks=(*bent.role("identify"), *straight.role("validate")))
-    found = search(mixed, (BEND,), GATES)
-    monkeypatch.setattr(verdicts, "held_out_rms", lambda _problem, fit: 1.0 if fit is found.final else 2.0)
-    assert validated(mixed, found).names == ("bend",)
+    _, rows, verdict = closed(mixed, (BEND,))
+    assert [found["effect"] for found in verdict["effects"]] == ["bend"]
+    worse = [one["run"] for one in verdict["verification"]["worse_runs"]]
+    assert worse == [block.run for block in straight.role("validate")]
+    assert "With the effects the error grows in" in verdict["verification"]["words"]
+    assert not closed(bent, (BEND,))[2]["verification"]["worse_runs"]
+    assert len(rows)
 
 
 def test_a_rival_that_is_no_effect_of_the_library_leaves_words_and_no_error():

@@ -15,12 +15,13 @@ from metro.loop.fitting.fit import fit
 from metro.loop.fitting.noise import first_noise
 from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
-from metro.observables.arm.give import GivingArm, give_of
+from metro.observables.arm.give import GivingArm, give_per_newton
 from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.deformation.model import DeformationModel
 from metro.observables.force import observable as force
+from metro.observables.force.held_out_give import PER_NEWTON, with_predicted_give
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import arm_of_cell
 from metro.robot.statics import tip_compliance
@@ -54,7 +55,24 @@ def test_the_give_is_the_compliance_of_the_tip_along_the_wall_normal(cell):
 
 
 def test_a_machine_that_is_no_arm_gives_nothing(cell):
-    assert give_of(cell[0], "r01", cell[1], Refusal("no arm.dh"), np.array([0.0, 100.0, 0.0])) == 0.0
+    assert not give_per_newton(cell[0], "r01", cell[1], Refusal("no arm.dh")).any()
+
+
+def test_the_give_of_a_held_out_run_is_predicted_and_nothing_of_its_force_is_read(cell):
+    batch, read = cell
+    observed, tool = force.observe(batch, read, {}), cutting_force.cutter(batch)
+    spindle = observed["spindle"].set_index("run")
+    held = [run for run in spindle.index if batch.runs.loc[run, "role"] == "validate"]
+    found = with_predicted_give(batch, observed["spindle"], tool).set_index("run")["give_mm"]
+    giving = [run for run in held if spindle.loc[run, "give_mm"] > 0.01]
+    assert giving
+    np.testing.assert_allclose(found[giving], spindle.loc[giving, "give_mm"], rtol=0.1)  # a few per cent off
+    assert (found.drop(held) == spindle["give_mm"].drop(held)).all()
+    wrong = spindle.copy()
+    wrong.loc[giving, [c for c in wrong.columns if c.startswith(("mean_", "give_mm"))]] = 7e3
+    wrong[PER_NEWTON] = spindle[PER_NEWTON]
+    again = with_predicted_give(batch, wrong.reset_index(), tool).set_index("run")["give_mm"]
+    np.testing.assert_array_equal(again, found)
 
 
 @pytest.mark.parametrize("run", SIDE)

@@ -121,12 +121,12 @@ def test_modes_without_a_driving_point_have_no_stiffness_and_the_first_page_show
 @pytest.mark.parametrize(
     ("status", "words"),
     [
-        ("clean", "the base model holds"),
+        ("clean", "show nothing that the base model lacks"),
         ("explained", "traced to tool runout (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°)"),
-        ("partly_explained", "A significant rest remains"),
+        ("partly_explained", "A significant residual remains"),
         ("undetermined", "It may be tool wear or charge drift."),
         ("unexplained", "no effect of the library accounts for it"),
-        ("insufficient", "too few runs to tell"),
+        ("insufficient", "too few runs to decide"),
     ],
 )
 def test_every_status_has_its_sentence(status, words):

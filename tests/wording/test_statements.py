@@ -40,9 +40,9 @@ def test_every_statement_has_a_sentence_and_every_sentence_is_stated():
 
 def test_statements_are_put_into_words_wherever_they_are_the_inner_ones_first():
     inner = Statement("no_prediction", {"run": "r1", "why": "it breaks"})
-    content = {"a": [Statement("makeshift", {"why": inner})], "b": {"code": 1}, "c": None}
-    makeshift = "what is predicted of a run that no fit has seen is a makeshift: in r1 it breaks"
-    assert in_words(content) == {"a": [makeshift], "b": {"code": 1}, "c": None}
+    content = {"a": [Statement("unseen", {"places": inner})], "b": {"code": 1}, "c": None}
+    outer = "only where a condition is left out of the fit: in r1 it breaks"
+    assert in_words(content) == {"a": [outer], "b": {"code": 1}, "c": None}
 
 
 @pytest.mark.parametrize(

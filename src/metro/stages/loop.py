@@ -30,7 +30,8 @@ from metro.loop.search.trial import Gates
 from metro.loop.statement import to_json
 from metro.loop.verdict.believable import believable, contradicted, with_share
 from metro.loop.verdict.story import story
-from metro.loop.verdict.verdict import judge, validated
+from metro.loop.verdict.verdict import judge
+from metro.loop.verdict.verification import noise_scale
 from metro.observables.labelled import Labelled
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Problem, Refusal
@@ -96,11 +97,13 @@ class Closure:
 class Loop:
     """Handler: close the loop of an observable; the held-out runs are read once, for the figures.
 
-    ``base``: the fit of the base model, None where the problem was posed anew.
+    ``base``: the fit of the base model, None where the problem was posed anew. ``first``: the problem before
+    that.
     """
 
     state: Closing
     base: Fit | None
+    first: Any
 
     def sampled(self, problem: Problem) -> Closure:
         """Search the library for the effects that the base model lacks."""
@@ -108,9 +111,11 @@ class Loop:
         if not problem.role("identify"):
             return Closure()
         outcome = search(problem, state.effects(problem.observable), state.gates, base=self.base)
-        outcome = believable(problem, validated(problem, outcome))
+        outcome = believable(outcome)
         final = comparison(problem, held_out(problem, outcome.final))
-        rows = final.assign(after=final["before"], before=state.before(problem.observable)["before"])
+        before = state.before(problem.observable)["before"]
+        sigma = final["sigma"] * noise_scale(outcome)
+        rows = final.assign(after=final["before"], before=before, sigma=sigma)
         verdict = state.without_causes(problem.observable, judge(problem, outcome, rows, state.gates))
         self._keep(problem.observable, rows, verdict, story(problem, outcome, verdict, state.gates))
         return Closure(outcome)
@@ -120,7 +125,9 @@ class Loop:
         state = self.state
         effects = state.effects(problem.observable)
         rows = state.before(problem.observable).assign(after=problem.comparison()["before"])
-        rows, verdict, record, change = judge_labels(problem, rows, state.upstream, effects, state.gates)
+        rows, verdict, record, change = judge_labels(
+            problem, rows, state.upstream, effects, state.gates, first=self.first
+        )
         verdict = state.without_causes(problem.observable, verdict)
         self._keep(problem.observable, rows, verdict, record)
         return Closure(redrawn=problem.redrawn(state.observed, change) if change else {})
@@ -168,7 +175,7 @@ def closed(
         if only is not None and name not in only:
             continue
         if posed.printed:
-            posed.task.handled_by(Loop(state, posed.base))
+            posed.task.handled_by(Loop(state, posed.base, posed.task))
         else:
             _close(state, by_name(name), posed, anew=bool(limits))
     return state
@@ -179,9 +186,10 @@ def _close(state: Closing, observable: Observable[Any], posed: Posed, *, anew: b
 
     Where effects changed the cutting coefficients, the problem is posed ``anew`` with these.
     """
+    first = posed.task
     if state.upstream or anew:
         posed = _posed_anew(state, observable, posed)
-    closure = posed.task.handled_by(Loop(state, posed.base))
+    closure = posed.task.handled_by(Loop(state, posed.base, first))
     state.observed |= closure.redrawn
     fitted = None
     if closure.outcome and isinstance(posed.task, Problem):

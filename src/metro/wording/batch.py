@@ -16,8 +16,7 @@ BRIEF = (
     "seen_in",
 )  # what verdict.json has of a cause
 STATUSES = {
-    "clean": "The base model predicts the held-out runs within the noise and the declared model-form budget; "
-    "nothing was added.",
+    "clean": "The identification runs show nothing that the base model lacks; nothing was added.",
     "explained": "The residual is explained by {effects}.",
     "partly_explained": "Part of the residual is explained by {effects}, proven on left-out conditions; "
     "a significant rest remains that no effect of the library accounts for.",
@@ -83,4 +82,6 @@ def verdict_in_words(verdict: JSON) -> str:
         unit = f" {printed(verdict['unit'])}".rstrip()
         sentence += f" On held-out runs the error is {before['rms']:.3g}{unit} rms before"
         sentence += f" and {after['rms']:.3g}{unit} after."
+    if verdict.get("verification"):
+        sentence += f" {verdict['verification']['words']}"
     return sentence + (f" What is left: {residual['signature']}." if residual else "")

@@ -104,7 +104,6 @@ SENTENCES: Mapping[str, Sentence] = {
     "undetermined": "these runs do not determine its parameters",
     "unlike": "no effect of the library, and it does not explain the rest either",
     "unbelieved": "more stays unexplained with it than it explains",
-    "refuted": "the held-out runs speak against it: they are predicted worse with it",
     "misses_half": _misses_half,
     "resembled": "no effect of the library: it is only said what the rest is like",
     "beaten": "passed every gate, but what was added explains the runs better",

@@ -51,24 +51,36 @@ def _test_beside(values: JSON) -> str:
 
 def _surprise(values: JSON) -> str:
     return (
-        f"{_unlikely(values)} Effects of the boundary are weighed by {values['weighed']} other tests at "
-        f"{values['speeds']} speeds; with probability {values['nothing']:.2g} nothing is missing."
+        f"Effects of the boundary are weighed by {values['weighed']} tests at {values['speeds']} speeds; "
+        f"with probability {values['nothing']:.2g} nothing is missing. {_verified(values)}"
     )
 
 
 def _surprise_alone(values: JSON) -> str:
     tests, speeds = values["tests_needed"], values["speeds_needed"]
     return (
-        f"{_unlikely(values)} Effects of the boundary need {tests} tests with a label that no fit holds out, "
-        f"at {speeds} speeds or more."
+        f"{values['weighed']} labelled tests may decide; effects of the boundary need {tests} of them that "
+        f"are not held out, at {speeds} speeds or more. {_verified(values)}"
     )
 
 
-def _unlikely(values: JSON) -> str:
+def _verified(values: JSON) -> str:
+    if not values["verified"]:
+        return "No held-out test verifies the boundary."
     return (
-        f"{values['tests']} held-out tests; labels drawn from the predicted probabilities would be as "
-        f"unlikely as those measured with probability {values['before']:.2g} for the base model and "
+        f"Labels of the {values['verified']} held-out tests drawn from the prediction would be as unlikely "
+        f"as those measured with probability {values['before']:.2g} for the base model and "
         f"{values['after']:.2g} with what was found."
+    )
+
+
+def _verification_of_labels(values: JSON) -> str:
+    right = f"{values['right']} of {values['tests']} held-out tests are on the predicted side of the boundary"
+    if values["holds"]:
+        return f"Verification: {right}; such labels are to be expected (chance {values['p_value']:.2g})."
+    return (
+        f"Verification contradicts the boundary: {right}; labels as unlikely would occur with a chance of "
+        f"{values['p_value']:.2g}."
     )
 
 
@@ -81,6 +93,7 @@ SENTENCES: Mapping[str, Sentence] = {
     "any_tests": "tests with a stable or unstable label, two depths at each of three speeds, half of them "
     "held out",
     "test_beside": _test_beside,
+    "verification_of_labels": _verification_of_labels,
     "surprise": _surprise,
     "surprise_alone": _surprise_alone,
 }

@@ -9,6 +9,7 @@ from metro.wording.candidates import Sentence
 from metro.wording.names import plain
 
 MOST_PLACES = 4  # that are named
+LEAST_CHANCE = 1e-4  # below it, tails of the distribution are no figure to quote
 
 
 def _residual(values: JSON) -> str:
@@ -69,11 +70,40 @@ def _value(entry: JSON) -> str:
 
 
 def _unseen(values: JSON) -> str:
-    return f"only on runs that no fit has seen: {values['places']}"
+    return f"only where a condition is left out of the fit: {values['places']}"
 
 
-def _makeshift(values: JSON) -> str:
-    return f"what is predicted of a run that no fit has seen is a makeshift: {values['why']}"
+def _above_floor(values: JSON) -> str:
+    return (
+        f"a condition that is left out of the fit is predicted with {values['ratio']:.2g} times the error "
+        f"that the noise explains (chance {_chance(values['p_value'])}), the largest in {values['condition']}"
+    )
+
+
+def _verification(values: JSON) -> str:
+    """Say how the final model does on the held-out runs; nothing is decided by it."""
+    runs = f"{values['runs']} held-out run{'s' if values['runs'] > 1 else ''}"
+    ratio = f"{values['ratio']:.2g} times the noise floor"
+    if values["holds"]:
+        words = f"Verification on {runs}: the error is {ratio}, which noise alone explains."
+    else:
+        words = (
+            f"Verification on {runs} contradicts the model: the error is {ratio} (chance by noise alone "
+            f"{_chance(values['p_value'])}), most in condition {values['condition']}."
+        )
+    if values["worse_runs"]:
+        unit = printed(values["unit"])
+        each = (
+            f"{one['run']} ({one['before']:.2g} to {one['after']:.2g} {unit})" for one in values["worse_runs"]
+        )
+        words += f" With the effects the error grows in {', '.join(each)}."
+    if values["without"]:
+        words += f" A held-out run is beyond the model: {values['without']}."
+    return words
+
+
+def _chance(p_value: float) -> str:
+    return f"{p_value:.2g}" if p_value >= LEAST_CHANCE else f"below {LEAST_CHANCE:g}"
 
 
 def _noise(values: JSON) -> str:
@@ -100,7 +130,8 @@ SENTENCES: Mapping[str, Sentence] = {
     "like": _like,
     "may_be": _may_be,
     "unseen": _unseen,
-    "makeshift": _makeshift,
+    "above_floor": _above_floor,
+    "verification": _verification,
     "noise": _noise,
     "contradiction": "not judged: the data contradict what the batch declares",
 }

@@ -12,12 +12,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from metro.loop.checks.left_out import LeftOut, left_out, most_missed
 from metro.loop.checks.predictive import predictive
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.descent import State, linearised, normal_equations, solution
-from metro.loop.fitting.fit import Fit, refit
+from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.noise import PRIOR_RUNS, Noise
-from metro.observables.problem import Block
 from metro.units import Array
 
 TOUCHED = 0.01  # of the largest gain or loss at a left-out condition: below it, the condition is not touched
@@ -119,45 +119,22 @@ def missed(fitted: Fit) -> float:
 def leave_out(fitted: Fit, prior: Noise, moved: Callable[[Fit], Fit] | None = None) -> dict[str, float]:
     """Log-likelihood of each condition under the fit of all others; of each run if there is one condition.
 
-    ``moved`` puts the fit of all others where something else than these runs wants it.
+    An unknown of a run itself is fitted to the run that is predicted, which gains that much by chance: one is
+    taken off for each. ``moved`` puts the fit of all others where something else than these runs wants it.
     """
-    cut = [block for block in fitted.blocks if block.role != "calibrate"]
-    by_condition = len({block.condition for block in cut}) > 1
-    groups: dict[str, list[Block]] = {}
-    for block in cut:
-        groups.setdefault(block.condition if by_condition else block.run, []).append(block)
-    if len(groups) == 1:
-        return dict.fromkeys(groups, -math.inf)
-    whole = moved(fitted) if moved else fitted
-    return {name: _unseen(fitted, held, prior, moved, whole.noise) for name, held in groups.items()}
+    known, chance = (moved(fitted) if moved else fitted).noise, _own(fitted)
+    return {
+        name: sum(_log_likelihood(part, moved, known) - len(part.blocks) * chance for part in parts)
+        if parts
+        else -math.inf
+        for name, parts in left_out(fitted, prior).items()
+    }
 
 
-def _unseen(
-    fitted: Fit, held: Sequence[Block], prior: Noise, moved: Callable[[Fit], Fit] | None, known: Noise
-) -> float:
-    """Log-likelihood of runs under the fit of all others, less one for each unknown that is their own.
-
-    Such an unknown is fitted to the run that is predicted, which gains that much by chance. Of runs that
-    alone tell a base parameter (the only hole among slots) nothing can be predicted without them: they are
-    left out one by one. ``known``: the noise by all runs.
-    """
-    left_out = {block.run for block in held}
-    others = refit(fitted, [block for block in fitted.blocks if block.run not in left_out], prior)
-    if len(held) > 1 and _determined(others) < _determined(fitted):
-        return sum(_unseen(fitted, [block], prior, moved, known) for block in held)
-    others = moved(others) if moved else others
-    # What a model misses may show in the condition that is left out only (where a gap closes): it is known.
-    others = replace(others, noise=replace(others.noise, misfit=_most_missed(others.noise, known)))
-    return predictive(others, held) - len(held) * _own(fitted)
-
-
-def _most_missed(noise: Noise, other: Noise) -> dict[str, float]:
-    return {axis: max(rms, other.misfit.get(axis, 0.0)) for axis, rms in noise.misfit.items()}
-
-
-def _determined(fitted: Fit) -> int:
-    """Count the base parameters that the runs of a fit tell."""
-    return int(np.isfinite(np.diag(fitted.covariance)[: len(fitted.beta)]).sum())
+def _log_likelihood(part: LeftOut, moved: Callable[[Fit], Fit] | None, known: Noise) -> float:
+    """Log-likelihood of what was left out; ``known``: the noise by all runs."""
+    others = moved(part.others) if moved else part.others
+    return predictive(most_missed(others, known), part.blocks)
 
 
 def weights(

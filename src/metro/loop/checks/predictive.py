@@ -17,6 +17,7 @@ import numpy as np
 from metro.loop.fitting.descent import UNSEEN, Known, State, descend, linearised, normal_equations
 from metro.loop.fitting.fit import Fit, score
 from metro.observables.problem import Block
+from metro.units import Array
 
 STAYS = 1e-9  # deviation, in units of its size, of a base parameter that the fit does not tell: as it is
 
@@ -40,15 +41,18 @@ def predictive(fitted: Fit, blocks: Sequence[Block]) -> float:
 
 def estimated(fitted: Fit) -> Known:
     """Return what a fit says of its base and effect parameters; an effect lies in its bounds at least."""
+    return known(fitted, fitted.covariance * fitted.dispersion)
+
+
+def known(fitted: Fit, covariance: Array) -> Known:
+    """Return what is known of the parameters of a fit that have a ``covariance`` (p + q, p + q)."""
     value = np.concatenate([fitted.beta, fitted.theta])
     bounds = np.array([parameter.upper - parameter.lower for parameter in fitted.candidate.parameters])
-    variance = np.diag(fitted.covariance) * fitted.dispersion
+    variance = np.diag(covariance)
     determined = np.isfinite(variance) & (variance > 0.0)
     unknown = np.concatenate([STAYS * np.maximum(np.abs(fitted.beta), STAYS), bounds])
     size = np.sqrt(np.where(determined, variance, unknown**2))
-    covariance = np.where(
-        np.outer(determined, determined), fitted.covariance * fitted.dispersion, np.diag(size**2)
-    )
+    covariance = np.where(np.outer(determined, determined), covariance, np.diag(size**2))
     share, direction = np.linalg.eigh(covariance / np.outer(size, size))
     precision = (direction / np.maximum(share, UNSEEN)) @ direction.T / np.outer(size, size)
     evenly = np.concatenate([np.zeros(len(fitted.beta)), 12.0 / bounds**2])  # anywhere in the bounds

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from metro.loop.checks.left_out import parameter_errors
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.fit import Fit
 from metro.loop.statement import Statement
@@ -48,36 +49,80 @@ class Line:
         return self.rms**2 / max(self.rms**2 - self.excess**2, 1e-300)
 
 
-def signature(fitted: Fit, least: float) -> list[Line]:
-    """Test the residual of a fit, place by place (axis × label × how it changes), against the plain noise.
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """What a fit leaves of a block, and what is expected of that.
 
-    The plain noise is that without the misfit. A place counts when it is significant by Benjamini–Hochberg at
-    1 % over all places and its excess over the noise is at least ``least`` of the axis's signal, a share
-    of that where it is of a shape of its own (a block's ``patterns``).
+    ``residual`` (n,); ``directions`` (n, k) of the errors that the whole run shares, ``variance`` (n,) of
+    those that nothing shares, by the noise without a misfit.
     """
+
+    block: Block
+    residual: Array
+    directions: Array
+    variance: Array
+
+
+def signature(fitted: Fit, least: float) -> list[Line]:
+    """Test the residual of a fit on its own runs, place by place (axis × label × how it changes).
+
+    It is compared with the plain noise, which is that without the misfit. A place counts when it is
+    significant by Benjamini–Hochberg at 1 % over all places and its excess over the noise is at least
+    ``least`` of the axis's signal, a share of that where it is of a shape of its own (a block's
+    ``patterns``).
+    """
+    cut = [block for block in fitted.blocks if block.role != "calibrate"]
+    return _lines([[_left(fitted, block)] for block in cut], least, as_one=False)
+
+
+def unseen_signature(scored: Sequence[Fit], least: float) -> list[Line]:
+    """Test in the same way what fits leave of runs that they have not seen (:func:`left_out.unseen`).
+
+    The errors of the fitted parameters are expected there as well. They are the same in all runs of a
+    condition, so that these count as one.
+    """
+    conditions: dict[str, list[_Left]] = {}
+    for fitted in scored:
+        for block in fitted.blocks:
+            left = _left(fitted, block, parameter_errors(fitted, block))
+            conditions.setdefault(block.condition, []).append(left)
+    return _lines(list(conditions.values()), least, as_one=True)
+
+
+def _left(fitted: Fit, block: Block, further: Array | None = None) -> _Left:
+    """Return what a fit leaves of a block; ``further`` (n, k): directions of errors beside those of a run."""
+    strict = replace(fitted.noise, misfit={})
+    model = fitted.candidate.model(fitted.theta)
+    matrix, offset = model.design(block, fitted.nuisance[block.run], fitted.beta)
+    directions = noise_room.shared(block, strict, matrix, fitted.beta)
+    if further is not None:
+        directions = np.hstack([directions, further])
+    residual = block.measured - offset - matrix @ fitted.beta
+    return _Left(block, residual, directions, noise_room.diagonal(block, strict))
+
+
+def _lines(units: Sequence[Sequence[_Left]], least: float, *, as_one: bool) -> list[Line]:
+    """Test every place over units of evidence: runs, or conditions, of which all that is seen counts once."""
     places: dict[tuple[str, str], list[Array]] = {}
     signal: dict[str, float] = {}
     shaped: set[str] = set()
-    cut = [block for block in fitted.blocks if block.role != "calibrate"]
-    for block in cut:
-        labels = np.full(len(block.axis), "all") if block.labels is None else block.labels
-        once = len(block.axis) // block.repeats
-        for axis in np.unique(block.axis):
-            power = float(np.sum(block.measured[block.axis == axis] ** 2)) / block.repeats
-            signal[str(axis)] = signal.get(str(axis), 0.0) + power
-        for change, seen in _by_change(fitted, block).items():
-            for axis, label in sorted(set(zip(block.axis.tolist(), labels.tolist(), strict=True))):
-                chosen = ((block.axis == axis) & (labels == label))[:once]
-                name = f"{label}, {change}" if change else str(label)
-                places.setdefault((str(axis), name), []).append(seen[:, chosen].reshape(3, -1))
-        for name, seen in _by_pattern(fitted, block).items():
-            places.setdefault((str(block.axis[0]), name), []).append(seen)
-            shaped.add(name)
+    for unit in units:
+        together: dict[tuple[str, str], list[Array]] = {}
+        for left in unit:
+            for axis, power in _power(left.block).items():
+                signal[axis] = signal.get(axis, 0.0) + power / len(unit)
+            for key, seen in _by_place(left).items():
+                together.setdefault(key, []).append(seen)
+            for name, seen in _by_pattern(left).items():
+                together.setdefault((str(left.block.axis[0]), name), []).append(seen)
+                shaped.add(name)
+        for key, parts in together.items():
+            places.setdefault(key, []).append(_as_one(parts, len(unit)) if as_one else parts[0])
 
     def floor(line: Line) -> float:
         return least * SHAPED if line.label in shaped else least
 
-    freedom = len(cut) + noise_room.PRIOR_RUNS
+    freedom = len(units) + noise_room.PRIOR_RUNS
     lines = [_line(axis, label, parts, signal[axis], freedom) for (axis, label), parts in places.items()]
     accepted = q_values([line.p_value for line in lines]) <= FALSE_DISCOVERY
     return [
@@ -88,20 +133,44 @@ def signature(fitted: Fit, least: float) -> list[Line]:
     ]
 
 
-def _by_change(fitted: Fit, block: Block) -> dict[str, Array]:
+def _as_one(parts: Sequence[Array], runs: int) -> Array:
+    """Return a place of the runs of a condition as one piece of evidence, (3, 1): what a run holds of it."""
+    return np.asarray(np.concatenate(parts, axis=1).sum(axis=1, keepdims=True) / runs)
+
+
+def _power(block: Block) -> dict[str, float]:
+    """Sum of squares of the signal of a block by axis, of one of its repeats."""
+    return {
+        str(axis): float(np.sum(block.measured[block.axis == axis] ** 2)) / block.repeats
+        for axis in np.unique(block.axis)
+    }
+
+
+def _by_place(left: _Left) -> dict[tuple[str, str], Array]:
+    """Return what :func:`_by_change` does, of each axis and label of a block, (3, k)."""
+    block = left.block
+    labels = np.full(len(block.axis), "all") if block.labels is None else block.labels
+    once = len(block.axis) // block.repeats
+    result = {}
+    for change, seen in _by_change(left).items():
+        for axis, label in sorted(set(zip(block.axis.tolist(), labels.tolist(), strict=True))):
+            chosen = ((block.axis == axis) & (labels == label))[:once]
+            name = f"{label}, {change}" if change else str(label)
+            result[str(axis), name] = seen[:, chosen].reshape(3, -1)
+    return result
+
+
+def _by_change(left: _Left) -> dict[str, Array]:
     """Residual of a block and what is expected of it, for what is steady ("") and each way it may change.
 
     Each (3, n / repeats, k): the square of the residual's component, the mean square expected of it, and the
     part of that which the whole run shares: that does not average out over the repeats.
     """
-    strict = replace(fitted.noise, misfit={})
-    model = fitted.candidate.model(fitted.theta)
-    matrix, offset = model.design(block, fitted.nuisance[block.run], fitted.beta)
-    repeats = block.repeats
-    residual = (block.measured - offset - matrix @ fitted.beta).reshape(repeats, -1)
-    directions = noise_room.shared(block, strict, matrix, fitted.beta).reshape(*residual.shape, -1)
+    block, repeats = left.block, left.block.repeats
+    residual = left.residual.reshape(repeats, -1)
+    directions = left.directions.reshape(*residual.shape, -1)
     within = block.sigma.reshape(residual.shape) ** 2
-    budget = noise_room.diagonal(block, strict).reshape(residual.shape) - within
+    budget = left.variance.reshape(residual.shape) - within
     result = {}
     for name, functions in {"": np.ones((repeats, 1)), **block.slow}.items():
         unit = _orthonormal(functions, against=np.ones((repeats, 1)) if name else None)
@@ -116,25 +185,18 @@ def _by_change(fitted: Fit, block: Block) -> dict[str, Array]:
     return result
 
 
-def _by_pattern(fitted: Fit, block: Block) -> dict[str, Array]:
+def _by_pattern(left: _Left) -> dict[str, Array]:
     """Return what :func:`_by_change` does, of each pattern of a block, (3, k)."""
-    if not block.patterns:
-        return {}
-    strict = replace(fitted.noise, misfit={})
-    model = fitted.candidate.model(fitted.theta)
-    matrix, offset = model.design(block, fitted.nuisance[block.run], fitted.beta)
-    residual = block.measured - offset - matrix @ fitted.beta
-    directions = noise_room.shared(block, strict, matrix, fitted.beta)
-    variance = noise_room.diagonal(block, strict)
-    result = {}
+    block, result = left.block, {}
     for name, shape in block.patterns.items():
         # What the zeros leave of a shape says more: they are not known well. If they leave next to nothing,
         # it is tested against them.
         free = shape - block.zeros @ np.linalg.lstsq(block.zeros, shape, rcond=None)[0]
         beyond = np.linalg.norm(free) > FREE * np.linalg.norm(shape)
         unit = _orthonormal(free if beyond else shape, against=None)
-        common = ((unit.T @ directions) ** 2).sum(axis=1)
-        result[name] = np.array([(unit.T @ residual) ** 2, (unit**2).T @ variance + common, common])
+        common = ((unit.T @ left.directions) ** 2).sum(axis=1)
+        expected = (unit**2).T @ left.variance + common
+        result[name] = np.array([(unit.T @ left.residual) ** 2, expected, common])
     return result
 
 

@@ -8,14 +8,15 @@ of the boundary are weighed by it (:mod:`metro.loop.labels.search`), on the iden
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from metro.effects.effect import Effect
+from metro.loop.labels.evidence import Labels
 from metro.loop.labels.next_test import NextTest, advice, beside, next_tests
-from metro.loop.labels.problem import every_test, tests_of
+from metro.loop.labels.problem import tests_of
 from metro.loop.labels.search import (
     LEAST_SPEEDS,
     LEAST_TESTS,
@@ -37,7 +38,6 @@ from metro.observables.labelled import Change, Labelled
 from metro.units import JSON, MM, Array
 
 SIGNIFICANT = 0.01
-REFUTED = -1.0  # log-likelihood of the held-out tests that a correction may cost: more is no chance
 
 
 def log_likelihood(label: Array, probability: Array) -> Array:
@@ -59,62 +59,76 @@ def surprise_alone(label: Array, probability: Array, seed: int) -> float:
 class _Judged:
     """What the verdict is made from.
 
-    ``rows`` of the held-out tests, ``after`` with what is claimed; ``surprises`` of these before and after,
-    and of the identification tests under the hypothesis that leads; ``upstream`` whether the effects of the
-    force explain; ``tests`` that could come next.
+    ``rows`` of the held-out tests, ``after`` with what is claimed; ``tests`` of the identification and their
+    ``runs``; ``contradiction``: how surprising these are under the hypothesis that leads; ``upstream``
+    whether the effects of the force explain; ``suggested`` tests that could come next.
     """
 
     rows: pd.DataFrame
     outcome: LabelOutcome | None
-    surprises: tuple[float, float, float]
+    tests: Labels
+    runs: tuple[str, ...]
+    contradiction: float
     upstream: bool
-    refuted: bool
-    tests: list[NextTest]
+    suggested: list[NextTest]
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are tests to decide by, and others to verify by."""
+        return self.outcome is not None and len(self.rows) >= LEAST_TESTS
 
     @property
     def claimed(self) -> bool:
-        """Whether the lead has passed the gates, its own tests agree, and held-out tests have judged it."""
+        """Whether the lead has passed the gates, its own tests agree, and held-out tests verify it."""
         lead = self.outcome.lead if self.outcome else None
-        agrees = self.surprises[2] >= SIGNIFICANT
-        passed = lead is not None and not lead.rejected and agrees and not self.refuted
-        return passed and len(self.rows) >= LEAST_TESTS
+        return self.enough and lead is not None and not lead.rejected and self.contradiction >= SIGNIFICANT
 
     @property
     def status(self) -> str:
         """The verdict."""
-        contradicted, outcome = min(self.surprises[1:]) < SIGNIFICANT, self.outcome
-        if len(self.rows) < LEAST_TESTS:
+        contradicted, outcome = self.contradiction < SIGNIFICANT, self.outcome
+        if outcome is None or not self.enough:
             return "insufficient"
-        if outcome and outcome.lead and not contradicted:
+        if outcome.lead and not contradicted:
             return "explained" if self.claimed and not outcome.rivals else "undetermined"
-        if self.claimed:
-            return "partly_explained"
-        if contradicted or (outcome and outcome.elsewhere and not outcome.unsettled):
+        if contradicted or (outcome.elsewhere and not outcome.unsettled):
             return "unexplained"
-        if outcome and outcome.unsettled:
+        if outcome.unsettled:
             return "undetermined"
         return "explained" if self.upstream else "clean"
 
     @property
     def residual(self) -> list[Statement]:
         """What no effect accounts for, or may not."""
-        parts = []
-        if self.status in ("unexplained", "partly_explained"):
-            label, after = (self.rows[name].to_numpy(float) for name in ("measured", "after"))
-            wrong = self.rows["run"][np.abs(label - after) > 0.5].tolist()
-            parts.append(Statement("wrong_labels", {"runs": wrong, "tests": len(label)}))
-        lacking = self.outcome and (self.outcome.elsewhere or self.outcome.doubtful)
-        if self.outcome and lacking and self.status in ("unexplained", "undetermined"):
+        parts: list[Statement] = []
+        if self.outcome is None:
+            return parts
+        if self.status == "unexplained":
+            leading = self.outcome.lead or self.outcome.weighed[0]
+            probability = predicted(leading.hypothesis, self.tests, self.outcome.evidence.deviations)
+            wrong = np.flatnonzero(np.abs(self.tests.unstable - probability) > 0.5)
+            parts.append(
+                Statement("wrong_labels", {"runs": [self.runs[i] for i in wrong], "tests": len(self.runs)})
+            )
+        lacking = self.outcome.elsewhere or self.outcome.doubtful
+        if lacking and self.status in ("unexplained", "undetermined"):
             parts.append(_elsewhere(self.outcome))
         return parts
 
 
 def judge_labels(
-    task: Labelled, rows: pd.DataFrame, upstream: list[JSON], library: Sequence[Effect], gates: Gates
+    task: Labelled,
+    rows: pd.DataFrame,
+    upstream: list[JSON],
+    library: Sequence[Effect],
+    gates: Gates,
+    *,
+    first: Labelled | None = None,
 ) -> tuple[pd.DataFrame, JSON, JSON, Change | None]:
     """Judge tests with labels: comparison rows, entries of verdict.json and loop.json, change of the models.
 
-    The change is that of the claimed effects, to draw the boundary with them; None where there are none.
+    The tests of the identification decide; those held out verify and decide nothing. The change is that of
+    the claimed effects, to draw the boundary with them; None where there are none.
 
     Parameters
     ----------
@@ -122,9 +136,10 @@ def judge_labels(
         when the effects found in the cutting force are known.
     upstream : those effects. They are what explains the labels where the prediction contradicts these without
         them only.
-    library : effects that change the boundary.
+    library : effects that change the boundary. first : the problem before those effects of the force were
+        known; None: the same.
     """
-    judged = _judged(task, rows, library, gates)
+    judged = _judged(task, rows, library, gates, first if upstream else None)
     rows, after = judged.rows, judged.rows["after"].to_numpy(float)
     floor = float(np.sqrt(np.mean(after * (1.0 - after)))) if len(rows) else None
     figures = {
@@ -136,6 +151,7 @@ def judge_labels(
         "noise_floor": floor,
         "held_out_runs": rows["run"].tolist(),
         **figures,
+        "verification": _verification(task, judged, gates) if len(rows) else None,
         "effects": (upstream if judged.upstream else []) + _effects(judged),
         "candidates": _candidates(judged),
         "indistinguishable": pairs(judged.outcome) if judged.outcome else [],
@@ -153,32 +169,48 @@ def judge_labels(
     return rows, verdict, _story(task, judged, verdict, gates), change
 
 
-def _judged(task: Labelled, rows: pd.DataFrame, library: Sequence[Effect], gates: Gates) -> _Judged:
-    tests, _ = tests_of(task, "identify")
+def _judged(
+    task: Labelled, rows: pd.DataFrame, library: Sequence[Effect], gates: Gates, first: Labelled | None
+) -> _Judged:
+    tests, runs = tests_of(task, "identify")
     outcome = search_labels(task, library, gates) if enough(tests) else None
-    label = rows["measured"].to_numpy(float)
-
-    def surprised(column: str) -> float:
-        return surprise_alone(label, rows[column].to_numpy(float), gates.seed) if len(rows) else 1.0
-
-    before, refitted = surprised("before"), surprised("after")
-    upstream = before < SIGNIFICANT <= refitted
     if outcome is None:
-        return _Judged(rows, None, (before, refitted, 1.0), upstream, False, [])
-    lead, refuted = outcome.lead, False
-    within = _within(task, outcome, gates)
-    nothing = leading = outcome.weighed[0]
-    if lead and not lead.rejected and within >= SIGNIFICANT:
-        corrected = _with_effects(task, rows, outcome)
-        old, new = (log_likelihood(label, each["after"].to_numpy(float)) for each in (rows, corrected))
-        still = _held_out(task, outcome, lead, gates) < SIGNIFICANT
-        refuted = bool(new - old < REFUTED) or (still and outcome.doubtful)
-        rows, leading = (rows, nothing) if refuted else (corrected, lead)
-    after = refitted
-    if rows["after"].equals(rows["before"]) or leading is lead:  # else the force's effects predict them
-        before, after = (_held_out(task, outcome, one, gates) for one in (nothing, leading))
-    suggested = next_tests(task, outcome) if lead or len(rows) < LEAST_TESTS else []
-    return _Judged(rows, outcome, (before, after, within), upstream, refuted, suggested)
+        return _Judged(rows, None, tests, runs, 1.0, False, [])
+    leading = outcome.lead or outcome.weighed[0]
+    contradiction = surprise(tests, leading.hypothesis, outcome.evidence.deviations, gates.seed)
+    upstream = first is not None and contradiction >= SIGNIFICANT > _without_upstream(first, gates)
+    suggested = next_tests(task, outcome) if outcome.lead or len(rows) < LEAST_TESTS else []
+    judged = _Judged(rows, outcome, tests, runs, contradiction, upstream and not outcome.lead, suggested)
+    return replace(judged, rows=_with_effects(task, rows, outcome)) if judged.claimed else judged
+
+
+def _without_upstream(first: Labelled, gates: Gates) -> float:
+    """Return how surprising the tests are under the base model with the coefficients as they were."""
+    tests, _ = tests_of(first, "identify")
+    outcome = search_labels(first, (), gates)
+    return surprise(tests, outcome.weighed[0].hypothesis, outcome.evidence.deviations, gates.seed)
+
+
+def _verification(task: Labelled, judged: _Judged, gates: Gates) -> JSON:
+    """Compare the held-out tests with what is predicted of them; nothing is decided by it."""
+    label = judged.rows["measured"].to_numpy(float)
+    before, after = (
+        surprise_alone(label, judged.rows[name].to_numpy(float), gates.seed) for name in ("before", "after")
+    )
+    if judged.outcome and not judged.upstream:  # else the force's effects predict them
+        nothing = judged.outcome.weighed[0]
+        leading = judged.outcome.lead if judged.claimed and judged.outcome.lead else nothing
+        before, after = (_held_out(task, judged.outcome, one, gates) for one in (nothing, leading))
+    right = int(np.sum(np.abs(label - judged.rows["after"].to_numpy(float)) < 0.5))
+    holds = after >= SIGNIFICANT
+    values: JSON = {"tests": len(label), "right": right, "p_value": after, "before": before, "holds": holds}
+    return {
+        "ratio": None,
+        "p_value": after,
+        "holds": holds,
+        "worse_runs": [],
+        "words": Statement("verification_of_labels", values),
+    }
 
 
 def _held_out(task: Labelled, outcome: LabelOutcome, one: Weighed, gates: Gates) -> float:
@@ -210,14 +242,6 @@ def _elsewhere(outcome: LabelOutcome) -> Statement:
     return Statement("lacking", {"perhaps": perhaps, "factors": factors})
 
 
-def _within(task: Labelled, outcome: LabelOutcome, gates: Gates) -> float:
-    """Return the surprise of the tests that weighed the hypothesis that leads; of all where it is nothing."""
-    leading, tests = outcome.lead, outcome.evidence.tests
-    if leading is None:
-        leading, tests = outcome.weighed[0], every_test(task)
-    return surprise(tests, leading.hypothesis, outcome.evidence.deviations, gates.seed)
-
-
 def _effects(judged: _Judged) -> list[JSON]:
     """Effects that are claimed, the first to lead first."""
     lead = judged.outcome.lead if judged.outcome else None
@@ -240,9 +264,9 @@ def _candidates(judged: _Judged) -> list[JSON]:
 
 
 def _next(judged: _Judged) -> Statement:
-    if judged.outcome and judged.tests and judged.status in ("undetermined", "insufficient"):
-        return advice(judged.tests, judged.outcome)
-    return beside(judged.rows)
+    if judged.outcome and judged.suggested and judged.status in ("undetermined", "insufficient"):
+        return advice(judged.suggested, judged.outcome)
+    return beside(judged.rows) if judged.outcome else Statement("any_tests")
 
 
 def _story(task: Labelled, judged: _Judged, verdict: JSON, gates: Gates) -> JSON:
@@ -253,7 +277,7 @@ def _story(task: Labelled, judged: _Judged, verdict: JSON, gates: Gates) -> JSON
         "noise": {
             "floor": verdict["noise_floor"],
             "budget": gates.model_form_budget,
-            "words": _surprise(judged),
+            "words": _surprise(judged, verdict),
         },
         "candidates": _tried(judged),
         "path": [],
@@ -299,18 +323,20 @@ def _experiments(judged: _Judged) -> list[JSON]:
             "spindle_rpm": test.rpm,
             "axial_depth_mm": test.depth / MM,
         }
-        for test in judged.tests[:MOST_PROPOSALS]
+        for test in judged.suggested[:MOST_PROPOSALS]
     ]
 
 
-def _surprise(judged: _Judged) -> Statement:
-    """State how unlikely the labels are under the prediction, and by which tests effects are weighed."""
-    before, after, _ = judged.surprises
-    values: JSON = {"tests": len(judged.rows), "before": before, "after": after}
+def _surprise(judged: _Judged, verdict: JSON) -> Statement:
+    """State how surprising the labels are under the prediction, and by which tests effects are weighed."""
+    verified = verdict["verification"]["words"].values if verdict["verification"] else {}
+    values: JSON = {
+        "verified": len(judged.rows),
+        "before": verified.get("before"),
+        "after": verified.get("p_value"),
+    }
     if judged.outcome is None:
-        return Statement(
-            "surprise_alone", {**values, "tests_needed": LEAST_TESTS, "speeds_needed": LEAST_SPEEDS}
-        )
-    tests = judged.outcome.evidence.tests
-    weighed = {"weighed": len(tests.depth), "speeds": len(tests.speeds)}
+        needed = {"tests_needed": LEAST_TESTS, "speeds_needed": LEAST_SPEEDS}
+        return Statement("surprise_alone", {**values, **needed, "weighed": len(judged.runs)})
+    weighed = {"weighed": len(judged.runs), "speeds": len(judged.tests.speeds)}
     return Statement("surprise", {**values, **weighed, "nothing": judged.outcome.weighed[0].probability})

@@ -4,40 +4,27 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.checks.floor import against_floor
+from metro.loop.checks.left_out import unseen
 from metro.loop.search.outcome import Outcome, withdrawn
 from metro.loop.statement import Statement
-from metro.observables.problem import Problem
 from metro.units import JSON
 
 HALF = 0.5  # of the signal, beyond the noise: a base model that misses more is not one of this cut
 
 
-def believable(problem: Problem, outcome: Outcome) -> Outcome:
+def believable(outcome: Outcome) -> Outcome:
     """Return the outcome, without its effects where even with these the model misses half of the signal.
 
-    The effects of the library are changes of a model that is right in the main. Judged on held-out runs,
-    beyond their noise.
+    The effects of the library are changes of a model that is right in the main. Judged on conditions that are
+    left out of the fit, beyond their noise.
     """
     if not outcome.names:
         return outcome
-    missed = _missed(problem, outcome)
-    if missed <= HALF:
+    error = against_floor(unseen(outcome.final, outcome.prior))
+    if error is None or error.relative <= HALF:
         return outcome
-    return withdrawn(outcome, Statement("misses_half", {"share": missed}))
-
-
-def _missed(problem: Problem, outcome: Outcome) -> float:
-    """Error of the final model on held-out runs beyond their noise, relative to the signal."""
-    rows = comparison(problem, held_out(problem, outcome.final))
-    if not len(rows):
-        return 0.0
-    measured, predicted = rows["measured"].to_numpy(float), rows["before"].to_numpy(float)
-    noise = float(np.mean(rows["sigma"].to_numpy(float) ** 2))
-    error = float(np.mean((measured - predicted) ** 2))
-    return math.sqrt(max(error - noise, 0.0) / max(float(np.mean(measured**2)), 1e-300))
+    return withdrawn(outcome, Statement("misses_half", {"share": error.relative}))
 
 
 def with_share(verdict: JSON) -> JSON:

@@ -5,23 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from metro.effects.effect import Effect
-from metro.loop.checks.signature import Line, places, signature
-from metro.loop.fitting.fit import Fit, score
+from metro.loop.checks.floor import ABOVE, against_floor
+from metro.loop.checks.left_out import unseen
+from metro.loop.checks.signature import Line, places, unseen_signature
+from metro.loop.fitting.fit import Fit
 from metro.loop.search.outcome import Outcome
-from metro.loop.search.trial import Gates, beyond, unsettled
+from metro.loop.search.trial import Gates, unsettled
 from metro.loop.statement import Statement
 from metro.observables.problem import Block, Problem
 from metro.units import JSON, Array
 
 LEAST_RUNS = 2  # to identify on
-WORSE = 2.0  # times the least residual that counts: on unseen runs, errors of the parameters add to it
 
 
 @dataclass(frozen=True)
 class Residual:
     """The significant residual: its ``parts``, one statement each, none where nothing significant remains.
 
-    ``fit`` and ``lines`` are those that it was seen in: of the held-out runs where it shows in these alone.
+    ``lines`` are those that it was seen in: of conditions left out of the fit where it shows in these alone.
     """
 
     parts: tuple[Statement, ...]
@@ -40,25 +41,25 @@ def enough_runs(problem: Problem) -> bool:
 
 
 def residual_of(problem: Problem, outcome: Outcome, gates: Gates) -> Residual:
-    """Return what remains, if only on held-out runs."""
-    parts, fitted, lines = remaining(outcome), outcome.final, outcome.lines
+    """Return what remains on the runs of the fit, if only where their condition is left out of it.
+
+    The runs that verify are not read: their errors decide nothing.
+    """
+    parts = remaining(outcome)
     astray = unsettled(outcome.final)
     if astray:  # nothing is claimed of it, least of all that nothing remains
-        return Residual((*parts, astray), fitted, lines)
-    if enough_runs(problem) and not parts:
-        fitted = score(outcome.final, problem.role("validate"))
-        lines = _unseen(problem, fitted, gates)
-        seen = places(lines)
-        parts = (Statement("unseen", {"places": seen}),) if seen else ()
-    nowhere = beyond(outcome.final, problem.role("validate"))
-    makeshift = (Statement("makeshift", {"why": nowhere}),) if nowhere else ()
-    return Residual((*parts, *makeshift), fitted, lines)
-
-
-def _unseen(problem: Problem, scored: Fit, gates: Gates) -> tuple[Line, ...]:
-    """Test the residual on the held-out runs, too: a model may be right only where it was fitted."""
+        return Residual((*parts, astray), outcome.final, outcome.lines)
+    if parts or not enough_runs(problem):
+        return Residual(parts, outcome.final, outcome.lines)
+    scored = unseen(outcome.final, outcome.prior)
     least = max(gates.materiality, 2.0 * problem.systematic, gates.model_form_budget)
-    return tuple(line for line in signature(scored, WORSE * least) if line.significant)
+    lines = tuple(line for line in unseen_signature(scored, least) if line.significant)
+    if seen := places(lines):
+        return Residual((Statement("unseen", {"places": seen}),), outcome.final, lines)
+    error = against_floor(scored)
+    if error and error.p_value < ABOVE and error.relative > least:
+        return Residual((Statement("above_floor", vars(error)),), outcome.final, outcome.lines)
+    return Residual((), outcome.final, outcome.lines)
 
 
 def remaining(outcome: Outcome) -> tuple[Statement, ...]:

@@ -9,19 +9,19 @@ import pandas as pd
 
 from metro.effects.effect import Effect, EffectParameter, by_name
 from metro.loop.checks.signature import share_left
-from metro.loop.fitting.fit import Fit, score
+from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.held_out import comparison, held_out, run_dof
-from metro.loop.search.outcome import Outcome, withdrawn
+from metro.loop.search.outcome import Outcome
 from metro.loop.search.trial import Gates, Trial
 from metro.loop.statement import Statement
 from metro.loop.verdict.advice import more_runs, next_experiment
 from metro.loop.verdict.residual import Residual, enough_runs, residual_of
+from metro.loop.verdict.verification import verification
 from metro.observables.problem import Problem
 from metro.observables.quantity import quantity
 from metro.units import JSON, Array
 
 DRAWS = 2000
-AGAINST = 1.0  # log-likelihood by which held-out runs must be worse off with effects to speak against them
 
 
 def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
@@ -33,21 +33,6 @@ def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
     low, high = np.quantile(np.sqrt(by_run[drawn].mean(axis=1)), [0.025, 0.975])
     rms = float(np.sqrt(square.mean()))
     return {"rms": rms, "nrmse": rms / signal if signal > 0 else 0.0, "ci95": [float(low), float(high)]}
-
-
-def validated(problem: Problem, outcome: Outcome) -> Outcome:
-    """Return the outcome, without its effects where the held-out runs refute them.
-
-    They do where these runs are predicted worse, and are less likely, with the effects than without. Nothing
-    is fitted or chosen by them.
-    """
-    held = problem.role("validate")
-    if not held or not outcome.names:
-        return outcome
-    before, after = held_out_rms(problem, outcome.base), held_out_rms(problem, outcome.final)
-    worse = before is not None and after is not None and after > before
-    unlikelier = score(outcome.final, held).total < score(outcome.base, held).total - AGAINST
-    return withdrawn(outcome, Statement("refuted")) if worse and unlikelier else outcome
 
 
 def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) -> JSON:
@@ -65,6 +50,7 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         "held_out_runs": [block.run for block in problem.role("validate")],
         "before": before,
         "after": after,
+        "verification": verification(problem, outcome, rows) if len(rows) else None,
         "effects": [_effect(outcome, name) for name in claimed],
         "candidates": [
             _candidate(problem, trial, why_not(outcome, trial))

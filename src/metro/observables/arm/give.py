@@ -58,14 +58,15 @@ def giving_arm(batch: Batch, read: Tables) -> GivingArm | Refusal:
     return GivingArm(model, loads, best_compliance(batch, model, loads))
 
 
-def give_of(batch: Batch, run: str, read: Tables, arm: GivingArm | Refusal, force: Array) -> float:
-    """Height by which a run's wall is proud under its mean force (3,) N, m; zero on a machine without an arm.
+def give_per_newton(batch: Batch, run: str, read: Tables, arm: GivingArm | Refusal) -> Array:
+    """Height by which a run's wall is proud per newton along x, y, z of the work, (3,) m/N.
 
-    The force is the measured one, just as the speed is that of the record. The model's prediction changes by
-    a few per cent with it.
+    It is zero on a machine without an arm. The give is linear in the mean force, and the prediction changes
+    by a few per cent with it.
     """
-    if isinstance(arm, Refusal) or not np.isfinite(force).all():
-        return 0.0
+    if isinstance(arm, Refusal):
+        return np.zeros(3)
     face = wall(batch, run)
     cut, _ = tip_force.logs(read("robot", run), arm.model.arm)
-    return arm.give(arm.log(batch, run, cut, face), face, force)
+    log = arm.log(batch, run, cut, face)
+    return np.array([arm.give(log, face, newton) for newton in np.eye(3)])

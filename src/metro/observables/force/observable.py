@@ -22,6 +22,7 @@ from metro.observables.force.blocks import block_of
 from metro.observables.force.bottom_edges import advice, told_apart
 from metro.observables.force.coefficients import correlation, mean_coefficients, waveform
 from metro.observables.force.dynamometer import Dynamometer
+from metro.observables.force.held_out_give import with_predicted_give
 from metro.observables.force.mean_bias import mean_bias
 from metro.observables.force.model import ForceModel
 from metro.observables.force.orders import observe, recorded
@@ -48,7 +49,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     if isinstance(tool, Refusal) or "orders" not in observed:
         return tool if isinstance(tool, Refusal) else Refusal("no order averages")
     by_run = dict(tuple(observed["orders"].groupby("run", sort=False)))
-    spindle = observed["spindle"].set_index("run")
+    spindle = with_predicted_give(batch, observed["spindle"], tool).set_index("run")
     blocks = tuple(
         block_of(batch, run, by_run[run], tool, spindle.loc[run]) for run in recorded(batch) if run in by_run
     )
@@ -101,8 +102,9 @@ def _give_note(batch: Batch, spindle: pd.DataFrame) -> tuple[str, ...]:
     run, give = max(zip(spindle["run"], spindle["give_mm"], strict=True), key=lambda one: abs(one[1]))
     if give:
         return (
-            "The radial depth of side cuts is the nominal one less what the arm gives way to the measured "
-            f"mean force by its load tests: at most {give:.2g} mm, in run {run}.",
+            "The radial depth of side cuts is the nominal one less what the arm gives way to the mean force "
+            f"by its load tests: at most {give:.2g} mm, in run {run}. That force is the measured one in "
+            "runs of the identification; in held-out runs it is predicted together with the give.",
         )
     if "arm" in batch.cell and any(wall(batch, name).normal.any() for name in spindle["run"]):
         return (

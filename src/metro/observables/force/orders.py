@@ -13,10 +13,11 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.cutting.cutter import Cutter
-from metro.observables.arm.give import give_of, giving_arm
+from metro.observables.arm.give import give_per_newton, giving_arm
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.cut.long_record import LongRecord, Stretch
 from metro.observables.force.coefficients import AXES
+from metro.observables.force.held_out_give import PER_NEWTON
 from metro.observables.problem import Refusal
 from metro.signals import orders, steady
 from metro.signals.slope import slope
@@ -41,7 +42,9 @@ def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataF
     tables = [result for result in results if not isinstance(result, Refusal)]
     for _, row in tables:
         force = np.array([row[f"mean_{axis}_n"] for axis in AXES])
-        row["give_mm"] = give_of(batch, row["run"], read, arm, force) / MM
+        per_newton = give_per_newton(batch, row["run"], read, arm) / MM
+        row["give_mm"] = float(per_newton @ force) if np.isfinite(force).all() else 0.0
+        row |= dict(zip(PER_NEWTON, per_newton.tolist(), strict=True))
     refused = [result.reason for result in results if isinstance(result, Refusal)]
     if not tables:
         return Refusal("; ".join(refused))

@@ -14,8 +14,9 @@ INTERVALS = (
     "held-out condition has none. A number without an interval is a reading, or its uncertainty is not known."
 )
 ALWAYS = {
-    "held out": "put aside before any signal was read; no fit and no search sees it, it is read once, at the "
-    "end",
+    "held out": "put aside before any signal was read: no fit, no search and no decision sees it; it "
+    "verifies the result. What a prediction needs of the run itself is taken from it (its speed, its start "
+    "phase, the zero of the sensor, joint angles; for a wall or a face the force that was measured there)",
     "error": "rms of measured less predicted; NRMSE: the same over the rms of the measured values",
     "noise floor": "error that a right model would still have here: noise, scatter of whole runs, declared "
     "accuracy of a simple model",
@@ -29,7 +30,7 @@ OF_THE_LOOP = {
     "these, none and what the library lacks",
 }
 VERDICTS = {
-    "clean": "the base model holds within the noise floor",
+    "clean": "the runs of the identification show nothing that the base model lacks",
     "explained": "the effects named were missing; with them nothing significant is left",
     "partly_explained": "the effects named are there, and something else too",
     "undetermined": "several causes explain these runs equally well",

@@ -75,15 +75,23 @@ def trust_in(results: Results, observable: str) -> str:
 def _reach(observable: str, entry: JSON) -> str:
     """Say the error of predictions on held-out runs, at the upper end of its interval."""
     name, status = heading(observable), str(entry.get("status"))
+    verification = entry.get("verification") or {}
     if status == "insufficient":
-        return f"{name}: nothing; no prediction was tested."
+        return f"{name}: nothing; {_undecided(verification)}."
     size = _size(entry)
-    if status in HOLDS:
+    if status in HOLDS and verification.get("holds", True):
         model = "with what was added, predictions" if entry.get("effects") else "predictions"
         return f"{name}: {model} hold to {size}."
     after, floor = (entry.get("after") or {}).get("rms"), entry.get("noise_floor")
     times = f", {number(after / floor, 2)} times the noise" if after and floor and after > floor else ""
     return f"{name}: the measured values, not the predictions; these are off by up to {size}{times}."
+
+
+def _undecided(verification: JSON) -> str:
+    if not verification:
+        return "no prediction was tested"
+    agree = "agree with" if verification["holds"] else "contradict"
+    return f"the held-out tests {agree} the prediction, but there are too few others to decide by"
 
 
 def _size(entry: JSON) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from metro.report.figures.verdicts import Change
-from metro.report.numbers import listing, number, percent, with_interval, words
+from metro.report.numbers import listing, percent, with_interval, words
 from metro.report.parameters import effect_words
 from metro.report.phrases import plain, residual_words
 from metro.report.results import Results, heading
@@ -23,20 +23,19 @@ STATUS = {
 def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
     """Say the verdict on an observable in a few sentences, with its numbers; ``left`` is the residual."""
     start, status = heading(observable), str(entry.get("status"))
-    floor = entry.get("noise_floor")
-    noise = f" (noise floor {number(floor)}{unit_after(entry)})" if floor is not None else ""
     whole, part = _attribution(entry, "the difference"), _attribution(entry, "part of the difference")
+    verified = (entry.get("verification") or {}).get("words", "")
     says = {
-        "clean": f"{start}: the base model holds. What it leaves on held-out runs is within the "
-        f"noise{noise} or its declared accuracy.",
-        "explained": f"{start}: {whole} {_fall(entry)} What is left is within the noise{noise}.",
-        "partly_explained": f"{start}: {part} {_fall(entry)} "
-        f"A significant rest remains{noise}. {_residual(entry, left)}",
-        "undetermined": f"{start}: something is missing from the base model; these data cannot tell what. "
-        f"{_rivals(entry)}{_fall(entry)}",
-        "unexplained": f"{start}: the base model leaves a significant error{noise}, and no effect of the "
-        f"library accounts for it. {_fall(entry)} {_residual(entry, left)}",
-        "insufficient": f"{start}: too few runs to tell. {_fall(entry)}",
+        "clean": f"{start}: the identification runs show nothing that the base model lacks. {_fall(entry)} "
+        f"{verified}",
+        "explained": f"{start}: {whole} {_fall(entry)} {verified}",
+        "partly_explained": f"{start}: {part} {_fall(entry)} {verified} A significant residual remains. "
+        f"{_residual(entry, left)}",
+        "undetermined": f"{start}: something is missing from the base model, but these data do not "
+        f"determine what. {_rivals(entry)}{_fall(entry)} {verified}",
+        "unexplained": f"{start}: the base model leaves a significant error, and no effect of the library "
+        f"accounts for it. {_fall(entry)} {verified} {_residual(entry, left)}",
+        "insufficient": f"{start}: too few runs to decide. {_fall(entry)} {verified}",
     }
     if entry.get("contradicted"):
         return f"{start}: the data contradict what the batch declares; nothing is attributed. {_fall(entry)}"

@@ -1,0 +1,111 @@
+"""Conditions left out: each predicted by the fit of all others, on the runs of the identification alone.
+
+This is how a model shows whether it holds where it was not fitted, without a look at the runs that verify it.
+The unit that is left out is the condition; it is the run where all runs are of one condition, or where
+the other conditions do not determine a base parameter (the only hole among slots).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from metro.loop.checks.predictive import known
+from metro.loop.fitting.descent import (
+    State,
+    inverse,
+    linearised,
+    moved_models,
+    normal_equations,
+    sensitivities,
+)
+from metro.loop.fitting.fit import Fit, refit, score
+from metro.loop.fitting.noise import Noise
+from metro.observables.problem import Block
+from metro.units import Array
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Runs that were left out, and the fit of all other runs, which has not seen them."""
+
+    blocks: tuple[Block, ...]
+    others: Fit
+
+
+@lru_cache(maxsize=256)
+def left_out(fitted: Fit, prior: Noise) -> dict[str, tuple[LeftOut, ...]]:
+    """Leave out each condition in turn; a condition has several parts where its runs are left out singly.
+
+    Nothing is left to fit where there is a single run: its entry is empty.
+    """
+    cut = [block for block in fitted.blocks if block.role != "calibrate"]
+    by_condition = len({block.condition for block in cut}) > 1
+    groups: dict[str, list[Block]] = {}
+    for block in cut:
+        groups.setdefault(block.condition if by_condition else block.run, []).append(block)
+    if len(groups) == 1:
+        return dict.fromkeys(groups, ())
+    return {name: _parts(fitted, tuple(held), prior) for name, held in groups.items()}
+
+
+def _parts(fitted: Fit, held: tuple[Block, ...], prior: Noise) -> tuple[LeftOut, ...]:
+    runs = {block.run for block in held}
+    others = refit(fitted, [block for block in fitted.blocks if block.run not in runs], prior)
+    if len(held) > 1 and _determined(others) < _determined(fitted):
+        return tuple(part for block in held for part in _parts(fitted, (block,), prior))
+    return (LeftOut(held, others),)
+
+
+def _determined(fitted: Fit) -> int:
+    """Count the base parameters that the runs of a fit determine."""
+    return int(np.isfinite(np.diag(fitted.covariance)[: len(fitted.beta)]).sum())
+
+
+def most_missed(others: Fit, whole: Noise) -> Fit:
+    """Return the fit of all others with the larger misfit of its own noise and that of the ``whole`` fit.
+
+    What a model misses may show in the condition that is left out only (where a gap closes).
+    """
+    misfit = {axis: max(rms, whole.misfit.get(axis, 0.0)) for axis, rms in others.noise.misfit.items()}
+    return replace(others, noise=replace(others.noise, misfit=misfit))
+
+
+@lru_cache(maxsize=64)
+def unseen(fitted: Fit, prior: Noise) -> tuple[Fit, ...]:
+    """Return the fit of all others on each part that was left out: only the runs' own unknowns are fitted.
+
+    The covariance is that which the parameters have if the model is complete: what the fit of all others
+    misses makes them no less certain there, or an incomplete model would excuse its own errors.
+    """
+    parts = (part for each in left_out(fitted, prior).values() for part in each)
+    return tuple(
+        replace(score(part.others, part.blocks), covariance=_if_complete(part.others)) for part in parts
+    )
+
+
+def _if_complete(others: Fit) -> Array:
+    """Covariance (p + q, p + q) of the parameters of a fit if its model missed nothing."""
+    state = State(others.theta, others.beta, dict(others.nuisance))
+    system = linearised(others.candidate, others.blocks, others.noise.sound, state)
+    return inverse(normal_equations(system)[0])
+
+
+def parameter_errors(fitted: Fit, block: Block) -> Array:
+    """Return the errors that its parameters leave in the prediction of a block that a fit has not seen.
+
+    Returns
+    -------
+    (n, p + q) directions, each of one standard deviation; they add to those that a whole run shares.
+    """
+    model, nuisance = fitted.candidate.model(fitted.theta), fitted.nuisance[block.run]
+    matrix, _ = model.design(block, nuisance, fitted.beta)
+    moved = moved_models(fitted.candidate, fitted.theta)
+    effect, _ = sensitivities(model, moved, block, nuisance, fitted.beta)
+    covariance = np.linalg.inv(known(fitted, fitted.covariance).precision)
+    size = np.sqrt(np.diag(covariance))  # parameters differ in size by many powers of ten
+    variance, axes = np.linalg.eigh(covariance / np.outer(size, size))
+    root = size[:, None] * axes * np.sqrt(np.maximum(variance, 0.0))
+    return np.asarray(np.hstack([matrix, effect]) @ root)

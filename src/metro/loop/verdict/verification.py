@@ -1,0 +1,82 @@
+"""Verification: the final model on the runs that neither a fit nor a decision has seen.
+
+What is found here is stated and decides nothing: which effects are named, and the status, are settled before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from metro.loop.checks.floor import ABOVE, against_floor
+from metro.loop.checks.left_out import unseen
+from metro.loop.fitting.fit import score
+from metro.loop.search.outcome import Outcome
+from metro.loop.search.trial import beyond
+from metro.loop.statement import Statement
+from metro.observables.problem import Block, Problem
+from metro.units import JSON
+
+WORSE = 1.1  # times the error without effects: a run that is predicted worse with them by more is named
+
+
+def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON:
+    """Compare the errors on the held-out runs with the noise floor, and with those without any effect.
+
+    Returns
+    -------
+    JSON
+        ``ratio`` of the error to the floor with the errors of the parameters, ``p_value`` of one as large by
+        noise alone, ``holds``: whether it is not beyond chance, ``worse_runs`` that the effects make worse,
+        ``words``: all that as a statement.
+    """
+    groups: dict[str, list[Block]] = {}
+    for block in problem.role("validate"):
+        groups.setdefault(block.condition, []).append(block)
+    scored = [score(outcome.final, blocks) for blocks in groups.values()]
+    error = against_floor(scored, noise_scale(outcome))
+    assert error is not None  # there are rows
+    holds = error.p_value >= ABOVE
+    worse = _worse(rows) if outcome.names else []
+    without = beyond(outcome.final, problem.role("validate"))
+    values = {
+        "runs": len(problem.role("validate")),
+        "conditions": len(groups),
+        "ratio": error.ratio,
+        "p_value": error.p_value,
+        "holds": holds,
+        "condition": error.condition,
+        "worse_runs": worse,
+        "unit": problem.unit,
+        "without": without,
+    }
+    return {
+        "ratio": error.ratio,
+        "p_value": error.p_value,
+        "holds": holds,
+        "worse_runs": worse,
+        "words": Statement("verification", values),
+    }
+
+
+def noise_scale(outcome: Outcome) -> float:
+    """Return the factor on the declared noise that the left-out conditions of the identification show."""
+    error = against_floor(unseen(outcome.final, outcome.prior))
+    return error.scale if error else 1.0
+
+
+def _worse(rows: pd.DataFrame) -> list[JSON]:
+    """Return the runs that are predicted worse with the effects than without, and their errors."""
+    square = pd.DataFrame(
+        {
+            "run": rows["run"],
+            "before": (rows["measured"] - rows["before"]) ** 2,
+            "after": (rows["measured"] - rows["after"]) ** 2,
+        }
+    )
+    by_run = np.sqrt(square.groupby("run").mean())
+    return [
+        {"run": str(run), "before": float(row["before"]), "after": float(row["after"])}
+        for run, row in by_run.iterrows()
+        if row["after"] > WORSE * row["before"]
+    ]
