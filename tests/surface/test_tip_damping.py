@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import eigh
 
 from metro.surface.tip_damping import Rayleigh, SharedRatio, fit_rayleigh, rayleigh_of_matrices
+from metro.surface.tip_response import TipModes, respond
 
 # Iglesias et al. 2025, section 3.1, point 25, wrists A and B
 PRINTED_A0, PRINTED_A1 = 0.9196, 0.0024
@@ -78,3 +79,19 @@ def test_the_doubts_of_measured_coefficients_make_up_their_covariance() -> None:
     known = Rayleigh(np.array([0.9, 0.002]), np.array([[0.04, -3e-5], [-3e-5, 1e-7]]), 1.0)
     moved = np.array([weight * (other.values - known.values) for weight, other in known.doubts()])
     assert moved.T @ moved == pytest.approx(known.covariance)
+
+
+def test_no_damping_within_the_errors_of_a_hammer_test_lets_the_tip_ring_up() -> None:
+    """At a frequency beside the measured ones a0 and a1 may make a damping below zero."""
+    known = Rayleigh(np.array([0.9, 0.002]), np.array([[9.0, -0.01], [-0.01, 2e-5]]), 1.0)
+    frequency = np.array([[40.0, 70.0, 300.0]])
+    modes = TipModes(frequency, np.eye(3)[None], np.eye(3)[None])
+    force = np.ones((1, 4001, 3))
+    force[:, :1] = 0.0
+    below_zero = [0.5 * other.values @ [1 / w, w] for _, other in known.doubts() for w in frequency[0]]
+    assert min(below_zero) < -0.1
+    for _, other in known.doubts():
+        ratio = other.ratio(frequency)
+        assert (ratio >= 0.0).all()
+        moved = respond(modes, ratio, force, 5e-3)
+        assert np.abs(moved).max() <= 2.01 * (1.0 / frequency**2).max()  # of a step without damping

@@ -27,8 +27,12 @@ class Rayleigh:
     misfit: float
 
     def ratio(self, frequency: Array) -> Array:
-        """Damping ratio at undamped ``frequency`` (rad/s): ζ = a0/2ω + a1 ω/2."""
-        return np.asarray(damping_rows(frequency) @ self.values)
+        """Damping ratio at undamped ``frequency`` (rad/s): ζ = a0/2ω + a1 ω/2, and never below zero.
+
+        A structure feeds no energy into its own vibration. Coefficients within the errors of a hammer test
+        may say so of a frequency beside the measured ones; the tip would then ring up without bounds.
+        """
+        return np.maximum(damping_rows(frequency) @ self.values, 0.0)
 
     def shifted(self, sd: Array) -> Rayleigh:
         """Return these coefficients moved by ``sd`` (2,)."""
