@@ -13,7 +13,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from virtual_cell.batches import bundled
-from virtual_cell.blind import HARDER, KINDS
+from virtual_cell.blind import KINDS
 from virtual_cell.hidden import Parameters
 from virtual_cell.recipes.force import STYLES
 
@@ -55,7 +55,7 @@ def _parser() -> argparse.ArgumentParser:
             help="hide an effect, its parameters as given or drawn; may be repeated: " + hidden,
         )
         one.add_argument("--seed", type=int, default=0)
-        one.add_argument("--style", choices=(*STYLES, *HARDER), default="a", help="how it is measured")
+        one.add_argument("--style", choices=STYLES, default="a", help="how it is measured")
         one.add_argument("--truth", type=Path, help="where to write the truth")
     return parser
 

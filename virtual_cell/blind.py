@@ -11,10 +11,10 @@ from virtual_cell.arm_effects import ARM_EFFECTS, SHOWN
 from virtual_cell.face_effects import FACE_EFFECTS
 from virtual_cell.hidden import BOUNDARY_EFFECTS, EFFECTS, Parameters
 from virtual_cell.recipes import arm, boundary, faces, force, force_world
-from virtual_cell.world.arm_causes import ARM_CAUSES
-from virtual_cell.world.arm_causes import SHOWN as WORLD_SHOWN
-from virtual_cell.world.boundary_effects import HARDER_EFFECTS
-from virtual_cell.world.face_causes import FACE_CAUSES
+from virtual_cell.world.arm.causes import ARM_CAUSES
+from virtual_cell.world.arm.causes import SHOWN as WORLD_SHOWN
+from virtual_cell.world.boundary.effects import HARDER_EFFECTS
+from virtual_cell.world.faces.causes import FACE_CAUSES
 from virtual_cell.write import Row
 
 HARDER = ("c", "d")  # styles of the harder world

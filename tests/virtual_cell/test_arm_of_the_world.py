@@ -12,13 +12,13 @@ from metro.cli import app
 from metro.effects.library import library
 from virtual_cell.arm_effects import SHOWN as IDEALISED
 from virtual_cell.blind import RECIPES
-from virtual_cell.recipes import arm, arm_programme, arm_world
+from virtual_cell.recipes import arm, arm_world, arm_world_programme
 from virtual_cell.recipes.arm_draws import side, way
 from virtual_cell.units import MM
-from virtual_cell.world.arm_causes import ARM_CAUSES, SHOWN
-from virtual_cell.world.arm_effects import LIBRARY
-from virtual_cell.world.robot import done
-from virtual_cell.world.robot import way as statics
+from virtual_cell.world.arm.causes import ARM_CAUSES, SHOWN
+from virtual_cell.world.arm.effects import LIBRARY
+from virtual_cell.world.arm.robot import done
+from virtual_cell.world.arm.robot import way as statics
 
 NONE = np.zeros(6)
 FORCE = np.array([180.0, -120.0, 60.0])
@@ -28,7 +28,7 @@ DRAWN = {}
 def world(style="c", seed=3):
     """Draw a world once; return robot, bench and session."""
     if (style, seed) not in DRAWN:
-        DRAWN[style, seed] = arm_programme.drawn(np.random.default_rng([seed, 41, ord(style)]), style)
+        DRAWN[style, seed] = arm_world_programme.drawn(np.random.default_rng([seed, 41, ord(style)]), style)
     return DRAWN[style, seed]
 
 
@@ -232,9 +232,9 @@ def made(tmp_path_factory):
     """One batch of either style; the fewest runs that the styles have."""
     folder, truths = tmp_path_factory.mktemp("world"), {}
     with pytest.MonkeyPatch.context() as patch:
-        for style, habits in arm_programme.HABITS.items():
+        for style, habits in arm_world_programme.HABITS.items():
             few = replace(habits, identify=(3, 3), validate=(1, 1), entries=1.0, lacking=0.0)
-            patch.setitem(arm_programme.HABITS, style, few)
+            patch.setitem(arm_world_programme.HABITS, style, few)
             truths[style] = arm.make(folder / style, {"stiffness_scale": None}, 11, style)
         again = arm.make(folder / "again" / "c", {"stiffness_scale": None}, 11, "c")
     assert again == truths["c"]

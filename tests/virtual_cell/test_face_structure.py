@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from virtual_cell.recipes.irb6640 import ARM, NEAR
-from virtual_cell.world import load_test, structure
-from virtual_cell.world.structure import BendingArm, Friction, Mode, Structure
+from virtual_cell.world.faces import load_test, structure
+from virtual_cell.world.faces.structure import BendingArm, Friction, Mode, Structure
 
 COMPLIANCE = np.array([[5.0, 0.4, 1.0], [0.4, 4.0, -0.5], [1.0, -0.5, 6.0]]) * 1e-7
 FREE = Friction(np.array([0.0, 0.0, 1.0]), 1e-9, 50e-6)

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from virtual_cell.face import Passes, Surroundings, surface
 from virtual_cell.units import MM, UM
-from virtual_cell.world import (
+from virtual_cell.world.faces import (
     fixture,
     machine_troubles,
     mount,
@@ -22,7 +22,7 @@ from virtual_cell.world import (
     warmth,
     work_troubles,
 )
-from virtual_cell.world.finish import Cutting, FaceRun, Influence, finished, gain
+from virtual_cell.world.faces.finish import Cutting, FaceRun, Influence, finished, gain
 
 PASSES = Passes((0.12, 0.06), 0, 0.01, 0.008, 0.04, 0.014)
 SIZE = PASSES.size

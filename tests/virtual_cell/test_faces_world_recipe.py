@@ -15,9 +15,9 @@ from virtual_cell.blind import RECIPES
 from virtual_cell.recipes import faces, faces_world
 from virtual_cell.recipes.faces_world_draws import drawn
 from virtual_cell.recipes.faces_world_programme import PROGRAMMES
-from virtual_cell.world import fixture
-from virtual_cell.world.face_causes import FACE_CAUSES, LIBRARY, applied
-from virtual_cell.world.face_troubles import TROUBLES
+from virtual_cell.world.faces import fixture
+from virtual_cell.world.faces.causes import FACE_CAUSES, LIBRARY, applied
+from virtual_cell.world.faces.troubles import TROUBLES
 
 CELLS = {}
 

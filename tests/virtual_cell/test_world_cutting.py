@@ -11,12 +11,12 @@ import pytest
 from virtual_cell.chips import Engagement, Tool
 from virtual_cell.milling import Coefficients, Cut, forces
 from virtual_cell.motion import Straight
-from virtual_cell.world.cutter import RealTool
-from virtual_cell.world.cutting import Pass, TrueEngagement, edge_force
-from virtual_cell.world.metal import Metal
-from virtual_cell.world.spindle import Spindle, turning
-from virtual_cell.world.travel import Circling, travelled
-from virtual_cell.world.yielding import Holder, march, propagator, swinging_force
+from virtual_cell.world.force.cutter import RealTool
+from virtual_cell.world.force.cutting import Pass, TrueEngagement, edge_force
+from virtual_cell.world.force.metal import Metal
+from virtual_cell.world.force.spindle import Spindle, turning
+from virtual_cell.world.force.travel import Circling, travelled
+from virtual_cell.world.force.yielding import Holder, march, propagator, swinging_force
 
 ANGLES = np.arange(3) * (2.0 * math.pi / 3.0)
 TOOL = RealTool(6e-3, math.radians(35.0), ANGLES)

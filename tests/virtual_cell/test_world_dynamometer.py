@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from virtual_cell.units import DEG
-from virtual_cell.world.amplifier import Amplifier, converted, drawn_amplifier, slow
-from virtual_cell.world.pickup import HARMONICS, Pickup, picked_up
-from virtual_cell.world.table import Table, drawn_table, loaded, single_modes
+from virtual_cell.world.force.amplifier import Amplifier, converted, drawn_amplifier, slow
+from virtual_cell.world.force.pickup import HARMONICS, Pickup, picked_up
+from virtual_cell.world.force.table import Table, drawn_table, loaded, single_modes
 
 AMPLIFIER = Amplifier(
     np.zeros(3),

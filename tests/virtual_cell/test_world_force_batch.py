@@ -14,11 +14,11 @@ from virtual_cell.blind import RECIPES
 from virtual_cell.recipes import force
 from virtual_cell.recipes.force_world import HARDER, _drawn, drawn_programme
 from virtual_cell.session import spread
-from virtual_cell.world.force_cell import cut_run
-from virtual_cell.world.force_effects import INSIDE
-from virtual_cell.world.force_outside import OUTSIDE
-from virtual_cell.world.force_terms import in_contract_terms, orbit_waves
-from virtual_cell.world.people import drawn_habits, order
+from virtual_cell.world.force.cell import cut_run
+from virtual_cell.world.force.effects import INSIDE
+from virtual_cell.world.force.outside import OUTSIDE
+from virtual_cell.world.force.people import drawn_habits, order
+from virtual_cell.world.force.terms import in_contract_terms, orbit_waves
 
 SEED = 4
 SURE = {  # of causes that by chance act in no run

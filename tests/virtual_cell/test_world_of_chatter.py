@@ -11,10 +11,10 @@ from virtual_cell.modes import Modes
 from virtual_cell.recipes.boundary_world_draws import drawn_cell, drawn_programme
 from virtual_cell.regeneration import Trials
 from virtual_cell.regeneration import march as idealised
-from virtual_cell.world.chatter import Law, march
-from virtual_cell.world.cutting_cell import Cell, Mishap, Plan, Session, Spindle, Tool, made, wandering
-from virtual_cell.world.flank import Flank
-from virtual_cell.world.resonances import Resonances, state_matrices
+from virtual_cell.world.boundary.cell import Cell, Mishap, Plan, Session, Spindle, Tool, made, wandering
+from virtual_cell.world.boundary.chatter import Law, march
+from virtual_cell.world.boundary.flank import Flank
+from virtual_cell.world.boundary.resonances import Resonances, state_matrices
 
 HZ, ZETA, K = np.array([310.0, 392.0]), np.array([0.03, 0.035]), np.array([9e6, 7e6])
 QUIET = Resonances(HZ, ZETA, K, np.array([0.0, math.pi / 2]), np.eye(2), np.ones(2), np.ones(2, dtype=bool))

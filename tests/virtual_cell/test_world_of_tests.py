@@ -12,9 +12,9 @@ from metro.effects.library import library
 from virtual_cell.blind import RECIPES
 from virtual_cell.recipes import boundary, boundary_world
 from virtual_cell.recipes.boundary_world_draws import drawn_cell
-from virtual_cell.world import ears, hammer
-from virtual_cell.world.boundary_effects import HARDER_EFFECTS, told
-from virtual_cell.world.resonances import Resonances
+from virtual_cell.world.boundary import ears, hammer
+from virtual_cell.world.boundary.effects import HARDER_EFFECTS, told
+from virtual_cell.world.boundary.resonances import Resonances
 
 LOUD = np.exp(np.linspace(math.log(0.01), math.log(3.0), 4000))
 PAIR = ears.Ears((0.2, 0.25), 0.12, 0.5)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from virtual_cell.recipes.kr160 import ARM, DRIVES, NEAR_DEG
-from virtual_cell.world import controller, gears, hose, joints, links, stylus, tracker
-from virtual_cell.world.dahl import dragged
+from virtual_cell.world.arm import controller, gears, hose, joints, links, stylus, tracker
+from virtual_cell.world.arm.dahl import dragged
 
 NEAR = np.array(NEAR_DEG) * np.pi / 180.0
 SEEDS = range(40)

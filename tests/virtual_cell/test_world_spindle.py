@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from virtual_cell.world.spindle import Spindle, drawn_spindle, turning
+from virtual_cell.world.force.spindle import Spindle, drawn_spindle, turning
 
 OMEGA = 500.0  # rad/s
 

@@ -10,7 +10,7 @@ import pytest
 
 from virtual_cell.chips import Tool
 from virtual_cell.units import DEG, MM, UM
-from virtual_cell.world.cutter import (
+from virtual_cell.world.force.cutter import (
     RealTool,
     Wear,
     drawn_tool,
@@ -20,7 +20,7 @@ from virtual_cell.world.cutter import (
     uneven_pitch,
     wear_per_metre,
 )
-from virtual_cell.world.metal import Metal, drawn_metal, factors, length_for, size_exponent
+from virtual_cell.world.force.metal import Metal, drawn_metal, factors, length_for, size_exponent
 
 ANGLES = np.arange(3) * (2.0 * math.pi / 3.0)
 Z = np.linspace(0.05, 2.0, 9) * MM

@@ -24,7 +24,7 @@ from virtual_cell.hidden import Parameters
 from virtual_cell.milling import scattered
 from virtual_cell.recipes import arm_world
 from virtual_cell.recipes.arm_draws import Bench, Side, drawn, entry, side, side_cut, speed, way
-from virtual_cell.recipes.arm_programme import HABITS
+from virtual_cell.recipes.arm_world_programme import HABITS
 from virtual_cell.recipes.kr160 import DH, NEAR_DEG, TOOL_AXES
 from virtual_cell.session import Plan, spread, write_force
 from virtual_cell.side_force import SideForce, side_force

@@ -1,7 +1,8 @@
 """Side cuts of an arm in the harder world: styles ``c`` and ``d`` of :mod:`virtual_cell.recipes.arm`.
 
 One force of a run is what the dynamometer reads, what the motors carry and what bends the arm; see
-:mod:`virtual_cell.world.robot`. Cutter, spindle and dynamometer are those of ``side_force`` and ``record``.
+:mod:`virtual_cell.world.arm.robot`. Cutter, spindle and dynamometer are those of ``side_force`` and
+``record``.
 """
 
 from __future__ import annotations
@@ -15,19 +16,19 @@ import numpy as np
 
 from virtual_cell.dynamometer import record
 from virtual_cell.hidden import Parameters
-from virtual_cell.recipes.arm_day import Session, in_plain_units
 from virtual_cell.recipes.arm_draws import Bench, Side, entry, side, side_cut, speed, way
-from virtual_cell.recipes.arm_programme import drawn
+from virtual_cell.recipes.arm_world_day import Session, in_plain_units
+from virtual_cell.recipes.arm_world_programme import drawn
 from virtual_cell.recipes.kr160 import DH, NEAR_DEG, TOOL_AXES
 from virtual_cell.session import Plan, write_force
 from virtual_cell.side_force import SideForce, side_force
 from virtual_cell.units import DEG, MM, Array
 from virtual_cell.wall import feed_marks
-from virtual_cell.world.arm_cause import During
-from virtual_cell.world.arm_causes import ARM_CAUSES
-from virtual_cell.world.made import Made
-from virtual_cell.world.robot import Course, Done, Robot, Way, done, logged
-from virtual_cell.world.robot import way as statics
+from virtual_cell.world.arm.cause import During
+from virtual_cell.world.arm.causes import ARM_CAUSES
+from virtual_cell.world.arm.made import Made
+from virtual_cell.world.arm.robot import Course, Done, Robot, Way, done, logged
+from virtual_cell.world.arm.robot import way as statics
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_signal, write_yaml
 
 _ORBIT = 0.5  # radius of the orbit of a helical entry over that of the tool

@@ -15,10 +15,10 @@ from virtual_cell.hidden import Parameters
 from virtual_cell.recipes.boundary_world_draws import Programme, drawn_cell, drawn_programme
 from virtual_cell.session import write_force
 from virtual_cell.units import MM, N_MM, N_MM2, UM, Array
-from virtual_cell.world import ears, hammer
-from virtual_cell.world.boundary_effects import HARDER_EFFECTS, told
-from virtual_cell.world.chatter import Course, march
-from virtual_cell.world.cutting_cell import Cell, Plan, made
+from virtual_cell.world.boundary import ears, hammer
+from virtual_cell.world.boundary.cell import Cell, Plan, made
+from virtual_cell.world.boundary.chatter import Course, march
+from virtual_cell.world.boundary.effects import HARDER_EFFECTS, told
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, impact_row, write_csv, write_signal, write_yaml
 
 STYLES = ("c", "d")

@@ -1,6 +1,6 @@
 """Machines and programmes of styles ``c`` and ``d``, drawn: everything of the harder world is on.
 
-Ranges and where they are from are listed in the docs (proof.md, the harder world of the lobes).
+Ranges and where they are from are listed in the docs (world-boundary.md).
 """
 
 from __future__ import annotations
@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from virtual_cell.units import DEG, MM, N_MM, N_MM2, UM, Array
-from virtual_cell.world import ears, hammer
-from virtual_cell.world.chatter import Law
-from virtual_cell.world.cutting_cell import Cell, Session, Spindle, Tool
-from virtual_cell.world.flank import Flank
-from virtual_cell.world.resonances import Resonances
+from virtual_cell.world.boundary import ears, hammer
+from virtual_cell.world.boundary.cell import Cell, Session, Spindle, Tool
+from virtual_cell.world.boundary.chatter import Law
+from virtual_cell.world.boundary.flank import Flank
+from virtual_cell.world.boundary.resonances import Resonances
+from virtual_cell.world.draws import between
 
 # Tangential, radial and axial chip force in N/mm², ploughing in N/mm, force of a squeezed volume in N/m³.
 _METALS = (
@@ -64,11 +65,6 @@ class Programme:
     ears: ears.Ears
     per_turn: int
     turns: int
-
-
-def between(rng: np.random.Generator, low: float, high: float) -> float:
-    """Log-uniform."""
-    return float(np.exp(rng.uniform(math.log(low), math.log(high))))
 
 
 def drawn_cell(rng: np.random.Generator) -> Cell:

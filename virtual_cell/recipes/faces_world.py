@@ -16,17 +16,17 @@ import numpy as np
 
 from virtual_cell.face_files import face_manifest, face_row, write_frf
 from virtual_cell.face_tables import PATH_STEP, mass_row, path_rows
-from virtual_cell.hidden import Parameters
+from virtual_cell.hidden import Parameters, drawn_size
 from virtual_cell.recipes.faces_draws import Case, feed_axes
 from virtual_cell.recipes.faces_world_draws import Workshop, drawn, side_cut
 from virtual_cell.recipes.faces_world_truth import world
 from virtual_cell.session import spread
 from virtual_cell.side_force import SideForce, full_cut, side_force
 from virtual_cell.units import DEG, MM, Array
-from virtual_cell.world import load_test, scan, structure
-from virtual_cell.world.draws import log_uniform, uniform
-from virtual_cell.world.face_causes import applied
-from virtual_cell.world.finish import FaceRun, Influence, Span, finished, gain
+from virtual_cell.world.draws import uniform
+from virtual_cell.world.faces import load_test, scan, structure
+from virtual_cell.world.faces.causes import applied
+from virtual_cell.world.faces.finish import FaceRun, Influence, Span, finished, gain
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_ply, write_yaml
 
 _HAMMER_HZ = np.arange(1.0, 55.0, 0.25)
@@ -173,7 +173,7 @@ def _write_tests(folder: Path, cell: Workshop, rng: np.random.Generator) -> None
     write_csv(folder / "loads.csv", itertools.chain(*tests))
     write_csv(folder / "mass.csv", [mass_row(name, "P5", at, mass) for name, mass in cell.masses.items()])
     if cell.hammered:
-        noise, aside = log_uniform(rng, 0.005, 0.04), uniform(rng, 2.0, 10.0) * DEG
+        noise, aside = drawn_size(rng, 0.005, 0.04), uniform(rng, 2.0, 10.0) * DEG
         rows = [
             row
             for name, pose in cell.poses.items()

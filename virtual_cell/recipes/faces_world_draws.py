@@ -13,6 +13,7 @@ import numpy as np
 
 from virtual_cell.arm import rotation_rpy
 from virtual_cell.face import Passes
+from virtual_cell.hidden import drawn_size
 from virtual_cell.milling import Coefficients, scattered
 from virtual_cell.recipes.faces_draws import Case, Milling
 from virtual_cell.recipes.faces_world_programme import PROGRAMMES, cases, milling, plate
@@ -20,12 +21,12 @@ from virtual_cell.recipes.irb6640 import ARM, DAMPING, MASS, NEAR, WORK_MM
 from virtual_cell.side_force import SideCut, full_cut
 from virtual_cell.tip_compliance import tip_compliance
 from virtual_cell.units import DEG, MM, UM, Array
-from virtual_cell.world import fixture, load_test, mount, path, scan, servo, structure, warmth
-from virtual_cell.world.draws import either_sign, log_uniform, uniform
-from virtual_cell.world.finish import Cause
-from virtual_cell.world.load_test import LoadTest
-from virtual_cell.world.scan import Scanner
-from virtual_cell.world.structure import BendingArm, Compliance, Structure
+from virtual_cell.world.draws import either_sign, uniform
+from virtual_cell.world.faces import fixture, load_test, mount, path, scan, servo, structure, warmth
+from virtual_cell.world.faces.finish import Cause
+from virtual_cell.world.faces.load_test import LoadTest
+from virtual_cell.world.faces.scan import Scanner
+from virtual_cell.world.faces.structure import BendingArm, Compliance, Structure
 
 _LEAD_MM = (4.0, 9.0)  # of the path beyond where the cutter touches the plate
 _DAMPED = {wrist: np.array(pair) for wrist, pair in DAMPING.items()}
@@ -155,7 +156,7 @@ def drawn(rng: np.random.Generator, style: str) -> Workshop:
         tilt=mount.drawn(rng),
         servo=servo.drawn(rng, usual),
         gears=path.drawn_gears(rng),
-        stock=path.Stock(log_uniform(rng, 5.0, 50.0) * UM),
+        stock=path.Stock(drawn_size(rng, 5.0, 50.0) * UM),
     )
     return Workshop(
         size=size,
@@ -173,8 +174,8 @@ def drawn(rng: np.random.Generator, style: str) -> Workshop:
         clumped=bool(rng.uniform() < programme.clumped),
         hammered=bool(rng.uniform() < programme.struck),
         metal=_metal(rng),
-        depth_error=log_uniform(rng, 10.0, 100.0) * UM,
-        speed_error=log_uniform(rng, 0.0005, 0.005),
+        depth_error=drawn_size(rng, 10.0, 100.0) * UM,
+        speed_error=drawn_size(rng, 0.0005, 0.005),
         pauses=path.drawn_pauses(rng),
         always=always,
     )
@@ -191,10 +192,10 @@ def side_cut(milling: Milling, depth: float, length: float, metal: Coefficients 
 def _metal(rng: np.random.Generator) -> Metal:
     other = either_sign(rng) * uniform(rng, 0.01, 0.04) if rng.uniform() < 0.25 else 0.0
     return Metal(
-        common=log_uniform(rng, 0.003, 0.01),
-        own=log_uniform(rng, 0.003, 0.01),
-        drift=either_sign(rng) * log_uniform(rng, 0.005, 0.03),
-        blunts=log_uniform(rng, 0.001, 0.008),
+        common=drawn_size(rng, 0.003, 0.01),
+        own=drawn_size(rng, 0.003, 0.01),
+        drift=either_sign(rng) * drawn_size(rng, 0.005, 0.03),
+        blunts=drawn_size(rng, 0.001, 0.008),
         other_bar=(other, uniform(rng, 0.3, 0.7)),
     )
 

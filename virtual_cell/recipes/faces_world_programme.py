@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from virtual_cell.chips import Tool
+from virtual_cell.hidden import drawn_size
 from virtual_cell.milling import in_millimetres
 from virtual_cell.recipes.faces_draws import FACTORS, Case, Milling
 from virtual_cell.recipes.irb6640 import KNOWN
 from virtual_cell.units import DEG, MM
-from virtual_cell.world.draws import log_uniform, uniform
+from virtual_cell.world.draws import uniform
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Programme:
     cutters : diameter and radial depth. teeth, rpm, feeds, depths : of which one is drawn; per tooth.
     conditions, replicates : from–to. levels : number of axial depths that the conditions take in turn.
     clumped : probability that repeats follow one another. struck : that the tip was struck.
-    known, sides : see :func:`virtual_cell.world.scan.drawn`. many_loads : load tests at more places.
+    known, sides : see :func:`virtual_cell.world.faces.scan.drawn`. many_loads : load tests at more places.
     """
 
     cutters: tuple[tuple[float, float], ...]
@@ -81,7 +82,7 @@ def milling(rng: np.random.Generator, programme: Programme) -> Milling:
     diameter, width = programme.cutters[rng.integers(len(programme.cutters))]
     teeth, rpm, feed = (float(rng.choice(of)) for of in (programme.teeth, programme.rpm, programme.feeds))
     true = {name: value * math.exp(rng.normal(0.0, 0.12)) for name, value in KNOWN.items()}
-    off = log_uniform(rng, 0.01, 0.04)
+    off = drawn_size(rng, 0.01, 0.04)
     declared = {name: float(f"{value * (1.0 + off * rng.normal()):.4g}") for name, value in true.items()}
     values = list(true.values())
     tool = Tool(0.5 * diameter * MM, uniform(rng, 25.0, 45.0) * DEG, np.arange(teeth) * 2.0 * math.pi / teeth)

@@ -6,8 +6,8 @@ import numpy as np
 
 from virtual_cell.recipes.faces_world_draws import Always, Workshop
 from virtual_cell.units import DEG, MM, MS, UM
-from virtual_cell.world import fixture, load_test, scan
-from virtual_cell.world.structure import Structure
+from virtual_cell.world.faces import fixture, load_test, scan
+from virtual_cell.world.faces.structure import Structure
 from virtual_cell.write import Row
 
 

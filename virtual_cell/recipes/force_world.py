@@ -17,20 +17,20 @@ import numpy as np
 from virtual_cell.hidden import Parameters, drawn_size
 from virtual_cell.session import Plan, row_of, write_force
 from virtual_cell.units import DEG, MM, N_MM, N_MM2
-from virtual_cell.world.amplifier import drawn_amplifier
-from virtual_cell.world.cutter import drawn_tool, drawn_wear
-from virtual_cell.world.force_cell import Cell, cut_run, metres_of
-from virtual_cell.world.force_effects import INSIDE
-from virtual_cell.world.force_outside import OUTSIDE
-from virtual_cell.world.force_terms import in_contract_terms
-from virtual_cell.world.force_words import in_words
-from virtual_cell.world.making import Making
-from virtual_cell.world.metal import drawn_metal
-from virtual_cell.world.outside_work import Spots
-from virtual_cell.world.people import SHORT, drawn_habits, order
-from virtual_cell.world.pickup import drawn_pickup
-from virtual_cell.world.spindle import drawn_spindle
-from virtual_cell.world.table import drawn_table
+from virtual_cell.world.force.amplifier import drawn_amplifier
+from virtual_cell.world.force.cell import Cell, cut_run, metres_of
+from virtual_cell.world.force.cutter import drawn_tool, drawn_wear
+from virtual_cell.world.force.effects import INSIDE
+from virtual_cell.world.force.making import Making
+from virtual_cell.world.force.metal import drawn_metal
+from virtual_cell.world.force.outside import OUTSIDE
+from virtual_cell.world.force.outside_work import Spots
+from virtual_cell.world.force.people import SHORT, drawn_habits, order
+from virtual_cell.world.force.pickup import drawn_pickup
+from virtual_cell.world.force.spindle import drawn_spindle
+from virtual_cell.world.force.table import drawn_table
+from virtual_cell.world.force.terms import in_contract_terms
+from virtual_cell.world.force.words import in_words
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_yaml
 
 STYLES = ("c", "d")

@@ -1,0 +1,1 @@
+"""A cutting arm: joints, gears, hoses, links, controller and gauges, and what its batches hide."""
