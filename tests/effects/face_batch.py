@@ -131,6 +131,14 @@ def loads(rng):
             for newton in (150.0, 250.0):
                 force = newton * np.eye(3)[axis]
                 moved = matrix @ force + rng.normal(0.0, 1e-3, 3)
-                rows.append(["A", f"P{number}", *[np.nan] * 6, x, y, 0.0, *force, *moved, 1])
-    known = [name for name in COLUMNS["loads"] if name != "sigma_mm"]
-    return pd.DataFrame(rows, columns=known).assign(sigma_mm=np.nan)[list(COLUMNS["loads"])]
+                rows.append(["A", f"P{number}", x, y, 0.0, *force, *moved, 1])
+    known = [
+        "pose",
+        "point",
+        "x_mm",
+        "y_mm",
+        "z_mm",
+        *(f"f{a}_n" for a in "xyz"),
+        *(f"d{a}_mm" for a in "xyz"),
+    ]
+    return pd.DataFrame(rows, columns=[*known, "replicate"]).reindex(columns=list(COLUMNS["loads"]))

@@ -100,7 +100,7 @@ def model_of(observable):
         "force": lambda: ForceModel(Cutter(6e-3, 0.5, evenly_pitched(3)), EdgeLaw()),
         "joint_force": lambda: JointForceModel(elastic_arm.ARM),
         "deformation": lambda: elastic_arm.DeformationModel(elastic_arm.ARM),
-        "waviness": wavy.WavinessModel,
+        "waviness": lambda: wavy.WavinessModel(tuple(range(6))),
         "lobes": lambda: StabilityModel(modes, (StabilityCut(3, 1.7, np.pi, 8e8, 3e8),), 0.006),
     }[observable]()
 
@@ -259,7 +259,13 @@ COMPOSED = {
     "tool_wear": ({"edge_growth_per_m": 0.1}, {"edge_growth_per_m": 0.25}, added),
 }
 OWN = [effect for effect in library() if effect.apply.__module__.startswith("metro.")]
-EACH = [(effect, observable) for effect in OWN for observable in effect.observables]
+# Of the forms by joint those of the arm that is made here, which has six.
+EACH = [
+    (effect, observable)
+    for effect in OWN
+    for observable in effect.observables
+    if effect.where.get("joint", "all") in {"all", *range(1, 7)}
+]
 
 
 def case(effect):

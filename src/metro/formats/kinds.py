@@ -93,14 +93,17 @@ def columns_to_read(path: Path, kind: Kind, names: Sequence[str]) -> list[str]:
         message = f"lacks the column {', '.join(missing)} of {kind.title}{hint}: found the columns {present}"
         raise FormatError(path, f"{message}, expected {', '.join(kind.required)}")
     wanted = [name for name in (*kind.required, *kind.optional) if name in names]
-    fault = kind.fault(wanted)
-    if fault:
-        present = ", ".join(name for name in names if name) or "none"
-        raise FormatError(path, f"lacks of {kind.title}: {fault}; found the columns {present}")
+    _check_whole_kind(path, kind, wanted, names)
     for name in wanted:
         if list(names).count(name) > 1:
             raise FormatError(path, f"column {name}: found {list(names).count(name)} times, expected once")
     return wanted
+
+
+def _check_whole_kind(path: Path, kind: Kind, wanted: Sequence[str], names: Sequence[str]) -> None:
+    if fault := kind.fault(wanted):
+        present = ", ".join(name for name in names if name) or "none"
+        raise FormatError(path, f"lacks of {kind.title}: {fault}; found the columns {present}")
 
 
 def checked(path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf) -> pd.DataFrame:
@@ -119,6 +122,8 @@ def checked(path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf
     frame = raw.frame
     blank = [name for name in kind.optional if name in frame and frame[name].isna().all()]
     frame = frame.drop(columns=blank)
+    if blank:  # what has no value is not there
+        _check_whole_kind(path, kind, list(frame), list(frame))
     if kind.title == KINDS["cloud"].title:
         frame = _without_missing(frame)
     else:
