@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 
+from metro.batch.arm import effects_agree
 from metro.batch.cell import cells_findings, read_cell, shared_cells, stations_path
 
 CELLS = Path(__file__).parents[2] / "config/cells"
@@ -117,3 +118,13 @@ def test_moments_of_inertia_that_no_body_has_are_an_error(tmp_path):
 def test_links_must_be_six_with_a_mass_each(tmp_path):
     (tmp_path / "cell.yaml").write_text(ARM + "  links: [{mass_kg: 10}]\n")
     assert "arm.links" in faults(tmp_path)
+
+
+@pytest.mark.parametrize(("joint", "fault"), [(6, ""), (7, "found 7, expected a joint, 1 to 6"), ("all", "")])
+def test_an_effect_is_declared_of_a_joint_that_the_arm_has(joint, fault):
+    cell = {"arm": {"dh": [[0, 0, 0, 0]] * 6}}
+    known = {"friction_reversal": {"joint": joint, "torque_nm": 5.0}, "tool_runout": {"radius_um": 3.0}}
+    found = [*effects_agree(cell, known, "batch.yaml")]
+    assert [one.column for one in found] == (["known.friction_reversal.joint"] if fault else [])
+    assert all(fault in one.message for one in found)
+    assert not [*effects_agree({"cell": "mill"}, known, "batch.yaml")]

@@ -184,7 +184,7 @@ def _loads():
         scaled("displacements in metres", ("dx_mm", "metres"), dx_mm=1e-3, dy_mm=1e-3, dz_mm=1e-3),
         scaled("displacements in micrometres", ("dx_mm", "micrometres"), dx_mm=1e3, dy_mm=1e3, dz_mm=1e3),
         scaled("places in metres", ("x_mm", "metres"), x_mm=1e-3, y_mm=1e-3),
-        Case(file, "", "one joint angle of six", angles, "refused", (at, "q2_deg", "expected all six")),
+        Case(file, "", "one joint angle of six", angles, "refused", ("q1_deg", "expected q1_deg to q6_deg")),
         Case(file, "", "joint angles in radians", radians, "refused", ("q1_deg", "radians")),
         Case(file, "", "nowhere", nowhere, "flagged", ("neither joint angles nor",)),
     ]

@@ -124,12 +124,12 @@ MANIFEST = {
         "7,35",
         "expected a number",
     ),
-    "an effect of a seventh joint": (
+    "an effect of a tenth joint": (
         "instruments:",
-        "known: {friction_reversal: {joint: 7, torque_nm: 5}}\ninstruments:",
+        "known: {friction_reversal: {joint: 10, torque_nm: 5}}\ninstruments:",
         "known.friction_reversal.joint",
-        "7",
-        "expected a joint, 1 to 6",
+        "10",
+        "expected a joint, 1 to 9",
     ),
     "an effect that is told by half": (
         "instruments:",

@@ -104,6 +104,16 @@ def tables_agree(cell: JSON, tables: Mapping[str, Table]) -> Iterator[Finding]:
             yield Finding("error", table.file, message, column=own.positions[0])
 
 
+def effects_agree(cell: JSON, known: JSON, file: str) -> Iterator[Finding]:
+    """Check that what is declared of a joint is of one that the arm has."""
+    axes = len(linear_axes(cell))
+    for effect, values in known.items():
+        joint = values.get("joint") if isinstance(values, dict) else None
+        if axes and isinstance(joint, int) and joint > axes:
+            message = f"found {joint}, expected a joint, 1 to {axes}, as the arm of the cell has"
+            yield Finding("error", file, message, column=f"known.{effect}.joint")
+
+
 def listed(names: Sequence[str]) -> str:
     """Write the columns of an arm's axes, from the first to the last."""
     return " to ".join(dict.fromkeys((names[0], names[-1])))

@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 
 from metro.batch import rules
-from metro.batch.arm import tables_agree
+from metro.batch.arm import effects_agree, tables_agree
 from metro.batch.batch import Batch
 from metro.batch.capabilities import Capability, Stock, nothing_computed
 from metro.batch.cell import CELLS, cells_findings, read_cell, shared_cells, stations_path
@@ -161,7 +161,7 @@ def examine(folder: Path, cells: Path, holdout: JSON) -> Examined:
     findings += [*rules.touch_findings(tables["touches"]), *rules.payload_findings(tables["payload"])]
     findings += [*rules.published_findings(tables["published"]), *rules.station_findings(tables["stations"])]
     findings += file_findings(folder, tables["runs"], tables["impacts"], sound.get(SECTION) or {})
-    findings += tables_agree(cell, tables)
+    findings += [*tables_agree(cell, tables), *effects_agree(cell, sound.get("known") or {}, FILE)]
     runs = filled(tables["runs"].frame, sound)
     findings += [*design_findings(runs, tables["runs"].file), *_about_the_whole(manifest, tables, runs)]
     roles = plan(runs, holdout["share"], holdout["seed"])
