@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from fake_tables import FakeTables
+from load_rows import load_table
 
 from metro.batch.batch import Batch
 from metro.batch.processed import COLUMNS, Processed, read_batch
@@ -60,8 +61,8 @@ def loads(noise=0.0):
     ):
         for force in np.vstack([150 * np.eye(3), 250 * np.eye(3)]):
             moved = compliance(x) @ force + rng.normal(0, noise, 3)
-            rows.append(["A", f"P{number}", *[np.nan] * 6, x, y, 0.0, *force, *moved, 1, np.nan])
-    return pd.DataFrame(rows, columns=list(COLUMNS["loads"]))
+            rows.append(["A", f"P{number}", x, y, 0.0, *force, *moved, 1])
+    return load_table(rows)
 
 
 def make_batch(depths=(1.0, 2.0), manifest=MANIFEST):

@@ -11,6 +11,7 @@ import pytest
 from cost import cost_ratio
 from face_manifest import SIZE, manifest
 from fake_tables import FakeTables
+from load_rows import load_table
 
 from metro.batch.batch import Batch
 from metro.batch.findings import ContractError
@@ -52,10 +53,9 @@ def loads() -> pd.DataFrame:
             for newton in (150.0, 250.0):
                 force = newton * np.eye(3)[axis]
                 rows.append(
-                    ["A", f"P{number}", *[np.nan] * 6, x, y, 0.0, *force, *np.round(matrix @ force, 4), 1]
+                    ["A", f"P{number}", x, y, 0.0, *force, *np.round(matrix @ force, 4), 1]
                 )  # gauges read to 0.1 µm
-    known = [name for name in COLUMNS["loads"] if name != "sigma_mm"]
-    return pd.DataFrame(rows, columns=known).assign(sigma_mm=np.nan)[list(COLUMNS["loads"])]
+    return load_table(rows)
 
 
 def make_batch(manifest: dict = MANIFEST, declared: float = 0.0) -> Batch:

@@ -66,7 +66,7 @@ def test_the_noise_of_each_encoder_is_told_at_the_tip_by_its_lever():
     for run, row in facts.iterrows():
         q = cell.logs[run][[f"q{i}_set_deg" for i in JOINTS]].to_numpy() * DEG
         levers = np.abs(wall(cell.batch, run).normal @ moves(cell.arm, q[len(q) // 4]))
-        at_tip = row[ENCODER].to_numpy(dtype=float) * 1e-6
+        at_tip = row[[ENCODER.format(i) for i in JOINTS]].to_numpy(dtype=float) * 1e-6
         np.testing.assert_allclose(at_tip, 2e-6 * levers, rtol=0.35, atol=2e-8)
 
 
