@@ -10,7 +10,8 @@ from label_toy import GATES, SHIFT, SLOPE, TWIN, Line, problem
 from scipy.stats import norm
 from worded import in_words
 
-from metro.loop.labels.verdict import judge_labels, log_likelihood, surprise_alone
+from metro.loop.labels.verdict import judge_labels
+from metro.loop.labels.verification import log_likelihood, surprise_alone
 
 RNG = np.random.default_rng(1)
 PROBABILITY = RNG.uniform(0.02, 0.98, 40)

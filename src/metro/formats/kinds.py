@@ -123,7 +123,8 @@ def checked(path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf
     blank = [name for name in kind.optional if name in frame and frame[name].isna().all()]
     frame = frame.drop(columns=blank)
     if blank:  # what has no value is not there
-        _check_whole_kind(path, kind, list(frame), list(frame))
+        there = [str(name) for name in frame]
+        _check_whole_kind(path, kind, there, there)
     if kind.title == KINDS["cloud"].title:
         frame = _without_missing(frame)
     else:

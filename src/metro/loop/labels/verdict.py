@@ -21,7 +21,6 @@ from metro.loop.labels.search import (
     LEAST_SPEEDS,
     LEAST_TESTS,
     LabelOutcome,
-    Weighed,
     enough,
     pairs,
     predicted,
@@ -30,29 +29,13 @@ from metro.loop.labels.search import (
 )
 from metro.loop.labels.surprise import surprise
 from metro.loop.labels.unknown import UNKNOWN, curves
+from metro.loop.labels.verification import SIGNIFICANT, of_hypotheses, verification
 from metro.loop.search.trial import Gates
 from metro.loop.statement import Statement
 from metro.loop.verdict.story import MOST_PROPOSALS
-from metro.loop.verdict.verdict import DRAWS, error
+from metro.loop.verdict.verdict import error
 from metro.observables.labelled import Change, Labelled
-from metro.units import JSON, MM, Array
-
-SIGNIFICANT = 0.01
-
-
-def log_likelihood(label: Array, probability: Array) -> Array:
-    """Log-likelihood of labels, (…, n) → (…,); the probabilities (n,) are kept off 0 and 1 by 1e-3."""
-    p = np.clip(probability, 1e-3, 1.0 - 1e-3)
-    return np.asarray(np.sum(np.where(label > 0.5, np.log(p), np.log1p(-p)), axis=-1))
-
-
-def surprise_alone(label: Array, probability: Array, seed: int) -> float:
-    """Probability that labels drawn one by one are at least as unlikely as those measured."""
-    drawn = np.random.default_rng(seed).random((DRAWS, len(label))) < probability
-    unlikelier = (
-        log_likelihood(drawn.astype(float), probability) <= log_likelihood(label, probability) + 1e-12
-    )
-    return float((1 + np.count_nonzero(unlikelier)) / (1 + DRAWS))
+from metro.units import JSON, MM
 
 
 @dataclass(frozen=True)
@@ -151,7 +134,7 @@ def judge_labels(
         "noise_floor": floor,
         "held_out_runs": rows["run"].tolist(),
         **figures,
-        "verification": _verification(task, judged, gates) if len(rows) else None,
+        "verification": _verified(task, judged, gates) if len(rows) else None,
         "effects": (upstream if judged.upstream else []) + _effects(judged),
         "candidates": _candidates(judged),
         "indistinguishable": pairs(judged.outcome) if judged.outcome else [],
@@ -191,32 +174,12 @@ def _without_upstream(first: Labelled, gates: Gates) -> float:
     return surprise(tests, outcome.weighed[0].hypothesis, outcome.evidence.deviations, gates.seed)
 
 
-def _verification(task: Labelled, judged: _Judged, gates: Gates) -> JSON:
-    """Compare the held-out tests with what is predicted of them; nothing is decided by it."""
-    label = judged.rows["measured"].to_numpy(float)
-    before, after = (
-        surprise_alone(label, judged.rows[name].to_numpy(float), gates.seed) for name in ("before", "after")
-    )
-    if judged.outcome and not judged.upstream:  # else the force's effects predict them
-        nothing = judged.outcome.weighed[0]
-        leading = judged.outcome.lead if judged.claimed and judged.outcome.lead else nothing
-        before, after = (_held_out(task, judged.outcome, one, gates) for one in (nothing, leading))
-    right = int(np.sum(np.abs(label - judged.rows["after"].to_numpy(float)) < 0.5))
-    holds = after >= SIGNIFICANT
-    values: JSON = {"tests": len(label), "right": right, "p_value": after, "before": before, "holds": holds}
-    return {
-        "ratio": None,
-        "p_value": after,
-        "holds": holds,
-        "worse_runs": [],
-        "words": Statement("verification_of_labels", values),
-    }
-
-
-def _held_out(task: Labelled, outcome: LabelOutcome, one: Weighed, gates: Gates) -> float:
-    """Return the surprise of the held-out tests under a hypothesis."""
-    tests, _ = tests_of(task, "validate")
-    return surprise(tests, one.hypothesis, outcome.evidence.deviations, gates.seed)
+def _verified(task: Labelled, judged: _Judged, gates: Gates) -> JSON:
+    """Compare the held-out tests with what is predicted of them, by the hypothesis that is claimed if any."""
+    if judged.outcome is None or judged.upstream:  # else the force's effects predict them
+        return verification(judged.rows, gates)
+    lead = judged.outcome.lead if judged.claimed else None
+    return verification(judged.rows, gates, of_hypotheses(task, judged.outcome, lead, gates))
 
 
 def _with_effects(task: Labelled, rows: pd.DataFrame, outcome: LabelOutcome) -> pd.DataFrame:

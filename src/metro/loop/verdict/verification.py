@@ -5,7 +5,6 @@ What is found here is stated and decides nothing: which effects are named, and t
 
 from __future__ import annotations
 
-import numpy as np
 import pandas as pd
 
 from metro.loop.checks.floor import ABOVE, against_floor
@@ -74,9 +73,9 @@ def _worse(rows: pd.DataFrame) -> list[JSON]:
             "after": (rows["measured"] - rows["after"]) ** 2,
         }
     )
-    by_run = np.sqrt(square.groupby("run").mean())
+    by_run = square.groupby("run").mean() ** 0.5
     return [
-        {"run": str(run), "before": float(row["before"]), "after": float(row["after"])}
-        for run, row in by_run.iterrows()
-        if row["after"] > WORSE * row["before"]
+        {"run": str(run), "before": before, "after": after}
+        for run, before, after in zip(by_run.index, by_run["before"], by_run["after"], strict=True)
+        if after > WORSE * before
     ]
