@@ -122,7 +122,7 @@ def checked(path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf
     frame = raw.frame
     blank = [name for name in kind.optional if name in frame and frame[name].isna().all()]
     frame = frame.drop(columns=blank)
-    if blank:  # what has no value is not there
+    if blank and len(frame):  # what has no value in any row is not there
         there = [str(name) for name in frame]
         _check_whole_kind(path, kind, there, there)
     if kind.title == KINDS["cloud"].title:
