@@ -19,7 +19,7 @@ from metro.loop.fitting.held_out import COMPARISON, comparison, held_out, identi
 from metro.loop.search.search import search
 from metro.loop.statement import Statement
 from metro.loop.verdict.story import story
-from metro.loop.verdict.verdict import bounded, error, judge
+from metro.loop.verdict.verdict import bounded, error, judge, widened
 from metro.wording.batch import STATUSES as SENTENCES
 from metro.wording.batch import verdict_in_words
 
@@ -308,3 +308,18 @@ def test_of_a_parameter_that_may_be_anything_it_is_said_that_nothing_is_told():
     assert bounded(size, 4.0, np.inf, 20.0)["told"] is False
     assert "told" not in bounded(angle, 90.0, 20.0, 20.0)
     assert bounded(angle, 90.0, 200.0, 20.0)["told"] is False
+
+
+def test_an_error_of_few_runs_that_agree_by_chance_has_the_interval_of_its_independent_values():
+    rows = pd.DataFrame({"run": ["a", "b"], "measured": [3.0, 3.001], "before": 0.0})
+    narrow = error(rows, "before", 1)
+    assert narrow["ci95"][1] - narrow["ci95"][0] < 0.002
+    low, high = widened(narrow, 10.0)["ci95"]
+    squares = 3.0**2 * np.random.default_rng(1).chisquare(10, 20_000) / 10.0
+    inside = (np.sqrt(squares) * np.sqrt(10.0 / stats.chi2.ppf(0.025, 10)) > 3.0) & (
+        np.sqrt(squares) * np.sqrt(10.0 / stats.chi2.ppf(0.975, 10)) < 3.0
+    )
+    assert inside.mean() == pytest.approx(0.95, abs=0.01)
+    assert (low, high) == pytest.approx((2.09, 5.27), abs=0.02)
+    wide = {**narrow, "ci95": [0.5, 9.0]}
+    assert widened(wide, 10.0)["ci95"] == [0.5, 9.0]

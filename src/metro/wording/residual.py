@@ -84,8 +84,13 @@ def _verification(values: JSON) -> str:
     """Say how the final model does on the held-out runs; nothing is decided by it."""
     runs = f"{values['runs']} held-out run{'s' if values['runs'] > 1 else ''}"
     ratio = f"{values['ratio']:.2g} times the noise floor"
-    if values["holds"]:
-        words = f"Verification on {runs}: the error is {ratio}, which noise alone explains."
+    if values["ratio"] <= 1.0:
+        words = f"Verification on {runs}: the error is {ratio}."
+    elif values["holds"]:
+        words = (
+            f"Verification on {runs}: the error is {ratio}; by noise alone it would be as large with a "
+            f"chance of {_chance(values['p_value'])}."
+        )
     else:
         words = (
             f"Verification on {runs} contradicts the model: the error is {ratio} (chance by noise alone "

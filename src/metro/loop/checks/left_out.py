@@ -7,6 +7,7 @@ the other conditions do not determine a base parameter (the only hole among slot
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -81,11 +82,15 @@ def unseen(fitted: Fit, prior: Noise) -> tuple[Fit, ...]:
     misses makes them no less certain there, or an incomplete model would excuse its own errors.
     """
     parts = (part for each in left_out(fitted, prior).values() for part in each)
-    return tuple(
-        replace(score(part.others, part.blocks), covariance=_if_complete(part.others)) for part in parts
-    )
+    return tuple(scored_unseen(part.others, part.blocks) for part in parts)
 
 
+def scored_unseen(fitted: Fit, blocks: Sequence[Block]) -> Fit:
+    """Return a fit on runs that it has not seen, with the covariance that a complete model would have."""
+    return replace(score(fitted, blocks), covariance=_if_complete(fitted))
+
+
+@lru_cache(maxsize=64)
 def _if_complete(others: Fit) -> Array:
     """Covariance (p + q, p + q) of the parameters of a fit if its model missed nothing."""
     state = State(others.theta, others.beta, dict(others.nuisance))

@@ -35,14 +35,29 @@ def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
     return {"rms": rms, "nrmse": rms / signal if signal > 0 else 0.0, "ci95": [float(low), float(high)]}
 
 
+def widened(figures: JSON, freedom: float) -> JSON:
+    """Return an error with an interval no narrower than that of a mean of ``freedom`` independent squares.
+
+    Two or three runs may agree by chance, which makes the bootstrap's interval as narrow as one likes.
+    """
+    from scipy.stats import chi2
+
+    low, high = (figures["rms"] * math.sqrt(freedom / chi2.ppf(at, freedom)) for at in (0.975, 0.025))
+    ends = figures["ci95"]
+    return {**figures, "ci95": [min(ends[0], low), max(ends[1], high)]}
+
+
 def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) -> JSON:
     """Return the observable's entry of verdict.json, with statements where that has sentences."""
     floor = float(np.sqrt((rows["sigma"] ** 2).mean())) if len(rows) else math.nan
     enough = enough_runs(problem)
     residual = residual_of(problem, outcome, gates)
     claimed = outcome.names if enough else ()  # what no held-out run has tested is not claimed
-    before = error(rows, "before", gates.seed) if len(rows) else None
-    after = error(rows, "after", gates.seed) if len(rows) else None
+    verified = verification(problem, outcome, rows) if len(rows) else None
+    before, after = (
+        widened(error(rows, name, gates.seed), verified["freedom"]) if verified else None
+        for name in ("before", "after")
+    )
     return {
         "status": _status(outcome, bool(residual.parts), enough),
         "unit": problem.unit,
@@ -50,7 +65,7 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         "held_out_runs": [block.run for block in problem.role("validate")],
         "before": before,
         "after": after,
-        "verification": verification(problem, outcome, rows) if len(rows) else None,
+        "verification": verified,
         "effects": [_effect(outcome, name) for name in claimed],
         "candidates": [
             _candidate(problem, trial, why_not(outcome, trial))

@@ -8,8 +8,7 @@ from __future__ import annotations
 import pandas as pd
 
 from metro.loop.checks.floor import ABOVE, against_floor
-from metro.loop.checks.left_out import unseen
-from metro.loop.fitting.fit import score
+from metro.loop.checks.left_out import scored_unseen, unseen
 from metro.loop.search.outcome import Outcome
 from metro.loop.search.trial import beyond
 from metro.loop.statement import Statement
@@ -25,14 +24,14 @@ def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON
     Returns
     -------
     JSON
-        ``ratio`` of the error to the floor with the errors of the parameters, ``p_value`` of one as large by
-        noise alone, ``holds``: whether it is not beyond chance, ``worse_runs`` that the effects make worse,
-        ``words``: all that as a statement.
+        ``ratio`` of the error to the floor with the errors of the parameters, ``freedom``: of how many
+        independent values it is the mean, ``p_value`` of one as large by noise alone, ``holds``: whether it
+        is not beyond chance, ``worse_runs`` that the effects make worse, ``words``: all that as a statement.
     """
     groups: dict[str, list[Block]] = {}
     for block in problem.role("validate"):
         groups.setdefault(block.condition, []).append(block)
-    scored = [score(outcome.final, blocks) for blocks in groups.values()]
+    scored = [scored_unseen(outcome.final, blocks) for blocks in groups.values()]
     error = against_floor(scored, noise_scale(outcome))
     assert error is not None  # there are rows
     holds = error.p_value >= ABOVE
@@ -51,6 +50,7 @@ def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON
     }
     return {
         "ratio": error.ratio,
+        "freedom": error.freedom,
         "p_value": error.p_value,
         "holds": holds,
         "worse_runs": worse,

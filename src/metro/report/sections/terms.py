@@ -10,8 +10,8 @@ INTERVALS = (
     "Uncertainty. Every ± is half of a 95 % interval, and “a (b … c)” gives the ends of one that is not "
     "symmetric; numbers are rounded to two digits of it. It holds the scatter of the data, and what "
     "batch.yaml declares of inputs and instruments. An error on held-out runs has the interval that drawing "
-    "whole runs anew gives (bootstrap): of two or three runs it is no wider than these scatter, and one "
-    "held-out condition has none. A number without an interval is a reading, or its uncertainty is not known."
+    "whole runs anew gives (bootstrap), and at least that of a mean square of as many independent values as "
+    "the noise leaves these runs. A number without an interval is a reading, or its uncertainty is not known."
 )
 ALWAYS = {
     "held out": "put aside before any signal was read: no fit, no search and no decision sees it; it "
