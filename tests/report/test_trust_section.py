@@ -127,3 +127,22 @@ def test_the_first_page_of_a_batch_without_a_verdict_gives_the_mode_that_yields_
     assert told["receptance at its peak"] == "5.00·10⁻⁶ m/N"  # 1 / (2 · 0.05 · 2e6)
     assert "highest response" in picture.caption
     assert any("Identified: 2 modes" in getattr(item, "text", "") for item in first_words(silent))
+
+
+@pytest.mark.parametrize(("holds", "words"), [(True, "agree with the prediction"), (False, "contradict")])
+def test_where_nothing_can_be_decided_the_held_out_tests_are_told_of_all_the_same(holds, words):
+    tested = {**entry("insufficient", runs=["r07"]), "verification": {"holds": holds}}
+    said = trust(results(force=tested))[0]
+    assert words in said
+    assert "too few tests have the role identify" in said
+    assert ("not the predictions" in said) is not holds
+
+
+def test_a_verification_that_fails_says_not_to_use_the_predictions_whatever_the_status():
+    for status in ("clean", "explained"):
+        good, bad = (
+            trust(results(force={**entry(status, runs=["r07"]), "verification": {"holds": holds}}))[0]
+            for holds in (True, False)
+        )
+        assert "predictions hold to" in good
+        assert "the measured values, not the predictions" in bad

@@ -77,7 +77,7 @@ def _reach(observable: str, entry: JSON) -> str:
     name, status = heading(observable), str(entry.get("status"))
     verification = entry.get("verification") or {}
     if status == "insufficient":
-        return f"{name}: nothing; {_undecided(verification)}."
+        return f"{name}: {_undecided(verification)}."
     size = _size(entry)
     if status in HOLDS and verification.get("holds", True):
         model = "with what was added, predictions" if entry.get("effects") else "predictions"
@@ -88,10 +88,18 @@ def _reach(observable: str, entry: JSON) -> str:
 
 
 def _undecided(verification: JSON) -> str:
+    """Say what can be trusted where there are too few runs to decide whether something is missing."""
     if not verification:
-        return "no prediction was tested"
-    agree = "agree with" if verification["holds"] else "contradict"
-    return f"the held-out tests {agree} the prediction, but there are too few others to decide by"
+        return "nothing; no prediction was tested"
+    if verification["holds"]:
+        return (
+            "the held-out tests agree with the prediction. Whether a cause is missing cannot be decided: too "
+            "few tests have the role identify"
+        )
+    return (
+        "the measured values, not the predictions, which the held-out tests contradict. No cause can be "
+        "sought: too few tests have the role identify"
+    )
 
 
 def _size(entry: JSON) -> str:
