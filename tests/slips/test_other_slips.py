@@ -120,7 +120,7 @@ class Tables:
 
 def batch_of(**columns):
     runs = pd.DataFrame({"order": range(1, 5), **columns}, index=[f"r{i}" for i in range(1, 5)])
-    for column in ("dynamometer", "robot_log", "scan", "profile"):
+    for column in ("dynamometer", "robot_log", "scan", "profile", "slopes"):
         runs[column] = columns.get(column, "")
     return Batch("b", {}, {}, runs, {})
 
