@@ -26,6 +26,13 @@ WIDE = 6.0  # robust standard deviations; of normal noise, 2 points in 10⁹ are
 APART = 6.0  # times the distance to the tenth neighbour: a wider gap parts two faces
 MEDIAN = 1.4826  # standard deviation over median absolute deviation of a normal distribution
 ROUNDS = 20
+# A slice of a curved surface goes on beside itself: where a plane takes what lies within ± w of a parabola,
+# 0.73 times as many points lie beside it within 5 w. Beside a face there are none, or the foot of a wall.
+BESIDE, GOES_ON = 5.0, 0.3
+CURVED = (
+    "its points lie evenly about the plane, the more of them the further one looks, as where a plane cuts "
+    "through a curved or a tilted surface"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,10 +102,7 @@ def _settled(points: Array, seen: PlaneSeen, widest: float) -> list[FaceSeen] | 
         within = np.abs(far) <= width
         spread = MEDIAN * float(np.median(np.abs(far[within] - np.median(far[within]))))
         if WIDE * spread > widest:
-            return (
-                "its points lie evenly about the plane, the more of them the further one looks, as where a "
-                "plane cuts through a curved or a tilted surface"
-            )
+            return CURVED
         before, width = width, max(WIDE * spread, float(np.spacing(np.abs(own).max())))
         plane = fit_plane(own[np.abs(far) <= width])
         if abs(width - before) < 1e-3 * before:
@@ -112,7 +116,20 @@ def _settled(points: Array, seen: PlaneSeen, widest: float) -> list[FaceSeen] | 
     pieces = [label == k for k in range(len(counts)) if counts[k] >= PART * len(points)]
     if not pieces:
         return f"it is in {len(counts)} pieces, each of which has less than {100 * PART:.0f} % of the points"
-    return [_face(on[piece], len(points), width, gap) for piece in pieces]
+    whole = [on[piece] for piece in pieces if not _goes_on(points, on[piece], plane, width, gap)]
+    return [_face(each, len(points), width, gap) for each in whole] or CURVED
+
+
+def _goes_on(points: Array, own: Array, plane: Plane, width: float, gap: float) -> bool:
+    """Whether beside a piece (k, 3) of a plane, points lie as close to it as a curved surface goes on."""
+    from scipy.spatial import cKDTree
+
+    far = np.abs(plane.deviations(points))
+    beside = points[(far > width) & (far <= BESIDE * width)]
+    if not len(beside):
+        return False
+    apart = cKDTree(plane.coordinates(own)).query(plane.coordinates(beside))[0]
+    return bool(np.count_nonzero(apart <= gap) > GOES_ON * len(own))
 
 
 def _tenth(places: Array) -> float:
