@@ -196,8 +196,9 @@ def fitted_to(
     """
     able: list[Effect] = []
     unable: dict[str, str] = {}
-    for effect in _of_its_joints(effects, getattr(problem.base, "joints", ())):
-        if effect.part and not hasattr(problem.base, effect.part):
+    base = getattr(problem, "base", None)  # a problem of labels has a model of its own
+    for effect in _of_its_joints(effects, getattr(base, "joints", ())):
+        if effect.part and not hasattr(base, effect.part):
             unable[effect.name] = f"what is predicted here has no {effect.part}"
             continue
         adapted = effect.adapt(effect, problem) if effect.adapt else effect
