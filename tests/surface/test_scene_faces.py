@@ -9,7 +9,8 @@ import pytest
 from metro.formats.gocator import read_gocator
 from metro.formats.kinds import KINDS
 from metro.surface.face import measure_face
-from metro.surface.scene_faces import scene_of
+from metro.surface.plane import fit_plane
+from metro.surface.scene_faces import _goes_on, scene_of
 
 ROOT = Path(__file__).resolve().parents[2]
 FIELD = Path(os.environ.get("METRO_REAL_DATA", ROOT / "../shared/real")).parent / "field/scan-gocator"
@@ -51,6 +52,20 @@ def test_a_cylinder_beside_a_face_is_no_face_and_the_reason_says_so():
     assert len(found.faces) == 1
     assert found.faces[0].sides == pytest.approx((99, 99), abs=1.0)
     assert "cuts through a curved or a tilted surface" in found.refused[0]
+
+
+def test_a_slice_of_a_curved_surface_goes_on_beside_itself_and_a_face_at_the_foot_of_a_wall_does_not():
+    """Asked of the slice itself: which plane the search finds first differs from call to call."""
+    width = 0.2
+    x, y = (c.ravel() for c in np.meshgrid(np.arange(0.0, 100.0), np.arange(-20.0, 20.0, 0.25)))
+    curved = np.column_stack([x, y, y**2 / 60.0])
+    slice_of_it = curved[curved[:, 2] <= 2 * width] - [0.0, 0.0, width]  # about a plane in mid-height
+    assert _goes_on(curved - [0.0, 0.0, width], slice_of_it, fit_plane(slice_of_it), width, 8.0)
+    face = noisy(raster(100, 100))
+    height, along = (c.ravel() for c in np.meshgrid(np.arange(0.0, 30.0, 0.25), np.arange(0.0, 100.0, 0.25)))
+    wall = np.column_stack([np.full(height.size, 100.0), along, height])
+    assert not _goes_on(np.vstack([face, wall]), face, fit_plane(face), 6 * NOISE, 8.0)
+    assert not _goes_on(face, face, fit_plane(face), 6 * NOISE, 8.0)
 
 
 def test_points_at_one_place_are_no_scene():
