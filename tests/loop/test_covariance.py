@@ -17,7 +17,8 @@ def system(designs, rests, weight=()):
         rows.append((rest, base, effect, np.zeros((len(rest), 0))))
     bases = designs[0].shape[1] - len(weight)
     precision = np.diag([*np.zeros(bases), *weight])
-    return System(rows, {}, {}, np.zeros(len(precision)), precision)
+    zero = np.zeros(len(precision))
+    return System(rows, [], {}, {}, zero, zero, precision)
 
 
 def fitted(designs, values):

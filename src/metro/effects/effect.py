@@ -31,6 +31,8 @@ class EffectParameter:
     plausible : standard deviation of a weak prior about zero (None: flat): of two explanations that the data
         cannot part, the one that a machinist would believe.
     period : for an angle, the period after which the model is the same; None otherwise.
+    length : for the angle of a plane vector, the name of the parameter that is its length: a step is one of
+        the vector, which does not bend where the vector is short.
     group : parameters of a group are started from all combinations of their ``starts``, group after group,
         those of later groups ``neutral`` meanwhile.
     neutral : value at which the parameter's group changes nothing.
@@ -48,6 +50,7 @@ class EffectParameter:
     scale: float
     starts: tuple[float, ...]
     period: float | None = None
+    length: str = ""
     plausible: float | None = None
     group: int = 0
     neutral: float = 0.0

@@ -52,7 +52,14 @@ def _of(joint: int) -> Effect:
             EffectParameter("torque_nm", "N m", 0.0, 300.0, 2.0, starts=(1.0,), plausible=30.0),
             EffectParameter("order", "1", 1.0, 5000.0, 10.0, starts=(100.0,)),
             EffectParameter(
-                "phase_deg", "deg", -180.0, 180.0, 20.0, starts=(-120.0, 0.0, 120.0), period=360.0
+                "phase_deg",
+                "deg",
+                -180.0,
+                180.0,
+                20.0,
+                starts=(-120.0, 0.0, 120.0),
+                period=360.0,
+                length="torque_nm",
             ),
         ),
         apply=apply,

@@ -42,6 +42,7 @@ EFFECT = Effect(
             20.0,
             starts=tuple(45.0 * i for i in range(-4, 4)),
             period=360.0,
+            length="amplitude",
         ),
     ),
     apply=apply,

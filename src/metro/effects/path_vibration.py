@@ -145,7 +145,15 @@ ON_WALLS = Effect(
         EffectParameter("frequency_hz", "Hz", 0.1, 500.0, 0.05, starts=(5.0,)),
         EffectParameter("amplitude_um", "um", 0.0, 500.0, 0.5, starts=(2.0,), local=True),
         EffectParameter(
-            "phase_deg", "deg", -180.0, 180.0, 20.0, (-120.0, 0.0, 120.0), period=360.0, local=True
+            "phase_deg",
+            "deg",
+            -180.0,
+            180.0,
+            20.0,
+            (-120.0, 0.0, 120.0),
+            period=360.0,
+            length="amplitude_um",
+            local=True,
         ),
     ),
     apply=apply,

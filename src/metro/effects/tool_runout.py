@@ -35,6 +35,7 @@ EFFECT = Effect(
             30.0,
             starts=tuple(15.0 + 30.0 * i for i in range(12)),
             period=360.0,
+            length="radius_um",
         ),
     ),
     apply=apply,

@@ -176,7 +176,7 @@ def ask(closed: Closed, key: Key, start: Witness | None = None) -> Witness | Non
         return None
     others = tuple(e for e in outcome.final.candidate.effects if e.name != effect.name)
     alone = len(others) == len(outcome.final.candidate.effects)
-    smaller = outcome.final if alone else without(outcome.final, others, outcome.prior)
+    smaller = outcome.final if alone else without(outcome.base, others, outcome.prior)
     names_it = effect.key in {e.key for e in outcome.final.candidate.effects}
     if names_it:
         larger = outcome.final

@@ -40,6 +40,17 @@ class Candidate:
             model = effect.apply(model, effect.values(theta[place]))
         return model
 
+    @property
+    def vectors(self) -> list[tuple[int, int]]:
+        """Places of the length and of the angle of each plane vector among the parameters."""
+        found = []
+        for effect, place in self.parts(np.zeros(len(self.parameters))):
+            names = [parameter.name for parameter in effect.parameters]
+            for i, parameter in enumerate(effect.parameters):
+                if parameter.length:
+                    found.append((place.start + names.index(parameter.length), place.start + i))
+        return found
+
     def groups(self, known: int) -> list[list[int]]:
         """Places of the parameters from ``known`` on, that are started together, group after group."""
         fresh = self.parameters[known:]

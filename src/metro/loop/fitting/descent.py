@@ -1,4 +1,4 @@
-"""Gauss–Newton descent in base parameters, effect parameters and every run's unknowns at once.
+"""Levenberg's and Marquardt's descent in base parameters, effect parameters and every run's unknowns at once.
 
 Each run's nuisance (start phase) touches only its own block and is eliminated there, so the system that is
 solved has only base and effect parameters, however many runs.
@@ -6,7 +6,8 @@ solved has only base and effect parameters, however many runs.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -14,14 +15,15 @@ import numpy as np
 
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.noise import Noise, Whitener
 from metro.observables.problem import Block, Model, predictions
 from metro.units import Array
 
 ITERATIONS = 40
 ENOUGH = 0.01  # gain in twice the log-likelihood below which a descent ends
-SHARES = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step, tried in turn until the cost falls
-DAMPINGS = (0.1, 10.0, 1e3, 1e5)  # of the normal matrix's diagonal, where no share of the step makes it fall
+FIRST_DAMPING, DAMPED = 0.1, 10.0  # of the normal matrix's diagonal, and the factor by which it grows
+HOPE = 30.0  # times what a step promises: more is not left to gain along a descent, except in a bent valley
+ACCEPTED, POOR, GOOD = 1e-3, 0.25, 0.75  # shares of what a step promised that it must keep
 THETA_STEP = 1e-3  # in units of the parameter's scale
 NUISANCE_STEP = 1e-4
 UNSEEN = 1e-12  # smallest eigenvalue of the scaled normal matrix that is more than its rounding
@@ -60,14 +62,17 @@ class System:
     Attributes
     ----------
     rows : of each block the whitened residual, base columns, effect columns and own (nuisance) columns.
+    whiteners : of each block.
     log_likelihood, chi2 : by run.
-    pull : distance of base and effect parameters from what is known of them beforehand, (p + q,).
-    weight : precision of that, (p + q, p + q).
+    at : base and effect parameters, (p + q,). pull : their distance from what is known beforehand, (p + q,).
+    weight : precision of what is known, (p + q, p + q).
     """
 
     rows: list[Rows]
+    whiteners: list[Whitener]
     log_likelihood: dict[str, float]
     chi2: dict[str, float]
+    at: Array
     pull: Array
     weight: Array
 
@@ -75,6 +80,20 @@ class System:
     def cost(self) -> float:
         """Twice the negative logarithm of likelihood times prior."""
         return float(self.pull @ self.weight @ self.pull) - 2.0 * sum(self.log_likelihood.values())
+
+    @property
+    def squares(self) -> float:
+        """Sum of the squares of the whitened residuals and of the pull."""
+        return float(self.pull @ self.weight @ self.pull) + sum(self.chi2.values())
+
+    def left(self, common: Array, alone: Sequence[Array]) -> float:
+        """Sum of squares that a step leaves if the model is linear; ``alone``: of each run's own unknowns."""
+        pull = self.pull + common
+        total = float(pull @ self.weight @ pull)
+        for row, step in zip(self.rows, alone, strict=True):
+            after = _without_common(row, common) - row[3] @ step
+            total += float(after @ after)
+        return total
 
 
 def linearised(
@@ -93,6 +112,7 @@ def linearised(
     model = candidate.model(state.theta)
     moved = moved_models(candidate, state.theta) if derivatives == "all" else []
     rows: list[Rows] = []
+    whiteners: list[Whitener] = []
     log_likelihood, chi2 = {}, {}
     for block in blocks:
         nuisance = state.nuisance[block.run]
@@ -100,6 +120,7 @@ def linearised(
         predicted = offset + matrix @ state.beta
         directions = noise_room.shared(block, noise, matrix, state.beta)
         whiten = noise_room.whitener(noise_room.diagonal(block, noise), directions)
+        whiteners.append(whiten)
         residual = whiten(block.measured - predicted)
         chi2[block.run] = float(residual @ residual)
         determinant = noise_room.log_determinant(block, noise, directions, whiten)
@@ -110,8 +131,8 @@ def linearised(
             p, q = matrix.shape[1], matrix.shape[1] + effect.shape[1]
             rows.append((residual, whitened[:, :p], whitened[:, p:q], whitened[:, q:]))
     known = known or weakly_known(candidate, len(state.beta))
-    pull = np.concatenate([state.beta, state.theta]) - known.mean
-    return System(rows, log_likelihood, chi2, pull, known.precision)
+    at = np.concatenate([state.beta, state.theta])
+    return System(rows, whiteners, log_likelihood, chi2, at, at - known.mean, known.precision)
 
 
 def sensitivities(
@@ -147,28 +168,52 @@ def moved_models(candidate: Candidate, theta: Array) -> list[tuple[Model, float]
     return models
 
 
-def normal_equations(system: System) -> tuple[Array, Array]:
-    """Return normal matrix and right side of base and effects, each block's own unknowns eliminated."""
+def normal_equations(system: System, damping: float = 0.0) -> tuple[Array, Array]:
+    """Return normal matrix and right side of base and effects, each block's own unknowns eliminated.
+
+    ``damping`` : by how much the diagonal of the normal matrix of all unknowns is larger, relative to it.
+    """
     p, q = (part.shape[1] for part in system.rows[0][1:3])
     normal, right = np.zeros((p + q, p + q)), np.zeros(p + q)
     for residual, base, effect, unknowns in system.rows:
         columns = np.hstack([base, effect])
-        own = unknowns[:, unknowns.any(axis=0)]  # what changes nothing has no direction to take out
+        normal[np.diag_indices(p + q)] += damping * (columns**2).sum(axis=0)
+        own = _damped(unknowns[:, unknowns.any(axis=0)], damping)  # what changes nothing has no direction
+        columns = _lengthened(columns, len(own))
         if own.shape[1]:
             basis = np.linalg.qr(own)[0]
             columns = columns - basis @ (basis.T @ columns)
         normal += columns.T @ columns
-        right += columns.T @ residual
+        right += columns.T @ _lengthened(residual, len(own))
     return normal + system.weight, right - system.weight @ system.pull
 
 
-def own_step(row: Rows, common: Array) -> Array:
+def own_step(row: Rows, common: Array, damping: float = 0.0) -> Array:
     """Step of a block's nuisance when base and effect parameters together move by ``common``."""
-    residual, base, effect, own = row
+    own = row[3]
     if not own.shape[1]:
         return np.zeros(0)
-    left = residual - np.hstack([base, effect]) @ common if common.any() else residual
-    return np.asarray(np.linalg.lstsq(own, left, rcond=None)[0])
+    left = _without_common(row, common)
+    damped = _damped(own, damping)
+    return np.asarray(np.linalg.lstsq(damped, _lengthened(left, len(damped)), rcond=None)[0])
+
+
+def _without_common(row: Rows, common: Array) -> Array:
+    """Residual of a block less what a step of base and effect parameters takes from it."""
+    residual, base, effect, _ = row
+    return residual - np.hstack([base, effect]) @ common if common.any() else residual
+
+
+def _damped(columns: Array, damping: float) -> Array:
+    """Append to columns the rows that damp a step along each of them."""
+    if not damping:
+        return columns
+    return np.vstack([columns, math.sqrt(damping) * np.diag(np.linalg.norm(columns, axis=0))])
+
+
+def _lengthened(values: Array, length: int) -> Array:
+    """Append rows of zeros."""
+    return np.concatenate([values, np.zeros((length - len(values), *values.shape[1:]))])
 
 
 def descend(
@@ -179,18 +224,21 @@ def descend(
     steps: int = ITERATIONS,
     *,
     own: bool = False,
-    enough: float = ENOUGH,
     known: Known | None = None,
+    rival: float = np.inf,
 ) -> tuple[State, float]:
-    """Follow Gauss–Newton steps, shortened until the cost falls, to where they gain next to nothing.
+    """Follow Levenberg's and Marquardt's steps to where none promises to gain anything that counts.
 
-    Where no share of a step lowers the cost although there is something to gain, Levenberg's steps are tried.
+    A step is judged by the weights at its start; then the weights are those of where it led (iteratively
+    reweighted least squares). How much a step was damped is remembered: where the model bends, the next one
+    need not find out anew (Marquardt 1963, J. SIAM 11, 431).
 
     Parameters
     ----------
     own : move the blocks' own unknowns alone; base and effect parameters stay.
-    enough : gain in twice the log-likelihood below which the descent ends.
     known : of the parameters beforehand; None: :func:`weakly_known`.
+    rival : cost that another descent has reached. This one is given up where it would stay above that even
+        if it gained ``HOPE`` times what its next step promises.
 
     Returns
     -------
@@ -198,56 +246,95 @@ def descend(
     """
     free: Literal["all", "own"] = "own" if own else "all"
     system = linearised(candidate, blocks, noise, state, derivatives=free, known=known)
-    for step in range(steps):
-        for way in _ways_down(blocks, system, own=own, enough=enough):
-            trial = _moved(candidate, state, way.common, way.alone)
-            reached = linearised(candidate, blocks, noise, trial, derivatives="none", known=known)
-            if reached.cost < system.cost:
-                break
-        else:
+    damping = 0.0
+    for step in range(1, steps + 1):
+        taken = _step(candidate, blocks, state, system, damping, own=own, hopeless=system.cost - rival)
+        if taken is None:
             break
-        gain, system, state = system.cost - reached.cost, reached, trial
-        if gain < way.share * enough:
+        state, gained, damping = taken
+        last = gained < ENOUGH or step == steps
+        system = linearised(
+            candidate, blocks, noise, state, derivatives="none" if last else free, known=known
+        )
+        if last:
             break
-        if step + 1 < steps:
-            system = linearised(candidate, blocks, noise, state, derivatives=free, known=known)
     return state, system.cost
 
 
-class _Way(NamedTuple):
-    """A step to try: what share of a whole one it is, its part of base and effects, and that of each run."""
+class _Taken(NamedTuple):
+    """A step that was taken: where it led, what it gained, and the damping to begin the next one with."""
 
-    share: float
-    common: Array
-    alone: dict[str, Array]
+    state: State
+    gained: float
+    damping: float
 
 
-def _ways_down(blocks: Sequence[Block], system: System, *, own: bool, enough: float) -> Iterator[_Way]:
-    """Yield steps to try in turn; none where the model overflows.
+def _step(
+    candidate: Candidate,
+    blocks: Sequence[Block],
+    state: State,
+    system: System,
+    damping: float,
+    *,
+    own: bool,
+    hopeless: float,
+) -> _Taken | None:
+    """Take a step, ever more damped until it gains; None where none promises to gain ``ENOUGH``.
 
-    First Gauss–Newton's, shortened; then, where that promises to gain ``enough``, Levenberg's, ever more
-    damped, which turn to the steepest way down.
+    ``hopeless`` : cost that a descent is above another; a step that promises far less is not taken.
     """
-    still = np.zeros_like(system.pull)
-    normal, right = (np.diag(still), still) if own else normal_equations(system)
-    if not np.isfinite(normal).all():
-        return
-    whole = still if own else solution(normal, right)
-    alone = [own_step(row, whole) for row in system.rows]
-    for share in SHARES:
-        yield _Way(share, share * whole, _by_run(blocks, alone, share))
-    if own or whole @ right < enough:
-        return
-    for damping in DAMPINGS:
-        common = solution(normal + damping * np.diag(np.diag(normal)), right)
-        alone = [own_step(row, common) for row in system.rows]
-        # not a share of a whole step: it must gain as much as that for the descent to go on
-        yield _Way(1.0, common, _by_run(blocks, alone, 1.0 / (1.0 + damping)))
+    here = system.squares
+    while True:
+        common, alone = _way(candidate, state, system, damping, own=own)
+        promised = here - system.left(common, alone)
+        if not promised >= max(ENOUGH, hopeless / HOPE):  # nor where the model overflows
+            return None
+        trial = _moved(candidate, state, common, _by_run(blocks, alone))
+        gained = here - _squares(candidate, blocks, trial, system)
+        if gained > ACCEPTED * promised:
+            return _Taken(trial, gained, _next(damping, gained / promised))
+        damping = max(DAMPED * damping, FIRST_DAMPING)
 
 
-def _by_run(blocks: Sequence[Block], steps: Sequence[Array], share: float) -> dict[str, Array]:
-    """Give each run its share of its own step."""
-    return {block.run: share * step for block, step in zip(blocks, steps, strict=True)}
+def _next(damping: float, kept: float) -> float:
+    """Return the damping for the next step, by how much of its promise the last one kept."""
+    if kept > GOOD:
+        return damping / DAMPED if damping > FIRST_DAMPING else 0.0
+    return max(DAMPED * damping, FIRST_DAMPING) if kept < POOR else damping
+
+
+def _way(
+    candidate: Candidate, state: State, system: System, damping: float, *, own: bool
+) -> tuple[Array, list[Array]]:
+    """Return a damped step of base and effects together, and of each run's own unknowns.
+
+    Parameters that are pressed to a bound stay there.
+    """
+    common = np.zeros_like(system.pull)
+    if not own:
+        normal, right = normal_equations(system, damping)
+        if not np.isfinite(normal).all():
+            return common, [np.full(row[3].shape[1], np.nan) for row in system.rows]
+        moving = free(candidate, state, right)
+        common[moving] = solution(normal[np.ix_(moving, moving)], right[moving])
+    return common, [own_step(row, common, damping) for row in system.rows]
+
+
+def _squares(candidate: Candidate, blocks: Sequence[Block], state: State, system: System) -> float:
+    """Sum of squares at another state under the weights of a system; infinite where the model overflows."""
+    model = candidate.model(state.theta)
+    pull = system.pull + np.concatenate([state.beta, state.theta]) - system.at
+    total = float(pull @ system.weight @ pull)
+    for block, whiten in zip(blocks, system.whiteners, strict=True):
+        predicted = predictions(model, block, state.nuisance[block.run][None], state.beta)[0]
+        residual = whiten(block.measured - predicted)
+        total += float(residual @ residual)
+    return total if np.isfinite(total) else np.inf
+
+
+def _by_run(blocks: Sequence[Block], steps: Sequence[Array]) -> dict[str, Array]:
+    """Give each run its own step."""
+    return {block.run: step for block, step in zip(blocks, steps, strict=True)}
 
 
 def polish(
@@ -269,14 +356,21 @@ def polish(
         nearest, best = left, state
         common = solution(normal, right)
         alone = [own_step(row, common) for row in system.rows]
-        state = _moved(candidate, state, common, _by_run(blocks, alone, 1.0))
+        state = _moved(candidate, state, common, _by_run(blocks, alone))
     return best
 
 
 def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, Array]) -> State:
-    """Add steps to a state; angles are turned into their period, other effect parameters kept in bounds."""
+    """Add steps to a state; angles are turned into their period, other effect parameters kept in bounds.
+
+    A step of a plane vector's length and angle is one along them where it begins, straight on.
+    """
     p = len(state.beta)
     theta = state.theta + common[p:]
+    for length, angle in candidate.vectors:
+        turn = math.radians(common[p + angle]) * state.theta[length]
+        theta[angle] = state.theta[angle] + math.degrees(math.atan2(turn, theta[length]))
+        theta[length] = math.hypot(theta[length], turn)
     for i, parameter in enumerate(candidate.parameters):
         if parameter.period:
             theta[i] = parameter.lower + (theta[i] - parameter.lower) % parameter.period

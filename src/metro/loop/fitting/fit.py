@@ -139,7 +139,7 @@ def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fi
             if without - first[0][0] < HOPELESS * len(fresh):
                 return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
     reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS)
-    near = [state for cost, state in reached if cost < reached[0][0] + UNDECIDED]
+    near = _distinct([one for one in reached if one[0] < reached[0][0] + UNDECIDED], ENOUGH)
     refined = [_refined(candidate, blocks, prior, noise, state, rounds=ROUNDS) for state in near]
     return max(refined, key=lambda fitted: fitted.total)
 
@@ -156,9 +156,16 @@ def _distinct(reached: Sequence[tuple[float, State]], apart: float) -> list[Stat
 def _lowest_first(
     candidate: Candidate, blocks: Sequence[Block], noise: Noise, states: Sequence[State], *, steps: int
 ) -> list[tuple[float, State]]:
-    """Follow each state some steps down; return where they lead, with the cost there."""
-    reached = [descend(candidate, blocks, noise, state, steps) for state in states]
-    return sorted(((cost, state) for state, cost in reached), key=lambda pair: pair[0])
+    """Follow each state some steps down; return where they lead, with the cost there.
+
+    Once one has been followed to its end, others are given up when they cannot come as low.
+    """
+    reached: list[tuple[float, State]] = []
+    for state in states:
+        lowest = min((cost for cost, _ in reached), default=np.inf) if steps == ITERATIONS else np.inf
+        end, cost = descend(candidate, blocks, noise, state, steps, rival=lowest + UNDECIDED)
+        reached.append((cost, end))
+    return sorted(reached, key=lambda pair: pair[0])
 
 
 def refit(start: Fit, blocks: Sequence[Block], prior: Noise) -> Fit:

@@ -20,10 +20,11 @@ MOST_EFFECTS = 4
 def forward(space: SearchSpace) -> Choice:
     """Add the best effect that passes every gate until none does, and weigh what was added."""
     current, steps, trials = _added(space)
-    compared = contested(current, space.effects, space.prior, space.gates)
+    compared = contested(space.base, current, space.effects, space.prior, space.gates)
     if compared.final is not current:
         current, dropped = _pruned(compared.final, space)
-        compared = contested(current, space.effects, space.prior, space.gates) if dropped else compared
+        if dropped:
+            compared = contested(space.base, current, space.effects, space.prior, space.gates)
     return Choice(compared.final, tuple(steps), tuple(trials.values()), compared.weight, compared.rivals)
 
 
@@ -56,7 +57,7 @@ def _pruned(current: Fit, space: SearchSpace) -> tuple[Fit, set[str]]:
     dropped: set[str] = set()
     for effect in current.candidate.effects[:-1]:
         kept = tuple(e for e in current.candidate.effects if e is not effect)
-        smaller = without(current, kept, space.prior)
+        smaller = without(space.base, kept, space.prior)
         evidence = compare(smaller, current)
         if evidence.size >= space.least:
             evidence = hold_out(evidence, leave_out(smaller, space.prior), current, space.prior)

@@ -52,11 +52,14 @@ def believed(effect: Effect, weight: float) -> tuple[bool, float]:
     return not effect.resembled and weight > RIVAL_WEIGHT, weight
 
 
-def contested(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> Contest:
-    """Weigh every effect chosen against each other effect in its place, and put the better one there."""
+def contested(base: Fit, current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> Contest:
+    """Weigh every effect chosen against each other effect in its place, and put the better one there.
+
+    ``base`` : the fit without any effect, from which the models without one of them are built up.
+    """
     swapped: set[tuple[str, str]] = set()
     while True:
-        contest, better = _round(current, effects, prior, gates)
+        contest, better = _round(base, current, effects, prior, gates)
         if better is None or set(_keys(better)) <= swapped:
             return contest
         swapped |= set(_keys(current)) | set(_keys(better))
@@ -74,14 +77,16 @@ def _keys(fitted: Fit) -> list[tuple[str, str]]:
     return [effect.key for effect in fitted.candidate.effects]
 
 
-def _round(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> tuple[Contest, Fit | None]:
+def _round(
+    base: Fit, current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates
+) -> tuple[Contest, Fit | None]:
     """Contest each effect once; also the fit with the best rival in place, where one is better."""
     weight: dict[str, float] = {}
     rivals: list[Rival] = []
     better: Fit | None = None
     out = leave_out(current, prior) if current.candidate.effects else {}
     for effect in current.candidate.effects:
-        smaller = without(current, tuple(e for e in current.candidate.effects if e is not effect), prior)
+        smaller = without(base, tuple(e for e in current.candidate.effects if e is not effect), prior)
         others = _replaced(current, smaller, effects, prior)
         in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
         left_out = [leave_out(smaller, prior), out, *(leave_out(fitted, prior) for fitted in others)]

@@ -76,7 +76,7 @@ def _described(
 ) -> Outcome:
     """Describe what a strategy chose: the fits without what is not of the library, and the residual."""
     base, prior, likeness = space.base, space.prior, choice.fit
-    final = _of_the_library(likeness, prior)
+    final = _of_the_library(base, likeness, prior)
     floor = max(space.least, space.gates.model_form_budget)
     outcome = Outcome(
         base=base,
@@ -104,10 +104,10 @@ def _described(
     )
 
 
-def _of_the_library(fitted: Fit, prior: Noise) -> Fit:
+def _of_the_library(base: Fit, fitted: Fit, prior: Noise) -> Fit:
     """Refit without the effects that are not of the library; the same fit where there are none."""
     kept = tuple(effect for effect in fitted.candidate.effects if not effect.resembled)
-    return fitted if len(kept) == len(fitted.candidate.effects) else without(fitted, kept, prior)
+    return fitted if len(kept) == len(fitted.candidate.effects) else without(base, kept, prior)
 
 
 def _steps(base: Fit, steps: Sequence[Fit], final: Fit) -> tuple[Fit, ...]:

@@ -177,12 +177,10 @@ def unlike(effect: Effect, fitted: Fit) -> bool:
     return bool(residual.share_left(residual.signature(fitted, budget)))
 
 
-def without(current: Fit, kept: tuple[Effect, ...], prior: Noise) -> Fit:
-    """Refit with the effects that are kept, from the base up."""
-    first = Candidate(current.candidate.base)
-    fitted = fit(first, current.blocks, prior)
+def without(base: Fit, kept: tuple[Effect, ...], prior: Noise) -> Fit:
+    """Refit with the effects that are kept, one after another on top of the ``base`` fit."""
+    fitted = base
     for effect in kept:
-        fitted = fit(
-            Candidate(first.base, (*fitted.candidate.effects, effect)), current.blocks, prior, fitted
-        )
+        candidate = Candidate(base.candidate.base, (*fitted.candidate.effects, effect))
+        fitted = fit(candidate, base.blocks, prior, fitted)
     return fitted
