@@ -78,7 +78,7 @@ def test_what_a_run_says_of_its_own_unknown_is_no_evidence():
         free.append((away @ rest, away @ design))
     with_own = System(
         [(r, d, np.zeros((6, 0)), o) for r, d, o in zip(rests, designs, own, strict=True)],
-        {}, {}, np.zeros(2), np.zeros((2, 2)),
+        [], {}, {}, np.zeros(2), np.zeros(2), np.zeros((2, 2)),
     )  # fmt: skip
     expected = between_runs(system([d for _, d in free], [r for r, _ in free]))
     assert between_runs(with_own) == pytest.approx(expected)

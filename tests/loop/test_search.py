@@ -128,20 +128,22 @@ def test_the_search_never_reads_the_validation_runs():
     assert other.final.total == pytest.approx(clean.final.total, rel=1e-12)
 
 
-def test_an_effect_that_a_later_one_makes_idle_is_dropped():
-    task = problem(11, truth=Wave(bend=0.3))
+def ripple_before_bend(task):
+    """The space of a problem with no effects in its base, and the fit with ``ripple`` and then ``bend``."""
     blocks = task.role("identify")
     prior = first_noise(GATES.model_form_budget, task.scatter, blocks)
-    both = fit(Candidate(task.base, (RIPPLE,)), blocks, prior)
-    both = fit(Candidate(task.base, (RIPPLE, BEND)), blocks, prior, both)
-    space = SearchSpace(both, (), prior, GATES, GATES.materiality)
+    base = fit(Candidate(task.base), blocks, prior)
+    first = fit(Candidate(task.base, (RIPPLE,)), blocks, prior, base)
+    both = fit(Candidate(task.base, (RIPPLE, BEND)), blocks, prior, first)
+    return SearchSpace(base, (), prior, GATES, GATES.materiality), both
+
+
+def test_an_effect_that_a_later_one_makes_idle_is_dropped():
+    space, both = ripple_before_bend(problem(11, truth=Wave(bend=0.3)))
     kept, dropped = forward_room._pruned(both, space)
     assert dropped == {"ripple"}
     assert [effect.name for effect in kept.candidate.effects] == ["bend"]
-    needed = problem(12, truth=Wave(bend=0.3, ripple=0.2))
-    blocks = needed.role("identify")
-    both = fit(Candidate(needed.base, (RIPPLE,)), blocks, prior)
-    both = fit(Candidate(needed.base, (RIPPLE, BEND)), blocks, prior, both)
+    space, both = ripple_before_bend(problem(12, truth=Wave(bend=0.3, ripple=0.2)))
     assert forward_room._pruned(both, space)[1] == set()
 
 

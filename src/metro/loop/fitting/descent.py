@@ -21,9 +21,10 @@ from metro.units import Array
 
 ITERATIONS = 40
 ENOUGH = 0.01  # gain in twice the log-likelihood below which a descent ends
-FIRST_DAMPING, DAMPED = 0.1, 10.0  # of the normal matrix's diagonal, and the factor by which it grows
+SHARES = (1.0, 0.5, 0.25, 0.1)  # of an undamped step: along a bent valley a shorter one leads on
+FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e9  # of the normal matrix's diagonal
 HOPE = 30.0  # times what a step promises: more is not left to gain along a descent, except in a bent valley
-ACCEPTED, POOR, GOOD = 1e-3, 0.25, 0.75  # shares of what a step promised that it must keep
+ACCEPTED = 1e-3  # share of what a step promised that it must keep
 THETA_STEP = 1e-3  # in units of the parameter's scale
 NUISANCE_STEP = 1e-4
 UNSEEN = 1e-12  # smallest eigenvalue of the scaled normal matrix that is more than its rounding
@@ -224,6 +225,7 @@ def descend(
     steps: int = ITERATIONS,
     *,
     own: bool = False,
+    enough: float = ENOUGH,
     known: Known | None = None,
     rival: float = np.inf,
 ) -> tuple[State, float]:
@@ -231,11 +233,12 @@ def descend(
 
     A step is judged by the weights at its start; then the weights are those of where it led (iteratively
     reweighted least squares). How much a step was damped is remembered: where the model bends, the next one
-    need not find out anew (Marquardt 1963, J. SIAM 11, 431).
+    need not find out anew (Marquardt 1963, J. SIAM 11, 431; Nielsen 1999, IMM-REP-1999-05, for its growth).
 
     Parameters
     ----------
     own : move the blocks' own unknowns alone; base and effect parameters stay.
+    enough : gain in twice the log-likelihood below which the descent ends.
     known : of the parameters beforehand; None: :func:`weakly_known`.
     rival : cost that another descent has reached. This one is given up where it would stay above that even
         if it gained ``HOPE`` times what its next step promises.
@@ -248,11 +251,19 @@ def descend(
     system = linearised(candidate, blocks, noise, state, derivatives=free, known=known)
     damping = 0.0
     for step in range(1, steps + 1):
-        taken = _step(candidate, blocks, state, system, damping, own=own, hopeless=system.cost - rival)
+        taken = _step(
+            candidate,
+            blocks,
+            state,
+            system,
+            damping,
+            own=own,
+            enough=max(enough, (system.cost - rival) / HOPE),
+        )
         if taken is None:
             break
         state, gained, damping = taken
-        last = gained < ENOUGH or step == steps
+        last = gained < enough or step == steps
         system = linearised(
             candidate, blocks, noise, state, derivatives="none" if last else free, known=known
         )
@@ -277,30 +288,24 @@ def _step(
     damping: float,
     *,
     own: bool,
-    hopeless: float,
+    enough: float,
 ) -> _Taken | None:
-    """Take a step, ever more damped until it gains; None where none promises to gain ``ENOUGH``.
-
-    ``hopeless`` : cost that a descent is above another; a step that promises far less is not taken.
-    """
-    here = system.squares
-    while True:
+    """Take a step, shortened and then ever more damped until it gains; None: none promises ``enough``."""
+    here, growth = system.squares, 2.0
+    while damping < LARGEST_DAMPING:
         common, alone = _way(candidate, state, system, damping, own=own)
-        promised = here - system.left(common, alone)
-        if not promised >= max(ENOUGH, hopeless / HOPE):  # nor where the model overflows
-            return None
-        trial = _moved(candidate, state, common, _by_run(blocks, alone))
-        gained = here - _squares(candidate, blocks, trial, system)
-        if gained > ACCEPTED * promised:
-            return _Taken(trial, gained, _next(damping, gained / promised))
-        damping = max(DAMPED * damping, FIRST_DAMPING)
-
-
-def _next(damping: float, kept: float) -> float:
-    """Return the damping for the next step, by how much of its promise the last one kept."""
-    if kept > GOOD:
-        return damping / DAMPED if damping > FIRST_DAMPING else 0.0
-    return max(DAMPED * damping, FIRST_DAMPING) if kept < POOR else damping
+        for share in (1.0,) if damping else SHARES:
+            part = [share * step for step in alone]
+            promised = here - system.left(share * common, part)
+            if not promised > enough:  # nor where the model overflows
+                return None
+            trial = _moved(candidate, state, share * common, _by_run(blocks, part))
+            gained = here - _squares(candidate, blocks, trial, system)
+            if gained > ACCEPTED * promised:
+                eased = max(1.0 / 3.0, 1.0 - (2.0 * gained / promised - 1.0) ** 3)
+                return _Taken(trial, gained, min(eased, 2.0) * damping)
+        damping, growth = max(growth * damping, FIRST_DAMPING), 2.0 * growth
+    return None
 
 
 def _way(
