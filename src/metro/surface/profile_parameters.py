@@ -43,6 +43,33 @@ class ProfileParameters:
     v: float
 
 
+@dataclass(frozen=True)
+class Moments:
+    """Mean deviation ``a``, rms ``q``, skewness and kurtosis of heights about their mean."""
+
+    a: float
+    q: float
+    skewness: float
+    kurtosis: float
+
+
+def moments(z: Array) -> Moments:
+    """Return the moments of heights (n,) about their mean, which are not all the same."""
+    z = z - z.mean()
+    square = z * z
+    q = float(np.sqrt(square.mean()))
+    return Moments(
+        float(np.abs(z).mean()), q, float(square @ z) / len(z) / q**3, float(square @ square) / len(z) / q**4
+    )
+
+
+def slope(z: Array, spacing: float) -> float:
+    """Return the rms slope of an evenly spaced profile (n,); NaN of fewer points than a slope takes."""
+    if len(z) < len(SLOPE):
+        return float("nan")
+    return float(np.sqrt(np.mean((np.convolve(z, SLOPE, mode="valid") / spacing) ** 2)))
+
+
 def profile_parameters(z: Array, spacing: float, narrowest: float = 0.0) -> ProfileParameters:
     """Return the parameters of an evenly spaced profile (n,) about its mean, ``spacing`` in the same unit.
 
@@ -58,16 +85,12 @@ def profile_parameters(z: Array, spacing: float, narrowest: float = 0.0) -> Prof
             f"a profile of {len(z)} points between {z.min():g} and {z.max():g} has no parameters"
         )
     z = z - z.mean()
-    q = float(np.sqrt(np.mean(z**2)))
-    slope = np.convolve(z, SLOPE, mode="valid") / spacing
+    of_heights = moments(z)
     widths = np.diff(upward_crossings(z, narrowest / spacing)) * spacing
     return ProfileParameters(
-        a=float(np.abs(z).mean()),
-        q=q,
-        skewness=float(np.mean(z**3)) / q**3,
-        kurtosis=float(np.mean(z**4)) / q**4,
+        **vars(of_heights),
         t=float(np.ptp(z)),
-        slope=float(np.sqrt(np.mean(slope**2))),
+        slope=slope(z, spacing),
         width=float(widths.mean()) if len(widths) else float("nan"),
         p=float(z.max()),
         v=float(-z.min()),

@@ -16,8 +16,10 @@ import numpy as np
 from metro.surface.profile import even, gaussian_filter
 from metro.surface.profile_parameters import (
     LEAST_WIDTH,
+    moments,
     profile_parameters,
     section_length,
+    slope,
     upward_crossings,
 )
 from metro.units import MM, UM, Array
@@ -217,9 +219,9 @@ def _over_sections(profile: Profile, values: dict[str, float]) -> dict[str, tupl
     """Return intervals by the jackknife over sections; of the total height, an extreme, there is none."""
     from scipy.special import stdtrit
 
-    sections = profile.sections
-    count = len(sections)
-    left_out = [_without(profile, sections, i) for i in range(count)]
+    pieces = _pieces(profile)
+    count = len(pieces.sections)
+    left_out = [_without(pieces, i) for i in range(count)]
     reach = float(stdtrit(count - 1, 0.975)) * math.sqrt((count - 1) ** 2 / count)
     ends = {}
     for name, value in values.items():
@@ -238,24 +240,44 @@ def _of_ends(profile: Profile, width: float) -> float:
     return NORMAL * profile.spacing * math.sqrt(2.0 / 12.0) / elements
 
 
-def _without(profile: Profile, sections: list[Array], gone: int) -> dict[str, float]:
-    """Return the parameters of all sections but one; element widths are those that begin in the others."""
-    kept = [each for i, each in enumerate(sections) if i != gone]
-    size = len(sections[0])
-    z = np.concatenate(kept)
-    of_rest = profile_parameters(z, profile.spacing)
-    slopes = [profile_parameters(each, profile.spacing).slope ** 2 for each in kept]
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """What the sections of a profile have each: ``heights`` (k, 3) of ``MEANS`` and ``slopes`` (k,), the rms.
+
+    ``begins`` (n,) the section in which each element of the whole profile begins, ``widths`` (n,) its width.
+    """
+
+    sections: list[Array]
+    heights: Array
+    slopes: Array
+    begins: Array
+    widths: Array
+
+
+def _pieces(profile: Profile) -> _Pieces:
+    sections = profile.sections
     crossings = upward_crossings(profile.z - profile.z.mean(), profile.narrowest / profile.spacing)
-    others = crossings[:-1] // size != gone
-    widths = np.diff(crossings)[others] * profile.spacing
-    heights = np.array([[each.max(), -each.min(), np.ptp(each)] for each in kept]).mean(axis=0)
+    return _Pieces(
+        sections,
+        np.array([[each.max(), -each.min(), np.ptp(each)] for each in sections]),
+        np.array([slope(each, profile.spacing) for each in sections]),
+        crossings[:-1] // len(sections[0]),
+        np.diff(crossings) * profile.spacing,
+    )
+
+
+def _without(pieces: _Pieces, gone: int) -> dict[str, float]:
+    """Return the parameters of all sections but one; element widths are those that begin in the others."""
+    kept = np.arange(len(pieces.sections)) != gone
+    rest = moments(np.concatenate([each for each, stays in zip(pieces.sections, kept, strict=True) if stays]))
+    widths = pieces.widths[pieces.begins != gone]
     return {
-        "a": of_rest.a,
-        "q": of_rest.q,
-        "sk": of_rest.skewness,
-        "ku": of_rest.kurtosis,
-        **dict(zip(MEANS, map(float, heights), strict=True)),
-        "dq": math.sqrt(float(np.mean(slopes))),
+        "a": rest.a,
+        "q": rest.q,
+        "sk": rest.skewness,
+        "ku": rest.kurtosis,
+        **dict(zip(MEANS, map(float, pieces.heights[kept].mean(axis=0)), strict=True)),
+        "dq": math.sqrt(float(np.mean(pieces.slopes[kept] ** 2))),
         "Sm": float(widths.mean()) if len(widths) else math.nan,
     }
 
