@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from metro.robot.kinematics import Arm
-from metro.robot.statics import joint_torque, tip_jacobian
+from metro.robot.statics import Flange, joint_torque, tip_jacobian_of
 from metro.units import Array
 
 GRAVITY = 9.81  # m/s², along −z of the base
@@ -21,13 +21,11 @@ class Payload:
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-def gravity_torque(arm: Arm, q: Array, payload: Payload) -> Array:
-    """Torque of the motors (m, 6), N m, that holds a payload: that of its weight at its centre.
+def gravity_torque(arm: Arm, flange: Flange, payload: Payload) -> Array:
+    """Torque of the motors (m, n), N m, that holds a payload: that of its weight at its centre.
 
-    ``q`` (m, 6) rad. The base stands upright.
+    ``flange`` along m points. The base stands upright.
     """
-    if payload.mass == 0.0:
-        return np.zeros_like(q)
-    at_centre = tip_jacobian(replace(arm, tool=np.array(payload.centre)), q)
+    at_centre = tip_jacobian_of(replace(arm, tool=np.array(payload.centre)), flange)
     weight = arm.work[:3, :3].T @ np.array([0.0, 0.0, -payload.mass * GRAVITY])
-    return joint_torque(at_centre, np.broadcast_to(weight, (len(q), 3)))
+    return joint_torque(at_centre, np.broadcast_to(weight, (len(at_centre), 3)))

@@ -6,9 +6,11 @@ the same W turned over gives what the tip moves when the flange does: δ_tip = W
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from metro.robot.kinematics import Arm, jacobian
+from metro.robot.kinematics import Arm, Geometry, forward, jacobian
 from metro.units import Array
 
 ROUNDING = 1e-12  # m/rad
@@ -27,15 +29,34 @@ def wrench_map(lever: Array) -> Array:
     return np.concatenate([identity, np.moveaxis(cross, (0, 1), (-2, -1))], axis=-2)
 
 
+@dataclass(frozen=True, eq=False)
+class Flange:
+    """The flange along a path: ``axes`` (..., 3, 3) and ``jacobian`` (..., 6, n), both in the base frame."""
+
+    axes: Array
+    jacobian: Array
+
+
+def flange_of(dh: Geometry, q: Array) -> Flange:
+    """Return the flange of an arm for joint angles ``q`` (..., n) in rad."""
+    return Flange(forward(dh, q)[..., :3, :3], jacobian(dh, q))
+
+
 def tip_jacobian(arm: Arm, q: Array) -> Array:
     """Tip velocity in the work frame per joint rate, (..., 3, n), for ``q`` (..., n) in rad."""
-    in_base = np.swapaxes(wrench_map(arm.lever(q)), -1, -2) @ jacobian(arm.dh, q)
-    return np.asarray(arm.work[:3, :3].T @ in_base)
+    return tip_jacobian_of(arm, flange_of(arm.dh, q))
 
 
 def driven_jacobian(arm: Arm, q: Array) -> Array:
     """Jacobian of the tip (..., 3, k) of the k joints whose torques are evaluated: those that turn."""
     return tip_jacobian(arm, q)[..., arm.axes.turning]
+
+
+def tip_jacobian_of(arm: Arm, flange: Flange) -> Array:
+    """Tip velocity in the work frame per joint rate, (..., 3, n), of an arm whose flange is known."""
+    lever = flange.axes @ arm.tool
+    in_base = np.swapaxes(wrench_map(lever), -1, -2) @ flange.jacobian
+    return np.asarray(arm.work[:3, :3].T @ in_base)
 
 
 def flange_jacobian(arm: Arm, q: Array) -> Array:

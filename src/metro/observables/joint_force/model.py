@@ -17,9 +17,9 @@ import numpy as np
 
 from metro.observables.problem import Block, Parameter
 from metro.robot.drive_torques import DriveTorques
-from metro.robot.kinematics import Arm
+from metro.robot.kinematics import Arm, Geometry
 from metro.robot.payload import Payload, gravity_torque
-from metro.robot.statics import driven_jacobian, joint_torque
+from metro.robot.statics import Flange, flange_of, joint_torque, tip_jacobian_of
 from metro.signals.waves import waves
 from metro.units import Array
 
@@ -119,8 +119,29 @@ class JointForceModel:
             return np.eye(gains)[1:], np.zeros(gains - 1)
         other = self.drives.at(run.q, run.rate, run.since, run.width)
         for mass in self.payload:
-            other = other + gravity_torque(self.arm, run.q, mass)
+            other = other + gravity_torque(self.arm, along(Same(self.arm.dh), run), mass)
         return carried(self.arm, run, self.offset), in_waves(other[:, list(self.joints)])
+
+
+@dataclass(frozen=True, eq=False)
+class Same:
+    """Stands for a geometry in the key of a cache: the same object, of whatever values."""
+
+    geometry: Geometry
+
+    def __hash__(self) -> int:
+        """Return that of the object."""
+        return id(self.geometry)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same object."""
+        return isinstance(other, Same) and other.geometry is self.geometry
+
+
+@lru_cache(maxsize=256)
+def along(arm: Same, run: TorqueRun) -> Flange:
+    """Return the flange along a run: no effect moves it, whatever else an effect changes of the arm."""
+    return flange_of(arm.geometry, run.q)
 
 
 @lru_cache(maxsize=256)
@@ -129,7 +150,8 @@ def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
 
     The log stamps it ``offset`` s later than the dynamometer.
     """
-    force, jacobian = run.force.mean(run.t - offset, run.width), driven_jacobian(arm, run.q)
+    force = run.force.mean(run.t - offset, run.width)
+    jacobian = tip_jacobian_of(arm, along(Same(arm.dh), run))[..., arm.axes.turning]
     by_axis = [in_waves(joint_torque(jacobian, force * axis)) for axis in np.eye(3)]
     whole = np.sum(by_axis, axis=0)
     by_joint = np.kron(np.eye(jacobian.shape[-1]), np.ones((len(force), 1))) * whole[:, None]
