@@ -2,15 +2,17 @@
 
 Per joint and bin of the path: torque = gain × (−Jᵀ f) + drives + payload (virtual work), with f the
 dynamometer's force, averaged over a revolution of the spindle and over the bin. Each joint's torque and each
-axis of the dynamometer may have a small additional gain, to first order, within the accuracy of the
-instruments. The rows of the comparison are forces: that of the dynamometer, and the sensorless force, which
-is that of the dynamometer plus the force at the tip that belongs to the residual torques.
+axis of the dynamometer may have a small additional gain, and each axis may show a little of the force along
+the others (crosstalk, a mounting that is turned), to first order, within the accuracy of the instruments. The
+rows of the comparison are forces: that of the dynamometer, and the sensorless force, which is that of the
+dynamometer plus the force at the tip that belongs to the residual torques.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -24,6 +26,7 @@ from metro.signals.waves import waves
 from metro.units import Array
 
 AXES = "xyz"
+CROSS = tuple(permutations(range(3), 2))  # axis that shows it, axis along which the force is
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +75,7 @@ class TorqueRun:
 
 @dataclass(frozen=True, eq=False)
 class Instruments:
-    """Setting of the prior knowledge on the gains of joints and axes: they are small."""
+    """Setting of the prior knowledge on the gains of joints and axes, and on crosstalk: they are small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +97,10 @@ class JointForceModel:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """One gain error that all torques share, and one for each joint that turns and each axis."""
+        """One gain error that all torques share, one for each joint that turns and each axis, crosstalk."""
         names = ["torque_gain", *(f"gain_of_joint_{i + 1}" for i in self.joints)]
         names += [f"gain_of_{a}" for a in AXES]
+        names += [f"crosstalk_of_{AXES[along]}_in_{AXES[seen]}" for seen, along in CROSS]
         return tuple(Parameter(name, "1") for name in names)
 
     @property
@@ -109,9 +113,9 @@ class JointForceModel:
         return np.zeros((1, 0))
 
     def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
-        """Torque (k m, k + 4) per gain, and that without a force (k m,), N m, as waves along the path.
+        """Torque (k m, k + 10) per gain, and that without a force (k m,), N m, as waves along the path.
 
-        For :class:`Instruments` they are the gains (k + 3, k + 4) themselves; k joints turn.
+        For :class:`Instruments` they are the gains (k + 9, k + 10) themselves; k joints turn.
         """
         run: Any = block.setting
         if isinstance(run, Instruments):
@@ -146,16 +150,20 @@ def along(arm: Same, run: TorqueRun) -> Flange:
 
 @lru_cache(maxsize=256)
 def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
-    """Waves (k m, k + 4), N m, of the torque that balances the force: whole, of each joint, of each axis.
+    """Waves (k m, k + 10), N m, of the torque that balances the force: whole, by joint, by axis, crosstalk.
 
     The log stamps it ``offset`` s later than the dynamometer.
     """
     force = run.force.mean(run.t - offset, run.width)
     jacobian = tip_jacobian_of(arm, along(Same(arm.dh), run))[..., arm.axes.turning]
-    by_axis = [in_waves(joint_torque(jacobian, force * axis)) for axis in np.eye(3)]
+    unit = np.eye(3)
+    by_axis = [in_waves(joint_torque(jacobian, force * axis)) for axis in unit]
+    across = [
+        in_waves(joint_torque(jacobian, np.outer(force[:, along], unit[seen]))) for seen, along in CROSS
+    ]
     whole = np.sum(by_axis, axis=0)
     by_joint = np.kron(np.eye(jacobian.shape[-1]), np.ones((len(force), 1))) * whole[:, None]
-    return np.column_stack([whole, by_joint, *by_axis])
+    return np.column_stack([whole, by_joint, *by_axis, *across])
 
 
 def in_waves(torque: Array) -> Array:
