@@ -59,6 +59,8 @@ class Block:
         first one), but a model with an effect does; None: none.
     labels : (n,) label of each element in the words of the report ("order 1"); the residual is tested per
         axis and label.
+    belief : whether it is what is believed of the base parameters beforehand (the errors that instruments
+        are allowed). It is left out of no fit; an effect that spares it a strain gains by that.
     repeats : how many times the block repeats one waveform (its time blocks); the model's error is the same
         in each.
     slow : slow changes along the run that are tested for, by their name in the report: (repeats, k) each.
@@ -82,6 +84,7 @@ class Block:
     synthesis: Array | None = None
     anchor: Array | None = None
     scale: Array | None = None
+    belief: bool = False
     repeats: int = 1
     labels: np.ndarray | None = None
     symmetries: Array | None = None

@@ -121,9 +121,11 @@ def leave_out(fitted: Fit, prior: Noise, moved: Callable[[Fit], Fit] | None = No
 
     An unknown of a run itself is fitted to the run that is predicted, which gains that much by chance: one is
     taken off for each. ``moved`` puts the fit of all others where something else than these runs wants it.
+    What is believed of the base parameters beforehand counts by how likely the whole fit leaves it.
     """
     known, chance = (moved(fitted) if moved else fitted).noise, _own(fitted)
-    return {
+    believed = {b.condition: fitted.log_likelihood[b.run] for b in fitted.blocks if b.belief}
+    return believed | {
         name: sum(_log_likelihood(part, moved, known) - len(part.blocks) * chance for part in parts)
         if parts
         else -math.inf

@@ -207,7 +207,9 @@ def _instruments(batch: Batch, arm: Arm) -> Block:
         own = np.diag(drives)[joints] - drives[0, 1]  # what joints share is the gain of all torques
         sigma[: len(joints)] = np.maximum(np.sqrt(np.maximum(own, 0.0)), CALIBRATED)
     return Block(
-        "instruments", "instruments", "calibrate", 0, known, sigma, Instruments(), axis, zeros, known[:0], {}
+        *("instruments", "instruments", "calibrate", 0, known, sigma, Instruments(), axis, zeros),
+        *(known[:0], {}),
+        belief=True,
     )
 
 
