@@ -15,6 +15,7 @@ from metro.loop.search.trial import Gates
 from metro.observables.arm.tip_force import FORCE
 from metro.observables.joint_force import observable as joint_force
 from metro.robot.kinematics import arm_of_cell, forward
+from metro.robot.statics import driven_jacobian, joint_torque
 from metro.stages.identify import base_fit
 from metro.stages.ingest import ingest
 
@@ -68,7 +69,8 @@ def test_nothing_is_found_where_nothing_is_hidden(cell):
 def test_the_gains_of_joints_and_of_axes_each_add_up_to_that_of_all(cell):
     task = joint_force.problem(*cell, {})
     block = task.role("identify")[0]
-    whole, joints, axes = np.split(task.base.design(block, np.zeros(0))[0], [1, 7], axis=1)
+    design = task.base.design(block, np.zeros(0))[0]
+    whole, joints, axes, _ = np.split(design, [1, 7, 10], axis=1)
     np.testing.assert_allclose(joints.sum(axis=1), whole[:, 0], atol=1e-9)
     np.testing.assert_allclose(axes.sum(axis=1), whole[:, 0], atol=1e-9)
     for i, axis in enumerate(np.eye(3)):
@@ -77,6 +79,50 @@ def test_the_gains_of_joints_and_of_axes_each_add_up_to_that_of_all(cell):
         np.testing.assert_allclose(task.base.design(alone, np.zeros(0))[0][:, 0], axes[:, i], atol=1e-9)
         of_joint = np.asarray(block.axis) == f"joint {i + 1}"
         assert not joints[~of_joint, i].any()
+
+
+def test_crosstalk_is_the_force_along_one_axis_seen_in_another(cell):
+    task = joint_force.problem(*cell, {})
+    block = task.role("identify")[0]
+    names = [parameter.name for parameter in task.base.parameters]
+    design = task.base.design(block, np.zeros(0))[0]
+    integral = block.setting.force.integral
+    for name in (name for name in names if name.startswith("crosstalk")):
+        along, seen = "xyz".index(name[13]), "xyz".index(name[-1])
+        record = np.zeros_like(integral)
+        record[:, seen] = integral[:, along]
+        alone = replace(
+            block, setting=replace(block.setting, force=replace(block.setting.force, integral=record))
+        )
+        np.testing.assert_allclose(
+            task.base.design(alone, np.zeros(0))[0][:, 0], design[:, names.index(name)], atol=1e-9
+        )
+
+
+@pytest.mark.parametrize(("axis", "other", "turn"), [(0, 2, 0.018), (1, 2, -0.015), (0, 1, 0.02)])
+def test_a_dynamometer_that_is_turned_by_a_degree_is_no_tool_elsewhere(cell, axis, other, turn):
+    force = cell[1]["tool_force"].copy()
+    seen = force[FORCE].to_numpy()
+    turned = seen.copy()
+    turned[:, axis] += turn * seen[:, other]
+    turned[:, other] -= turn * seen[:, axis]
+    force[FORCE] = turned
+    assert found(cell, force=force) == []
+
+
+def test_a_tool_that_is_far_elsewhere_is_still_named(cell):
+    model = joint_force.problem(*cell, {}).base
+    away = replace(model, arm=replace(model.arm, tool=model.arm.tool + np.array([0.0, 0.12, 0.0])))
+    torque = cell[1]["joint_torque"].copy()
+    forces = dict(tuple(cell[1]["tool_force"].groupby("run")))
+    for run, rows in torque.groupby("run"):
+        setting = joint_force.torque_run(rows, forces[run])
+        mean = setting.force.mean(setting.t, setting.width)
+        more = [joint_torque(driven_jacobian(each.arm, setting.q), mean) for each in (away, model)]
+        torque.loc[rows.index, AXES.torques] += more[0] - more[1]
+    ((name, _, values),) = found(cell, torque)
+    assert name == "tool_offset_error"
+    assert values["dy_mm"] == pytest.approx(120.0, abs=30.0)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
