@@ -58,6 +58,8 @@ class _Work:
     def differences(self, first: Indices, second: Indices, tooth: Indices, top: Array, place: Place) -> Array:
         """Return levels ``first`` less levels ``second``, all (n,); one level more is zero."""
         sine, cosine = _immersed(top, self.lag, place.height)
+        if self.teeth.only_passes and self.teeth.passes == 1:
+            return self.teeth.after(first, tooth, place, sine, cosine)
         if self.teeth.only_passes:
             other = second < self.teeth.passes
             chips = self.teeth.after(np.stack([first, other * second]), tooth, place, sine, cosine)

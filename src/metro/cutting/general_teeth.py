@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from metro.cutting.chip import Cut, curve_excess, feed_per_radian, path_excess
+from metro.cutting.chip import Cut, curve_excess, feed_per_radian
 from metro.cutting.cutter import Cutter
 from metro.cutting.envelope import Place
 from metro.units import Array
@@ -61,9 +61,9 @@ class Teeth:
 
     @property
     def only_passes(self) -> bool:
-        """Whether nothing but passes, several of them, bounds what a tooth cuts."""
+        """Whether nothing but passes bounds what a tooth cuts."""
         arc = self.cut.engagement
-        return self.passes > 1 and not (self.raw or arc.entry_face or arc.exit_face)
+        return not (self.raw or arc.entry_face or arc.exit_face)
 
     @property
     def outside(self) -> float:
@@ -81,21 +81,36 @@ class Teeth:
         return np.sqrt(np.sqrt(radius**4 + (LEAST_RADIUS * self.cut.feed_per_tooth) ** 4))
 
     def after(self, passed: Indices, tooth: Indices, place: Place, sine: Array, cosine: Array) -> Array:
-        """Chips in the plane that passes 0… leave to teeth at places, m; all broadcast."""
+        """Chips in the plane that passes 0… leave to teeth at places, m; all broadcast.
+
+        On true paths with :func:`metro.cutting.chip.path_excess`, put so that it takes few temporaries.
+        """
         feed = feed_per_radian(self.cutter, self.cut)
         pitch = self.pitch[passed, tooth]
         travel = feed * pitch
-        chip = np.asarray(travel * sine)
         earlier: Array | float = 0.0
+        cleared: Array | float = 0.0
         if self.off.size:
             lag = self._lag(place)
             earlier = self._wave(passed + 1, tooth, lag)
-            chip += self._wave(np.intp(0), tooth, lag) - earlier
+            cleared = self._wave(np.intp(0), tooth, lag) - earlier
         if self.true_path:
-            chip += path_excess(feed, pitch, self.least(place.radius) + earlier, sine, cosine)
+            lean = feed / (self.least(place.radius) + earlier) * cosine
+            rest = 1.0 - lean
+            lean *= rest
+            rest *= cosine
+            chip = 0.5 * pitch * rest
+            chip -= sine
+            chip *= lean
+            chip += sine
+            chip *= travel
             if self.cut.curvature:
                 chip += curve_excess(self.cut.curvature, travel) * cosine
-        return chip
+        else:
+            chip = travel * sine
+        if self.off.size:
+            chip += cleared
+        return np.asarray(chip)
 
     def chips(self, tooth: Indices, place: Place, sine: Array, cosine: Array) -> Array:
         """Chips in the plane of which the least counts, (chips, …) m, of teeth at places; all broadcast.
