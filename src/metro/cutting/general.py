@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -33,6 +33,9 @@ from metro.units import Array
 POINTS = 4
 STEPS, NEAR = 20, 1e-5  # to where a panel is cut; a share of the meridian
 MARGIN = 0.05  # in feeds per tooth and pass: sin φ is 0.02 off its chord over a panel
+# Edges are sorted by whether one pass alone counts where there are more than a few, and where it does so from
+# an immersion of this sine on: else it takes longer than to compute all.
+FEW, WORTH = 2, 0.5
 SUMS = 16
 
 
@@ -107,19 +110,50 @@ def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_
 
 
 def _integrate(work: _Work, along: Edges, total: Array) -> None:
-    """Add to ``total`` (angles, N, SUMS) what the edges give."""
-    angle = _in_reach(work, along)
+    """Add to ``total`` (angles, N, SUMS) what the edges give.
+
+    Edges that are far inside the cut as a whole know one pass alone.
+    """
+    panels, cells = len(work.line.length), len(work.nodes) - 1
+    at = np.append(np.repeat(np.arange(panels), cells), panels - 1)
+    nodes = work.line.at(at, np.append(np.tile(work.nodes[:-1], panels), 1.0))
+    low, high = work.teeth.reach(float(nodes.radius.max()))
+    reached = np.mod(along.top - low, TURN) < high - low + along.span
+    alone = work.teeth.alone_from(float(nodes.radius.min())) if work.teeth.passes > FEW else 1.0
+    if alone < WORTH:
+        inward = math.asin(alone)
+        leading = np.mod(along.top - inward, TURN)
+        inside = reached & (leading >= along.span) & (leading <= math.pi - 2.0 * inward)
+        angle = _first(inside, int(np.count_nonzero(inside, axis=0).min()))
+        _some(replace(work, teeth=replace(work.teeth, passes=1)), nodes, along.top, angle, total)
+        np.put_along_axis(reached, angle.T, values=False, axis=0)
+    # The shorter lists end with edges that are done again, with all passes, or do not cut.
+    angle = _first(reached, int(np.count_nonzero(reached, axis=0).max()))
+    _some(work, nodes, along.top, angle, total)
+
+
+def _first(which: npt.NDArray[np.bool_], count: int) -> Indices:
+    """Return indices (N, count) of angles, those of ``which`` (angles, N) first."""
+    return np.argsort(~which, axis=0, kind="stable")[:count].T
+
+
+def _some(work: _Work, nodes: Place, tops: Array, angle: Indices, total: Array) -> None:
+    """Write to ``total`` what the edges of each tooth at the angles ``angle`` (N, k) give.
+
+    Parameters
+    ----------
+    nodes : the places between which changes are looked for.
+    tops : (angles, N) immersions of all leading ends, rad.
+    """
     if not angle.size:
         return
     teeth = angle.shape[0]
     own = np.arange(teeth)[:, None]
     panels, cells = len(work.line.length), len(work.nodes) - 1
-    at = np.append(np.repeat(np.arange(panels), cells), panels - 1)
-    nodes = work.line.at(at, np.append(np.tile(work.nodes[:-1], panels), 1.0))
-    top = along.top[angle, own]
+    top = tops[angle, own]
     sine, cosine = _immersed(top, work.lag, nodes.height[:, None, None])
     levels = work.teeth.levels(own, nodes.shaped((-1, 1, 1)), sine, cosine)
-    levels = levels.reshape(len(levels), len(at), -1)
+    levels = levels.reshape(len(levels), len(nodes.height), -1)
     positive = levels > 0.0
     bound, chip = _least(levels[: work.teeth.chip_count])
     left, right = positive[:, :-1], positive[:, 1:]
@@ -129,8 +163,8 @@ def _integrate(work: _Work, along: Edges, total: Array) -> None:
     whole = positive[:, :-1:cells].all(axis=0) & ~changed
     # What is left of a chip at a raw edge is bounded by several functions: it goes with the panels to be cut.
     plain = bound[:-1:cells] < work.teeth.passes
-    inner = np.arange(len(at) - 1).reshape(panels, cells)[:, 1:].ravel()  # Gauss's points
-    waves = tuple(wave.reshape(len(at), -1)[inner] for wave in (sine, cosine))
+    inner = np.arange(panels * cells).reshape(panels, cells)[:, 1:].ravel()  # Gauss's points
+    waves = tuple(wave.reshape(len(wave), -1)[inner] for wave in (sine, cosine))
     place = Place(*(each[inner] for each in (nodes.height, nodes.radius, nodes.sine, nodes.cosine)))
     edge, tooth = (angle * teeth + own).ravel(), np.repeat(np.arange(teeth), angle.shape[1])
     flat = total.reshape(-1, SUMS)
@@ -139,17 +173,6 @@ def _integrate(work: _Work, along: Edges, total: Array) -> None:
     if len(row):
         crossing = _crossing(levels, changes, panel, row, changed.shape)
         _add(flat, edge[row], panel, _cut(work, tooth[row], top.ravel()[row], panel, crossing))
-
-
-def _in_reach(work: _Work, along: Edges) -> Indices:
-    """Return indices (N, most) of the angles at which edges of each tooth may cut; a few more where one has.
-
-    So many for each tooth as the one with most has.
-    """
-    beyond = math.asin(min(work.teeth.outside, 1.0))
-    reached = np.mod(along.top + beyond, TURN) < math.pi + 2.0 * beyond + along.span
-    most = int(np.count_nonzero(reached, axis=0).max())
-    return np.argsort(~reached, axis=0, kind="stable")[:most].T
 
 
 def _add(total: Array, at: Indices, group: Indices, values: Array) -> None:
