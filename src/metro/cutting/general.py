@@ -4,9 +4,9 @@ The chip normal to the edge is that in the plane times sin κ (:mod:`metro.cutti
 length of the meridian. The radial force acts along the normal to the envelope, the axial force along the
 meridian. Each edge is cut into panels; a panel in which the tooth starts or stops cutting, or in which
 another earlier pass comes to bound the chip, is cut there, so that all is smooth between Gauss's points.
-Such changes are looked for between the ends of a panel and its points, so that the chip at the points of a
-panel without any is known already. Arrays have places first and edges last, those of one tooth side by side:
-what depends on the place and the tooth alone is then computed once for all angles of the tool.
+Such changes are looked for between the ends of a panel, its middle and its points, so that the chip at the
+points of a panel without any is known already. Arrays have places first and edges last, those of one tooth
+side by side: what depends on the place and the tooth alone is then computed once for all angles of the tool.
 
 Raw edges and faces of the work are met at the local radius.
 """
@@ -43,7 +43,8 @@ SUMS = 16
 class _Work:
     """What all edges share: teeth, law, meridian, lag (rad/m), and the quadrature of a panel.
 
-    ``nodes`` are the shares of a panel between which changes are looked for: its ends and its ``places``.
+    ``nodes`` are the shares of a panel between which changes are looked for: its ends, its ``places`` and its
+    middle, so that a tooth that only just touches the work is seldom overlooked.
     """
 
     teeth: Teeth
@@ -102,7 +103,7 @@ def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_
         lag,
         places,
         weights,
-        np.concatenate([[0.0], places, [1.0]]),
+        np.sort(np.concatenate([[0.0, 0.5, 1.0], places])),
     )
     total = np.zeros((*along.top.shape, SUMS))
     _integrate(work, along, total)
@@ -157,13 +158,16 @@ def _some(work: _Work, nodes: Place, tops: Array, angle: Indices, total: Array) 
     positive = levels > 0.0
     bound, chip = _least(levels[: work.teeth.chip_count])
     left, right = positive[:, :-1], positive[:, 1:]
-    changes = (left != right).any(axis=0) | (bound[1:] != bound[:-1])
-    changes &= (left | right).all(axis=0)
+    changes = (left != right).any(axis=0)
+    if len(levels) > 1:
+        changes |= bound[1:] != bound[:-1]
+        changes &= (left | right).all(axis=0)
     changed = changes.reshape(panels, cells, -1).any(axis=1)
     whole = positive[:, :-1:cells].all(axis=0) & ~changed
     # What is left of a chip at a raw edge is bounded by several functions: it goes with the panels to be cut.
     plain = bound[:-1:cells] < work.teeth.passes
-    inner = np.arange(panels * cells).reshape(panels, cells)[:, 1:].ravel()  # Gauss's points
+    gauss = np.isin(work.nodes, work.places).nonzero()[0]
+    inner = (np.arange(panels)[:, None] * cells + gauss).ravel()
     waves = tuple(wave.reshape(len(wave), -1)[inner] for wave in (sine, cosine))
     place = Place(*(each[inner] for each in (nodes.height, nodes.radius, nodes.sine, nodes.cosine)))
     edge, tooth = (angle * teeth + own).ravel(), np.repeat(np.arange(teeth), angle.shape[1])
@@ -194,9 +198,9 @@ def _crossing(
     return _Cells(number[cell // count, edge], cell % count, values)
 
 
-def _least(values: Array) -> tuple[Indices, Array]:
+def _least(values: Array) -> tuple[npt.NDArray[np.int8], Array]:
     """Return which of the few values along the first axis is the least, and it: much faster than argmin."""
-    bound, least = np.zeros(values.shape[1:], dtype=np.intp), values[0]
+    bound, least = np.zeros(values.shape[1:], dtype=np.int8), values[0]
     for which in range(1, len(values)):
         less = values[which] < least
         bound[less] = which
@@ -249,7 +253,7 @@ def _cut(work: _Work, tooth: Indices, top: Array, panel: Indices, cells: _Cells)
     sine, cosine = _immersed(np.broadcast_to(top[at], share.shape).ravel(), work.lag, place.height.ravel())
     sine, cosine = sine.reshape(share.shape), cosine.reshape(share.shape)
     if work.teeth.only_passes:
-        chip = work.teeth.after(_least(middle)[0], tooth[at], place, sine, cosine)
+        chip = work.teeth.after(_least(middle)[0].astype(np.intp), tooth[at], place, sine, cosine)
     else:
         chip = work.teeth.chips(tooth[at], place, sine, cosine).min(axis=0)
     width = work.weights[:, None] * size * work.line.length[panel[at]]
