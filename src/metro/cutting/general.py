@@ -40,20 +40,52 @@ SUMS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class _Work:
-    """What all edges share: teeth, law, meridian, lag (rad/m), and the quadrature of a panel.
+class _Line:
+    """The meridian with its quadrature: the same for all engagements, pitches and deviations of teeth.
 
-    ``nodes`` are the shares of a panel between which changes are looked for: its ends, its ``places`` and its
-    middle, so that a tooth that only just touches the work is seldom overlooked.
+    Attributes
+    ----------
+    shares : of a panel, between which changes are looked for: its ends, its ``places`` and its middle, so
+        that a tooth that only just touches the work is seldom overlooked.
+    nodes : these places of all panels, (nodes,). inner : which of them are Gauss's, (points,).
+    across, edgewise : (3, points) weights of 1, sin κ and cos κ at these, of an integral over the meridian's
+        length, and over the edge's times cos(helix).
     """
+
+    meridian: Meridian
+    places: Array
+    weights: Array
+    shares: Array
+    nodes: Place
+    inner: Indices
+    across: Array
+    edgewise: Array
+
+
+@lru_cache(maxsize=64)
+def _line(bare: Cutter, depth: float, lag: float, feed: float, *, linear: bool) -> _Line:
+    """Return the meridian of a cutter of which nothing but its end and its helix is given."""
+    line = meridian(bare, depth, lag, feed)
+    places, weights = rule(POINTS, linear)
+    shares = np.sort(np.concatenate([[0.0, 0.5, 1.0], places]))
+    panels, cells = len(line.length), len(shares) - 1
+    at = np.append(np.repeat(np.arange(panels), cells), panels - 1)
+    nodes = line.at(at, np.append(np.tile(shares[:-1], panels), 1.0))
+    inner = (np.arange(panels)[:, None] * cells + np.isin(shares, places).nonzero()[0]).ravel()
+    of_points = Place(*(each[inner] for each in (nodes.height, nodes.radius, nodes.sine, nodes.cosine)))
+    factors = np.stack([np.ones(len(inner)), of_points.sine, of_points.cosine])
+    across = factors * np.tile(weights, panels) * np.repeat(line.length, len(places))
+    return _Line(line, places, weights, shares, nodes, inner, across, across * line.edge_length(of_points))
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """What all edges share: teeth, law, meridian, and lag (rad/m)."""
 
     teeth: Teeth
     law: EdgeLaw
-    line: Meridian
+    line: _Line
     lag: float
-    places: Array
-    weights: Array
-    nodes: Array
 
     def levels(self, tooth: Indices, top: Array, place: Place) -> Array:
         """Return the levels of teeth at places, all (n,): (levels, n)."""
@@ -95,16 +127,10 @@ def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_
     if cut.axial_depth <= 0.0:
         return np.zeros((len(along.top), 3, 6))
     lag = 1.0 / along.depth
-    places, weights = rule(POINTS, is_linear(law, feed_per_radian(cutter, cut)))
-    work = _Work(
-        teeth_in(cutter, cut, true_path=true_path),
-        law,
-        meridian(cutter, cut.axial_depth, lag, cut.feed_per_tooth if true_path else 0.0),
-        lag,
-        places,
-        weights,
-        np.sort(np.concatenate([[0.0, 0.5, 1.0], places])),
-    )
+    bare = replace(cutter, tooth_angles=(0.0,), runout_radius=0.0, runout_angle=0.0, reach=())
+    feed, linear = cut.feed_per_tooth if true_path else 0.0, is_linear(law, feed_per_radian(cutter, cut))
+    line = _line(bare, cut.axial_depth, lag, feed, linear=linear)
+    work = _Work(teeth_in(cutter, cut, true_path=true_path), law, line, lag)
     total = np.zeros((*along.top.shape, SUMS))
     _integrate(work, along, total)
     return _assembled(np.asarray(sum(total[:, tooth] for tooth in range(total.shape[1]))))
@@ -115,9 +141,7 @@ def _integrate(work: _Work, along: Edges, total: Array) -> None:
 
     Edges that are far inside the cut as a whole know one pass alone.
     """
-    panels, cells = len(work.line.length), len(work.nodes) - 1
-    at = np.append(np.repeat(np.arange(panels), cells), panels - 1)
-    nodes = work.line.at(at, np.append(np.tile(work.nodes[:-1], panels), 1.0))
+    nodes = work.line.nodes
     low, high = work.teeth.reach(float(nodes.radius.max()))
     reached = np.mod(along.top - low, TURN) < high - low + along.span
     alone = work.teeth.alone_from(float(nodes.radius.min())) if work.teeth.passes > FEW else 1.0
@@ -126,11 +150,11 @@ def _integrate(work: _Work, along: Edges, total: Array) -> None:
         leading = np.mod(along.top - inward, TURN)
         inside = reached & (leading >= along.span) & (leading <= math.pi - 2.0 * inward)
         angle = _first(inside, int(np.count_nonzero(inside, axis=0).min()))
-        _some(replace(work, teeth=replace(work.teeth, passes=1)), nodes, along.top, angle, total)
+        _some(replace(work, teeth=replace(work.teeth, passes=1)), along.top, angle, total)
         np.put_along_axis(reached, angle.T, values=False, axis=0)
     # The shorter lists end with edges that are done again, with all passes, or do not cut.
     angle = _first(reached, int(np.count_nonzero(reached, axis=0).max()))
-    _some(work, nodes, along.top, angle, total)
+    _some(work, along.top, angle, total)
 
 
 def _first(which: npt.NDArray[np.bool_], count: int) -> Indices:
@@ -138,19 +162,19 @@ def _first(which: npt.NDArray[np.bool_], count: int) -> Indices:
     return np.argsort(~which, axis=0, kind="stable")[:count].T
 
 
-def _some(work: _Work, nodes: Place, tops: Array, angle: Indices, total: Array) -> None:
+def _some(work: _Work, tops: Array, angle: Indices, total: Array) -> None:
     """Write to ``total`` what the edges of each tooth at the angles ``angle`` (N, k) give.
 
     Parameters
     ----------
-    nodes : the places between which changes are looked for.
     tops : (angles, N) immersions of all leading ends, rad.
     """
     if not angle.size:
         return
     teeth = angle.shape[0]
     own = np.arange(teeth)[:, None]
-    panels, cells = len(work.line.length), len(work.nodes) - 1
+    nodes, inner = work.line.nodes, work.line.inner
+    panels, cells = len(work.line.meridian.length), len(work.line.shares) - 1
     top = tops[angle, own]
     sine, cosine = _immersed(top, work.lag, nodes.height[:, None, None])
     levels = work.teeth.levels(own, nodes.shaped((-1, 1, 1)), sine, cosine)
@@ -166,13 +190,10 @@ def _some(work: _Work, nodes: Place, tops: Array, angle: Indices, total: Array) 
     whole = positive[:, :-1:cells].all(axis=0) & ~changed
     # What is left of a chip at a raw edge is bounded by several functions: it goes with the panels to be cut.
     plain = bound[:-1:cells] < work.teeth.passes
-    gauss = np.isin(work.nodes, work.places).nonzero()[0]
-    inner = (np.arange(panels)[:, None] * cells + gauss).ravel()
     waves = tuple(wave.reshape(len(wave), -1)[inner] for wave in (sine, cosine))
-    place = Place(*(each[inner] for each in (nodes.height, nodes.radius, nodes.sine, nodes.cosine)))
     edge, tooth = (angle * teeth + own).ravel(), np.repeat(np.arange(teeth), angle.shape[1])
     flat = total.reshape(-1, SUMS)
-    flat[edge] = _whole(work, place, waves, chip[inner], whole & plain).T
+    flat[edge] = _whole(work, waves, chip[inner], whole & plain).T
     panel, row = np.nonzero(changed | (whole & ~plain))
     if len(row):
         crossing = _crossing(levels, changes, panel, row, changed.shape)
@@ -217,47 +238,42 @@ def _immersed(top: Array, lag: float, height: Array) -> tuple[Array, Array]:
     return s * lc - c * ls, c * lc + s * ls
 
 
-def _whole(
-    work: _Work, place: Place, waves: tuple[Array, ...], chip: Array, whole: npt.NDArray[np.bool_]
-) -> Array:
+def _whole(work: _Work, waves: tuple[Array, ...], chip: Array, whole: npt.NDArray[np.bool_]) -> Array:
     """Return sums (SUMS, edges) over the panels (panels, edges) that are ``whole``.
 
     Parameters
     ----------
-    place : Gauss's points of all panels (points,). waves : sine and cosine of the immersion there,
-        (points, edges). chip : in the plane.
+    waves : sine and cosine of the immersion at Gauss's points of all panels, (points, edges).
+    chip : in the plane, there.
     """
-    count, line = len(work.places), work.line
-    width = np.tile(work.weights, len(whole)) * np.repeat(line.length, count)
-    length = width * line.edge_length(place)
-    there = np.repeat(whole, count, axis=0)
-    shear = work.law.shear(np.maximum(chip, 0.0) * place.sine[:, None]) * there
-    across = np.stack([width, width * place.sine, width * place.cosine])
-    edgewise = np.stack([length, length * place.sine, length * place.cosine])
-    sums = [across @ (shear * wave) for wave in waves] + [across[1:] @ shear]
-    sums += [edgewise @ (there * wave) for wave in waves] + [edgewise[1:] @ there]
+    line = work.line
+    there = np.repeat(whole, len(line.places), axis=0)
+    shear = work.law.shear(np.maximum(chip, 0.0) * line.nodes.sine[line.inner, None]) * there
+    sums = [line.across @ (shear * wave) for wave in waves] + [line.across[1:] @ shear]
+    sums += [line.edgewise @ (there * wave) for wave in waves] + [line.edgewise[1:] @ there]
     return np.concatenate(sums)
 
 
 def _cut(work: _Work, tooth: Indices, top: Array, panel: Indices, cells: _Cells) -> Array:
     """Return sums (panels, SUMS) over the parts of panels that are cut in part or after several passes."""
+    line = work.line.meridian
     breaks = _breaks(work, tooth, top, panel, cells)
     bounds = np.concatenate([np.zeros((1, len(panel))), breaks, np.ones((1, len(panel)))])
     part, at = np.nonzero(bounds[1:] > bounds[:-1])
     low, size = bounds[part, at], bounds[part + 1, at] - bounds[part, at]
-    middle = work.levels(tooth[at], top[at], work.line.at(panel[at], low + 0.5 * size))
+    middle = work.levels(tooth[at], top[at], line.at(panel[at], low + 0.5 * size))
     kept = (middle > 0.0).all(axis=0)
     part, at, low, size, middle = part[kept], at[kept], low[kept], size[kept], middle[:, kept]
-    share = low + work.places[:, None] * size
-    place = work.line.at(panel[at], share)
+    share = low + work.line.places[:, None] * size
+    place = line.at(panel[at], share)
     sine, cosine = _immersed(np.broadcast_to(top[at], share.shape).ravel(), work.lag, place.height.ravel())
     sine, cosine = sine.reshape(share.shape), cosine.reshape(share.shape)
     if work.teeth.only_passes:
         chip = work.teeth.after(_least(middle)[0].astype(np.intp), tooth[at], place, sine, cosine)
     else:
         chip = work.teeth.chips(tooth[at], place, sine, cosine).min(axis=0)
-    width = work.weights[:, None] * size * work.line.length[panel[at]]
-    length = width * work.line.edge_length(place)
+    width = work.line.weights[:, None] * size * line.length[panel[at]]
+    length = width * line.edge_length(place)
     shear = work.law.shear(np.maximum(chip, 0.0) * place.sine) * width
     alone = np.ones_like(share)
     sums = []
@@ -272,7 +288,7 @@ def _cut(work: _Work, tooth: Indices, top: Array, panel: Indices, cells: _Cells)
 
 def _breaks(work: _Work, tooth: Indices, top: Array, panel: Indices, cells: _Cells) -> Array:
     """Shares (breaks, panels), rising, at which a level vanishes or two chips are equal; 1 where none is."""
-    count = work.teeth.chip_count
+    count, line = work.teeth.chip_count, work.line.meridian
     low, high = np.concatenate([cells.values, np.zeros((2, 1, cells.values.shape[2]))], axis=1)
     first, second = _functions(count, len(low) - 1)
     fa, fb = low[first] - low[second], high[first] - high[second]
@@ -286,14 +302,14 @@ def _breaks(work: _Work, tooth: Indices, top: Array, panel: Indices, cells: _Cel
         function, cell, fa, fb = function[matters], cell[matters], fa[matters], fb[matters]
     first, second = first[function], second[function]
     at, which = cells.panel[cell], cells.cell[cell]
-    start, size = work.nodes[which], work.nodes[which + 1] - work.nodes[which]
+    start, size = work.line.shares[which], work.line.shares[which + 1] - work.line.shares[which]
     teeth, tops, panels = tooth[at], top[at], panel[at]
 
     def value(share: Array, some: Indices | slice) -> Array:
-        place = work.line.at(panels[some], start[some] + size[some] * share)
+        place = line.at(panels[some], start[some] + size[some] * share)
         return work.differences(first[some], second[some], teeth[some], tops[some], place)
 
-    near = NEAR * work.line.length.sum() / (work.line.length[panels] * size)
+    near = NEAR * line.length.sum() / (line.length[panels] * size)
     share = start + size * _roots(value, fa, fb, near)
     order = np.lexsort((share, at))
     at, share = at[order], share[order]
