@@ -33,8 +33,8 @@ from metro.units import Array
 POINTS = 4
 STEPS, NEAR = 20, 1e-5  # to where a panel is cut; a share of the meridian
 MARGIN = 0.05  # in feeds per tooth and pass: sin φ is 0.02 off its chord over a panel
-# Edges are sorted by whether one pass alone counts where there are more than a few, and where it does so from
-# an immersion of this sine on: else it takes longer than to compute all.
+# On true paths edges are sorted by whether one pass alone counts where there are more than a few, and where
+# it does so from an immersion of this sine on: else, and on circles, it takes longer than to compute all.
 FEW, WORTH = 2, 0.5
 SUMS = 16
 
@@ -144,7 +144,8 @@ def _integrate(work: _Work, along: Edges, total: Array) -> None:
     nodes = work.line.nodes
     low, high = work.teeth.reach(float(nodes.radius.max()))
     reached = np.mod(along.top - low, TURN) < high - low + along.span
-    alone = work.teeth.alone_from(float(nodes.radius.min())) if work.teeth.passes > FEW else 1.0
+    many = work.teeth.true_path and work.teeth.passes > FEW
+    alone = work.teeth.alone_from(float(nodes.radius.min())) if many else 1.0
     if alone < WORTH:
         inward = math.asin(alone)
         leading = np.mod(along.top - inward, TURN)

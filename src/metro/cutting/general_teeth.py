@@ -163,8 +163,11 @@ class Teeth:
         Each pass leaves one. On true paths a raw edge leaves of them what is beyond it, or before it: where
         it is between a tooth's tip and what was cleared, only that part of the chip is there.
         """
-        # one by one: each fits a cache, all together do not
-        chips = np.stack([self.after(np.intp(m), tooth, place, sine, cosine) for m in range(self.passes)])
+        last = self.after(np.intp(0), tooth, place, sine, cosine)
+        chips = np.empty((self.passes, *last.shape))
+        chips[0] = last
+        for older in range(1, self.passes):  # one by one: each fits a cache, all together do not
+            chips[older] = self.after(np.intp(older), tooth, place, sine, cosine)
         if not (self.true_path and self.raw):
             return chips
         own = self._wave(np.intp(0), tooth, self._lag(place)) if self.off.size else 0.0
