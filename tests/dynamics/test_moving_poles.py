@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from metro.dynamics.by_file import own_fits, with_files
 from metro.dynamics.modal import identify_modes
+from metro.dynamics.modes import modal_constants
+from metro.dynamics.refine import Data, refine
 
 HZ, ZETA, STIFFNESS = np.array([40.0, 71.0, 110.0]), np.array([0.02, 0.015, 0.01]), 1e7 * np.array([1, 3, 6])
 FREQUENCY = np.arange(20.0, 140.0, 0.25)
@@ -83,3 +86,22 @@ def test_a_close_pair_that_every_file_shows_remains_a_pair():
     frf = frf + sd * (rng.normal(size=frf.shape) + 1j * rng.normal(size=frf.shape))
     model = identify_modes(FREQUENCY, frf, driving=0, files=[[np.array([i]) for i in range(4)]])
     np.testing.assert_allclose([mode.frequency for mode in model.modes], natural, rtol=2e-3)
+
+
+def test_a_pole_that_strays_to_another_mode_says_nothing_of_its_own():
+    """The second file hardly shows the broad mode, but has one beside the third that the common fit lacks."""
+    natural, zeta = np.array([40.0, 71.0, 110.0, 113.0]), np.array([0.02, 0.2, 0.01, 0.03])
+    ratio = FREQUENCY[:, None] / natural
+    modal = 1e-7 / (1 - ratio**2 + 2j * zeta * ratio)
+    frf = modal @ np.array([[1.0, 1.0, 1.0, 0.0], [1.0, 0.3, 1.0, 0.3]]).T
+    data = Data(2 * np.pi * FREQUENCY, frf, np.full(frf.shape, 1e9))
+    common = refine(data, 2 * np.pi * natural[:3], zeta[:3], real=False, iterations=0)
+    fits = own_fits(data, common, WAY[0][:2])
+    np.testing.assert_array_equal([each.strayed for each in fits], [[False] * 3, [False, True, False]])
+    assert fits[1].fit.omega[1] == pytest.approx(common.omega[1])
+    alone = modal_constants(common, 1, None, common.residues[1])
+    mode, moved = with_files(alone, 1, fits[1:], driving=None, decay=0.0, fit=common)
+    assert moved is not None
+    assert not mode.resolved
+    assert mode.frequency == pytest.approx(alone.frequency)
+    assert 1.96 * mode.frequency_sd == pytest.approx(0.2 * mode.frequency)

@@ -58,6 +58,21 @@ def test_telegrams_become_a_robot_log_whatever_stands_between_them(tmp_path, bet
     assert table.attrs["notes"] == []
 
 
+@pytest.mark.parametrize("joints", [4, 7])
+def test_an_arm_has_as_many_axes_as_the_first_telegram(tmp_path, joints):
+    def axes(text, tag):
+        start, end = text.index(f"<{tag} "), text.index("/>", text.index(f"<{tag} "))
+        values = " ".join(f'A{i}="{i}"' for i in range(1, joints + 1))
+        return f"{text[:start]}<{tag} {values}{text[end:]}"
+
+    telegrams = [telegram(k) for k in range(20)]
+    for tag in ("AIPos", "ASPos", "GearTorque"):
+        telegrams = [axes(text, tag) for text in telegrams]
+    table = read(recorded(tmp_path, telegrams), "robot")
+    assert len(table.columns) == 1 + 3 * joints
+    np.testing.assert_array_equal(table[f"q{joints}_set_deg"], float(joints))
+
+
 def test_a_telegram_may_spread_over_lines(tmp_path):
     path = recorded(tmp_path, [telegram(k).replace("><", ">\n  <") for k in range(9)])
     assert len(read(path, "robot")) == 9

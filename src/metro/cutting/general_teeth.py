@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from metro.cutting.chip import Cut, curve_excess, feed_per_radian, path_excess
+from metro.cutting.chip import Cut, curve_excess, feed_per_radian
 from metro.cutting.cutter import Cutter
 from metro.cutting.envelope import Place
 from metro.units import Array
@@ -61,9 +61,9 @@ class Teeth:
 
     @property
     def only_passes(self) -> bool:
-        """Whether nothing but passes, several of them, bounds what a tooth cuts."""
+        """Whether nothing but passes bounds what a tooth cuts."""
         arc = self.cut.engagement
-        return self.passes > 1 and not (self.raw or arc.entry_face or arc.exit_face)
+        return not (self.raw or arc.entry_face or arc.exit_face)
 
     @property
     def outside(self) -> float:
@@ -76,26 +76,86 @@ class Teeth:
             0.5 * self.passes * self.cut.feed_per_tooth / float(self.least(inner)) if self.true_path else 0.0
         )
 
+    def reach(self, radius: float) -> tuple[float, float]:
+        """Immersions between which teeth cut all that they cut, rad, whatever the height and the deviations.
+
+        A raw edge on the side of the axis on which teeth that are nearer to it pass it later than the others
+        begins what they cut, and likewise one that they pass earlier ends it.
+
+        Parameters
+        ----------
+        radius : the largest one, m.
+        """
+        beyond = math.asin(min(self.outside, 1.0))
+        low, high = -beyond, math.pi + beyond
+        farthest = radius + self.cutter.runout_radius + float(np.abs(self.cutter.reach or 0.0).max())
+        for edge in self.raw:
+            at = math.acos(max(-1.0, min(edge.line / farthest, 1.0)))
+            if edge.outer and edge.begins:
+                low = at
+            elif edge.outer:
+                high = at
+        return low, high
+
+    def alone_from(self, radius: float) -> float:
+        """Sine of the immersion from which on the last pass alone bounds chips that are no nearer than that.
+
+        An older pass leaves more by (travel since) × sin φ, but for the deviations from the radius; on true
+        paths, with a the feed per radian over the radius, by a share a of it less and by pitch × a² of the
+        deviations, while what the square of the pitch makes only adds. Infinite on a curve.
+
+        Parameters
+        ----------
+        radius : the least one, m.
+        """
+        if self.cut.curvature and self.true_path:
+            return math.inf
+        feed = feed_per_radian(self.cutter, self.cut)
+        apart = 2.0 * self.cutter.runout_radius + float(np.ptp(self.cutter.reach or 0.0))
+        since = feed * float((self.pitch[1:] - self.pitch[0]).min())
+        nearest = float(self.least(np.array(radius))) - apart
+        lean = feed / nearest if self.true_path else 0.0
+        if nearest <= 0.0 or lean >= 1.0:
+            return math.inf
+        return apart * (1.0 + float(self.pitch[0].max()) * lean**2) / (since * (1.0 - lean))
+
     def least(self, radius: Array) -> Array:
         """Return the radius at which paths are taken as true ones, m."""
         return np.sqrt(np.sqrt(radius**4 + (LEAST_RADIUS * self.cut.feed_per_tooth) ** 4))
 
-    def after(self, passed: Indices, tooth: Indices, place: Place, sine: Array, cosine: Array) -> Array:
-        """Chips in the plane that passes 0… leave to teeth at places, m; all broadcast."""
+    def after(
+        self, passed: Indices | np.intp, tooth: Indices, place: Place, sine: Array, cosine: Array
+    ) -> Array:
+        """Chips in the plane that passes 0… leave to teeth at places, m; all broadcast.
+
+        On true paths with :func:`metro.cutting.chip.path_excess`, put so that it takes few temporaries.
+        """
         feed = feed_per_radian(self.cutter, self.cut)
         pitch = self.pitch[passed, tooth]
         travel = feed * pitch
-        chip = np.asarray(travel * sine)
         earlier: Array | float = 0.0
+        cleared: Array | float = 0.0
         if self.off.size:
             lag = self._lag(place)
             earlier = self._wave(passed + 1, tooth, lag)
-            chip += self._wave(np.intp(0), tooth, lag) - earlier
+            cleared = self._wave(np.intp(0), tooth, lag) - earlier
         if self.true_path:
-            chip += path_excess(feed, pitch, self.least(place.radius) + earlier, sine, cosine)
+            lean = feed / (self.least(place.radius) + earlier) * cosine
+            rest = 1.0 - lean
+            lean *= rest
+            rest *= cosine
+            chip = 0.5 * pitch * rest
+            chip -= sine
+            chip *= lean
+            chip += sine
+            chip *= travel
             if self.cut.curvature:
                 chip += curve_excess(self.cut.curvature, travel) * cosine
-        return chip
+        else:
+            chip = travel * sine
+        if self.off.size:
+            chip += cleared
+        return np.asarray(chip)
 
     def chips(self, tooth: Indices, place: Place, sine: Array, cosine: Array) -> Array:
         """Chips in the plane of which the least counts, (chips, …) m, of teeth at places; all broadcast.
@@ -103,8 +163,11 @@ class Teeth:
         Each pass leaves one. On true paths a raw edge leaves of them what is beyond it, or before it: where
         it is between a tooth's tip and what was cleared, only that part of the chip is there.
         """
-        passed = np.arange(self.passes).reshape(-1, *(1,) * sine.ndim)
-        chips = self.after(passed, tooth, place, sine, cosine)
+        last = self.after(np.intp(0), tooth, place, sine, cosine)
+        chips = np.empty((self.passes, *last.shape))
+        chips[0] = last
+        for older in range(1, self.passes):  # one by one: each fits a cache, all together do not
+            chips[older] = self.after(np.intp(older), tooth, place, sine, cosine)
         if not (self.true_path and self.raw):
             return chips
         own = self._wave(np.intp(0), tooth, self._lag(place)) if self.off.size else 0.0

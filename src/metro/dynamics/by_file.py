@@ -18,18 +18,26 @@ from metro.dynamics.common_value import Common, common_value
 from metro.dynamics.modes import RESOLVED, Mode, modal_constants
 from metro.dynamics.polefit import PoleFit, criterion
 from metro.dynamics.refine import Data, refine
-from metro.units import Array
+from metro.units import Array, ComplexArray
 
+_HALF = 0.5  # to which, at 95 %, a damping is known that files do not tell: it is not resolved
 _FEW = 8  # iterations of a fit that is only compared with another one
 
 
 @dataclass(frozen=True)
 class Own:
-    """Fit of the responses ``columns`` of one file; ``seen`` (m,) are the modes whose poles are its own."""
+    """Fit of the responses ``columns`` of one file.
+
+    Attributes
+    ----------
+    seen : (m,) the modes whose poles are its own.
+    strayed : (m,) those whose poles went to another mode's place, and are the common ones instead.
+    """
 
     columns: np.ndarray
     fit: PoleFit
     seen: np.ndarray
+    strayed: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -43,17 +51,30 @@ class Moved:
 def own_fits(data: Data, fit: PoleFit, files: Sequence[np.ndarray]) -> list[Own]:
     """Fit each file from the common poles on; ``files`` are the columns of each.
 
-    A mode keeps its common pole in a file that does not resolve its damping (near a node of its shape).
+    A mode keeps its common pole in a file that does not resolve its damping (near a node of its shape), and
+    in one whose fit moves it to another mode's place: it makes up for something else there.
     """
-    found = []
-    for columns in files:
-        part = data.of(columns)
-        common = refine(part, fit.omega, fit.zeta, real=fit.real, iterations=0)
-        modes = len(fit.omega)
-        seen = np.array([_sees(common, r) for r in range(modes)])
-        own = refine(part, fit.omega, fit.zeta, real=fit.real, free=seen) if seen.any() else common
-        found.append(Own(columns, own, seen))
-    return found
+    return [_own(data.of(columns), fit, columns) for columns in files]
+
+
+def _own(part: Data, fit: PoleFit, columns: np.ndarray) -> Own:
+    common = refine(part, fit.omega, fit.zeta, real=fit.real, iterations=0)
+    seen = np.array([_sees(common, r) for r in range(len(fit.omega))])
+    strayed = np.zeros_like(seen)
+    own = common
+    while seen.any():
+        own = refine(part, fit.omega, fit.zeta, real=fit.real, free=seen)
+        away = seen & _strays(fit.poles, own.poles)
+        if not away.any():
+            break
+        seen, strayed, own = seen & ~away, strayed | away, common
+    return Own(columns, own, seen, strayed)
+
+
+def _strays(common: ComplexArray, own: ComplexArray) -> np.ndarray:
+    """Return which modes (m,) have a pole of their own that is nearer to the common pole of another."""
+    distance = np.abs(own[:, None] - common)
+    return np.asarray(distance.argmin(axis=1) != np.arange(len(common)))
 
 
 def _sees(fit: PoleFit, r: int) -> bool:
@@ -106,6 +127,21 @@ def moved(fits: Sequence[Own], r: int, decay: float) -> Moved | None:
     )
 
 
+def _untold(mode: Mode, r: int, fits: Sequence[Own]) -> Moved | None:
+    """Return what is known of a mode that single files do not tell from its neighbours; None if none tried.
+
+    Its pole strayed in files that resolve it as long as it stays: together with the neighbours it makes up
+    the response, and files that agree on the sum need not agree on it. It is said to lie within the half
+    width of its resonance, and its damping to be known to half.
+    """
+    strayed = sum(bool(own.strayed[r]) for own in fits)
+    if not strayed:
+        return None
+    values, sds = (math.log(mode.frequency), math.log(mode.damping)), (mode.damping / 1.96, _HALF / 1.96)
+    frequency, damping = (Common(x, sd, sd, strayed, 1.0) for x, sd in zip(values, sds, strict=True))
+    return Moved(frequency, damping)
+
+
 def with_files(
     mode: Mode, r: int, fits: Sequence[Own], *, driving: int | None, decay: float, fit: PoleFit
 ) -> tuple[Mode, Moved | None]:
@@ -119,7 +155,7 @@ def with_files(
     driving : column of the driving point.
     fit : of the common poles.
     """
-    seen = moved(fits, r, decay)
+    seen = moved(fits, r, decay) or _untold(mode, r, fits)
     if seen is None or seen.frequency.scatter == seen.damping.scatter == 0.0:
         return mode, seen
     if seen.frequency.scatter > 0.0:

@@ -22,6 +22,9 @@ _CLEAR = 4.0
 _NEAR_A_NODE = 0.025
 # Residues of modes closer than this many times the sum of their half widths share their errors.
 _APART = 2.0
+# Of the power that the force exchanges. At its own point all goes in; with the sign of the response turned,
+# all but what noise between the resonances makes comes out.
+_NEARLY_ALL = 0.75
 
 
 class Standing(Enum):
@@ -32,14 +35,17 @@ class Standing(Enum):
     ELSEWHERE = "elsewhere"
 
 
-def standing(fit: PoleFit, free: ComplexArray, column: int, modes: Sequence[int]) -> Standing:
-    """Judge a driving point by the modes in the band.
+def standing(fit: PoleFit, free: ComplexArray, column: int, modes: Sequence[int], power: float) -> Standing:
+    """Judge a driving point by the modes in the band, and by the power of its force where they have no say.
+
+    Modes that overlap have none: of a tool in its holder it may be all of them.
 
     Parameters
     ----------
     free : (m, c) residues fitted as complex: one that is not within 45° of a normal mode's has no say.
     column : of the driving point.
     modes : which of the fit's are in the band.
+    power : of its FRF, by :func:`power_given_out`.
     """
     width = fit.omega * fit.zeta
     apart = np.abs(fit.omega[:, None] - fit.omega) / (width[:, None] + width)
@@ -53,7 +59,7 @@ def standing(fit: PoleFit, free: ComplexArray, column: int, modes: Sequence[int]
     right = clear & (residue < 0.0)
     wrong = clear & (residue > 0.0) & (size > _NEAR_A_NODE * np.max(size, initial=0.0))
     if not wrong.any():
-        return Standing.THERE
+        return Standing.REVERSED if power > _NEARLY_ALL and not right.any() else Standing.THERE
     return Standing.ELSEWHERE if right.any() else Standing.REVERSED
 
 
@@ -74,6 +80,11 @@ def turning(frf: ComplexArray) -> float:
     return float(np.sum(step.imag)) / size if size > 0.0 else 0.0
 
 
-def gives_out_power(frequency: Array, frf: ComplexArray) -> bool:
-    """Return whether Σ ω Im H is positive: the force at its own point takes power out of the structure."""
-    return bool(np.sum(frf.imag * frequency) > 0.0)
+def power_given_out(frequency: Array, frf: ComplexArray) -> float:
+    """Return the power that a force takes out of the structure over all that it exchanges, in −1…1.
+
+    Σ ω Im H over Σ ω |Im H|: −1 at its own point, where it puts power in at every frequency; 1 where the
+    response there is reversed or the FRF conjugated.
+    """
+    exchanged = float(np.sum(np.abs(frf.imag) * frequency))
+    return float(np.sum(frf.imag * frequency)) / exchanged if exchanged > 0.0 else 0.0

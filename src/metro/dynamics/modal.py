@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from metro.dynamics.by_file import Moved, explained, own_fits, with_files
-from metro.dynamics.driving import Standing, gives_out_power, standing, turning
+from metro.dynamics.driving import Standing, power_given_out, standing, turning
 from metro.dynamics.modes import Mode, modal_constants
 from metro.dynamics.polefit import PoleFit, Scatter, criterion
 from metro.dynamics.refine import Data, losses, refine
@@ -101,7 +101,7 @@ def identify_modes(
     if not (np.all(np.isfinite(frf)) and frequency[0] > 0):
         raise ValueError("FRF: found values that are not finite, or a line at 0 Hz")
     point = None if driving is None else frf[:, driving]
-    if point is not None and gives_out_power(frequency, point) and turning(point) >= 0.0:
+    if point is not None and power_given_out(frequency, point) > 0.0 and turning(point) >= 0.0:
         raise ValueError(
             "driving-point receptance: its imaginary part is positive and its phase rises; expected e^{+iωt}"
             " and m/N"
@@ -124,7 +124,8 @@ def identify_modes(
     free = residues(data.omega, frf, np.sqrt(np.mean(data.weight**2, axis=1)), fit.poles)
     order = [int(r) for r in np.argsort(fit.omega) if inside[r]]
     points = [each for each in (driving, *others) if each is not None]
-    stands = {column: standing(fit, free, column, order) for column in points}
+    powers = {column: power_given_out(frequency, frf[:, column]) for column in points}
+    stands = {column: standing(fit, free, column, order, power) for column, power in powers.items()}
     driving = next((column for column in points if stands[column] is Standing.THERE), None)
     ways = [own_fits(data, fit, way) for way in files]
     modes, moved = [], []

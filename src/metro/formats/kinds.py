@@ -13,8 +13,6 @@ from metro.formats.errors import FormatError
 from metro.joint_columns import JOINT_COLUMNS, fault_of, fault_of_cut
 from metro.spelling import resembling
 
-JOINTS = range(1, 7)
-
 
 @dataclass(frozen=True)
 class Kind:

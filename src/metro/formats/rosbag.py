@@ -17,8 +17,9 @@ import pandas as pd
 
 from metro.formats.bag_limits import check_tables, limited_chunks, plain_types
 from metro.formats.errors import FormatError
-from metro.formats.kinds import JOINTS, Kind, Raw
+from metro.formats.kinds import Kind, Raw
 from metro.formats.packets import Note, in_order
+from metro.joint_columns import MOST_AXES
 from metro.units import DEG, Array
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ _CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 _SET = re.compile(r"set|command|cmd|reference|desired|target", re.IGNORECASE)
 _NS = 1e-9
 _IDL_RULE = "=" * 80 + "\nIDL: "
+_LEAST_JOINTS = 4  # of an arm: fewer are the numbered ones of a wrist, or the fingers of a gripper
 _GAP = 1.5  # between set-points further apart than so many of their steps the command is not known
 
 
@@ -56,7 +58,7 @@ def read_rosbag(path: Path, kind: Kind, rows: int | None) -> Raw:
     Raises
     ------
     FormatError
-        Where the file is no whole bag, or the topics, joints 1 … 6 or efforts are not there.
+        Where the file is no whole bag, or the topics, the joints of one arm or efforts are not there.
     """
     from rosbags.rosbag2 import Reader
 
@@ -72,6 +74,10 @@ def read_rosbag(path: Path, kind: Kind, rows: int | None) -> Raw:
         raise
     except Exception as error:  # whatever a damaged bag makes its reader stumble over
         raise FormatError(path, f"is not a readable ROS 2 bag: {error or type(error).__name__}") from error
+    joints, targets = measured.values.shape[1] // 2, commanded.values.shape[1]
+    if joints != targets:
+        fault = f"found {joints} measured joints and set-points of {targets}, expected those of one arm"
+        raise FormatError(path, fault)
     return _joined(measured, commanded, kind, whole=rows is None)
 
 
@@ -128,16 +134,21 @@ def _series(
     values_of: Callable[[Any, list[int]], list[float]],
     rows: int | None,
 ) -> _Series:
-    """Read a topic's messages that name joints 1 … 6; others (a gripper's) are passed over."""
+    """Read a topic's messages that name the most joints of one arm; others (a gripper's) are passed over."""
     topic, (bag, store) = connections[0].topic, source
     stamps: list[int] = []
     values: list[list[float]] = []
     seen: tuple[str, ...] = ()
+    most = 0
     for connection, _, data in bag.messages(connections):
         message: Any = store.deserialize_cdr(data, connection.msgtype)
         seen = tuple(message.name if connection.msgtype == _STATE else message.joint_names)
         joints = _joints(seen)
-        if joints is not None:
+        if len(joints) > most:
+            most = len(joints)
+            stamps.clear()
+            values.clear()
+        if joints and len(joints) == most:
             stamp = message.header.stamp
             stamps.append(stamp.sec * 1_000_000_000 + stamp.nanosec)
             try:
@@ -149,7 +160,8 @@ def _series(
             break
     if not stamps:
         fault = f"found the joints {', '.join(seen)}" if seen else "found no message"
-        raise FormatError(path, f"{topic}: {fault}, expected six joints whose names end in 1 … 6")
+        expected = f"expected the joints of one arm, {_LEAST_JOINTS} or more, whose names end in 1, 2, 3, …"
+        raise FormatError(path, f"{topic}: {fault}, {expected}")
 
     def place(row: int) -> str:
         return f"message {row + 1} of {topic}"
@@ -160,15 +172,18 @@ def _series(
 
 
 @cache
-def _joints(names: tuple[str, ...]) -> list[int] | None:
-    """Give the places of joints 1 … 6: the names of one stem that end so; None where there are none."""
+def _joints(names: tuple[str, ...]) -> list[int]:
+    """Give the places of joints 1, 2, …: those of the one stem of which most names end so; else none."""
     stems: dict[str, dict[int, int]] = {}
     for index, name in enumerate(names):
-        match = re.fullmatch(r"(.*?)0*([1-6])", name)
+        match = re.fullmatch(rf"(.*?)0*([1-{MOST_AXES}])", name)
         if match:
             stems.setdefault(match[1], {})[int(match[2])] = index
-    arms = [places for places in stems.values() if len(places) == len(JOINTS)]
-    return [arms[0][i] for i in JOINTS] if len(arms) == 1 else None
+    arms = [[places[i] for i in sorted(places)] for places in stems.values() if max(places) == len(places)]
+    arms = [places for places in arms if len(places) >= _LEAST_JOINTS]
+    most = max(map(len, arms), default=0)
+    largest = [places for places in arms if len(places) == most]
+    return largest[0] if len(largest) == 1 else []
 
 
 def _measured(message: Any, joints: Iterable[int]) -> list[float]:
@@ -190,9 +205,10 @@ def _joined(measured: _Series, commanded: _Series, kind: Kind, *, whole: bool) -
     # nanoseconds since 1970 do not fit a float: times are interpolated from the first one on
     at, known = (ns - commanded.ns[0]) * _NS, (commanded.ns - commanded.ns[0]) * _NS
     columns: dict[str, Array] = {"t_s": np.asarray(ns * _NS, dtype=np.float64)}
-    for i, angles in zip(JOINTS, commanded.values.T, strict=True):
+    joints = range(1, 1 + commanded.values.shape[1])
+    for i, angles in zip(joints, commanded.values.T, strict=True):
         columns[f"q{i}_set_deg"] = np.interp(at, known, angles)
-    names = [*(f"q{i}_deg" for i in JOINTS), *(f"tau{i}_nm" for i in JOINTS)]
+    names = [*(f"q{i}_deg" for i in joints), *(f"tau{i}_nm" for i in joints)]
     columns |= dict(zip(names, measured.values[keep].T, strict=True))
     frame = pd.DataFrame({name: columns[name] for name in kind.columns if name in columns})
     frame.attrs["notes"] = [*measured.notes, *commanded.notes, *_left_out(len(measured.ns) - len(keep))]

@@ -1,7 +1,8 @@
 """Robot logs as recorded KUKA RSI telegrams: ``<Rob …>…</Rob>``, one per line or one after the other.
 
 Each interpolation cycle sends one telegram, stamped IPOC in ms: AIPos and ASPos hold the actual and the
-commanded axis angles in degrees; GearTorque (or Torque) the joint torques in N m; MACur the motor currents.
+commanded axis angles in degrees, from A1 to the last that the first telegram has; GearTorque (or Torque) the
+joint torques in N m; MACur the motor currents.
 Text between telegrams (a logger's time stamps, the ``<Sen …>`` answers) is passed over.
 """
 
@@ -18,8 +19,9 @@ import numpy as np
 import pandas as pd
 
 from metro.formats.errors import FormatError
-from metro.formats.kinds import JOINTS, Kind, Raw
+from metro.formats.kinds import Kind, Raw
 from metro.formats.packets import Note, in_order
+from metro.joint_columns import AXES
 from metro.units import MS
 
 STARTS = (b"<Rob ", b"<Rob>")
@@ -90,7 +92,7 @@ def read_rsi(path: Path, kind: Kind, rows: int | None) -> Raw:
         torn = f", {recording.torn} torn" if recording.torn else ""
         raise FormatError(path, f"found no whole telegram <Rob …>…</Rob>{torn}, expected {kind.title}")
     elements = _elements(recording, kind)
-    columns = [(tag, f"A{i}", name.format(i)) for tag, name in elements.items() for i in JOINTS]
+    columns = [(tag, f"A{i}", name.format(i)) for tag, name in elements.items() for i in _axes(recording)]
     values = np.empty((len(recording.telegrams), len(columns)))
     cycles = np.empty(len(recording.telegrams), dtype=np.int64)
     late_answers = 0.0
@@ -127,6 +129,12 @@ def _elements(recording: _Recording, kind: Kind) -> dict[str, str]:
             recording.path, f"{recording.place(0)}: lacks the element {lacks}: {listed}, {expected}"
         )
     return {**_ANGLES, torque: _TORQUE}
+
+
+def _axes(recording: _Recording) -> range:
+    """Return the numbers of the axes, up to the last of which the first whole telegram has an angle."""
+    angles = [child.attrib for child in recording.telegrams[0].rob if child.tag in _ANGLES]
+    return range(1, 1 + max((i for i in AXES if any(f"A{i}" in each for each in angles)), default=0))
 
 
 def _notes(torn: int, late_answers: float, elements: dict[str, str]) -> list[Note]:
