@@ -1,5 +1,6 @@
 import io
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,18 @@ def test_a_real_batch_is_clean(name):
 def test_a_bundled_batch_follows_the_contract(folder):
     problems = check(folder, ROOT / "config/cells").problems
     assert [str(problem) for problem in problems if problem.severity != "note"] == []
+
+
+def test_one_load_test_of_the_wrong_sign_is_left_out_and_the_batch_can_be_run(tmp_path):
+    folder = shutil.copytree(ROOT / "data/raw/irb6640-setup", tmp_path / "irb6640-setup")
+    sound = len(load(folder, ROOT / "config/cells").loads)
+    edit(folder / "loads.csv", "A,P1,25,10,0,150,0,0,0.084", "A,P1,25,10,0,150,0,0,-0.084")
+    report = check(folder, ROOT / "config/cells")
+    assert report.ok
+    said = [str(problem) for problem in report.problems if problem.severity == "warning"]
+    assert len(said) == 1
+    assert said[0].startswith("loads.csv: row 2 (A): column dx_mm: the tip moves against its load")
+    assert len(load(folder, ROOT / "config/cells").loads) == sound - 1
 
 
 def test_a_batch_is_loaded_with_defaults_and_roles(batch):

@@ -136,3 +136,50 @@ def test_a_row_that_cannot_be_used_is_named(tmp_path, name, text, message):
 )
 def test_what_is_wrong_with_touches_and_torques_is_said(tmp_path, name, text, said):
     assert said in faults(tmp_path, name, text)
+
+
+def without_those_against_their_load(folder, rows):
+    (folder / "loads.csv").write_text(LOADS + "".join(f"{row}\n" for row in rows))
+    return rules.with_their_load(read_table(folder, "loads")[0])
+
+
+@pytest.mark.parametrize("second", ["100,0,0,0.2,,", "-50,0,0,-0.1,0.01,"])
+def test_a_load_test_against_its_load_is_left_out_where_another_stands_in(tmp_path, second):
+    rows = ["p,,,,,,,1,2,3,100,0,0,-0.2,,", f"p,,,,,,,1,2,3,{second}", "p,,,,,,,9,2,3,0,50,0,0,0.1,"]
+    table, warnings = without_those_against_their_load(tmp_path, rows)
+    assert table.rows == (3, 4)
+    assert [warning.severity for warning in warnings] == ["warning"]
+    said = str(warnings[0])
+    assert said.startswith("loads.csv: row 2 (p): column dx_mm: the tip moves against its load")
+    assert said.endswith("the row is left out, since row 3 loads the same place along the same line")
+    assert not list(rules.load_findings(table))
+
+
+@pytest.mark.parametrize(
+    "second",
+    [
+        "p,,,,,,,1,2,4,100,0,0,0.2,,",  # another place
+        "o,,,,,,,1,2,3,100,0,0,0.2,,",  # another pose
+        "p,,,,,,,1,2,3,0,100,0,,0.2,",  # along another line
+        "p,,,,,,,1,2,3,50,0,0,-0.1,,",  # against its load too
+    ],
+)
+def test_a_load_test_against_its_load_refuses_the_batch_where_nothing_stands_in(tmp_path, second):
+    table, warnings = without_those_against_their_load(tmp_path, ["p,,,,,,,1,2,3,100,0,0,-0.2,,", second])
+    assert (table.rows, warnings) == ((2, 3), [])
+    said = [str(finding) for finding in rules.load_findings(table)]
+    assert "row 2 (p): column dx_mm: the tip moves against its load" in said[0]
+    assert "no other row loads the same place along the same line" in said[0]
+
+
+def test_load_tests_of_which_no_place_is_known_do_not_stand_in_for_each_other(tmp_path):
+    rows = ["p,,,,,,,,,,100,0,0,-0.2,,", "p,,,,,,,,,,100,0,0,0.2,,"]
+    assert without_those_against_their_load(tmp_path, rows)[0].rows == (2, 3)
+
+
+def test_a_table_without_rows_keeps_the_numbers_and_the_faults_of_the_others(tmp_path):
+    (tmp_path / "loads.csv").write_text(
+        LOADS + "a,,,,,,,1,2,3,1,0,0,1,,\nb,,,,,,,1,2,3,x,0,0,1,,\nc,,,,,,,1,2,3,1,0,0,1,,\n"
+    )
+    table = read_table(tmp_path, "loads")[0].without({0})
+    assert (list(table.frame["pose"]), table.rows, table.faulty) == (["b", "c"], (3, 4), {0})

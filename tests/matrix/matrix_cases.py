@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 import yaml
 
-RUN_FILES = ("dynamometer", "robot_log", "idle_log", "path", "scan", "profile")
+RUN_FILES = ("dynamometer", "robot_log", "idle_log", "path", "scan", "profile", "slopes")
 TABLES = ("runs.csv", "impacts.csv", "loads.csv", "mass.csv", "published.csv", "cell.yaml", "stations.csv")
 NEEDED = {"format", "batch", "source", "cell", "citation"}
 SETTINGS = ("condition", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm", "direction")
@@ -56,6 +56,9 @@ def alone(folder):
 
 def messy(folder):
     """Yield cases of batches that were made without a plan."""
+    if (folder / "loads.csv").exists():
+        yield Case("messy", "a load test of the wrong sign", lambda to: _turned(to, 1))
+        yield Case("messy", "every load test of the wrong sign", lambda to: _turned(to, None))
     if not (folder / "runs.csv").exists():
         return
     for role in ("identify", "validate"):
@@ -204,6 +207,15 @@ def _set(to, column, value):
 
 def _roles(to):
     _change(to, "runs.csv", lambda content: content.assign(role=["identify", "validate"][: len(content)]))
+
+
+def _turned(to, count):
+    def change(content):
+        moved = content[["dx_mm", "dy_mm", "dz_mm"]].head(count)
+        turned = moved.apply(pd.to_numeric).mul(-1).astype(str).replace("nan", "")
+        return content.assign(**turned.reindex(content.index).fillna(content[moved.columns]))
+
+    _change(to, "loads.csv", change)
 
 
 def _one_condition(to):

@@ -117,6 +117,22 @@ def scans_alone(folder):
     (folder / "runs.csv").write_text("\n".join(rows) + "\n")
 
 
+def slopes_alone(folder):
+    """Write a batch of a level's readings alone: two faces on grids of lines, one on a single line."""
+    folder.mkdir()
+    text = "format: 1\nsource: measured\ncell: bench\ninstruments: {level: {sigma_urad: 1}}\n"
+    (folder / "batch.yaml").write_text(f"{text}batch: {folder.name}\n")
+    along = [(x, y, x + 200, y) for y in range(0, 601, 200) for x in range(0, 800, 200)]
+    across = [(x, y, x, y + 200) for x in range(0, 801, 200) for y in range(0, 600, 200)]
+    rows = ["run,slopes"]
+    for run, feet in enumerate(([*along, *across], [*along, *across], along[:4]), 1):
+        slopes = np.random.default_rng(run).normal(30.0, 5.0, len(feet))
+        table = pd.DataFrame(feet, columns=["x1_mm", "y1_mm", "x2_mm", "y2_mm"]).assign(slope_urad=slopes)
+        table.to_csv(folder / f"level{run}.csv", index=False)
+        rows.append(f"r{run},level{run}.csv")
+    (folder / "runs.csv").write_text("\n".join(rows) + "\n")
+
+
 PLACES = range(1, 10)
 WRITERS = {
     "made-driving-point": lambda folder: frf(folder, [(1, 1)]),
@@ -134,4 +150,5 @@ WRITERS = {
     "made-hits-no-driving-point": lambda folder: records(folder, [(2, 1), (3, 1)]),
     "made-logs-alone": logs_alone,
     "made-scans-alone": scans_alone,
+    "made-slopes-alone": slopes_alone,
 }

@@ -35,8 +35,8 @@ EMPTY_SVG = b'<svg xmlns="http://www.w3.org/2000/svg" width="100pt" height="50pt
 CELLS = Path(__file__).parents[2] / "config/cells"
 # Words of a program, which no sentence for a process engineer holds.
 ODD = re.compile(
-    r"\bnan\b|\bNone\b|\binf\b|Traceback|KeyError|Error:|cannot convert|out of bounds|zero-size|object has no"
-    r"|must be|0-dimensional|singular matrix|not in index|\bdtype\b",
+    r"\bnan\b|\bNone\b(?! of the )|\binf\b|Traceback|KeyError|Error:|cannot convert|out of bounds|zero-size"
+    r"|object has no|must be|0-dimensional|singular matrix|not in index|\bdtype\b",
 )
 
 

@@ -16,12 +16,14 @@ FEW = {
         "only run 1",
     ],
     "irb6640-face": ["no scan/r01.ply"],
+    "irb6640-setup": ["a load test of the wrong sign", "every load test of the wrong sign"],
     "irb6640-published": ["no published.csv", "published.csv without axis"],
     "kr160-published": ["published.csv with one row"],
     "kr160-side": ["runs.csv without axial_depth_mm"],
     "made-grid": ["as it is"],
     "made-hits-no-driving-point": ["as it is"],
     "made-scans-alone": ["batch.yaml without work"],
+    "made-slopes-alone": ["as it is"],
     "trimule-helical": ["only impacts.csv"],
     "trimule-published": ["runs.csv without operation"],
 }
@@ -59,7 +61,8 @@ def test_a_traceback_and_a_word_of_a_program_are_wrong_outcomes():
     assert matrix_outcome.Outcome("passed", "refused", ("no",)).wrong.startswith(
         "check passed, pipeline refused"
     )
-    odd = matrix_outcome.odd_in(["cannot convert float NaN to integer", "the finance of a nanometre"])
+    said = ["cannot convert float NaN to integer", "the finance of a nanometre", "None of the usual mistakes"]
+    odd = matrix_outcome.odd_in(said)
     assert odd == ("cannot convert float NaN to integer",)
     assert matrix_outcome.Outcome("passed", "PDF").wrong == ""
     assert matrix_cases.ODD_NAMES

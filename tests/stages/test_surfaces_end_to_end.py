@@ -175,6 +175,16 @@ def test_a_batch_of_slopes_alone_passes_its_check_and_one_without_the_column_doe
         load(folder)
 
 
+def test_a_batch_of_slopes_alone_does_not_miss_a_scan(tmp_path):
+    folder = levelled(tmp_path, grid_of_slopes(1))
+    ingest(folder, tmp_path, tmp_path / "processed", {}, "c0de")
+    settings = yaml.safe_load((ROOT / "config/config.yaml").read_text())["loop"]
+    identify(tmp_path / "processed", settings, "c0de")
+    identified = json.loads((tmp_path / "processed/identified.json").read_text())
+    assert "minimum_zone" in identified["levelling"]["plate"]
+    assert "flatness" not in identified["not_identified"]
+
+
 def test_import_asks_for_the_unit_of_a_reading_alone(tmp_path):
     table = grid_of_slopes(1).assign(line=range(31))
     own = dict(

@@ -157,6 +157,8 @@ def examine(folder: Path, cells: Path, holdout: JSON) -> Examined:
     sound = {key: value for key, value in manifest.items() if key not in faulty}
     unread = not manifest or HOLE in faulty
     findings += [*run_findings(tables["runs"], sound, unread), *rules.impact_findings(tables["impacts"])]
+    tables["loads"], more = rules.with_their_load(tables["loads"])
+    findings += more
     findings += [*rules.load_findings(tables["loads"]), *rules.mass_findings(tables["mass"])]
     findings += [*rules.touch_findings(tables["touches"]), *rules.payload_findings(tables["payload"])]
     findings += [*rules.published_findings(tables["published"]), *rules.station_findings(tables["stations"])]

@@ -41,7 +41,7 @@ class Finding:
         """Where in the file it is, in words."""
         yaml = self.file.endswith((".yaml", ".yml"))
         row = "" if self.row is None else f"line {self.row}" if yaml else f"row {self.row}"
-        label = f"{row} ({self.run})" if self.run else row
+        label = f"{row} ({self.run})".lstrip() if self.run else row
         column = self.column if yaml or not self.column else f"column {self.column}"
         return ": ".join(part for part in (label, column) if part)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,8 @@ CLOSEST_MM = 1.0
 QUATERNION = 0.01  # by which the length of one with two digits may differ from 1
 NEAREST_MM = 10.0  # no flange of an arm comes as near to the base
 MASSES_KG = (1.0, 2e4)
+ALONG = 1.0 - 1e-4  # cosine of the angle between two forces along one line
+AGAINST = "the tip moves against its load, expected with it: a sign is wrong, or two axes are exchanged"
 SELF_DESCRIBING = (".uff", ".unv", ".uf")  # universal files carry points, axes, kind and unit themselves
 
 
@@ -49,12 +51,56 @@ def load_findings(table: Table) -> Iterator[Finding]:
             yield table.finding(position, "fx_n", "the load is zero, expected a force")
         if not any(math.isfinite(row[name]) for name in ("dx_mm", "dy_mm", "dz_mm")):
             yield table.finding(position, "dx_mm", "dx_mm, dy_mm, dz_mm are all blank, expected at least one")
-        elif sum(row[f"f{a}_n"] * row[f"d{a}_mm"] for a in "xyz" if math.isfinite(row[f"d{a}_mm"])) < 0:
-            message = (
-                "the tip moves against its load, expected with it: a sign is wrong, or two axes are exchanged"
-            )
-            yield table.finding(position, "dx_mm", message)
+        elif _work(row) < 0:
+            alone = "no other row loads the same place along the same line, so correct it or remove it"
+            yield table.finding(position, "dx_mm", f"{AGAINST}; {alone}")
     yield from _load_units(table)
+
+
+def with_their_load(table: Table) -> tuple[Table, list[Finding]]:
+    """Leave out load tests whose tip moves against the load, where another test stands in for each.
+
+    Another test stands in if it loads the same place along the same line and its tip moves with the load:
+    nothing that is loaded at rest moves against its load, so that of two such tests it is known which is
+    wrong. A test that nothing stands in for is kept, and is an error of :func:`load_findings`.
+
+    Returns
+    -------
+    The table without those rows, and a warning about each.
+    """
+    rows = list(table.sound())
+    left_out: dict[int, int] = {}
+    for position, row in rows:
+        if _work(row) < 0:
+            others = [at for at, other in rows if _work(other) > 0 and _loaded_alike(row, other)]
+            left_out |= {position: table.rows[others[0]]} if others else {}
+    warnings = [
+        table.finding(
+            position,
+            "dx_mm",
+            f"{AGAINST}; the row is left out, since row {other} loads the same place along the same line",
+            "warning",
+        )
+        for position, other in left_out.items()
+    ]
+    return table.without(left_out), warnings
+
+
+def _work(row: Mapping[str, Any]) -> float:
+    """Return the load times the displacement along it, N mm; a component that was not read counts for 0."""
+    return sum(float(row[f"f{a}_n"] * row[f"d{a}_mm"]) for a in "xyz" if math.isfinite(row[f"d{a}_mm"]))
+
+
+def _loaded_alike(row: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Return whether two load tests are of one place, and their forces along one line, either way."""
+    place = [name for name in row if name in (*POSITIONS, "x_mm", "y_mm", "z_mm")]
+    here, there = (np.array([float(each[name]) for name in place]) for each in (row, other))
+    if (row["pose"], row["point"]) != (other["pose"], other["point"]):
+        return False
+    first, second = (np.array([each[f"f{a}_n"] for a in "xyz"]) for each in (row, other))
+    along = abs(first @ second) > ALONG * np.linalg.norm(first) * np.linalg.norm(second)
+    known = np.isfinite(here).any() and np.array_equal(here, there, equal_nan=True)
+    return bool(known and along)
 
 
 def _load_units(table: Table) -> Iterator[Finding]:

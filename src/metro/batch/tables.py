@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import date, datetime
 from pathlib import Path
@@ -56,6 +56,13 @@ class Table:
         for position, row in enumerate(self.frame.to_dict("records")):
             if position not in self.faulty:
                 yield position, {str(name): value for name, value in row.items()}
+
+    def without(self, out: Collection[int]) -> Table:
+        """Return the table less the rows at these positions."""
+        kept = [position for position in range(len(self.frame)) if position not in out]
+        faulty = frozenset(new for new, old in enumerate(kept) if old in self.faulty)
+        frame = self.frame.iloc[kept].reset_index(drop=True)
+        return Table(self.file, frame, tuple(self.rows[position] for position in kept), faulty)
 
 
 def read_table(folder: Path, name: str, stem: str | None = None) -> tuple[Table, list[Finding]]:

@@ -115,7 +115,8 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
             state.observed |= tables
             state.add(blocks)
     posed = {each.name: state.posed[each.name] for each in observables()}
-    lacking = {name: each.task.reason for name, each in posed.items() if isinstance(each.task, Refusal)}
+    refused = {name: each.task for name, each in posed.items() if isinstance(each.task, Refusal)}
+    lacking = {name: refusal.reason for name, refusal in refused.items() if not refusal.moot}
     printed = published.observe(batch, state.read, state.identified)
     if not isinstance(printed, Refusal):
         state.observed |= printed

@@ -43,7 +43,7 @@ def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataF
     """
     runs, planned = scanned(batch), planned_points(batch, read)
     if not runs and planned.empty:
-        return Refusal("runs.csv names no scan")
+        return Refusal("runs.csv names no scan", moot=bool(batch.with_files("slopes")))
     parts: dict[str, list[pd.DataFrame]] = {name: [] for name in FACE_TABLES}
     refused = []
     repeated = noise_by_repeats(batch, read)
