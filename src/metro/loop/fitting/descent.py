@@ -22,6 +22,7 @@ from metro.units import Array
 ITERATIONS = 40
 ENOUGH = 0.01  # gain in twice the log-likelihood below which a descent ends
 SHARES = (1.0, 0.5, 0.25, 0.1)  # of an undamped step: along a bent valley a shorter one leads on
+SMALL_SHARES = (0.03, 0.01, 0.003)  # that say whether the derivatives hold
 FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e9  # of the normal matrix's diagonal
 HOPE = 30.0  # times what a step promises: more is not left to gain along a descent, except in a bent valley
 ACCEPTED = 1e-3  # share of what a step promised that it must keep
@@ -306,6 +307,22 @@ def _step(
                 return _Taken(trial, gained, min(eased, 2.0) * damping)
         damping, growth = max(growth * damping, FIRST_DAMPING), 2.0 * growth
     return None
+
+
+def farthest(candidate: Candidate, blocks: Sequence[Block], state: State, system: System) -> float:
+    """Return the share of an undamped step at which the sum of squares is lowest.
+
+    A model that bends more than its derivatives say has its end short of the whole step. All of it (1) counts
+    where not even a small share gains: the derivatives of a rough model say nothing of where its end is.
+    """
+    common, alone = _way(candidate, state, system, 0.0, own=False)
+    left = {}
+    for share in (*SHARES, *SMALL_SHARES):
+        part = [share * step for step in alone]
+        trial = _moved(candidate, state, share * common, _by_run(blocks, part))
+        left[share] = _squares(candidate, blocks, trial, system)
+    best = min(left, key=lambda share: left[share])
+    return best if left[SMALL_SHARES[-1]] < system.squares else 1.0
 
 
 def _way(

@@ -22,6 +22,7 @@ from metro.loop.fitting.descent import (
     State,
     condition,
     descend,
+    farthest,
     free,
     inverse,
     linearised,
@@ -291,8 +292,10 @@ def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: 
     covariance[p:, p:] = alike[p:, p:]
     moving = free(candidate, state, right)
     still, downhill = normal[np.ix_(moving, moving)], right[moving]
-    step = np.abs(solution(still, downhill)) / np.sqrt(np.diag(inverse(still)))
-    return _End(covariance, float(step.max(initial=0.0)), condition(normal))
+    step = float((np.abs(solution(still, downhill)) / np.sqrt(np.diag(inverse(still)))).max(initial=0.0))
+    if step > CONVERGED:
+        step *= farthest(candidate, blocks, state, system)
+    return _End(covariance, step, condition(normal))
 
 
 def _reestimated(
