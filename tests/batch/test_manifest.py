@@ -49,6 +49,11 @@ def test_a_manifest_that_follows_the_contract_has_no_findings(batch):
             "teeth: 4, pitch_deg: [90, 90, 90]",
             "tool: pitch_deg has 3 angles, expected as many as teeth (4)",
         ),
+        (
+            "teeth: 4",
+            "pitch_deg: [90, 90, 90, 90]",
+            "tool: pitch_deg has 4 angles, but teeth is missing, expected teeth: 4",
+        ),
         ("teeth: 4", "teeth: 4, pitch_deg: [90, 90, 90, 80]", "tool: pitch_deg adds up to 350, expected 360"),
         ("teeth: 4", "teeth: 4, end: round", 'tool.end: found "round", expected "flat" or "ball"'),
         ("teeth: 4", "teeth: 4, corner_radius_mm: 6", "corner_radius_mm is 6, expected at most half of"),

@@ -47,11 +47,12 @@ def small_copy(folder, to):
         runs = pd.concat(few).sort_index()
         runs.to_csv(table, index=False)
     named = {file for column in FILES if column in runs for file in runs[column] if file}
+    if (to / "impacts.csv").exists():
+        impacts = pd.read_csv(to / "impacts.csv", dtype=str, keep_default_na=False)
+        named |= {file.partition("#")[0] for file in impacts["file"]}
     for path in [path for path in to.rglob("*") if path.is_file() and path.parent != to]:
-        file = str(path.relative_to(to))
-        if file in named or path.parent.name == "impacts":
-            continue
-        path.unlink()
+        if str(path.relative_to(to)) not in named:
+            path.unlink()
     for file in {file for file in runs.get("dynamometer", []) if file}:
         _shorten(to / file)
 

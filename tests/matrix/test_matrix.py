@@ -8,6 +8,8 @@ import matrix_outcome
 import matrix_run
 import pytest
 
+from metro.batch.check import check
+
 # A few cases of each kind, of batches that take little time; ``python tests/matrix`` has them all.
 FEW = {
     "clean-slot": [
@@ -46,6 +48,15 @@ def test_a_part_of_a_batch_ends_as_the_check_says(batch, batches, tmp_path):
         ended = matrix_outcome.outcome(copy, tmp_path / "out", {})
         wrong += [f"{name}: {ended.wrong}"] if ended.wrong else []
     assert wrong == []
+
+
+def test_no_small_copy_of_a_batch_lacks_what_makes_it_sound(tmp_path):
+    said = {
+        source.name: [str(problem) for problem in check(source.folder, matrix_outcome.CELLS).problems]
+        for source in matrix_batches.sources(tmp_path)
+        if not check(source.folder, matrix_outcome.CELLS).ok
+    }
+    assert said == {}
 
 
 @pytest.mark.slow

@@ -119,6 +119,8 @@ def _tool(tool: JSON) -> str | None:
     pitch, teeth = tool.get("pitch_deg"), tool.get("teeth")
     if pitch is None:
         return _shape(tool)
+    if teeth is None:
+        return f"pitch_deg has {len(pitch)} angles, but teeth is missing, expected teeth: {len(pitch)}"
     if len(pitch) != teeth:
         return f"pitch_deg has {len(pitch)} angles, expected as many as teeth ({shown(teeth)})"
     if abs(sum(pitch) - 360) > CLOSED_DEG:
