@@ -297,10 +297,11 @@ SETS = (
         ),
         folder="real/batches/tool-impact",
         remark="the published figures are peaks of a structure with nine to fifteen modes, compared with the "
-        "nearest mode: 1961 Hz is no pole: fitted by itself, 1700–2300 Hz has poles at 1938 and 2062 Hz, which "
-        "make up that peak; so has the whole band, the second at 2056 ± 230 Hz, since single files do not tell "
-        "it from its neighbours; and the peak at 1074 Hz is that of two broad modes, 1053 ± 53 and 1098 ± 21 "
-        "Hz, beside a narrow one at 1058.7 Hz, which is in all five files and in the tail of the raw record",
+        "nearest mode: 1961 Hz is no pole: fitted by itself, 1700–2300 Hz has poles at 1938 and 2062 Hz, "
+        "which make up that peak; so has the whole band, the second at 2056 ± 230 Hz, since single files do "
+        "not tell it from its neighbours; and the peak at 1074 Hz is that of two broad modes, 1053 ± 53 and "
+        "1098 ± 21 Hz, beside a narrow one at 1058.7 Hz, which is in all five files and in the tail "
+        "of the raw record",
     ),
     FieldSet(
         "granite-again",
