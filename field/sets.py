@@ -296,11 +296,12 @@ SETS = (
             Known(f"mode at {hz} Hz", "Hz", hz, TOOL, mode(hz), half=0.5) for hz in (1074.0, 1961.0, 2617.0)
         ),
         folder="real/batches/tool-impact",
-        remark="the published figures are peaks of a structure with nine to fifteen modes; 1961 Hz is no "
-        "pole: fitted by itself, 1700–2300 Hz has poles at 1938 and 2062 Hz, which make up that peak, and so "
-        "has the whole band, the second of them not told from its neighbours by single files; the narrow "
-        "mode at 1058 Hz beside the broad one is in all five files, and rings on in the raw record for 80 ms "
-        "after the other has died down",
+        remark="the published figures are peaks of a structure with nine to fifteen modes, compared with the "
+        "nearest mode: 1961 Hz is no pole: fitted by itself, 1700–2300 Hz has poles at 1938 and 2062 Hz, "
+        "which make up that peak; so has the whole band, the second at 2056 ± 230 Hz, since single files do "
+        "not tell it from its neighbours; and the peak at 1074 Hz is that of two broad modes, 1053 ± 53 and "
+        "1098 ± 21 Hz, beside a narrow one at 1058.7 Hz, which is in all five files and in the tail "
+        "of the raw record",
     ),
     FieldSet(
         "granite-again",
