@@ -37,8 +37,11 @@ class Batch:
         return entry
 
     def with_files(self, *columns: str, any_of: bool = False) -> list[str]:
-        """List the runs, in the order of cutting, that name a file in all (or any) of ``columns``."""
+        """List the runs, in the order of cutting, that name a file in all (or any) of ``columns``.
+
+        A column that the table lacks names none.
+        """
         table = self.runs.sort_values("order", kind="stable")
-        named = table[list(columns)].map(lambda file: isinstance(file, str) and file != "")
+        named = table.reindex(columns=list(columns)).map(lambda file: isinstance(file, str) and file != "")
         have = named.any(axis=1) if any_of else named.all(axis=1)
         return [str(run) for run in table.index[have.to_numpy(dtype=bool)]]

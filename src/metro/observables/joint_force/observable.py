@@ -43,7 +43,7 @@ SCATTER = 0.01
 CALIBRATED = 0.01  # relative error of the torque of a joint and of an axis of the dynamometer, in all runs
 # Of the force along one axis that another one shows: makers state up to 2 % of crosstalk, and a mounting is
 # square to 1° or so. As two standard deviations each, together √(1² + 0.87²) %.
-CROSSTALK = 0.013
+CROSSTALK = 0.0133
 
 GRID = 5 * MS
 NOISE, WANDER = "noise{}_nm", "wander{}_nm"
