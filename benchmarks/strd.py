@@ -20,7 +20,8 @@ the models use: for the linear sets the first estimate of the base parameters
 descent (`loop/fitting/descent.py`:
 Gauss–Newton, then damped by Levenberg and Marquardt where no share of a step leads down) from NIST's two
 starts, followed to its end (`polish`). Made by `python benchmarks/strd.py > docs/numerics.md`. Eleven digits
-are certified of the nonlinear sets, up to 15 of the linear ones; the count is of the parameter where fewest agree.
+are certified of the nonlinear sets, up to 15 of the linear ones; the count is of the parameter where fewest
+agree.
 
 A fit says three things of itself: what another step would gain (`Fit.ahead`, in units of twice the
 log-likelihood; more than 0.1 is not converged), the condition of its scaled columns (`Fit.condition`; beyond
