@@ -24,8 +24,8 @@ from metro.formats.uff_writer import universal_file
 from metro.loop.checks.signature import q_values
 from metro.loop.fitting import descent
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import State
 from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.system import State
 from metro.observables.problem import Block, Parameter
 from metro.signals import kalman, kalman_uneven
 

@@ -16,7 +16,7 @@ from metro.cutting.force import force_basis
 from metro.cutting.law import EdgeLaw
 from metro.effects.chipped_tooth import EFFECT, apply
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import moved_models, sensitivities
+from metro.loop.fitting.system import moved_models, sensitivities
 from metro.observables.force.dynamometer import Recording
 from metro.observables.force.model import ForceModel, ForceSetting
 

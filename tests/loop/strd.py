@@ -10,9 +10,9 @@ import numpy as np
 
 from metro.loop.fitting import descent
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import State, ahead, condition, linearised, normal_equations
 from metro.loop.fitting.fit import UNDECIDED, _first_beta
 from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.system import State, ahead, condition, inverse, linearised, normal_equations
 from metro.observables.problem import Block, Parameter
 
 REAL = Path(os.environ.get("METRO_REAL_DATA", Path(__file__).parents[3] / "shared/real")) / "reference"
@@ -96,7 +96,7 @@ def reached(problem, start=None):
         if not np.isfinite(normal).all():
             return Reached(0.0, 0.0, np.inf, np.inf)
         variance = system.chi2["r"] / max(n - p, 1)  # of the data, as the rest says
-        sd = np.sqrt(np.diag(descent.inverse(normal)) * variance)
+        sd = np.sqrt(np.diag(inverse(normal)) * variance)
         digits = agreeing(state.beta, problem.value)
         sd_digits = agreeing(sd, problem.sd) if problem.rss > 0 else np.nan
         # of data without noise the rest is rounding, and what is ahead of it says nothing

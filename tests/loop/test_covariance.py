@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from metro.loop.fitting.covariance import between_runs
-from metro.loop.fitting.descent import System
+from metro.loop.fitting.system import System
 
 
 def system(designs, rests, weight=()):

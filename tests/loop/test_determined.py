@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import strd
 
-from metro.loop.fitting.descent import condition, inverse
+from metro.loop.fitting.system import condition, inverse
 
 
 def columns_apart(share):

@@ -9,10 +9,11 @@ from toy_knee import STOP, Knee
 from worded import in_words
 
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import State, descend, linearised
+from metro.loop.fitting.descent import descend
 from metro.loop.fitting.fit import fit, score
 from metro.loop.fitting.held_out import comparison, held_out
 from metro.loop.fitting.noise import first_noise
+from metro.loop.fitting.system import State, linearised
 from metro.loop.planning.experiment import probability, prospects
 from metro.loop.search.search import search
 from metro.loop.verdict.story import story

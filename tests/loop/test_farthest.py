@@ -5,8 +5,9 @@ import pytest
 from strd import Curve
 
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import State, descend, farthest, linearised
+from metro.loop.fitting.descent import descend, farthest
 from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.system import State, linearised
 from metro.observables.problem import Block
 
 

@@ -11,9 +11,16 @@ from metro.loop.checks.evidence import compare, hold_out, leave_out, surviving_s
 from metro.loop.checks.predictive import predictive
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import State, descend, inverse, linearised, normal_equations, own_step
+from metro.loop.fitting.descent import descend
 from metro.loop.fitting.fit import fit, refit, score
 from metro.loop.fitting.noise import first_noise
+from metro.loop.fitting.system import (
+    State,
+    inverse,
+    linearised,
+    normal_equations,
+    own_step,
+)
 
 
 def prior_of(task, blocks):

@@ -13,9 +13,10 @@ from metro.loop.causes.causes import judged
 from metro.loop.causes.witnesses import Closed, Witness, agreement, ask, weighed
 from metro.loop.checks.evidence import change, leave_out
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import State, descend
+from metro.loop.fitting.descent import descend
 from metro.loop.fitting.fit import fit
 from metro.loop.fitting.held_out import comparison, held_out
+from metro.loop.fitting.system import State
 from metro.loop.search.search import search
 from metro.loop.verdict.batch_story import causes
 from metro.loop.verdict.verdict import judge

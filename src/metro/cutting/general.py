@@ -14,7 +14,6 @@ Raw edges and faces of the work are met at the local radius.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -28,10 +27,11 @@ from metro.cutting.envelope import Meridian, Place, meridian
 from metro.cutting.general_teeth import Indices, Teeth, teeth_in
 from metro.cutting.law import EdgeLaw
 from metro.cutting.nearby import Edges
+from metro.cutting.roots import roots
 from metro.units import Array
 
 POINTS = 4
-STEPS, NEAR = 20, 1e-5  # to where a panel is cut; a share of the meridian
+NEAR = 1e-5  # to where a panel is cut, as a share of the meridian
 MARGIN = 0.05  # in feeds per tooth and pass: sin φ is 0.02 off its chord over a panel
 # On true paths edges are sorted by whether one pass alone counts where there are more than a few, and where
 # it does so from an immersion of this sine on: else, and on circles, it takes longer than to compute all.
@@ -311,7 +311,7 @@ def _breaks(work: _Work, tooth: Indices, top: Array, panel: Indices, cells: _Cel
         return work.differences(first[some], second[some], teeth[some], tops[some], place)
 
     near = NEAR * line.length.sum() / (line.length[panels] * size)
-    share = start + size * _roots(value, fa, fb, near)
+    share = start + size * roots(value, fa, fb, near)
     order = np.lexsort((share, at))
     at, share = at[order], share[order]
     rank = np.arange(len(at)) - np.searchsorted(at, at)
@@ -325,39 +325,6 @@ def _functions(chips: int, levels: int) -> tuple[Indices, Indices]:
     """Levels whose difference vanishes where something changes: two chips, or any and zero, the last."""
     first, second = np.triu_indices(chips, 1)
     return np.append(first, np.arange(levels)), np.append(second, np.full(levels, levels))
-
-
-def _roots(
-    value: Callable[[Array, Indices | slice], Array], at_zero: Array, at_one: Array, near: Array
-) -> Array:
-    """Where functions (n,) vanish between 0 and 1, at which their values have unlike signs.
-
-    By inverse quadratic interpolation through the ends of the bracket and the point that it lost last, or at
-    the bracket's middle where that leads out of it. Near the root the error of a step is of the order of the
-    product of the errors of the three points, so that one after a step of less than ``near`` (n,) is much
-    less. ``value`` takes places and which of the functions.
-    """
-    root = at_zero / (at_zero - at_one)
-    some: Indices | slice = slice(None)
-    a, b, fa, fb = np.zeros_like(root), np.ones_like(root), at_zero, at_one
-    for _ in range(STEPS):
-        x = root[some].copy()
-        fx = value(x, some)
-        crossed = fx * fb < 0.0
-        c, fc = np.where(crossed, a, b), np.where(crossed, fa, fb)
-        a, fa, b, fb = np.where(crossed, b, a), np.where(crossed, fb, fa), x, fx
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = fb / (fa - fc) * ((a - b) * fc / (fa - fb) - (c - b) * fa / (fc - fb))
-        inside = (step * (a - b) >= 0.0) & (np.abs(step) <= np.abs(a - b))
-        step = np.where(fb == 0.0, 0.0, np.where(inside, step, 0.5 * (a - b)))
-        root[some] = b + step
-        left = np.abs(step) >= near[some]
-        if not left.any():
-            break
-        if 2 * np.count_nonzero(left) < len(left):
-            some = np.arange(len(root))[some][left]
-            a, fa, b, fb = a[left], fa[left], b[left], fb[left]
-    return root
 
 
 def _assembled(sums: Array) -> Array:

@@ -18,8 +18,8 @@ import numpy as np
 from metro.effects.effect import Effect
 from metro.loop.checks.evidence import Evidence, change, compare, hold_out, leave_out, tail
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import inverse, moved_models, solution
 from metro.loop.fitting.fit import Fit, fit, refit
+from metro.loop.fitting.system import inverse, moved_models, solution
 from metro.loop.search.outcome import Outcome
 from metro.loop.search.trial import OF_THE_RESIDUAL, Gates, without
 from metro.observables.problem import Problem

@@ -15,9 +15,14 @@ import numpy as np
 from metro.loop.checks.left_out import LeftOut, left_out, most_missed
 from metro.loop.checks.predictive import predictive
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import State, linearised, normal_equations, solution
 from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.noise import PRIOR_RUNS, Noise
+from metro.loop.fitting.system import (
+    State,
+    linearised,
+    normal_equations,
+    solution,
+)
 from metro.units import Array
 
 TOUCHED = 0.01  # of the largest gain or loss at a left-out condition: below it, the condition is not touched

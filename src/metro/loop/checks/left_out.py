@@ -14,7 +14,9 @@ from functools import lru_cache
 import numpy as np
 
 from metro.loop.checks.predictive import known
-from metro.loop.fitting.descent import (
+from metro.loop.fitting.fit import Fit, refit, score
+from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.system import (
     State,
     inverse,
     linearised,
@@ -22,8 +24,6 @@ from metro.loop.fitting.descent import (
     normal_equations,
     sensitivities,
 )
-from metro.loop.fitting.fit import Fit, refit, score
-from metro.loop.fitting.noise import Noise
 from metro.observables.problem import Block
 from metro.units import Array
 

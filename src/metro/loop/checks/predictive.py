@@ -14,8 +14,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from metro.loop.fitting.descent import UNSEEN, Known, State, descend, linearised, normal_equations
+from metro.loop.fitting.descent import descend
 from metro.loop.fitting.fit import Fit, score
+from metro.loop.fitting.system import (
+    UNSEEN,
+    Known,
+    State,
+    linearised,
+    normal_equations,
+)
 from metro.observables.problem import Block
 from metro.units import Array
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from metro.loop.fitting.descent import System, inverse, normal_equations
+from metro.loop.fitting.system import System, inverse, normal_equations
 from metro.units import Array
 
 ENOUGH = 2.0  # degrees of freedom from which the runs tell how far a parameter is off

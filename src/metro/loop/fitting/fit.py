@@ -19,19 +19,21 @@ from metro.loop.fitting.covariance import between_runs
 from metro.loop.fitting.descent import (
     ENOUGH,
     ITERATIONS,
-    State,
-    condition,
     descend,
     farthest,
     free,
-    inverse,
-    linearised,
-    normal_equations,
     polish,
-    solution,
 )
 from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.system import (
+    State,
+    condition,
+    inverse,
+    linearised,
+    normal_equations,
+    solution,
+)
 from metro.observables.problem import Block, Model, predictions
 from metro.units import Array
 

@@ -21,8 +21,8 @@ from metro.effects.effect import Effect, fitted_to
 from metro.loop.checks.evidence import sensitivity, unabsorbed_share
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import moved_models, sensitivities
 from metro.loop.fitting.fit import Fit, score
+from metro.loop.fitting.system import moved_models, sensitivities
 from metro.loop.search.search import NOT_VISIBLE
 from metro.observables.problem import Block, Problem, Proposal
 from metro.units import Array

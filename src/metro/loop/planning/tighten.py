@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from metro.loop.fitting.descent import moved_models, sensitivities
 from metro.loop.fitting.fit import Fit, score
 from metro.loop.fitting.noise import block_sigma
+from metro.loop.fitting.system import moved_models, sensitivities
 from metro.loop.planning.decide import Kind
 from metro.loop.planning.experiment import MOST_REPEATS, covariance, information
 from metro.observables.problem import Block, Problem, Proposal
