@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from strd import Curve
 
+from metro.effects.effect import Effect, EffectParameter
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.descent import descend, farthest
+from metro.loop.fitting.descent import _moved, descend, farthest
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.system import State, linearised
 from metro.observables.problem import Block
@@ -58,3 +59,18 @@ def test_a_descent_is_given_up_only_where_another_is_lower_than_it_can_come():
     assert given_up.beta[0] == 3.0
     assert higher > cost
     assert descend(*away, rival=cost + 1.0)[1] == pytest.approx(cost)
+
+
+def test_a_length_and_its_angle_go_straight_on():
+    parameters = (
+        EffectParameter("radius_um", "um", 0.0, 200.0, 5.0, (4.0,)),
+        EffectParameter("angle_deg", "deg", 0.0, 360.0, 30.0, (0.0,), period=360.0, length="radius_um"),
+    )
+    runout = Effect("runout", ("toy",), parameters, lambda model, _: model, "", "", "")
+    candidate = Candidate(Curve(bent, 1), (runout,))
+    begun = State(np.array([3.0, 90.0]), np.zeros(1), {})
+    sideways = np.array([0.0, 0.0, np.degrees(4.0 / 3.0)])  # 4 µm across a vector of 3 µm: 5 µm long
+    after = _moved(candidate, begun, sideways, {}).theta
+    assert after == pytest.approx([5.0, 90.0 + np.degrees(np.arctan2(4.0, 3.0))])
+    backwards_through_nothing = np.array([0.0, -8.0, 0.0])
+    assert _moved(candidate, begun, backwards_through_nothing, {}).theta == pytest.approx([5.0, 270.0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -42,8 +43,8 @@ from metro.units import JSON, MM, MS, Array
 SCATTER = 0.01
 CALIBRATED = 0.01  # relative error of the torque of a joint and of an axis of the dynamometer, in all runs
 # Of the force along one axis that another one shows: makers state up to 2 % of crosstalk, and a mounting is
-# square to 1° or so. As two standard deviations each, together √(1² + 0.87²) %.
-CROSSTALK = 0.0133
+# square to 1° or so, as two standard deviations each.
+CROSSTALK = math.hypot(0.01, 0.5 * math.radians(1.0))
 
 GRID = 5 * MS
 NOISE, WANDER = "noise{}_nm", "wander{}_nm"
