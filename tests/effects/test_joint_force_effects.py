@@ -9,6 +9,7 @@ import pytest
 from metro.batch.processed import Processed, read_batch
 from metro.effects.library import library
 from metro.joint_columns import Axes
+from metro.loop.checks.evidence import leave_out
 from metro.loop.fitting.held_out import identified_fit
 from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
@@ -110,7 +111,8 @@ def test_a_dynamometer_that_is_turned_by_a_degree_is_no_tool_elsewhere(cell, axi
     assert found(cell, force=force) == []
 
 
-def test_a_tool_that_is_far_elsewhere_is_still_named(cell):
+def elsewhere(cell):
+    """The torques of a tool whose tip is 120 mm from where it was declared to be."""
     model = joint_force.problem(*cell, {}).base
     away = replace(model, arm=replace(model.arm, tool=model.arm.tool + np.array([0.0, 0.12, 0.0])))
     torque = cell[1]["joint_torque"].copy()
@@ -120,9 +122,20 @@ def test_a_tool_that_is_far_elsewhere_is_still_named(cell):
         mean = setting.force.mean(setting.t, setting.width)
         more = [joint_torque(driven_jacobian(each.arm, setting.q), mean) for each in (away, model)]
         torque.loc[rows.index, AXES.torques] += more[0] - more[1]
-    ((name, _, values),) = found(cell, torque)
+    return torque
+
+
+def test_a_tool_that_is_far_elsewhere_is_still_named(cell):
+    ((name, _, values),) = found(cell, elsewhere(cell))
     assert name == "tool_offset_error"
     assert values["dy_mm"] == pytest.approx(120.0, abs=30.0)
+
+
+def test_the_strain_that_an_effect_takes_from_the_instruments_counts_for_it(cell):
+    task = joint_force.problem(cell[0], cell[1] | {"joint_torque": elsewhere(cell)}, {})
+    outcome = search(task, library("joint_force"), GATES)
+    without, with_it = (leave_out(each, outcome.prior) for each in (outcome.base, outcome.final))
+    assert with_it["instruments"] > without["instruments"] + 1.0
 
 
 @pytest.mark.parametrize("seed", [1, 2])
