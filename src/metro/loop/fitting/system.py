@@ -218,7 +218,7 @@ def ahead(normal: Array, right: Array) -> float:
 def condition(normal: Array) -> float:
     """Return the condition number of the whitened columns, brought to one length, that a normal matrix is of.
 
-    Infinite where a column tells nothing, or nothing beside the others.
+    Infinite where a column, alone or beside the others, is not identifiable.
     """
     size = np.linalg.eigvalsh(_scaled(normal)[0])
     return float(np.sqrt(size[-1] / size[0])) if size.size and size[0] > UNSEEN * size[-1] else float(np.inf)
