@@ -20,7 +20,7 @@ from metro.dynamics.polefit import PoleFit, criterion
 from metro.dynamics.refine import Data, refine
 from metro.units import Array, ComplexArray
 
-_HALF = 0.5  # to which, at 95 %, a damping is known that single files cannot identify: it is not resolved
+_HALF = 0.5  # half width, at 95 %, from which on a mode is not resolved: single files cannot identify it
 _FEW = 8  # iterations of a fit that is only compared with another one
 
 
