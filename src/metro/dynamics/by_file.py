@@ -20,7 +20,7 @@ from metro.dynamics.polefit import PoleFit, criterion
 from metro.dynamics.refine import Data, refine
 from metro.units import Array, ComplexArray
 
-_HALF = 0.5  # half width, at 95 %, from which on a mode is not resolved: single files cannot identify it
+_HALF = 0.5  # half width, at 95 %, of the logarithm of a damping that single files cannot identify
 _FEW = 8  # iterations of a fit that is only compared with another one
 
 
@@ -128,7 +128,7 @@ def moved(fits: Sequence[Own], r: int, decay: float) -> Moved | None:
 
 
 def _untold(mode: Mode, r: int, fits: Sequence[Own]) -> Moved | None:
-    """Return what is known of a mode that single files cannot separate from its neighbours; None if none tried.
+    """Return what is known of a mode that single files cannot separate from others; None if none tried.
 
     Its pole strayed in files that resolve it as long as it stays: together with the neighbours it makes up
     the response, and files that agree on the sum need not agree on it. It is said to lie within the half
