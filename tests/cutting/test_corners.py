@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from chip_grids import bounds_of, chips_left
 
 from metro.cutting.chip import Cut
-from metro.cutting.corners import corners
+from metro.cutting.corners import raw_edges
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import engagement
 from metro.cutting.force import force_basis, mean_basis
 from metro.cutting.law import EdgeLaw
-from metro.cutting.nearby import nearby
-from metro.cutting.passes import passes
+from metro.cutting.passes import OFF_COSINE, OFF_SINE, passes
 from virtual_cell.chips import Engagement as TrueEngagement
 from virtual_cell.chips import Tool
 from virtual_cell.milling import Cut as TrueCut
@@ -50,18 +50,27 @@ def test_between_tip_and_foot_the_edge_is_between_the_tip_and_what_was_cleared(d
     engaged = engagement("side", direction, width, RADIUS)
     tool = Cutter(RADIUS, HELIX, evenly_pitched(3), 80e-6, 0.7)
     before = passes(tool, Cut(FEED, DEPTH, engaged), True, angle)
-    (corner,) = corners(before, engaged, nearby(None, before.sine.shape[1:]))
+    raw = raw_edges(engaged, RADIUS, True)
     line = RADIUS - width if direction == "up" else width - RADIUS
+    side, some = (1, []) if direction == "up" else (0, [])
+    assert raw.line[side] == pytest.approx(line)
+    for row in np.ndindex(before.rows.shape[:2]):
+        rows = before.rows[row]
+        limits = bounds_of(before, raw, *row)[1][side]
+        tip, foot = limits if raw.outer[side] else limits[::-1]
 
-    def edge(phi):
-        """Chip, tip and edge, from the axis, on the rays at φ."""
-        off = before.off_sine[-1] * np.sin(phi) + before.off_cosine[-1] * np.cos(phi)
-        return before.chip(np.sin(phi), np.cos(phi)).min(axis=0), RADIUS + off, line / np.cos(phi)
+        def edge(phi, rows=rows):
+            """Chip, tip and edge, from the axis, on the ray at φ."""
+            off = rows[-1, OFF_SINE] * math.sin(phi) + rows[-1, OFF_COSINE] * math.cos(phi)
+            chip = chips_left(before.scale, rows, np.array([phi])).min()
+            return chip, RADIUS + off, line / math.cos(phi)
 
-    _, tip, crossing = edge(corner.tip)
-    assert crossing == pytest.approx(tip, abs=1e-9)
-    chip, tip, crossing = edge(corner.foot)
-    cuts = edge(corner.tip)[0] > 0.0
-    assert 0.0 < cuts.mean() < 1.0
-    assert crossing[cuts] == pytest.approx((tip - chip)[cuts], abs=1e-9)
-    assert np.array_equal(corner.foot[~cuts], corner.tip[~cuts])
+        chip_at_tip, at_tip, crossing = edge(tip)
+        assert crossing == pytest.approx(at_tip, abs=1e-9)
+        some.append(chip_at_tip > 0.0)
+        if chip_at_tip > 0.0:
+            chip, at_foot, crossing = edge(foot)
+            assert crossing == pytest.approx(at_foot - chip, abs=1e-9)
+        else:
+            assert foot == tip
+    assert 0.0 < np.mean(some) < 1.0

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from metro.cutting.chip import Cut, chip_thickness
 from metro.cutting.cutter import Cutter, evenly_pitched
-from metro.cutting.edges import rule
 from metro.cutting.engagement import Engagement, engagement
 from metro.cutting.force import ANGLES, force_basis
 from metro.cutting.law import EdgeLaw
+from metro.cutting.quadrature import rule
 
 SLOT = Engagement(0.0, math.pi)
 # [T] table 4, N/m² and N/m

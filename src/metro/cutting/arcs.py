@@ -1,4 +1,4 @@
-"""Where around the tool each tooth cuts, at one angle of the tool: between its ends, and pass by pass.
+"""Where around the tool a tooth cuts, at one angle of the tool: between its ends, and pass by pass.
 
 Of the passes that may bound the chip the least counts. On circular paths each is A sin φ + B cos φ, so ends
 and crossings of passes are closed forms; on true paths Newton steps from there settle them.
@@ -7,109 +7,190 @@ and crossings of passes are closed forms; on true paths Newton steps from there 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from metro.cutting.corners import Corner
-from metro.cutting.engagement import Engagement
-from metro.cutting.nearby import LARGEST_STEP, Edges, Nearby, nearby
-from metro.cutting.passes import Passes
+from metro.compiled import compiled
+from metro.cutting.corners import BEGINS, ENDS, LARGEST_STEP, RawHere, foot_at, tip_at
+from metro.cutting.passes import COSINE, SINE, Row, Scale, chip_left, chip_slope, row_of
 from metro.units import Array
 
 STEPS_TO_ENDS, STEPS = 3, 2  # an error of a crossing counts in second order only
+TURN = 2.0 * math.pi
 
 
-def arcs(
-    before: Passes, engagement: Engagement, edges: Edges | None = None, corners: tuple[Corner, ...] = ()
-) -> Array:
-    """Immersions (bounds, angles, teeth) rad, rising, between which one pass bounds a tooth's chip.
+class Near(NamedTuple):
+    """Sine and cosine of the middle of an edge, and the cosine of how far from it bounds matter to it."""
 
-    The first and the last are where the tooth starts and stops cutting: the first above the last where it
-    does not cut. Along the feed it is the chip that begins and ends there: on true paths a little outside
-    0…π. Where ``edges`` are given, bounds that they do not reach are left out, or are ends of circular paths.
-    ``corners``: of the raw edges; an arc that ends at one that has none given is cut short there.
+    sine: float
+    cosine: float
+    least: float
+
+
+class Arc(NamedTuple):
+    """Where a tooth cuts.
+
+    Attributes
+    ----------
+    bounds : (``most_bounds``,) immersions, rising, between which one pass bounds the chip, rad. The first and
+        the last are where the tooth starts and stops cutting: the first above the last where it does not cut.
+        Along the feed it is the chip that begins and ends there: on true paths a little outside 0…π.
+    corner : (2, 2) at each raw edge that teeth pass little by little the immersions at which the chip
+        vanishes, and from or to which it is whole, rad.
     """
-    near = nearby(edges, before.sine.shape[1:])
-    (low, high), between = _ends(before, near), _crossings(before, near)
-    at_corners = [corner.begins for corner in corners]
-    if engagement.entry > 0.0 and True not in at_corners:
-        low = np.maximum(low, engagement.entry)
-    if engagement.exit < math.pi and False not in at_corners:
-        high = np.minimum(high, engagement.exit)
-    for corner in corners:
-        vanishing, whole = corner.limits
-        between = np.sort(np.concatenate([between, whole[None]]), axis=0)
-        if corner.begins:
-            low = np.maximum(low, vanishing)
-        else:
-            high = np.minimum(high, vanishing)
-    return np.concatenate([low[None], np.clip(between, low, high), high[None]])
+
+    bounds: Array
+    corner: Array
 
 
-def _ends(before: Passes, near: Nearby) -> Array:
-    """Find the ends (2, angles, teeth) of the arc where every pass leaves a chip."""
-    root = np.arctan2(-before.cosine, before.sine)
-    phi = np.stack([root.max(axis=0), root.min(axis=0) + math.pi])
-    if not before.true_path:
-        return phi
-    at = np.nonzero(near.covers(np.sin(phi), np.cos(phi)))
-    passed, end, inward = before.before(*at[1:]), phi[at], 1.0 - 2.0 * at[0]
-    for _ in range(STEPS_TO_ENDS):  # each to the innermost of where the passes leave none
-        sine, cosine = np.sin(end), np.cos(end)
-        value, growth = passed.chip(sine, cosine), inward * passed.slope(sine, cosine)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = np.where(growth > 0.0, -value / growth, -LARGEST_STEP).max(axis=0)
-        end += inward * np.clip(step, -LARGEST_STEP, LARGEST_STEP)
-    phi[at] = end
-    return phi
+EVERYWHERE = Near(0.0, 0.0, -1.0)
 
 
-def _crossings(before: Passes, near: Nearby) -> Array:
-    """Immersions (most, angles, teeth), rising, where two passes leave the same chip, less than any other.
+def empty_arc(passes: int) -> Arc:
+    """Return an arc to be written, of a tooth with so many passes before it."""
+    return Arc(np.empty(4 + passes * (passes - 1)), np.empty((2, 2)))
 
-    Where there are fewer than most, ∞ follows.
+
+@compiled
+def find_arc(scale: Scale, rows: Array, raw: RawHere, near: Near, arc: Arc) -> int:
+    """Find the bounds of the arc of a tooth, and return how many they are.
+
+    Parameters
+    ----------
+    rows : (passes, 7) of the passes. raw : edges of the work.
+    near : around the edge; bounds elsewhere are left out, or are ends of circular paths. arc : is written.
     """
-    first, second = np.triu_indices(len(before.sine), 1)
-    a, b = before.sine[first] - before.sine[second], before.cosine[first] - before.cosine[second]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        length = np.copysign(np.sqrt(a * a + b * b), b)
-        sine, cosine = b / length, -a / length
+    bounds = arc.bounds
+    low, high = _ends(scale, rows, near)
+    count = _crossings(scale, rows, near, bounds)
+    arc.corner[:] = math.nan
+    if math.isnan(raw.line[BEGINS]):
+        low = max(low, raw.immersion[BEGINS])
+    else:
+        vanishing, whole = _limits(scale, rows, near, raw, BEGINS)
+        arc.corner[BEGINS, 0], arc.corner[BEGINS, 1] = vanishing, whole
+        count, low = _inserted(bounds, count, whole), max(low, vanishing)
+    if math.isnan(raw.line[ENDS]):
+        high = min(high, raw.immersion[ENDS])
+    else:
+        vanishing, whole = _limits(scale, rows, near, raw, ENDS)
+        arc.corner[ENDS, 0], arc.corner[ENDS, 1] = vanishing, whole
+        count, high = _inserted(bounds, count, whole), min(high, vanishing)
+    for at in range(1, count):
+        bounds[at] = min(max(bounds[at], low), high)
+    bounds[0], bounds[count] = low, high
+    return count + 1
+
+
+@compiled
+def _limits(scale: Scale, rows: Array, near: Near, raw: RawHere, side: int) -> tuple[float, float]:
+    """Immersions at a raw edge at which the chip vanishes, and from or to which it is whole, rad."""
+    tip = tip_at(scale.radius, rows, raw.line[side])
+    foot = tip
+    if _covers(near, math.sin(tip), math.cos(tip)):
+        towards = 1.0 if (side == BEGINS) == raw.outer[side] else -1.0
+        foot = foot_at(scale, rows, raw.line[side], towards, tip)
+    return (tip, foot) if raw.outer[side] else (foot, tip)
+
+
+@compiled
+def _covers(near: Near, sine: float, cosine: float) -> bool:
+    """Whether an immersion given by its sine and cosine matters."""
+    return near.sine * sine + near.cosine * cosine > near.least
+
+
+@compiled
+def _inserted(bounds: Array, count: int, value: float) -> int:
+    """Insert a value among ``bounds[1:count]``, which rise, and return how far they go then."""
+    at = count
+    while at > 1 and bounds[at - 1] > value:
+        bounds[at] = bounds[at - 1]
+        at -= 1
+    bounds[at] = value
+    return count + 1
+
+
+@compiled
+def _ends(scale: Scale, rows: Array, near: Near) -> tuple[float, float]:
+    """Find the ends of the arc where every pass leaves a chip."""
+    low, high = -math.inf, math.inf
+    for m in range(len(rows)):
+        root = math.atan2(-rows[m, COSINE], rows[m, SINE])
+        low, high = max(low, root), min(high, root + math.pi)
+    if scale.true_path:
+        low, high = _end(scale, rows, near, low, 1.0), _end(scale, rows, near, high, -1.0)
+    return low, high
+
+
+@compiled
+def _end(scale: Scale, rows: Array, near: Near, end: float, inward: float) -> float:
+    """Newton's steps from the end of circular paths, each to the innermost of where passes leave nothing."""
+    if not _covers(near, math.sin(end), math.cos(end)):
+        return end
+    for _ in range(STEPS_TO_ENDS):
+        sine, cosine = math.sin(end), math.cos(end)
+        step = -math.inf
+        for m in range(len(rows)):
+            row = row_of(rows, m)
+            growth = inward * chip_slope(scale, row, sine, cosine)
+            value = chip_left(scale, row, sine, cosine)
+            step = max(step, -value / growth if growth > 0.0 else -LARGEST_STEP)
+        end += inward * min(max(step, -LARGEST_STEP), LARGEST_STEP)
+    return end
+
+
+@compiled
+def _crossings(scale: Scale, rows: Array, near: Near, bounds: Array) -> int:
+    """Write to ``bounds[1:]`` the immersions, rising, where two passes leave the same chip, less than others.
+
+    Return the place after the last one.
+    """
     # Between centres that the pass is a turn behind: so far, relative to feed, circles stray from true paths.
-    stray = 2.0 * math.pi * before.feed / before.radius if before.true_path else 0.0
-    margin = (0.6 * 2.0 * math.pi * stray + 1e-9) * before.feed
-    least = np.full(sine.shape, np.inf)
-    for of_sine, of_cosine in zip(before.sine, before.cosine, strict=True):
-        np.minimum(least, of_sine * sine + of_cosine * cosine, out=least)
-    crossed = before.sine[first] * sine + before.cosine[first] * cosine
-    at = np.stack(np.nonzero(near.covers(sine, cosine) & (crossed < least + margin) & (crossed > -margin)))
-    phi = np.arctan2(sine[*at], cosine[*at])
-    if before.true_path:  # a little outside 0…π as well
-        beyond = np.stack(np.nonzero((sine < stray) & near.covers(-sine, -cosine)))
-        opposite = np.arctan2(sine[*beyond], cosine[*beyond])
-        phi = np.append(phi, opposite + np.where(opposite < 1.0, math.pi, -math.pi))
-        at = np.concatenate([at, beyond], axis=1)
-        phi = _settled(phi, before[first[at[0]], *at[1:]], before[second[at[0]], *at[1:]])
-    return _in_order(phi, at[1:], before.sine.shape[1:])
+    stray = TURN * scale.feed / scale.radius if scale.true_path else 0.0
+    margin = (0.6 * TURN * stray + 1e-9) * scale.feed
+    count = 1
+    for one in range(len(rows) - 1):
+        for other in range(one + 1, len(rows)):
+            a = rows[one, SINE] - rows[other, SINE]
+            b = rows[one, COSINE] - rows[other, COSINE]
+            length = math.copysign(math.sqrt(a * a + b * b), b)
+            if length == 0.0:
+                continue
+            sine, cosine = b / length, -a / length
+            if _covers(near, sine, cosine) and _is_least(rows, one, sine, cosine, margin):
+                phi = _settled(scale, row_of(rows, one), row_of(rows, other), math.atan2(sine, cosine))
+                count = _inserted(bounds, count, phi)
+            if scale.true_path and sine < stray and _covers(near, -sine, -cosine):  # a little outside 0…π
+                opposite = math.atan2(sine, cosine)
+                opposite += math.pi if opposite < 1.0 else -math.pi
+                phi = _settled(scale, row_of(rows, one), row_of(rows, other), opposite)
+                count = _inserted(bounds, count, phi)
+    return count
 
 
-def _settled(phi: Array, one: Passes, other: Passes) -> Array:
+@compiled
+def _is_least(rows: Array, one: int, sine: float, cosine: float, margin: float) -> bool:
+    """Whether on circles a pass leaves a chip, and none less by a margin, m."""
+    crossed = rows[one, SINE] * sine + rows[one, COSINE] * cosine
+    if not crossed > -margin:
+        return False
+    least = math.inf
+    for m in range(len(rows)):
+        least = min(least, rows[m, SINE] * sine + rows[m, COSINE] * cosine)
+    return bool(crossed < least + margin)
+
+
+@compiled
+def _settled(scale: Scale, one: Row, other: Row, phi: float) -> float:
     """Newton's steps from circular paths to where two passes leave the same chip."""
+    if not scale.true_path:
+        return phi
     for _ in range(STEPS):
-        sine, cosine = np.sin(phi), np.cos(phi)
-        value = one.chip(sine, cosine) - other.chip(sine, cosine)
-        slope = one.slope(sine, cosine) - other.slope(sine, cosine)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            phi = phi - np.clip(value / slope, -LARGEST_STEP, LARGEST_STEP)
+        sine, cosine = math.sin(phi), math.cos(phi)
+        value = chip_left(scale, one, sine, cosine) - chip_left(scale, other, sine, cosine)
+        slope = chip_slope(scale, one, sine, cosine) - chip_slope(scale, other, sine, cosine)
+        if slope == 0.0:
+            break
+        phi -= min(max(value / slope, -LARGEST_STEP), LARGEST_STEP)
     return phi
-
-
-def _in_order(phi: Array, at: npt.NDArray[np.intp], shape: tuple[int, ...]) -> Array:
-    """Arrange values (n,) at rows (2, n) of a shape as columns (most in a row, *shape), rising, then ∞."""
-    row = np.ravel_multi_index((at[0], at[1]), shape)
-    order = np.lexsort((phi, row))
-    row = row[order]
-    rank = np.arange(len(row)) - np.searchsorted(row, row)
-    columns = np.full((rank.max(initial=-1) + 1, math.prod(shape)), np.inf)
-    columns[rank, row] = phi[order]
-    return columns.reshape(-1, *shape)

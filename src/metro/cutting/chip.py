@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from metro.cutting.engagement import Engagement
 from metro.units import Array
 
 ARC_POINTS = 2001
+Number = TypeVar("Number", float, Array)
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ def chip_thickness(cutter: Cutter, cut: Cut, immersion: Array, height: Array, tr
     return least
 
 
-def path_excess(feed: float, pitch: Array, radius: Array, sine: Array, cosine: Array) -> Array:
+def path_excess(feed: float, pitch: Number, radius: Number, sine: Number, cosine: Number) -> Number:
     """Chip between two trochoidal paths less that between the two circles, m.
 
     The earlier tooth, ``radius`` from the axis and ``pitch`` ahead, crossed the ray of the later one from a
@@ -77,7 +79,7 @@ def path_excess(feed: float, pitch: Array, radius: Array, sine: Array, cosine: A
     """
     lean = (feed / radius) * cosine
     lean = lean * pitch * (1.0 - lean)
-    return np.asarray(lean * ((0.5 * radius) * lean - feed * sine))
+    return lean * ((0.5 * radius) * lean - feed * sine)
 
 
 def curve_excess(curvature: float, travel: Array) -> Array:

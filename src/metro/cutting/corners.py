@@ -1,4 +1,4 @@
-"""The corners of raw edges: a tooth enters or leaves the work through its side little by little.
+"""Raw edges of the work along the feed, which the teeth on true paths pass little by little.
 
 On the ray from the axis through a tooth the line of a raw edge along the feed is y / cos φ away. Where that
 is between the tooth and what the teeth before it cleared, only a part of the chip is there: the outer part,
@@ -9,97 +9,106 @@ before its tip is in the work.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from metro.compiled import compiled
 from metro.cutting.engagement import Engagement
-from metro.cutting.nearby import LARGEST_STEP, Nearby
-from metro.cutting.passes import Passes
+from metro.cutting.passes import Row, Scale, chip_left, chip_slope, row_of
 from metro.units import Array
 
+LARGEST_STEP = 0.3  # rad, from a bound to first order towards the true one
 STEPS = 3
+BEGINS, ENDS = 0, 1  # the edge that begins the arc, and the one that ends it
 
 
-@dataclass(frozen=True, eq=False)
-class Corner:
-    """A raw edge as the teeth pass it: arrays (angles, N), or 1 where all are alike.
+class RawEdges(NamedTuple):
+    """The two raw edges as the axis passes them at angles of the tool, of which all may be alike.
 
     Attributes
     ----------
-    begins : whether it begins the arc, else ends it. outer : whether the outer part of the chip is there.
-    radius : m. line : y of the edge, m. off_sine, off_cosine : of the tooth's deviation from the radius, m.
-    tip, foot : immersions at which the edge is where the tip is, and where what was cleared ends, rad.
+    immersion : (2, angles or 1) at which the arc begins and ends there, rad; infinite where it does not.
+    line : (2, angles or 1) y of the edges that teeth pass little by little, m; not a number for others.
+    outer : (2,) whether the outer part of the chip is there.
     """
 
-    begins: bool
-    outer: bool
-    radius: float
+    immersion: Array
     line: Array
-    off_sine: Array
-    off_cosine: Array
-    tip: Array
-    foot: Array
-
-    @property
-    def limits(self) -> tuple[Array, Array]:
-        """Immersions at which the chip vanishes, and from or to which it is whole, rad."""
-        return (self.tip, self.foot) if self.outer else (self.foot, self.tip)
-
-    def at(self, angle: npt.NDArray[np.intp], tooth: npt.NDArray[np.intp]) -> Corner:
-        """Return the corner as teeth (n,) pass it at angles (n,)."""
-        arrays = (self.line, self.off_sine, self.off_cosine, self.tip, self.foot)
-        parts = (part[angle % part.shape[0], tooth % part.shape[1]] for part in arrays)
-        return Corner(self.begins, self.outer, self.radius, *parts)
-
-    def beyond(self, sine: Array, cosine: Array) -> Array:
-        """How far the tip is beyond the edge on the ray, m."""
-        off = self.off_sine * sine + self.off_cosine * cosine
-        return np.asarray(self.radius + off - self.line / cosine)
-
-    def steepness(self, sine: Array, cosine: Array) -> Array:
-        """Change of that with the immersion, m/rad."""
-        off = self.off_sine * cosine - self.off_cosine * sine
-        return np.asarray(off - self.line * sine / cosine**2)
+    outer: tuple[bool, bool]
 
 
-def corners(
-    before: Passes, engagement: Engagement, near: Nearby, aside: Array | float = 0.0
-) -> tuple[Corner, ...]:
-    """Return the corners of a cut on true paths; ``aside`` (angles, 1) m displaces the tool along y."""
-    ends = []
-    if engagement.entry > 0.0 and not engagement.entry_face:
-        ends.append(_corner(before, engagement.entry, near, aside, begins=True))
-    if engagement.exit < math.pi and not engagement.exit_face:
-        ends.append(_corner(before, engagement.exit, near, aside, begins=False))
-    return tuple(ends)
+class RawHere(NamedTuple):
+    """The two raw edges at one angle of the tool, else as ``RawEdges``."""
+
+    immersion: tuple[float, float]
+    line: tuple[float, float]
+    outer: tuple[bool, bool]
 
 
-def _corner(before: Passes, immersion: float, near: Nearby, aside: Array | float, *, begins: bool) -> Corner:
-    """Find where tip and edge meet and, from there, where what was cleared and the edge do."""
-    outer = (math.cos(immersion) < 0.0) == begins
-    line = np.atleast_2d(before.radius * math.cos(immersion) - aside)
-    own = before.off_sine[-1], before.off_cosine[-1]
-    tip = np.arccos(np.clip(line / before.radius, -1.0, 1.0)) + np.zeros_like(own[0])
-    corner = Corner(begins, outer, before.radius, line, *own, tip, tip)
+def raw_edges(engagement: Engagement, radius: float, true_path: bool, aside: Array | None = None) -> RawEdges:
+    """Return the raw edges of a cut; ``aside`` (angles,) m displaces a tool on true paths along y."""
+    begins, ends = engagement.entry > 0.0, engagement.exit < math.pi
+    passed = (
+        true_path and begins and not engagement.entry_face,
+        true_path and ends and not engagement.exit_face,
+    )
+    immersion = np.array([engagement.entry if begins else -math.inf, engagement.exit if ends else math.inf])
+    cosine = np.array([math.cos(engagement.entry), math.cos(engagement.exit)])
+    line = radius * cosine[:, None] - (np.zeros(1) if aside is None else aside)
+    return RawEdges(
+        np.repeat(immersion[:, None], line.shape[1], axis=1),
+        np.where(np.array(passed)[:, None], line, math.nan),
+        (bool(cosine[0] < 0.0), bool(cosine[1] >= 0.0)),
+    )
+
+
+def shifted(raw: RawEdges, radius: float, aside: Array) -> RawEdges:
+    """Return raw edges, which stay where they are, for a tool displaced along y by ``aside`` (angles,) m."""
+    there = np.isfinite(raw.immersion)
+    cosine = np.cos(np.where(there, raw.immersion, 0.0)) - aside / radius
+    immersion = np.where(there, np.arccos(np.clip(cosine, -1.0, 1.0)), raw.immersion)
+    return raw._replace(immersion=immersion, line=np.full(immersion.shape, math.nan))
+
+
+@compiled
+def beyond(radius: float, own: Row, line: float, sine: float, cosine: float) -> float:
+    """How far the tip of a tooth is beyond an edge on the ray, m; ``own`` is the row of the tooth."""
+    return radius + own.off_sine * sine + own.off_cosine * cosine - line / cosine
+
+
+@compiled
+def steepness(own: Row, line: float, sine: float, cosine: float) -> float:
+    """Change of that with the immersion, m/rad."""
+    return own.off_sine * cosine - own.off_cosine * sine - line * sine / (cosine * cosine)
+
+
+@compiled
+def tip_at(radius: float, rows: Array, line: float) -> float:
+    """Immersion at which the tip meets the edge, rad; the tooth's own row is the last one."""
+    own, phi = row_of(rows, len(rows) - 1), math.acos(min(max(line / radius, -1.0), 1.0))
     for _ in range(STEPS):
-        sine, cosine = np.sin(tip), np.cos(tip)
-        tip = tip - corner.beyond(sine, cosine) / corner.steepness(sine, cosine)
-    at = np.nonzero(near.covers(np.sin(tip), np.cos(tip)))
-    foot = tip.copy()
-    foot[at] = _foot(before.before(*at), corner.at(*at), tip[at])
-    return replace(corner, tip=tip, foot=foot)
+        sine, cosine = math.sin(phi), math.cos(phi)
+        phi -= beyond(radius, own, line, sine, cosine) / steepness(own, line, sine, cosine)
+    return phi
 
 
-def _foot(passed: Passes, corner: Corner, tip: Array) -> Array:
-    """Immersion (n,) at which the edge comes to what the first of the passes (passes, n) cleared."""
-    towards, phi = (1.0 if corner.begins == corner.outer else -1.0), tip
+@compiled
+def foot_at(scale: Scale, rows: Array, line: float, towards: float, tip: float) -> float:
+    """Immersion at which the edge comes to what the first of the passes (passes, 7) cleared, rad.
+
+    ``towards``: in which sense that is from the ``tip``. Where there is no chip at the tip it is there.
+    """
+    own, phi = row_of(rows, len(rows) - 1), tip
     for _ in range(STEPS):
-        sine, cosine = np.sin(phi), np.cos(phi)
-        lacking = passed.chip(sine, cosine) - corner.beyond(sine, cosine)
-        growth = towards * (corner.steepness(sine, cosine) - passed.slope(sine, cosine))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = np.where(growth > 0.0, lacking / growth, LARGEST_STEP).min(axis=0)
-        phi = phi + towards * np.clip(step, -LARGEST_STEP, LARGEST_STEP)
-    return np.where(towards * (phi - tip) > 0.0, phi, tip)  # where there is no chip at the tip: none
+        sine, cosine = math.sin(phi), math.cos(phi)
+        edge = beyond(scale.radius, own, line, sine, cosine)
+        slope = steepness(own, line, sine, cosine)
+        step = math.inf
+        for m in range(len(rows)):
+            row = row_of(rows, m)
+            lacking = chip_left(scale, row, sine, cosine) - edge
+            growth = towards * (slope - chip_slope(scale, row, sine, cosine))
+            step = min(step, lacking / growth if growth > 0.0 else LARGEST_STEP)
+        phi += towards * min(max(step, -LARGEST_STEP), LARGEST_STEP)
+    return phi if towards * (phi - tip) > 0.0 else tip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -52,10 +53,7 @@ class Cutter:
 
     def pitch(self, steps: int) -> Array:
         """Angle from each tooth clockwise to the one ``steps`` on, which cut here before it, (N,) rad."""
-        angles = np.asarray(self.tooth_angles)
-        turns = (np.arange(self.teeth) + steps) // self.teeth
-        ahead = np.roll(angles, -(steps % self.teeth))
-        return np.asarray(ahead + 2.0 * math.pi * turns - angles)
+        return np.asarray(pitches(self.tooth_angles, steps)[-1])
 
     def radius_deviation(self, height: Array) -> Array:
         """Return how far each tooth is from the axis of rotation, less the radius: (N, heights) m."""
@@ -77,3 +75,14 @@ class Cutter:
 def evenly_pitched(teeth: int) -> tuple[float, ...]:
     """Tooth angles of a cutter with equal pitch, rad."""
     return tuple(2.0 * math.pi * j / teeth for j in range(teeth))
+
+
+@lru_cache(maxsize=256)
+def pitches(tooth_angles: tuple[float, ...], passes: int) -> Array:
+    """Angles (passes, N) from each tooth clockwise to those that cut here 1… passes before it, rad."""
+    angles = np.asarray(tooth_angles)
+    ahead = np.arange(len(angles)) + np.arange(1, passes + 1)[:, None]
+    turns, tooth = np.divmod(ahead, len(angles))
+    pitch = np.asarray(angles[tooth] + 2.0 * math.pi * turns - angles)
+    pitch.flags.writeable = False
+    return pitch

@@ -1,123 +1,193 @@
-"""Integrals of what a law makes of the chip, along the engaged edges.
+"""Where the cutting edges are at each angle of the tool, and the pieces of them that are in the cut.
 
-Along a helical edge dz = −dφ/κ, κ the lag per depth: the integral over the height is one over the immersion.
-It is taken by Gauss-Legendre quadrature over the pieces of the edge in which one pass bounds the chip: all is
-smooth there, so that a few points are exact to rounding.
+In each piece one pass bounds the chip, so that all is smooth along it.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from metro.cutting.corners import Corner
-from metro.cutting.law import EdgeLaw
-from metro.cutting.nearby import Edges
-from metro.cutting.passes import Passes
+from metro.compiled import compiled
+from metro.cutting.arcs import EVERYWHERE, TURN, Arc, Near, empty_arc, find_arc
+from metro.cutting.chip import Cut
+from metro.cutting.corners import BEGINS, ENDS, LARGEST_STEP, RawEdges, RawHere, beyond
+from metro.cutting.cutter import Cutter
+from metro.cutting.passes import Passes, Row, Scale, chip_left, row_of
 from metro.units import Array
 
-TURN = 2.0 * math.pi
-# Worst is an arc that begins where the chip does: over a length L, n points leave 4.8e-5 L⁴ (n = 3) and
-# 2.2e-7 L⁶ (4) of the integral of sin² φ. Of a quarter of a radian 2 + 4 L points leave 2e-7, 3 + 4 L 5e-11.
-LEAST_POINTS, POINTS_PER_RADIAN = 3, 4.0
-POINTS_OF_ROOTS = 8  # more, where the law makes roots of the chip's ends
+Indices = npt.NDArray[np.intp]
+LOW, HIGH, LINES = 0, 1, 2  # columns of ``Pieces.bounds``
 
 
-@dataclass(frozen=True, eq=False)
-class Pieces:
+class Edges(NamedTuple):
+    """Where the edges are at angles of the tool: ``top`` and a ``span`` below it.
+
+    Attributes
+    ----------
+    top : (angles, N) immersion of the leading end of each edge, rad. span : what an edge spans, > 0, rad.
+    depth : what a radian of edge spans, m/rad.
+    """
+
+    top: Array
+    span: float
+    depth: float
+
+
+def edges(cutter: Cutter, cut: Cut, angle: Array, *, step: float) -> Edges:
+    """Return the edges at angles (n,) of tooth 0, a ``step`` apart, rad.
+
+    One that lags by less than a step is spread over what it turns through in the step.
+    """
+    lag = cutter.lag_per_depth * cut.axial_depth
+    span = max(abs(lag), step)
+    top = angle[:, None] + np.asarray(cutter.tooth_angles) + 0.5 * (span - lag)
+    return Edges(top, span, cut.axial_depth / span)
+
+
+class Pieces(NamedTuple):
     """Pieces of edges in the cut, in each of which one pass bounds the chip.
 
     Attributes
     ----------
     angle : (pieces,) index of the angle of the tool. bounding : (pieces,) of the pass, 0 the last one.
-    low, high : (pieces,) immersions at the ends, rad. before : the pass that bounds each, (pieces,).
-    depth : what a radian of edge spans, m/rad. partial : pieces in a corner of the work, with the corner.
+    bounds : (pieces, 4) immersions at which the piece begins and ends, rad; y of either raw edge, m, where
+        the piece is in a corner of the work there, else not a number.
+    passed, own : (pieces, 7) of the pass that bounds the chip, and of the tooth itself.
+    scale : of the passes. outer : of the raw edges. depth : what a radian of edge spans, m/rad.
     """
 
-    angle: npt.NDArray[np.intp]
-    bounding: npt.NDArray[np.intp]
-    low: Array
-    high: Array
-    before: Passes
+    angle: Indices
+    bounding: Indices
+    bounds: Array
+    passed: Array
+    own: Array
+    scale: Scale
+    outer: tuple[bool, bool]
     depth: float
-    partial: tuple[tuple[npt.NDArray[np.intp], Corner], ...] = ()
 
-    def chip(self, sine: Array, cosine: Array) -> Array:
-        """Chip (…, pieces) at an immersion given by its sine and cosine, m."""
-        chip = self.before.chip(sine, cosine)
-        for at, corner in self.partial:
-            beyond = corner.beyond(sine[..., at], cosine[..., at])
-            chip[..., at] = beyond if corner.outer else chip[..., at] - beyond
-        return np.maximum(chip, 0.0)
+    @property
+    def length(self) -> Array:
+        """What the pieces span, rad."""
+        return np.asarray(self.bounds[:, HIGH] - self.bounds[:, LOW])
 
 
-def pieces(before: Passes, bounds: Array, along: Edges, corners: tuple[Corner, ...] = ()) -> Pieces:
-    """Cut the engaged part of each edge where the pass that bounds its chip changes.
+def pieces(before: Passes, raw: RawEdges, along: Edges) -> Pieces:
+    """Cut the engaged part of each edge where the pass that bounds its chip changes."""
+    return Pieces(*_pieces(before, raw, along, empty_arc(before.rows.shape[2])), along.depth)
 
-    Parameters
-    ----------
-    bounds : (bounds, angles or 1, N or 1) of :func:`metro.cutting.arcs.arcs`, rad. along : the edges.
-    corners : of the work, where the bounds allow for them.
+
+@compiled
+def _pieces(
+    before: Passes, raw: RawEdges, along: Edges, arc: Arc
+) -> tuple[Indices, Indices, Array, Array, Array, Scale, tuple[bool, bool]]:
+    """Return what ``Pieces`` are made of but for the depth."""
+    scale, rows, top, span, ends = before.scale, before.rows, along.top, along.span, arc.bounds
+    (angles, teeth), raws = top.shape, raw.line.shape[1]
+    alike = rows.shape[0] == 1 and rows.shape[1] == 1 and raws == 1
+    least = math.cos(min(0.5 * span + LARGEST_STEP, math.pi)) - 1e-9
+    count, found, room = 0, 0, 2 * angles * teeth
+    places, bounds, whose = np.empty((room, 2), np.intp), np.empty((room, 4)), np.empty(room, np.intp)
+    for i in range(angles):
+        at = i % raws
+        here = RawHere(
+            (raw.immersion[0, at], raw.immersion[1, at]), (raw.line[0, at], raw.line[1, at]), raw.outer
+        )
+        for j in range(teeth):
+            if _in_air(top[i, j], span):
+                continue
+            passed = rows[i % rows.shape[0], j % rows.shape[1]]
+            if count == 0 or not alike:  # else the bounds are those of the last edge
+                middle = top[i, j] - 0.5 * span
+                near = EVERYWHERE if alike else Near(math.sin(middle), math.cos(middle), least)
+                count = find_arc(scale, passed, here, near, arc)
+            leading = ends[0] + (top[i, j] - ends[0]) % TURN
+            while leading - span < ends[count - 1]:
+                if found + count > len(places):
+                    places, bounds, whose = _twice(places), _twice(bounds), _twice(whose)
+                for part in range(count - 1):
+                    low, high = max(ends[part], leading - span), min(ends[part + 1], leading)
+                    if high > low:
+                        middle = 0.5 * (low + high)
+                        places[found, 0], places[found, 1] = i, _bounding(scale, passed, middle)
+                        whose[found] = j
+                        bounds[found, LOW], bounds[found, HIGH] = low, high
+                        bounds[found, LINES] = _line(here.line[BEGINS], arc.corner[BEGINS], middle)
+                        bounds[found, LINES + 1] = _line(here.line[ENDS], arc.corner[ENDS], middle)
+                        found += 1
+                leading += TURN
+    bounding, own = np.empty((found, rows.shape[3])), np.empty((found, rows.shape[3]))
+    for k in range(found):
+        i, j = places[k, 0] % rows.shape[0], whose[k] % rows.shape[1]
+        for column in range(rows.shape[3]):
+            bounding[k, column] = rows[i, j, places[k, 1], column]
+            own[k, column] = rows[i, j, -1, column]
+    angle, which = places[:found, 0].copy(), places[:found, 1].copy()
+    return angle, which, bounds[:found].copy(), bounding, own, scale, raw.outer
+
+
+@compiled
+def _line(line: float, corner: Array, immersion: float) -> float:
+    """Return the line of a raw edge where an immersion is in its corner, else not a number."""
+    return line if (immersion - corner[0]) * (immersion - corner[1]) < 0.0 else math.nan
+
+
+@compiled
+def _in_air(top: float, span: float) -> bool:
+    """Whether an edge is behind the axis and far from where chips begin or end, whatever the passes.
+
+    No tooth cuts where its own pass, a turn ago, left nothing: where sin φ < 0 on circles, and about half the
+    feed over the radius farther on true paths.
     """
-    low, high = bounds[:-1], bounds[1:]
-    start = low[0].min()
-    leading = start + np.mod(along.top - start, TURN)
-    parts = []
-    for turn in range(math.ceil((high.max() - start + along.span) / TURN)):
-        upper = np.minimum(high, leading + TURN * turn)
-        lower = np.maximum(low, leading + (TURN * turn - along.span))
-        at = np.nonzero(upper > lower)
-        parts.append((at[1], at[2], lower[at], upper[at]))
-    angle, tooth, lower, upper = (np.concatenate(part) for part in zip(*parts, strict=True))
-    passed = before.before(angle, tooth)
-    middle = 0.5 * (lower + upper)
-    bounding = passed.chip(np.sin(middle), np.cos(middle)).argmin(axis=0)
-    partial = []
-    for corner in corners:
-        vanishing, whole = corner.at(angle, tooth).limits
-        (inside,) = np.nonzero((middle - vanishing) * (middle - whole) < 0.0)
-        partial.append((inside, corner.at(angle[inside], tooth[inside])))
-    bounded = passed[bounding, np.arange(len(angle))]
-    return Pieces(angle, bounding, lower, upper, bounded, along.depth, tuple(partial))
+    leading = (top - math.pi) % TURN  # from where circles leave the cut
+    return leading - span > LARGEST_STEP and leading < math.pi - LARGEST_STEP
 
 
-def points(cut: Pieces, law: EdgeLaw) -> tuple[Array, Array]:
-    """Immersions (points, pieces), rad, and weights (points,) of a quadrature along each piece."""
-    length = cut.high - cut.low
-    count = LEAST_POINTS + math.ceil(POINTS_PER_RADIAN * length.max(initial=0.0))
-    places, weights = rule(count, is_linear(law, cut.before.feed))
-    return cut.low + places[:, None] * length, weights
+@compiled
+def _twice(values: Array) -> Array:
+    """Return an array with room for twice as many values."""
+    return np.concatenate((values, np.empty_like(values)))
 
 
-def integrated(cut: Pieces, law: EdgeLaw, angles: int) -> Array:
-    """Integrals (angles, 6) m of shear × sin φ, shear × cos φ, shear, sin φ, cos φ, 1, summed over teeth."""
-    phi, weights = points(cut, law)
-    sine, cosine = np.sin(phi), np.cos(phi)
-    shear = law.shear(cut.chip(sine, cosine))
-    parts = [weights @ wave for wave in (shear * sine, shear * cosine, shear, sine, cosine)]
-    depths = np.stack([*parts, np.ones(len(cut.angle))]) * (cut.depth * (cut.high - cut.low))
-    return np.stack([np.bincount(cut.angle, part, angles) for part in depths], axis=1)
+@compiled
+def _bounding(scale: Scale, rows: Array, immersion: float) -> int:
+    """Return which pass bounds the chip."""
+    sine, cosine = math.sin(immersion), math.cos(immersion)
+    which, least = 0, math.inf
+    for m in range(len(rows)):
+        chip = chip_left(scale, row_of(rows, m), sine, cosine)
+        if chip < least:
+            which, least = m, chip
+    return which
 
 
-def is_linear(law: EdgeLaw, thickness: float) -> bool:
-    """Whether the law's shear is the thickness itself: asked of it, for an effect may have replaced it."""
-    some = np.linspace(0.0, thickness, 5)
-    return bool(np.all(law.shear(some) == some))
+class Piece(NamedTuple):
+    """One of ``Pieces``."""
+
+    passed: Row
+    own: Row
+    line: tuple[float, float]
+    outer: tuple[bool, bool]
 
 
-@lru_cache(maxsize=64)
-def rule(count: int, linear: bool) -> tuple[Array, Array]:
-    """Points and weights (count,) of a quadrature over 0…1.
+@compiled
+def piece_of(cut: Pieces, at: int) -> Piece:
+    """Return one of the pieces."""
+    line = (cut.bounds[at, LINES], cut.bounds[at, LINES + 1])
+    return Piece(row_of(cut.passed, at), row_of(cut.own, at), line, cut.outer)
 
-    Gauss-Legendre; for laws that are not linear in w, t = w² (3 − 2w): the root of the distance from the end,
-    which a power of the chip makes, is smooth in w.
-    """
-    nodes, weights = np.polynomial.legendre.leggauss(count if linear else count + POINTS_OF_ROOTS)
-    points, weights = 0.5 * (nodes + 1.0), 0.5 * weights
-    if linear:
-        return points, weights
-    return points**2 * (3.0 - 2.0 * points), weights * 6.0 * points * (1.0 - points)
+
+@compiled
+def chip_of(scale: Scale, piece: Piece, sine: float, cosine: float) -> float:
+    """Chip of a piece at an immersion, m."""
+    chip = chip_left(scale, piece.passed, sine, cosine)
+    if not math.isnan(piece.line[BEGINS]):
+        edge = beyond(scale.radius, piece.own, piece.line[BEGINS], sine, cosine)
+        chip = edge if piece.outer[BEGINS] else chip - edge
+    if not math.isnan(piece.line[ENDS]):
+        edge = beyond(scale.radius, piece.own, piece.line[ENDS], sine, cosine)
+        chip = edge if piece.outer[ENDS] else chip - edge
+    return max(chip, 0.0)

@@ -7,16 +7,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from metro.cutting.arcs import arcs
+from metro.cutting.arcs import TURN
 from metro.cutting.chip import Cut, chip_thickness
-from metro.cutting.corners import corners
+from metro.cutting.corners import raw_edges
 from metro.cutting.cutter import Cutter
-from metro.cutting.edges import TURN, Pieces, integrated, pieces
-from metro.cutting.engagement import Engagement
+from metro.cutting.edges import Edges, edges, pieces
 from metro.cutting.general import general_basis
 from metro.cutting.law import EdgeLaw
-from metro.cutting.nearby import Edges, edges, nearby
-from metro.cutting.passes import ALIKE, Passes, passes
+from metro.cutting.passes import ALIKE, passes
+from metro.cutting.quadrature import assembled
 from metro.units import Array
 
 __all__ = [
@@ -52,10 +51,11 @@ def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False)
     if not cutter.cylindrical:
         return _general_table(cutter, law, cut, true_path)
     before = passes(cutter, cut, true_path, angle)
-    if before.sine[0].size == 1 and ANGLES % cutter.teeth == 0:  # all teeth are alike: one pitch of angles
-        angle = angle[: ANGLES // cutter.teeth]
+    if len(before.rows) == 1 and before.rows.shape[1] == 1 and ANGLES % cutter.teeth == 0:
+        angle = angle[: ANGLES // cutter.teeth]  # all teeth are alike: one pitch of angles
     along = edges(cutter, cut, angle, step=TURN / ANGLES)
-    pitch = assembled(engaged(before, cut.engagement, along), law, len(angle))
+    raw = raw_edges(cut.engagement, cutter.radius, true_path)
+    pitch = assembled(pieces(before, raw, along), law, len(angle))
     basis = np.tile(pitch, (ANGLES // len(angle), 1, 1))
     basis.flags.writeable = False
     return basis
@@ -77,13 +77,6 @@ def placed(cutter: Cutter, cut: Cut, true_path: bool) -> Cutter:
     return cutter.about_axis(0.5 * cut.axial_depth) if true_path and cutter.runout_radius else cutter
 
 
-def engaged(before: Passes, engagement: Engagement, along: Edges, aside: Array | float = 0.0) -> Pieces:
-    """Return the engaged pieces of edges; ``aside`` (angles, 1) m displaces a tool on true paths along y."""
-    near = nearby(along, before.sine.shape[1:])
-    cut = corners(before, engagement, near, aside) if before.true_path else ()
-    return pieces(before, arcs(before, engagement, along, cut), along, cut)
-
-
 def mean_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) -> Array:
     """Mean over a revolution of the force on the tool per unit of each coefficient, (3, 6), feed frame.
 
@@ -92,26 +85,15 @@ def mean_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) 
     """
     if not cutter.cylindrical:
         return np.asarray(force_basis(cutter, law, cut, true_path).mean(axis=0))
-    before = passes(cutter, cut, true_path, np.zeros(1))
-    if before.off_sine.any() or before.off_cosine.any():
+    if cutter.runout_radius or any(cutter.reach):
         return np.asarray(force_basis(cutter, law, cut, true_path).mean(axis=0))
+    before = passes(cutter, cut, true_path, np.zeros(1))
     top = np.full((1, cutter.teeth), 1.5 * math.pi)  # in the air
     around = Edges(top, TURN, cut.axial_depth / TURN)
-    return np.asarray(assembled(engaged(before, cut.engagement, around), law, 1)[0])
+    raw = raw_edges(cut.engagement, cutter.radius, true_path)
+    return np.asarray(assembled(pieces(before, raw, around), law, 1)[0])
 
 
 def mean_force(cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array) -> Array:
     """Mean force on the tool over a revolution, (3,) N, feed frame; ``coefficients`` (6,) SI."""
     return np.asarray(mean_basis(cutter, law, cut) @ coefficients)
-
-
-def assembled(cut: Pieces, law: EdgeLaw, angles: int) -> Array:
-    """Force on the tool per unit of each coefficient, (angles, 3, 6), of pieces of edges (physics.md §2)."""
-    integrals = integrated(cut, law, angles)
-    basis = np.zeros((angles, 3, 6))
-    for column in (0, 3):
-        along_sine, along_cosine, whole = integrals[:, column : column + 3].T
-        basis[:, 0, column], basis[:, 1, column] = -along_cosine, along_sine
-        basis[:, 0, column + 1], basis[:, 1, column + 1] = -along_sine, -along_cosine
-        basis[:, 2, column + 2] = whole
-    return basis

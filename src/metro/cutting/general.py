@@ -20,13 +20,14 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from metro.cutting.arcs import TURN
 from metro.cutting.chip import Cut, feed_per_radian
 from metro.cutting.cutter import Cutter
-from metro.cutting.edges import TURN, is_linear, rule
+from metro.cutting.edges import Edges
 from metro.cutting.envelope import Meridian, Place, meridian
 from metro.cutting.general_teeth import Indices, Teeth, teeth_in
 from metro.cutting.law import EdgeLaw
-from metro.cutting.nearby import Edges
+from metro.cutting.quadrature import is_linear, rule
 from metro.cutting.roots import roots
 from metro.units import Array
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from metro.cutting.chip import Cut, curve_excess, feed_per_radian
-from metro.cutting.cutter import Cutter
+from metro.cutting.cutter import Cutter, pitches
 from metro.cutting.envelope import Place
 from metro.units import Array
 
@@ -222,7 +222,7 @@ def teeth_in(cutter: Cutter, cut: Cut, *, true_path: bool) -> Teeth:
     """Return the teeth of a cutter in a cut."""
     wobbles = bool(cutter.runout_radius or any(cutter.reach))
     passes = cutter.teeth if wobbles or (cut.curvature and true_path) else 1
-    pitch = np.stack([cutter.pitch(step) for step in range(1, passes + 1)])
+    pitch = pitches(cutter.tooth_angles, passes)
     arc = cut.engagement
     ends = [(arc.entry, True)] * (arc.entry > 0.0 and not arc.entry_face)
     ends += [(arc.exit, False)] * (arc.exit < math.pi and not arc.exit_face)

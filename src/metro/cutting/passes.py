@@ -8,98 +8,132 @@ the chip that pass m = 1…N leaves to a tooth is A sin φ + B cos φ on circula
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from metro.compiled import compiled
 from metro.cutting.chip import Cut, curve_excess, feed_per_radian, path_excess
-from metro.cutting.cutter import Cutter
+from metro.cutting.cutter import Cutter, pitches
 from metro.units import Array
 
 ALIKE = 1e-12
-Index = tuple[npt.NDArray[np.intp] | slice | None, ...]
+_path_excess = compiled(path_excess)
 
 
-@dataclass(frozen=True)
-class Passes:
-    """Earlier passes, one an element of arrays of one shape: from :func:`passes` (passes, angles, teeth).
-
-    Attributes
-    ----------
-    feed : m/rad. radius : m. true_path : whether the paths are trochoids, else circles.
-    pitch : angle from the tooth to the one that made the pass, rad.
-    sine, cosine : A and B of the chip, m.
-    off_sine, off_cosine : the same of the deviation from the radius of the tooth that made the pass, m.
-    """
+class Scale(NamedTuple):
+    """What all passes have in common: ``feed``, m/rad, ``radius``, m, and whether they are trochoids."""
 
     feed: float
     radius: float
     true_path: bool
-    pitch: Array
-    sine: Array
-    cosine: Array
-    off_sine: Array
-    off_cosine: Array
 
-    def __getitem__(self, index: Index) -> Passes:
-        """Return the passes at an index of the arrays."""
-        return self._each(lambda part: part[index])
 
-    def before(self, angle: npt.NDArray[np.intp], tooth: npt.NDArray[np.intp]) -> Passes:
-        """Return the passes (passes, n) before teeth (n,) at angles (n,); equal ones are stored once."""
-        count, angles, teeth = self.sine.shape
-        place = (angle % angles) * teeth + tooth % teeth
-        return self._each(lambda part: part.reshape(count, -1).take(place, axis=1))
+class Row(NamedTuple):
+    """A pass before a tooth at an angle of the tool.
 
-    def _each(self, select: Callable[[Array], Array]) -> Passes:
-        parts = (self.pitch, self.sine, self.cosine, self.off_sine, self.off_cosine)
-        return Passes(self.feed, self.radius, self.true_path, *map(select, parts))
+    Attributes
+    ----------
+    pitch : angle from the tooth to the one that made the pass, rad.
+    sine, cosine : A and B of the chip, m.
+    off_sine, off_cosine : the same of the deviation from the radius of the tooth that made the pass, m.
+    moved_x, moved_y : how the tip moved along x and y as it made the pass, m/rad.
+    """
 
-    def chip(self, sine: Array, cosine: Array) -> Array:
-        """Chip that each pass leaves at an immersion given by its sine and cosine, m."""
-        thickness = self.sine * sine + self.cosine * cosine
-        if self.true_path:
-            radius = self.off_sine * sine + self.off_cosine * cosine + self.radius
-            thickness += path_excess(self.feed, self.pitch, radius, sine, cosine)
-        return np.asarray(thickness)
+    pitch: float
+    sine: float
+    cosine: float
+    off_sine: float
+    off_cosine: float
+    moved_x: float
+    moved_y: float
 
-    def slope(self, sine: Array, cosine: Array) -> Array:
-        """Change of the chip with the immersion, m/rad; on true paths to second order of feed/radius."""
-        slope = self.sine * cosine - self.cosine * sine
-        if self.true_path:
-            turned = (self.pitch * sine + cosine) * cosine - sine**2
-            slope -= (self.feed**2 / self.radius) * self.pitch * turned
-        return np.asarray(slope)
+
+PITCH, SINE, COSINE, OFF_SINE, OFF_COSINE, MOVED_X, MOVED_Y = range(len(Row._fields))
+
+
+class Passes(NamedTuple):
+    """Earlier passes before the teeth at angles of the tool.
+
+    Attributes
+    ----------
+    scale : of all of them. rows : (angles, teeth, passes, 7) of each a ``Row``, the last pass of a turn last.
+        Angles or teeth that are alike are stored once.
+    """
+
+    scale: Scale
+    rows: Array
+
+
+@compiled
+def row_of(rows: Array, at: int) -> Row:
+    """Return ``rows[at]`` as numbers, which compiled functions hand on faster than arrays."""
+    return Row(
+        rows[at, PITCH],
+        rows[at, SINE],
+        rows[at, COSINE],
+        rows[at, OFF_SINE],
+        rows[at, OFF_COSINE],
+        rows[at, MOVED_X],
+        rows[at, MOVED_Y],
+    )
+
+
+@compiled
+def chip_left(scale: Scale, row: Row, sine: float, cosine: float) -> float:
+    """Chip that a pass leaves at an immersion given by its sine and cosine, m.
+
+    A later tooth meets a tip that moved where that was δ = feed × pitch cos φ / radius later than a pitch
+    ago.
+    """
+    chip = row.sine * sine + row.cosine * cosine
+    if scale.true_path:
+        reach = row.off_sine * sine + row.off_cosine * cosine + scale.radius
+        later = (scale.feed / scale.radius) * row.pitch * cosine
+        chip += _path_excess(scale.feed, row.pitch, reach, sine, cosine)
+        chip -= later * (row.moved_x * sine + row.moved_y * cosine)
+    return chip
+
+
+@compiled
+def chip_slope(scale: Scale, row: Row, sine: float, cosine: float) -> float:
+    """Change of the chip with the immersion, m/rad; on true paths to second order of feed/radius."""
+    slope = row.sine * cosine - row.cosine * sine
+    if scale.true_path:
+        turned = (row.pitch * sine + cosine) * cosine - sine * sine
+        slope -= (scale.feed * scale.feed / scale.radius) * row.pitch * turned
+    return slope
 
 
 def passes(cutter: Cutter, cut: Cut, true_path: bool, angle: Array, *, every: bool = False) -> Passes:
     """Return the passes before each tooth at angles (n,) of tooth 0's tip, rad.
 
-    (N or 1, n or 1, N or 1): without deviations of the radius the angles are alike, and the last pass counts
-    alone unless the path is curved, or ``every`` one is wanted; where pitch and deviations are equal as
-    well, the teeth are alike.
+    Without deviations of the radius the angles are alike, and the last pass counts alone unless the path is
+    curved, or ``every`` one is wanted; where pitch and deviations are equal as well, the teeth are alike.
     """
     deviation = _deviation(cutter, cut)
     off = deviation.any()
     curvature = cut.curvature if true_path else 0.0
-    steps = range(1, cutter.teeth + 1 if off or curvature or every else 2)
-    pitch = np.stack([cutter.pitch(m) for m in steps])
+    pitch = pitches(cutter.tooth_angles, cutter.teeth if off or curvature or every else 1)
     # Where tooth j has immersion φ, tooth j+m deviates by the real part of earlier × exp i(θ − φ).
     here = np.exp(1j * np.asarray(cutter.tooth_angles))
-    earlier = here * np.stack([np.roll(deviation, -m) for m in steps])
+    steps = np.arange(1, len(pitch) + 1)[:, None]
+    earlier = here * deviation[(np.arange(cutter.teeth) + steps) % cutter.teeth]
     apart = max(np.ptp(pitch, axis=1).max(), np.abs(earlier.T - earlier[:, 0]).max() / cutter.radius)
     if apart < ALIKE:
         pitch, earlier = pitch[:, :1], earlier[:, :1]
-    turned = np.exp(1j * (angle if off else np.zeros(1)))[:, None] * earlier[:, None, :]
-    change = turned[-1] - turned  # the last pass is the tooth's own
-    feed, pitch = feed_per_radian(cutter, cut), np.broadcast_to(pitch[:, None, :], turned.shape)
-    sine, cosine, off_sine, off_cosine = (
-        np.ascontiguousarray(part) for part in (change.imag, change.real, turned.imag, turned.real)
-    )
-    sine, cosine = sine + feed * pitch, cosine + curve_excess(curvature, feed * pitch)
-    return Passes(feed, cutter.radius, true_path, pitch, sine, cosine, off_sine, off_cosine)
+    turned = np.exp(1j * (angle if off else np.zeros(1)))[:, None, None] * earlier.T
+    change = turned[..., -1:] - turned  # the last pass is the tooth's own
+    feed, pitch = feed_per_radian(cutter, cut), pitch.T
+    rows = np.zeros((*turned.shape, len(Row._fields)))
+    rows[..., PITCH] = pitch
+    rows[..., SINE], rows[..., COSINE] = change.imag, change.real
+    rows[..., SINE] += feed * pitch
+    rows[..., COSINE] += curve_excess(curvature, feed * pitch)
+    rows[..., OFF_SINE], rows[..., OFF_COSINE] = turned.imag, turned.real
+    return Passes(Scale(feed, cutter.radius, true_path), rows)
 
 
 def _deviation(cutter: Cutter, cut: Cut) -> npt.NDArray[np.complex128]:

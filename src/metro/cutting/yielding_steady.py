@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from metro.compiled import compiled
 from metro.cutting.chip import Cut
+from metro.cutting.corners import RawEdges
 from metro.cutting.cutter import Cutter
 from metro.cutting.displaced import Displaced, displaced
-from metro.cutting.edges import Pieces, points
-from metro.cutting.force import assembled
+from metro.cutting.edges import HIGH, LOW, Pieces
 from metro.cutting.law import EdgeLaw
+from metro.cutting.passes import chip_left, chip_slope, row_of
+from metro.cutting.quadrature import Points, assembled, ends, of_points, points
 from metro.units import Array
 
 ANGLES, LEAST_ANGLES = 360, 120  # of the force, and of the deflection
@@ -86,12 +90,13 @@ def deflection(
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """A deflection ``bent`` and its ``residual`` C F − q, (n, 2) m, with the cut's pieces and raw edges."""
+    """A deflection ``bent`` and its ``residual`` C F − q, (n, 2) m, with the cut there."""
 
     bent: Array
     residual: Array
     pieces: Pieces
-    raw: Array
+    along: Points
+    raw: RawEdges
 
     def within(self, share: float) -> bool:
         return bool(np.abs(self.residual).max() <= share * np.abs(self.bent + self.residual).max())
@@ -108,8 +113,9 @@ class _Spring:
 
     def balance(self, bent: Array) -> _Balance:
         pieces, raw = self.tool.pieces(bent)
-        force = assembled(pieces, self.law, len(bent)) @ self.coefficients
-        return _Balance(bent, force[:, :2] @ self.compliance.T - bent, pieces, raw)
+        along = points(pieces, self.law)
+        force = of_points(pieces, along, self.law, len(bent)) @ self.coefficients
+        return _Balance(bent, force[:, :2] @ self.compliance.T - bent, pieces, along, raw)
 
 
 def _balanced(spring: _Spring) -> Array:
@@ -157,56 +163,68 @@ def _slope(spring: _Spring, balance: _Balance) -> tuple[Array, Array]:
     The shear force grows with the chip along the pieces; where the chip begins or ends along the feed the
     edge force sets in earlier or stops later; where a raw edge does it, dφ = dq_y / (R sin φ).
     """
-    pieces, n, teeth = balance.pieces, len(balance.bent), spring.tool.cutter.teeth
-    by_pass = _by_chip(spring, pieces)
-    by_edge = _by_raw_edge(spring, pieces, balance.raw)
-    place = pieces.angle * teeth + pieces.bounding
-    summed = [np.bincount(place, part, n * teeth) for part in by_pass.reshape(4, -1)]
-    across = [np.bincount(pieces.angle, part, n) for part in by_edge]
-    none = np.zeros(n)
-    edges = np.stack([none, across[0], none, across[1]], axis=1).reshape(n, 2, 2)
-    passes = np.stack(summed, axis=1).reshape(n, teeth, 2, 2)
-    return np.asarray(pieces.depth * passes), np.asarray(pieces.depth * edges)
+    cut, along, law = balance.pieces, balance.along, spring.law
+    growth = (law.shear(along.chip + DIFFERENCE) - law.shear(along.chip)) / DIFFERENCE
+    at_ends, n = ends(cut), len(balance.bent)
+    slopes = np.zeros((n, spring.tool.cutter.teeth, 2, 2)), np.zeros((n, 2, 2))
+    waves = (
+        Waves(along.sine, along.cosine, along.weights * growth),
+        Waves(at_ends.sine, at_ends.cosine, law.shear(at_ends.chip)),
+    )
+    _add_slopes(cut, balance.raw.immersion, spring.coefficients, waves, slopes)
+    return cut.depth * slopes[0], cut.depth * slopes[1]
 
 
-def _by_chip(spring: _Spring, pieces: Pieces) -> Array:
-    """Change (2, 2, pieces) of the force in the plane, per depth, with how much nearer the pass is."""
-    law, before = spring.law, pieces.before
-    phi, weights = points(pieces, law)
-    sine, cosine = np.sin(phi), np.cos(phi)
-    chip = np.maximum(before.chip(sine, cosine), 0.0)
-    growth = (law.shear(chip + DIFFERENCE) - law.shear(chip)) / DIFFERENCE
-    along = weights[:, None] * (pieces.high - pieces.low) * growth
-    inside = _towards(_push(spring.coefficients[:2], along, sine, cosine), sine, cosine)
-    sine, cosine = _ends(pieces)
-    steepness = np.maximum(np.abs(before.slope(sine, cosine)), FLATTEST * before.feed)
-    begins = (np.abs(before.chip(sine, cosine)) < NO_CHIP * before.feed) / steepness
-    return inside + _towards(_push(spring.coefficients[3:5], begins, sine, cosine), sine, cosine)
+class Waves(NamedTuple):
+    """Sine and cosine of the immersion at points of pieces, and what pushes there, (pieces, points)."""
+
+    sine: Array
+    cosine: Array
+    amount: Array
 
 
-def _by_raw_edge(spring: _Spring, pieces: Pieces, raw: Array) -> Array:
-    """Change (2, pieces) of the force in the plane, per depth, with the displacement across the feed."""
-    sine, cosine = _ends(pieces)
-    sign = np.array([[-1.0], [1.0]])
-    turned = sign * (np.stack([pieces.low, pieces.high]) == raw[:, pieces.angle])
-    turned /= spring.tool.cutter.radius * np.maximum(sine, FLATTEST)
-    full = spring.law.shear(np.maximum(pieces.before.chip(sine, cosine), 0.0))
-    shear = _push(spring.coefficients[:2], full * turned, sine, cosine)
-    return np.asarray((shear + _push(spring.coefficients[3:5], turned, sine, cosine)).sum(axis=1))
+@compiled
+def _add_slopes(
+    cut: Pieces, raw: Array, coefficients: Array, waves: tuple[Waves, Waves], slopes: tuple[Array, Array]
+) -> None:
+    """Add to the ``slopes`` by pass and by raw edge the changes of the force in the plane, per depth.
+
+    ``waves``: inside the pieces, where the shear grows, and at their ends, where it is whole.
+    """
+    angle, bounds, (by_pass, by_edge), (inside, at_ends) = cut.angle, cut.bounds, slopes, waves
+    shear, edge = (coefficients[0], coefficients[1]), (coefficients[3], coefficients[4])
+    for i in range(len(bounds)):
+        change, row = by_pass[angle[i], cut.bounding[i]], row_of(cut.passed, i)
+        length = bounds[i, HIGH] - bounds[i, LOW]
+        for k in range(inside.sine.shape[1]):
+            push = _push(shear, length * inside.amount[i, k], inside.sine[i, k], inside.cosine[i, k])
+            _towards(change, push, inside.sine[i, k], inside.cosine[i, k])
+        for end in range(2):
+            sine, cosine = at_ends.sine[i, end], at_ends.cosine[i, end]
+            if abs(chip_left(cut.scale, row, sine, cosine)) < NO_CHIP * cut.scale.feed:
+                steep = max(abs(chip_slope(cut.scale, row, sine, cosine)), FLATTEST * cut.scale.feed)
+                _towards(change, _push(edge, 1.0 / steep, sine, cosine), sine, cosine)
+            if bounds[i, LOW + end] == raw[end, angle[i]]:
+                turned = (1.0 if end else -1.0) / (cut.scale.radius * max(sine, FLATTEST))
+                of_shear = _push(shear, at_ends.amount[i, end] * turned, sine, cosine)
+                of_edge = _push(edge, turned, sine, cosine)
+                by_edge[angle[i], 0, 1] += of_shear[0] + of_edge[0]
+                by_edge[angle[i], 1, 1] += of_shear[1] + of_edge[1]
 
 
-def _ends(pieces: Pieces) -> tuple[Array, Array]:
-    """Sine and cosine (2, pieces) of where pieces begin and end."""
-    ends = np.stack([pieces.low, pieces.high])
-    return np.sin(ends), np.cos(ends)
+@compiled
+def _push(
+    coefficients: tuple[float, float], weight: float, sine: float, cosine: float
+) -> tuple[float, float]:
+    """Push along x and y of a tangential and a radial force."""
+    tangential, radial = coefficients[0] * weight, coefficients[1] * weight
+    return -tangential * cosine - radial * sine, tangential * sine - radial * cosine
 
 
-def _push(coefficients: Array, weight: Array, sine: Array, cosine: Array) -> Array:
-    """Push along x and y, (2, …), of a tangential and a radial force."""
-    tangential, radial = coefficients
-    return np.stack([-tangential * cosine - radial * sine, tangential * sine - radial * cosine]) * weight
-
-
-def _towards(push: Array, sine: Array, cosine: Array) -> Array:
-    """Sum (2, 2, pieces) over points of a push, per displacement along x and y: a tooth sees u · q of it."""
-    return np.stack([(push * sine).sum(axis=1), (push * cosine).sum(axis=1)], axis=1)
+@compiled
+def _towards(change: Array, push: tuple[float, float], sine: float, cosine: float) -> None:
+    """Add a push per displacement along x and y to a (2, 2): a tooth sees u · q of it."""
+    change[0, 0] += push[0] * sine
+    change[0, 1] += push[0] * cosine
+    change[1, 0] += push[1] * sine
+    change[1, 1] += push[1] * cosine
