@@ -130,12 +130,7 @@ def table(tool, cut, true_path):
 
 
 def test_rounded_ends_beside_the_flat_end():
-    """On true paths, by which coefficients are identified, and on circles: closed forms of the flat end.
-
-    The aim is twice the time of the flat end. In the median it is met on true paths, by which coefficients
-    are identified; on circles, of which a flat end has closed forms, it is three times: what is left is the
-    search for where edges enter and leave, in so few numbers that calls of numpy are most of the time.
-    """
+    """A rounded end takes less than twice the time of the flat end, in the median."""
     radius, side = TOOL.radius, math.pi - math.acos(1.0 - 0.5)
     arcs = {"slot": Engagement(0.0, math.pi), "down": Engagement(side, math.pi)}
     print(f"\n{'ms of a revolution':36s}{'flat':>8s}{'ball':>8s}{'corner':>8s}{'ratios':>14s}")
@@ -150,4 +145,5 @@ def test_rounded_ends_beside_the_flat_end():
         times = "".join(f"{1e3 * each:8.2f}" for each in spent)
         print(f"{words:36s}{times}{spent[1] / spent[0]:8.2f}{spent[2] / spent[0]:6.2f}")
     print(f"in the median {np.median(ratios[True]):.2f} and {np.median(ratios[False]):.2f}")
-    assert np.median(ratios[True]) < 2.5  # it has become slower
+    assert np.median(ratios[True]) < 2.0
+    assert np.median(ratios[False]) < 2.0

@@ -10,7 +10,7 @@ from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import engagement
 from metro.cutting.entry import entry_basis
-from metro.cutting.envelope import mean_inclination, meridian
+from metro.cutting.envelope import edge_length, mean_inclination, meridian, place_at
 from metro.cutting.force import ANGLES, force_basis, mean_basis
 from metro.cutting.law import EdgeLaw
 
@@ -182,9 +182,11 @@ def test_mean_forces_of_a_ball_in_a_slot_as_deep_as_its_radius_are_the_closed_fo
 def test_the_edge_of_a_ball_has_the_length_of_its_curve():
     line = meridian(BALL, R, BALL.lag_per_depth)
     shares, weights = np.polynomial.legendre.leggauss(4)
-    panels = np.repeat(np.arange(len(line.length)), 4)
-    place = line.at(panels, np.tile(0.5 * (shares + 1), len(line.length)))
-    length = (line.edge_length(place) * line.length[panels] * np.tile(0.5 * weights, len(line.length))).sum()
+    length = sum(
+        0.5 * weight * line.length[panel] * edge_length(line, place_at(line, panel, 0.5 * (share + 1)))
+        for panel in range(len(line.length))
+        for share, weight in zip(shares, weights, strict=True)
+    )
     z = R * (1 - np.cos(np.linspace(0, math.pi / 2, 200_001)))  # the curve itself, as a polygon
     r, psi = np.sqrt(2 * R * z - z**2), math.tan(BALL.helix) / R * z
     polygon = np.linalg.norm(np.diff([r * np.cos(psi), r * np.sin(psi), z], axis=1), axis=0).sum()
@@ -196,8 +198,8 @@ def test_mean_tangential_power_is_the_pressure_times_the_volume_removed(tool):
     """The tangential force of a ring has the ring's radius as its lever."""
     depths = np.linspace(0.0, 3e-3, 201)
     means = np.array([mean_basis(tool, EdgeLaw(), replace(SLOT, axial_depth=d))[1, 0] for d in depths])
-    place = [meridian(tool, d, 1.0) for d in 0.5 * (depths[1:] + depths[:-1])]
-    radius = np.array([one.at(np.array([-1]), np.ones(1)).radius[0] for one in place])
+    lines = [meridian(tool, d, 1.0) for d in 0.5 * (depths[1:] + depths[:-1])]
+    radius = np.array([place_at(line, len(line.length) - 1, 1.0).radius for line in lines])
     # F_t ∝ sin φ over half a turn: its mean is 4/π of that of F_t sin φ.
     power = 2 * math.pi * np.sum(4 / math.pi * np.diff(means) * radius)
     removed = 3 * SLOT.feed_per_tooth * np.sum(2 * radius * np.diff(depths))

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
-from metro.compiled import compiled
+from metro.compiled import compiled_with_arrays
 from metro.cutting.arcs import EVERYWHERE, empty_arc, find_arc
 from metro.cutting.corners import RawHere
 from metro.cutting.passes import chip_left, chip_slope, row_of
 
 
-@compiled
+@compiled_with_arrays
 def chips_left(scale, rows, immersion):
     """Chip (passes, n) that passes (passes, 7) leave at immersions (n,), m."""
     chips = np.empty((len(rows), len(immersion)))
@@ -20,7 +20,7 @@ def chips_left(scale, rows, immersion):
     return chips
 
 
-@compiled
+@compiled_with_arrays
 def chip_slopes(scale, rows, immersion):
     """Change (passes, n) of that with the immersion, m/rad."""
     slopes = np.empty((len(rows), len(immersion)))

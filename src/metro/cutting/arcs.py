@@ -70,13 +70,13 @@ def find_arc(scale: Scale, rows: Array, raw: RawHere, near: Near, arc: Arc) -> i
     else:
         vanishing, whole = _limits(scale, rows, near, raw, BEGINS)
         arc.corner[BEGINS, 0], arc.corner[BEGINS, 1] = vanishing, whole
-        count, low = _inserted(bounds, count, whole), max(low, vanishing)
+        count, low = inserted(bounds, count, whole), max(low, vanishing)
     if math.isnan(raw.line[ENDS]):
         high = min(high, raw.immersion[ENDS])
     else:
         vanishing, whole = _limits(scale, rows, near, raw, ENDS)
         arc.corner[ENDS, 0], arc.corner[ENDS, 1] = vanishing, whole
-        count, high = _inserted(bounds, count, whole), min(high, vanishing)
+        count, high = inserted(bounds, count, whole), min(high, vanishing)
     for at in range(1, count):
         bounds[at] = min(max(bounds[at], low), high)
     bounds[0], bounds[count] = low, high
@@ -101,7 +101,7 @@ def _covers(near: Near, sine: float, cosine: float) -> bool:
 
 
 @compiled
-def _inserted(bounds: Array, count: int, value: float) -> int:
+def inserted(bounds: Array, count: int, value: float) -> int:
     """Insert a value among ``bounds[1:count]``, which rise, and return how far they go then."""
     at = count
     while at > 1 and bounds[at - 1] > value:
@@ -160,12 +160,12 @@ def _crossings(scale: Scale, rows: Array, near: Near, bounds: Array) -> int:
             sine, cosine = b / length, -a / length
             if _covers(near, sine, cosine) and _is_least(rows, one, sine, cosine, margin):
                 phi = _settled(scale, row_of(rows, one), row_of(rows, other), math.atan2(sine, cosine))
-                count = _inserted(bounds, count, phi)
+                count = inserted(bounds, count, phi)
             if scale.true_path and sine < stray and _covers(near, -sine, -cosine):  # a little outside 0…π
                 opposite = math.atan2(sine, cosine)
                 opposite += math.pi if opposite < 1.0 else -math.pi
                 phi = _settled(scale, row_of(rows, one), row_of(rows, other), opposite)
-                count = _inserted(bounds, count, phi)
+                count = inserted(bounds, count, phi)
     return count
 
 

@@ -82,14 +82,14 @@ def path_excess(feed: float, pitch: Number, radius: Number, sine: Number, cosine
     return lean * ((0.5 * radius) * lean - feed * sine)
 
 
-def curve_excess(curvature: float, travel: Array) -> Array:
+def curve_excess(curvature: float, travel: Number) -> Number:
     """Share of cos φ, m, in the chip between two passes on a curve, ``travel`` (m) along it apart.
 
     The chord between the two centres is turned against the feed by half the angle between them, and a curve
     of radius 1/κ turns by κ × travel: travel sin(φ − κ travel / 2). Towards the centre of the curve the older
     passes have cleared more than the last one.
     """
-    return np.asarray(-0.5 * curvature * travel**2)
+    return -0.5 * curvature * travel * travel
 
 
 def path_difference(cutter: Cutter, cut: Cut) -> PathDifference:

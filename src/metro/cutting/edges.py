@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from metro.compiled import compiled
+from metro.compiled import compiled, compiled_with_arrays
 from metro.cutting.arcs import EVERYWHERE, TURN, Arc, Near, empty_arc, find_arc
 from metro.cutting.chip import Cut
 from metro.cutting.corners import BEGINS, ENDS, LARGEST_STEP, RawEdges, RawHere, beyond
@@ -80,7 +80,7 @@ def pieces(before: Passes, raw: RawEdges, along: Edges) -> Pieces:
     return Pieces(*_pieces(before, raw, along, empty_arc(before.rows.shape[2])), along.depth)
 
 
-@compiled
+@compiled_with_arrays
 def _pieces(
     before: Passes, raw: RawEdges, along: Edges, arc: Arc
 ) -> tuple[Indices, Indices, Array, Array, Array, Scale, tuple[bool, bool]]:
@@ -146,7 +146,7 @@ def _in_air(top: float, span: float) -> bool:
     return leading - span > LARGEST_STEP and leading < math.pi - LARGEST_STEP
 
 
-@compiled
+@compiled_with_arrays
 def _twice(values: Array) -> Array:
     """Return an array with room for twice as many values."""
     return np.concatenate((values, np.empty_like(values)))

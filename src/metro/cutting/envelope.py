@@ -11,11 +11,11 @@ heights, on the ball and on the flank as on the cylinder (Lee and Altintas, Int.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from metro.compiled import compiled
 from metro.cutting.cutter import Cutter
 from metro.units import Array
 
@@ -24,73 +24,78 @@ from metro.units import Array
 LARGEST_TURN, LARGEST_LAG = 0.79, 0.4  # of the edge angle and of the lag angle in a panel, rad
 
 
-@dataclass(frozen=True)
-class Place:
-    """Places along the meridian, arrays of one shape.
+class Place(NamedTuple):
+    """A place along the meridian.
 
     Attributes
     ----------
     height, radius : m. sine, cosine : of the edge angle κ between the edge's normal and the tool axis.
     """
 
-    height: Array
-    radius: Array
-    sine: Array
-    cosine: Array
-
-    def shaped(self, shape: tuple[int, ...]) -> Place:
-        """Return the places as arrays of another shape."""
-        return Place(*(each.reshape(shape) for each in (self.height, self.radius, self.sine, self.cosine)))
+    height: float
+    radius: float
+    sine: float
+    cosine: float
 
 
-@dataclass(frozen=True, eq=False)
-class Meridian:
+class Meridian(NamedTuple):
     """The meridian of a cutter up to a depth, in panels: of the corner first, then of the flank.
 
     Attributes
     ----------
-    cutter : whose meridian it is.
+    corner : its radius, m. inner : where the corner begins, m from the axis.
+    helix_cosine, lag_per_depth : of the cutter.
     start, turn : (panels,) edge angle at the lower end, and its growth, rad: 0 on the flank.
     bottom, bottom_radius : (panels,) height and radius at the lower end, m.
     length : (panels,) m.
     """
 
-    cutter: Cutter
+    corner: float
+    inner: float
+    helix_cosine: float
+    lag_per_depth: float
     start: Array
     turn: Array
     bottom: Array
     bottom_radius: Array
     length: Array
 
-    def at(self, panel: npt.NDArray[np.intp], share: Array) -> Place:
-        """Return the places at shares (0…1) of panels; the two broadcast."""
-        angle = self.start[panel] + self.turn[panel] * share
-        sine, cosine = np.sin(angle), np.cos(angle)
-        rc, straight = self.cutter.corner, (self.turn[panel] == 0.0) * share * self.length[panel]
-        on_arc = self.turn[panel] > 0.0
-        height = np.where(on_arc, rc * (1.0 - cosine), self.bottom[panel] + straight * sine)
-        of_arc = self.cutter.radius - rc + rc * sine
-        radius = np.where(on_arc, of_arc, self.bottom_radius[panel] + straight * cosine)
-        return Place(height, radius, sine, cosine)
 
-    def edge_length(self, place: Place) -> Array:
-        """Length of edge per length of the meridian, times cos(helix): 1 on a cylinder.
+@compiled
+def place_at(line: Meridian, panel: int, share: float) -> Place:
+    """Return the place at a share (0…1) of a panel."""
+    angle = line.start[panel] + line.turn[panel] * share
+    sine, cosine = math.sin(angle), math.cos(angle)
+    if line.turn[panel] > 0.0:
+        return Place(line.corner * (1.0 - cosine), line.inner + line.corner * sine, sine, cosine)
+    straight = share * line.length[panel]
+    return Place(
+        line.bottom[panel] + straight * sine, line.bottom_radius[panel] + straight * cosine, sine, cosine
+    )
 
-        Edge coefficients per axial depth of a cylinder are those per length of edge over cos(helix), so that
-        this is what they multiply at every place.
-        """
-        sideways = place.radius * place.sine * self.cutter.lag_per_depth
-        return np.asarray(math.cos(self.cutter.helix) * np.sqrt(1.0 + sideways**2))
+
+@compiled
+def edge_length(line: Meridian, place: Place) -> float:
+    """Length of edge per length of the meridian, times cos(helix): 1 on a cylinder.
+
+    Edge coefficients per axial depth of a cylinder are those per length of edge over cos(helix), so that this
+    is what they multiply at every place.
+    """
+    sideways = place.radius * place.sine * line.lag_per_depth
+    return line.helix_cosine * math.sqrt(1.0 + sideways * sideways)
 
 
 def mean_inclination(cutter: Cutter, depth: float) -> tuple[float, float]:
     """Means of sin κ and cos κ over the height of a cut of a ``depth``, m."""
     line = meridian(cutter, depth, 0.0)
-    places, weights = np.polynomial.legendre.leggauss(4)
-    panel = np.repeat(np.arange(len(line.length)), 4)
-    place = line.at(panel, np.tile(0.5 * (places + 1.0), len(line.length)))
-    height = np.tile(0.5 * weights, len(line.length)) * line.length[panel] * place.sine
-    return float(height @ place.sine / height.sum()), float(height @ place.cosine / height.sum())
+    shares, weights = np.polynomial.legendre.leggauss(4)
+    along = across = whole = 0.0
+    for panel, length in enumerate(line.length):
+        for share, weight in zip(0.5 * (shares + 1.0), weights * length, strict=True):
+            place = place_at(line, panel, share)
+            height = weight * place.sine
+            along, across, whole = along + height * place.sine, across + height * place.cosine, whole + height
+    return along / whole, across / whole
 
 
 def meridian(cutter: Cutter, depth: float, lag: float, feed: float = 0.0) -> Meridian:
@@ -121,7 +126,8 @@ def meridian(cutter: Cutter, depth: float, lag: float, feed: float = 0.0) -> Mer
         radius = cutter.radius - rc + rc * math.sin(steepest) + (at - top) / math.tan(steepest)
         even = np.full(count, steepest)
         parts.append((even, 0.0 * even, at[:-1], radius[:-1], np.diff(at) / math.sin(steepest)))
-    return Meridian(cutter, *(np.concatenate(each) for each in zip(*parts, strict=True)))
+    columns = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return Meridian(rc, cutter.radius - rc, math.cos(cutter.helix), cutter.lag_per_depth, *columns)
 
 
 def _turning(cutter: Cutter, square: float) -> float:

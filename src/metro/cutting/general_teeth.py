@@ -1,237 +1,126 @@
-"""What the teeth of a general cutter find: chips at the local radius, and the edges of the work."""
+"""What a tooth of a general cutter finds at a place of its edge: chips at the local radius, raw edges."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from metro.cutting.chip import Cut, curve_excess, feed_per_radian
+from metro.compiled import compiled
+from metro.cutting.chip import Cut, curve_excess, feed_per_radian, path_excess
 from metro.cutting.cutter import Cutter, pitches
-from metro.cutting.envelope import Place
 from metro.units import Array
 
-Indices = npt.NDArray[np.intp]
 # Where the tool's radius is not much larger than the feed, paths are no trochoids that cross a ray once:
 # closer to the tip than this many feeds per tooth, the difference to circles is taken as that at this radius.
 LEAST_RADIUS = 2.0
 
+_path_excess, _curve_excess = compiled(path_excess), compiled(curve_excess)
 
-@dataclass(frozen=True)
-class RawEdge:
-    """A raw edge of the work along the feed, at ``line``, m, of y.
 
-    ``outer``: whether the outer part of the chip is there, else the inner one (metro.cutting.corners).
+class Spot(NamedTuple):
+    """Where a tooth is at a place of its edge.
+
+    Attributes
+    ----------
+    tooth : its number. radius : of the place, m. lag_sine, lag_cosine : of the angle by which the edge lags.
+    sine, cosine : of the immersion.
     """
 
+    tooth: int
+    radius: float
+    lag_sine: float
+    lag_cosine: float
+    sine: float
+    cosine: float
+
+
+class RawLine(NamedTuple):
+    """A raw edge of the work along the feed, at ``line``, m, of y.
+
+    ``there``: whether there is one. ``outer``: whether on true paths the outer part of the chip is there,
+    else the inner one (metro.cutting.corners). ``side`` of y on which the tooth's rays cross it.
+    """
+
+    there: bool
     line: float
     outer: bool
-    begins: bool
+    side: float
 
 
-@dataclass(frozen=True, eq=False)
-class Teeth:
+class Face(NamedTuple):
+    """A face of the work square to the feed, at ``x``, m, and on which side the work is (±1; 0: no face).
+
+    ``behind``: half of the cutter, of y, that the face ends as a whole (±1; 0: neither).
+    """
+
+    side: float
+    x: float
+    behind: float
+
+
+class Reach(NamedTuple):
+    """How far a tooth's ``tip`` is from the axis, m, and cosine of its immersion.
+
+    ``least``: that it is beyond an edge which its ray does not cross, m.
+    """
+
+    tip: float
+    cosine: float
+    least: float
+
+
+class Teeth(NamedTuple):
     """Teeth of a cutter in a cut.
 
     Attributes
     ----------
-    passes : number of earlier passes that may bound a chip. pitch : (passes, N) to the tooth of each, rad.
+    true_path : whether the paths are trochoids, else circles. feed : m/rad. least : the radius below which
+        paths are taken as at this one, m. curvature : of the path, 1/m.
+    pitch : (passes, N) to the tooth that made each pass that may bound a chip, rad.
     off : (3, N + 1, N) deviation from the radius of the tooth some places ahead of each, m: shares of the
         cosine and of the sine of the lag angle, and what is steady; (3, 0, 0) where there is none.
-    raw : the raw edges.
+    radius : of the cutter, m. begins, ends : raw edges. entry, exit : faces.
     """
 
-    cutter: Cutter
-    cut: Cut
     true_path: bool
-    passes: int
+    feed: float
+    least: float
+    curvature: float
     pitch: Array
     off: Array
-    raw: tuple[RawEdge, ...]
-
-    @property
-    def chip_count(self) -> int:
-        """Number of chips of which the least counts."""
-        if not self.true_path:
-            return self.passes
-        outer = sum(edge.outer for edge in self.raw)
-        return self.passes * (1 + len(self.raw) - outer) + outer
-
-    @property
-    def only_passes(self) -> bool:
-        """Whether nothing but passes bounds what a tooth cuts."""
-        arc = self.cut.engagement
-        return not (self.raw or arc.entry_face or arc.exit_face)
-
-    @property
-    def outside(self) -> float:
-        """Sine of the immersion behind which no tooth cuts: on true paths half the feed over the radius.
-
-        Of the pass a turn ago where teeth deviate, for that one is the tooth's own.
-        """
-        inner = np.array(self.cutter.radius - self.cutter.corner)
-        return (
-            0.5 * self.passes * self.cut.feed_per_tooth / float(self.least(inner)) if self.true_path else 0.0
-        )
-
-    def reach(self, radius: float) -> tuple[float, float]:
-        """Immersions between which teeth cut all that they cut, rad, whatever the height and the deviations.
-
-        A raw edge on the side of the axis on which teeth that are nearer to it pass it later than the others
-        begins what they cut, and likewise one that they pass earlier ends it.
-
-        Parameters
-        ----------
-        radius : the largest one, m.
-        """
-        beyond = math.asin(min(self.outside, 1.0))
-        low, high = -beyond, math.pi + beyond
-        farthest = radius + self.cutter.runout_radius + float(np.abs(self.cutter.reach or 0.0).max())
-        for edge in self.raw:
-            at = math.acos(max(-1.0, min(edge.line / farthest, 1.0)))
-            if edge.outer and edge.begins:
-                low = at
-            elif edge.outer:
-                high = at
-        return low, high
-
-    def alone_from(self, radius: float) -> float:
-        """Sine of the immersion from which on the last pass alone bounds chips that are no nearer than that.
-
-        An older pass leaves more by (travel since) × sin φ, but for the deviations from the radius; on true
-        paths, with a the feed per radian over the radius, by a share a of it less and by pitch × a² of the
-        deviations, while what the square of the pitch makes only adds. Infinite on a curve.
-
-        Parameters
-        ----------
-        radius : the least one, m.
-        """
-        if self.cut.curvature and self.true_path:
-            return math.inf
-        feed = feed_per_radian(self.cutter, self.cut)
-        apart = 2.0 * self.cutter.runout_radius + float(np.ptp(self.cutter.reach or 0.0))
-        since = feed * float((self.pitch[1:] - self.pitch[0]).min())
-        nearest = float(self.least(np.array(radius))) - apart
-        lean = feed / nearest if self.true_path else 0.0
-        if nearest <= 0.0 or lean >= 1.0:
-            return math.inf
-        return apart * (1.0 + float(self.pitch[0].max()) * lean**2) / (since * (1.0 - lean))
-
-    def least(self, radius: Array) -> Array:
-        """Return the radius at which paths are taken as true ones, m."""
-        return np.sqrt(np.sqrt(radius**4 + (LEAST_RADIUS * self.cut.feed_per_tooth) ** 4))
-
-    def after(
-        self, passed: Indices | np.intp, tooth: Indices, place: Place, sine: Array, cosine: Array
-    ) -> Array:
-        """Chips in the plane that passes 0… leave to teeth at places, m; all broadcast.
-
-        On true paths with :func:`metro.cutting.chip.path_excess`, put so that it takes few temporaries.
-        """
-        feed = feed_per_radian(self.cutter, self.cut)
-        pitch = self.pitch[passed, tooth]
-        travel = feed * pitch
-        earlier: Array | float = 0.0
-        cleared: Array | float = 0.0
-        if self.off.size:
-            lag = self._lag(place)
-            earlier = self._wave(passed + 1, tooth, lag)
-            cleared = self._wave(np.intp(0), tooth, lag) - earlier
-        if self.true_path:
-            lean = feed / (self.least(place.radius) + earlier) * cosine
-            rest = 1.0 - lean
-            lean *= rest
-            rest *= cosine
-            chip = 0.5 * pitch * rest
-            chip -= sine
-            chip *= lean
-            chip += sine
-            chip *= travel
-            if self.cut.curvature:
-                chip += curve_excess(self.cut.curvature, travel) * cosine
-        else:
-            chip = travel * sine
-        if self.off.size:
-            chip += cleared
-        return np.asarray(chip)
-
-    def chips(self, tooth: Indices, place: Place, sine: Array, cosine: Array) -> Array:
-        """Chips in the plane of which the least counts, (chips, …) m, of teeth at places; all broadcast.
-
-        Each pass leaves one. On true paths a raw edge leaves of them what is beyond it, or before it: where
-        it is between a tooth's tip and what was cleared, only that part of the chip is there.
-        """
-        last = self.after(np.intp(0), tooth, place, sine, cosine)
-        chips = np.empty((self.passes, *last.shape))
-        chips[0] = last
-        for older in range(1, self.passes):  # one by one: each fits a cache, all together do not
-            chips[older] = self.after(np.intp(older), tooth, place, sine, cosine)
-        if not (self.true_path and self.raw):
-            return chips
-        own = self._wave(np.intp(0), tooth, self._lag(place)) if self.off.size else 0.0
-        return np.concatenate([chips, *self._at_raw_edges(chips, place.radius + own, cosine)])
-
-    def _at_raw_edges(self, chips: Array, tip: Array, cosine: Array) -> list[Array]:
-        """Return what raw edges leave of chips, of a tooth whose ``tip`` is so far from the axis, m."""
-        left: list[Array] = []
-        for edge in self.raw:
-            side = 1.0 if edge.outer != edge.begins else -1.0  # of y on which rays cross it
-            crossing = side * cosine > 0.0
-            beyond = np.where(
-                crossing, tip - edge.line / np.where(crossing, cosine, 1.0), -self.cutter.radius
-            )
-            np.maximum(beyond, -self.cutter.radius, out=beyond)
-            left.append(np.broadcast_to(beyond, chips.shape[1:])[None] if edge.outer else chips - beyond)
-        return left
-
-    def _lag(self, place: Place) -> tuple[Array, Array]:
-        angle = self.cutter.lag_per_depth * place.height
-        return np.cos(angle), np.sin(angle)
-
-    def _wave(self, ahead: Indices | np.intp, tooth: Indices, lag: tuple[Array, Array]) -> Array:
-        """Deviations from the radius, m, of the teeth so many places ``ahead``, where the lag is so."""
-        cosine, sine, steady = self.off[:, ahead, tooth]
-        wave = cosine * lag[0] + sine * lag[1]
-        return np.asarray(wave + steady if self.cutter.reach else wave)
-
-    def levels(self, tooth: Indices, place: Place, sine: Array, cosine: Array) -> Array:
-        """All that must be above zero where a tooth cuts, (levels, …) m: the chips first."""
-        chips = self.chips(tooth, place, sine, cosine)
-        inside = self._inside(place, sine, cosine)
-        return np.concatenate([chips, inside]) if inside else chips
-
-    def _inside(self, place: Place, sine: Array, cosine: Array) -> list[Array]:
-        """How far places are inside the work's faces and, on circular paths, its raw edges, m."""
-        arc, radius = self.cut.engagement, self.cutter.radius
-        x, y = place.radius * sine, place.radius * cosine
-        inside = []
-        if not self.true_path:
-            inside += [edge.line - y if edge.begins else y - edge.line for edge in self.raw]
-        if arc.entry_face:
-            beyond = x - radius * math.sin(arc.entry)
-            inside += [beyond] if arc.entry < 0.5 * math.pi else [-beyond, -y]
-        if arc.exit_face:
-            beyond = x - radius * math.sin(arc.exit)
-            inside += [beyond] if arc.exit > 0.5 * math.pi else [-beyond, y]
-        return inside
+    radius: float
+    begins: RawLine
+    ends: RawLine
+    entry: Face
+    exit: Face
 
 
 def teeth_in(cutter: Cutter, cut: Cut, *, true_path: bool) -> Teeth:
     """Return the teeth of a cutter in a cut."""
     wobbles = bool(cutter.runout_radius or any(cutter.reach))
     passes = cutter.teeth if wobbles or (cut.curvature and true_path) else 1
-    pitch = pitches(cutter.tooth_angles, passes)
     arc = cut.engagement
-    ends = [(arc.entry, True)] * (arc.entry > 0.0 and not arc.entry_face)
-    ends += [(arc.exit, False)] * (arc.exit < math.pi and not arc.exit_face)
-    raw = [
-        RawEdge(cutter.radius * math.cos(end), (math.cos(end) < 0.0) == begins, begins)
-        for end, begins in ends
-    ]
-    off = _deviations(cutter) if wobbles else np.zeros((3, 0, 0))
-    return Teeth(cutter, cut, true_path, passes, pitch, off, tuple(raw))
+    entry, exit_ = cutter.radius * math.sin(arc.entry), cutter.radius * math.sin(arc.exit)
+    return Teeth(
+        true_path,
+        feed_per_radian(cutter, cut),
+        LEAST_RADIUS * cut.feed_per_tooth,
+        cut.curvature if true_path else 0.0,
+        pitches(cutter.tooth_angles, passes),
+        _deviations(cutter) if wobbles else np.zeros((3, 0, 0)),
+        cutter.radius,
+        _raw_line(cutter.radius, arc.entry, arc.entry > 0.0 and not arc.entry_face, begins=True),
+        _raw_line(cutter.radius, arc.exit, arc.exit < math.pi and not arc.exit_face, begins=False),
+        Face(arc.entry_face * (1.0 if arc.entry < 0.5 * math.pi else -1.0), entry, -1.0),
+        Face(arc.exit_face * (1.0 if arc.exit > 0.5 * math.pi else -1.0), exit_, 1.0),
+    )
+
+
+def _raw_line(radius: float, immersion: float, there: bool, *, begins: bool) -> RawLine:
+    outer = (math.cos(immersion) < 0.0) == begins
+    return RawLine(there, radius * math.cos(immersion), outer, 1.0 if outer != begins else -1.0)
 
 
 def _deviations(cutter: Cutter) -> Array:
@@ -241,3 +130,121 @@ def _deviations(cutter: Cutter) -> Array:
     wave = np.stack([*(cutter.runout_radius * np.array([np.cos(towards), -np.sin(towards)])), reach])
     ahead = np.arange(cutter.teeth + 1)[:, None] + np.arange(cutter.teeth)
     return np.asarray(wave[:, ahead % cutter.teeth])
+
+
+def reach(teeth: Teeth, farthest: float, inner: float) -> tuple[float, float]:
+    """Immersions between which teeth cut all that they cut, rad, whatever the height and the deviations.
+
+    On true paths a tooth cuts from half the feed over the radius before circles do, of the pass a turn ago
+    where teeth deviate, for that one is the tooth's own. A raw edge on the side of the axis on which teeth
+    that are nearer to it pass it later than the others begins what they cut, and likewise one that they pass
+    earlier ends it.
+
+    Parameters
+    ----------
+    farthest, inner : the largest radius, with the deviations, and the least one, m.
+    """
+    travel = teeth.feed * float(teeth.pitch.max())
+    beyond = math.asin(min(0.5 * travel / true_radius(teeth, inner), 1.0)) if teeth.true_path else 0.0
+    low, high = -beyond, math.pi + beyond
+    if teeth.begins.there and teeth.begins.outer:
+        low = math.acos(max(-1.0, min(teeth.begins.line / farthest, 1.0)))
+    if teeth.ends.there and teeth.ends.outer:
+        high = math.acos(max(-1.0, min(teeth.ends.line / farthest, 1.0)))
+    return low, high
+
+
+def alone_from(teeth: Teeth, cutter: Cutter, inner: float) -> float:
+    """Sine of the immersion from which on the last pass alone bounds chips that are no nearer than ``inner``.
+
+    An older pass leaves more by (travel since) × sin φ, but for the deviations from the radius; on true
+    paths, with a the feed per radian over the radius, by a share a of it less and by pitch × a² of the
+    deviations, while what the square of the pitch makes only adds. Infinite on a curve.
+    """
+    if teeth.curvature or len(teeth.pitch) == 1:
+        return math.inf
+    apart = 2.0 * cutter.runout_radius + float(np.ptp(cutter.reach or 0.0))
+    since = teeth.feed * float((teeth.pitch[1:] - teeth.pitch[0]).min())
+    nearest = true_radius(teeth, inner) - apart
+    lean = teeth.feed / nearest if teeth.true_path else 0.0
+    if nearest <= 0.0 or lean >= 1.0:
+        return math.inf
+    return apart * (1.0 + float(teeth.pitch[0].max()) * lean**2) / (since * (1.0 - lean))
+
+
+@compiled
+def true_radius(teeth: Teeth, radius: float) -> float:
+    """Return the radius at which paths are taken as true ones, m."""
+    squares = radius * radius, teeth.least * teeth.least
+    return math.sqrt(math.sqrt(squares[0] * squares[0] + squares[1] * squares[1]))
+
+
+@compiled
+def levels_at(teeth: Teeth, spot: Spot, levels: Array) -> int:
+    """Write all that must be above zero where a tooth cuts, m: the chips first. Return how many chips.
+
+    Each pass leaves a chip in the plane. On true paths a raw edge leaves of them what is beyond it, or before
+    it: where it is between a tooth's tip and what was cleared, only that part of the chip is there.
+    """
+    passes, wobbles = len(teeth.pitch), teeth.off.size > 0
+    sine, cosine = spot.sine, spot.cosine
+    own = _wave(teeth.off, 0, spot) if wobbles else 0.0
+    path = true_radius(teeth, spot.radius) if teeth.true_path else 0.0
+    for m in range(passes):
+        pitch = teeth.pitch[m, spot.tooth]
+        earlier = _wave(teeth.off, m + 1, spot) if wobbles else 0.0
+        chip = teeth.feed * pitch * sine + own - earlier
+        if teeth.true_path:
+            chip += _path_excess(teeth.feed, pitch, path + earlier, sine, cosine)
+            chip += _curve_excess(teeth.curvature, teeth.feed * pitch) * cosine
+        levels[m] = chip
+    count = passes
+    if teeth.true_path:
+        reach_of = Reach(spot.radius + own, cosine, -teeth.radius)
+        count = _at_raw_edge(teeth.begins, reach_of, levels, passes, count)
+        count = _at_raw_edge(teeth.ends, reach_of, levels, passes, count)
+    return count
+
+
+@compiled
+def _wave(off: Array, ahead: int, spot: Spot) -> float:
+    """Deviation from the radius, m, of the tooth so many places ``ahead``."""
+    wave: float = off[0, ahead, spot.tooth] * spot.lag_cosine + off[1, ahead, spot.tooth] * spot.lag_sine
+    wave += off[2, ahead, spot.tooth]
+    return wave
+
+
+@compiled
+def _at_raw_edge(edge: RawLine, tooth: Reach, levels: Array, passes: int, count: int) -> int:
+    """Append what a raw edge leaves of the chips of a tooth."""
+    if not edge.there:
+        return count
+    beyond = tooth.least
+    if edge.side * tooth.cosine > 0.0:
+        beyond = max(tooth.tip - edge.line / tooth.cosine, beyond)
+    if edge.outer:
+        levels[count] = beyond
+        return count + 1
+    for m in range(passes):
+        levels[count + m] = levels[m] - beyond
+    return count + passes
+
+
+@compiled
+def bounds_at(teeth: Teeth, spot: Spot, levels: Array, count: int) -> int:
+    """Append how far a place is inside the work's faces and, on circular paths, its raw edges, m."""
+    x, y = spot.radius * spot.sine, spot.radius * spot.cosine
+    if not teeth.true_path and teeth.begins.there:
+        levels[count] = teeth.begins.line - y
+        count += 1
+    if not teeth.true_path and teeth.ends.there:
+        levels[count] = y - teeth.ends.line
+        count += 1
+    for face in (teeth.entry, teeth.exit):
+        if face.side != 0.0:
+            levels[count] = face.side * (x - face.x)
+            count += 1
+        if face.side < 0.0:
+            levels[count] = face.behind * y
+            count += 1
+    return count

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from metro.compiled import compiled
+from metro.compiled import compiled_with_arrays
 from metro.cutting.edges import HIGH, LOW, Pieces, chip_of, piece_of
 from metro.cutting.law import EdgeLaw
 from metro.units import Array
@@ -48,7 +48,7 @@ def ends(cut: Pieces) -> Points:
     return _along(cut, WHOLE, np.zeros(2))
 
 
-@compiled
+@compiled_with_arrays
 def _along(cut: Pieces, places: Array, weights: Array) -> Points:
     bounds, sine = cut.bounds, np.empty((len(cut.bounds), len(places)))
     cosine, chip = np.empty_like(sine), np.empty_like(sine)
@@ -72,7 +72,7 @@ def of_points(cut: Pieces, along: Points, law: EdgeLaw, angles: int) -> Array:
     return _summed(cut, along, law.shear(along.chip), angles)
 
 
-@compiled
+@compiled_with_arrays
 def _summed(cut: Pieces, along: Points, shear: Array, angles: int) -> Array:
     """Force per unit of each coefficient: shear in the first three columns, edge in the others."""
     angle, bounds, sine, cosine, weights = cut.angle, cut.bounds, along.sine, along.cosine, along.weights
