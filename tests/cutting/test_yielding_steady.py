@@ -12,7 +12,8 @@ from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement, engagement
 from metro.cutting.force import force_basis
 from metro.cutting.law import EdgeLaw
-from metro.cutting.yielding_steady import ANGLES, NotBalancedError, deflection, yielding_basis
+from metro.cutting.yielding_steady import ANGLES, NotBalancedError, deflection
+from metro.cutting.yielding_steady import yielding as solved
 from metro.signals.orders import order_matrix, to_orders
 from virtual_cell.chips import Engagement as TrueEngagement
 from virtual_cell.chips import Tool
@@ -42,7 +43,7 @@ def rigid(cutter, cut, true_path=False):
 
 
 def yielding(cutter, cut, compliance, true_path=False):
-    return yielding_basis(cutter, EdgeLaw(), cut, STEEL, compliance, true_path=true_path) @ STEEL
+    return solved(cutter, EdgeLaw(), cut, STEEL, compliance, true_path=true_path).basis @ STEEL
 
 
 def rms(wave):
@@ -140,7 +141,7 @@ def test_the_deflection_is_that_of_a_spring_under_the_force(teeth, cut, runout, 
     cutter, law = tool(teeth, runout, angles), EdgeLaw(size_exponent=exponent, reference_thickness=50e-6)
     compliance = np.array([[1 / spring[0], spring[2]], [spring[2], 1 / spring[1]]]) * 1e-6
     bent = deflection(cutter, law, CUTS[cut], STEEL, compliance)
-    force = yielding_basis(cutter, law, CUTS[cut], STEEL, compliance) @ STEEL
+    force = solved(cutter, law, CUTS[cut], STEEL, compliance).basis @ STEEL
     expected = force[:: ANGLES // len(bent), :2] @ compliance
     # At the few angles where a tooth just touches there may be no better balance than a hundredth.
     assert bent == pytest.approx(expected, abs=0.011 * np.abs(expected).max())
@@ -220,3 +221,20 @@ def simulated_change(motion, teeth, runout, compliance, speed):
     change = np.stack([c * x + s * y, c * y - s * x, z], axis=1)
     steady = time > 8 * math.pi / speed
     return np.linalg.lstsq(order_matrix(speed * time[steady], ORDERS), change[steady], rcond=None)[0]
+
+
+@pytest.mark.parametrize("true_path", [False, True])
+@pytest.mark.parametrize("cut", list(CUTS))
+def test_from_a_tool_that_hardly_differs_one_step_gives_the_derivative(cut, true_path):
+    before, law = CUTS[cut], EdgeLaw()
+
+    def force(runout, soft, start=None):
+        found = solved(tool(4, runout), law, before, STEEL, SOFT * soft, true_path=true_path, start=start)
+        return found.basis @ STEEL
+
+    start = deflection(tool(4, 8e-6), law, before, STEEL, SOFT, true_path=true_path)
+    for runout, soft in ((8.008e-6, 1.0), (8e-6, 1.001)):
+        expected = force(runout, soft) - force(8e-6, 1.0)
+        change = force(runout, soft, start) - force(8e-6, 1.0, start)
+        assert rms(change - expected) < 0.02 * rms(expected)
+        assert rms(expected) > 1e-5 * rms(force(8e-6, 1.0))

@@ -15,7 +15,7 @@ from metro.cutting.engagement import Engagement
 from metro.cutting.helical import Helix, ramped
 from metro.cutting.helical import turn as turn_about_z
 from metro.cutting.law import EdgeLaw
-from metro.cutting.yielding_steady import yielding_basis
+from metro.cutting.yielding_steady import yielding
 from metro.effects import tool_runout
 from metro.effects.tool_deflection import EFFECT, apply
 from metro.loop.checks.evidence import compare
@@ -122,7 +122,7 @@ def test_on_an_orbit_each_time_block_has_the_spring_as_it_stands_to_the_feed():
         c, s = math.cos(feed), math.sin(feed)
         turn = np.array([[c, s], [-s, c]])
         compliance = turn @ np.diag([1 / 10e6, 1 / 5e6]) @ turn.T
-        basis = to_orders(yielding_basis(cutter, law, cut, STEEL, compliance, true_path=True), 12)
+        basis = to_orders(yielding(cutter, law, cut, STEEL, compliance, true_path=True).basis, 12)
         expected = (turn_about_z(start) @ ramped(advance(basis, phase), setting.helix.ramp) @ STEEL).T
         change = np.linalg.norm(expected - rigid[b])
         assert np.linalg.norm(predicted[b] - expected) < 0.1 * change

@@ -39,35 +39,65 @@ class NotBalancedError(RuntimeError):
         self.error = error
 
 
-def yielding_basis(
-    cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array, compliance: Array, *, true_path: bool = False
-) -> Array:
+class Yielding(NamedTuple):
     """Force on a tool that yields per unit of each coefficient, (ANGLES, 3, 6), else as of ``force_basis``.
 
-    The tool is displaced as it is with ``coefficients`` (6,): times these the basis is the force in balance.
+    ``bent``: the deflection, of :func:`deflection`. Times the coefficients of that the basis is the force in
+    balance.
+    """
+
+    basis: Array
+    bent: Array
+
+
+def yielding(
+    cutter: Cutter,
+    law: EdgeLaw,
+    cut: Cut,
+    coefficients: Array,
+    compliance: Array,
+    *,
+    true_path: bool = False,
+    start: Array | None = None,
+) -> Yielding:
+    """Force and deflection of a tool that yields.
+
     The change of the swept path by the tip's movement (on true paths) is neglected in the balance itself: it
     is less than some hundredths of the force.
 
     Parameters
     ----------
-    compliance : (2, 2) m/N, feed frame, positive definite.
+    coefficients : (6,). compliance : (2, 2) m/N, feed frame, positive definite.
+    start : of :func:`deflection`.
 
     Raises
     ------
     NotBalancedError
         As :func:`deflection`.
     """
-    coarse = deflection(cutter, law, cut, coefficients, compliance, true_path=true_path)
-    spectrum = np.fft.rfft(coarse, axis=0) * (ANGLES / len(coarse))
-    bent = np.fft.irfft(spectrum, ANGLES, axis=0)
-    pieces, _ = displaced(cutter, cut, compliance, ANGLES, true_path).pieces(bent, swept=true_path)
-    return assembled(pieces, law, ANGLES)
+    bent = deflection(cutter, law, cut, coefficients, compliance, true_path=true_path, start=start)
+    spectrum = np.fft.rfft(bent, axis=0) * (ANGLES / len(bent))
+    finer = np.fft.irfft(spectrum, ANGLES, axis=0)
+    pieces, _ = displaced(cutter, cut, compliance, ANGLES, true_path).pieces(finer, swept=true_path)
+    return Yielding(assembled(pieces, law, ANGLES), bent)
 
 
 def deflection(
-    cutter: Cutter, law: EdgeLaw, cut: Cut, coefficients: Array, compliance: Array, *, true_path: bool = False
+    cutter: Cutter,
+    law: EdgeLaw,
+    cut: Cut,
+    coefficients: Array,
+    compliance: Array,
+    *,
+    true_path: bool = False,
+    start: Array | None = None,
 ) -> Array:
     """Deflection of the tip (n, 2) m, feed frame, at n even angles of tooth 0 over a revolution.
+
+    Parameters
+    ----------
+    start : deflection of a tool that hardly differs in a cut that hardly does, such as for a derivative: one
+        step leads from it. None: of none.
 
     Raises
     ------
@@ -76,15 +106,21 @@ def deflection(
         into the work, or thrown out of it.
     """
     count = cutter.teeth * math.ceil(LEAST_ANGLES / cutter.teeth)
-    circular = _Spring(displaced(cutter, cut, compliance, count, False), law, coefficients, compliance)
-    bent = _balanced(circular)
-    if not true_path:
-        return bent
+
+    def spring(true: bool) -> _Spring:
+        return _Spring(displaced(cutter, cut, compliance, count, true), law, coefficients, compliance)
+
+    if start is not None:
+        return _stepped(spring(true_path), start, 1)
+    bent = _balanced(spring(False))
     # Circular paths, which are quick, lead to where true ones take few steps: always as many, so that the
     # deflection is a smooth function of the compliance.
-    true = _Spring(displaced(cutter, cut, compliance, count, True), law, coefficients, compliance)
-    for _ in range(STEPS_ON_TRUE_PATHS):
-        bent = bent + _step(true, true.balance(bent))
+    return _stepped(spring(True), bent, STEPS_ON_TRUE_PATHS) if true_path else bent
+
+
+def _stepped(spring: _Spring, bent: Array, steps: int) -> Array:
+    for _ in range(steps):
+        bent = bent + _step(spring, spring.balance(bent))
     return bent
 
 

@@ -146,6 +146,20 @@ def predictions(model: Model, block: Block, nuisances: Array, beta: Array) -> Ar
 
 
 @runtime_checkable
+class Moved(Protocol):
+    """A model that is computed faster as a small change of another one, such as for a derivative."""
+
+    def moved_from(self, origin: Any) -> Model:
+        """Return the model as a small change of another of its kind."""
+        ...
+
+
+def moved_from(model: Model, origin: Model) -> Model:
+    """Return a model as a small change of another one; as it is where that makes nothing faster."""
+    return model.moved_from(origin) if isinstance(model, Moved) and type(model) is type(origin) else model
+
+
+@runtime_checkable
 class Limited(Protocol):
     """A model without a valid prediction for some values of its parameters, where only a search may go."""
 

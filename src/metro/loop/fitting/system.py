@@ -16,7 +16,7 @@ import numpy as np
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.noise import Noise, Whitener
-from metro.observables.problem import Block, Model, predictions
+from metro.observables.problem import Block, Model, moved_from, predictions
 from metro.units import Array
 
 THETA_STEP = 1e-3  # in units of the parameter's scale
@@ -141,11 +141,14 @@ def sensitivities(
     ``moved``: the model with each effect parameter moved, of :func:`moved_models`. All are predicted by one
     way, so that a parameter that changes nothing has a derivative of exactly zero and no direction.
     """
-    here = nuisance[None]
-    predicted = predictions(model, block, here, beta)[0]
-    effect = [(predictions(other, block, here, beta)[0] - predicted) / step for other, step in moved]
+    here, unmoved = nuisance[None], moved_from(model, model)
+    predicted = predictions(unmoved, block, here, beta)[0]
+    effect = [
+        (predictions(moved_from(other, model), block, here, beta)[0] - predicted) / step
+        for other, step in moved
+    ]
     places = nuisance + NUISANCE_STEP * np.eye(len(nuisance))
-    own = (predictions(model, block, places, beta) - predicted) / NUISANCE_STEP
+    own = (predictions(unmoved, block, places, beta) - predicted) / NUISANCE_STEP
     return np.array(effect).reshape(-1, len(predicted)).T, own.T
 
 

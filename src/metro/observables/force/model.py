@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from metro.cutting.engagement import with_wall_proud
 from metro.cutting.force import COEFFICIENTS, Cut, force_basis
 from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped, turn
 from metro.cutting.law import EdgeLaw
-from metro.cutting.yielding_steady import NotBalancedError, yielding_basis
+from metro.cutting.yielding_steady import NotBalancedError, yielding
 from metro.observables.force.dynamometer import Dynamometer, Recording, transfer
 from metro.observables.problem import Block, Parameter
 from metro.signals.orders import amplitudes, from_amplitudes, to_orders
@@ -80,6 +81,8 @@ class ForceModel:
     immersion). A block's nuisance is the angle of tooth 0 at the record's start, rad, and in helical milling
     also the direction of feed there. ``bottom_edges`` names those of K_Fac and K_Fae that the helical runs
     can identify. ``end_declared``: whether the cutter's end is that of the manifest, else it is assumed flat.
+    ``origin``: the model that this one hardly differs from, such as for a derivative: the deflection of a
+    tool that yields is found from that of the origin, by one step.
     """
 
     cutter: Cutter
@@ -90,6 +93,11 @@ class ForceModel:
     sensor: Dynamometer = field(default_factory=Dynamometer)
     chipped: tuple[Chipped, ...] = ()
     end_declared: bool = False
+    origin: ForceModel | None = None
+
+    def moved_from(self, origin: ForceModel) -> ForceModel:
+        """Return the model as a small change of another."""
+        return replace(self, origin=origin)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -188,22 +196,29 @@ class ForceModel:
         """Return the cutter, and the cylinder that it would be with a flat end."""
         return self.cutter, replace(self.cutter, corner=0.0, taper=0.0)
 
-    def _yielding(self, setting: ForceSetting, beta: Array) -> list[_Yielding]:
+    def _yielding(self, setting: ForceSetting, beta: Array) -> list[_Orders]:
         """Return the force on a tool that yields, in each direction of feed that is computed."""
+        starts: Sequence[_Soft | None] = [None] * len(FEEDS)
+        if self.origin and any(self.origin.structure.compliance):
+            starts = self.origin._soft(setting, beta)
+        return [
+            _yielding_orders(soft, setting.highest, start)
+            for soft, start in zip(self._soft(setting, beta), starts, strict=False)
+        ]
+
+    def _soft(self, setting: ForceSetting, beta: Array) -> list[_Soft]:
+        """Return the tool that yields and its cut, in each direction of feed that is computed."""
+        cut = self._cutting(setting).cut
         worn = tuple((beta[:6] * np.repeat([1.0, self.law.edge(setting.cut_length)], 3)).tolist())
         return [
-            _yielding_orders(
-                *(self._ends()[1], self.law, setting.cut, self.structure.seen(feed), worn),
-                highest=setting.highest,
-                true_path=self.true_path,
-            )
+            _Soft(self._ends()[1], self.law, cut, self.structure.seen(feed), worn, self.true_path)
             for feed in (FEEDS if setting.helix else (setting.feed_direction,))
         ]
 
     def beyond(self, block: Block, beta: Array) -> str:
         """Say that a tool this soft would not cut steadily, if force and deflection have no equilibrium."""
         if not any(self.structure.compliance) or all(
-            each.balanced for each in self._yielding(self._cutting(block.setting), beta)
+            each.balanced for each in self._yielding(block.setting, beta)
         ):
             return ""
         return "force and deflection find no balance: a tool this soft would not cut steadily"
@@ -259,38 +274,47 @@ def _order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path
     return basis
 
 
-class _Yielding(NamedTuple):
-    """Amplitudes of the orders of a tool that yields, and whether they are those of its whole compliance."""
+class _Soft(NamedTuple):
+    """A tool that yields, its cut, its compliance xx, yy, xy in the feed frame, and its coefficients."""
+
+    cutter: Cutter
+    law: EdgeLaw
+    cut: Cut
+    spring: tuple[float, float, float]
+    coefficients: tuple[float, ...]
+    true_path: bool
+
+
+class _Orders(NamedTuple):
+    """Amplitudes of the orders of a tool that yields; its deflection, None where it is not balanced."""
 
     orders: ComplexArray
-    balanced: bool
+    bent: Array | None
+
+    @property
+    def balanced(self) -> bool:
+        """Whether the orders are those of its whole compliance."""
+        return self.bent is not None
 
 
 @lru_cache(maxsize=1024)
-def _yielding_orders(
-    cutter: Cutter,
-    law: EdgeLaw,
-    cut: Cut,
-    spring: tuple[float, float, float],
-    coefficients: tuple[float, ...],
-    *,
-    highest: int,
-    true_path: bool,
-) -> _Yielding:
+def _yielding_orders(soft: _Soft, highest: int, start: _Soft | None) -> _Orders:
     """Return the orders of a tool that yields; the compliance is halved until the tool cuts steadily.
 
     A search then has a slope to follow. A fit that ends there is not a result (``ForceModel.beyond``).
+    ``start``: a tool that hardly differs.
     """
-    along, across, mixed = spring
-    compliance = np.array([[along, mixed], [mixed, across]])
-    sharp, balanced = np.array(coefficients), True
+    along, across, mixed = soft.spring
+    compliance, sharp = np.array([[along, mixed], [mixed, across]]), np.array(soft.coefficients)
+    tool, balanced = (soft.cutter, soft.law, soft.cut), True
+    bent = _yielding_orders(start, highest, None).bent if start else None
     while True:
         try:
-            basis = yielding_basis(cutter, law, cut, sharp, compliance, true_path=true_path)
+            found = yielding(*tool, sharp, compliance, true_path=soft.true_path, start=bent)
         except NotBalancedError:
             compliance, balanced = 0.5 * compliance, False
         else:
             break
-    orders = amplitudes(to_orders(basis, highest))
+    orders = amplitudes(to_orders(found.basis, highest))
     orders.flags.writeable = False
-    return _Yielding(orders, balanced)
+    return _Orders(orders, found.bent if balanced else None)
