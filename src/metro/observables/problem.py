@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, runtime_check
 
 import numpy as np
 
-from metro.units import Array
+from metro.units import Array, ComplexArray
 
 if TYPE_CHECKING:
     from metro.observables.task import Handler
@@ -143,6 +143,23 @@ def predictions(model: Model, block: Block, nuisances: Array, beta: Array) -> Ar
         return model.predictions(block, nuisances, beta)
     designs = [model.design(block, nuisance, beta) for nuisance in nuisances]
     return np.array([offset + matrix @ beta for matrix, offset in designs]).reshape(-1, len(block.measured))
+
+
+@runtime_checkable
+class Overlaid(Protocol):
+    """A model whose blocks can be laid over one another, whatever the own unknowns of each."""
+
+    def overlaid(self, block: Block, nuisance: Array, values: Array) -> ComplexArray:
+        """Lay values (n,) of a block where those of all blocks are: (channels, harmonics), averaged."""
+        ...
+
+    def circumstances(self, block: Block) -> Mapping[str, float]:
+        """Return the settings of a block's run to which a waveform may be proportional, SI."""
+        ...
+
+    def place(self, channel: int, harmonic: int) -> tuple[str, str]:
+        """Return axis and label of a place of what is laid over."""
+        ...
 
 
 @runtime_checkable

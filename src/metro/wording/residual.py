@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from metro.units import JSON, printed, printed_name
 from metro.wording.candidates import Sentence
-from metro.wording.names import plain
+from metro.wording.names import listed, plain
 
 MOST_PLACES = 4  # that are named
 LEAST_CHANCE = 1e-4  # below it, tails of the distribution are no figure to quote
@@ -125,7 +125,55 @@ def _noise(values: JSON) -> str:
     return words
 
 
+PARTS = {
+    "same": "is the same in every run",
+    "feed": "grows with the feed",
+    "depth": "grows with the depth",
+    "speed": "grows with the spindle speed",
+    "arc": "grows with the arc of engagement",
+    "travel": "grows with the length cut",
+}
+KINDS = {
+    "same": "a cause that does not depend on the chip, such as an imbalance or a wave of the sensor",
+    "feed": "a cause between the chip and the sensor, such as a structure that vibrates, crosstalk, or teeth "
+    "that engage elsewhere than declared",
+    "depth": "a cause at the end of the tool or along its edge, such as a corner or a ball",
+    "speed": "a dynamic cause, such as a resonance",
+    "arc": "a cause at the entry or the exit, such as another engagement than declared",
+    "travel": "a cause that grows while cutting, such as wear or heat",
+}
+LEAST_PART = 0.05  # of the residual, that is told
+
+
+def _ceiling(values: JSON) -> str:
+    """Say how much any cause could explain, how it changes with the cut, and of which kind it is."""
+    told = [(name, share) for name, share in values["parts"].items() if share >= LEAST_PART and name in PARTS]
+    if not told or values["share"] <= 0.0:
+        return (
+            "How much of that any cause could explain cannot be seen from these runs: none is predicted by "
+            "the others."
+        )
+    low, high = (100 * max(end, 0.0) for end in values["ci95"])
+    parts = [f"{100 * share:.0f} % {PARTS[name]}" for name, share in told]
+    held = "".join(
+        f", {100 * max(one['share'], 0.0):.0f} % in held-out run {one['run']}, where "
+        f"{100 * one['of_signal']:.0f} % of the signal would stay"
+        for one in values["held_out"][:MOST_PLACES]
+    )
+    places = listed([f"{place['label']} in {place['axis']}" for place in values["places"]])
+    return (
+        f"Of what the base model leaves, {listed([*parts, _alone(values)])}. Whatever the cause, the other "
+        f"conditions predict {100 * values['share']:.0f} % ({low:.0f} to {high:.0f} %) of it in one that is left "
+        f"out{held}. It is largest at {places}. This points to {KINDS[told[0][0]]}."
+    )
+
+
+def _alone(values: JSON) -> str:
+    return f"{100 * values['parts']['alone']:.2g} % does not repeat"
+
+
 SENTENCES: Mapping[str, Sentence] = {
+    "ceiling": _ceiling,
     "residual": _residual,
     "residual_and_likeness": _residual_and_likeness,
     "places": _places,

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from metro.effects.effect import Effect, EffectParameter, by_name
+from metro.loop.ceiling import ceiling
 from metro.loop.checks.signature import share_left
 from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.held_out import comparison, held_out, run_dof
@@ -219,4 +220,9 @@ def _unexplained(problem: Problem, outcome: Outcome, rows: pd.DataFrame, residua
         statement = Statement(
             "residual_and_likeness", {"residual": statement, "rms": rms, "unit": problem.unit}
         )
-    return {"rms": over, "unit": problem.unit, "signature": statement}
+    return {
+        "rms": over,
+        "unit": problem.unit,
+        "signature": statement,
+        "ceiling": ceiling(problem, outcome.base),
+    }

@@ -24,6 +24,7 @@ from metro.units import N_MM, N_MM2, Array, ComplexArray
 
 PHASES_PER_PITCH = 12
 ORBIT_PHASES = 12
+LAID_OVER = 24  # highest order at which runs are laid over one another: most records have it
 FEEDS = (
     0.0,
     math.pi / 3.0,
@@ -131,6 +132,31 @@ class ForceModel:
         """Return the prediction (k, n) of a block at each of ``nuisances`` (k, m)."""
         force = self._force(block.setting, beta) @ beta
         return self._rows(force[..., None], block.setting, nuisances)[..., 0] + self._drift(block)
+
+    def overlaid(self, block: Block, nuisance: Array, values: Array) -> ComplexArray:
+        """Amplitudes (3, orders) of values of a block at phase 0; (3, 0) in helical milling."""
+        setting: ForceSetting = block.setting
+        if setting.helix is not None:
+            return np.zeros((3, 0), complex)
+        waves = amplitudes(values.reshape(block.repeats, 3, -1).mean(axis=0).T)[: LAID_OVER + 1]
+        waves = np.pad(waves, ((0, LAID_OVER + 1 - len(waves)), (0, 0)))
+        return np.asarray(waves.T * np.exp(-1j * nuisance[0] * np.arange(LAID_OVER + 1)))
+
+    def circumstances(self, block: Block) -> dict[str, float]:
+        """Return the settings of a cut to which a force may be proportional."""
+        setting: ForceSetting = block.setting
+        arc = setting.cut.engagement
+        return {
+            "feed": setting.cut.feed_per_tooth,
+            "depth": setting.cut.axial_depth,
+            "speed": setting.recording.speed,
+            "arc": arc.exit - arc.entry,
+            "travel": setting.cut_length,
+        }
+
+    def place(self, channel: int, harmonic: int) -> tuple[str, str]:
+        """Return axis and label of an order."""
+        return "xyz"[channel], f"order {harmonic}" if harmonic else "mean"
 
     def _force(self, setting: ForceSetting, beta: Array | None) -> ComplexArray:
         """Amplitudes of the force at phase 0, (feeds, H+1, 3, coefficients), with x along the feed."""

@@ -153,6 +153,8 @@ def _residual_items(entry: JSON, record: JSON, left: str) -> list[Item]:
     unexplained = entry.get("unexplained") or {}
     if unexplained.get("signature"):
         items.append(Paragraph(f"Unexplained: {left or plain(unexplained['signature'])}.", "warning"))
+    if unexplained.get("ceiling"):
+        items.append(Paragraph(str(unexplained["ceiling"]["words"])))
     groups = [" and ".join(words(str(n)) for n in group) for group in entry.get("indistinguishable") or []]
     if groups:
         items.append(Paragraph("Cannot be told apart with these data: " + "; ".join(groups) + "."))

@@ -132,7 +132,8 @@ def _residual(entry: JSON, left: str) -> str:
     unexplained = entry.get("unexplained") or {}
     if not unexplained.get("signature"):
         return ""
-    return f"What is left: {left or plain(str(unexplained['signature']))}."
+    ceiling = (unexplained.get("ceiling") or {}).get("words", "")
+    return f"What is left: {left or plain(str(unexplained['signature']))}. {ceiling}".rstrip()
 
 
 def left_words(results: Results, observable: str) -> str:
