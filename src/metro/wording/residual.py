@@ -163,8 +163,8 @@ def _ceiling(values: JSON) -> str:
     places = listed([f"{place['label']} in {place['axis']}" for place in values["places"]])
     return (
         f"Of what the base model leaves, {listed([*parts, _alone(values)])}. Whatever the cause, the other "
-        f"conditions predict {100 * values['share']:.0f} % ({low:.0f} to {high:.0f} %) of it in one that is left "
-        f"out{held}. It is largest at {places}. This points to {KINDS[told[0][0]]}."
+        f"conditions predict {100 * values['share']:.0f} % ({low:.0f} to {high:.0f} %) of it in one that is "
+        f"left out{held}. It is largest at {places}. This points to {KINDS[told[0][0]]}."
     )
 
 
