@@ -2,11 +2,15 @@
 
 import math
 import os
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
 
 from metro.batch.processed import Processed, read_batch
 from metro.cutting.cutter import Cutter, evenly_pitched
@@ -92,6 +96,36 @@ def test_of_the_real_slot_nearly_all_that_the_base_model_leaves_could_be_explain
 def test_mean_forces_of_all_five_feeds_give_the_published_coefficients(slotting):
     found = slotting.identified()["mean_all_runs"]
     assert {name: entry["value"] for name, entry in found.items()} == pytest.approx(PUBLISHED, rel=1e-3)
+
+
+def missed(observed):
+    """What the base model leaves of the runs of the fit, rms, N."""
+    blocks = observed.task.role("identify")
+    base = fit(Candidate(observed.task.base), blocks, first_noise(0.007, observed.task.scatter, blocks))
+    model = base.candidate.model(base.theta)
+    left = []
+    for block in blocks:
+        matrix, offset = model.design(block, base.nuisance[block.run], base.beta)
+        left.append(np.mean((block.measured - offset - matrix @ base.beta) ** 2))
+    return math.sqrt(np.mean(left))
+
+
+@pytest.mark.parametrize("wander", [0.0005, 0.005])
+def test_a_spindle_that_wanders_without_a_tacho_is_followed(clean, wander, tmp_path):
+    """Its speed changes by a relative standard deviation over 0.3 s; the record is 0.9 s long."""
+    folder = tmp_path / "clean-slot"
+    shutil.copytree(ROOT / "data" / "raw" / "clean-slot", folder)
+    rng = np.random.default_rng(7)
+    for file in sorted((folder / "force").glob("*.parquet")):
+        record = pd.read_parquet(file)
+        time = record["t_s"].to_numpy()
+        step = time[1] - time[0]
+        slow = gaussian_filter1d(rng.standard_normal(len(time)), 0.3 / step)
+        ahead = np.cumsum(wander * (slow - slow.mean()) / slow.std()) * step
+        for axis in ("fx_n", "fy_n", "fz_n"):
+            record[axis] = CubicSpline(time, record[axis].to_numpy())(time + ahead)
+        record.to_parquet(file)
+    assert missed(Observed(folder, tmp_path / "out")) < 1.15 * missed(clean)
 
 
 def test_mean_forces_lie_on_the_lines_of_the_coefficients_that_made_them(clean):

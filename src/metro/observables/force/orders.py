@@ -21,6 +21,7 @@ from metro.observables.force.held_out_give import PER_NEWTON
 from metro.observables.problem import Refusal
 from metro.signals import orders, steady
 from metro.signals.slope import slope
+from metro.signals.wander import followed
 from metro.units import DEG, JSON, MM, RPM, Array
 
 TIME_BLOCKS = 4
@@ -83,7 +84,9 @@ def _observed(batch: Batch, run: str, read: Tables, tool: Cutter) -> tuple[pd.Da
     when = (np.flatnonzero(air).mean() + 0.5) * turns.length / record.rate if air.any() else 0.0
     orbit = orbit_rate(row) / (2.0 * math.pi)
     highest = orders.highest_order(record.rate, nominal, tool.teeth)
-    parts = [_part(part, zero, nominal, orbit, highest) for part in record.stretches(segments.steady)]
+    parts = [
+        _part(part, zero, (nominal, orbit), tool.teeth, highest) for part in record.stretches(segments.steady)
+    ]
     first, last = parts[0], parts[-1]
     averages = _together(parts, time_blocks(first.time[0], last.time[1], nominal, orbit))
     rate, rate_sd = _slope(turns, segments.steady, record.rate, orbit)
@@ -136,15 +139,22 @@ class _Part:
     known: bool
 
 
-def _part(part: Stretch, zero: Array, nominal: float, orbit: float, highest: int) -> _Part:
-    """Take the order averages of a stretch: as many blocks as if it were the whole cut."""
+def _part(part: Stretch, zero: Array, revolutions: tuple[float, float], teeth: int, highest: int) -> _Part:
+    """Take the order averages of a stretch: as many blocks as if it were the whole cut.
+
+    ``revolutions`` per second of the spindle, nominally, and of the orbit. Where no tacho measures the angle,
+    a speed that wanders is followed in the signal.
+    """
+    nominal, orbit = revolutions
     signal = with_orbit(part.time, part.signal - zero, orbit)
     angle, speed, deviation = spindle_angle(
         part.time, signal, part.tacho, nominal=nominal, orbit=orbit, highest=highest
     )
+    known = bool(np.isfinite(part.tacho).all())
+    if not known:
+        angle = followed(part.time, angle, signal, teeth)
     ends = float(part.time[0]), float(part.time[-1])
     averages = orders.order_averages(part.time, angle, signal, highest, time_blocks(*ends, nominal, orbit))
-    known = bool(np.isfinite(part.tacho).all())
     return _Part(ends, averages, speed, deviation, _whole_mean(angle, signal), known)
 
 
