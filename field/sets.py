@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from field.modes import Found, mode, others
 from metro.units import JSON
-
-Found = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -18,7 +16,8 @@ class Known:
     Attributes
     ----------
     what, unit : in the table. value : what is known; None where only ours is listed. source : who says so.
-    ours : takes ``identified`` and ``verdict`` and gives a quantity (value, ci95); None where we have none.
+    ours : takes ``identified`` and ``verdict`` and gives a quantity (value, ci95), or a list as text
+        (listed); None where we have none.
     half : half width of what is known, by its rounding or its own interval.
     """
 
@@ -49,19 +48,6 @@ class FieldSet:
     refused: str = ""
     remark: str = ""
     folder: str = ""
-
-
-def mode(hz: float, key: str = "frequency") -> Callable[[Found], JSON | None]:
-    """Take the identified mode that is nearest to a frequency, within a tenth of it."""
-
-    def ours(found: Found) -> JSON | None:
-        modes = [one for one in found["identified"].get("modes") or [] if one.get("frequency")]
-        nearest = min(modes, key=lambda one: abs(one["frequency"]["value"] - hz), default=None)
-        if nearest is None or abs(nearest["frequency"]["value"] - hz) > 0.1 * hz:
-            return None
-        return dict(nearest[key])
-
-    return ours
 
 
 def at(*path: str) -> Callable[[Found], JSON | None]:
@@ -99,6 +85,12 @@ def trace(key: str) -> Callable[[Found], JSON | None]:
 def texture(source: str, *values: tuple[str, str, float, float]) -> tuple[Known, ...]:
     """Known parameters of a trace: name, unit, value and half width of each."""
     return tuple(Known(name, unit, value, source, trace(name), half) for name, unit, value, half in values)
+
+
+def modes(published: Sequence[float], source: str, half: float) -> tuple[Known, ...]:
+    """Published modes, one by one, and which of ours nobody published."""
+    each = (Known(f"mode at {hz:g} Hz", "Hz", hz, source, mode(hz, published), half) for hz in published)
+    return (*each, Known("modes that were not published", "", None, "", others(published)))
 
 
 def printed(value: float) -> Callable[[Found], JSON | None]:
@@ -166,6 +158,8 @@ def coefficient(name: str) -> Callable[[Found], JSON | None]:
 
 
 BEAM = "mean of single-FRF fits over nine places of the hammer"
+BEAM_MODES = (111.99, 306.86, 596.37, 974.14)
+TOOL_MODES = (1074.0, 1961.0, 2617.0)
 SLOTTING = "published by the recorder: mean forces, all five feeds"
 BALL = "by the name of the tool, ball 16"
 UR10E = "published for this arm"
@@ -196,8 +190,8 @@ SETS = (
             ),
             Known("error on held-out depths, after the loop", "%", None, "", held_out("force")),
         ),
-        remark="a ball end of which diameter, teeth and helix alone are declared, and no axes: page one names "
-        "the axes that the records have, with a ball end, and no cause is looked for before that is mended. "
+        remark="a ball end of which diameter, teeth and helix alone are declared, and no axes: page one "
+        "names the axes that the records have, with a ball end, and no cause is looked for before that is mended. "
         "The error is that of a fit under wrong axes, which has several optima and means nothing",
     ),
     FieldSet(
@@ -241,10 +235,7 @@ SETS = (
         "modal-beam",
         ("Hxysv*.txt.gz",),
         ("--set=reference={number}z", "--set=response=1z"),
-        tuple(
-            Known(f"mode at {hz:.0f} Hz", "Hz", hz, BEAM, mode(hz), half=0.005)
-            for hz in (111.99, 306.86, 596.37, 974.14)
-        ),
+        modes(BEAM_MODES, BEAM, half=0.005),
     ),
     FieldSet(
         "modal-duplicated-channel",
@@ -333,9 +324,7 @@ SETS = (
     ),
     FieldSet(
         "tool-impact",
-        known=tuple(
-            Known(f"mode at {hz} Hz", "Hz", hz, TOOL, mode(hz), half=0.5) for hz in (1074.0, 1961.0, 2617.0)
-        ),
+        known=modes(TOOL_MODES, TOOL, half=0.5),
         folder="real/batches/tool-impact",
         remark="the published figures are peaks of a structure with nine to fifteen modes, compared with the "
         "nearest mode: 1961 Hz is no pole: fitted by itself, 1700–2300 Hz has poles at 1938 and 2062 Hz, "
