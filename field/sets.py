@@ -88,7 +88,7 @@ def texture(source: str, *values: tuple[str, str, float, float]) -> tuple[Known,
 
 
 def modes(published: Sequence[float], source: str, half: float) -> tuple[Known, ...]:
-    """Published modes, one by one, and which of ours nobody published."""
+    """Return published modes, one by one, and which of ours nobody published."""
     each = (Known(f"mode at {hz:g} Hz", "Hz", hz, source, mode(hz, published), half) for hz in published)
     return (*each, Known("modes that were not published", "", None, "", others(published)))
 
