@@ -191,7 +191,8 @@ SETS = (
             Known("error on held-out depths, after the loop", "%", None, "", held_out("force")),
         ),
         remark="a ball end of which diameter, teeth and helix alone are declared, and no axes: page one "
-        "names the axes that the records have, with a ball end, and no cause is looked for before that is mended. "
+        "names the axes that the records have, with a ball end, and no cause is looked for before they are "
+        "declared. "
         "The error is that of a fit under wrong axes, which has several optima and means nothing",
     ),
     FieldSet(
@@ -326,12 +327,12 @@ SETS = (
         "tool-impact",
         known=modes(TOOL_MODES, TOOL, half=0.5),
         folder="real/batches/tool-impact",
-        remark="the published figures are peaks of a structure with nine to fifteen modes, compared with the "
-        "nearest mode: 1961 Hz is no pole: fitted by itself, 1700–2300 Hz has poles at 1938 and 2062 Hz, "
-        "which make up that peak; so has the whole band, the second at 2056 ± 230 Hz, since single files do "
-        "not tell it from its neighbours; and the peak at 1074 Hz is that of two broad modes, 1053 ± 53 and "
-        "1098 ± 21 Hz, beside a narrow one at 1058.7 Hz, which is in all five files and in the tail "
-        "of the raw record",
+        remark="the published figures are peaks of a structure with nine to fifteen modes: 1961 Hz is no "
+        "pole: fitted by itself, 1700–2300 Hz has poles at 1938 and 2062 Hz, which make up that peak; "
+        "so has the whole band, the second at 2057 ± 132 Hz, since single files do not tell it from "
+        "its neighbours; and the peak at 1074 Hz is that of two broad modes, 1067.0 ± 4.4 and 1103 ± "
+        "11 Hz, beside a narrow one at 1059.3 Hz, which is in all five files and in the tail of the "
+        "raw record",
     ),
     FieldSet(
         "granite-again",
