@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from field.taken import Found
 from metro.report.numbers import with_interval
 from metro.units import JSON
 
-Found = Mapping[str, Any]
 REACH = 0.1  # relative distance beyond which two modes are not the same
 
 

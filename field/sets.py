@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from field.modes import Found, mode, others
+from field.modes import mode, others
+from field.taken import (
+    Found,
+    at,
+    coefficient,
+    effect,
+    face,
+    friction,
+    held_out,
+    printed,
+    probability,
+    trace,
+)
 from metro.units import JSON
 
 
@@ -50,38 +62,6 @@ class FieldSet:
     folder: str = ""
 
 
-def at(*path: str) -> Callable[[Found], JSON | None]:
-    """Take the quantity at a path of ``identified``."""
-
-    def ours(found: Found) -> JSON | None:
-        here: JSON = found["identified"]
-        for name in path:
-            here = (here or {}).get(name) or {}
-        return here or None
-
-    return ours
-
-
-def face(key: str) -> Callable[[Found], JSON | None]:
-    """Take an index of the only face."""
-
-    def ours(found: Found) -> JSON | None:
-        faces: Mapping[str, JSON] = found["identified"].get("faces") or {}
-        return next((one.get(key) for one in faces.values()), None)
-
-    return ours
-
-
-def trace(key: str) -> Callable[[Found], JSON | None]:
-    """Take a parameter of the only trace."""
-
-    def ours(found: Found) -> JSON | None:
-        traces: Mapping[str, JSON] = found["identified"].get("texture") or {}
-        return next((one.get(key) for name, one in traces.items() if name != "not_identified"), None)
-
-    return ours
-
-
 def texture(source: str, *values: tuple[str, str, float, float]) -> tuple[Known, ...]:
     """Known parameters of a trace: name, unit, value and half width of each."""
     return tuple(Known(name, unit, value, source, trace(name), half) for name, unit, value, half in values)
@@ -91,70 +71,6 @@ def modes(published: Sequence[float], source: str, half: float) -> tuple[Known, 
     """Return published modes, one by one, and which of ours nobody published."""
     each = (Known(f"mode at {hz:g} Hz", "Hz", hz, source, mode(hz, published), half) for hz in published)
     return (*each, Known("modes that were not published", "", None, "", others(published)))
-
-
-def printed(value: float) -> Callable[[Found], JSON | None]:
-    """Take the printed value of a table of published values that is nearest to one, within a hundredth."""
-
-    def ours(found: Found) -> JSON | None:
-        rows: Sequence[JSON] = found["printed"]
-        values = [float(row["measured"]) for row in rows if row["measured"]]
-        nearest = min(values, key=lambda one: abs(one - value), default=None)
-        near = nearest is not None and abs(nearest - value) <= 0.01 * abs(value)
-        return {"value": nearest} if near else None
-
-    return ours
-
-
-def friction(kind: str, joint: int) -> Callable[[Found], JSON | None]:
-    """Take the friction of a joint from the log without a load."""
-
-    def ours(found: Found) -> JSON | None:
-        runs: Mapping[str, JSON] = (found["identified"].get("joints") or {}).get("runs") or {}
-        values = (runs.get("r01") or {}).get(kind) or []
-        return dict(values[joint - 1]) if len(values) >= joint else None
-
-    return ours
-
-
-def effect(observable: str, name: str, parameter: str) -> Callable[[Found], JSON | None]:
-    """Take a parameter of an effect that the verdict names."""
-
-    def ours(found: Found) -> JSON | None:
-        entry = (found["verdict"].get("observables") or {}).get(observable) or {}
-        effects = [one for one in entry.get("effects") or [] if one["effect"] == name]
-        return effects[0]["parameters"].get(parameter) if effects else None
-
-    return ours
-
-
-def probability(observable: str, name: str) -> Callable[[Found], JSON | None]:
-    """Take the probability of an effect that the verdict names."""
-
-    def ours(found: Found) -> JSON | None:
-        effects = found["verdict"]["observables"][observable]["effects"]
-        return next(({"value": one["probability"]} for one in effects if one["effect"] == name), None)
-
-    return ours
-
-
-def held_out(observable: str, when: str = "after") -> Callable[[Found], JSON | None]:
-    """Take the error on held-out runs relative to the signal, in %."""
-
-    def ours(found: Found) -> JSON | None:
-        entry = (found["verdict"].get("observables") or {}).get(observable) or {}
-        error = entry.get(when)
-        if not error:
-            return None
-        scale = 100.0 * error["nrmse"] / error["rms"] if error["rms"] else 0.0
-        return {"value": 100.0 * error["nrmse"], "ci95": [scale * end for end in error["ci95"]]}
-
-    return ours
-
-
-def coefficient(name: str) -> Callable[[Found], JSON | None]:
-    """Take a cutting coefficient by the mean forces of all runs."""
-    return at("force", "mean_all_runs", name)
 
 
 BEAM = "mean of single-FRF fits over nine places of the hammer"
@@ -327,10 +243,10 @@ SETS = (
         "tool-impact",
         known=modes(TOOL_MODES, TOOL, half=0.5),
         folder="real/batches/tool-impact",
-        remark="the published figures are peaks of a structure with nine to fifteen modes: 1961 Hz is no "
-        "pole: fitted by itself, 1700–2300 Hz has poles at 1938 and 2062 Hz, which make up that peak; "
-        "so has the whole band, the second at 2057 ± 132 Hz, since single files do not tell it from "
-        "its neighbours; and the peak at 1074 Hz is that of two broad modes, 1067.0 ± 4.4 and 1103 ± "
+        remark="the published figures are peaks of a structure with nine to fifteen modes. 1961 Hz is no "
+        "pole: the five files by themselves have one at 1926 to 1946 Hz and the next at 2054 to 2242 "
+        "Hz, so has the whole band, the second at 2057 ± 132 Hz, since single files do not tell it "
+        "from its neighbours. The peak at 1074 Hz is that of two broad modes, 1067.0 ± 4.4 and 1103 ± "
         "11 Hz, beside a narrow one at 1059.3 Hz, which is in all five files and in the tail of the "
         "raw record",
     ),

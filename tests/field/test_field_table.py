@@ -10,8 +10,9 @@ import pytest
 
 from field.modes import assigned, mode, others
 from field.run import Result
-from field.sets import SETS, FieldSet, Known, effect, face, held_out, probability
+from field.sets import SETS, FieldSet, Known
 from field.table import page, summary
+from field.taken import effect, face, held_out, probability
 
 MODES = {"modes": [{"frequency": {"value": 99.0, "ci95": [98.9, 99.1]}}, {"frequency": None}]}
 
