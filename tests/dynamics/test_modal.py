@@ -183,7 +183,8 @@ def test_the_loss_of_a_mode_is_what_a_linear_fit_without_it_leaves_more(real):
     for mode, loss in enumerate(losses(data, fit)):
         poles_left = np.delete(fit.poles, mode)
         plus, minus = 1 / (s - poles_left), 1 / (s - poles_left.conj())
-        columns = [1j * (plus - minus), *([] if real else [plus + minus]), np.ones_like(s), 1 / s**2, 1 / s**3]
+        shapes = [1j * (plus - minus), *([] if real else [plus + minus])]
+        columns = [*shapes, np.ones_like(s), 1 / s**2, 1 / s**3]
         basis = np.concatenate(columns, axis=1)
         chi2 = 0.0
         for weight, values in zip(data.weight.T, frf.T, strict=True):
@@ -197,7 +198,7 @@ def test_the_loss_of_a_mode_is_what_a_linear_fit_without_it_leaves_more(real):
 
 
 def test_a_mode_that_the_lines_determine_in_one_direction_alone_has_the_loss_of_that_direction(monkeypatch):
-    """As two modes that coincide: the covariance of the two unknowns is v vᵀ, and t v is t deviations away."""
+    """As of two modes that coincide: the covariance of the unknowns is v vᵀ, and t v is t deviations away."""
     frequency, mode = np.arange(10.0, 110.0, 1.0), np.array([50.0])
     frf = receptance(frequency, mode, np.array([0.05]), np.array([1e6]))[:, None]
     data = Data(2 * np.pi * frequency, frf, np.full(frf.shape, 1e8))

@@ -8,7 +8,6 @@ import numpy as np
 
 from metro.units import Array, ComplexArray
 
-
 TERMS = 3  # that stand for the modes outside the band
 
 
