@@ -13,7 +13,8 @@ HEAD = """# Files of others
 
 Files that other people recorded, brought in by `metro import` alone and run like any batch, beside what is
 known of them. The files are not part of the repository; `python -m field --write docs/field.md` makes this
-page from them. *Agreement*: whether our 95 % interval and the known value with its rounding overlap.
+page from them. *Agreement*: whether our 95 % interval and the known value with its rounding overlap. Each
+published mode is compared with at most one of ours; *none* beside it: it is missing among ours.
 
 | set | questions | time, s | ends in | quantity | known | ours (95 %) | agreement |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -48,6 +49,8 @@ def _compared(known: Known, found: dict[str, JSON] | None) -> list[str]:
     given = "–" if known.value is None else f"{known.value:g} {known.unit}"
     if ours is None:
         return [known.what, given, "none", "cannot say"]
+    if "listed" in ours:
+        return [known.what, given, ours["listed"], "–"]
     text = f"{with_interval(ours['value'], ours.get('ci95'))} {known.unit}"
     return [known.what, given, text, _agreement(known, ours)]
 

@@ -1,6 +1,7 @@
 """Lobes of ball ends and lead angles: against a march in time over slices of the edge, and limits."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,10 +10,11 @@ from machines import TWO
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.dynamics.by_depth import boundary_of_edge, depths_anew
 from metro.dynamics.lobes import stability_boundary
-from metro.dynamics.system import Cut, Edge
+from metro.dynamics.system import Cut, Edge, RawFace, immersion
 
 R = 5e-3
 KTC, KRC, KAC = 9e8, 5e8, 4e8
+DAMPING = 1.8e8  # N/m², of the process
 FLAT = Cutter(R, 0.0, evenly_pitched(2))
 BALL = Cutter(R, 0.0, evenly_pitched(2), corner=R)
 NOSE = Cutter(R, 0.0, evenly_pitched(2), corner=1e-3)
@@ -24,19 +26,22 @@ def slot(tool, krc=KRC, kac=KAC):
     return Cut(2, 0.0, math.pi, KTC, edge.radial(1e-3), edge=edge)
 
 
-def marched_growth(structure, corner, rpm, depth):
-    """Growth of a small vibration per tooth period, of a tool with a corner in a slot, without helix.
+def marched_growth(structure, corner, rpm, depth, *, face=None, towards=0.0, rubbing=0.0):
+    """Growth of a small vibration per tooth period, of a tool with a corner and two teeth, without helix.
 
     The edge is summed over slices of equal height: chip normal to the edge, three forces of it, their parts
-    in the plane; each mode is integrated by Störmer's rule.
+    in the plane; each mode is integrated by Störmer's rule. A slot, or beside a raw face at a distance: a
+    slice cuts while its own circle is beyond the face. A slice that moves into the work is pushed back by its
+    height times ``rubbing``, by its speed over that of the spindle.
     """
     periods, steps = 160, 300
     z = depth * (np.arange(200) + 0.5) / 200
     kappa = np.where(z < corner, np.arccos(np.clip(1.0 - z / corner, -1.0, 1.0)), math.pi / 2)
     width = depth / 200 / np.sin(kappa)
     chip = np.sin(kappa)  # normal to the edge, per chip in the plane
-    tangential = KTC * np.sum(chip * width)
-    inward = np.sum((KRC * np.sin(kappa) - KAC * np.cos(kappa)) * chip * width)
+    tangential = KTC * chip * width
+    inward = (KRC * np.sin(kappa) - KAC * np.cos(kappa)) * chip * width
+    radius = R - corner + np.where(z < corner, corner * np.sin(kappa), corner)
     along = structure.directions[structure.axis]
     damping, square = 2.0 * structure.zeta * structure.omega, structure.omega**2
     per_force = square / structure.stiffness
@@ -50,7 +55,11 @@ def marched_growth(structure, corner, rpm, depth):
         s, c = math.sin(phi), math.cos(phi)
         change = tip[n] - (tip[n - steps] if n >= steps else 0.0)
         h = change @ [s, c]
-        force = h * np.array([-tangential * c - inward * s, tangential * s - inward * c])
+        there = np.ones(200, bool) if face is None else radius * math.cos(phi - towards) > face
+        pushed, pressed = tangential[there].sum(), inward[there].sum()
+        force = h * np.array([-pushed * c - pressed * s, pushed * s - pressed * c])
+        into = (v @ along) @ [s, c] / (2.0 * math.pi * rpm / 60.0)
+        force -= rubbing * depth * there.mean() * into * np.array([s, c])
         v = v + dt * (per_force * (along @ force) - damping * v - square * q)
         q = q + dt * v
     size = np.linalg.norm(tip.reshape(periods, steps, 2), axis=(1, 2))
@@ -64,6 +73,38 @@ def test_a_vibration_dies_below_the_boundary_and_grows_above_it(tool):
     for speed, depth in zip(rpm, found.depth, strict=True):
         assert marched_growth(TWO, tool.corner, speed, 0.96 * depth) < 1.0
         assert marched_growth(TWO, tool.corner, speed, 1.04 * depth) > 1.0
+
+
+def side(tool, direction):
+    """Side cut of half of the radius, and what the march takes of its face."""
+    entry, leave = immersion(direction, R / 2, 2 * R)
+    edge, towards = Edge(tool, KRC, KAC), 0.0 if direction == "up" else math.pi
+    cut = Cut(2, entry, leave, KTC, edge.radial(1e-3), edge=edge, face=RawFace(R / 2, towards))
+    return cut, {"face": R / 2, "towards": towards}
+
+
+def test_beside_a_raw_face_what_is_engaged_alone_damps_the_process():
+    cut, beside = side(BALL, "up")
+    damped, rpm = replace(cut, damping=DAMPING), RPM[[1]]
+    (depth,), (without,) = (boundary_of_edge(TWO, one, rpm).depth for one in (damped, cut))
+    assert depth > 1.1 * without
+    assert marched_growth(TWO, R, rpm[0], 0.96 * depth, rubbing=DAMPING, **beside) < 1.0
+    assert marched_growth(TWO, R, rpm[0], 1.04 * depth, rubbing=DAMPING, **beside) > 1.0
+
+
+@pytest.mark.parametrize("direction", ["up", "down"])
+@pytest.mark.parametrize("tool", [BALL, NOSE], ids=["ball", "bull nose"])
+def test_beside_a_raw_face_each_height_is_engaged_by_its_own_circle(tool, direction):
+    """Half of the radius is cut: a ball that is 0.6 mm deep does not yet reach the face."""
+    cut, beside = side(tool, direction)
+    rpm = RPM[[1, 5]]
+    found = boundary_of_edge(TWO, cut, rpm)
+    whole = boundary_of_edge(TWO, replace(cut, face=None), rpm)
+    for speed, depth, without in zip(rpm, found.depth, whole.depth, strict=True):
+        assert marched_growth(TWO, tool.corner, speed, 0.96 * depth, **beside) < 1.0
+        assert marched_growth(TWO, tool.corner, speed, 1.04 * depth, **beside) > 1.0
+        assert tool is NOSE or depth > 1.5 * without
+    assert cut.at_depth(0.6e-3).exit == cut.at_depth(0.6e-3).entry or tool is NOSE
 
 
 def test_of_a_flat_end_nothing_changes():

@@ -1,6 +1,7 @@
 """Automatic modal identification against exact synthetic sets, published modes and noise."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 
 from metro.dynamics.modal import identify_modes, roughness
 from metro.dynamics.plscf import normal_equations, poles
-from metro.dynamics.refine import Data, losses, refine
+from metro.dynamics.refine import Data, _fits, losses, refine
+from metro.dynamics.shapes import residues
 
 REAL = Path(os.environ.get("METRO_REAL_DATA", "../shared/real"))
 needs_real = pytest.mark.skipif(not REAL.exists(), reason="METRO_REAL_DATA is not there")
@@ -181,7 +183,8 @@ def test_the_loss_of_a_mode_is_what_a_linear_fit_without_it_leaves_more(real):
     for mode, loss in enumerate(losses(data, fit)):
         poles_left = np.delete(fit.poles, mode)
         plus, minus = 1 / (s - poles_left), 1 / (s - poles_left.conj())
-        columns = [1j * (plus - minus), *([] if real else [plus + minus]), np.ones_like(s), 1 / s**2]
+        shapes = [1j * (plus - minus), *([] if real else [plus + minus])]
+        columns = [*shapes, np.ones_like(s), 1 / s**2, 1 / s**3]
         basis = np.concatenate(columns, axis=1)
         chi2 = 0.0
         for weight, values in zip(data.weight.T, frf.T, strict=True):
@@ -192,6 +195,37 @@ def test_the_loss_of_a_mode_is_what_a_linear_fit_without_it_leaves_more(real):
                 (both[:, -1] - both[:, :-1] @ np.linalg.lstsq(both[:, :-1], both[:, -1])[0]) ** 2
             )
         assert loss == pytest.approx(chi2 - fit.chi2, rel=1e-6)
+
+
+def test_a_mode_that_the_lines_determine_in_one_direction_alone_has_the_loss_of_that_direction(monkeypatch):
+    """As of two modes that coincide: the covariance of the unknowns is v vᵀ, and t v is t deviations away."""
+    frequency, mode = np.arange(10.0, 110.0, 1.0), np.array([50.0])
+    frf = receptance(frequency, mode, np.array([0.05]), np.array([1e6]))[:, None]
+    data = Data(2 * np.pi * frequency, frf, np.full(frf.shape, 1e8))
+    fit = refine(data, 2 * np.pi * mode, np.array([0.05]), real=False)
+    (whole,) = _fits(data, np.log(np.concatenate([fit.omega, fit.zeta])), False)
+    spread, unknowns, direction = whole.spread.copy(), whole.unknowns.copy(), np.array([2.0, 1.0])
+    spread[:2, :2], unknowns[:2, 0] = np.outer(direction, direction), 3.0 * direction
+    single = replace(whole, spread=spread, unknowns=unknowns)
+    monkeypatch.setattr("metro.dynamics.refine._fits", lambda *_: [single])
+    assert losses(data, fit) / whole.of.scale[0] ** 2 == pytest.approx([9.0])
+
+
+def test_a_damped_mode_far_below_the_band_is_an_inertance_and_what_damping_adds():
+    """1/(m s² + c s + k) at s = iω: −1/(m ω²) − i c/(m² ω³) but for the square of its frequency over ω."""
+    frequency, below, ratio, mass = np.arange(20.0, 120.0, 0.25), 1.0, 0.6, 50.0
+    stiffness = np.array([mass * (2 * np.pi * below) ** 2])
+    frf = receptance(frequency) + receptance(frequency, np.array([below]), np.array([ratio]), stiffness)
+    data = Data(2 * np.pi * frequency, frf[:, None], np.full((len(frequency), 1), 1e9))
+    found = refine(data, 2 * np.pi * UNDAMPED, ZETA, real=True)
+    viscous = 2.0 * ratio * np.sqrt(stiffness[0] * mass)
+    inertance, damped = found.residual_terms[1:, 0]
+    assert inertance == pytest.approx(-1.0 / mass, rel=0.02)
+    assert damped == pytest.approx(-viscous / mass**2, rel=0.05)
+    assert found.zeta == pytest.approx(ZETA, rel=1e-3)
+    assert found.evaluate(data.omega)[:, 0] == pytest.approx(frf, rel=1e-3)
+    shapes = residues(data.omega, data.frf, np.ones(len(frequency)), found.poles)
+    assert shapes == pytest.approx(found.residues, rel=5e-3)
 
 
 def test_a_mode_in_a_gap_of_the_lines_is_not_claimed_and_its_neighbours_are():

@@ -164,7 +164,7 @@ def test_errors_of_the_constants_follow_from_those_of_pole_and_residue(decay):
                 omega=omega * np.exp(change[:m]),
                 zeta=zeta * np.exp(change[m : 2 * m]),
                 residues=1j * (residue + change[2 * m :])[:, None],
-                residual_terms=np.zeros((2, 1)),
+                residual_terms=np.zeros((3, 1)),
                 joint=np.outer(direction, direction)[None],
                 shifts=np.zeros((1, 0, 3 * m)),
                 mean=np.zeros(0, dtype=int),

@@ -1,13 +1,18 @@
 """The table of foreign files: what agrees, what does not, what cannot be said, and what ended wrongly."""
 
+import itertools
 import json
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from field.modes import assigned, mode, others
 from field.run import Result
-from field.sets import SETS, FieldSet, Known, effect, face, held_out, mode
+from field.sets import SETS, FieldSet, Known
 from field.table import page, summary
+from field.taken import effect, face, held_out, probability
 
 MODES = {"modes": [{"frequency": {"value": 99.0, "ci95": [98.9, 99.1]}}, {"frequency": None}]}
 
@@ -24,13 +29,16 @@ def row(known, identified=None, verdict=None):
     [(99.05, 0.0, "within"), (99.15, 0.1, "within"), (99.3, 0.0, "off by 3.0 half widths"), (None, 0.0, "–")],
 )
 def test_a_value_agrees_where_the_intervals_overlap(value, half, agreement):
-    cells = row(Known("mode", "Hz", value, "", mode(99.0), half), MODES)
+    cells = row(Known("mode", "Hz", value, "", mode(99.0, (99.0,)), half), MODES)
     assert cells[:4] == ["`a-set`", "3", "12", "report"]
     assert cells[-2:] == ["99.00 ± 0.10 Hz", agreement]
 
 
 def test_what_was_not_found_cannot_be_said():
-    assert row(Known("mode", "Hz", 200.0, "", mode(200.0)), MODES)[-2:] == ["none", "cannot say"]
+    assert row(Known("mode", "Hz", 200.0, "", mode(200.0, (99.0, 200.0))), MODES)[-2:] == [
+        "none",
+        "cannot say",
+    ]
     assert row(Known("X_m", "µm", 1.0, "", face("xm")), {"faces": {"r": {}}})[-1] == "cannot say"
 
 
@@ -44,6 +52,39 @@ def test_effects_and_held_out_errors_are_read_from_the_verdict():
     assert share[-2] == "10.0 ± 5.0 %"
     runout = row(Known("runout", "µm", 5.0, "", effect("force", "tool_runout", "radius_um")), verdict=verdict)
     assert runout[-1] == "within"
+
+
+def test_the_probability_of_an_effect_is_that_of_the_verdict():
+    entry = {"effects": [{"effect": "tool_end", "probability": 0.61, "parameters": {}}]}
+    known = Known("the end", "1", None, "", probability("force", "tool_end"))
+    assert row(known, verdict={"observables": {"force": entry}})[-2] == "0.610 1"
+    assert row(known, verdict={"observables": {"force": {"effects": []}}})[-2:] == ["none", "cannot say"]
+
+
+def test_modes_are_paired_one_to_one_by_the_least_sum_of_all_pairings():
+    """Beside an exhaustive search over all pairings: the most pairs, then the least sum of distances."""
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        published = 100.0 * np.exp(rng.uniform(0.0, 0.4, 3))
+        ours = 100.0 * np.exp(rng.uniform(0.0, 0.4, rng.integers(1, 5)))
+        best = (0, 0.0)
+        for places in itertools.product(range(-1, len(ours)), repeat=3):
+            taken = [(i, j) for i, j in enumerate(places) if j >= 0]
+            distance = [abs(math.log(published[i] / ours[j])) for i, j in taken]
+            if len({j for _, j in taken}) == len(taken) and all(d <= math.log(1.1) for d in distance):
+                best = max(best, (len(taken), -sum(distance)))
+        found = assigned(published, ours)
+        total = -sum(abs(math.log(published[i] / ours[j])) for i, j in found.items())
+        assert (len(found), total) == pytest.approx(best)
+
+
+def test_a_mode_beside_one_published_mode_is_not_beside_another_and_the_rest_is_listed():
+    modes = {"modes": [{"frequency": {"value": f, "ci95": [f - 1, f + 1]}} for f in (100.0, 160.0)]}
+    published = (99.0, 102.0)
+    near, far = (row(Known("mode", "Hz", hz, "", mode(hz, published)), modes) for hz in published)
+    assert near[-2:] == ["100.0 ± 1.0 Hz", "within"]
+    assert far[-2:] == ["none", "cannot say"]
+    assert row(Known("others", "", None, "", others(published)), modes)[-2:] == ["160.0 ± 1.0 Hz", "–"]
 
 
 def test_a_set_that_ends_otherwise_than_it_should_is_wrong_and_said_so():

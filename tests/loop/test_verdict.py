@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -86,6 +87,20 @@ def test_every_status_has_an_entry_by_the_contract_and_a_sentence(status):
     assert verdict["held_out_runs"] == [block.run for block in task.role("validate")]
     assert verdict_in_words(verdict).startswith(SENTENCES[status].split("{")[0])
     json.dumps(in_words(story(task, outcome, verdict, GATES)), allow_nan=False)
+
+
+def test_a_probability_that_an_unexplained_residual_lowers_says_so_with_its_parts():
+    """Half of the wave is bent, a fifth of it is a spike that the library lacks: power 0.5² beside 0.2²."""
+    outcome, _, verdict = closed(*CASES["partly_explained"])
+    (effect,) = verdict["effects"]
+    assert "of the residual's power" in effect["lowered"]
+    assert effect["lowered"] in verdict_in_words(verdict)
+    weight, share = (float(number) for number in re.findall(r"[0-9.]*[0-9]", effect["lowered"])[:2])
+    assert weight == pytest.approx(outcome.weight["bend"], abs=0.006)
+    assert weight * share / 100.0 == pytest.approx(effect["probability"], abs=0.01)
+    assert share < 99.0
+    (whole,) = closed(*CASES["explained"])[2]["effects"]
+    assert "lowered" not in whole
 
 
 def with_spike_where_unseen(task):

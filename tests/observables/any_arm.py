@@ -19,6 +19,7 @@ START = {
 TOOL = np.array([0.06, 0.02, 0.14])
 FORCE = np.array([35.0, 110.0, -20.0])
 LOAD, CENTRE = 4.2, np.array([0.03, -0.02, 0.11])
+TOOL_DIAMETER = 0.016
 PERIOD, FEED, LENGTH = 0.012, 0.02, 0.1  # s, m/s, m
 SOFT = 4e-7  # rad/(N m) of every joint, and a fifth of it in m/N of the rail
 
@@ -126,7 +127,9 @@ def write(folder, name, *, commanded=True, profile=True, form="tau{}_nm", scale=
             s = np.arange(0.0, knots[-1], FEED * PERIOD)
             q = CubicSpline(knots, nodes)(s)
             rate = np.gradient(q, PERIOD, axis=0)
-            inside = np.clip((s - 0.02 - 0.0) / 0.005, 0, 1) * np.clip((0.02 + LENGTH - s) / 0.005, 0, 1)
+            # The arc of contact is ahead of the tool's axis: it is whole where the axis meets the work.
+            arc = np.sqrt(share * 1e-3 * (TOOL_DIAMETER - share * 1e-3))
+            inside = np.clip((s - 0.02) / arc + 1, 0, 1) * np.clip((0.02 + LENGTH - s) / arc, 0, 1)
             at_knots = np.array([arm.weight(each) for each in nodes])
             torque = CubicSpline(knots, at_knots)(s) + 20 * np.tanh(rate / 1e-3) + 300 * rate
             if log == "robot":
@@ -175,7 +178,7 @@ def write(folder, name, *, commanded=True, profile=True, form="tau{}_nm", scale=
     (folder / "cell.yaml").write_text(yaml.safe_dump(cell | ({"drives": drives} if drives else {})))
     batch = {"format": 1, "batch": folder.name, "title": "Any arm", "source": "simulated", "cell": name}
     batch |= {
-        "tool": {"diameter_mm": 16, "teeth": 2, "helix_deg": 30},
+        "tool": {"diameter_mm": TOOL_DIAMETER * 1e3, "teeth": 2, "helix_deg": 30},
         "tool_in_flange_mm": (TOOL * 1e3).tolist(),
     }
     batch |= {"work": {"material": "AA6061-T6", "size_mm": [LENGTH * 1e3, 50, 20]}}

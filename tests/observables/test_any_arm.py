@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from any_arm import CENTRE, FORCE, LOAD, AnyArm, write
+from any_arm import CENTRE, FORCE, LOAD, TOOL, AnyArm, write
 
 from metro.batch.findings import BatchError
 from metro.batch.processed import Processed, read_batch
@@ -79,6 +79,73 @@ def test_the_force_by_the_torques_holds_the_errors_of_the_drives_joint_by_joint(
     mean = np.array([assumed[axis]["value"] for axis in "xyz"])
     # independent errors of the joints turn the force; of one joint alone they would be those of one factor
     assert not np.allclose(np.sqrt(moved**2 - at_rest**2), np.abs(mean), rtol=0.05)
+
+
+def by_hand(folder, arm, run, constants):
+    """Force on the tip from a batch's own files: currents less those of the idle run, by −Jᵀ of the middle.
+
+    Joints that turn alone; the middle fifth of the path, where the cut is steady.
+    """
+    cut, idle = (pd.read_csv(folder / f"{run}-{log}.csv") for log in ("robot", "idle"))
+    turning = np.flatnonzero(~arm.linear)
+    currents = [f"current{i + 1}_a" for i in turning]
+    middle = slice(int(0.4 * len(cut)), int(0.6 * len(cut)))
+    more = (cut[currents] - idle[currents]).to_numpy()[middle].mean(axis=0) * constants[turning]
+    names = list(arm.columns("q{}_{}", np.zeros((1, len(arm.rows)))))
+    q = cut[names].to_numpy()[middle].mean(axis=0) * np.where(arm.linear, 1e-3, np.pi / 180)
+    return np.linalg.lstsq(-arm.jacobian(q)[:, turning].T, more, rcond=None)[0], q
+
+
+def by_pinocchio(arm, q, torque):
+    """Force that makes ``torque`` at the joints that turn, by pinocchio's Jacobian of the tip."""
+    pin = pytest.importorskip("pinocchio", reason="pinocchio (pin) is not installed (development only)")
+    model, parent, place = pin.Model(), 0, pin.SE3(arm.base, np.zeros(3))
+    for i, (kind, theta, alpha, d, a) in enumerate(arm.rows):
+        turn = pin.SE3(pin.utils.rotate("z", np.radians(theta)), np.zeros(3))
+        joint = pin.JointModelRZ() if kind == "revolute" else pin.JointModelPZ()
+        parent = model.addJoint(parent, joint, place * turn, f"joint {i + 1}")
+        place = pin.SE3(pin.utils.rotate("x", np.radians(alpha)), np.array([a, 0, d]) * 1e-3)
+    tip = place * pin.SE3(np.eye(3), TOOL)
+    number = model.addFrame(pin.Frame("tip", parent, tip, pin.FrameType.OP_FRAME))
+    jacobian = pin.computeFrameJacobian(model, model.createData(), q, number, pin.LOCAL_WORLD_ALIGNED)
+    return np.linalg.lstsq(-jacobian[:3, ~arm.linear].T, torque, rcond=None)[0]
+
+
+@pytest.fixture(scope="module", params=["seven", "rail"])
+def by_currents(request, tmp_path_factory):
+    """Arm, constants of its drives (N m/A at the joint), raw folder, and what its currents say of r1."""
+    place, name = tmp_path_factory.mktemp(f"{request.param}-currents"), request.param
+    constants = np.array([11.0, -9.5, 8.0, 12.5, -7.0, 10.0, 6.5])
+    ratio = np.array([100.0, 120.0, 100.0, 80.0, 50.0, 100.0, 60.0])
+    drives = {"torque_per_ampere_nm_a": (constants / ratio).tolist(), "gear_ratio": ratio.tolist()}
+    write(place / name, name, form="current{}_a", scale=constants, drives=drives | {"uncertainty": 0.02})
+    payload = place / name / "payload.csv"  # of torques, which this log has not
+    payload.unlink()
+    ingest(place / name, place, place / "out", {}, "test")
+    read = Processed(place / "out")
+    found = force_without_dynamometer(read_batch(place / "out"), read, {})["tip_force_by_torques"]["r1"]
+    return AnyArm(name), constants, place / name, found
+
+
+def test_currents_of_seven_axes_are_a_force_by_the_transposed_jacobian(by_currents):
+    """The interval holds the force that the logs were made with, and what this file computes of the files."""
+    arm, constants, folder, found = by_currents
+    own, _ = by_hand(folder, arm, "r1", constants)
+    for axis, true, ours in zip("xyz", FORCE, own, strict=True):
+        low, high = found[axis]["ci95"]
+        assert low < true < high
+        assert abs(found[axis]["value"] - ours) < 0.005 * np.linalg.norm(FORCE)
+        assert high - low < np.linalg.norm(FORCE)
+
+
+def test_the_force_by_currents_is_that_of_pinocchio_s_jacobian(by_currents):
+    arm, constants, folder, found = by_currents
+    own, q = by_hand(folder, arm, "r1", constants)
+    torque = -arm.jacobian(q)[:, ~arm.linear].T @ own
+    theirs = by_pinocchio(arm, q, torque)
+    np.testing.assert_allclose(theirs, own, rtol=1e-6, atol=1e-6)
+    for axis, value in zip("xyz", theirs, strict=True):
+        assert abs(found[axis]["value"] - value) < 0.005 * np.linalg.norm(FORCE)
 
 
 @pytest.mark.slow

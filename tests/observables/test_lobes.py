@@ -1,5 +1,6 @@
 """From hammer records and labels to lobes and probabilities, on a batch made in the test."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,8 +8,9 @@ import pandas as pd
 import pytest
 
 from metro.batch.batch import Batch
+from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.dynamics.lobes import stability_boundary
-from metro.dynamics.system import Cut, Structure
+from metro.dynamics.system import Cut, Edge, Structure
 from metro.observables.problem import Refusal
 from metro.observables.stability import boundary as stability
 from metro.observables.stability import observable as lobes
@@ -248,3 +250,23 @@ def test_probability_is_a_half_at_the_boundary_and_grows_with_depth():
     assert middle == pytest.approx(0.5)
     assert low == pytest.approx(1 - high, abs=0.02)
     assert stability.probability_unstable(np.array([1e-6]), samples[:, :1])[0] == stability.LABEL_ERROR
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 30.0])
+@pytest.mark.parametrize(("direction", "normal"), [("up", 0.0), ("down", math.pi)])
+def test_a_side_cut_of_a_rounded_end_knows_its_raw_face(direction, normal, turn_deg):
+    """At the face's distance from the axis, 8 − 3 mm, in the frame of the modes; none in slots and beyond."""
+    ball = Cutter(8e-3, 0.0, evenly_pitched(2), corner=8e-3)
+    cutting = stability.Cutting(9e8, 5e8, np.zeros(2), ball, Edge(ball, 5e8, 4e8))
+    first = pd.Series({"operation": "side", "direction": direction, "radial_depth_mm": 3.0})
+    first["feed_direction_deg"] = turn_deg
+    _, (cut,) = stability.cuts_of(first, cutting)
+    assert cut.face.distance == pytest.approx(5e-3)
+    assert cut.face.towards == pytest.approx(normal - math.radians(turn_deg))
+    made = cut.at_depth(8e-3)
+    assert (made.entry, made.exit) == pytest.approx((cut.entry, cut.exit))
+    assert made.exit - made.entry > cut.at_depth(3e-3).exit - cut.at_depth(3e-3).entry > 0.0
+    wide = stability.cuts_of(pd.Series({**first, "radial_depth_mm": 9.0}), cutting)[1][0]
+    slot = stability.cuts_of(pd.Series({**first, "direction": "slot"}), cutting)[1][0]
+    assert wide.face is None
+    assert slot.face is None

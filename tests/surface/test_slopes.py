@@ -211,6 +211,24 @@ def test_the_intervals_of_the_indices_hold_the_truth(flat):
     assert min(held.values()) >= 10, held
 
 
+@pytest.mark.parametrize("name", ["fltt", "fltp", "fltv"])
+def test_a_face_that_noise_alone_may_make_of_a_flat_one_may_be_flat(name):
+    """Readings of nothing but noise exceed the 97.5 % quantile of an index, by draws made here, in 2.5 %.
+
+    Up to that quantile the lower end is zero, whichever stations are the extreme ones, and well beyond not.
+    """
+    read = {"fltt": np.ptp, "fltp": np.max, "fltv": lambda z: -np.min(z)}[name]
+    found, random = level(jack(6, 4, 8, (1.0, 0.6), own_zeros=True)), np.random.default_rng(5)
+    root = np.linalg.cholesky(found.cofactor + 1e-9 * np.trace(found.cofactor) * np.eye(len(found.heights)))
+    drawn = 1e-6 * random.standard_normal((20_000, len(root))) @ root.T
+    most = np.quantile([read(each) for each in drawn], 0.975)
+    for noise in drawn[:4]:
+        for times, zero in ((0.93, True), (3.0, False)):
+            heights = noise * times * most / read(noise)
+            low = level_indices(replace(found, heights=heights), 1e-6, np.inf)[name].low
+            assert (low == 0.0) == zero, (name, times, low)
+
+
 def test_the_minimum_zone_of_a_saddle_is_that_of_its_four_corners():
     """z = c (x² − y²) over a square: the middles of two edges against those of two others, a width of 2 c."""
     plate = of_surface(jack(4, 4, 6, (2.0, 2.0)), lambda x, y: 1e-6 * ((x - 1) ** 2 - (y - 1) ** 2))

@@ -109,7 +109,8 @@ def collocate(structure: Structure, cut: Cut, points: tuple[int, ...]) -> Arc:
         directions = chip_direction(phi)
         channels = _channels(directions, cut.force_direction(phi), flexible, False)
         if cut.damping:
-            channels += _channels(directions, -cut.damping / cut.pitch * directions, flexible, True)
+            rubs = -cut.damping / cut.pitch * cut.acting(phi)[0][..., None] * directions
+            channels += _channels(directions, rubs, flexible, True)
         for unit, density, is_rate in channels:
             time.append(tau)
             weight.append((end - start) * w)

@@ -27,18 +27,18 @@ class Alike:
 
 @dataclass(frozen=True)
 class LinearFit:
-    """Fit of c alike responses with u m + 2 unknowns each, for m poles; u = 1 (real modes) or 2.
+    """Fit of c alike responses with u m + 3 unknowns each, for m poles; u = 1 (real modes) or 2.
 
     Attributes
     ----------
     of : the responses.
-    unknowns : (u m + 2, c) ``solve`` times the data under ``of.weight``.
+    unknowns : (u m + 3, c) ``solve`` times the data under ``of.weight``.
     residual : (2 n, c) of the data under ``of.weight``, real parts first.
-    solve : (u m + 2, 2 n).
-    spread : (u m + 2, u m + 2) covariance of the unknowns for given poles and unit noise under ``of.weight``.
+    solve : (u m + 3, 2 n).
+    spread : (u m + 3, u m + 3) covariance of the unknowns for given poles and unit noise under ``of.weight``.
     slopes : (2 n, 2, u, m) how the weighted columns change with (log omega, log zeta) of their mode, clear of
         what the unknowns can follow.
-    followed : (u m + 2, 2, u, m) how the unknowns follow.
+    followed : (u m + 3, 2, u, m) how the unknowns follow.
     """
 
     of: Alike
@@ -88,12 +88,12 @@ class LinearFit:
         return result
 
     def slope(self, which: int) -> Array:
-        """(u m + 2, 2 m) change of the unknowns of response ``which`` of these with (log omega, log zeta)."""
+        """(u m + 3, 2 m) change of the unknowns of response ``which`` of these with (log omega, log zeta)."""
         moved = np.einsum("psum,um->psm", self.followed, self.shares[:, :, which])
         return -np.asarray(moved).reshape(len(self.followed), -1)
 
     def own(self, which: int) -> Array:
-        """(u m + 2, u m + 2) covariance of the unknowns of ``which`` for unit noise and given poles."""
+        """(u m + 3, u m + 3) covariance of the unknowns of ``which`` for unit noise and given poles."""
         result: Array = self.spread / self.of.scale[which] ** 2
         return result
 
@@ -117,7 +117,7 @@ def linear_fit(basis: ComplexArray, slopes: ComplexArray, frf: ComplexArray, of:
 
     Parameters
     ----------
-    basis : (n, u m + 2) columns that the unknowns multiply.
+    basis : (n, u m + 3) columns that the unknowns multiply.
     slopes : (n, 2, u, m) changes of the first u m of them with (log omega, log zeta) of their mode.
     frf : (n, all responses).
     """

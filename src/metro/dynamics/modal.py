@@ -10,7 +10,7 @@ import numpy as np
 from metro.dynamics.by_file import Moved, explained, own_fits, with_files
 from metro.dynamics.driving import Standing, power_given_out, standing, turning
 from metro.dynamics.modes import Mode, modal_constants
-from metro.dynamics.polefit import PoleFit, Scatter, criterion
+from metro.dynamics.polefit import TERMS, PoleFit, Scatter, criterion
 from metro.dynamics.refine import Data, losses, refine
 from metro.dynamics.shapes import residues
 from metro.dynamics.stabilisation import Diagram, stabilisation
@@ -175,7 +175,7 @@ def _search(data: Data, files: Ways) -> tuple[PoleFit, Diagram]:
     diagram = stabilisation(data, orders)
     starts = diagram.recurring()[:_MOST_MODES]
     starts = starts or [_strongest(data, np.zeros_like(data.frf))]
-    general = _added(data, _pruned(data, _fit(data, np.array(starts), real=False)))
+    general = _settled(data, _pruned(data, _fit(data, np.array(starts), real=False)))
     normal = _pruned(data, _fit(data, general.poles, real=True))
     return _merged(data, min(normal, general, key=lambda fit: fit.bic()), files), diagram
 
@@ -214,7 +214,7 @@ def _is_there(data: Data, fit: PoleFit) -> bool:
     if len(fit.omega) > 1:
         return True
     without = fit.chi2 + float(losses(data, fit)[0])
-    return fit.bic() < criterion(without, (fit.count[0], 2 * data.frf.shape[1]))
+    return fit.bic() < criterion(without, (fit.count[0], TERMS * data.frf.shape[1]))
 
 
 def _pruned(data: Data, fit: PoleFit) -> PoleFit:
@@ -226,6 +226,15 @@ def _pruned(data: Data, fit: PoleFit) -> PoleFit:
             break
         fit = again
     return fit
+
+
+def _settled(data: Data, fit: PoleFit) -> PoleFit:
+    """Add and remove modes in turn while the criterion falls: what was added first may be idle by now."""
+    while True:
+        again = _pruned(data, _added(data, fit))
+        if again.bic() >= fit.bic():
+            return fit
+        fit = again
 
 
 def _added(data: Data, fit: PoleFit) -> PoleFit:

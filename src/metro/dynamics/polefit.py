@@ -8,6 +8,19 @@ import numpy as np
 
 from metro.units import Array, ComplexArray
 
+TERMS = 3  # that stand for the modes outside the band
+
+
+def residual_columns(omega: Array, unit: float = 1.0) -> ComplexArray:
+    """Return what the residual terms multiply, (n, 3): 1, (u/ω)², i (u/ω)³, for ω (n,) and the ``unit`` u.
+
+    Far above its own frequency a mode of mass m is 1/(m s² (1 + 2 ζ ω_r / s + …)) with s = iω: an inertance,
+    and what its damping adds to that. So is a sensor's time constant τ: it multiplies an inertance by
+    1/(1 + 1/(τ s)). Far below its own frequency a mode is a compliance.
+    """
+    share = unit / omega
+    return np.stack([np.ones(len(omega)), share**2, 1j * share**3], axis=1)
+
 
 @dataclass(frozen=True)
 class Scatter:
@@ -37,7 +50,8 @@ class PoleFit:
     ----------
     omega, zeta : (m,) undamped frequency in rad/s and damping ratio.
     residues : (m, c) complex, m rad/(N s): the FRF is sum_r A_r/(i w - p_r) + conj(A_r)/(i w - conj(p_r)).
-    residual_terms : (2, c): compliance (m/N) and inertance (coefficient of 1/omega²).
+    residual_terms : (3, c): compliance (m/N), inertance (coefficient of 1/omega²), and the coefficient of
+        i/omega³ (:func:`residual_columns`).
     joint : (c, 3m, 3m) covariance of (log omega, log zeta, imaginary part of the residues of response c) for
         noise that is independent from line to line, scaled by the residual.
     shifts : (c, g, 3m) what each of g repeats adds to their error, to first order; no rows without repeats.
@@ -94,7 +108,7 @@ class PoleFit:
         value = (1.0 / (s - self.poles)) @ self.residues + (
             1.0 / (s - self.poles.conj())
         ) @ self.residues.conj()
-        total: ComplexArray = value + self.residual_terms[0] + self.residual_terms[1] / omega[:, None] ** 2
+        total: ComplexArray = value + residual_columns(omega) @ self.residual_terms
         return total
 
 

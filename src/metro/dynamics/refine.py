@@ -1,7 +1,7 @@
 """Maximum-likelihood refinement of poles: variable projection, residues and residual terms linear.
 
 Golub and Pereyra (1973) with Kaufman's Jacobian. Each response has, per mode, one residue (imaginary for real
-modes, else complex), and the residual terms 1 and 1/omega² of the modes outside the band.
+modes, else complex), and the residual terms of the modes outside the band (``polefit.residual_columns``).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from metro.dynamics.linear_fit import Alike, LinearFit, alike, linear_fit, stacked
-from metro.dynamics.polefit import PoleFit, Scatter
+from metro.dynamics.polefit import TERMS, PoleFit, Scatter, residual_columns
 from metro.units import Array, ComplexArray
 
 
@@ -100,7 +100,7 @@ def _bounds(data: Data, modes: int) -> tuple[Array, Array]:
 
 
 def _basis(omega: Array, theta: Array, *, real: bool) -> tuple[ComplexArray, ComplexArray]:
-    """Columns (n, u m + 2) that the linear unknowns multiply, and their slopes (n, 2, u, m).
+    """Columns (n, u m + 3) that the linear unknowns multiply, and their slopes (n, 2, u, m).
 
     There are u = 1 (real modes) or 2 unknowns per mode and response. A slope is by (log omega, log zeta) of
     the column's own mode: it depends on no other.
@@ -113,7 +113,7 @@ def _basis(omega: Array, theta: Array, *, real: bool) -> tuple[ComplexArray, Com
     plus, minus = 1.0 / (s - pole), 1.0 / (s - pole.conj())
     units = (1j,) if real else (1j, 1.0)
     columns = [u * plus + np.conj(u) * minus for u in units]
-    outside = np.stack([np.ones(len(omega)), omega[0] ** 2 / omega**2], axis=1)
+    outside = residual_columns(omega, float(omega[0]))
     changes = [[u * p * plus**2 + np.conj(u * p) * minus**2 for u in units] for p in slopes]
     return np.concatenate([*columns, outside], axis=1), np.array(changes).transpose(2, 0, 1, 3)
 
@@ -142,18 +142,19 @@ def losses(data: Data, fit: PoleFit) -> Array:
     own = np.arange(units) * m + np.arange(m)[:, None]
     for each in _fits(data, np.log(np.concatenate([fit.omega, fit.zeta])), fit.real):
         x = each.unknowns[own]  # (m, units, c)
-        blocks = each.spread[own[:, :, None], own[:, None, :]]
-        total += np.sum(each.of.scale**2 * np.sum(x * np.linalg.solve(blocks, x), axis=1), axis=1)
+        # Of two modes that coincide, as at a bound of the search, the unknowns are not determined: singular.
+        known = np.linalg.pinv(each.spread[own[:, :, None], own[:, None, :]], hermitian=True)
+        total += np.sum(each.of.scale**2 * np.sum(x * (known @ x), axis=1), axis=1)
     return total
 
 
 def _finish(data: Data, theta: Array, real: bool, fitted: np.ndarray) -> PoleFit:
     chi2, _, normal = _quadratic(data, theta, real)
     m, responses = len(theta) // 2, data.frf.shape[1]
-    count = 2 * len(data.omega) * responses, len(fitted) + responses * ((1 if real else 2) * m + 2)
+    count = 2 * len(data.omega) * responses, len(fitted) + responses * ((1 if real else 2) * m + TERMS)
     noise = chi2 / max(count[0] - count[1], 1)
     inverse = _inverse(normal, fitted)
-    x = np.empty(((1 if real else 2) * m + 2, responses))
+    x = np.empty(((1 if real else 2) * m + TERMS, responses))
     joint = np.empty((responses, 3 * m, 3 * m))
     for each in _fits(data, theta, real):
         x[:, each.of.columns] = each.unknowns
@@ -167,7 +168,7 @@ def _finish(data: Data, theta: Array, real: bool, fitted: np.ndarray) -> PoleFit
         omega=np.exp(theta[:m]),
         zeta=np.exp(theta[m:]),
         residues=np.asarray(1j * x[:m] + (0.0 if real else x[m : 2 * m]), dtype=np.complex128),
-        residual_terms=x[-2:] * np.array([[1.0], [data.omega[0] ** 2]]),
+        residual_terms=x[-TERMS:] * data.omega[0] ** np.array([[0], [2], [3]]),
         joint=joint,
         shifts=_shifts(data, theta, inverse, real=real),
         mean=np.zeros(0, dtype=int) if data.scatter is None else data.scatter.mean,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from metro.dynamics.polefit import residual_columns
 from metro.units import Array, ComplexArray
 
 
 def residues(omega: Array, frf: ComplexArray, weight: Array, poles: ComplexArray) -> ComplexArray:
-    """Least-squares frequency-domain residues (m, c) of poles (m,), with residual terms 1 and 1/omega².
+    """Least-squares frequency-domain residues (m, c) of poles (m,), with residual terms.
 
     Parameters
     ----------
@@ -18,7 +19,7 @@ def residues(omega: Array, frf: ComplexArray, weight: Array, poles: ComplexArray
     """
     s = 1j * omega[:, None]
     plus, minus = 1.0 / (s - poles), 1.0 / (s - poles.conj())
-    outside = np.stack([np.ones(len(omega)), omega[0] ** 2 / omega**2], axis=1)
+    outside = residual_columns(omega, float(omega[0]))
     basis = np.concatenate([plus + minus, 1j * (plus - minus), outside], axis=1) * weight[:, None]
     scale = np.linalg.norm(basis, axis=0)
     target = frf * weight[:, None]

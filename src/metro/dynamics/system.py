@@ -99,6 +99,70 @@ class Edge:
 
 
 @dataclass(frozen=True)
+class RawFace:
+    """Face of the work that a side cut removes: what of a tooth is beyond it is in the work.
+
+    Attributes
+    ----------
+    distance : from the tool's axis, m, above 0.
+    towards : immersion at which a tooth is farthest beyond it, rad.
+    """
+
+    distance: float
+    towards: float
+
+    def reach(self, radius: float) -> float:
+        """Angle on either side of ``towards`` up to which a tooth of a radius is beyond the face, rad."""
+        return math.acos(min(self.distance / radius, 1.0))
+
+
+@dataclass(frozen=True)
+class Engaged:
+    """What of the height of a corner is in a side cut at each immersion: the face is met by the widest part.
+
+    Attributes
+    ----------
+    edge : with a straight flank of no taper above its corner. face, depth : of the cut, m.
+    """
+
+    edge: Edge
+    face: RawFace
+    depth: float
+
+    def __call__(self, phi: Array) -> tuple[Array, Array]:
+        """Return what the tangential and the normal coefficient act with at immersions ``phi``.
+
+        Means over the height of the cut of 1 and of sin κ − K_ac/K_rc cos κ, over the part that is engaged.
+        """
+        least = self.face.distance / np.maximum(np.cos(phi - self.face.towards), 1e-9)  # radius in the work
+        low = np.minimum(self._height(least), self.depth)
+        whole = self._inclined(np.full_like(low, self.depth))
+        sine, cosine = (whole - self._inclined(low)) / self.depth
+        return 1.0 - low / self.depth, sine - self.edge.kac / self.edge.krc * cosine
+
+    def widest(self) -> float:
+        """Radius at the upper end of the cut, m."""
+        tool = self.edge.tool
+        above = max(tool.corner - self.depth, 0.0)
+        return tool.radius - tool.corner + math.sqrt(tool.corner**2 - above**2)
+
+    def _height(self, radius: Array) -> Array:
+        """Return the height above which the tool is wider than a radius, m; infinite where it never is."""
+        tool = self.edge.tool
+        beside = np.maximum(radius - tool.radius + tool.corner, 0.0)
+        height = tool.corner - np.sqrt(np.maximum(tool.corner**2 - beside**2, 0.0))
+        return np.where(beside < tool.corner, height, np.inf)
+
+    def _inclined(self, height: Array) -> Array:
+        """Integrals of sin κ and cos κ over the height from the tip on, (2, ...), m."""
+        corner = self.edge.tool.corner
+        arc = np.minimum(height, corner)
+        kappa = np.arccos(1.0 - arc / corner)
+        sine = corner * (kappa / 2.0 - np.sin(2.0 * kappa) / 4.0) + (height - arc)
+        return np.stack([sine, arc - arc**2 / (2.0 * corner)])
+
+
+@dataclass(frozen=True)
 class Cut:
     """Engagement and cutting coefficients.
 
@@ -109,6 +173,8 @@ class Cut:
     ktc, krc : tangential and radial cutting coefficients, N/m².
     edge : of an end that is not flat: what of the coefficients acts along the radius at each depth of cut.
         The mean at one depth is ``krc``, for what takes one coefficient.
+    face : that a side cut removes, where the edge is not straight; None of a slot.
+    engaged : what of the edge is engaged at each immersion, at the one depth that this is the cut of.
     damping : of the process, coefficient over the tool's radius, N/m²: a tooth that moves into the work at a
         speed v is pushed back by ``damping * depth * v / spindle's angular speed``.
     """
@@ -120,10 +186,25 @@ class Cut:
     krc: float
     damping: float = 0.0
     edge: Edge | None = None
+    face: RawFace | None = None
+    engaged: Engaged | None = None
 
     def at_depth(self, depth: float) -> Cut:
-        """Return the cut with the mean radial coefficient of an axial depth, m, at all depths."""
-        return self if self.edge is None else replace(self, krc=self.edge.radial(depth), edge=None)
+        """Return the cut with what an axial depth, m, makes of its edge, at all depths.
+
+        In a slot that is the mean radial coefficient. In a side cut a corner meets the raw face the later the
+        narrower it is, and what is narrower than the face's distance does not cut.
+        """
+        if self.edge is None:
+            return self
+        tool = self.edge.tool
+        if self.face is None or tool.corner == 0.0 or tool.taper or not self.edge.krc:
+            return replace(self, krc=self.edge.radial(depth), edge=None, face=None)
+        engaged = Engaged(self.edge, self.face, depth)
+        towards, reach = self.face.towards, self.face.reach(engaged.widest())
+        entry, leave = max(self.entry, towards - reach), min(self.exit, towards + reach)
+        made = replace(self, entry=entry, exit=max(entry, leave), krc=self.edge.krc)
+        return replace(made, edge=None, face=None, engaged=engaged)
 
     def harder(self, tangential: float, radial: float) -> Cut:
         """Return the cut with so many times the tangential and the radial coefficient."""
@@ -139,10 +220,16 @@ class Cut:
         """Tooth period in seconds at spindle speeds in rev/min."""
         return 60.0 / (self.teeth * np.asarray(rpm, dtype=float))
 
+    def acting(self, phi: Array) -> tuple[Array, Array]:
+        """Return what ktc and krc act with at immersions: 1, or the means of what is engaged of an edge."""
+        return (np.ones_like(phi), np.ones_like(phi)) if self.engaged is None else self.engaged(phi)
+
     def force_direction(self, phi: Array) -> Array:
         """(..., 2) force on the tool per chip area times thickness, N/m²: ``F = a * force_direction * h``."""
         s, c = np.sin(phi), np.cos(phi)
-        return np.stack([-(self.ktc * c + self.krc * s), self.ktc * s - self.krc * c], axis=-1)
+        along, inward = self.acting(phi)
+        ktc, krc = self.ktc * along, self.krc * inward
+        return np.stack([-(ktc * c + krc * s), ktc * s - krc * c], axis=-1)
 
 
 def chip_direction(phi: Array) -> Array:

@@ -5,7 +5,9 @@ difference of two stations, a station, a station turned over, three stations aga
 Noise makes the largest of them larger. Whichever is the largest in truth, its own interval is a Student's
 one, so that the upper end of the index is the largest upper end. The lower end is the largest of the lower
 ends that hold for all of them at once (Chernozhukov, Lee & Rosen, Econometrica 81 (2013) 667). The functions
-that count are those that are the largest in some of many draws of the noise.
+that count are those that are the largest in some of many draws of the noise. Of a face that is flat they are
+too few: every function may be the largest there. So the lower end is zero where noise alone reaches the index
+in more than one case of forty.
 """
 
 from __future__ import annotations
@@ -53,10 +55,13 @@ def level_indices(found: Levelled, sigma: float, dof: float) -> dict[str, Index]
     indices = {"fltq": _rms(values["fltq"], heights, covariance, dof)}
     for name, (function, count) in largest.items():
         some = draws[:count]
+        alone = [function(each) for each in some]
         tried = [function(heights), *map(function, heights + some)]
         # of a zone there are more functions than so few draws find: those that noise alone chooses count too
-        tried += map(function, some) if name == "minimum_zone" else []
+        tried += alone if name == "minimum_zone" else []
         low, high = _ends(np.unique(np.round(tried, 9), axis=0), heights, covariance, some, dof)
+        if values[name] <= _of_noise(alone, some):
+            low = 0.0
         indices[name] = Index(values[name], values[name], max(0.0, min(low, values[name])), high)
     return indices
 
@@ -114,6 +119,15 @@ def _ends(weights: Array, heights: Array, covariance: Array, draws: Array, dof: 
     of_one = float(t.ppf(ENDS[1], dof) if np.isfinite(dof) else norm.ppf(ENDS[1]))
     of_all = float(np.quantile(standard.max(axis=1), ENDS[1]))
     return float((values - of_all * sd).max()), float((values + of_one * sd).max())
+
+
+def _of_noise(weights: list[Array], draws: Array) -> float:
+    """Return what an index of noise alone exceeds in one case of forty, by ``draws`` (d, p) of the noise.
+
+    A further draw is above the quantile (d + 1) q in just that share of cases, however few the draws.
+    """
+    reached = [float(one @ draw) for one, draw in zip(weights, draws, strict=True)]
+    return float(np.quantile(reached, ENDS[1], method="weibull"))
 
 
 def _rms(value: float, heights: Array, covariance: Array, dof: float) -> Index:

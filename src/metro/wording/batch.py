@@ -77,6 +77,7 @@ def verdict_in_words(verdict: JSON) -> str:
     rivals = "; ".join(plain(" or ".join(pair)) for pair in verdict["indistinguishable"])
     status = "contradicted" if verdict.get("contradicted") else verdict["status"]
     sentence = STATUSES[status].format(effects=effects, rivals=rivals)
+    sentence += "".join(f" {one['lowered']}." for one in verdict["effects"] if one.get("lowered"))
     before, after, residual = verdict["before"], verdict["after"], verdict["unexplained"]
     if before and after:
         unit = f" {printed(verdict['unit'])}".rstrip()

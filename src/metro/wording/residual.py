@@ -32,6 +32,15 @@ def _places(values: JSON) -> str:
     return "; ".join(parts) + (f" and {more} more places" if more > 0 else "")
 
 
+def _lowered(values: JSON) -> str:
+    name = plain(values["effect"])
+    return (
+        f"{name[:1].upper()}{name[1:]} has the weight {values['weight']:.2f} against all other effects and "
+        f"against none. {100 * values['explained']:.0f} % of the residual's power is explained; what is "
+        "missing may resemble the effect, so the probability is lowered to that share of the weight"
+    )
+
+
 def _step(values: JSON) -> str:
     return f"a step of {values['parameter']} by {100 * values['relative']:+.1f} % after run {values['after']}"
 
@@ -177,6 +186,7 @@ SENTENCES: Mapping[str, Sentence] = {
     "residual": _residual,
     "residual_and_likeness": _residual_and_likeness,
     "places": _places,
+    "lowered": _lowered,
     "step": _step,
     "between": _between,
     "restless": _restless,

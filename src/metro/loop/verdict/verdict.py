@@ -23,6 +23,7 @@ from metro.observables.quantity import quantity
 from metro.units import JSON, Array
 
 DRAWS = 2000
+LOWERED = 0.01  # by which an unexplained residual lowers a probability: below, no printed digit shows it
 
 
 def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
@@ -100,9 +101,12 @@ def _status(outcome: Outcome, remaining: bool, enough: bool) -> str:
 
 
 def _effect(outcome: Outcome, name: str) -> JSON:
+    weight, explained = outcome.weight[name], outcome.explained
+    lowered = Statement("lowered", {"effect": name, "weight": weight, "explained": explained})
     return {
         "effect": name,
         "probability": outcome.probability(name),
+        **({"lowered": lowered} if weight * (1.0 - explained) > LOWERED else {}),
         "parameters": parameters(outcome.final, name),
     }
 

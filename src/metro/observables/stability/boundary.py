@@ -11,7 +11,7 @@ from metro.batch.batch import Batch
 from metro.cutting.cutter import Cutter
 from metro.dynamics.by_depth import boundary_of_edge, depths_anew
 from metro.dynamics.lobes import Boundary
-from metro.dynamics.system import Cut, Edge, immersion
+from metro.dynamics.system import Cut, Edge, RawFace, immersion
 from metro.dynamics.teeth import equal_teeth, mean_directional_factors
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.problem import Refusal
@@ -130,8 +130,9 @@ def _of_the_end(batch: Batch) -> list[str]:
         return [] if cutting_force.end_declared(batch) else ["a flat end of the tool is assumed"]
     return [
         "corner, ball end and taper: the radial coefficient is K_rc sin κ - K_ac cos κ (κ: edge angle) with "
-        "the means over the height of the cut at each depth of the boundary; other methods and islands take "
-        f"them at {_usual_depth(batch) / MM:.2g} mm; side cuts have the engagement of the full radius"
+        "the means over the height of the cut at each depth of the boundary; in side cuts of up to the "
+        "radius the raw face is met at each height by the radius there, in deeper ones by the full radius, "
+        f"as in other methods and islands, which take the means at {_usual_depth(batch) / MM:.2g} mm"
     ]
 
 
@@ -163,8 +164,11 @@ def _cut(first: pd.Series, cutting: Cutting, turn: float) -> Cut:
     diameter = 2 * cutting.tool.radius
     radial = diameter if pd.isna(first["radial_depth_mm"]) else first["radial_depth_mm"] * MM
     entry, leave = immersion(direction, radial, diameter)
-    teeth = len(cutting.tool.tooth_angles)
-    return Cut(teeth, entry - turn, leave - turn, cutting.ktc, cutting.krc, edge=cutting.edge)
+    teeth, distance = len(cutting.tool.tooth_angles), 0.5 * diameter - radial
+    face = None
+    if direction != "slot" and distance > 0.0:
+        face = RawFace(distance, (entry if direction == "up" else leave) - turn)
+    return Cut(teeth, entry - turn, leave - turn, cutting.ktc, cutting.krc, edge=cutting.edge, face=face)
 
 
 def _distinct(turned: list[tuple[float, Cut]]) -> tuple[tuple[float, ...], tuple[Cut, ...]]:

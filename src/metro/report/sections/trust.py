@@ -161,4 +161,5 @@ def _causes(entry: JSON) -> str:
         certain[chance is not None and chance >= SURE].append(name)
     finding = f"A finding: {listing(certain[True])}." if certain[True] else ""
     lead = f"A lead, not a finding: {listing(certain[False])}." if certain[False] else ""
-    return f"{finding} {lead}".strip()
+    lowered = " ".join(f"{one['lowered']}." for one in entry.get("effects") or [] if one.get("lowered"))
+    return " ".join(filter(None, [finding, lead, lowered]))
