@@ -23,7 +23,7 @@ CUT, ARC = (
 FROM_SOLID = ("slot", "helical")
 NO_MEASUREMENT = (
     "it holds no measurement: name its files in runs.csv or impacts.csv, "
-    "or give printed values in published.csv"
+    "or give load tests in loads.csv or printed values in published.csv"
 )
 COEFFICIENTS = tuple(f"coefficients.{name}_n_mm2" for name in ("ktc", "krc", "kac"))
 
@@ -55,7 +55,7 @@ class Stock:
     ----------
     manifest, cell : as read.
     runs : the run table, filled in, with the roles of the hold-out plan.
-    tables : impacts, loads, mass, published, stations.
+    tables : impacts, loads, mass, touches, payload, published, stations.
     """
 
     manifest: JSON
