@@ -134,13 +134,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m proof.slips", description=__doc__)
     parser.add_argument("batches", type=Path, nargs="+", help="folders of batches")
     parser.add_argument("--few", action="store_true", help="a few of the wrong orientations, the check alone")
+    parser.add_argument("--check", action="store_true", help="the check alone")
     parser.add_argument("--slip", default="", help="only slips whose name contains this")
     options = parser.parse_args(arguments)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     chosen = [one for one in mistakes(full=not options.few) if options.slip in one.name]
     count: Counter[str] = Counter()
     for folder in options.batches:
-        for result in tried(folder, chosen, loop=not options.few):
+        for result in tried(folder, chosen, loop=not (options.few or options.check)):
             count[result.outcome] += 1
             print(f"| {result.slip} | {result.batch} | {result.outcome} | {result.said} |", flush=True)
     print("; ".join(f"{outcome}: {number}" for outcome, number in count.most_common()))

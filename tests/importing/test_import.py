@@ -217,7 +217,9 @@ def test_the_csv_of_a_data_logger_has_its_time_and_units_behind_its_names(tmp_pa
     result = called(tmp_path / "slot", path, batch="slot", **given)
     assert result.exit_code == 0, result.output
     batch = load(tmp_path / "slot").batch
-    table = read(source(tmp_path / "slot", batch.runs["dynamometer"].iloc[0], batch.manifest["files"]), "force")
+    table = read(
+        source(tmp_path / "slot", batch.runs["dynamometer"].iloc[0], batch.manifest["files"]), "force"
+    )
     np.testing.assert_allclose(table["t_s"], time)
     np.testing.assert_allclose(table["fz_n"], forces[:, 2] * 1e3)
 

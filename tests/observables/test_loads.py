@@ -52,7 +52,7 @@ def test_the_stiffness_along_an_axis_is_that_of_a_spring_free_across_it():
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
-    """With three tests of one component, Student's t has two degrees of freedom: 1.96 would hold it in 81 %."""
+    """Three tests of one component leave two degrees of freedom: 1.96 standard errors would hold 81 %."""
     held = 0
     for seed in range(400):
         table = pushed(np.diag([1.0, 1.0, 1.0]), "z", 1.0, seed, pose="A", point="P").iloc[:3]

@@ -24,8 +24,8 @@ PURE = 1e-6
 class PointCompliance:
     """Compliance at a point: symmetric ``matrix`` (3, 3) m/N and ``sd``, NaN where no load shows it.
 
-    ``residual_sd`` (m) is the scatter of the displacements about the straight line through the origin, ``dof``
-    its degrees of freedom.
+    ``residual_sd`` (m) is the scatter of the displacements about the straight line through the origin, with
+    ``dof`` degrees of freedom.
     """
 
     matrix: Array

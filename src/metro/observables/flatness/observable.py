@@ -16,7 +16,7 @@ from metro.batch.writing import writing
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness import NAME, TABLES
 from metro.observables.flatness.advice import advice, after_loop, planned_points, studied
-from metro.observables.flatness.blocks import LOADS, Pose, face_block, load_arrays, pose_of_loads
+from metro.observables.flatness.blocks import LOADS, Pose, face_block, pose_of_loads
 from metro.observables.flatness.dynamics import tip_block
 from metro.observables.flatness.model import FlatnessModel
 from metro.observables.flatness.pairing import paired
@@ -28,7 +28,7 @@ from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.surface.face_noise import Noise
 from metro.surface.tip_damping import Rayleigh
-from metro.units import JSON, MM, UM
+from metro.units import JSON, MM
 
 SCATTER = 0.02
 SYSTEMATIC = 0.02  # of the mean force, which the coefficients and the load cells share among all runs

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
@@ -12,7 +13,7 @@ from metro.batch.processed import Tables
 from metro.joint_columns import axes_of
 from metro.observables.quantity import quantity
 from metro.surface.tip_stiffness import PAIRS, PointCompliance, point_compliance
-from metro.units import JSON, MM, UM
+from metro.units import JSON, MM, UM, Array
 
 FORCE, MOVED, PLACE = ["fx_n", "fy_n", "fz_n"], ["dx_mm", "dy_mm", "dz_mm"], ["x_mm", "y_mm", "z_mm"]
 
@@ -55,11 +56,14 @@ def _points(loads: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
 
 def _named(loads: pd.DataFrame, column: str, places: Sequence[str]) -> pd.Series:
     """Return the names in a column; where one is blank, the numbers in the columns of places, rounded."""
-    by_place = loads[list(places)].round(0).apply(
-        lambda row: f"({', '.join(f'{value:.0f}' for value in row)})" if row.notna().all() else "", axis=1
-    )
     given = loads[column].fillna("").astype(str)
-    return given.where(given != "", by_place if len(places) else "")
+    return given.where(given != "", [_place(row) for row in loads[list(places)].to_numpy(dtype=float)])
+
+
+def _place(numbers: Array) -> str:
+    """Name a place by its coordinates, or by those of the joints; "" where they are not all known."""
+    known = len(numbers) and np.isfinite(numbers).all()
+    return f"({', '.join(f'{each:.0f}' for each in numbers)})" if known else ""
 
 
 def _entries(found: PointCompliance) -> JSON:

@@ -10,9 +10,9 @@ from metro.report.results import Results
 from metro.report.sections.stiffness import LONGEST, more
 
 ABOUT = (
-    "Force along an axis over the displacement along the same axis at rest, with 95 % intervals by the scatter "
-    "of the displacements about a linear spring, work frame. The intervals hold no error of the load cell or the "
-    "gauge that all tests share; – where no test shows it."
+    "Force along an axis over the displacement along the same axis at rest, work frame, with 95 % intervals "
+    "by the scatter of the displacements about a linear spring. These hold no error of load cell and gauge "
+    "that all tests share. A dash: no test shows it."
 )
 
 
