@@ -77,7 +77,7 @@ def _brought_in(one: FieldSet, data: Path, out: Path) -> Result:
 def _reason(said: str, out: Path) -> str:
     """Return the first error of what was said, or what was not used of the files, in one line."""
     found = re.search(
-        r"^(?:error|not used)[:\s]+(.*?)(?=\n\n|\nerror|\nnote|\nwarning|\Z)", said, re.M | re.S
+        r"^(?:error|not used)[:\s]+(.*?)(?=\n\n|\nerror|\nnote|\nwarning|\nnot used|\Z)", said, re.M | re.S
     )
     text = found[1] if found else said[-MOST:]
     return " ".join(text.replace(f"{out}/", "").split())[:MOST]

@@ -208,6 +208,12 @@ SETS = (
         remark="with the published drive constants, which by themselves give 2.46 kg",
     ),
     FieldSet(
+        "robot-poses-ur10",
+        ("grid/*.csv", "random/measurements*.csv"),
+        refused="a joint log takes angles and torques or currents",
+        remark="poses of a tip under a tracker, of which nothing is computed",
+    ),
+    FieldSet(
         "scan-gocator",
         ("*.csv",),
         ("--set=work.size_mm=none",),

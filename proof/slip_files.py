@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
+from metro.formats.registry import read
 from proof.slip_edits import Edit, files_of
 
 
@@ -17,13 +18,16 @@ def copied(column: str) -> Edit:
     """Put the values of one file in the place of another, as other bytes."""
 
     def edit(folder: Path) -> bool:
-        files = [file for file in files_of(folder, column) if file.suffix in (".parquet", ".ply")]
+        files = [file for file in files_of(folder, column) if file.suffix in (".parquet", ".csv", ".ply")]
         if len(files) < 2:
             return False
         if files[0].suffix == ".ply":
             _write_ply(files[1], _read_ply(files[0]))
             with files[1].open("ab") as stream:
                 stream.write(b"")
+            return True
+        if files[0].suffix == ".csv":
+            _write_record(files[1], read(files[0], "force"))
             return True
         pd.read_parquet(files[0]).to_parquet(files[1], compression="gzip")
         return True
@@ -35,11 +39,11 @@ def records(change: Callable[[pd.DataFrame], None], rate: float = 1.0) -> Edit:
     """Edit every force record; ``rate``: factor on the declared rate."""
 
     def edit(folder: Path) -> bool:
-        files = [file for file in files_of(folder, "dynamometer") if file.suffix == ".parquet"]
+        files = [file for file in files_of(folder, "dynamometer") if file.suffix in (".parquet", ".csv")]
         for file in files:
-            table = pd.read_parquet(file)
+            table = read(file, "force")
             change(table)
-            table.to_parquet(file)
+            _write_record(file, table)
         if files and rate != 1.0:
             path = folder / "batch.yaml"
             content = yaml.safe_load(path.read_text())
@@ -49,6 +53,14 @@ def records(change: Callable[[pd.DataFrame], None], rate: float = 1.0) -> Edit:
         return bool(files)
 
     return edit
+
+
+def _write_record(file: Path, table: pd.DataFrame) -> None:
+    """Write a force record; a text of any program becomes a plain one, with all digits."""
+    if file.suffix == ".parquet":
+        table.to_parquet(file)
+    else:
+        table.to_csv(file, index=False)
 
 
 def times(name: str, factor: float) -> Callable[[pd.DataFrame], None]:

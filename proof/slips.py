@@ -1,14 +1,16 @@
 """``python -m proof.slips``: every slip in every suitable batch, and what the check and the report say of it.
 
 Outcomes: *caught by check* (an error, or a contradiction, that the batch as it is does not give), *flagged on
-page one*, *undecidable* (no datum of the batch contradicts it, for the reason that the list gives), and two
-that must not be: *named a false cause* and *clean without a word*.
+page one*, *undecidable* (no datum of the batch contradicts it, for the reason that the list gives), *without
+effect* (no figure leaves its interval and the verdicts are the same to the last digit), and two that must not
+be: *named a false cause* and *clean without a word*.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import shutil
 import sys
@@ -22,6 +24,7 @@ from pathlib import Path
 from metro.batch.batch import Batch
 from metro.batch.findings import Finding
 from metro.batch.processed import Tables, read_json
+from metro.dataset.results import quantities
 from metro.stages.contradictions import contradictions
 from metro.stages.whole import check_whole
 from metro.units import JSON
@@ -31,8 +34,17 @@ from proof.slip_edits import Mistake
 from proof.slip_list import mistakes
 
 CAUGHT, FLAGGED, UNDECIDABLE = "caught by check", "flagged on page one", "undecidable"
+IDLE = "without effect"
 FALSE_CAUSE, SILENT = "NAMED A FALSE CAUSE", "CLEAN WITHOUT A WORD"
 NEVER = (FALSE_CAUSE, SILENT)
+
+
+@dataclass(frozen=True)
+class Ended:
+    """What the stages wrote: ``verdict.json`` and ``identified.json``."""
+
+    verdict: JSON
+    identified: JSON
 
 
 @dataclass(frozen=True)
@@ -51,7 +63,7 @@ def tried(folder: Path, slips: Sequence[Mistake], *, loop: bool) -> Iterator[Res
     ``loop``: run the stages; else a slip that the check does not catch is given as such.
     """
     known = _said(folder)
-    clean: JSON | None = None
+    clean: Ended | None = None
     for slip in slips:
         with tempfile.TemporaryDirectory() as place:
             copy = Path(place) / "raw" / folder.name
@@ -68,8 +80,8 @@ def tried(folder: Path, slips: Sequence[Mistake], *, loop: bool) -> Iterator[Res
             if not loop:
                 yield Result(slip.name, folder.name, "not caught by check")
                 continue
-            clean = clean or _verdict(folder, Path(place) / "clean")
-            yield _judged(slip, folder.name, clean, _verdict(copy, Path(place) / "out"))
+            clean = clean or _ended(folder, Path(place) / "clean")
+            yield _judged(slip, folder.name, clean, _ended(copy, Path(place) / "out"))
 
 
 def _said(folder: Path) -> list[str]:
@@ -86,8 +98,8 @@ def _said(folder: Path) -> list[str]:
     return [*(str(one) for one in report.problems if one.severity == "error"), *found]
 
 
-def _verdict(folder: Path, out: Path) -> JSON:
-    """Run the stages of a batch; return its verdict.json."""
+def _ended(folder: Path, out: Path) -> Ended:
+    """Run the stages of a batch; return what they say."""
     plan = Plan.read(CHECKOUT, {"raw_roots": [str(folder.parent)]})
     processed, reports = out / "processed", out / "reports"
     given = {
@@ -98,26 +110,51 @@ def _verdict(folder: Path, out: Path) -> JSON:
     for stage in STAGES:
         run = getattr(import_module(f"metro.stages.{stage}"), stage)
         run(**given.get(stage, {"processed": processed}), settings=json.loads(plan.settings(stage)), code="")
-    return read_json(reports / "verdict.json")
+    return Ended(read_json(reports / "verdict.json"), read_json(reports / "identified.json"))
 
 
-def _judged(slip: Mistake, batch: str, clean: JSON, verdict: JSON) -> Result:
-    """Compare a verdict with that of the batch as it is."""
+def _judged(slip: Mistake, batch: str, before: Ended, after: Ended) -> Result:
+    """Compare what the stages say with what they say of the batch as it is."""
+    clean, verdict = before.verdict, after.verdict
+    if verdict == clean and not _moved(before.identified, after.identified):
+        return Result(slip.name, batch, IDLE)
     entries = verdict["observables"]
     flagged = [one["words"] for one in verdict.get("contradictions") or []]
     flagged += [f"{name} misses half of the signal" for name in entries if "misses" in entries[name]]
+    flagged += [
+        words
+        for name in entries
+        if _holds(clean, name) and not _holds(verdict, name)
+        for words in [entries[name]["verification"]["words"]]
+    ]
     causes = _causes(verdict) - _causes(clean)
     if causes:
         return Result(slip.name, batch, FALSE_CAUSE, ", ".join(sorted(causes)))
     if flagged:
         return Result(slip.name, batch, FLAGGED, flagged[0])
-    before, after = _statuses(clean), _statuses(verdict)
+    now = _statuses(verdict)
     worse = [
-        f"{name}: {status} → {after.get(name, 'lost')}"
-        for name, status in before.items()
-        if after.get(name, "lost") not in (status, "clean")
+        f"{name}: {status} → {now.get(name, 'lost')}"
+        for name, status in _statuses(clean).items()
+        if now.get(name, "lost") not in (status, "clean")
     ]
     return Result(slip.name, batch, FLAGGED if worse else SILENT, "; ".join(worse))
+
+
+def _holds(verdict: JSON, name: str) -> bool:
+    """Whether the held-out runs do not contradict an observable's result; so where there are none."""
+    verification = (verdict["observables"].get(name) or {}).get("verification")
+    return verification is None or bool(verification["holds"])
+
+
+def _moved(clean: JSON, identified: JSON) -> bool:
+    """Whether any identified figure came, went, or left the interval that it had."""
+    here = {name: value for name, value, *_ in quantities(identified)}
+    there = {name: (value, low, high) for name, value, low, high, _ in quantities(clean)}
+    return set(here) != set(there) or any(
+        here[name] != value and (low is None or high is None or not low <= (here[name] or math.nan) <= high)
+        for name, (value, low, high) in there.items()
+    )
 
 
 def _statuses(verdict: JSON) -> dict[str, str]:
@@ -134,13 +171,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m proof.slips", description=__doc__)
     parser.add_argument("batches", type=Path, nargs="+", help="folders of batches")
     parser.add_argument("--few", action="store_true", help="a few of the wrong orientations, the check alone")
+    parser.add_argument("--check", action="store_true", help="the check alone")
     parser.add_argument("--slip", default="", help="only slips whose name contains this")
     options = parser.parse_args(arguments)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     chosen = [one for one in mistakes(full=not options.few) if options.slip in one.name]
     count: Counter[str] = Counter()
     for folder in options.batches:
-        for result in tried(folder, chosen, loop=not options.few):
+        for result in tried(folder, chosen, loop=not (options.few or options.check)):
             count[result.outcome] += 1
             print(f"| {result.slip} | {result.batch} | {result.outcome} | {result.said} |", flush=True)
     print("; ".join(f"{outcome}: {number}" for outcome, number in count.most_common()))

@@ -50,6 +50,21 @@ def test_a_header_that_names_the_coordinates_is_followed(tmp_path):
     np.testing.assert_array_equal(read(path, "cloud"), POINTS)
 
 
+@pytest.mark.parametrize(
+    "header", ["Time(sec),Fx(N),Fy(N),Fz(N)\n", "t [ms],a,b,c\n", "t_s,fx_n,fy_n,fz_n\n", "a,b,c,U [mV]\n"]
+)
+def test_columns_whose_names_measure_something_else_are_no_points(tmp_path, header):
+    path = written(tmp_path, POINTS[:, :1], POINTS, header=header)
+    with pytest.raises(FormatError, match="expected coordinates x, y, z in mm"):
+        read(path, "cloud")
+
+
+@pytest.mark.parametrize("header", ["E [mm],N [mm],H [mm],colour\n", "points of the third plate\n", "1000\n"])
+def test_other_names_of_lengths_and_remarks_leave_the_first_three_columns(tmp_path, header):
+    path = written(tmp_path, POINTS, POINTS[:, :1], header=header)
+    np.testing.assert_array_equal(read(path, "cloud"), POINTS)
+
+
 @pytest.mark.skipif(not NUMBERED.is_file(), reason="the field files are not there")
 def test_numbered_points_of_a_granite_plate_give_its_flatness():
     with pytest.raises(FormatError, match="counts the rows"):

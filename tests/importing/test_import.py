@@ -206,6 +206,24 @@ def test_a_clock_without_a_name_is_the_time_and_no_rate_is_asked(tmp_path):
     assert "rate_hz" not in mapping
 
 
+def test_the_csv_of_a_data_logger_has_its_time_and_units_behind_its_names(tmp_path):
+    time, forces = np.arange(400) / 5000, RANDOM.normal(size=(400, 3)).round(4)
+    path = tmp_path / "slot1.csv"
+    rows = "\n".join(f"{t:.4f},{x},{y},{z}" for t, (x, y, z) in zip(time, forces, strict=True))
+    head = '"Test title","切削"\n"Number of channels","3"\n"Sampling frequency (Hz)","5000"\n'
+    path.write_text(f"{head}Time(sec),Fx(kN),Fy(kN),Fz(kN)\n{rows}\n", encoding="cp932")
+    answers = CUTS | {"axial_depth_mm": "1"}
+    given = {key: answers[key] for key in answers if key not in ("rate_hz", "unit.force")}
+    result = called(tmp_path / "slot", path, batch="slot", **given)
+    assert result.exit_code == 0, result.output
+    batch = load(tmp_path / "slot").batch
+    table = read(
+        source(tmp_path / "slot", batch.runs["dynamometer"].iloc[0], batch.manifest["files"]), "force"
+    )
+    np.testing.assert_allclose(table["t_s"], time)
+    np.testing.assert_allclose(table["fz_n"], forces[:, 2] * 1e3)
+
+
 def test_a_place_that_is_left_out_or_is_none_is_refused_before_anything_is_written(tmp_path):
     time = np.arange(400) / 4000
     for name in ("impact_1.txt", "accel_1.txt"):

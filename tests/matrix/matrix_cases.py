@@ -11,7 +11,8 @@ import pandas as pd
 import yaml
 
 RUN_FILES = ("dynamometer", "robot_log", "idle_log", "path", "scan", "profile", "slopes")
-TABLES = ("runs.csv", "impacts.csv", "loads.csv", "mass.csv", "published.csv", "cell.yaml", "stations.csv")
+MEASURED = ("impacts.csv", "loads.csv", "mass.csv", "touches.csv", "payload.csv", "published.csv")
+TABLES = ("runs.csv", *MEASURED, "cell.yaml", "stations.csv")
 NEEDED = {"format", "batch", "source", "cell", "citation"}
 SETTINGS = ("condition", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm", "direction")
 ODD_NAMES = ("лауф 1", "切削-2", "a b/c", "ärger", "r'\"5", "run #6 🙂", "e\u0301", "$x^2$", "*_`", "10")
@@ -90,7 +91,7 @@ def measured(folder):
     if (folder / "runs.csv").exists():
         runs = read(folder / "runs.csv")
         there = [column for column in RUN_FILES if column in runs and runs[column].ne("").any()]
-    return there + [name for name in TABLES[1:5] if (folder / name).exists()]
+    return there + [name for name in MEASURED if (folder / name).exists()]
 
 
 def read(path):

@@ -7,7 +7,7 @@ import pytest
 
 from proof.slip_edits import Mistake
 from proof.slip_list import mistakes
-from proof.slips import CAUGHT, FALSE_CAUSE, FLAGGED, SILENT, _judged, tried
+from proof.slips import CAUGHT, FALSE_CAUSE, FLAGGED, IDLE, SILENT, Ended, _judged, tried
 
 RAW = Path(__file__).parents[2] / "data/raw"
 SLIP = Mistake("a slip", lambda _folder: True)
@@ -39,7 +39,7 @@ def test_an_edit_changes_a_batch_that_it_suits_and_leaves_any_other_alone(slip, 
 
 def test_an_outcome_is_a_false_cause_a_flag_or_silence():
     def outcome(after, before=None):
-        return _judged(SLIP, "b", before or verdict(), after).outcome
+        return _judged(SLIP, "b", Ended(before or verdict(), {"k": 1.0}), Ended(after, {"k": 2.0})).outcome
 
     assert outcome(verdict("explained", ["tool_wear"])) == FALSE_CAUSE
     assert outcome(verdict("explained", ["tool_wear"]), verdict("explained", ["tool_wear"])) == SILENT
@@ -47,6 +47,25 @@ def test_an_outcome_is_a_false_cause_a_flag_or_silence():
     assert outcome(verdict(misses=0.7)) == FLAGGED
     assert outcome(verdict() | {"contradictions": [{"words": "it is"}]}) == FLAGGED
     assert outcome(verdict()) == SILENT
+
+
+def test_a_prediction_that_the_held_out_runs_contradict_now_is_flagged():
+    sound, contradicted = ({"verification": {"holds": each, "words": "11 of 23"}} for each in (True, False))
+    before, after = (Ended({"observables": {"lobes": {"status": "insufficient", "effects": []} | one}}, {})
+                     for one in (sound, contradicted))  # fmt: skip
+    assert _judged(SLIP, "b", before, after).said == "11 of 23"
+    assert _judged(SLIP, "b", after, after).outcome == IDLE
+
+
+def test_a_slip_is_without_effect_where_no_figure_leaves_its_interval():
+    def figure(value):
+        return {"lobes": {"depth": {"value": value, "ci95": [0.9, 1.1], "unit": "mm"}}}
+
+    def outcome(after):
+        return _judged(SLIP, "b", Ended(verdict(), figure(1.0)), Ended(verdict(), after)).outcome
+
+    assert outcome(figure(1.0)) == outcome(figure(1.05)) == IDLE
+    assert outcome(figure(1.2)) == outcome({}) == outcome(figure(None)) == SILENT
 
 
 @pytest.mark.slow

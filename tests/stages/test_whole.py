@@ -138,3 +138,16 @@ def test_the_command_reads_the_files_wholly_unless_it_is_to_be_quick(slots):
     assert not json.loads(CliRunner().invoke(app, call).stdout)[0]["ok"]
     assert json.loads(CliRunner().invoke(app, [*call, "--quick"]).stdout)[0]["ok"]
     assert Path(slots / "runs.csv").exists()
+
+
+def test_a_batch_whose_recordings_are_all_unfit_says_so_and_not_that_it_holds_none(slots, tmp_path):
+    for run in (1, 2, 3):
+        record(slots, run, lambda table: table.assign(fy_n=table["fx_n"]))
+    report, refused = both(slots, tmp_path)
+    (said,) = errors_of(report)
+    assert refused == [said]
+    assert (
+        "not fit for use: r1.csv: Fx and Fy are one signal: is one cable in two inputs? (and 2 others)"
+        in said
+    )
+    assert "holds no measurement" not in said

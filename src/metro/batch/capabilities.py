@@ -23,7 +23,7 @@ CUT, ARC = (
 FROM_SOLID = ("slot", "helical")
 NO_MEASUREMENT = (
     "it holds no measurement: name its files in runs.csv or impacts.csv, "
-    "or give printed values in published.csv"
+    "or give load tests in loads.csv or printed values in published.csv"
 )
 COEFFICIENTS = tuple(f"coefficients.{name}_n_mm2" for name in ("ktc", "krc", "kac"))
 
@@ -55,7 +55,7 @@ class Stock:
     ----------
     manifest, cell : as read.
     runs : the run table, filled in, with the roles of the hold-out plan.
-    tables : impacts, loads, mass, published, stations.
+    tables : impacts, loads, mass, touches, payload, published, stations.
     """
 
     manifest: JSON
@@ -99,12 +99,17 @@ def capability(
     return Capability(name, "" if lacking else source, lacking or tuple(dict.fromkeys(wishes)), measured)
 
 
-def nothing_computed(capabilities: Sequence[Capability]) -> list[Finding]:
-    """Report that nothing can be computed from a batch, where it is so: with what each of its data lacks."""
+def nothing_computed(capabilities: Sequence[Capability], unfit: Sequence[str] = ()) -> list[Finding]:
+    """Report that nothing can be computed from a batch, where it is so: with what each of its data lacks.
+
+    ``unfit``: why recordings were left out, each with its file; what is left may be nothing.
+    """
     if not capabilities or any(each.source for each in capabilities):
         return []
     lacking = [f"{each.name} lacks {', '.join(each.missing)}" for each in capabilities if each.measured]
-    why = "; ".join(lacking) or NO_MEASUREMENT
+    more = f" (and {plural(len(unfit) - 1, 'other')})" if len(unfit) > 1 else ""
+    left_out = [f"its recordings are not fit for use: {unfit[0]}{more}"] if unfit else []
+    why = "; ".join([*lacking, *left_out]) or NO_MEASUREMENT
     return [Finding("error", "", f"nothing can be computed from this batch: {why}")]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from metro.formats import cutpro, gocator, matlab, rosbag, rsi, signalcalc, softgauge, sur, tdms
+from metro.formats.closed import closed
 from metro.formats.contents import Contents, of_channels, of_frame, of_text
 from metro.formats.dynoware import dynoware_pieces
 from metro.formats.e57 import SIGNATURE, e57_pieces
@@ -285,9 +286,12 @@ def _by_suffix(path: Path, title: str) -> list[Format]:
     Raises
     ------
     FormatError
-        Where the suffix is that of a format with a mark, which the file has not, or the file is no text.
+        Where the suffix is that of a format with a mark, which the file has not, or of a program whose files
+        cannot be read, or where the file is no text.
     """
     suffix = path.suffix.lower()
+    if message := closed(suffix):
+        raise FormatError(path, message)
     plain = [each for each in FORMATS if each.starts == _ANY]
     named = [each for each in plain if suffix in each.suffixes]
     marked = [each.title for each in FORMATS if suffix in each.suffixes]

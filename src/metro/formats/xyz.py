@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from metro.formats.channels import parted
 from metro.formats.cloud import own_names, piece
 from metro.formats.errors import FormatError
 from metro.formats.kinds import Kind, Raw
+from metro.formats.measures import MeasureError, measure
 from metro.formats.text import SPACES, Layout, fields, is_number, lines, number_pieces
 from metro.units import Array
 
@@ -42,7 +44,7 @@ def _layout(path: Path, kind: Kind) -> Layout:
         parted_by = _separator(text)
         parts = fields(text, parted_by)
         if len(parts) >= 3 and all(is_number(field) for field in parts[:3]):
-            return Layout(_names(header, len(parts)), parted_by, number - 1)
+            return Layout(_names(path, header, len(parts)), parted_by, number - 1)
         if number > _HEADER_LINES:
             break
         header = text
@@ -54,13 +56,38 @@ def _separator(text: str) -> str:
     return next((mark for mark in (";", ",") if mark in text), SPACES)
 
 
-def _names(header: str, count: int) -> tuple[str, ...]:
-    """Take the columns' names from the last line before the points, if it has as many fields as they have."""
+def _names(path: Path, header: str, count: int) -> tuple[str, ...]:
+    """Take the columns' names from the last line before the points, if it has as many fields as they have.
+
+    Raises
+    ------
+    FormatError
+        Where it names something else: the unit behind a name is that of no length.
+    """
     text = header.lstrip("/ ")
-    names = tuple(field.lower() for field in fields(text, _separator(text)))
+    own = fields(text, _separator(text))
+    names = tuple(field.lower() for field in own)
     if len(names) == count and {name[:1] for name in names} >= {"x", "y", "z"}:
         return names
+    if len(names) == count and any(_quantity(field) not in ("", "length") for field in own):
+        found = f"its columns are named {', '.join(own)}, expected coordinates x, y, z in mm"
+        raise FormatError(path, f"{found}; {_what_to_write(path, 1)}")
     return (*_FIRST, *(f"field {index}" for index in range(3, count)))
+
+
+def _quantity(name: str) -> str:
+    """Return the quantity that the unit behind a column's name measures; "" where none does."""
+    try:
+        return measure(parted(name)[1]).quantity
+    except MeasureError:
+        return ""
+
+
+def _what_to_write(path: Path, first: int) -> str:
+    """Say how ``batch.yaml`` states that the coordinates are three columns from the ``first`` on."""
+    mapping = ", ".join(f"{axis}_mm: {{from: {first + k}, unit: mm}}" for k, axis in enumerate("xyz"))
+    files = f'files: {{"{path.name}": {{columns: {{{mapping}}}}}}}'
+    return f"write in batch.yaml which columns are the coordinates, as {files}"
 
 
 def _check_unnamed(path: Path, layout: Layout) -> None:
@@ -89,10 +116,7 @@ def _check_unnamed(path: Path, layout: Layout) -> None:
         why, first = "it has six columns without names, and the last three are neither normals nor colours", 1
     else:
         return
-    mapping = ", ".join(f"{axis}_mm: {{from: {first + k}, unit: mm}}" for k, axis in enumerate("xyz"))
-    files = f'files: {{"{path.name}": {{columns: {{{mapping}}}}}}}'
-    what = f"write in batch.yaml which columns are the coordinates, as {files}"
-    raise FormatError(path, f"line {layout.skip + 1}: {why}; {what}")
+    raise FormatError(path, f"line {layout.skip + 1}: {why}; {_what_to_write(path, first)}")
 
 
 def _directions(values: Array) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from metro.formats.measures import MeasureError, measure
 from metro.importing.look import Column, Seen
-from metro.importing.propose import Proposal, is_clock
+from metro.importing.propose import Proposal, is_clock, time_of
 from metro.joint_columns import MOST_AXES
 
 DRIVE = "joints.drive"  # the question for the columns of currents or torques
@@ -28,7 +28,6 @@ _NAMES = {
     "tau{}_nm": rf"{_MEASURED}(?:motor_?|joint_?)?(?:tau|torque|effort|moment|t)s?(?:_?j)?",
 }
 _NUMBERED = re.compile(r"(?P<stem>.*?)[ _\[(.]*(?P<axis>\d)[\])]?(?: *\[(?P<unit>[^\]]*)\])?")
-_TIME = re.compile(r"t|time|timestamp|zeit|stamp|t_s|time_s", re.IGNORECASE)
 
 
 def joint_log(seen: Seen) -> Proposal | None:
@@ -50,7 +49,7 @@ def _by_name(seen: Seen) -> Proposal | None:
     angles = found.get("q{}_deg", {})
     axes = _consecutive(angles)
     drive = next((name for name in ("tau{}_nm", "current{}_a") if set(found.get(name, {})) >= set(axes)), "")
-    time = next((each for each in seen.columns if _TIME.fullmatch(each.name.split("[")[0].strip())), None)
+    time = time_of(seen)
     if len(axes) < LEAST_AXES or not drive:
         return None
     columns: dict[str, str | int | tuple[str, int]] = {} if time is None else {"t_s": time.name}

@@ -9,11 +9,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from metro.batch.capabilities import plural
+from metro.formats.channels import parted
 from metro.importing.look import Column, Seen
 
 _AXIS = re.compile(
     r"(?P<head>.*?(?:f|force|kraft|load)[ _]?)(?P<axis>[xyz])(?P<tail>(?![a-z]).*)", re.IGNORECASE
 )
+_TIME = re.compile(r"t|time|timestamp|zeit|stamp", re.IGNORECASE)
 _NUMBER = re.compile(r"(\d+)(?!.*\d)")
 _RUN_COLUMNS = {
     "spindle_rpm": r"(?:n|rpm|s)",
@@ -97,14 +99,7 @@ def _forces(seen: Seen) -> Proposal | None:
     if not whole:
         return None
     (_, tail), first = next(iter(whole.items()))
-    time = next(
-        (
-            each
-            for each in seen.columns
-            if re.fullmatch(r"t|time|zeit", each.name.split("[")[0].strip().lower())
-        ),
-        None,
-    )
+    time = time_of(seen)
     why = {f"f{axis}_n": f"the name {first[axis].name}" for axis in "xyz"}
     stated = {f"f{axis}_n": first[axis].unit for axis in "xyz" if first[axis].unit}
     file = seen.path.name
@@ -204,6 +199,11 @@ def _without_partner(hammers: Sequence[Seen], sensors: Sequence[Seen]) -> list[s
         "by the last number in their names, one of each with the same number. Rename the files so that their "
         "numbers agree, or give the command those alone that belong together"
     ]
+
+
+def time_of(seen: Seen) -> Column | None:
+    """Return the column that is named as times are; None where a file has none."""
+    return next((each for each in seen.columns if _TIME.fullmatch(parted(each.name)[0])), None)
 
 
 def is_clock(values: np.ndarray, *, uneven: bool = False) -> bool:

@@ -10,13 +10,15 @@ from importlib import import_module
 
 from metro.batch.capabilities import Capability, Stock
 from metro.observables import PACKAGES
+from metro.observables.arm.description import CALIBRATION
 from metro.observables.description import Description
 from metro.observables.levelling.description import LEVELLING
+from metro.observables.loads.description import LOADED
 from metro.observables.published.description import PRINTED
 from metro.observables.texture.description import TEXTURE
 
 # What is found without a model, so that nothing is compared with it.
-BESIDE = (LEVELLING, TEXTURE, PRINTED)
+BESIDE = (LOADED, CALIBRATION, LEVELLING, TEXTURE, PRINTED)
 
 
 @cache

@@ -19,6 +19,7 @@ from metro.units import Array
 
 # Checks that a recording must pass to be used; one that does not is left out, and the report says so.
 MUST_PASS = frozenset({"dead channel", "clipping", "channels alike", "motion", "FRF convention"})
+LEFT_OUT = "; the recording is left out"
 
 
 @dataclass
@@ -126,7 +127,7 @@ class Recordings:
         """Note findings on a run's recording; tell whether it can be used, and leave it out otherwise."""
         failed = [each.check in MUST_PASS and not each.ok for each in findings]
         noted = [
-            each._replace(message=f"{each.message}; the recording is left out") if bad else each
+            each._replace(message=f"{each.message}{LEFT_OUT}") if bad else each
             for each, bad in zip(findings, failed, strict=True)
         ]
         self.note(file, run, noted)

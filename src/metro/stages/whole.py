@@ -33,7 +33,7 @@ from metro.signals.quality import EXTENT
 from metro.stages import joint_logs, robot_logs, scans
 from metro.stages import recordings as parts
 from metro.stages.data_checks import data_findings
-from metro.stages.reading import Recordings
+from metro.stages.reading import LEFT_OUT, MUST_PASS, Recordings
 from metro.units import JSON
 
 # Canonical table → the columns of runs.csv that name its files.
@@ -146,7 +146,8 @@ def read_whole(examined: Examined, place: Path) -> Whole:
         *_doubts(recordings),
     ]
     if not errors(problems):
-        problems += [*nothing_computed(capabilities(stock)), *data_findings(batch, Processed(place))]
+        problems += nothing_computed(capabilities(stock), _unfit(recordings))
+        problems += data_findings(batch, Processed(place))
     return Whole(batch, stock, sources, tuple(problems))
 
 
@@ -170,6 +171,12 @@ def _doubts(recordings: Recordings) -> list[Finding]:
         for row in recordings.findings
         if (not row["ok"] or row["check"] == EXTENT) and row["check"] != OF_THE_TABLES
     ]
+
+
+def _unfit(recordings: Recordings) -> list[str]:
+    """Return why recordings are not fit for use, each with its file."""
+    rows = [row for row in recordings.findings if not row["ok"] and row["check"] in MUST_PASS]
+    return [f"{row['file']}: {str(row['message']).removesuffix(LEFT_OUT)}" for row in rows]
 
 
 def provenance_of(sources: Mapping[str, str]) -> dict[str, str]:

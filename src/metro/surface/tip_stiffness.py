@@ -24,12 +24,14 @@ PURE = 1e-6
 class PointCompliance:
     """Compliance at a point: symmetric ``matrix`` (3, 3) m/N and ``sd``, NaN where no load shows it.
 
-    ``residual_sd`` (m) is the scatter of the displacements about the straight line through the origin.
+    ``residual_sd`` (m) is the scatter of the displacements about the straight line through the origin, with
+    ``dof`` degrees of freedom.
     """
 
     matrix: Array
     sd: Array
     residual_sd: float
+    dof: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,10 +111,10 @@ def point_compliance(force: Array, displacement: Array) -> PointCompliance:
             design[axis == j, column] += force[load[axis == j], i]
     values, covariance, seen = _solve(design, measured)
     residual = measured - design @ values
-    dof = len(measured) - np.linalg.matrix_rank(design)
+    dof = len(measured) - int(np.linalg.matrix_rank(design))
     residual_sd = float(np.sqrt(residual @ residual / dof)) if dof > 0 else float("nan")
     values, sd = np.where(seen, values, np.nan), np.where(seen, np.sqrt(np.diag(covariance)), np.nan)
-    return PointCompliance(_symmetric(values), residual_sd * _symmetric(sd), residual_sd)
+    return PointCompliance(_symmetric(values), residual_sd * _symmetric(sd), residual_sd, dof)
 
 
 def _solve(design: Array, measured: Array) -> tuple[Array, Array, np.ndarray]:

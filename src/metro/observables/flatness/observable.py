@@ -16,7 +16,7 @@ from metro.batch.writing import writing
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness import NAME, TABLES
 from metro.observables.flatness.advice import advice, after_loop, planned_points, studied
-from metro.observables.flatness.blocks import LOADS, Pose, face_block, load_arrays, pose_of_loads
+from metro.observables.flatness.blocks import LOADS, Pose, face_block, pose_of_loads
 from metro.observables.flatness.dynamics import tip_block
 from metro.observables.flatness.model import FlatnessModel
 from metro.observables.flatness.pairing import paired
@@ -28,8 +28,7 @@ from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.surface.face_noise import Noise
 from metro.surface.tip_damping import Rayleigh
-from metro.surface.tip_stiffness import point_compliance
-from metro.units import JSON, MM, UM
+from metro.units import JSON, MM
 
 SCATTER = 0.02
 SYSTEMATIC = 0.02  # of the mean force, which the coefficients and the load cells share among all runs
@@ -179,7 +178,7 @@ def report(
     task: Problem | Refusal,
     fit: BaseFit | None,
 ) -> JSON:
-    """Return each face's indices (as read, and less the bias), X_m as predicted, and the compliance."""
+    """Return each face's indices (as read, and less the bias), X_m as predicted, and the tip's damping."""
     predicted = {} if isinstance(task, Refusal) or fit is None else paired(task, fit)
     faces: JSON = {}
     for run, table in observed["face_indices"].groupby("run", sort=False):
@@ -187,8 +186,6 @@ def report(
     blocks: JSON = {"faces": faces} | (
         {} if isinstance(task, Refusal) else tip_block(_damping(task, observed))
     )
-    if len(observed["face_loads"]):
-        blocks["tip_compliance"] = _compliance_json(observed["face_loads"])
     advised = advice(
         *(batch, observed, identified, task, fit),
         pose_of=lambda run: _pose(_pose_name(batch, run, observed["face_loads"]), observed),
@@ -232,20 +229,6 @@ def struck_damping(observed: Mapping[str, pd.DataFrame]) -> dict[str, Rayleigh]:
     poses = {str(name): _pose(str(name), observed) for name in observed["face_loads"]["pose"].unique()}
     known = {n: p.dynamics for n, p in poses.items() if isinstance(p, Pose) and p.dynamics is not None}
     return {n: tip.damping for n, tip in known.items() if tip.damping is not None}
-
-
-def _compliance_json(loads: pd.DataFrame) -> JSON:
-    """Entries of C at each load point, pose → point → entry, those that the loads determine."""
-    result: JSON = {}
-    for (pose, point), table in loads.groupby(["pose", "point"], sort=False):
-        compliance = point_compliance(*load_arrays(table)[1:])
-        result.setdefault(str(pose), {})[str(point)] = {
-            "xyz"[i] + "xyz"[j]: quantity(compliance.matrix[i, j] / UM, compliance.sd[i, j] / UM, "um/N")
-            for i in range(3)
-            for j in range(i, 3)
-            if math.isfinite(compliance.matrix[i, j])
-        }
-    return result
 
 
 def ranked_again(

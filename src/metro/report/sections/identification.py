@@ -42,6 +42,7 @@ RUN_BLOCKS = {
 ABOUT = ("format", "batch", "metro", "not_identified")  # the batch and the file, not quantities
 ELSEWHERE = {
     "faces": "flatness of faces",
+    "tip_compliance": "stiffness by load tests",
     "levelling": "flatness by slopes",
     "texture": "surface texture",
     "areal": "areal parameters",

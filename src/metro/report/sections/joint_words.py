@@ -12,7 +12,7 @@ from metro.units import JSON
 
 
 def joint_words(identified: JSON) -> Iterator[str]:
-    """Yield what was identified of joints and payload."""
+    """Yield what was identified of joints, tool, work and payload."""
     runs = ((identified.get("joints") or {}).get("runs") or {}).values()
     known = {
         joint
@@ -22,7 +22,11 @@ def joint_words(identified: JSON) -> Iterator[str]:
     }
     if known:
         yield f"friction of {len(known)} joint{'s' if len(known) > 1 else ''}"
-    payload = (identified.get("calibration") or {}).get("payload")
+    calibrated = identified.get("calibration") or {}
+    touched = [name for name in ("tool", "work") if name in calibrated]
+    if touched:
+        yield f"{' and '.join(touched)} by touched points"
+    payload = calibrated.get("payload")
     if payload:
         centre = ", ".join(quantity(payload["centre"][axis], with_unit=False) for axis in "xyz")
         yield f"payload {quantity(payload['mass'])}, its centre at {centre} mm in the flange's frame"

@@ -13,6 +13,7 @@ from metro.report.results import Results
 from metro.report.sections.friction import friction
 from metro.report.sections.joint_logs import joint_logs
 from metro.report.sections.joint_torques import joint_torques
+from metro.report.sections.loads import load_points
 from metro.report.sections.stiffness import LONGEST, arm_stiffness, band, more, stations
 from metro.report.sections.tracking import tracking
 from metro.units import JSON
@@ -28,6 +29,7 @@ def robot(results: Results) -> Section | None:
         *friction(results),
         *joint_logs(results),
         *_deformation(results),
+        *load_points(results),
         *arm_stiffness(results),
         *stations(results),
         *_waviness(results),

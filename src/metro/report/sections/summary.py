@@ -15,6 +15,7 @@ from metro.report.sections import findings
 from metro.report.sections.areal import first_areal
 from metro.report.sections.joint_words import joint_facts, joint_next, joint_words
 from metro.report.sections.levelling import first_levelled
+from metro.report.sections.loads import first_loaded
 from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
@@ -115,6 +116,7 @@ def _identified(results: Results) -> list[Item]:
     """Give the most compliant mode, and the boundary or the response that shows the identification."""
     shown = [
         *joint_facts(results),
+        *first_loaded(results),
         *first_faces(results),
         *first_levelled(results),
         *first_areal(results),
@@ -159,6 +161,7 @@ def _identified_words(identified: JSON) -> str:
         f"{modes} mode{'s' if modes > 1 else ''}" if modes else "",
         "cutting coefficients" if identified.get("force") else "",
         "joint stiffness" if (identified.get("arm") or {}).get("joint_stiffness") else "",
+        "stiffness by load tests" if identified.get("tip_compliance") else "",
         "flatness of faces" if identified.get("faces") else "",
         *joint_words(identified),
         "flatness by slopes" if set(identified.get("levelling") or {}) - {"not_identified"} else "",
