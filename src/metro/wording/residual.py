@@ -35,9 +35,9 @@ def _places(values: JSON) -> str:
 def _lowered(values: JSON) -> str:
     name = plain(values["effect"])
     return (
-        f"{name[:1].upper()}{name[1:]} has the weight {values['weight']:.2f} against all other effects and "
-        f"against none. {100 * values['explained']:.0f} % of the residual's power is explained; what is "
-        "missing may resemble the effect, so the probability is lowered to that share of the weight"
+        f"{name[:1].upper()}{name[1:]} has {values['weight']:.2f} against the other effects; its probability "
+        f"is lower because {100 * values['explained']:.0f} % of the residual is explained and the rest may "
+        "look like it"
     )
 
 
@@ -165,8 +165,8 @@ def _ceiling(values: JSON) -> str:
     low, high = (100 * max(end, 0.0) for end in values["ci95"])
     parts = [f"{100 * share:.0f} % {PARTS[name]}" for name, share in told]
     held = "".join(
-        f", {100 * max(one['share'], 0.0):.0f} % in held-out run {one['run']}, where "
-        f"{100 * one['of_signal']:.0f} % of the signal would stay"
+        f", {100 * max(one['share'], 0.0):.0f} % in held-out run {one['run']} (which leaves "
+        f"{100 * one['of_signal']:.0f} % of its signal)"
         for one in values["held_out"][:MOST_PLACES]
     )
     places = listed([f"{place['label']} in {place['axis']}" for place in values["places"]])

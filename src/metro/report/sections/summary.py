@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import pandas as pd
 
 from metro.observables.catalogue import title
@@ -74,10 +76,18 @@ def first_words(results: Results) -> list[Item]:
         *(Paragraph(text, "verdict") for text in texts or [no_verdict(results)]),
         Heading("What to trust"),
         Bullets([*trust(results), *static_deflection(results)]),
+        *missing(verdicts),
         *(measure if nexts else []),
         *advice(results.identified),
         *print_check(results),
     ]
+
+
+def missing(verdicts: Mapping[str, JSON]) -> list[Item]:
+    """Say how much of what is unexplained any cause could explain, and of which kind that is."""
+    ceilings = {name: (entry.get("unexplained") or {}).get("ceiling") for name, entry in verdicts.items()}
+    said = [f"{heading(name)}: {ceiling['words']}" for name, ceiling in ceilings.items() if ceiling]
+    return [Heading("What is missing"), Bullets([sentence(text) for text in said])] if said else []
 
 
 def advice(identified: JSON) -> list[Item]:

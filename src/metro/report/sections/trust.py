@@ -22,6 +22,9 @@ MEASURED = (
     f"{UNTESTED} The figures describe the surface that was measured, where it was measured; their intervals "
     "hold what is said beside them, and nothing of how it was cut."
 )
+LOWERED = (
+    "Much of the error stays unexplained and may look like these causes, which lowers their probability."
+)
 OF_SURFACES = ("faces", "levelling", "texture", "areal")
 ABOUT = ("format", "batch", "metro", "not_identified")
 
@@ -161,5 +164,5 @@ def _causes(entry: JSON) -> str:
         certain[chance is not None and chance >= SURE].append(name)
     finding = f"A finding: {listing(certain[True])}." if certain[True] else ""
     lead = f"A lead, not a finding: {listing(certain[False])}." if certain[False] else ""
-    lowered = " ".join(f"{one['lowered']}." for one in entry.get("effects") or [] if one.get("lowered"))
+    lowered = LOWERED if any(effect.get("lowered") for effect in entry.get("effects") or []) else ""
     return " ".join(filter(None, [finding, lead, lowered]))

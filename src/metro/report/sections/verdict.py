@@ -132,8 +132,7 @@ def _residual(entry: JSON, left: str) -> str:
     unexplained = entry.get("unexplained") or {}
     if not unexplained.get("signature"):
         return ""
-    ceiling = (unexplained.get("ceiling") or {}).get("words", "")
-    return f"What is left: {left or plain(str(unexplained['signature']))}. {ceiling}".rstrip()
+    return f"What is left: {left or plain(str(unexplained['signature']))}."
 
 
 def left_words(results: Results, observable: str) -> str:
