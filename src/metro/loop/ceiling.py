@@ -23,7 +23,7 @@ from metro.units import JSON, Array, ComplexArray
 SAME, ALONE = "same", "alone"  # the same in every run; of one run alone, so that it does not repeat
 VARIES = 1e-3  # relative range of a circumstance that is more than its rounding
 LEAST_CONDITIONS = 3
-STEPS = 2000  # of expectation and maximisation
+STEPS, SETTLED = 2000, 1e-5  # of expectation and maximisation; least change, relative to the power
 MOST_PLACES = 6  # that are named
 CARRIED = 0.8  # share of the explained power that these carry at most
 
@@ -173,8 +173,11 @@ def _variances(factors: Array, seen: Array) -> tuple[Array, float]:
     for _ in range(STEPS):
         inverse = np.linalg.inv((factors * variance) @ factors.T + alone * np.eye(count))
         gain = inverse @ seen @ inverse - inverse
-        variance = variance + variance**2 * np.einsum("nk,nm,mk->k", factors, gain, factors)
-        alone += alone**2 * float(np.trace(gain)) / count
+        change = variance**2 * np.sum(factors * (gain @ factors), axis=0)
+        own = alone**2 * float(np.trace(gain)) / count
+        variance, alone = variance + change, alone + own
+        if max(np.abs(change).max(), abs(own)) < SETTLED * power:
+            break
     return variance, alone
 
 
