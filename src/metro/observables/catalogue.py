@@ -12,11 +12,12 @@ from metro.batch.capabilities import Capability, Stock
 from metro.observables import PACKAGES
 from metro.observables.description import Description
 from metro.observables.levelling.description import LEVELLING
+from metro.observables.poses.description import POSES
 from metro.observables.published.description import PRINTED
 from metro.observables.texture.description import TEXTURE
 
 # What is found without a model, so that nothing is compared with it.
-BESIDE = (LEVELLING, TEXTURE, PRINTED)
+BESIDE = (LEVELLING, TEXTURE, POSES, PRINTED)
 
 
 @cache

@@ -43,6 +43,7 @@ ABOUT = ("format", "batch", "metro", "not_identified")  # the batch and the file
 ELSEWHERE = {
     "faces": "flatness of faces",
     "levelling": "flatness by slopes",
+    "pose": "the arm by measured poses",
     "texture": "surface texture",
     "areal": "areal parameters",
     "study": "factors and configurations",

@@ -22,6 +22,10 @@ MEASURED = (
     f"{UNTESTED} The figures describe the surface that was measured, where it was measured; their intervals "
     "hold what is said beside them, and nothing of how it was cut."
 )
+POSED = (
+    "The identified arm was tested on poses that no fit saw, whose errors are stated; how well it predicts a "
+    "cut is not known."
+)
 OF_SURFACES = ("faces", "levelling", "texture", "areal")
 ABOUT = ("format", "batch", "metro", "not_identified")
 
@@ -45,6 +49,8 @@ def untested(identified: JSON) -> str:
     found = {name for name, block in identified.items() if name not in ABOUT and _has_values(block)}
     if not found:
         return UNTESTED
+    if found == {"pose"}:
+        return POSED
     return MEASURED if found <= set(OF_SURFACES) else IDENTIFIED
 
 
