@@ -15,7 +15,7 @@ from metro.robot.calibration.fit import Fit
 from metro.robot.calibration.held_out import HeldOut, median
 from metro.robot.calibration.model import names
 from metro.robot.calibration.poses import Poses, approached
-from metro.robot.calibration.study import STAGES, Calibration, calibrated, left_out, sizes
+from metro.robot.calibration.study import FEWEST, STAGES, Calibration, calibrated, left_out, sizes
 from metro.robot.kinematics import geometry_of_cell
 from metro.units import DEG, JSON, MM, Array
 
@@ -36,12 +36,10 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
             reasons[run] = NO_ARM
             continue
         poses = poses_of(read("poses", run))
-        try:
-            found = calibrated(poses, geometry)
-            held = left_out(poses, geometry)
-        except ValueError as error:
-            reasons[run] = str(error)
+        if len(poses) < FEWEST:
+            reasons[run] = f"found {len(poses)} poses, expected at least {FEWEST}"
             continue
+        found, held = calibrated(poses, geometry), left_out(poses, geometry)
         block[run] = _block(found, held, poses)
         tables["pose_errors"].append(_errors(run, poses, held))
         tables["pose_curves"] += _curves(run, found.final, poses)

@@ -151,8 +151,8 @@ def _drawn(results: Results, run: str) -> list[Item]:
         caption = "Distances of poses left out by region, before and after."
         items.append(Picture(figures.distances(mine), caption, caption))
         caption = (
-            "Error over the workspace, of poses left out by region: mean distance in each cell, in two planes "
-            "of the instrument's frame."
+            "Error over the workspace, of poses left out by region: mean distance in each cell, in two "
+            "planes of the instrument's frame."
         )
         items.append(Picture(figures.maps(mine), caption, caption))
     if curves is not None and (mine := curves[curves["run"] == run]).size:

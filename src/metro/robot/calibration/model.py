@@ -45,12 +45,12 @@ class State:
         frame = np.broadcast_to(self.base, (len(q), 4, 4))
         frames, normals = [frame], []
         for i, shifts in enumerate(self.prismatic):
-            turn = theta[i] + (0.0 if shifts else q[:, i])
+            turn = theta[i] + (0.0 if shifts else 1.0) * q[:, i, None]
+            along = d[i] + (1.0 if shifts else 0.0) * q[:, i, None]
             c, s = np.cos(turn), np.sin(turn)
-            along = d[i] + (q[:, i] if shifts else 0.0)
             x, y, z, origin = np.moveaxis(frame[:, :3], -1, 0)
-            new_x = c[:, None] * x + s[:, None] * y
-            side = c[:, None] * y - s[:, None] * x
+            new_x = c * x + s * y
+            side = c * y - s * x
             new_y = np.cos(alpha[i]) * side + np.sin(alpha[i]) * z
             new_z = np.cos(alpha[i]) * z - np.sin(alpha[i]) * side
             normals.append(new_x)
@@ -58,7 +58,7 @@ class State:
             frame[:, :3, 0] = np.cos(beta[i]) * new_x - np.sin(beta[i]) * new_z
             frame[:, :3, 1] = new_y
             frame[:, :3, 2] = np.cos(beta[i]) * new_z + np.sin(beta[i]) * new_x
-            frame[:, :3, 3] = origin + np.reshape(along, (-1, 1)) * z + a[i] * new_x
+            frame[:, :3, 3] = origin + along * z + a[i] * new_x
             frame[:, 3, 3] = 1.0
             frames.append(frame)
         return np.array(frames), np.array(normals)
