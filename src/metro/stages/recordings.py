@@ -118,7 +118,7 @@ def poses(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         table = recordings.table(file, "poses")
         if table is None:
             continue
-        own = axes_in(list(table))
+        own = axes_in([str(name) for name in table])
         wrong = ""
         if len(arm) and own != arm:
             wrong = (

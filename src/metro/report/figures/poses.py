@@ -25,7 +25,9 @@ GAP = 3.0  # steps between readings from which on a curve is interrupted
 
 
 def _distance(errors: pd.DataFrame, stage: str) -> Array:
-    return np.linalg.norm(errors[[f"{stage}_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float), axis=1)
+    return np.asarray(
+        np.linalg.norm(errors[[f"{stage}_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float), axis=1)
+    )
 
 
 def distances(errors: pd.DataFrame) -> Figure:
@@ -33,7 +35,7 @@ def distances(errors: pd.DataFrame) -> Figure:
     with style.style():
         figure, ((axes,),) = style.new_figure(2.4)
         most = float(np.percentile(_distance(errors, "nominal"), 99.5)) or 1.0
-        edges = np.linspace(0.0, most, BINS + 1)
+        edges = list(np.linspace(0.0, most, BINS + 1))
         for stage, label, colour in SHOWN:
             values = _distance(errors, stage)
             axes.hist(

@@ -47,7 +47,7 @@ def determined(derivatives: Array, allowed: np.ndarray, scatter: float) -> Deter
     by_kind = [FRAMES + len(KINDS) * joint + KINDS.index(kind) for kind in ORDER for joint in range(joints)]
     order = [place for place in (*range(FRAMES), *by_kind) if allowed[place]]
     design = derivatives.reshape(-1, derivatives.shape[-1])[:, order] * PLAUSIBLE
-    reduced = np.linalg.qr(design, mode="r")
+    _, reduced = np.linalg.qr(design)
     directions: list[Array] = []
     kept = np.zeros(len(allowed), dtype=bool)
     for column, place in zip(reduced.T, order, strict=True):
