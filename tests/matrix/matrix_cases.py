@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 import yaml
 
-RUN_FILES = ("dynamometer", "robot_log", "idle_log", "path", "scan", "profile", "slopes")
+RUN_FILES = ("dynamometer", "robot_log", "idle_log", "path", "scan", "profile", "slopes", "poses")
 TABLES = ("runs.csv", "impacts.csv", "loads.csv", "mass.csv", "published.csv", "cell.yaml", "stations.csv")
 NEEDED = {"format", "batch", "source", "cell", "citation"}
 SETTINGS = ("condition", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm", "direction")

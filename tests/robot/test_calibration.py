@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from metro.robot.calibration.determined import determined
-from metro.robot.calibration.fit import fitted
+from metro.robot.calibration.fit import Fit, fitted
 from metro.robot.calibration.model import State, free_of_geometry, jacobian, moved, names
+from metro.robot.calibration.performance import repeated
 from metro.robot.calibration.poses import Poses, approached, regions
 from metro.robot.calibration.rows import standard_rows
 from metro.robot.calibration.start import nominal
@@ -137,7 +138,7 @@ def test_geometry_is_found_within_its_intervals_and_outliers_do_no_harm():
     known = determined(jacobian(state, q)[1], free_of_geometry(state), SIGMA)
     fit = fitted(poses(q, at), state, known.kept)
     assert SIGMA * 0.85 < fit.scale < SIGMA * 1.2
-    truth = np.column_stack([errors, np.zeros(6)])[:, [0, 1, 2, 3, 4]].ravel()
+    truth = np.column_stack([errors, np.zeros(6)]).ravel()
     found = (fit.state.rows - state.rows).ravel()
     free = np.flatnonzero(known.kept)
     sd = np.sqrt(np.diag(fit.covariance))
@@ -221,3 +222,46 @@ def test_regions_hold_as_many_poses_each_and_lie_apart():
 def test_the_reach_of_the_drawn_poses_is_that_of_the_table():
     assert ROWS.shape == (6, 4)
     assert np.all(np.abs(drawn(50)) <= REACH)
+
+
+def test_accuracy_and_repeatability_are_those_of_their_definitions():
+    """Six corners of an octahedron, 3 µm beside the expected place: all 5 µm from the middle."""
+    corners = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1.0]]) * 5e-6
+    start = some_state(np.random.default_rng(6))
+    q = np.repeat(drawn(1), 6, axis=0)
+    fit = fitted_as(start)
+    at = start.position(q) + corners + [3e-6, 0, 0]
+    came = np.repeat([[1.0] * 6, [-1.0] * 6], 3, axis=0)
+    (one,) = repeated(poses(q, at, came=came), np.full(6, 7.0), (fit,))
+    assert (one.target, one.count) == (7, 6)
+    assert np.isclose(one.accuracy[0], 3e-6, rtol=1e-6)
+    assert np.isclose(one.repeatability[0], 5e-6, rtol=1e-6)
+    assert one.repeatability[1] < one.repeatability[0] < one.repeatability[2]
+    apart = np.mean(corners[:3], axis=0) - np.mean(corners[3:], axis=0)
+    assert np.isclose(one.directional, np.linalg.norm(apart), rtol=1e-6)
+
+
+def test_repeats_of_few_are_none():
+    start = some_state(np.random.default_rng(6))
+    q = np.repeat(drawn(1), 6, axis=0)
+    target = np.array([1.0, 1, 1, 1, np.nan, 2])
+    assert repeated(poses(q, start.position(q)), target, (fitted_as(start),)) == ()
+
+
+def test_the_interval_of_repeatability_holds_that_of_many():
+    rng = np.random.default_rng(7)
+    start = some_state(rng)
+    q = np.repeat(drawn(1), 20, axis=0)
+    distances = np.linalg.norm(rng.standard_normal((200_000, 3)) * 1e-5, axis=1)
+    truth = distances.mean() + 3 * distances.std()
+    held = 0
+    for _ in range(200):
+        at = start.position(q) + 1e-5 * rng.standard_normal((20, 3))
+        (one,) = repeated(poses(q, at), np.ones(20), (fitted_as(start),))
+        held += one.repeatability[1] < truth < one.repeatability[2]
+    assert held / 200 > 0.85
+
+
+def fitted_as(state):
+    """Return a fit that predicts by a state alone."""
+    return Fit(state, np.zeros(39, dtype=bool), (), (), 0.0, np.zeros((0, 0)))

@@ -58,7 +58,8 @@ KINDS: dict[str, Kind] = {
     "poses": Kind(
         "measured poses",
         ("x_mm", "y_mm", "z_mm"),
-        (*POSITIONS, "t_s", "temperature_c", "sigma_mm"),
+        (*POSITIONS, "t_s", "temperature_c", "sigma_mm", "target"),
+        whole=("target",),
         fault=fault_of_poses,
     ),
     "cloud": Kind("a point cloud", ("x_mm", "y_mm", "z_mm"), least=3),

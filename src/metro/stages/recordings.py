@@ -128,7 +128,7 @@ def poses(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         turns = [name for name, linear in zip(own.positions, own.linear, strict=True) if not linear]
         wrong = wrong or plausible.poses(turns, table[turns].to_numpy(), table[list(POINT)].to_numpy())
         if not recordings.doubt(file, wrong):
-            yield {"run": run, **{str(name): table[name] for name in table}}
+            yield {"run": run, **{str(name): table[name].astype(float) for name in table}}
 
 
 def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:

@@ -14,6 +14,7 @@ from metro.observables.quantity import quantity
 from metro.robot.calibration.fit import Fit
 from metro.robot.calibration.held_out import HeldOut, median
 from metro.robot.calibration.model import names
+from metro.robot.calibration.performance import repeated
 from metro.robot.calibration.poses import Poses, approached
 from metro.robot.calibration.study import FEWEST, STAGES, Calibration, calibrated, left_out, sizes
 from metro.robot.kinematics import geometry_of_cell
@@ -40,7 +41,7 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
             reasons[run] = f"found {len(poses)} poses, expected at least {FEWEST}"
             continue
         found, held = calibrated(poses, geometry), left_out(poses, geometry)
-        block[run] = _block(found, held, poses)
+        block[run] = _block(found, held, poses) | _repeats(found, poses, read("poses", run))
         tables["pose_errors"].append(_errors(run, poses, held))
         tables["pose_curves"] += _curves(run, found.final, poses)
     block |= {"not_identified": reasons} if reasons else {}
@@ -99,6 +100,26 @@ def _block(found: Calibration, held: tuple[HeldOut, ...], poses: Poses) -> JSON:
         ],
         "errors": {one.kind: _of_held_out(one) for one in held},
     }
+
+
+def _repeats(found: Calibration, poses: Poses, rows: pd.DataFrame) -> JSON:
+    """Return the block of poses that were taken several times; empty without any."""
+    figures = repeated(poses, rows["target"].to_numpy(dtype=float), found.fits)
+    entries = []
+    for one in figures:
+        rp, low, high = (each / MM for each in one.repeatability)
+        entry: JSON = {"target": one.target, "repeats": one.count}
+        entry |= {
+            f"ap_{stage}": _least_zero(quantity(value / MM, one.accuracy_sd / MM, "mm"))
+            for stage, value in zip(STAGES, one.accuracy, strict=True)
+        }
+        entry["rp"] = {"value": rp, "ci95": [low, high], "unit": "mm"}
+        entry["vap"] = {
+            "value": one.directional / MM if math.isfinite(one.directional) else None,
+            "unit": "mm",
+        }
+        entries.append(entry)
+    return {"repeats": entries} if entries else {}
 
 
 def _parameters(fit: Fit) -> Array:

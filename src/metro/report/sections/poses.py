@@ -23,6 +23,11 @@ ABOUT_CORRECTIONS = (
     "between regions. Those that these poses cannot tell from others are left at 0: {redundant}. Condition "
     "number {condition}, observability index O1 {o1} mm per correction of 5 mm or 5 mrad."
 )
+MOST_REPEATED = 12
+ABOUT_REPEATS = (
+    "Poses that were taken several times, mm, as ISO 9283 defines them: accuracy AP, from where each model "
+    "expects the point by the readings; repeatability RP; variation by the direction of approach, vAP."
+)
 ABOUT_EFFECTS = (
     "What the effects move the measured point by (rms over the poses, less what a change of the geometry "
     "would do alike), and by how much each made the squared residual of left-out regions smaller."
@@ -37,7 +42,7 @@ def poses(results: Results) -> Section | None:
     for run, one in series.items():
         items += [Heading(f"Series {run}, {one['poses']} poses")] if len(series) > 1 else []
         items += [Paragraph(said(one)), _errors_table(one), *_drawn(results, run)]
-        items += [*_effects(one), _corrections(one)]
+        items += [*_effects(one), *_repeats(one), _corrections(one)]
     reasons = [f"{run}: {reason}." for run, reason in (block.get("not_identified") or {}).items()]
     items += [Paragraph("No calibration by these poses:"), Bullets(reasons)] if reasons else []
     return Section("The arm by measured poses", items) if items else None
@@ -105,6 +110,25 @@ def _effects(one: JSON) -> list[Item]:
     if missed:
         items.append(Paragraph(f"Tried without a gain: {listing(missed)}.", "note"))
     return items
+
+
+def _repeats(one: JSON) -> list[Item]:
+    entries = one.get("repeats") or []
+    if not entries:
+        return []
+    rows = [
+        [
+            str(entry["target"]),
+            str(entry["repeats"]),
+            *(quantity(entry[f"ap_{stage}"], with_unit=False) for stage in STAGES),
+            quantity(entry["rp"], with_unit=False),
+            number(entry["vap"]["value"], 2),
+        ]
+        for entry in entries[:MOST_REPEATED]
+    ]
+    more = f" The first {MOST_REPEATED} of {len(entries)} poses." if len(entries) > MOST_REPEATED else ""
+    header = ["pose", "repeats", *(f"AP, {words}" for words in STAGES.values()), "RP", "vAP"]
+    return [Table(header, rows, ABOUT_REPEATS + more, [0.5, 0.6, 1.3, 1.3, 1.2, 1.2, 0.6], small=True)]
 
 
 def _grouped(labels: Sequence[str]) -> list[str]:

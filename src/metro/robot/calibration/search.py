@@ -24,7 +24,7 @@ from metro.units import Array
 
 MOST = 5000  # poses that are searched; of more, every so many
 MATERIAL = 0.01  # of the left-out squared residual
-CHANCE = 0.05  # that the mean gain over the regions is above zero by luck, one-sided
+CHANCE = 0.01  # that the mean gain over the regions is above zero by luck, one-sided
 RENEWED = 0.95  # of the scale, below which weights are made anew
 
 
