@@ -6,7 +6,7 @@ parameters have a prior of mean 0, so that what the poses do not show stays 0 (s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +21,9 @@ SPACING = 4.0 * DEG  # of a curve's knots: it follows up to some 36 cycles per t
 SHIFT_SPACING = 0.02  # m, of a joint that shifts
 OLD = 1e-3  # K or s of range below which nothing can be said of a drift
 
+SHORT = 0.01  # of the longest offset or length of a row: along less than that no mass lies
 Basis = Callable[[Poses, State], Array]
+Link = tuple[int, bool]  # joint from 0, and whether its length is meant and not its offset
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,36 +55,51 @@ class Effect:
         return f"{self.title}, joint {self.joint + 1}" if self.joint >= 0 else self.title
 
 
-def library(poses: Poses, prismatic: np.ndarray, up: Array) -> tuple[Effect, ...]:
+def library(poses: Poses, nominal: State, up: Array) -> tuple[Effect, ...]:
     """Return the effects that these poses may show.
 
-    ``up`` (3,): the vertical in the base frame of the rows.
+    ``nominal``: rows of the arm. ``up`` (3,): the vertical in the base frame of the rows.
     """
+    links, joints = _links(nominal), range(len(nominal.rows))
     return (
-        *(effect for joint in range(len(prismatic)) for effect in _of_joint(joint, prismatic, up, poses)),
-        *_of_all(poses, up, len(prismatic)),
+        *(effect for joint in joints for effect in _of_joint(joint, nominal, poses)),
+        *(effect for joint in joints for effect in _of_gravity(joint, nominal, links, up)),
+        *_of_all(poses, links, up),
     )
 
 
-def _of_joint(joint: int, prismatic: np.ndarray, up: Array, poses: Poses) -> Iterator[Effect]:
-    if not prismatic[joint]:
+def _links(nominal: State) -> tuple[Link, ...]:
+    """Return along what the masses of an arm lie: the offset and the length of each row that has one."""
+    size = np.abs(nominal.rows[:, 2:4])
+    kinds = ((joint, kind) for joint in range(len(size)) for kind in (0, 1))
+    return tuple((joint, kind == 1) for joint, kind in kinds if size[joint, kind] > SHORT * size.max())
+
+
+def _of_joint(joint: int, nominal: State, poses: Poses) -> Iterator[Effect]:
+    shifts = bool(nominal.prismatic[joint])
+    if not shifts:
         names = ("sin q", "cos q", "sin 2q", "cos 2q")
         yield Effect("eccentricity", "gear eccentricity", joint, _eccentricity(joint), names)
-        bodies = range(joint + 1, len(prismatic) + 1)
-        names = tuple(f"{axis} of body {body}" for body in bodies for axis in "xyz")
-        yield Effect("elasticity", "elasticity under gravity", joint, _elasticity(joint, up), names)
-        yield Effect(
-            "torque_side", "play by the side of gravity's torque", joint, _side(joint, up), ("play",)
-        )
     if np.ptp(poses.came[:, joint]) > 0.0:
         yield Effect("approach", "direction of approach", joint, _approach(joint), ("half play",))
-    curve = _curve(joint, SHIFT_SPACING if prismatic[joint] else SPACING, bool(prismatic[joint]), poses)
+    curve = _curve(joint, SHIFT_SPACING if shifts else SPACING, shifts, poses)
     yield Effect("curve", "curve of the reading", joint, curve, (), OF_CURVE, late=True)
 
 
-def _of_all(poses: Poses, up: Array, joints: int) -> Iterator[Effect]:
-    names = tuple(f"{axis} of body {body}" for body in range(2, joints + 1) for axis in "xyz")
-    yield Effect("base_tilt", "tilt of the base under the arm's weight", -1, _base_tilt(up), names)
+def _of_gravity(joint: int, nominal: State, links: Sequence[Link], up: Array) -> Iterator[Effect]:
+    # A mass along a joint's own offset lies on its axis.
+    own = tuple(link for link in links if link[0] >= joint and link != (joint, False))
+    if nominal.prismatic[joint] or not own:
+        return
+    elasticity = _elasticity(joint, own, up)
+    yield Effect("elasticity", "elasticity under gravity", joint, elasticity, _names(own))
+    yield Effect("torque_side", "play by the side of gravity's torque", joint, _side(joint, up), ("play",))
+
+
+def _of_all(poses: Poses, links: Sequence[Link], up: Array) -> Iterator[Effect]:
+    # The first link turns with the first joint alone, as does an error of its row.
+    own = tuple(link for link in links if link[0] > 0)
+    yield Effect("base_tilt", "tilt of the base under the arm's weight", -1, _base_tilt(own, up), _names(own))
     if np.ptp(poses.time) > OLD:
         centre, span = float(np.mean(poses.time)), float(np.ptp(poses.time))
         moved = _drift(lambda p: (p.time - centre) / span)
@@ -93,6 +110,10 @@ def _of_all(poses: Poses, up: Array, joints: int) -> Iterator[Effect]:
         yield Effect("warmth", "growth with temperature", -1, warm, ("x", "y", "z", "scale"))
 
 
+def _names(links: Sequence[Link]) -> tuple[str, ...]:
+    return tuple(f"{'length' if length else 'offset'} of link {joint + 1}" for joint, length in links)
+
+
 def _eccentricity(joint: int) -> Basis:
     def basis(poses: Poses, _state: State) -> Array:
         q = poses.q[:, joint]
@@ -101,34 +122,30 @@ def _eccentricity(joint: int) -> Basis:
     return basis
 
 
-def _down(state: State, up: Array) -> Array:
-    return np.asarray(-state.base[:3, :3] @ up)
+def _moments(links: Sequence[Link], poses: Poses, state: State, up: Array) -> list[Array]:
+    """Moments (m, 3) about any point of a weight of 1 at the end of each link's unit vector."""
+    frames, normals = state.frames(poses.q)
+    down = -state.base[:3, :3] @ up
+    along = [normals[joint] if length else frames[joint][:, :3, 2] for joint, length in links]
+    return [np.cross(direction, down) for direction in along]
 
 
-def _elasticity(joint: int, up: Array) -> Basis:
-    """Compliance times first moment of all that hangs on each body, in that body's frame: a torque each."""
+def _elasticity(joint: int, links: Sequence[Link], up: Array) -> Basis:
+    """Compliance times first moment of what hangs on each link: a torque about the joint's axis each."""
 
     def basis(poses: Poses, state: State) -> Array:
-        frames, _ = state.frames(poses.q)
-        across = np.cross(frames[joint][:, :3, 2], -_down(state, up))  # z · (e × g) = e · (g × z)
-        torques = [np.einsum("mik,mi->mk", frame[:, :3, :3], across) for frame in frames[joint + 1 :]]
-        return np.concatenate(torques, axis=1)
+        axis = state.frames(poses.q)[0][joint][:, :3, 2]
+        return np.stack([np.sum(each * axis, axis=1) for each in _moments(links, poses, state, up)], axis=-1)
 
     return basis
 
 
-def _base_tilt(up: Array) -> Basis:
-    """Turn of the base by a compliance, alike about all horizontal axes, times the moments of the bodies.
-
-    What the first body does turns with the first joint alone, as does an error of its row: it is left out.
-    """
+def _base_tilt(links: Sequence[Link], up: Array) -> Basis:
+    """Turn of the base by a compliance, alike about all horizontal axes, times the moments of the links."""
 
     def basis(poses: Poses, state: State) -> Array:
-        frames, _ = state.frames(poses.q)
-        point = frames[-1][:, :3, :3] @ state.tool + frames[-1][:, :3, 3]
-        lever = point - state.base[:3, 3]
-        turns = [np.cross(frame[:, :3, k], _down(state, up)) for frame in frames[2:] for k in range(3)]
-        return np.stack([np.cross(turn, lever) for turn in turns], axis=-1)
+        lever = state.position(poses.q) - state.base[:3, 3]
+        return np.stack([np.cross(turn, lever) for turn in _moments(links, poses, state, up)], axis=-1)
 
     return basis
 
@@ -137,7 +154,7 @@ def _side(joint: int, up: Array) -> Basis:
     def basis(poses: Poses, state: State) -> Array:
         frames, _ = state.frames(poses.q)
         point = frames[-1][:, :3, :3] @ state.tool + frames[-1][:, :3, 3]
-        torque = np.cross(point - frames[joint][:, :3, 3], _down(state, up))
+        torque = np.cross(point - frames[joint][:, :3, 3], -state.base[:3, :3] @ up)
         return np.asarray(np.sign(np.sum(torque * frames[joint][:, :3, 2], axis=1)))[:, None]
 
     return basis

@@ -43,8 +43,8 @@ class Poses:
 
     @cached_property
     def regions(self) -> np.ndarray:
-        """Return of each pose which of eight regions of the workspace it is in, (m,) int."""
-        return regions(self.at, 3)
+        """Return of each pose which of sixteen regions of the workspace it is in, (m,) int."""
+        return regions(self.at, 4)
 
 
 def regions(points: Array, halvings: int) -> np.ndarray:

@@ -4,27 +4,27 @@ The model is linear about the fitted geometry (corrections of some 10⁻³ leave
 region is its information matrix and gradient, and leaving one out is a subtraction. An effect is added where
 the squared residual of left-out regions falls: by more than chance over the regions, and by more than
 :data:`MATERIAL` of it. First those effects that have a shape, then curves, which could take
-the place of any; then those with a shape once more, in what curves left; at last each must still earn its
-place.
+the place of any; then all once more, in what is left; at last those with a shape must still earn their place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
 
 from metro.robot.calibration.effects import PLAUSIBLE, Effect
-from metro.robot.calibration.fit import Fit, columns, weights_of
+from metro.robot.calibration.fit import TAILS, Fit, columns, weights_of
 from metro.robot.calibration.model import jacobian
 from metro.robot.calibration.poses import Poses
 from metro.units import Array
 
 MOST = 5000  # poses that are searched; of more, every so many
 MATERIAL = 0.01  # of the left-out squared residual
-CHANCE = 0.01  # that the mean gain over the regions is above zero by luck, one-sided
+CHANCE = 0.01  # that the gains of the regions are gains by luck: see `by_luck`
 RENEWED = 0.95  # of the scale, below which weights are made anew
 
 
@@ -35,8 +35,8 @@ class Trial:
     Attributes
     ----------
     label, code : of it.
-    gain, error : mean over the left-out regions of the logarithm by which the squared residual falls, and its
-        standard error.
+    gain, error : mean over the left-out regions of what the loss falls by, and its standard error: the share
+        of the squared residual that the effect takes away, while this is small.
     kept : whether it stays.
     """
 
@@ -78,43 +78,51 @@ class _Search:
         self.scale = scale
         root = np.sqrt(weight)[:, None]
         scaled, left = self.design * root[..., None], self.residuals * root
-        self.information, self.gradient, self.square = [], [], []
+        self.information, self.gradient = [], []
         for region in range(int(self.region.max()) + 1):
             mine = self.region == region
             rows, values = scaled[mine].reshape(-1, len(self.precision)), left[mine].ravel()
             self.information.append(rows.T @ rows)
             self.gradient.append(rows.T @ values)
-            self.square.append(float(values @ values))
 
     def places(self, chosen: Sequence[int]) -> np.ndarray:
         """Return the columns of the geometry and of chosen effects."""
         return np.concatenate([self.geometry, *(self.blocks[one] for one in chosen)]).astype(int)
 
     def left_out(self, chosen: Sequence[int], more: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Squared residual (regions,) of each region by a fit to the others: chosen effects, and with each.
+        """Loss (regions,) of each region by a fit to the others: of chosen effects, and with one more each.
 
-        The second is (len(more), regions), of chosen effects with one more each.
+        The second is (len(more), regions).
         """
         from scipy.linalg import cho_factor, cho_solve
 
         have = self.places(chosen)
         total, slope = sum(self.information), sum(self.gradient)
-        base, each = np.zeros(len(self.square)), np.zeros((len(more), len(self.square)))
-        for region, (own, gradient, square) in enumerate(
-            zip(self.information, self.gradient, self.square, strict=True)
-        ):
+        losses = np.zeros((1 + len(more), len(self.information)))
+        for region, (own, gradient) in enumerate(zip(self.information, self.gradient, strict=True)):
             rest, pull = total - own + np.diag(self.precision), slope - gradient
             factor = cho_factor(rest[np.ix_(have, have)])
             values = cho_solve(factor, pull[have])
-            base[region] = _square(own, gradient, square, have, values)
-            for row, one in enumerate(more):
-                new = self.blocks[one]
+            mine = self.region == region
+            design = self.design[mine].reshape(-1, len(self.precision))
+            known = design[:, have]
+            left = self.residuals[mine].ravel() - known @ values
+            changed = [left]
+            for new in (self.blocks[one] for one in more):
                 carried = cho_solve(factor, rest[np.ix_(have, new)])
                 schur = rest[np.ix_(new, new)] - rest[np.ix_(new, have)] @ carried
                 added = np.linalg.solve(schur, pull[new] - rest[np.ix_(new, have)] @ values)
-                both = np.concatenate([values - carried @ added, added])
-                each[row, region] = _square(own, gradient, square, np.concatenate([have, new]), both)
-        return base, each
+                changed.append(left - design[:, new] @ added + known @ (carried @ added))
+            losses[:, region] = [self.loss(each.reshape(-1, 3), self.sigma[mine]) for each in changed]
+        return losses[0], losses[1:]
+
+    def loss(self, residuals: Array, sigma: Array) -> float:
+        """Mean of -⅔ times the log-likelihood of poses, of Student's t, less that of no residual.
+
+        It grows as the logarithm of the squared residual where this is as the scale has it.
+        """
+        out = np.sum(residuals**2, axis=1) / (self.scale**2 + sigma**2)
+        return float((TAILS + 3.0) / 3.0 * np.mean(np.log1p(out / TAILS)))
 
     def remaining(self) -> Array:
         """Residuals (m, 3) of the fit with the chosen effects to all regions."""
@@ -122,10 +130,6 @@ class _Search:
         total = sum(self.information) + np.diag(self.precision)
         values = np.linalg.solve(total[np.ix_(have, have)], sum(self.gradient)[have])
         return np.asarray(self.residuals - self.design[..., have] @ values)
-
-
-def _square(own: Array, gradient: Array, square: float, places: np.ndarray, values: Array) -> float:
-    return float(square - 2.0 * gradient[places] @ values + values @ own[np.ix_(places, places)] @ values)
 
 
 def search(poses: Poses, fit: Fit, effects: Sequence[Effect]) -> tuple[tuple[Effect, ...], tuple[Trial, ...]]:
@@ -148,7 +152,7 @@ def search(poses: Poses, fit: Fit, effects: Sequence[Effect]) -> tuple[tuple[Eff
     early = [place for place, effect in enumerate(effects) if not effect.late]
     late = [place for place, effect in enumerate(effects) if effect.late]
     trials: dict[int, Trial] = {}
-    for candidates in (early, late, early):
+    for candidates in (early, late, early + late):
         _forward(model, effects, candidates, trials)
     _backward(model, effects, early, trials)
     return tuple(effects[one] for one in sorted(model.chosen)), tuple(trials[one] for one in sorted(trials))
@@ -187,11 +191,22 @@ def _backward(
 
 
 def _trial(effect: Effect, without: Array, with_it: Array) -> Trial:
-    """Judge an effect by the squared residuals of left-out regions without and with it."""
-    from scipy.stats import t
+    """Judge an effect by the losses of left-out regions without and with it."""
+    gains = without - with_it
+    gain, error = float(np.mean(gains)), float(np.std(gains, ddof=1) / np.sqrt(len(gains)))
+    return Trial(effect.label, effect.code, gain, error, gain > MATERIAL and by_luck(gains) < CHANCE)
 
-    gains = np.log(without / with_it)
-    gain, count = float(np.mean(gains)), len(gains)
-    error = float(np.std(gains, ddof=1) / np.sqrt(count))
-    kept = gain > float(t.ppf(1.0 - CHANCE, count - 1)) * error and gain > MATERIAL
-    return Trial(effect.label, effect.code, gain, error, kept)
+
+@cache
+def _signs(count: int) -> Array:
+    return 1.0 - 2.0 * ((np.arange(2**count)[:, None] >> np.arange(count)) & 1)
+
+
+def by_luck(gains: Array) -> float:
+    """Return how often a mean gain is as large where each region's is as likely to be a loss.
+
+    Fisher's test of all signs: regions gain by very different amounts, which a test by their scatter would
+    hold against what helps everywhere.
+    """
+    means = _signs(len(gains)) @ gains
+    return float(np.mean(means >= means[0] - 1e-12 * np.abs(gains).sum()))

@@ -46,7 +46,7 @@ def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
     state = as_declared.state
     known = determined(jacobian(state, poses.q)[1], free_of_geometry(state), as_declared.scale)
     corrected = fitted(poses, state, known.kept)
-    chosen, trials = search(poses, corrected, library(poses, state.prismatic, up))
+    chosen, trials = search(poses, corrected, library(poses, state, up))
     return Calibration((as_declared, corrected, fitted(poses, state, known.kept, chosen)), known, trials)
 
 
