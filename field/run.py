@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from field.sets import FieldSet
+from field.taking import FieldSet
 from metro.units import JSON
 
 ROOT = Path(__file__).parents[1]

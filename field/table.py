@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from field.run import Result
-from field.sets import Known
+from field.taking import Known
 from metro.report.numbers import with_interval
 from metro.units import JSON
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from field.run import Result
-from field.sets import SETS, FieldSet, Known, effect, face, held_out, mode
+from field.sets import SETS
 from field.table import page, summary
+from field.taking import FieldSet, Known, effect, face, held_out, mode
 
 MODES = {"modes": [{"frequency": {"value": 99.0, "ci95": [98.9, 99.1]}}, {"frequency": None}]}
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import permutation_test
 
 from metro.robot.calibration.determined import determined
 from metro.robot.calibration.fit import Fit, fitted
@@ -13,6 +14,7 @@ from metro.robot.calibration.model import State, free_of_geometry, jacobian, mov
 from metro.robot.calibration.performance import repeated
 from metro.robot.calibration.poses import Poses, approached, regions
 from metro.robot.calibration.rows import standard_rows
+from metro.robot.calibration.search import by_luck
 from metro.robot.calibration.start import nominal
 from metro.robot.calibration.study import calibrated, sizes
 from metro.robot.chain import chain, of_rows
@@ -205,6 +207,21 @@ def test_play_shows_by_the_direction_of_approach():
     sd = float(np.sqrt(final.covariance[-1, -1]))
     assert abs(float(final.values[0][0]) - 1.5e-4) < 3.0 * sd < 1e-5
     assert not np.allclose(at, late)
+
+
+def test_the_test_of_all_signs_is_that_of_another_package():
+    gains = np.random.default_rng(13).normal(0.2, 1.0, 9)
+    other = permutation_test(
+        (gains,), np.mean, permutation_type="samples", alternative="greater", n_resamples=np.inf
+    )
+    assert np.isclose(by_luck(gains), other.pvalue)
+    assert by_luck(np.linspace(0.1, 3.0, 5)) == 1 / 32
+
+
+def test_what_helps_in_one_region_alone_is_luck():
+    one = np.array([5.0, *(-0.01 * np.ones(15))])
+    assert np.mean(one) > 0.2
+    assert by_luck(one) > 0.4
 
 
 def test_a_joint_that_stands_keeps_the_direction_in_which_it_came():

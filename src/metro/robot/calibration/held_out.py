@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.robot.calibration.fit import Fit
-from metro.robot.calibration.poses import Poses, regions
+from metro.robot.calibration.poses import Poses, evenly, regions
 from metro.units import Array
 
 MOST = 5000  # poses of which some are left out; of more, every so many
@@ -44,7 +44,7 @@ def held_out(poses: Poses, fits: Fitting) -> tuple[HeldOut, ...]:
 
     ``fits``: all that is fitted, the choice of effects included, from the poses that it is given.
     """
-    chosen = np.linspace(0, len(poses) - 1, min(len(poses), MOST)).astype(int)
+    chosen = evenly(len(poses), MOST)
     some = poses.of(chosen)
     found = []
     for kind, folds in _folds(some):

@@ -41,10 +41,19 @@ class Poses:
         fields = ("q", "at", "sigma", "time", "temperature", "came")
         return replace(self, **{name: getattr(self, name)[chosen] for name in fields})
 
+    def thinned(self, count: int) -> Poses:
+        """Return at most so many of the poses, every so many where there are more."""
+        return self.of(evenly(len(self), count))
+
     @cached_property
     def regions(self) -> np.ndarray:
         """Return of each pose which of sixteen regions of the workspace it is in, (m,) int."""
         return regions(self.at, 4)
+
+
+def evenly(total: int, count: int) -> np.ndarray:
+    """Return at most ``count`` of the numbers below ``total``, at equal distances."""
+    return np.linspace(0, total - 1, min(total, count)).astype(int)
 
 
 def regions(points: Array, halvings: int) -> np.ndarray:

@@ -137,7 +137,7 @@ def search(poses: Poses, fit: Fit, effects: Sequence[Effect]) -> tuple[tuple[Eff
 
     ``fit``: of the geometry alone.
     """
-    some = poses.of(np.linspace(0, len(poses) - 1, min(len(poses), MOST)).astype(int))
+    some = poses.thinned(MOST)
     state = fit.state
     at, derivatives = jacobian(state, some.q)
     parts = [derivatives[..., fit.free], *columns(state, derivatives, effects, some)]
@@ -199,7 +199,8 @@ def _trial(effect: Effect, without: Array, with_it: Array) -> Trial:
 
 @cache
 def _signs(count: int) -> Array:
-    return 1.0 - 2.0 * ((np.arange(2**count)[:, None] >> np.arange(count)) & 1)
+    places = np.arange(count)
+    return np.asarray(1.0 - 2.0 * ((np.arange(2**count)[:, None] >> places) & 1), dtype=np.float64)
 
 
 def by_luck(gains: Array) -> float:

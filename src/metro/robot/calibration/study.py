@@ -17,6 +17,7 @@ from metro.robot.calibration.start import nominal
 from metro.robot.kinematics import Geometry
 
 FEWEST = 40  # poses: without a quarter, 90 coordinates for the 27 parameters of a six-axis arm
+MOST = 15_000  # poses of a fit, of more every so many: their derivatives take some 100 MB
 STAGES = ("nominal", "geometry", "effects")
 
 
@@ -41,7 +42,8 @@ class Calibration:
 
 
 def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
-    """Calibrate an arm."""
+    """Calibrate an arm by at most :data:`MOST` poses."""
+    poses = poses.thinned(MOST)
     as_declared, up = nominal(poses, geometry)
     state = as_declared.state
     known = determined(jacobian(state, poses.q)[1], free_of_geometry(state), as_declared.scale)
