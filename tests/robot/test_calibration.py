@@ -258,6 +258,16 @@ def test_accuracy_and_repeatability_are_those_of_their_definitions():
     assert np.isclose(one.directional, np.linalg.norm(apart), rtol=1e-6)
 
 
+def test_poses_that_do_not_place_the_arm_are_refused_with_the_reason():
+    q = np.repeat(drawn(1), 60, axis=0)
+    noise = 1e-5 * np.random.default_rng(0).standard_normal((60, 3))
+    with pytest.raises(ValueError, match="along one line at most"):
+        calibrated(poses(q, measured(q) + noise), rows_rad())
+    q = drawn(60)
+    with pytest.raises(ValueError, match="do not determine where the arm stands: they scatter by"):
+        calibrated(poses(q, measured(q, sigma=0.2)), rows_rad())
+
+
 def test_repeats_of_few_are_none():
     start = some_state(np.random.default_rng(6))
     q = np.repeat(drawn(1), 6, axis=0)

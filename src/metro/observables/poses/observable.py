@@ -40,7 +40,11 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
         if len(poses) < FEWEST:
             reasons[run] = f"found {len(poses)} poses, expected at least {FEWEST}"
             continue
-        found, held = calibrated(poses, geometry), left_out(poses, geometry)
+        try:
+            found, held = calibrated(poses, geometry), left_out(poses, geometry)
+        except ValueError as error:
+            reasons[run] = str(error)
+            continue
         block[run] = _block(found, held, poses) | _repeats(found, poses, read("poses", run))
         tables["pose_errors"].append(_errors(run, poses, held))
         tables["pose_curves"] += _curves(run, found.final, poses)

@@ -60,6 +60,8 @@ def determined(derivatives: Array, allowed: np.ndarray, scatter: float) -> Deter
             directions.append(rest / size)
             kept[place] = True
     chosen = [at for at, place in enumerate(order) if kept[place]]
+    if not chosen:
+        return Determined(kept, float("inf"), 0.0)
     singular = np.linalg.svd(reduced[:, chosen], compute_uv=False)
     o1 = float(np.exp(np.mean(np.log(singular))) / np.sqrt(len(derivatives)))
     return Determined(kept, float(singular[0] / singular[-1]), o1)

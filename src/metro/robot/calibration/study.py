@@ -15,6 +15,7 @@ from metro.robot.calibration.poses import Poses
 from metro.robot.calibration.search import Trial, search
 from metro.robot.calibration.start import nominal
 from metro.robot.kinematics import Geometry
+from metro.units import MM
 
 FEWEST = 40  # poses: without a quarter, 90 coordinates for the 27 parameters of a six-axis arm
 MOST = 15_000  # poses of a fit, of more every so many: their derivatives take some 100 MB
@@ -42,11 +43,20 @@ class Calibration:
 
 
 def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
-    """Calibrate an arm by at most :data:`MOST` poses."""
+    """Calibrate an arm by at most :data:`MOST` poses.
+
+    Raises
+    ------
+    ValueError
+        Where the poses do not determine even where the arm stands.
+    """
     poses = poses.thinned(MOST)
     as_declared, up = nominal(poses, geometry)
     state = as_declared.state
     known = determined(jacobian(state, poses.q)[1], free_of_geometry(state), as_declared.scale)
+    if not known.kept[:6].all():
+        scatter = f"they scatter by {as_declared.scale / MM:.3g} mm about the declared arm"
+        raise ValueError(f"the poses do not determine where the arm stands: {scatter}")
     corrected = fitted(poses, state, known.kept)
     chosen, trials = search(poses, corrected, library(poses, state, up))
     return Calibration((as_declared, corrected, fitted(poses, state, known.kept, chosen)), known, trials)
