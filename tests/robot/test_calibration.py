@@ -11,6 +11,7 @@ from scipy.stats import permutation_test
 from metro.robot.calibration.determined import determined
 from metro.robot.calibration.fit import Fit, fitted
 from metro.robot.calibration.model import State, free_of_geometry, jacobian, moved, names
+from metro.robot.calibration.next_poses import next_poses
 from metro.robot.calibration.performance import repeated
 from metro.robot.calibration.poses import Poses, approached, regions
 from metro.robot.calibration.rows import standard_rows
@@ -266,6 +267,26 @@ def test_poses_that_do_not_place_the_arm_are_refused_with_the_reason():
     q = drawn(60)
     with pytest.raises(ValueError, match="do not determine where the arm stands: they scatter by"):
         calibrated(poses(q, measured(q, sigma=0.2)), rows_rad())
+
+
+def test_the_next_poses_lower_the_errors_as_the_information_says_and_more_than_others():
+    q = drawn(60, seed=14)
+    own = poses(q, measured(q, sigma=SIGMA))
+    fit = calibrated(own, rows_rad()).final
+    free = int(fit.free.sum())
+    chosen, left = next_poses(fit, own, count=6)
+
+    def errors_left(more):
+        shifts = jacobian(fit.state, more)[1][..., fit.free].reshape(-1, free)
+        before = np.linalg.inv(fit.covariance[:free, :free])
+        ratio = np.linalg.slogdet(before)[1] - np.linalg.slogdet(before + shifts.T @ shifts / fit.scale**2)[1]
+        return np.exp(0.5 * ratio / free)
+
+    assert np.isclose(left[-1], errors_left(chosen), rtol=1e-4)
+    assert np.all(np.diff(left) < 0.0)
+    others = [errors_left(drawn(6, seed)) for seed in range(20)]
+    assert left[-1] < min(others)
+    assert np.all((chosen >= q.min(axis=0)) & (chosen <= q.max(axis=0)))
 
 
 def test_repeats_of_few_are_none():

@@ -114,6 +114,13 @@ def test_the_report_and_the_page_print_the_medians_that_the_results_have(found):
     assert "No effect beyond the geometry predicts left-out regions better" in text
 
 
+def test_the_next_poses_are_a_table_in_the_contracts_columns_and_on_the_report(found):
+    table = pd.read_parquet(found[3] / "pose_next.parquet")
+    assert list(table.filter(like="_deg")) == [f"q{i}_deg" for i in range(1, 7)]
+    assert len(table) == 20
+    assert "Poses to measure next" in found[1]
+
+
 def test_the_check_names_what_poses_give_and_what_they_lack(tmp_path):
     folder = batch(tmp_path, series(50))
     assert "1 run with measured poses" in _words(checked(folder).output)

@@ -4,4 +4,4 @@
 """
 
 NAME = "pose"
-TABLES = ("pose_errors", "pose_curves")
+TABLES = ("pose_errors", "pose_curves", "pose_next")

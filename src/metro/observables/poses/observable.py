@@ -9,11 +9,13 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
-from metro.joint_columns import axes_of
+from metro.joint_columns import Axes, axes_of
+from metro.observables.poses import TABLES
 from metro.observables.quantity import quantity
 from metro.robot.calibration.fit import Fit
 from metro.robot.calibration.held_out import HeldOut, median
 from metro.robot.calibration.model import names
+from metro.robot.calibration.next_poses import next_poses
 from metro.robot.calibration.performance import repeated
 from metro.robot.calibration.poses import Poses, approached
 from metro.robot.calibration.study import FEWEST, STAGES, Calibration, calibrated, left_out, sizes
@@ -31,7 +33,7 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
     geometry = geometry_of_cell(batch.cell)
     block: JSON = {}
     reasons: JSON = {}
-    tables: dict[str, list[pd.DataFrame]] = {"pose_errors": [], "pose_curves": []}
+    tables: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
     for run in batch.with_files("poses"):
         if geometry is None:
             reasons[run] = NO_ARM
@@ -47,6 +49,7 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
             continue
         block[run] = _block(found, held, poses) | _repeats(found, poses, read("poses", run))
         tables["pose_errors"].append(_errors(run, poses, held))
+        tables["pose_next"].append(_next(run, found.final, poses, axes_of(read("poses", run))))
         tables["pose_curves"] += _curves(run, found.final, poses)
     block |= {"not_identified": reasons} if reasons else {}
     written = {name: pd.concat(parts, ignore_index=True) for name, parts in tables.items() if parts}
@@ -172,6 +175,13 @@ def _errors(run: str, poses: Poses, held: tuple[HeldOut, ...]) -> pd.DataFrame:
             part |= {f"{stage}_{axis}_mm": errors[:, k] / MM for k, axis in enumerate("xyz")}
         parts.append(pd.DataFrame(part))
     return pd.concat(parts, ignore_index=True)
+
+
+def _next(run: str, fit: Fit, poses: Poses, axes: Axes) -> pd.DataFrame:
+    """Return the poses to measure next, in the columns of the contract, and what standard errors are left."""
+    q, left = next_poses(fit, poses)
+    table = pd.DataFrame(q / axes.units, columns=axes.positions)
+    return table.assign(run=run, order=np.arange(1, len(q) + 1), left=left)
 
 
 def _curves(run: str, fit: Fit, poses: Poses) -> list[pd.DataFrame]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from metro.report.content import Bullets, Facts, Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import poses as figures
-from metro.report.numbers import listing, number, quantity
+from metro.report.numbers import listing, number, percent, quantity
 from metro.report.results import Results
 from metro.units import JSON
 
@@ -23,7 +23,12 @@ ABOUT_CORRECTIONS = (
     "between regions. Those that these poses cannot tell from others are left at 0: {redundant}. Condition "
     "number {condition}, observability index O1 {o1} mm per correction of 5 mm or 5 mrad."
 )
-MOST_REPEATED = 12
+MOST_REPEATED, MOST_NEXT = 12, 8
+ABOUT_NEXT = (
+    "Poses to measure next, in this order: they lower the standard errors of the geometry most (D-optimal, "
+    "within the ranges of joints and positions so far). Left: geometric mean of the standard errors over "
+    "that of now. Table pose_next has more; nobody has checked that the way to them is free."
+)
 ABOUT_REPEATS = (
     "Poses that were taken several times, mm, as ISO 9283 defines them: accuracy AP, from where each model "
     "expects the point by the readings; repeatability RP; variation by the direction of approach, vAP."
@@ -42,7 +47,7 @@ def poses(results: Results) -> Section | None:
     for run, one in series.items():
         items += [Heading(f"Series {run}, {one['poses']} poses")] if len(series) > 1 else []
         items += [Paragraph(said(one)), _errors_table(one), *_drawn(results, run)]
-        items += [*_effects(one), *_repeats(one), _corrections(one)]
+        items += [*_effects(one), *_repeats(one), _corrections(one), *_next(results, run)]
     reasons = [f"{run}: {reason}." for run, reason in (block.get("not_identified") or {}).items()]
     items += [Paragraph("No calibration by these poses:"), Bullets(reasons)] if reasons else []
     return Section("The arm by measured poses", items) if items else None
@@ -165,6 +170,24 @@ def _corrections(one: JSON) -> Table:
         o1=number(one["observability"], 2),
     )
     return Table(["parameter", "correction"] * 2, pairs, caption, [1.1, 1.2] * 2, small=True)
+
+
+def _next(results: Results, run: str) -> list[Item]:
+    table = results.tables.get("pose_next")
+    mine = None if table is None else table[table["run"] == run]
+    if mine is None or mine.empty:
+        return []
+    joints = [str(name) for name in mine if str(name).startswith("q") and mine[name].notna().all()]
+    rows = [
+        [
+            str(int(row["order"])),
+            *(number(float(row[name]), 4) for name in joints),
+            percent(float(row["left"])),
+        ]
+        for _, row in mine.head(MOST_NEXT).iterrows()
+    ]
+    header = ["pose", *(name.replace("_", ", ").replace("deg", "°") for name in joints), "left"]
+    return [Table(header, rows, ABOUT_NEXT, numeric=list(range(len(header))), small=True)]
 
 
 def _drawn(results: Results, run: str) -> list[Item]:
