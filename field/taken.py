@@ -104,3 +104,8 @@ def held_out(observable: str, when: str = "after") -> Callable[[Found], JSON | N
 def coefficient(name: str) -> Callable[[Found], JSON | None]:
     """Take a cutting coefficient by the mean forces of all runs."""
     return at("force", "mean_all_runs", name)
+
+
+def posed(run: str, kind: str, stage: str) -> Callable[[Found], JSON | None]:
+    """Take the median distance of poses that were left out from where a fit predicted them."""
+    return at("pose", run, "errors", kind, stage, "median")

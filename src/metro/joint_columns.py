@@ -62,6 +62,18 @@ def fault_of(names: Sequence[str]) -> str:
     return f"one drive signal of axis {both}: there are tau{both}_nm and current{both}_a" if both else ""
 
 
+def fault_of_poses(names: Sequence[str]) -> str:
+    """Say which position of a joint a table of poses lacks, or has too much; "" where it is whole."""
+    own = [name for name in POSITIONS if name in names]
+    count = len(positions(own))
+    if count < 2:
+        return "q1_deg, q2_deg, … (q1_mm of a linear axis), the positions of two axes or more"
+    if len(own) > count:
+        beyond = next(name for name in own if name not in positions(own))
+        return f"one position of each axis, counted from 1 without a gap: there is {beyond}"
+    return ""
+
+
 def fault_of_cut(names: Sequence[str]) -> str:
     """Say which column the robot log of a cut lacks, or has too much; "" where it is whole.
 

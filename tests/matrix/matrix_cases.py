@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 import yaml
 
-RUN_FILES = ("dynamometer", "robot_log", "idle_log", "path", "scan", "profile", "slopes")
+RUN_FILES = ("dynamometer", "robot_log", "idle_log", "path", "scan", "profile", "slopes", "poses")
 MEASURED = ("impacts.csv", "loads.csv", "mass.csv", "touches.csv", "payload.csv", "published.csv")
 TABLES = ("runs.csv", *MEASURED, "cell.yaml", "stations.csv")
 NEEDED = {"format", "batch", "source", "cell", "citation"}

@@ -12,6 +12,7 @@ rule ingest:
                 "scan",
                 "profile",
                 "slopes",
+                "poses",
                 "hit",
                 "frf",
                 "loads",

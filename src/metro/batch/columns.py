@@ -95,6 +95,7 @@ RUNS = (
     Column("scan", "file"),
     Column("profile", "file"),
     Column("slopes", "file"),
+    Column("poses", "file"),
     Column("stable", choices=("yes", "no")),
     Column("started_at", "time"),
     *_numbers("return_s", "return_s"),

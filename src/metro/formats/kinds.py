@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.formats.errors import FormatError
-from metro.joint_columns import JOINT_COLUMNS, fault_of, fault_of_cut
+from metro.joint_columns import JOINT_COLUMNS, POSITIONS, fault_of, fault_of_cut, fault_of_poses
 from metro.spelling import resembling
 
 
@@ -55,6 +55,13 @@ KINDS: dict[str, Kind] = {
         whole=("line",),
         least=4,
     ),
+    "poses": Kind(
+        "measured poses",
+        ("x_mm", "y_mm", "z_mm"),
+        (*POSITIONS, "t_s", "temperature_c", "sigma_mm", "target"),
+        whole=("target",),
+        fault=fault_of_poses,
+    ),
     "cloud": Kind("a point cloud", ("x_mm", "y_mm", "z_mm"), least=3),
     "record": Kind("a hammer record", ("t_s", "force_n", "response"), rising="t_s"),
     "frf": Kind("an FRF", ("frequency_hz", "real", "imag"), ("coherence",), rising="frequency_hz"),
@@ -62,7 +69,7 @@ KINDS: dict[str, Kind] = {
 
 
 # Column → what its values lie between, where nothing else is possible.
-RANGES = {"frequency_hz": (0.0, np.inf), "coherence": (0.0, 1.0 + 1e-6)}
+RANGES = {"frequency_hz": (0.0, np.inf), "coherence": (0.0, 1.0 + 1e-6), "sigma_mm": (0.0, np.inf)}
 
 
 @dataclass(frozen=True)

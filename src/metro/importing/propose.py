@@ -56,14 +56,19 @@ class Proposal:
 def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
     """Propose how files are read; what nothing is proposed for is in the second list, with the reason."""
     from metro.importing import joints
+    from metro.importing.poses import measured_poses
     from metro.importing.slopes import slope_readings
 
     proposals: list[Proposal] = []
     unknown = [f"{seen.path.name}: {seen.fault}" for seen in files if seen.fault]
     rest = [seen for seen in files if not seen.fault]
-    # columns that are named as angles and torques, or as feet and slopes, are no coordinates, whatever else
-    # could be read from them
-    named = {s.path for s in rest if s.kind == "cloud" and (joints.joint_log(s) or slope_readings(s))}
+    # columns that are named as angles and torques, as feet and slopes, or as joints and where the arm was
+    # seen, are no coordinates, whatever else could be read from them
+    named = {
+        seen.path
+        for seen in rest
+        if seen.kind == "cloud" and (joints.joint_log(seen) or slope_readings(seen) or measured_poses(seen))
+    }
     rest = [replace(s, kind="") if s.path in named else s for s in rest]
     for kind in dict.fromkeys(seen.kind for seen in rest if seen.kind):
         for placed in (False, True):
@@ -75,7 +80,8 @@ def propose(files: Sequence[Seen]) -> tuple[list[Proposal], list[str]]:
     proposals += pairs
     unknown += single
     for seen in rest:
-        found = _forces(seen) or joints.joint_log(seen) or slope_readings(seen) or _numbered(seen)
+        readers = (_forces, joints.joint_log, slope_readings, measured_poses, _numbered)
+        found = next((made for reader in readers if (made := reader(seen))), None)
         if found is None:
             unknown.append(_reason(seen))
         else:
@@ -228,7 +234,7 @@ def _reason(seen: Seen) -> str:
     named = sum(bool(column.name) for column in seen.columns)
     listed = ", ".join(column.name for column in seen.columns[:8] if column.name)
     names = f", named {listed}" if named else " without names"
-    none = "no dynamometer, hammer, profile, slopes or scan"
+    none = "no dynamometer, hammer, profile, slopes, poses or scan"
     message = f"{seen.path.name}: {len(seen.columns)} columns{names}: {none}"
     logs = (
         "a joint log takes angles and torques or currents with numbered names; a robot log of a cut takes "

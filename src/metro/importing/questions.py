@@ -83,11 +83,12 @@ def questions(proposals: Sequence[Proposal]) -> Iterator[Question]:
         number = "as 1x; {number} is the number in the file's name"
         yield Question("reference", f"where the hammer struck, point and axis, {number}", _place)
         yield Question("response", f"where the sensor was, point and axis, {number}", _place)
+    if kinds & {"joints", "poses"}:
+        arm = "the robot: a name of config/cells or of your own (cell_file=… copies a cell.yaml), or none"
+        yield Question("cell", arm, leaves_out=True)
     if "joints" in kinds:
         rows = [name for each in proposals if each.kind == "joints" for name, _ in each.rows]
         named = ", ".join(rows)
-        arm = "the robot: a name of config/cells or of your own (cell_file=… copies a cell.yaml), or none"
-        yield Question("cell", arm, leaves_out=True)
         what = f"is a load on the flange: yes or no, one for each of {named} by commas; none: not known"
         yield Question("loaded", what, partial(_states, len(rows)), leaves_out=True)
     if "cloud" in kinds:

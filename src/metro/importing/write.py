@@ -27,6 +27,7 @@ RUN_COLUMN = {
     "cloud": "scan",
     "path": "path",
     "slopes": "slopes",
+    "poses": "poses",
 }
 _RUN_KEYS = (
     *("operation", "direction", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm"),

@@ -14,11 +14,12 @@ from metro.observables.arm.description import CALIBRATION
 from metro.observables.description import Description
 from metro.observables.levelling.description import LEVELLING
 from metro.observables.loads.description import LOADED
+from metro.observables.poses.description import POSES
 from metro.observables.published.description import PRINTED
 from metro.observables.texture.description import TEXTURE
 
 # What is found without a model, so that nothing is compared with it.
-BESIDE = (LOADED, CALIBRATION, LEVELLING, TEXTURE, PRINTED)
+BESIDE = (LOADED, CALIBRATION, LEVELLING, TEXTURE, POSES, PRINTED)
 
 
 @cache

@@ -17,6 +17,7 @@ from metro.report.sections.contradictions import with_contradictions
 from metro.report.sections.identification import identification
 from metro.report.sections.levelling import levelling
 from metro.report.sections.loop import loop
+from metro.report.sections.poses import poses
 from metro.report.sections.provenance import provenance
 from metro.report.sections.published import published
 from metro.report.sections.quality import quality, with_flags
@@ -49,6 +50,7 @@ def report_sections(results: Results) -> list[Section]:
         levelling(results),
         texture(results),
         areal(results),
+        poses(results),
         robot(results),
         study(results),
         comparison(results),

@@ -14,6 +14,7 @@ CLOCKS = {"milliseconds": 1e3, "microseconds": 1e6, "minutes": 1 / 60}
 SPECIFIC_N_MM2 = (20.0, 2e5)  # peak force over chip section: plastics … steel at the thinnest chips
 ABOUT_KNOWN = (1 / 50, 500.0)  # of ktc where it is declared; thin chips are all edge force
 HEIGHTS_MM = (1e-4, 5.0)  # peak to valley of a milled trace: finer than any roughness … coarser than any wave
+WORKSPACE_MM = (10.0, 2e4)  # extent of a set of poses: a calibration over less, or of a larger arm, is none
 STEEPEST_URAD = 2e4  # 20 µm on a millimetre, ten times the range of an autocollimator: no level reads that
 TURN = 2.0 * np.pi
 FOLLOWS_DEG = 5.0  # a joint that is further from its set-point is not the joint of that set-point
@@ -77,6 +78,22 @@ def angles(names: list[str], values_deg: Array) -> str:
     before, after = values_deg[row, column], values_deg[row + 1, column]
     fault = f"row {row + 2} of the log, column {names[column]}: jumps from {before:.5g} to {after:.5g}"
     return f"{fault}, expected a continuous angle: {why}; export it unwrapped"
+
+
+def poses(names: list[str], values_deg: Array, points_mm: Array) -> str:
+    """Check the units of measured poses: joint angles (m, k) in degrees, positions (m, 3) in millimetres."""
+    most = float(np.abs(values_deg).max()) if names else TURN + 1.0
+    if 0.0 < most <= TURN:
+        fault = f"columns {names[0]} …: all angles lie within ±{most:.4g}"
+        return (
+            f"{fault}: they seem to be in radians, expected degrees: state the unit under files in batch.yaml"
+        )
+    size, (low, high) = float(np.ptp(points_mm, axis=0).max()), WORKSPACE_MM
+    if low <= size <= high:
+        return ""
+    unit = "metres" if size < low else "micrometres"
+    fault = f"columns x_mm, y_mm, z_mm: the poses are within {size:.4g}, expected {low:g} to {high:g} mm"
+    return f"{fault}: they seem to be in {unit}: state the unit under files in batch.yaml"
 
 
 def following(set_deg: Array, actual_deg: Array) -> str:

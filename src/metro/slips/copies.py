@@ -23,6 +23,7 @@ MEASURED = {
     "scan": ("scan", ("z_mm",)),
     "profile": ("profile", ("z_mm",)),
     "slopes": ("slopes", ("slope_urad",)),
+    "poses": ("poses", ("x_mm", "y_mm", "z_mm")),
 }
 HIT = ("test", "position", "reference", "response", "replicate")
 

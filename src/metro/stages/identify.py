@@ -25,6 +25,8 @@ from metro.observables.levelling import observable as levelling
 from metro.observables.loads import TABLES as LOADED
 from metro.observables.loads import observable as loads
 from metro.observables.observable import Observable
+from metro.observables.poses import TABLES as POSES
+from metro.observables.poses import observable as poses
 from metro.observables.problem import Problem, Refusal
 from metro.observables.published import TABLES as PRINTED
 from metro.observables.published import observable as published
@@ -126,7 +128,7 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
         posed = {task.observable: Posed(task, state.base_model.sampled(task), printed=True) for task in tasks}
     state.add(printed_study(batch, state.observed))
     state.add(calibration(batch, state.read))
-    for measured in (loads, levelling, texture):
+    for measured in (loads, levelling, texture, poses):
         tables, blocks = measured.observe(batch, state.read)
         state.observed |= tables
         state.add(blocks)
@@ -179,7 +181,7 @@ def _identified(
 def _write(processed: Path, batch: Batch, observed: dict[str, pd.DataFrame]) -> None:
     """Write every table that an observable may have, empty where it has not."""
     names = [name for observable in observables() for name in observable.tables]
-    names += [*LOADED, *LEVELLED, *TEXTURE, *PRINTED]
+    names += [*LOADED, *LEVELLED, *TEXTURE, *POSES, *PRINTED]
     unknown = set(observed) - set(names)
     if unknown:
         raise KeyError(f"{batch.name}: observed tables that no observable names: {sorted(unknown)}")

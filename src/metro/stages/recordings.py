@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from metro.batch.arm import linear_axes, listed
 from metro.batch.axes import signed_axes
 from metro.batch.batch import Batch
 from metro.batch.canonical import Part
 from metro.dynamics.driving import turning
 from metro.dynamics.hits import Hit, fault
+from metro.joint_columns import Axes, axes_in
 from metro.signals import plausible, quality
 from metro.signals.conversion import driving_point_sign, receptance, response_si, sensor_to_tool
 from metro.signals.record_quality import RecordQuality
@@ -107,6 +109,26 @@ def slopes(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         line = table["line"].to_numpy() if "line" in table else np.zeros(len(table), np.int64)
         if not recordings.doubt(file, plausible.slopes(feet, table["slope_urad"].to_numpy(), line)):
             yield {"run": run, **{str(name): table[name] for name in table}, "line": line}
+
+
+def poses(batch: Batch, recordings: Recordings) -> Iterator[Part]:
+    """Yield the measured poses of each series, in the order in which they were taken."""
+    arm = Axes(linear_axes(batch.cell))
+    for run, file in files(batch, "poses"):
+        table = recordings.table(file, "poses")
+        if table is None:
+            continue
+        own = axes_in([str(name) for name in table])
+        wrong = ""
+        if len(arm) and own != arm:
+            wrong = (
+                f"has {listed(own.positions)}, expected {listed(arm.positions)}: one for each joint of the "
+                "arm that moves"
+            )
+        turns = [name for name, linear in zip(own.positions, own.linear, strict=True) if not linear]
+        wrong = wrong or plausible.poses(turns, table[turns].to_numpy(), table[list(POINT)].to_numpy())
+        if not recordings.doubt(file, wrong):
+            yield {"run": run, **{str(name): table[name].astype(float) for name in table}}
 
 
 def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:

@@ -45,6 +45,7 @@ RUN_FILES = {
     "scan": ("scan",),
     "profile": ("profile",),
     "slopes": ("slopes",),
+    "poses": ("poses",),
 }
 
 OF_THE_TABLES = "contract"  # the check, in the quality table, that findings on the batch's tables are of
@@ -210,6 +211,7 @@ def _tables(loaded: Loaded, recordings: Recordings) -> Iterator[tuple[str, Itera
     yield "scan", scans.scan(batch, recordings)
     yield "profile", parts.profile(batch, recordings)
     yield "slopes", parts.slopes(batch, recordings)
+    yield "poses", parts.poses(batch, recordings)
     yield "hit", parts.hit(batch, loaded.impacts, recordings)
     yield "frf", parts.frf(loaded.impacts, recordings)
     yield "pickups", _whole(_pickups(loaded.impacts))

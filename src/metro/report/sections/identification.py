@@ -44,6 +44,7 @@ ELSEWHERE = {
     "faces": "flatness of faces",
     "tip_compliance": "stiffness by load tests",
     "levelling": "flatness by slopes",
+    "pose": "the arm by measured poses",
     "texture": "surface texture",
     "areal": "areal parameters",
     "study": "factors and configurations",

@@ -10,7 +10,7 @@ from metro.report.results import Results
 
 ORIGIN = {"measured": "Measured on", "simulated": "Simulated for", "published": "Published values of"}
 OF_A_CUT = ("operation", "spindle_rpm", "dynamometer", "robot_log", "idle_log")
-UNCUT = {"scan": "scan", "profile": "traced profile", "slopes": "levelled face"}
+UNCUT = {"scan": "scan", "profile": "traced profile", "slopes": "levelled face", "poses": "pose test"}
 
 
 def count_of(count: int, name: str) -> str:

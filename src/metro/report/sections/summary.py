@@ -21,6 +21,7 @@ from metro.report.sections.loads import first_loaded
 from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
+from metro.report.sections.poses import first_poses
 from metro.report.sections.surface import first_faces
 from metro.report.sections.texture import first_traces
 from metro.report.sections.trust import static_deflection, trust
@@ -129,6 +130,7 @@ def _identified(results: Results) -> list[Item]:
         *first_loaded(results),
         *first_faces(results),
         *first_levelled(results),
+        *first_poses(results),
         *first_areal(results),
         *first_traces(results),
         *boundary_items(results),
@@ -175,6 +177,7 @@ def _identified_words(identified: JSON) -> str:
         "flatness of faces" if identified.get("faces") else "",
         *joint_words(identified),
         "flatness by slopes" if set(identified.get("levelling") or {}) - {"not_identified"} else "",
+        "the arm by measured poses" if set(identified.get("pose") or {}) - {"not_identified"} else "",
         "surface texture" if set(identified.get("texture") or {}) - {"not_identified"} else "",
         "areal parameters" if identified.get("areal") else "",
     ]

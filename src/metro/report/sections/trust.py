@@ -25,6 +25,10 @@ MEASURED = (
 LOWERED = (
     "Much of the error stays unexplained and may look like these causes, which lowers their probability."
 )
+POSED = (
+    "The identified arm was tested on poses that no fit saw, whose errors are stated; how well it predicts a "
+    "cut is not known."
+)
 OF_SURFACES = ("faces", "levelling", "texture", "areal")
 ABOUT = ("format", "batch", "metro", "not_identified")
 
@@ -48,6 +52,8 @@ def untested(identified: JSON) -> str:
     found = {name for name, block in identified.items() if name not in ABOUT and _has_values(block)}
     if not found:
         return UNTESTED
+    if found == {"pose"}:
+        return POSED
     return MEASURED if found <= set(OF_SURFACES) else IDENTIFIED
 
 

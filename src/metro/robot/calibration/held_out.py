@@ -1,0 +1,80 @@
+"""Errors on poses that no fit saw: left out at random, by regions of the workspace, and by time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from metro.robot.calibration.fit import Fit
+from metro.robot.calibration.poses import Poses, evenly, regions
+from metro.units import Array
+
+MOST = 5000  # poses of which some are left out; of more, every so many
+FIFTH = 5
+QUARTERS = 4
+HALF_WIDTH = 0.98  # ranks about the median per root of the count: 95 % of a binomial of one half
+
+Fitting = Callable[[Poses], tuple[Fit, ...]]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Distances of held-out poses from where they were predicted.
+
+    Attributes
+    ----------
+    kind : random, region or time. which : (m,) numbers of the poses.
+    errors : (fits, m, 3) m, measured less predicted, by one fit after the other.
+    """
+
+    kind: str
+    which: np.ndarray
+    errors: Array
+
+    @property
+    def distances(self) -> Array:
+        """Lengths (fits, m) of the errors, m."""
+        return np.asarray(np.linalg.norm(self.errors, axis=2))
+
+
+def held_out(poses: Poses, fits: Fitting) -> tuple[HeldOut, ...]:
+    """Fit to what is left and predict what was left out, for each way of leaving out.
+
+    ``fits``: all that is fitted, the choice of effects included, from the poses that it is given.
+    """
+    chosen = evenly(len(poses), MOST)
+    some = poses.of(chosen)
+    found = []
+    for kind, folds in _folds(some):
+        parts = []
+        for out in folds:
+            left = fits(some.of(~out))
+            parts.append(np.stack([some.at[out] - fit.predicted(some.of(out)) for fit in left]))
+        which = np.concatenate([chosen[out] for out in folds])
+        found.append(HeldOut(kind, which, np.concatenate(parts, axis=1)))
+    return tuple(found)
+
+
+def _folds(poses: Poses) -> Iterator[tuple[str, list[np.ndarray]]]:
+    """Yield the kinds of leaving out, each with masks (m,) of what is left out at once.
+
+    A random fifth; each quarter of the workspace; each quarter of the time.
+    """
+    shuffled = np.random.default_rng(0).permutation(len(poses))
+    yield "random", [shuffled % FIFTH == 0]
+    quarter = regions(poses.at, 2)
+    yield "region", [quarter == one for one in np.unique(quarter)]
+    order = np.empty(len(poses), dtype=int)
+    order[np.argsort(poses.time, kind="stable")] = np.arange(len(poses))
+    late = order * QUARTERS // len(poses)
+    yield "time", [late == one for one in range(QUARTERS)]
+
+
+def median(distances: Array) -> tuple[float, float, float]:
+    """Return the median of distances with its 95 % interval by order statistics."""
+    ordered = np.sort(distances)
+    half = HALF_WIDTH * np.sqrt(len(ordered))
+    low, high = (int(np.clip(len(ordered) / 2 + side * half, 0, len(ordered) - 1)) for side in (-1, 1))
+    return float(np.median(ordered)), float(ordered[low]), float(ordered[high])
