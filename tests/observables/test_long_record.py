@@ -90,7 +90,7 @@ def test_the_averages_of_stretches_are_those_of_the_whole(tacho, monkeypatch):
     assert np.median(b["variance_n2"] / a["variance_n2"]) == pytest.approx(1.0, rel=0.5)
 
 
-def test_a_speed_that_changes_over_a_long_record_smears_stretches_less_than_the_whole(monkeypatch):
+def test_a_speed_that_changes_over_a_long_record_smears_neither_the_whole_nor_stretches(monkeypatch):
     table = record(wander=5e-3)
     strongest = []
     for size in (10**6, 4_000):
@@ -98,8 +98,7 @@ def test_a_speed_that_changes_over_a_long_record_smears_stretches_less_than_the_
         passing = orders[(orders["order"] == TEETH) & (orders["axis"] == "x")]
         power = (passing["force_n"] ** 2).groupby(passing["block"]).sum()
         strongest.append(np.sqrt(2.0 * power.min()))
-    assert strongest[0] < 55.0
-    assert strongest[1] == pytest.approx(60.0, abs=0.6)
+    assert strongest == pytest.approx([60.0, 60.0], abs=0.6)
 
 
 def test_the_force_on_a_robots_tool_is_the_same_in_stretches(tmp_path, monkeypatch):

@@ -88,7 +88,7 @@ def ceiling(problem: Problem, base: Fit) -> JSON | None:
     if not isinstance(problem.base, Overlaid):
         return None
     runs = _overlaid(problem.base, base, problem.role("identify"))
-    if len({run.condition for run in runs}) < LEAST_CONDITIONS or not runs[0].residual.size:
+    if len({run.condition for run in runs}) < LEAST_CONDITIONS:
         return None
     pattern, held = _pattern(runs), problem.role("validate")
     unseen = _overlaid(problem.base, score(base, held), held, pattern) if held else []
@@ -123,6 +123,8 @@ def _overlaid(
         residual = block.measured - offset - matrix @ fitted.beta
         shifts = np.zeros((1, len(nuisance))) if block.symmetries is None else block.symmetries
         images = [model.overlaid(block, nuisance + shift, residual) for shift in shifts]
+        if not images[0].size:
+            continue
         settings = model.circumstances(block)
         if like:
             wanted = like.predicted(settings)

@@ -150,7 +150,10 @@ class Overlaid(Protocol):
     """A model whose blocks can be laid over one another, whatever the own unknowns of each."""
 
     def overlaid(self, block: Block, nuisance: Array, values: Array) -> ComplexArray:
-        """Lay values (n,) of a block where those of all blocks are: (channels, harmonics), averaged."""
+        """Lay values (n,) of a block where those of all blocks are: (channels, harmonics), averaged.
+
+        Empty where the block cannot be laid over others.
+        """
         ...
 
     def circumstances(self, block: Block) -> Mapping[str, float]:

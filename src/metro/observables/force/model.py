@@ -134,7 +134,7 @@ class ForceModel:
         return self._rows(force[..., None], block.setting, nuisances)[..., 0] + self._drift(block)
 
     def overlaid(self, block: Block, nuisance: Array, values: Array) -> ComplexArray:
-        """Amplitudes (3, orders) of values of a block at phase 0; (3, 0) in helical milling."""
+        """Amplitudes (3, orders) of values of a block at phase 0; empty in helical milling."""
         setting: ForceSetting = block.setting
         if setting.helix is not None:
             return np.zeros((3, 0), complex)
