@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import pandas as pd
+
 from metro.report.content import Bullets, Facts, Heading, Item, Paragraph, Picture, Section, Table
 from metro.report.figures import poses as figures
 from metro.report.numbers import listing, number, percent, quantity
@@ -64,7 +66,7 @@ def first_poses(results: Results) -> list[Item]:
         (f"{words}, {run}", quantity(errors[stage]["median"]), "median distance, left out by region")
         for stage, words in STAGES.items()
     ]
-    return [Facts(facts), Paragraph(said(block[run]))]
+    return [Facts(facts), Paragraph(said(block[run])), *_histogram(_left_out(results, run))]
 
 
 def said(one: JSON) -> str:
@@ -190,18 +192,27 @@ def _next(results: Results, run: str) -> list[Item]:
     return [Table(header, rows, ABOUT_NEXT, numeric=list(range(len(header))), small=True)]
 
 
+def _left_out(results: Results, run: str) -> pd.DataFrame | None:
+    """Return the errors of a series on poses that were left out by region; None where there are none."""
+    errors = results.tables.get("pose_errors")
+    return None if errors is None else errors[(errors["run"] == run) & (errors["kind"] == "region")]
+
+
+def _histogram(errors: pd.DataFrame | None) -> list[Item]:
+    caption = "Distances of poses left out by region, before and after."
+    return [] if errors is None else [Picture(figures.distances(errors), caption, caption)]
+
+
 def _drawn(results: Results, run: str) -> list[Item]:
     items: list[Item] = []
-    errors, curves = (results.tables.get(name) for name in ("pose_errors", "pose_curves"))
+    errors, curves = _left_out(results, run), results.tables.get("pose_curves")
     if errors is not None:
-        mine = errors[(errors["run"] == run) & (errors["kind"] == "region")]
-        caption = "Distances of poses left out by region, before and after."
-        items.append(Picture(figures.distances(mine), caption, caption))
+        items += _histogram(errors)
         caption = (
             "Error over the workspace, of poses left out by region: mean distance in each cell, in two "
             "planes of the instrument's frame."
         )
-        items.append(Picture(figures.maps(mine), caption, caption))
+        items.append(Picture(figures.maps(errors), caption, caption))
     if curves is not None and (mine := curves[curves["run"] == run]).size:
         caption = (
             "Curves of the readings: what each joint turns by beyond its reading, about its mean, over "

@@ -163,6 +163,8 @@ def _peak(mode: JSON) -> float:
 def no_verdict(results: Results) -> str:
     """Say that nothing was compared, and which quantities were identified instead."""
     nothing = "No held-out measurement could be compared with a prediction in this batch: no verdict."
+    if set(results.identified.get("pose") or {}) - {"not_identified"}:
+        nothing = "The arm was fitted to measured poses and tested on others. There was no cut to judge."
     return f"{nothing} {_identified_words(results.identified)}".strip()
 
 
