@@ -37,8 +37,8 @@ def example(kind, rows=12):
         table[name] = np.arange(rows)
     if KINDS[kind].rising:
         table[KINDS[kind].rising] = np.arange(rows) * 0.25
-    if "coherence" in table:
-        table["coherence"] = table["coherence"].abs()
+    for name in {"coherence", "sigma_mm"} & {*table}:  # never below zero
+        table[name] = table[name].abs()
     return table
 
 
