@@ -93,7 +93,7 @@ def test_a_probability_that_an_unexplained_residual_lowers_says_so_with_its_part
     """Half of the wave is bent, a fifth of it is a spike that the library lacks: power 0.5² beside 0.2²."""
     outcome, _, verdict = closed(*CASES["partly_explained"])
     (effect,) = verdict["effects"]
-    assert "of the residual's power" in effect["lowered"]
+    assert "of the residual is explained" in effect["lowered"]
     assert effect["lowered"] in verdict_in_words(verdict)
     weight, share = (float(number) for number in re.findall(r"[0-9.]*[0-9]", effect["lowered"])[:2])
     assert weight == pytest.approx(outcome.weight["bend"], abs=0.006)
