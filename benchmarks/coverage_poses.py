@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 
 from metro.robot.calibration.poses import Poses, approached
 from metro.robot.calibration.study import calibrated
-from tests.robot.simulated_poses import drawn, measured, rows_rad
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests/shared"))
+from simulated_poses import drawn, measured, rows_rad
 
 POSES, SIGMA = 600, 3e-5
 FREE = {1: (0, 1, 3), 2: (0, 1, 3), 4: (1,)}  # joint from 0 → what of its row is drawn: no redundant one

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import permutation_test
+from simulated_poses import REACH, ROWS, TOOL, drawn, measured, rows_rad
 
 from metro.robot.calibration.determined import determined
 from metro.robot.calibration.fit import Fit, fitted
@@ -20,7 +21,6 @@ from metro.robot.calibration.start import nominal
 from metro.robot.calibration.study import calibrated, sizes
 from metro.robot.chain import chain, of_rows
 from metro.robot.kinematics import forward
-from tests.robot.simulated_poses import REACH, ROWS, TOOL, drawn, measured, rows_rad
 
 SIGMA = 3e-5  # m: a tracker
 

@@ -10,6 +10,7 @@ import pandas as pd
 import pypdfium2
 import pytest
 import yaml
+from simulated_poses import ROWS, drawn, measured
 from typer.testing import CliRunner
 
 from metro.cli import app
@@ -20,7 +21,6 @@ from metro.stages.loop import loop
 from metro.stages.predict import predict
 from metro.stages.report import report
 from metro.stages.verdict import verdict
-from tests.robot.simulated_poses import ROWS, drawn, measured
 
 ROOT = Path(__file__).resolve().parents[2]
 JOINTS = [f"arm_joint_{i}" for i in range(1, 7)]
