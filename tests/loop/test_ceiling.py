@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from metro.loop import ceiling as room
+from metro.wording.residual import SENTENCES
 
 FEEDS = (0.02, 0.05, 0.08, 0.1, 0.13)
 
@@ -54,3 +55,18 @@ def test_the_share_is_that_of_the_best_linear_prediction():
     left = alone * (1.0 + same / (alone + n * same))  # of a common mean from n others, plus its own
     shares = [room._unseen_share(runs(seed, same, 0.0, alone))[0] for seed in range(8)]
     assert np.mean(shares) == pytest.approx(1.0 - left / (same + alone), abs=0.08)
+
+
+@pytest.mark.parametrize(("low", "points"), [(0.1, True), (-0.1, False)])
+def test_a_kind_is_named_only_where_more_than_chance_is_predicted(low, points):
+    values = {
+        "parts": {"depth": 0.4, "same": 0.01, "alone": 0.59},
+        "share": 0.3,
+        "ci95": [low, 0.5],
+        "noise_share": 0.0,
+        "places": [{"axis": "x", "label": "order 2", "share": 1.0}],
+        "held_out": [],
+    }
+    words = SENTENCES["ceiling"](values)
+    assert ("end of the tool" in words) is points
+    assert ("may be chance" in words) is not points

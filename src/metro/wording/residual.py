@@ -170,10 +170,16 @@ def _ceiling(values: JSON) -> str:
         for one in values["held_out"][:MOST_PLACES]
     )
     places = listed([f"{place['label']} in {place['axis']}" for place in values["places"]])
+    # A share that may be nothing says of no kind that it is there.
+    kind = (
+        f"This points to {KINDS[told[0][0]]}."
+        if values["ci95"][0] > 0.0
+        else "That may be chance: it points to no kind of cause."
+    )
     return (
         f"Of what the base model leaves, {listed([*parts, _alone(values)])}. Whatever the cause, the other "
         f"conditions predict {100 * values['share']:.0f} % ({low:.0f} to {high:.0f} %) of it in one that is "
-        f"left out{held}. It is largest at {places}. This points to {KINDS[told[0][0]]}."
+        f"left out{held}. It is largest at {places}. {kind}"
     )
 
 
