@@ -100,7 +100,7 @@ def ceiling(problem: Problem, base: Fit) -> JSON | None:
         "ci95": ci95,
         "noise_share": min(1.0, sum(run.noise for run in runs) / power),
         "places": _places(problem.base, runs),
-        "held_out": [_left(run, pattern) for run in unseen],
+        "held_out": [_left(run, pattern) for run in unseen if run.signal],
     }
     return entry | {"words": Statement("ceiling", entry)}
 
@@ -233,5 +233,5 @@ def _places(model: Overlaid, runs: Sequence[Run]) -> list[JSON]:
 def _left(run: Run, pattern: Pattern) -> JSON:
     """Return what a pattern explains of a run, and what it leaves of the signal."""
     left = _power(run.residual - pattern.predicted(run.circumstances))
-    rest = math.sqrt(left / run.signal) if run.signal else None
-    return {"run": run.name, "share": 1.0 - left / _power(run.residual), "of_signal": rest}
+    share = 1.0 - left / _power(run.residual)
+    return {"run": run.name, "share": share, "of_signal": math.sqrt(left / run.signal)}
