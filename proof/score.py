@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -30,11 +30,12 @@ class Score:
 
     Attributes
     ----------
-    kind : none, one, two or outside. hidden : names of the true effects. sizes : of each over the noise, once
-        all else is refitted.
+    kind : none, one, two or outside. hidden : names of the effects hidden on purpose. sizes : of each over
+        the noise, once all else is refitted. also : effects that a real cell always has a little of.
     named : the effects of the verdict with their stated probabilities, in order; one that is hidden, but in
-        another joint, is named so. claimed : whether they are added to the model, or only the first of
-        rivals. groups : sets that it cannot distinguish. unexplained : whether it states an unexplained part.
+        another joint, is named so; those that are always there are left out: naming one is neither demanded
+        nor false. claimed : whether any of ``named`` is added to the model, or only the first of rivals.
+        groups : sets that it cannot distinguish. unexplained : whether it states an unexplained part.
         advised : whether it recommends what to measure next.
     enough : whether the batch has tests enough for any verdict.
     before, after : rms error on held-out runs. oracle, floor : that of the fit that knows which effects act,
@@ -53,6 +54,7 @@ class Score:
     sizes: dict[str, float]
     status: str
     named: dict[str, float]
+    also: frozenset[str] = frozenset()
     claimed: bool = False
     groups: tuple[frozenset[str], ...] = ()
     unexplained: bool = False
@@ -79,7 +81,7 @@ class Score:
     @cached_property
     def extra(self) -> frozenset[str]:
         """Effects named that are neither there nor declared a rival of one that is, or of nothing."""
-        true = set(self.hidden) or {NOTHING}
+        true = (set(self.hidden) or {NOTHING}) | self.also
         rivals = frozenset().union(*(group for group in self.groups if group & true))
         return frozenset(self.named) - frozenset(self.hidden) - rivals
 
@@ -163,6 +165,7 @@ def score(truth: JSON, oracle: JSON | None, said: JSON | None, *, teeth: int, ob
     said : what a program says of the observable (:func:`proof.answers.answer`); None where it failed.
     """
     hidden: JSON = truth["effects"]
+    also = frozenset(truth.get("always_on", ()))
     oracle = oracle or {"after": None, "floor": None, "sizes": {}}
     if said is None:
         return Score(truth["batch"], truth["kind"], tuple(hidden), oracle["sizes"], FAILED, {})
@@ -172,12 +175,13 @@ def score(truth: JSON, oracle: JSON | None, said: JSON | None, *, teeth: int, ob
         one | {"effect": attributed(one["effect"], one["parameters"], hidden)} for one in said["effects"]
     ]
     # What is claimed without a probability is claimed for sure.
-    named = {one["effect"]: 1.0 if one["probability"] is None else one["probability"] for one in effects}
-    if not named and said["status"] == "undetermined":
+    every = {one["effect"]: 1.0 if one["probability"] is None else one["probability"] for one in effects}
+    named = {name: probability for name, probability in every.items() if name not in also}
+    if not every and said["status"] == "undetermined":
         candidates = {c["effect"]: c["probability"] for c in said["candidates"]}
         lacking = _lacking(observable)
         firsts = [group[0] for group in pairs if group[0] not in lacking]
-        named = {first: candidates.get(first.split(",")[0], 0.0) for first in firsts}
+        named = {first: candidates.get(first.split(",")[0], 0.0) for first in firsts if first not in also}
     return Score(
         batch=truth["batch"],
         kind=truth["kind"],
@@ -185,7 +189,8 @@ def score(truth: JSON, oracle: JSON | None, said: JSON | None, *, teeth: int, ob
         sizes=oracle["sizes"],
         status=said["status"],
         named=named,
-        claimed=bool(said["effects"]),
+        also=also,
+        claimed=bool(every.keys() - also),
         groups=groups,
         unexplained=said["unexplained"] is not None,
         advised=bool(said["next_experiment"]),
@@ -202,8 +207,8 @@ def score(truth: JSON, oracle: JSON | None, said: JSON | None, *, teeth: int, ob
             if effect["effect"] in hidden
             for one in estimates(effect["effect"], hidden[effect["effect"]], effect["parameters"], teeth)
         ),
-        stated=_stated(effects, hidden, oracle["sizes"]),
-        rejected=_rejected(said["candidates"], hidden, oracle["sizes"], observable),
+        stated=_stated(effects, {*hidden, *also}, oracle["sizes"]),
+        rejected=_rejected(said["candidates"], hidden, also, oracle["sizes"], observable),
         cannot_be_seen=tuple(said["cannot_be_seen"]),
         p_value=said["p_value"],
         seconds=said["seconds"],
@@ -235,24 +240,27 @@ def _lacking(observable: str) -> frozenset[str]:
     return frozenset({UNKNOWN, *(effect.name for effect in library(observable) if effect.resembled)})
 
 
-def _stated(said: Iterable[JSON], hidden: JSON, sizes: Mapping[str, float]) -> tuple[Stated, ...]:
+def _stated(said: Iterable[JSON], there: Collection[str], sizes: Mapping[str, float]) -> tuple[Stated, ...]:
     return tuple(
-        (one["probability"], one["effect"] in hidden)
+        (one["probability"], one["effect"] in there)
         for one in said
         if one["probability"] is not None and sizes.get(one["effect"], SEEN) >= SEEN
     )
 
 
 def _rejected(
-    said: list[JSON], hidden: JSON, sizes: Mapping[str, float], observable: str
+    said: list[JSON], hidden: JSON, also: frozenset[str], sizes: Mapping[str, float], observable: str
 ) -> tuple[Stated, ...]:
-    """Return what was stated of the candidates; those of labels are whole hypotheses, "a + b" and no more."""
+    """Return what was stated of the candidates; those of labels are whole hypotheses, "a + b" and no more.
+
+    How large an effect is that is always there is not known, so nothing is demanded of its probability.
+    """
     if observable != "lobes":
-        return _stated(said, hidden, sizes)
+        return _stated([one for one in said if one["effect"] not in also], hidden, sizes)
     if any(sizes.get(name, SEEN) < SEEN for name in hidden):
         return ()
     tried = [(one["probability"], set(one["effect"].split(" + "))) for one in said]
-    return tuple((p, names == set(hidden)) for p, names in tried if not names & _lacking(observable))
+    return tuple((p, names - also == set(hidden)) for p, names in tried if not names & _lacking(observable))
 
 
 def _rms(error: JSON | None) -> float | None:

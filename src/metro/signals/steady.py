@@ -10,6 +10,9 @@ import numpy as np
 from metro.units import Array
 
 IN_AIR, CUTTING = 0.12, 0.5
+# Within a revolution the force of a cut swings at least this many times as much as in the air, and its mean
+# moves by at least this share of that swing. Chatter swings more as well, but about the same mean.
+LIVELIER, MOVED = 3.0, 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +61,8 @@ def turns(pieces: Iterable[Array], samples_per_revolution: float) -> Turns:
 def segments(record: Turns, settling: int) -> Segments:
     """Find the steady cut and the air in a record by the level of the force in each revolution.
 
-    The level is the rms of all channels about the air's zero. Revolutions below 12 % of the typical level are
-    air; the cut is the longest run above half of it. Where the record shows an end of the cut, what the tool
+    The level is the rms of all channels about the air's zero, less the noise there. Revolutions below 12 % of
+    the typical level are air; the cut is the longest run above half of it. Where the record shows an end of the cut, what the tool
     needs to get wholly in or out is cut away there: the force looks steady well before the engagement is.
 
     Parameters
@@ -77,10 +80,11 @@ def segments(record: Turns, settling: int) -> Segments:
         raise ValueError(f"{fault} at the speed of runs.csv")
     if count < 6:
         return Segments(record, slice(0, samples), np.zeros(count, dtype=bool))
-    level = _level(record, np.zeros(record.mean.shape[1]))
-    quiet = level < IN_AIR * np.quantile(level, 0.9)
+    quiet = _in_air(record)
+    zero, noise = np.zeros(record.mean.shape[1]), 0.0
     if quiet.any():
-        level = _level(record, record.mean[quiet].mean(axis=0))
+        zero, noise = record.mean[quiet].mean(axis=0), float(np.median(_swing(record)[quiet]))
+    level = _level(record, zero, noise)
     typical = np.median(level[level > 0.5 * np.quantile(level, 0.9)])
     first, last = _longest(level > CUTTING * typical)
     start = first * length + (settling if first > 0 else 0)
@@ -92,6 +96,26 @@ def segments(record: Turns, settling: int) -> Segments:
     return Segments(record, slice(start, stop), _clear(level < IN_AIR * typical))
 
 
+def _in_air(record: Turns) -> np.ndarray:
+    """Revolutions that may be in the air (turns,), before their zero is known.
+
+    They have little force, or a constant one: an amplifier whose charge has drifted since it was reset shows
+    a zero far from nought. A constant force is no cut where elsewhere it swings, about another mean. (On a
+    helix the mean of a cut turns with the orbit.)
+    """
+    level = _level(record, np.zeros(record.mean.shape[1]))
+    quiet = level < IN_AIR * np.quantile(level, 0.9)
+    swing = _swing(record)
+    least, most = float(np.sort(swing)[:3].mean()), float(np.quantile(swing, 0.9))
+    if quiet.any() or most < LIVELIER * least:
+        return quiet
+    still = swing < least + IN_AIR * (most - least)
+    zero = record.mean[still].mean(axis=0)
+    moved = float(np.linalg.norm(np.median(record.mean[swing > CUTTING * most], axis=0) - zero))
+    wanders = float(np.sqrt(((record.mean[still] - zero) ** 2).sum(axis=1).mean()))
+    return still if moved > MOVED * most and wanders < IN_AIR * moved else quiet
+
+
 def _clear(quiet: np.ndarray) -> np.ndarray:
     """Quiet revolutions beside quiet ones: where the tool first touches, it cuts a little already."""
     padded = np.pad(quiet, 1, constant_values=True)
@@ -99,9 +123,15 @@ def _clear(quiet: np.ndarray) -> np.ndarray:
     return clear if clear.any() else quiet
 
 
-def _level(record: Turns, zero: Array) -> Array:
+def _level(record: Turns, zero: Array, noise: float = 0.0) -> Array:
+    """Rms of all channels about a zero in each revolution, less what there is in the air."""
     about = (record.square - 2.0 * zero * record.mean + zero**2).sum(axis=1)
-    return np.asarray(np.sqrt(np.maximum(about, 0.0)))
+    return np.asarray(np.sqrt(np.maximum(about - noise**2, 0.0)))
+
+
+def _swing(record: Turns) -> Array:
+    """Rms of all channels about their mean in each revolution."""
+    return np.asarray(np.sqrt(np.maximum((record.square - record.mean**2).sum(axis=1), 0.0)))
 
 
 def _longest(mask: np.ndarray) -> tuple[int, int]:

@@ -24,11 +24,13 @@ from metro.units import DEG, MM, Array
 
 ANGLES = 120
 ZERO_SHARE = 0.003  # standard error of a zero that was read in the air, as a share of the run's rms
-UNZEROED_SHARE = 0.01  # the same for a record without air
+UNZEROED_SHARE = 0.01  # the same for a record without air, at least
+ENOUGH_ZEROS = 3  # records that were read in the air, to say how far from nought a zero may be
 
 
-def block_of(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, spindle: Any) -> Block:
-    """Return the block of a run from its order averages ``table`` and its row of the spindle table."""
+def block_of(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, spindles: pd.DataFrame) -> Block:
+    """Return the block of a run from its order averages ``table`` and the spindle table of all runs."""
+    spindle: Any = spindles.loc[run]
     row: Any = batch.runs.loc[run]
     middles = tuple(float(t) for t in table.groupby("block")["t_s"].first())
     highest = int(table["order"].max())
@@ -59,7 +61,9 @@ def block_of(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, spindle:
         setting=setting,
         axis=axis,
         zeros=directions,
-        zero_sd=np.full(3, (ZERO_SHARE if spindle["air_s"] > 0.0 else UNZEROED_SHARE) * rms),
+        zero_sd=np.full(3, ZERO_SHARE * rms)
+        if spindle["air_s"] > 0.0
+        else np.maximum(UNZEROED_SHARE * rms, read_zeros(spindles)),
         coordinates=_coordinates(middles),
         synthesis=_synthesis(len(middles), highest),
         scale=_scale(table, turning=path is not None),
@@ -68,6 +72,19 @@ def block_of(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, spindle:
         labels=np.where(mean, "mean", "order " + table["order"].astype(str)).astype(str),
         slow=_slow(setting.recording),
     )
+
+
+def read_zeros(spindles: pd.DataFrame) -> Array:
+    """Rms (3,) of the zeros, N, that the other records of the session show in the air; 0 if these are few.
+
+    A record without air has a zero of that size, which nobody has read: the charge may have drifted for as
+    long since the amplifier was reset.
+    """
+    read = spindles[spindles["air_s"] > 0.0]
+    if len(read) < ENOUGH_ZEROS:
+        return np.zeros(3)
+    columns = read[[f"zero_{axis}_n" for axis in AXES]].to_numpy()
+    return np.asarray(np.sqrt(np.mean(columns**2, axis=0)))
 
 
 def _recording(row: Any, middles: tuple[float, ...], spindle: Any) -> Recording:

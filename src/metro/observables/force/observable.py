@@ -51,7 +51,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     by_run = dict(tuple(observed["orders"].groupby("run", sort=False)))
     spindle = with_predicted_give(batch, observed["spindle"], tool).set_index("run")
     blocks = tuple(
-        block_of(batch, run, by_run[run], tool, spindle.loc[run]) for run in recorded(batch) if run in by_run
+        block_of(batch, run, by_run[run], tool, spindle) for run in recorded(batch) if run in by_run
     )
     helical = any(block.setting.helix is not None for block in blocks)
     bottom = _bottom_edges(blocks)

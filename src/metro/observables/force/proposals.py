@@ -10,7 +10,7 @@ import numpy as np
 
 from metro.cutting.cutter import Cutter
 from metro.cutting.engagement import Engagement, engagement
-from metro.observables.force.blocks import UNZEROED_SHARE, ZERO_SHARE, zeros
+from metro.observables.force.blocks import ZERO_SHARE, zeros
 from metro.observables.force.model import ForceSetting
 from metro.observables.problem import Block, Made, Proposal
 from metro.units import DEG, MM
@@ -109,7 +109,7 @@ def _first_again(first: Block) -> Iterator[Proposal]:
     )
     rms = math.sqrt(float(np.sum(first.measured**2)) / first.repeats)
     if first.zero_sd.max() > 2.0 * ZERO_SHARE * rms:
-        zeroed = replace(first, zero_sd=first.zero_sd * (ZERO_SHARE / UNZEROED_SHARE))
+        zeroed = replace(first, zero_sd=np.full(3, ZERO_SHARE * rms))
         yield _proposal(f"{words} with a record of the air before the cut", zeroed, setting, Made(first.run))
     if setting.helix is None:
         made = Made(first.run, {"cut_length_mm": LONGER})
