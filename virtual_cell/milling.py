@@ -91,10 +91,19 @@ class Cut:
 
 def _edges(cut: Cut, traced: Chips) -> tuple[Array, Array, Array]:
     """Tangential, radial and axial force (N) on the traced points of a tooth."""
-    slices = cut.engagement.slices
-    dz = cut.engagement.depth / len(slices)
     law = cut.coefficients.per_length(traced.thickness, cut.coefficients.worn(cut.metres(traced.t)))
+    dz = engaged(cut.engagement, traced)
     return law[0] * dz, law[1] * dz, law[2] * dz
+
+
+def engaged(engagement: Engagement, traced: Chips) -> Array | float:
+    """Width (m) of the slices of the traced points, or of what is below the floor that an orbit left."""
+    dz = engagement.depth / len(engagement.slices)
+    motion = engagement.motion
+    if not isinstance(motion, Orbit):
+        return dz
+    above = motion.ceiling(motion.direction(traced.t), traced.sin, traced.cos, traced.radius)
+    return np.clip(above - traced.level * dz, 0.0, dz)
 
 
 def _rigid(cut: Cut, t: Array) -> Array:

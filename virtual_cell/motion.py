@@ -116,3 +116,19 @@ class Orbit:
         """Material all around."""
         del ray
         return _everywhere(position[0])
+
+    def ceiling(self, direction: Array, sine: Array, cosine: Array, reach: Array) -> Array:
+        """Height (m) above the tip up to which there is material at the ends of rays from the axis.
+
+        The floor at a place was left when the tool last stood over it: the farther out it lies, the longer
+        ago. A tool circling about the hole's axis covers the place while the axis is within an angle w of it:
+        of the drop per orbit, 1 − w/π has come since. Outside of the hole, w = 0: there all of it is cut.
+        """
+        return np.asarray(self.pitch * (1.0 - self.covers(direction, sine, cosine, reach) / math.pi))
+
+    def covers(self, direction: Array, sine: Array, cosine: Array, reach: Array) -> Array:
+        """Angle (rad) of the axis about the hole's within which the tool covers the ends of rays."""
+        side = math.copysign(1.0, self.rate)
+        outward = np.sin(direction) * sine * side - np.cos(direction) * cosine * side
+        across = np.cos(direction) * sine + np.sin(direction) * cosine
+        return np.arctan2(np.abs(reach * across), self.radius + reach * outward)

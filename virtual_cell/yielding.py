@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from virtual_cell.chips import Path, chips, lags
-from virtual_cell.milling import Cut
+from virtual_cell.milling import Cut, engaged
 from virtual_cell.units import Array
 
 # The tip follows forces up to far above tooth passing, as a static spring would.
@@ -47,15 +47,18 @@ def yielding_force(cut: Cut, t: Array) -> Array:
 
 
 def _dense(cut: Cut, t: Array, past: Path, guess: Array) -> Array:
-    """Chip, sine and cosine of the immersion (3, n, N·S) of a tool displaced by ``guess`` (2, n)."""
+    """Return (4, n, N·S) of a tool displaced by ``guess`` (2, n): chip, sine and cosine of the immersion,
+    width of the slice that is engaged.
+    """
     engagement = cut.engagement
     teeth, levels = engagement.tool.teeth, len(engagement.slices)
-    dense = np.zeros((3, len(t), teeth, levels))
+    dense = np.zeros((4, len(t), teeth, levels))
     dense[0] = -np.inf
     for tooth in range(teeth):
         traced = chips(engagement, t, tooth, past, guess)
-        dense[:, traced.sample, tooth, traced.level] = traced.thickness, traced.sin, traced.cos
-    return dense.reshape(3, len(t), teeth * levels)
+        dense[:3, traced.sample, tooth, traced.level] = traced.thickness, traced.sin, traced.cos
+        dense[3, traced.sample, tooth, traced.level] = engaged(engagement, traced)
+    return dense.reshape(4, len(t), teeth * levels)
 
 
 def _march(
@@ -63,16 +66,16 @@ def _march(
 ) -> Array:
     """Step the tip through one block, filling ``moved`` and ``force``; return position and velocity."""
     assert cut.compliance is not None
-    dz = cut.engagement.depth / len(cut.engagement.slices)
     worn = np.asarray(cut.coefficients.worn(cut.metres(t)))
     step, push = _propagator(dt)
-    for i, (thickness, sine, cosine) in enumerate(zip(*dense, strict=True)):
+    for i, (thickness, sine, cosine, width) in enumerate(zip(*dense, strict=True)):
         x, y = state[0] - guess[:, i]
-        tangential, radial, axial = cut.coefficients.per_length(thickness + x * sine + y * cosine, worn[i])
+        law = cut.coefficients.per_length(thickness + x * sine + y * cosine, worn[i])
+        tangential, radial, axial = (width * each for each in law)
         force[i] = (
-            -dz * (tangential @ cosine + radial @ sine),
-            dz * (tangential @ sine - radial @ cosine),
-            dz * axial.sum(),
+            -(tangential @ cosine + radial @ sine),
+            tangential @ sine - radial @ cosine,
+            axial.sum(),
         )
         moved[i] = state[0]
         state = step @ state + np.outer(push, cut.compliance @ force[i, :2])

@@ -135,14 +135,26 @@ def test_spindle_power_is_the_mean_tangential_power():
     assert power(cut, t).mean() == pytest.approx(tangential * 6e-3 * SPINDLE, rel=5e-3)
 
 
+def left_by_a_disc(orbit, radius, pitch, immersion):
+    """Height of the floor before a disc that is fed along +y at (orbit, 0): how long ago it was last there."""
+    back = np.linspace(0.0, 2.0 * math.pi, 20_001)[1:]
+    place = orbit + radius * (1j * math.sin(immersion) - math.cos(immersion))
+    covered = np.abs(orbit * np.exp(-1j * back) - place) < radius
+    return pitch * (back[np.argmax(covered)] / (2.0 * math.pi) if covered.any() else 1.0)
+
+
 def test_helical_axial_force_is_periphery_plus_bottom():
     n, a, e, feed, k = 4, 0.2e-3, 3.525e-3, 0.04e-3, TITANIUM
     rate = feed * n * SPINDLE / (2.0 * np.pi) / e
     orbit = Orbit(e, rate, 0.7, a)
     mean = forces(Cut(Engagement(mill(), orbit, SPINDLE, 0.3, a), k), turns(10))[:, 2].mean()
     axial_feed = a * rate / (SPINDLE * n)
-    periphery = n * a / np.pi * k.kac * feed + n * a / 2 * k.kae
-    forward = -n * a / 4 * k.krc * feed - n * a / np.pi * k.kre
+    phi = (np.arange(180) + 0.5) * np.pi / 180.0
+    height = np.array([left_by_a_disc(e, 6e-3, a, one) for one in phi])
+    along = height * np.pi / len(phi) * n / (2.0 * np.pi)  # per tooth over a revolution
+    sine, cosine = np.sin(phi), np.cos(phi)
+    periphery = along @ (k.kac * feed * sine + k.kae)
+    forward = along @ (-(k.ktc * feed * sine + k.kte) * cosine - (k.krc * feed * sine + k.kre) * sine)
     ramp = math.atan(a / (2.0 * np.pi * e))
     expected = (
         periphery * math.cos(ramp) - forward * math.sin(ramp) + n * 6e-3 * (k.kfac * axial_feed + k.kfae)

@@ -21,12 +21,15 @@ class Cut:
     """The nominal settings of a cut (SI): what the force over a revolution depends on besides the tool.
 
     ``curvature`` of the tool's path, 1/m, positive where it turns left (counter-clockwise seen from +z).
+    ``pitch``: how far the tool sinks in an orbit of a helix, m; 0 where its path is level. On a helix the
+    orbit before has left a floor that is the higher above the tip the farther it is from the hole's axis.
     """
 
     feed_per_tooth: float
     axial_depth: float
     engagement: Engagement
     curvature: float = 0.0
+    pitch: float = 0.0
 
 
 @dataclass(frozen=True)

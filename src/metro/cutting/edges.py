@@ -16,10 +16,12 @@ from metro.cutting.arcs import EVERYWHERE, TURN, Arc, Near, empty_arc, find_arc
 from metro.cutting.chip import Cut
 from metro.cutting.corners import BEGINS, ENDS, LARGEST_STEP, RawEdges, RawHere, beyond
 from metro.cutting.cutter import Cutter
+from metro.cutting.floor import Floor, floor_at, floor_of
 from metro.cutting.passes import Passes, Row, Scale, chip_left, row_of
 from metro.units import Array
 
 Indices = npt.NDArray[np.intp]
+HALVINGS = 30  # of a piece, in which an edge crosses the floor of a helix: 1e-9 of it
 LOW, HIGH, LINES = 0, 1, 2  # columns of ``Pieces.bounds``
 
 
@@ -29,12 +31,15 @@ class Edges(NamedTuple):
     Attributes
     ----------
     top : (angles, N) immersion of the leading end of each edge, rad. span : what an edge spans, > 0, rad.
-    depth : what a radian of edge spans, m/rad.
+    depth : what a radian of edge spans, m/rad. tip_leads : whether that end is at the tip.
+    floor : that the orbit before left on a helix.
     """
 
     top: Array
     span: float
     depth: float
+    tip_leads: bool
+    floor: Floor
 
 
 def edges(cutter: Cutter, cut: Cut, angle: Array, *, step: float) -> Edges:
@@ -45,7 +50,7 @@ def edges(cutter: Cutter, cut: Cut, angle: Array, *, step: float) -> Edges:
     lag = cutter.lag_per_depth * cut.axial_depth
     span = max(abs(lag), step)
     top = angle[:, None] + np.asarray(cutter.tooth_angles) + 0.5 * (span - lag)
-    return Edges(top, span, cut.axial_depth / span)
+    return Edges(top, span, cut.axial_depth / span, lag >= 0.0, floor_of(cutter, cut))
 
 
 class Pieces(NamedTuple):
@@ -86,6 +91,7 @@ def _pieces(
 ) -> tuple[Indices, Indices, Array, Array, Array, Scale, tuple[bool, bool]]:
     """Return what ``Pieces`` are made of but for the depth."""
     scale, rows, top, span, ends = before.scale, before.rows, along.top, along.span, arc.bounds
+    floor = along.floor
     (angles, teeth), raws = top.shape, raw.line.shape[1]
     alike = rows.shape[0] == 1 and rows.shape[1] == 1 and raws == 1
     least = math.cos(min(0.5 * span + LARGEST_STEP, math.pi)) - 1e-9
@@ -110,6 +116,8 @@ def _pieces(
                     places, bounds, whose = _twice(places), _twice(bounds), _twice(whose)
                 for part in range(count - 1):
                     low, high = max(ends[part], leading - span), min(ends[part + 1], leading)
+                    if floor.pitch > 0.0 and high > low:
+                        low, high = _below(along, leading, low, high)
                     if high > low:
                         middle = 0.5 * (low + high)
                         places[found, 0], places[found, 1] = i, _bounding(scale, passed, middle)
@@ -127,6 +135,35 @@ def _pieces(
             own[k, column] = rows[i, j, -1, column]
     angle, which = places[:found, 0].copy(), places[:found, 1].copy()
     return angle, which, bounds[:found].copy(), bounding, own, scale, raw.outer
+
+
+@compiled
+def _below(along: Edges, leading: float, low: float, high: float) -> tuple[float, float]:
+    """Return the part of an edge from ``low`` to ``high`` that is below the floor of the orbit before.
+
+    An edge crosses the floor once: along it the height changes faster than the floor does.
+    """
+    at_low, at_high = _depth_below(along, leading, low), _depth_below(along, leading, high)
+    if at_low >= 0.0 and at_high >= 0.0:
+        return low, high
+    if at_low <= 0.0 and at_high <= 0.0:
+        return low, low
+    inside, outside = (low, high) if at_low > 0.0 else (high, low)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (inside + outside)
+        if _depth_below(along, leading, middle) > 0.0:
+            inside = middle
+        else:
+            outside = middle
+    return (low, inside) if at_low > 0.0 else (inside, high)
+
+
+@compiled
+def _depth_below(along: Edges, leading: float, immersion: float) -> float:
+    """Return how far a point of an edge is below the floor, m."""
+    behind = leading - immersion
+    height = along.depth * (behind if along.tip_leads else along.span - behind)
+    return floor_at(along.floor, math.sin(immersion), math.cos(immersion)) - height
 
 
 @compiled

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,6 +13,7 @@ from metro.cutting.chip import Cut, chip_thickness
 from metro.cutting.corners import raw_edges
 from metro.cutting.cutter import Cutter
 from metro.cutting.edges import Edges, edges, pieces
+from metro.cutting.floor import floor_of
 from metro.cutting.general import general_basis
 from metro.cutting.law import EdgeLaw
 from metro.cutting.passes import ALIKE, passes
@@ -68,8 +70,17 @@ def _general_table(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool) -> A
     along = edges(cutter, cut, TURN * np.arange(count) / ANGLES, step=TURN / ANGLES)
     pitch = general_basis(cutter, law, cut, along, true_path=true_path)
     basis = np.tile(pitch, (ANGLES // count, 1, 1))
+    if cut.pitch:
+        basis += _lost_at_the_floor(cutter, law, cut, true_path)
     basis.flags.writeable = False
     return basis
+
+
+def _lost_at_the_floor(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool) -> Array:
+    """Return what the floor of a helix takes from the table of a cylinder: its ends are far below the floor."""
+    cylinder, level = replace(cutter, corner=0.0, taper=0.0), replace(cut, pitch=0.0)
+    with_floor, without = (force_basis(cylinder, law, each, true_path) for each in (cut, level))
+    return np.asarray(with_floor - without)
 
 
 def placed(cutter: Cutter, cut: Cut, true_path: bool) -> Cutter:
@@ -81,15 +92,13 @@ def mean_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) 
     """Mean over a revolution of the force on the tool per unit of each coefficient, (3, 6), feed frame.
 
     Without runout every height of the edge goes through the same arc: exact, whatever the helix. With
-    runout, or a corner or a taper, the mean of :func:`force_basis`.
+    runout, a corner or a taper, or on a helical path, the mean of :func:`force_basis`.
     """
-    if not cutter.cylindrical:
-        return np.asarray(force_basis(cutter, law, cut, true_path).mean(axis=0))
-    if cutter.runout_radius or any(cutter.reach):
+    if not cutter.cylindrical or cutter.runout_radius or any(cutter.reach) or cut.pitch:
         return np.asarray(force_basis(cutter, law, cut, true_path).mean(axis=0))
     before = passes(cutter, cut, true_path, np.zeros(1))
     top = np.full((1, cutter.teeth), 1.5 * math.pi)  # in the air
-    around = Edges(top, TURN, cut.axial_depth / TURN)
+    around = Edges(top, TURN, cut.axial_depth / TURN, True, floor_of(cutter, cut))
     raw = raw_edges(cut.engagement, cutter.radius, true_path)
     return np.asarray(assembled(pieces(before, raw, around), law, 1)[0])
 

@@ -80,18 +80,10 @@ class Circling(Orbit):
         return np.asarray(-np.gradient(floor, step)[past:])
 
     def ceiling(self, direction: Array, sine: Array, cosine: Array, reach: Array) -> Array:
-        """Height (m) above the tip up to which there is material at the ends of rays from the axis.
-
-        The floor at a place was left when the tool last stood over it: the farther out it lies, the longer
-        ago. A tool circling about the hole's axis covers the place while the axis is within an angle w of it:
-        of the drop per orbit, 1 − w/π has come since. Outside of the hole, w = 0: there all of it is cut.
-        """
-        side = math.copysign(1.0, self.rate)
-        outward = np.sin(direction) * sine * side - np.cos(direction) * cosine * side
-        across = np.cos(direction) * sine + np.sin(direction) * cosine
-        within = np.arctan2(np.abs(reach * across), self.radius + reach * outward)
-        then = self.too_high(direction + 2.0 * side * within)
-        return np.asarray(self.pitch * (1.0 - within / math.pi) + then - self.too_high(direction))
+        """Height (m) above the tip up to which there is material: the machine stood higher or lower then."""
+        ago = 2.0 * math.copysign(1.0, self.rate) * self.covers(direction, sine, cosine, reach)
+        even = super().ceiling(direction, sine, cosine, reach)
+        return np.asarray(even + self.too_high(direction + ago) - self.too_high(direction))
 
 
 def travelled(

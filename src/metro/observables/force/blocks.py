@@ -36,9 +36,12 @@ def block_of(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, spindles
     highest = int(table["order"].max())
     values = table["force_n"].to_numpy()
     path = helix(batch, row)
-    curvature = 0.0 if path is None else math.copysign(1.0 / path.radius, row["orbit_rpm"])
+    cut = cutting_force.cut(batch, run, tool.radius, spindle["give_mm"] * MM)
+    if path is not None:
+        curvature = math.copysign(1.0 / path.radius, row["orbit_rpm"])
+        cut = replace(cut, curvature=curvature, pitch=path.pitch)
     setting = ForceSetting(
-        cut=replace(cutting_force.cut(batch, run, tool.radius, spindle["give_mm"] * MM), curvature=curvature),
+        cut=cut,
         feed_direction=cutting_force.or_zero(row["feed_direction_deg"]) * DEG,
         highest=highest,
         recording=_recording(row, middles, spindle),
