@@ -107,7 +107,8 @@ def test_forces_are_those_of_chips_traced_on_the_orbit(orbit, runout, monkeypatc
     cut = milling.Cut(chips.Engagement(tool, path, SPEED, 0.1, CUT.axial_depth), law)
     time = np.arange(2880) / 2880 * 2 * math.pi / (SPEED + orbit)
     found = helical_signal(
-        replace(TOOL, runout_radius=runout, runout_angle=0.6), EdgeLaw(), CUT, HELIX, TITANIUM,
+        replace(TOOL, runout_radius=runout, runout_angle=0.6), EdgeLaw(),
+        replace(CUT, pitch=HELIX.pitch), HELIX, TITANIUM,
         speed=SPEED, orbit_speed=orbit, time=time, phase=0.4, direction=0.3, true_path=True,
     )  # fmt: skip
     # Over one revolution against the turning feed, up to six tooth passings: what a record tells.

@@ -77,7 +77,8 @@ def helical_signal(
 
     Peripheral forces of the feed frame, inclined by the ramp; the bottom edges' thrust, which is along the
     spindle and not inclined; all turned to the direction of feed (physics.md §2). The feed turns as well, so
-    the teeth pass it at the spindle's and the orbit's speed together. True paths follow the orbit's curve.
+    the teeth pass it at the spindle's and the orbit's speed together. True paths follow the orbit's curve. A
+    ``cut`` whose pitch is 0 is taken to its full depth, as [T] does.
 
     Parameters
     ----------

@@ -187,7 +187,8 @@ def _depths(
 def _deep(words: str, like: Block, factor: float) -> Proposal:
     """Cut deeper; in a hole that is a steeper helix."""
     setting = _setting(like)
-    cut, helix = replace(setting.cut, axial_depth=factor * setting.cut.axial_depth), setting.helix
+    cut, helix = setting.cut, setting.helix
+    cut = replace(cut, axial_depth=factor * cut.axial_depth, pitch=factor * cut.pitch)
     if helix is not None:
         helix = replace(helix, pitch=factor * helix.pitch, axial_feed=factor * helix.axial_feed)
     setting = replace(setting, cut=cut, helix=helix)
