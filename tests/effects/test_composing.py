@@ -171,6 +171,25 @@ COMPOSED = {
         added,
     ),
     "depth_yielding": ({"growth_per_mm": 0.1}, {"growth_per_mm": 0.05}, added),
+    "dynamometer_crosstalk": (
+        {
+            "x_in_z_percent": 1.0,
+            "y_in_z_percent": -2.0,
+            "z_in_x_percent": 0.5,
+            "z_in_y_percent": 3.0,
+            "x_and_y_percent": -1.0,
+            "y_gain_percent": 1.5,
+        },
+        {
+            "x_in_z_percent": 0.5,
+            "y_in_z_percent": 1.0,
+            "z_in_x_percent": -2.0,
+            "z_in_y_percent": 0.3,
+            "x_and_y_percent": 2.0,
+            "y_gain_percent": -1.0,
+        },
+        added,
+    ),
     "dynamometer_resonance": (
         {"frequency_hz": [900.0, 1000.0, 1500.0], "damping": [0.03, 0.04, 0.05]},
         {"frequency_hz": [700.0, 1300.0, 1100.0], "damping": [0.05, 0.03, 0.02]},

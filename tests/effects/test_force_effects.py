@@ -1,7 +1,7 @@
 """The force effects in the data of an independent simulator: found where they are, and nowhere else.
 
-Of tool_wear, chip_size_effect, pitch_error, orbit_stiffness, charge_drift, charge_leak, dynamometer_resonance
-and dynamometer_rotation; from metro.effects by their names.
+Of tool_wear, chip_size_effect, pitch_error, orbit_stiffness, charge_drift, charge_leak, dynamometer_resonance,
+dynamometer_rotation and dynamometer_crosstalk; from metro.effects by their names.
 """
 
 import math
@@ -17,6 +17,7 @@ from metro.effects import (
     charge_drift,
     charge_leak,
     chip_size_effect,
+    dynamometer_crosstalk,
     dynamometer_resonance,
     dynamometer_rotation,
     orbit_stiffness,
@@ -80,6 +81,20 @@ def test_a_turned_sensor_changes_the_coefficients_and_nothing_else(tmp_path):
     assert "dynamometer_rotation" in outcome.not_visible
     turned = complex(*outcome.final.beta[:2]) / complex(*straight.final.beta[:2])
     assert math.degrees(abs(np.angle(turned))) == pytest.approx(5.0, abs=0.5)
+
+
+def test_crosstalk_puts_shares_of_the_force_into_the_channels_as_a_matrix_by_hand():
+    shares = [1.0, -2.0, 0.5, 3.0, -1.5, 2.5]
+    values = dict(zip(dynamometer_crosstalk.ENTRIES, shares, strict=True))
+    axes = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    model = replace(MODEL, sensor=Dynamometer(axes=axes))
+    sensor = dynamometer_crosstalk.apply(model, values).sensor
+    matrix = np.array([[1.0, -0.015, 0.005], [-0.015, 1.025, 0.03], [0.01, -0.02, 1.0]])
+    force = np.array([30.0, -70.0, 20.0])
+    read = np.linalg.inv(axes) @ matrix @ np.array(axes) @ force
+    seen = transfer(sensor, Recording((0.5,), 0.2, 50.0), 4)
+    assert np.allclose(seen[0] @ force, read)
+    assert not sensor.ideal
 
 
 def test_wear_and_size_effect_change_the_law():

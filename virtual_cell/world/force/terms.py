@@ -81,11 +81,27 @@ def _of_sensor(cell: Cell) -> dict[str, Term]:
             {"angle_deg": _digits(cell.table.yaw / DEG)}, tilt / max(abs(cell.table.yaw), 1e-9)
         ),
         "dynamometer_resonance": Term({"frequency_hz": _list(hz), "damping": _list(damping)}, apart),
+        "dynamometer_crosstalk": Term(_crosstalk(cell.table.gains), tilt),
         "charge_drift": Term({"slope_n_s": _list(cell.amplifier.drift)}, 0.0),
     }
     if float(cell.amplifier.constant.min()) < LONG:
         terms["charge_drift"] = Term({"time_constant_s": _list(cell.amplifier.constant)}, 0.0)
     return terms
+
+
+def _crosstalk(gains: np.ndarray) -> Parameters:
+    """Shares of an axis in another, of the gains that the coefficients do not take up: per that of x or z."""
+    g = gains / np.diag(gains)[:, None]
+    plane = 0.5 * (g[0, 1] + g[1, 0])
+    shares = {
+        "x_in_z": g[2, 0],
+        "y_in_z": g[2, 1],
+        "z_in_x": g[0, 2],
+        "z_in_y": g[1, 2],
+        "x_and_y": plane,
+        "y_gain": gains[1, 1] / gains[0, 0] - 1.0,
+    }
+    return {f"{name}_percent": _digits(100.0 * float(share)) for name, share in shares.items()}
 
 
 def _deflection(cell: Cell) -> Term:

@@ -1,25 +1,33 @@
 """The strategy of the search: forward with backward elimination, then every effect against its rivals.
 
 Forward: each effect of the library is fitted jointly with what the model has already; the best that passes
-every gate is added. Backward: an effect that a later one made idle is dropped for good. Then each is weighed
-against its rivals.
+every gate is added. An effect that is small beside what stays unexplained may be a part of that: where no other
+is left it is added on trial, and in the end only those stay that are not small beside what the whole model
+leaves. (Several causes of one size hide each other otherwise.) Backward: an effect that a later one made idle is
+dropped for good. Then each is weighed against its rivals.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from metro.effects.effect import Effect
 from metro.loop.checks.evidence import compare, hold_out, leave_out
 from metro.loop.fitting.fit import Fit
 from metro.loop.search.rivals import believed, contested
 from metro.loop.search.strategy import Choice, SearchSpace
-from metro.loop.search.trial import Trial, tried, without
+from metro.loop.search.trial import Trial, small_beside_residual, tried, without
+from metro.loop.statement import Statement
 
-MOST_EFFECTS = 4
+MOST_EFFECTS = 6
 
 
 def forward(space: SearchSpace) -> Choice:
     """Add the best effect that passes every gate until none does, and weigh what was added."""
     current, steps, trials = _added(space)
+    current, small = _large_enough(current, space)
+    trials |= {key: replace(trials[key], why_not=why) for key, why in small.items()}
+    steps = [step for step in steps if set(step.candidate.effects) <= set(current.candidate.effects)]
     compared = contested(space.base, current, space.effects, space.prior, space.gates)
     if compared.final is not current:
         current, dropped = _pruned(compared.final, space)
@@ -36,7 +44,8 @@ def _added(space: SearchSpace) -> tuple[Fit, list[Fit], dict[tuple[str, str], Tr
     while len(current.candidate.effects) < MOST_EFFECTS:
         round_trials = tried(current, _open(current, barred, space), space.prior, space.gates, space.least)
         trials |= {trial.effect.key: trial for trial in round_trials}
-        passed = [trial for trial in round_trials if not trial.why_not]
+        open_to = [trial for trial in round_trials if not trial.why_not]
+        passed = [trial for trial in open_to if not trial.beside] or open_to
         if not passed:
             break
         first = max(passed, key=lambda trial: believed(trial.effect, trial.weight))
@@ -44,6 +53,24 @@ def _added(space: SearchSpace) -> tuple[Fit, list[Fit], dict[tuple[str, str], Tr
         barred |= dropped
         steps.append(current)
     return current, steps, trials
+
+
+def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str, str], Statement]]:
+    """Drop, the smallest first, effects that are small beside what stays unexplained; say why of each."""
+    dropped: dict[tuple[str, str], Statement] = {}
+    while current.candidate.effects:
+        evidences = {}
+        for effect in current.candidate.effects:
+            kept = tuple(e for e in current.candidate.effects if e is not effect)
+            evidences[effect] = compare(without(space.base, kept, space.prior), current)
+        least = min(evidences, key=lambda effect: evidences[effect].size)
+        why = small_beside_residual(evidences[least])
+        if why is None:
+            break
+        dropped[least.key] = why
+        kept = tuple(e for e in current.candidate.effects if e is not least)
+        current = without(space.base, kept, space.prior)
+    return current, dropped
 
 
 def _open(current: Fit, barred: set[str], space: SearchSpace) -> list[Effect]:

@@ -58,14 +58,16 @@ class Outcome:
 
     @property
     def explained(self) -> float:
-        """Share of the base model's significant residual, within and between runs, that effects explain."""
-        after, before = (
-            residual.share_left(lines) ** 2 + sum(one.relative**2 for one in others if one)
-            for lines, *others in (
-                (self.lines, self.between, self.restless),
-                (self.base_lines, self.base_between, self.base_restless),
-            )
-        )
+        """Share of the base model's significant residual, within and between runs, that effects explain.
+
+        Differences between conditions or runs that only came to light as the effects took the rest away were
+        there all the same: they are held neither for nor against these.
+        """
+        before, after = (residual.share_left(lines) ** 2 for lines in (self.base_lines, self.lines))
+        for base, final in ((self.base_between, self.between), (self.base_restless, self.restless)):
+            shown = base.relative**2 if base else 0.0
+            before += shown
+            after += min(final.relative**2, shown) if final else 0.0
         return 1.0 - after / max(before, after) if after else 1.0
 
     def probability(self, name: str) -> float:

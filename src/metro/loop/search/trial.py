@@ -44,7 +44,10 @@ class Gates:
 
 @dataclass(frozen=True)
 class Trial:
-    """One effect tried on top of those already chosen; ``why_not``: why it may not be added, None: it may."""
+    """One effect tried on top of those already chosen; ``why_not``: why it may not be added, None: it may.
+
+    ``beside``: why it may only be added where others come to explain the rest, None: it may at once.
+    """
 
     effect: Effect
     fit: Fit
@@ -52,6 +55,7 @@ class Trial:
     q_value: float = 1.0
     weight: float = 0.0
     why_not: Statement | None = None
+    beside: Statement | None = None
 
 
 def tried(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, least: float) -> list[Trial]:
@@ -73,6 +77,7 @@ def tried(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, l
             why_not=unsettled(trial.fit)
             or _why_not(trial.evidence, float(q), gates, least)
             or (Statement("unlike") if unlike(trial.effect, trial.fit) else None),
+            beside=small_beside_residual(trial.evidence),
         )
         for trial, q in zip(trials, q_values, strict=True)
     ]
@@ -153,6 +158,11 @@ def _why_not(evidence: Evidence, q: float, gates: Gates, least: float) -> Statem
         return Statement("no_evidence", {"p_value": evidence.p_value, "q_value": by_chance})
     if evidence.size < least:
         return Statement("immaterial", {"size": evidence.size, "least": least})
+    return None
+
+
+def small_beside_residual(evidence: Evidence) -> Statement | None:
+    """Return that an effect is small beside what stays unexplained with it, if it is."""
     if evidence.size < OF_THE_RESIDUAL * evidence.missed:
         return Statement("small_beside_residual", {"size": evidence.size, "missed": evidence.missed})
     return None

@@ -7,7 +7,7 @@ with the orbit and the sensor does not, so the sensor's matrix is averaged over 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -18,6 +18,7 @@ from metro.units import Array, ComplexArray
 ORBIT_POINTS = 5  # within a time block, over which the turning frame is averaged
 Triple = tuple[float, float, float]
 Rows = tuple[tuple[float, ...], ...]
+NO_CROSSTALK: Rows = ((0.0, 0.0, 0.0),) * 3
 WORK_AXES: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -38,6 +39,7 @@ class Dynamometer:
     axes : declared rows that turn the force on the tool, work frame, into the channels (reversed if the
         sensor reads the force on the work).
     rotation : of the sensor about +z against the declared, rad.
+    crosstalk : what each channel (row) reads of the force along each channel, beside its own.
     resonances : in series; none: rigid.
     slope : drift of each channel, N/s.
     discharge : reciprocal time constant of each channel's charge, 1/s.
@@ -45,6 +47,7 @@ class Dynamometer:
 
     axes: Rows = WORK_AXES
     rotation: float = 0.0
+    crosstalk: Rows = NO_CROSSTALK
     resonances: tuple[Resonance, ...] = ()
     slope: Triple = (0.0, 0.0, 0.0)
     discharge: Triple = (0.0, 0.0, 0.0)
@@ -52,7 +55,14 @@ class Dynamometer:
     @property
     def ideal(self) -> bool:
         """Whether it reads the force as it is, but for a drift."""
-        return not self.resonances and self.rotation == 0.0 and not any(self.discharge)
+        mixed = self.rotation != 0.0 or self.crosstalk != NO_CROSSTALK
+        return not self.resonances and not mixed and not any(self.discharge)
+
+    @property
+    def rows(self) -> tuple[Array, Array]:
+        """Return the declared channels (3, 3), and those that the sensor has."""
+        declared = np.array(self.axes)
+        return declared, (np.eye(3) + self.crosstalk) @ declared @ turn(np.array(-self.rotation))
 
     @property
     def drift(self) -> Array:
@@ -86,17 +96,18 @@ class Recording:
 
 def transfer(sensor: Dynamometer, recording: Recording, orders: int) -> ComplexArray:
     """Map of the force to the reading at the orders 0…, in the comparison's frame: (blocks, orders, 3, 3)."""
-    by_channel = _by_channel(sensor.axes, sensor.rotation, recording)
+    still = replace(sensor, resonances=(), slope=(0.0, 0.0, 0.0))  # what the maps below depend on
+    by_channel = _by_channel(replace(still, discharge=(0.0, 0.0, 0.0)), recording)
     gain = _gain(sensor, recording.speed, orders)
     seen = (gain @ by_channel.reshape(len(by_channel), 3, 9)).reshape(-1, orders, 3, 3)
-    seen[:, 0] = _steady(sensor.axes, sensor.rotation, sensor.discharge, recording)
+    seen[:, 0] = _steady(still, recording)
     return np.asarray(seen)
 
 
 @lru_cache(maxsize=512)
-def _by_channel(axes: Rows, rotation: float, recording: Recording) -> Array:
+def _by_channel(sensor: Dynamometer, recording: Recording) -> Array:
     """Share of each channel in that map, (blocks, channels, 3, 3), averaged over the turn within a block."""
-    declared, true = _rows(axes, rotation)
+    declared, true = sensor.rows
     points = ORBIT_POINTS if recording.orbit else 1
     shares = (np.arange(points) + 0.5) / points - 0.5
     times = np.array(recording.middles)[:, None] + shares * recording.span
@@ -105,12 +116,6 @@ def _by_channel(axes: Rows, rotation: float, recording: Recording) -> Array:
     by_channel = np.einsum("bpic,bpcj->bcij", back, true @ frame) / points
     by_channel.flags.writeable = False
     return np.asarray(by_channel)
-
-
-def _rows(axes: Rows, rotation: float) -> tuple[Array, Array]:
-    """Return the declared channels, and the channels with the sensor's rotation."""
-    declared = np.array(axes)
-    return declared, declared @ turn(np.array(-rotation))
 
 
 def _gain(sensor: Dynamometer, speed: float, orders: int) -> ComplexArray:
@@ -123,15 +128,15 @@ def _gain(sensor: Dynamometer, speed: float, orders: int) -> ComplexArray:
 
 
 @lru_cache(maxsize=512)
-def _steady(axes: Rows, rotation: float, discharge: Triple, recording: Recording) -> Array:
+def _steady(sensor: Dynamometer, recording: Recording) -> Array:
     """Map (blocks, 3, 3) of the mean force to its reading while the charge leaks away.
 
     A channel with discharge rate 1/τ reads y' = F' − y/τ, y = 0 before the contact. A force that turns with
     the orbit is the real part of a complex one times e^{iωt}.
     """
-    declared, true = _rows(axes, rotation)
+    declared, true = sensor.rows
     orbit, middles = recording.orbit, np.array(recording.middles)
-    rate, since = np.array(discharge), middles[:, None] - recording.contact
+    rate, since = np.array(sensor.discharge), middles[:, None] - recording.contact
     plane = (true[:, 0] - 1j * true[:, 1]) * np.exp(1j * orbit * recording.contact)
     turning = plane * _leaked(rate, orbit, since)
     rows = np.stack(
