@@ -41,7 +41,7 @@ def names() -> tuple[str, ...]:
 
 def title(observable: str) -> str:
     """Return the title of an observable; that of one which is not known is its name in words."""
-    known = {each.name: each.title for each in descriptions()}
+    known = {each.name: each.title for each in (*descriptions(), *BESIDE)}
     return known.get(observable, observable.replace("_", " "))
 
 

@@ -20,7 +20,9 @@ def needs(stock: Stock) -> tuple[Capability, ...]:
 POSES = Description(
     name=NAME,
     title="the arm by measured poses",
-    assumes="",
+    assumes="Joints turn by their readings about the axes of the declared geometry; links and base are "
+    "rigid. Corrections and effects are added to that. Orientation of the flange follows from the model and "
+    "was not measured.",
     tables=TABLES,
     shown=TABLES,
     needs=needs,

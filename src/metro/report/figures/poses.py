@@ -55,7 +55,7 @@ def distances(errors: pd.DataFrame) -> Figure:
 def maps(errors: pd.DataFrame) -> Figure:
     """Draw the mean distance over two projections of the workspace, before and after."""
     with style.style():
-        figure, grid = style.new_figure(5.6, 2, 2)
+        figure, grid = style.new_figure(3.9, 2, 2)
         for row, (first, second) in zip(grid, (("x", "y"), ("x", "z")), strict=True):
             for axes, (stage, label, _) in zip(row, (SHOWN[0], SHOWN[2]), strict=True):
                 _map(figure, axes, errors, (first, second), stage)
@@ -74,17 +74,19 @@ def _map(figure: Figure, axes: Axes, errors: pd.DataFrame, plane: tuple[str, str
         linewidths=0.1,
         mincnt=1,
     )
+    cells = np.asarray(drawn.get_array(), dtype=float)
+    drawn.set_clim(float(cells.min()), float(np.percentile(cells, 98)))
     axes.set_aspect("equal")
     axes.set_xlabel(f"{plane[0]} (mm)")
     axes.set_ylabel(f"{plane[1]} (mm)")
-    figure.colorbar(drawn, ax=axes, label="mm", fraction=0.04, pad=0.01)
+    figure.colorbar(drawn, ax=axes, label="mm", fraction=0.04, pad=0.01, extend="max")
 
 
 def curves(table: pd.DataFrame) -> Figure:
     """Draw the curve of each joint with its 95 % interval; ``table``: rows of ``pose_curves`` of a run."""
     joints = list(dict.fromkeys(table["joint"]))
     with style.style():
-        figure, grid = style.new_figure(0.3 + 1.15 * len(joints), len(joints), sharex=True)
+        figure, grid = style.new_figure(0.3 + 0.85 * len(joints), len(joints), sharex=True)
         for (axes,), joint in zip(grid, joints, strict=True):
             own = table[table["joint"] == joint]
             reading, error, sigma = (

@@ -12,7 +12,7 @@ from metro.robot.calibration.fit import Fit, columns, fitted, predicted
 from metro.robot.calibration.held_out import HeldOut, held_out
 from metro.robot.calibration.model import free_of_geometry, jacobian
 from metro.robot.calibration.poses import Poses
-from metro.robot.calibration.search import Trial, search
+from metro.robot.calibration.search import Found, search
 from metro.robot.calibration.start import nominal
 from metro.robot.kinematics import Geometry
 from metro.units import MM
@@ -29,12 +29,12 @@ class Calibration:
     Attributes
     ----------
     fits : of the nominal geometry (base and tool free), of its corrections, and of these with the effects.
-    determined : what the poses determine of the geometry. trials : what became of each effect.
+    determined : what the poses determine of the geometry. found : the search for effects.
     """
 
     fits: tuple[Fit, Fit, Fit]
     determined: Determined
-    trials: tuple[Trial, ...]
+    found: Found
 
     @property
     def final(self) -> Fit:
@@ -58,8 +58,10 @@ def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
         scatter = f"they scatter by {as_declared.scale / MM:.3g} mm about the declared arm"
         raise ValueError(f"the poses do not determine where the arm stands: {scatter}")
     corrected = fitted(poses, state, known.kept)
-    chosen, trials = search(poses, corrected, library(poses, state, up))
-    return Calibration((as_declared, corrected, fitted(poses, state, known.kept, chosen)), known, trials)
+    found = search(poses, corrected, library(poses, state, up))
+    return Calibration(
+        (as_declared, corrected, fitted(poses, state, known.kept, found.effects)), known, found
+    )
 
 
 def left_out(poses: Poses, geometry: Geometry) -> tuple[HeldOut, ...]:
