@@ -32,6 +32,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "profile": ("run", "x_mm", "z_mm"),
     "slopes": ("run", "line", "x1_mm", "y1_mm", "x2_mm", "y2_mm", "slope_urad"),
     "poses": ("run", *POSITIONS, "x_mm", "y_mm", "z_mm", "t_s", "temperature_c", "sigma_mm", "target"),
+    "targets": ("run", *POSITIONS),
     "hit": (
         "test",
         "position",

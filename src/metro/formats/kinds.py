@@ -62,6 +62,7 @@ KINDS: dict[str, Kind] = {
         whole=("target",),
         fault=fault_of_poses,
     ),
+    "targets": Kind("joint targets", (), POSITIONS, least=1, fault=fault_of_poses),
     "cloud": Kind("a point cloud", ("x_mm", "y_mm", "z_mm"), least=3),
     "record": Kind("a hammer record", ("t_s", "force_n", "response"), rising="t_s"),
     "frf": Kind("an FRF", ("frequency_hz", "real", "imag"), ("coherence",), rising="frequency_hz"),

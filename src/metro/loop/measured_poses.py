@@ -239,7 +239,7 @@ def _kind(one: JSON) -> str:
     """Return of which kind the largest part of a rest is that others predict; "alone" where none do."""
     if one["ceiling"]["ci95"][0] <= 0.0:
         return "alone"
-    return next(name for name in one["ceiling"]["parts"])
+    return str(next(iter(one["ceiling"]["parts"])))
 
 
 def _unexplained(series: Mapping[str, JSON], left: Mapping[str, bool], after: JSON) -> JSON:

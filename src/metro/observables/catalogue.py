@@ -47,7 +47,7 @@ def title(observable: str) -> str:
 
 def assumptions(observable: str) -> str:
     """Return what the base model of an observable assumes; empty where the observable is not known."""
-    return next((each.assumes for each in descriptions() if each.name == observable), "")
+    return next((each.assumes for each in (*descriptions(), *BESIDE) if each.name == observable), "")
 
 
 def observed_tables() -> tuple[str, ...]:

@@ -5,4 +5,4 @@
 
 NAME = "pose"
 ERRORS = "pose_errors"
-TABLES = (ERRORS, "pose_curves", "pose_next")
+TABLES = (ERRORS, "pose_curves", "pose_next", "pose_targets")

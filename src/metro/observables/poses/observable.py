@@ -12,6 +12,7 @@ from metro.batch.processed import Tables
 from metro.joint_columns import Axes, axes_of
 from metro.observables.poses import TABLES
 from metro.observables.poses.block import MRAD, series_block
+from metro.observables.poses.targets import corrected_targets
 from metro.robot.calibration.fit import HALVINGS, Fit
 from metro.robot.calibration.held_out import HeldOut
 from metro.robot.calibration.next_poses import next_poses
@@ -31,6 +32,8 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
     block: JSON = {}
     reasons: JSON = {}
     tables: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
+    targets = read("targets")
+    served = _served(batch)
     for run in batch.with_files("poses"):
         if geometry is None:
             reasons[run] = NO_ARM
@@ -48,9 +51,26 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
         tables["pose_errors"].append(_errors(run, poses, held))
         tables["pose_next"].append(_next(run, found.final, poses, axes_of(read("poses", run))))
         tables["pose_curves"] += _curves(run, found.final, poses)
+        for other in served.get(run, ()):
+            rows = targets[targets["run"] == other]
+            part, summary = corrected_targets(other, rows, found, poses, held)
+            tables["pose_targets"].append(part)
+            block[run].setdefault("targets", {})[other] = summary
     block |= {"not_identified": reasons} if reasons else {}
     written = {name: pd.concat(parts, ignore_index=True) for name, parts in tables.items() if parts}
     return written, {"pose": block} if block else {}
+
+
+def _served(batch: Batch) -> dict[str, list[str]]:
+    """Return by series the runs whose targets it corrects: its own, else those of the series before."""
+    served: dict[str, list[str]] = {}
+    series, wanting = batch.with_files("poses"), batch.with_files("targets")
+    last = ""
+    for run in batch.runs.index:
+        last = str(run) if run in series else last
+        if run in wanting and (last or series):
+            served.setdefault(last or series[0], []).append(str(run))
+    return served
 
 
 def poses_of(rows: pd.DataFrame) -> Poses:

@@ -10,6 +10,7 @@ from metro.report.content import Bullets, Facts, Heading, Item, Paragraph, Pictu
 from metro.report.figures import poses as figures
 from metro.report.numbers import listing, number, percent, quantity
 from metro.report.results import Results
+from metro.report.sections.pose_targets import corrected_targets, joint_titles
 from metro.units import JSON
 
 KINDS = {"random": "at random", "region": "by region", "time": "by time"}
@@ -52,7 +53,8 @@ def poses(results: Results) -> Section | None:
         items += [Heading(f"Series {run}, {one['poses']} poses")] if len(series) > 1 else []
         items += [Paragraph(said(one)), _errors_table(one)]
         items += [*([] if at == 0 else _histogram(_left_out(results, run))), *_drawn(results, run)]
-        items += [*_effects(one), *_repeats(one), _corrections(one), *_next(results, run)]
+        items += [*_effects(one), *_repeats(one), _corrections(one), *corrected_targets(results, one)]
+        items += _next(results, run)
     reasons = [f"{run}: {reason}." for run, reason in (block.get("not_identified") or {}).items()]
     items += [Paragraph("No calibration by these poses:"), Bullets(reasons)] if reasons else []
     return Section("The arm by measured poses", items) if items else None
@@ -197,7 +199,7 @@ def _next(results: Results, run: str) -> list[Item]:
         ]
         for _, row in mine.head(MOST_NEXT).iterrows()
     ]
-    header = ["pose", *(name.replace("_", ", ").replace("deg", "°") for name in joints), "left"]
+    header = ["pose", *joint_titles(joints), "left"]
     return [Table(header, rows, ABOUT_NEXT, numeric=list(range(len(header))), small=True)]
 
 
