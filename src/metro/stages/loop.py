@@ -36,6 +36,7 @@ from metro.loop.verdict.verification import noise_scale
 from metro.observables.labelled import Labelled
 from metro.observables.observable import Observable
 from metro.observables.poses import ERRORS as POSE_ERRORS
+from metro.observables.poses.calibrated_arm import with_calibrated_arm
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.observables.published import TABLES as PRINTED
 from metro.observables.registry import by_name, observables
@@ -164,13 +165,14 @@ def closed(
 
     ``limits`` of settings, [least, largest] by column of the run table, within which runs may be proposed.
     """
-    batch = read_batch(processed)
+    identified = read_json(processed / "identified.json")
+    batch = with_calibrated_arm(read_batch(processed), identified)
     state = Closing(
         batch=replace(batch, manifest={**batch.manifest, "limits": limits}) if limits else batch,
         processed=processed,
         gates=gates,
         prediction=read_table(processed / "prediction.parquet"),
-        identified=read_json(processed / "identified.json"),
+        identified=identified,
         observed=_read_observed(processed),
     )
     for name, posed in read_problems(processed).items():

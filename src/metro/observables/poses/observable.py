@@ -12,6 +12,7 @@ from metro.batch.processed import Tables
 from metro.joint_columns import Axes, axes_of
 from metro.observables.poses import TABLES
 from metro.observables.poses.block import MRAD, series_block
+from metro.observables.poses.calibrated_arm import calibrated_chain, serves
 from metro.observables.poses.targets import corrected_targets
 from metro.robot.calibration.fit import HALVINGS, Fit
 from metro.robot.calibration.held_out import HeldOut
@@ -48,6 +49,7 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
             reasons[run] = str(error)
             continue
         block[run] = series_block(found, held, poses, read("poses", run)["target"].to_numpy(dtype=float))
+        block[run] |= {"arm": calibrated_chain(found.final, geometry), "serves": serves(batch)}
         tables["pose_errors"].append(_errors(run, poses, held))
         tables["pose_next"].append(_next(run, found.final, poses, axes_of(read("poses", run))))
         tables["pose_curves"] += _curves(run, found.final, poses)

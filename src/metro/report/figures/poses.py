@@ -33,7 +33,7 @@ def _distance(errors: pd.DataFrame, stage: str) -> Array:
 def distances(errors: pd.DataFrame) -> Figure:
     """Draw histograms of the distances; ``errors``: rows of ``pose_errors``."""
     with style.style():
-        figure, ((axes,),) = style.new_figure(2.4)
+        figure, ((axes,),) = style.new_figure(2.1)
         most = float(np.percentile(_distance(errors, "nominal"), 99.5)) or 1.0
         edges = list(np.linspace(0.0, most, BINS + 1))
         for stage, label, colour in SHOWN:
@@ -69,7 +69,7 @@ def _map(figure: Figure, axes: Axes, errors: pd.DataFrame, plane: tuple[str, str
         across,
         up,
         C=_distance(errors, stage),
-        gridsize=CELLS,
+        gridsize=int(np.clip(np.sqrt(len(errors)) / 2.0, 6, CELLS)),
         cmap=style.SEQUENTIAL,
         linewidths=0.1,
         mincnt=1,

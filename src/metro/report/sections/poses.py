@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import pandas as pd
@@ -28,6 +29,7 @@ ABOUT_CORRECTIONS = (
 )
 MOST_REPEATED, MOST_NEXT = 12, 8
 LEAST_CHANCE = 1e-4
+LEAST_OF_NOISE = 0.2  # adds 2 % to it
 ABOUT_NEXT = (
     "Poses to measure next, in this order: they lower the standard errors of the geometry most (D-optimal, "
     "within the ranges of joints and positions so far). Left: geometric mean of the standard errors over "
@@ -84,10 +86,22 @@ def said(one: JSON) -> str:
         if chosen
         else "No effect beyond the geometry predicts left-out regions better. "
     )
+    noise = (one.get("noise") or {}).get("value") or 0.0
+    scatter = one["scatter"]["value"]
+    beyond = " beyond that of the instrument" if noise else ""
+    left = (
+        "What stays is no more than the noise of the instrument."
+        if scatter < LEAST_OF_NOISE * noise
+        else f"What stays has a standard deviation of {number(scatter, 2)} mm in a coordinate{beyond}."
+    )
+    serves = (
+        " What else this batch computes with the arm uses the corrected geometry, without the effects."
+        if one.get("serves")
+        else ""
+    )
     return (
         f"The median error on left-out regions falls from {before} mm with the nominal geometry to "
-        f"{corrected} mm with its corrections and to {after} mm with effects. {found}What stays has a "
-        f"standard deviation of {number(one['scatter']['value'], 2)} mm in a coordinate."
+        f"{corrected} mm with its corrections and to {after} mm with effects. {found}{left}{serves}"
     )
 
 
@@ -114,7 +128,8 @@ def _effects(one: JSON) -> list[Item]:
     rows = []
     for effect in one["effects"]:
         trial = gains[effect["title"]]
-        gain = f"{number(100 * trial['gain'], 2)} ± {number(100 * trial['error'], 2)}"
+        less = math.exp(-trial["gain"])  # the loss is the logarithm of the squared residual
+        gain = f"{number(100 * (1 - less), 2)} ± {number(100 * less * trial['error'], 2)}"
         values = listing([f"{name} {quantity(value)}" for name, value in effect["parameters"].items()])
         chance = "< 0.0001" if trial["p_value"] < LEAST_CHANCE else number(trial["p_value"], 2)
         moves = quantity(effect["moves"], with_unit=False)
