@@ -251,7 +251,8 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
             error_text(entry.get("after"), None),
             number(entry.get("noise_floor")),
             unit_after(entry).strip() or "1",
-            listing([words(str(e["effect"])) for e in entry.get("effects") or []]) or "none",
+            listing(list(dict.fromkeys(words(str(e["effect"])) for e in entry.get("effects") or [])))
+            or "none",
         ]
         for name, entry in verdicts.items()
     ]
