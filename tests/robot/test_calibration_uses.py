@@ -13,6 +13,7 @@ from metro.observables.poses.calibrated_arm import calibrated_chain, with_calibr
 from metro.robot.calibration.ceiling import ALONE, POSE, TIME, ceiling
 from metro.robot.calibration.compensation import corrected
 from metro.robot.calibration.performance import spread
+from metro.robot.calibration.rounding import moved_by_rounding, steps
 from metro.robot.calibration.study import calibrated, left_out
 from metro.robot.chain import chain, of_rows
 from metro.robot.kinematics import forward, geometry_of_cell
@@ -157,3 +158,20 @@ def test_the_spread_of_repeats_is_that_of_each_pose_about_its_mean():
     assert freedom == 30 * 21
     assert one == pytest.approx(2e-5, rel=0.1)
     assert spread(poses(q, at), np.full(240, np.nan)) == (0.0, 0)
+
+
+def test_the_rounding_of_readings_is_found_with_what_it_makes_of_the_scatter():
+    """The arm goes to where it is told, and the log has hundredths of a degree."""
+    q = drawn(500, seed=24)
+    step = np.deg2rad(0.01)
+    own = poses(np.round(q / step) * step, measured(q, sigma=1e-6))
+    fit = calibrated(own, rows_rad()).final
+    found, moves = moved_by_rounding(fit, own)
+    assert found == pytest.approx(np.full(6, step), rel=1e-6)
+    assert moves == pytest.approx(fit.scale, rel=0.1)
+
+
+def test_readings_that_are_not_rounded_or_programmed_have_no_step():
+    q = drawn(500, seed=25)
+    q[:, 2] = np.deg2rad(np.random.default_rng(0).integers(-3, 3, 500) * 15.0)
+    assert steps(q).tolist() == [0.0] * 6

@@ -42,6 +42,7 @@ class Kind:
         return (*self.required, *self.optional)
 
 
+OF_A_POSE = ("t_s", "temperature_c", "sigma_mm", "target", "point")
 KINDS: dict[str, Kind] = {
     "force": Kind("a force record", ("t_s", "fx_n", "fy_n", "fz_n"), ("spindle_deg",), rising="t_s"),
     "robot": Kind("a robot log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of_cut),
@@ -58,8 +59,8 @@ KINDS: dict[str, Kind] = {
     "poses": Kind(
         "measured poses",
         ("x_mm", "y_mm", "z_mm"),
-        (*POSITIONS, "t_s", "temperature_c", "sigma_mm", "target"),
-        whole=("target",),
+        (*POSITIONS, "rx_deg", "ry_deg", "rz_deg", "q1", "q2", "q3", "q4", *OF_A_POSE),
+        whole=("target", "point"),
         fault=fault_of_poses,
     ),
     "targets": Kind("joint targets", (), POSITIONS, least=1, fault=fault_of_poses),

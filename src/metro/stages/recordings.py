@@ -24,6 +24,7 @@ from metro.units import Array
 
 FORCES = ("fx_n", "fy_n", "fz_n")
 POINT = ("x_mm", "y_mm", "z_mm")
+ORIENTATION = (("rx_deg", "ry_deg", "rz_deg"), ("q1", "q2", "q3", "q4"))
 PIECE = 1 << 19  # samples of a force record in memory at a time
 
 
@@ -117,7 +118,11 @@ def poses(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         table = recordings.table(file, "poses")
         if table is None:
             continue
-        wrong = _joints_at_odds(batch, table) or plausible.positions(table[list(POINT)].to_numpy())
+        wrong = (
+            _joints_at_odds(batch, table)
+            or _half_turned(table)
+            or plausible.positions(table[list(POINT)].to_numpy())
+        )
         if not recordings.doubt(file, wrong):
             yield {"run": run, **{str(name): table[name].astype(float) for name in table}}
 
@@ -128,6 +133,16 @@ def targets(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         table = recordings.table(file, "targets")
         if table is not None and not recordings.doubt(file, _joints_at_odds(batch, table)):
             yield {"run": run, **{str(name): table[name].astype(float) for name in table}}
+
+
+def _half_turned(table: pd.DataFrame) -> str:
+    """Say that an orientation is not whole, or stated twice; "" where it is once or not at all."""
+    stated = [[name for name in names if name in table] for names in ORIENTATION]
+    whole = [len(own) == len(names) for own, names in zip(stated, ORIENTATION, strict=True)]
+    if not any(stated) or (sum(whole) == 1 and sum(map(bool, stated)) == 1):
+        return ""
+    found = ", ".join(name for own in stated for name in own)
+    return f"has {found}, expected an orientation once: rx_deg, ry_deg and rz_deg, or q1 to q4"
 
 
 def _joints_at_odds(batch: Batch, table: pd.DataFrame) -> str:

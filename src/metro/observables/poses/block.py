@@ -14,6 +14,7 @@ from metro.robot.calibration.held_out import HeldOut, median
 from metro.robot.calibration.model import KINDS, names
 from metro.robot.calibration.performance import repeated, spread
 from metro.robot.calibration.poses import Poses
+from metro.robot.calibration.rounding import moved_by_rounding
 from metro.robot.calibration.study import STAGES, Calibration, sizes
 from metro.units import JSON, MM, Array
 
@@ -24,15 +25,19 @@ LENGTHS = ("length", "link offset")
 def series_block(found: Calibration, held: tuple[HeldOut, ...], poses: Poses, target: Array) -> JSON:
     """Return all that is said of a series; ``target`` (m,): number of the commanded pose, or NaN."""
     final, known = found.final, found.determined
-    labels = names(final.state)
+    target = target[poses.point == 0]
+    labels, head = names(final.state), final.state.head
     left = ceiling(final, poses)
+    step, rounded = moved_by_rounding(final, poses.first)
     return {
-        "poses": len(poses),
+        "poses": len(poses.first),
+        "points": int(poses.point.max()) + 1,
         "scatter": {"value": final.scale / MM, "unit": "mm"},
-        "noise": _noise(poses, target),
+        "noise": _noise(poses.first, target, rounded),
+        **({"rounding": _rounding(step, rounded)} if rounded else {}),
         "condition": known.condition,
         "observability": known.o1 / MM,
-        "redundant": [labels[place] for place in range(9, len(labels)) if not known.kept[place]],
+        "redundant": [labels[place] for place in range(head, len(labels)) if not known.kept[place]],
         "tool": _tool(final),
         "corrections": _corrections(found),
         "geometry": _by_joint(found),
@@ -57,13 +62,23 @@ def series_block(found: Calibration, held: tuple[HeldOut, ...], poses: Poses, ta
             "ci95": list(left.ci95),
             "noise_share": left.noise_share,
         },
-        **_repeats(found, poses, target),
+        **_repeats(found, poses.first, target),
     }
 
 
-def _noise(poses: Poses, target: Array) -> JSON | None:
-    """Return what a coordinate scatters by without any cause: the repeats' spread, or the instrument's."""
+def _rounding(step: Array, rounded: float) -> JSON:
+    """Return the joints whose readings are rounded, to how much, and what that moves a coordinate by."""
+    joints = {str(joint + 1): float(each) / MRAD for joint, each in enumerate(step) if each > 0.0}
+    return {"steps": joints, "unit": "mrad", "moves": {"value": rounded / MM, "unit": "mm"}}
+
+
+def _noise(poses: Poses, target: Array, rounded: float) -> JSON | None:
+    """Return what a coordinate scatters by without any cause, mm.
+
+    The spread of repeats; or that of the instrument, as stated, and of rounded readings.
+    """
     stated = float(np.sqrt(np.mean(poses.sigma**2))) if bool((poses.sigma > 0.0).all()) else 0.0
+    stated = float(np.hypot(stated, rounded)) if stated else 0.0
     repeats, freedom = spread(poses, target)
     if repeats > stated:
         return {"value": repeats / MM, "unit": "mm", "source": "repeats", "freedom": freedom}
@@ -71,24 +86,23 @@ def _noise(poses: Poses, target: Array) -> JSON | None:
 
 
 def _tool(fit: Fit) -> JSON:
-    sd = np.sqrt(np.diag(fit.covariance))[6:9]
-    return {
-        axis: quantity(float(fit.state.tool[k]) / MM, float(sd[k]) / MM, "mm") for k, axis in enumerate("xyz")
-    }
+    sd, tool = np.sqrt(np.diag(fit.covariance))[6:9], np.atleast_2d(fit.state.tool)[0]
+    return {axis: quantity(float(tool[k]) / MM, float(sd[k]) / MM, "mm") for k, axis in enumerate("xyz")}
 
 
 def _changes(found: Calibration) -> tuple[np.ndarray, Array]:
     """Return the places of the corrected parameters of rows, and their corrections, rad and m."""
     free = np.flatnonzero(found.final.free)
-    own = free[free >= 9]
+    own = free[free >= found.final.state.head]
     change = (found.final.state.rows - found.fits[0].state.rows).ravel()
-    return own, change[own - 9]
+    return own, change[own - found.final.state.head]
 
 
 def _corrections(found: Calibration) -> JSON:
     labels = names(found.final.state)
     places, change = _changes(found)
-    sd = np.sqrt(np.diag(found.final.covariance))[9 : 9 + len(places)]
+    head = found.final.state.head
+    sd = np.sqrt(np.diag(found.final.covariance))[head : head + len(places)]
     return {
         labels[place]: _corrected(labels[place], float(value), float(each))
         for place, value, each in zip(places, change, sd, strict=True)
@@ -105,8 +119,9 @@ def _by_joint(found: Calibration) -> list[JSON]:
     from scipy.stats import chi2
 
     places, change = _changes(found)
-    covariance = found.final.covariance[9 : 9 + len(places), 9 : 9 + len(places)]
-    joint = (places - 9) // len(KINDS)
+    own = slice(found.final.state.head, found.final.state.head + len(places))
+    covariance = found.final.covariance[own, own]
+    joint = (places - found.final.state.head) // len(KINDS)
     entries = []
     for one in np.unique(joint):
         mine = np.flatnonzero(joint == one)

@@ -13,11 +13,12 @@ from metro.joint_columns import Axes, axes_of
 from metro.observables.poses import TABLES
 from metro.observables.poses.block import MRAD, series_block
 from metro.observables.poses.calibrated_arm import calibrated_chain, serves
+from metro.observables.poses.rows import euler_of, misread, poses_of
 from metro.observables.poses.targets import corrected_targets
 from metro.robot.calibration.fit import HALVINGS, Fit
 from metro.robot.calibration.held_out import HeldOut
 from metro.robot.calibration.next_poses import next_poses
-from metro.robot.calibration.poses import Poses, approached, regions
+from metro.robot.calibration.poses import Poses
 from metro.robot.calibration.study import FEWEST, STAGES, calibrated, left_out
 from metro.robot.kinematics import geometry_of_cell
 from metro.units import DEG, JSON, MM, Array
@@ -39,23 +40,27 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
         if geometry is None:
             reasons[run] = NO_ARM
             continue
-        poses = poses_of(read("poses", run))
-        if len(poses) < FEWEST:
-            reasons[run] = f"found {len(poses)} poses, expected at least {FEWEST}"
+        rows = read("poses", run)
+        poses, target = poses_of(rows, euler_of(batch))
+        if len(poses.first) < FEWEST:
+            reasons[run] = f"found {len(poses.first)} poses, expected at least {FEWEST}"
             continue
         try:
+            if wrong := misread(rows, euler_of(batch), geometry):
+                reasons[run] = wrong
+                continue
             found, held = calibrated(poses, geometry), left_out(poses, geometry)
         except ValueError as error:
             reasons[run] = str(error)
             continue
-        block[run] = series_block(found, held, poses, read("poses", run)["target"].to_numpy(dtype=float))
+        block[run] = series_block(found, held, poses, target)
         block[run] |= {"arm": calibrated_chain(found.final, geometry), "serves": serves(batch)}
         tables["pose_errors"].append(_errors(run, poses, held))
-        tables["pose_next"].append(_next(run, found.final, poses, axes_of(read("poses", run))))
+        tables["pose_next"].append(_next(run, found.final, poses, axes_of(rows)))
         tables["pose_curves"] += _curves(run, found.final, poses)
         for other in served.get(run, ()):
-            rows = targets[targets["run"] == other]
-            part, summary = corrected_targets(other, rows, found, poses, held)
+            asked = targets[targets["run"] == other]
+            part, summary = corrected_targets(other, asked, found, poses, held)
             tables["pose_targets"].append(part)
             block[run].setdefault("targets", {})[other] = summary
     block |= {"not_identified": reasons} if reasons else {}
@@ -75,26 +80,15 @@ def _served(batch: Batch) -> dict[str, list[str]]:
     return served
 
 
-def poses_of(rows: pd.DataFrame) -> Poses:
-    """Return the poses of a canonical table in SI; a pose without a time has its number."""
-    axes = axes_of(rows)
-    q = rows[axes.positions].to_numpy(dtype=float) * axes.units
-    at = rows[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
-    time = rows["t_s"].to_numpy(dtype=float)
-    time = time if np.isfinite(time).all() else np.arange(len(rows), dtype=float)
-    sigma = np.nan_to_num(rows["sigma_mm"].to_numpy(dtype=float)) * MM
-    return Poses(q, at, sigma, time, rows["temperature_c"].to_numpy(dtype=float), approached(q))
-
-
 def _errors(run: str, poses: Poses, held: tuple[HeldOut, ...]) -> pd.DataFrame:
     """Return the held-out errors: measured position, and measured less predicted by each fit, mm.
 
     ``region``: of the workspace, within which errors are alike.
     """
-    parts, region = [], regions(poses.at, HALVINGS) + 1
+    parts, region = [], poses.parted(HALVINGS) + 1
     for one in held:
         x, y, z = poses.at[one.which].T / MM
-        part = {"run": run, "kind": one.kind, "pose": one.which + 1, "region": region[one.which]}
+        part = {"run": run, "kind": one.kind, "pose": poses.pose[one.which] + 1, "region": region[one.which]}
         part |= {"x_mm": x, "y_mm": y, "z_mm": z, "sigma_mm": _stated(poses.sigma[one.which] / MM)}
         for stage, errors in zip(STAGES, one.errors, strict=True):
             part |= {f"{stage}_{axis}_mm": errors[:, k] / MM for k, axis in enumerate("xyz")}

@@ -99,9 +99,16 @@ def said(one: JSON) -> str:
         if one.get("serves")
         else ""
     )
+    rounding = one.get("rounding")
+    rounded = (
+        f" The readings of joints {listing(list(rounding['steps']))} are rounded, which makes "
+        f"{number(rounding['moves']['value'], 2)} mm of that."
+        if rounding and rounding["moves"]["value"] > LEAST_OF_NOISE * scatter
+        else ""
+    )
     return (
         f"The median error on left-out regions falls from {before} mm with the nominal geometry to "
-        f"{corrected} mm with its corrections and to {after} mm with effects. {found}{left}{serves}"
+        f"{corrected} mm with its corrections and to {after} mm with effects. {found}{left}{rounded}{serves}"
     )
 
 

@@ -76,8 +76,8 @@ class _Kind:
 
 def ceiling(fit: Fit, poses: Poses) -> Ceiling:
     """Return the ceiling of what a fit leaves of poses."""
-    chosen = _with_neighbours(fit, poses)
-    own = poses.of(chosen)
+    poses = poses.first
+    own = poses.of(_with_neighbours(fit, poses))
     at, q = predicted(fit.state, fit.effects, fit.values, own)
     residuals = own.at - at
     size = np.linalg.norm(residuals, axis=1, keepdims=True)

@@ -113,7 +113,7 @@ def _inside(q: Array, poses: Poses) -> np.ndarray:
 def _expected(final: Fit, poses: Poses) -> Array:
     """Return the standard deviation (m,) of the distance that a fit expects, m: scatter and parameters."""
     _, q = predicted(final.state, final.effects, final.values, poses)
-    _, derivatives = jacobian(final.state, q)
+    _, derivatives = jacobian(final.state, q, poses.point)
     parts = [derivatives[..., final.free], *columns(final.state, derivatives, final.effects, poses)]
     design = np.concatenate(parts, axis=-1)
     variance = np.einsum("mik,kl,mil->m", design, final.covariance, design, optimize=True)

@@ -152,11 +152,11 @@ def search(poses: Poses, fit: Fit, effects: Sequence[Effect]) -> Found:
     """Search for the effects that stay; ``fit`` is of the geometry alone."""
     some = poses.thinned(MOST)
     state = fit.state
-    at, derivatives = jacobian(state, some.q)
+    at, derivatives = jacobian(state, some.q, some.point)
     parts = [derivatives[..., fit.free], *columns(state, derivatives, effects, some)]
     ends = np.cumsum([0, *(part.shape[-1] for part in parts)])
     blocks = [np.arange(a, b) for a, b in pairwise(ends)]
-    geometry = np.where(np.flatnonzero(fit.free) < 9, np.inf, PLAUSIBLE)
+    geometry = np.where(np.flatnonzero(fit.free) < state.head, np.inf, PLAUSIBLE)
     priors = [geometry, *(np.full(len(own), one.prior) for own, one in zip(blocks[1:], effects, strict=True))]
     design = np.concatenate(parts, axis=-1)
     model = _Search(

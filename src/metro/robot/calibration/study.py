@@ -53,7 +53,9 @@ def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
     poses = poses.thinned(MOST)
     as_declared, up = nominal(poses, geometry)
     state = as_declared.state
-    known = determined(jacobian(state, poses.q)[1], free_of_geometry(state), as_declared.scale)
+    known = determined(
+        jacobian(state, poses.q, poses.point)[1], free_of_geometry(state), as_declared.scale, state.head
+    )
     if not known.kept[:6].all():
         scatter = f"they scatter by {as_declared.scale / MM:.3g} mm about the declared arm"
         raise ValueError(f"the poses do not determine where the arm stands: {scatter}")
@@ -81,7 +83,7 @@ class Size:
 def sizes(fit: Fit, poses: Poses) -> tuple[Size, ...]:
     """Return how much each effect moves the point, less what corrections of the geometry would do alike."""
     _, q = predicted(fit.state, fit.effects, fit.values, poses)
-    _, derivatives = jacobian(fit.state, q)
+    _, derivatives = jacobian(fit.state, q, poses.point)
     geometry, _ = np.linalg.qr(derivatives[..., fit.free].reshape(3 * len(poses), -1))
     found = []
     for at, part in enumerate(columns(fit.state, derivatives, fit.effects, poses)):
