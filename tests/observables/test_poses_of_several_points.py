@@ -18,6 +18,7 @@ ERRORS[1, 3], ERRORS[4, 0], ERRORS[4, 1] = 8e-4, 9e-4, -7e-4
 BLANK = [
     *("q7_deg", "q8_deg", "q9_deg", "rx_deg", "ry_deg", "rz_deg", "q1", "q2", "q3", "q4"),
     *("t_s", "temperature_c", "sigma_mm", "target", "point"),
+    *("sigma_x_mm", "sigma_y_mm", "sigma_z_mm"),
 ]
 
 
@@ -110,3 +111,8 @@ def test_angles_in_another_order_than_stated_are_named_with_the_right_one():
     said = misread(rows, "zyx", rows_rad())
     assert "in the order xyz (about turning axes ZYX): state instruments.tracker.euler" in said
     assert misread(table(drawn(80, seed=6), "quaternion"), "zyx", rows_rad()) == ""
+
+
+def test_the_uncertainty_of_a_pose_is_that_of_its_coordinates():
+    rows = table(drawn(3), sigma_x_mm=0.03, sigma_y_mm=0.0, sigma_z_mm=0.04, sigma_mm=[np.nan, np.nan, 0.1])
+    assert poses_of(rows)[0].sigma * 1e3 == pytest.approx([0.05 / np.sqrt(3), 0.05 / np.sqrt(3), 0.1])

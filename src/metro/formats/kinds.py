@@ -42,7 +42,8 @@ class Kind:
         return (*self.required, *self.optional)
 
 
-OF_A_POSE = ("t_s", "temperature_c", "sigma_mm", "target", "point")
+SIGMAS = ("sigma_x_mm", "sigma_y_mm", "sigma_z_mm")
+OF_A_POSE = ("t_s", "temperature_c", "sigma_mm", *SIGMAS, "target", "point")
 KINDS: dict[str, Kind] = {
     "force": Kind("a force record", ("t_s", "fx_n", "fy_n", "fz_n"), ("spindle_deg",), rising="t_s"),
     "robot": Kind("a robot log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of_cut),
@@ -71,7 +72,11 @@ KINDS: dict[str, Kind] = {
 
 
 # Column → what its values lie between, where nothing else is possible.
-RANGES = {"frequency_hz": (0.0, np.inf), "coherence": (0.0, 1.0 + 1e-6), "sigma_mm": (0.0, np.inf)}
+RANGES = {
+    "frequency_hz": (0.0, np.inf),
+    "coherence": (0.0, 1.0 + 1e-6),
+    **dict.fromkeys(("sigma_mm", *SIGMAS), (0.0, np.inf)),
+}
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from metro.units import DEG, MM, Array
 
 LEVER = 0.1  # m: a tracker that tells 0.03 mm and 0.3 mrad tells these points as well as the first
 SOME, WORSE = 200, 3.0  # poses that are tried; times the scatter of the best order, from which on it is wrong
+SIGMAS = ("sigma_x_mm", "sigma_y_mm", "sigma_z_mm")
 ANGLES, QUATERNION = ("rx_deg", "ry_deg", "rz_deg"), ("q1", "q2", "q3", "q4")
 FIXED_AXES = "xyz"  # R = R_z(rz) R_y(ry) R_x(rx), as everywhere in the contract
 
@@ -43,7 +44,7 @@ def poses_of(rows: pd.DataFrame, euler: str = FIXED_AXES) -> tuple[Poses, Array]
     pose = _poses(q, point)
     time = rows["t_s"].to_numpy(dtype=float)
     time = time if np.isfinite(time).all() else pose.astype(float)
-    sigma = np.nan_to_num(rows["sigma_mm"].to_numpy(dtype=float)) * MM
+    sigma = np.nan_to_num(_sigma(rows)) * MM
     warm = rows["temperature_c"].to_numpy(dtype=float)
     found = Poses(q, at, sigma, time, warm, approached(q), pose, point)
     target, turn = rows["target"].to_numpy(dtype=float), _orientation(rows, euler)
@@ -87,6 +88,13 @@ def misread(rows: pd.DataFrame, euler: str, geometry: Geometry) -> str:
         f"rx_deg, ry_deg and rz_deg fit the arm to {found} in the order {euler} and to {other} in the order "
         f"{best} (about turning axes {turning}): state instruments.tracker.euler in batch.yaml"
     )
+
+
+def _sigma(rows: pd.DataFrame) -> Array:
+    """Return the standard deviation of a coordinate (m,), mm: as stated, or rms of those of x, y and z."""
+    each = rows[list(SIGMAS)].to_numpy(dtype=float)
+    stated = rows["sigma_mm"].to_numpy(dtype=float)
+    return np.where(np.isnan(stated), np.sqrt(np.mean(each**2, axis=1)), stated)
 
 
 def _poses(q: Array, point: np.ndarray) -> np.ndarray:

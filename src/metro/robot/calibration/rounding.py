@@ -1,4 +1,4 @@
-"""Rounding of joint readings, or of the set-points that stand for them: its step, and what it moves points by.
+"""Rounding of joint readings, or of the set-points in their place: its step, and what it moves points by.
 
 Where all readings of a joint are multiples of what the closest two are apart by, that is the step: by chance
 each would be so with a probability of one fifth.
