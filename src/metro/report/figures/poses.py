@@ -21,6 +21,7 @@ SHOWN = (
 )
 BINS = 80
 CELLS = 24
+OUTER = 0.002  # of the poses at each side that a map leaves out: one far away would make it small
 GAP = 3.0  # steps between readings from which on a curve is interrupted
 
 
@@ -64,6 +65,8 @@ def maps(errors: pd.DataFrame) -> Figure:
 
 
 def _map(figure: Figure, axes: Axes, errors: pd.DataFrame, plane: tuple[str, str], stage: str) -> None:
+    places = errors[[f"{axis}_mm" for axis in plane]]
+    errors = errors[((places >= places.quantile(OUTER)) & (places <= places.quantile(1 - OUTER))).all(axis=1)]
     across, up = (errors[f"{axis}_mm"].to_numpy(dtype=float) for axis in plane)
     drawn = axes.hexbin(
         across,

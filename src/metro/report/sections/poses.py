@@ -242,7 +242,8 @@ def _drawn(results: Results, run: str) -> list[Item]:
     if errors is not None:
         caption = (
             "Error over the workspace, of poses left out by region: mean distance in each cell, in two "
-            "planes of the instrument's frame. Each map has its own colours: 2 % of the cells are above them."
+            "planes of the instrument's frame, without the outermost 0.2 % of the poses. Each map has its "
+            "own colours: 2 % of the cells are above them."
         )
         items.append(Picture(figures.maps(errors), caption, caption))
     if curves is not None and (mine := curves[curves["run"] == run]).size:
