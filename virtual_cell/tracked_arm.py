@@ -59,7 +59,7 @@ class TrackedArm:
             angles[joint] += np.sum(coefficients * np.column_stack([np.cos(orders), np.sin(orders)]))
         if self.lag is not None:
             angles = angles - self.lag * came
-        return angles + self.compliance * self._torques(q)[1]
+        return np.asarray(angles + self.compliance * self._torques(q)[1])
 
     def point(self, q: Array, came: Array, warmth: float = 0.0, part: float = 0.0) -> Array:
         """Return the point (3,) in the base, m; ``warmth`` in kelvin, ``part`` of the series that is over."""
@@ -69,7 +69,7 @@ class TrackedArm:
             moment = self._torques(q)[0]
             at = at + self.base * np.cross([moment[0], moment[1], 0.0], at)
         at = at * (1.0 + self.growth * warmth)
-        return at if self.drift is None else at + part * self.drift
+        return np.asarray(at if self.drift is None else at + part * self.drift)
 
     def _torques(self, q: Array) -> tuple[Array, Array]:
         """Return the weights' moment about the base (3,), and their torques about the axes (n,), N m."""

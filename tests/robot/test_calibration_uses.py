@@ -12,11 +12,14 @@ from metro.batch.batch import Batch
 from metro.observables.poses.calibrated_arm import calibrated_chain, with_calibrated_arm
 from metro.robot.calibration.ceiling import ALONE, POSE, TIME, ceiling
 from metro.robot.calibration.compensation import corrected
+from metro.robot.calibration.fit import Fit
+from metro.robot.calibration.model import State
 from metro.robot.calibration.performance import spread
 from metro.robot.calibration.rounding import moved_by_rounding, steps
 from metro.robot.calibration.study import calibrated, left_out
 from metro.robot.chain import chain, of_rows
 from metro.robot.kinematics import forward, geometry_of_cell
+from virtual_cell.tracked_arm import TrackedArm
 
 ERRORS = np.zeros((6, 4))
 ERRORS[1] = [0.0011, -0.0006, 0.0, 0.0007]
@@ -130,6 +133,19 @@ def test_the_calibrated_arm_is_the_true_one_where_the_cell_has_the_declared():
     assert np.sqrt(np.mean(before**2)) > 5e-4
     off = after - after.mean(axis=0)
     assert np.sqrt(np.mean(off**2)) < 0.2 * np.sqrt(np.mean((before - before.mean(axis=0)) ** 2))
+
+
+def test_the_tilt_of_parallel_axes_is_in_the_calibrated_arm():
+    rows = np.column_stack([rows_rad() + ERRORS, np.zeros(6)])
+    rows[1, 4] = 7e-4
+    state = State(rows, np.zeros(6, dtype=bool), np.eye(4), np.zeros(3))
+    fit = Fit(state, np.zeros(39, dtype=bool), (), (), 0.0, np.zeros((0, 0)))
+    geometry = geometry_of_cell({"arm": {"chain": calibrated_chain(fit, rows_rad())}})
+    true = TrackedArm(rows, np.zeros(3), np.zeros(6), np.zeros(6))
+    for q in drawn(5, seed=26):
+        turn, origin = true.frames(q)[-1]
+        assert np.allclose(forward(geometry, q)[:3, 3], origin, atol=1e-12)
+        assert np.allclose(forward(geometry, q)[:3, :3], turn.as_matrix(), atol=1e-12)
 
 
 def test_without_errors_the_calibrated_arm_is_the_declared_one_in_any_convention():
