@@ -37,7 +37,8 @@ def example(kind, rows=12):
         table[name] = np.arange(rows)
     if KINDS[kind].rising:
         table[KINDS[kind].rising] = np.arange(rows) * 0.25
-    for name in {"coherence", "sigma_mm"} & {*table}:  # never below zero
+    sigmas = {f"sigma_{axis}mm" for axis in ("", "x_", "y_", "z_")}
+    for name in {"coherence", *sigmas} & {*table}:  # never below zero
         table[name] = table[name].abs()
     return table
 

@@ -17,6 +17,7 @@ ROWS = np.array(
     ]
 )
 TOOL = np.array([0.09, -0.05, 0.11])
+TRACKER, PLACE = Rotation.from_euler("xyz", [0.02, -0.03, 1.1]), np.array([2.3, -1.4, 0.3])
 REACH = np.array([2.4, 1.0, 1.0, 2.6, 1.7, 2.8])
 MASSES = np.array([0.0, 14.0, 11.0, 4.0, 2.0, 1.5])  # kg
 CENTRES = 0.4  # part of the way back to the joint before
@@ -54,14 +55,13 @@ def measured(q, errors=None, turned=lambda _joint, angle: 0.0 * angle, *, sags=F
     reading, rad.
     """
     rows = ROWS * (np.pi / 180, np.pi / 180, 1.0, 1.0) + (0.0 if errors is None else errors)
-    tracker, place = Rotation.from_euler("xyz", [0.02, -0.03, 1.1]), np.array([2.3, -1.4, 0.3])
     points = []
     for pose in q:
         angles = pose + [turned(joint, angle) for joint, angle in enumerate(pose)]
         if sags:
             angles = angles + COMPLIANCE * gravity_torques(rows, pose)
         turn, origin = frames(rows, angles)[-1]
-        points.append(tracker.apply(origin + turn.apply(TOOL)) + place)
+        points.append(TRACKER.apply(origin + turn.apply(TOOL)) + PLACE)
     return np.array(points) + sigma * np.random.default_rng(seed).standard_normal((len(q), 3))
 
 

@@ -84,6 +84,11 @@ def found(tmp_path_factory):
     return identified, " ".join(text.split()), " ".join(page.split()), processed
 
 
+@pytest.fixture(scope="module")
+def judged(found):
+    return json.loads((found[3].parent / "reports/verdict.json").read_text())["observables"]["pose"]
+
+
 def test_joints_and_positions_are_read_with_decimal_commas_in_radians_and_metres(found):
     read = pd.read_parquet(found[3] / "poses.parquet")
     table = series()
@@ -112,6 +117,41 @@ def test_the_report_and_the_page_print_the_medians_that_the_results_have(found):
         assert printed in text
         assert printed in page
     assert "No effect beyond the geometry predicts left-out regions better" in text
+
+
+def test_the_verdict_names_the_longer_link_with_errors_on_poses_left_out(found, judged):
+    assert judged["status"] == "explained"
+    assert (judged["unit"], judged["held_out"]) == ("mm", {"poses": 260, "by": "region"})
+    for when in ("before", "after"):
+        low, high = judged[when]["ci95"]
+        assert low < judged[when]["rms"] < high
+    assert judged["before"]["rms"] > 5 * judged["after"]["rms"]
+    assert judged["after"]["rms"] == pytest.approx(0.03, rel=0.15)
+    (effect,) = judged["effects"]
+    assert (effect["effect"], effect["parameters"]["joint"]) == ("kinematic_error", 2)
+    assert effect["probability"] > 0.999
+    assert effect["parameters"]["length_mm"] == found[0]["pose"]["r01"]["corrections"]["joint 2 length"]
+    assert judged["unexplained"] is None
+    assert judged["noise_floor"] is None
+    assert "to know what of the rest is noise" in judged["next_experiment"]
+    assert {one["effect"] for one in judged["candidates"]} >= {"gear_eccentricity", "gravity_elasticity"}
+
+
+def test_the_comparison_has_each_coordinate_of_each_pose_that_was_left_out(found, judged):
+    rows = pd.read_parquet(found[3] / "comparison.parquet")
+    assert set(rows["observable"]) == {"pose"}
+    assert rows.groupby("axis").size().to_dict() == {"x": 260, "y": 260, "z": 260}
+    for when in ("before", "after"):
+        rms = np.sqrt(np.mean((rows["measured"] - rows[when]) ** 2))
+        assert rms == pytest.approx(judged[when]["rms"])
+    assert sorted(rows["measured"][rows["axis"] == "z"]) == pytest.approx(sorted(series()["Leica z"] * 1e3))
+
+
+def test_page_one_says_the_verdict_and_what_it_is_worth(found):
+    for text in found[1:2]:
+        assert "The arm by measured poses: explained. Of poses left out by region the median error is" in text
+        assert "Found: kinematic error (joint 2)." in text
+        assert "predictions of poses among those that were measured are off by up to" in text
 
 
 def test_the_next_poses_are_a_table_in_the_contracts_columns_and_on_the_report(found):

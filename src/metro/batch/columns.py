@@ -96,6 +96,7 @@ RUNS = (
     Column("profile", "file"),
     Column("slopes", "file"),
     Column("poses", "file"),
+    Column("targets", "file"),
     Column("stable", choices=("yes", "no")),
     Column("started_at", "time"),
     *_numbers("return_s", "return_s"),

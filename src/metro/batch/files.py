@@ -23,13 +23,14 @@ RUN_FILES = {
     "profile": "profile",
     "slopes": "slopes",
     "poses": "poses",
+    "targets": "targets",
 }
 LONGEST_NAME = 255  # bytes, of every file system
 OWN_TO_A_RUN = ("dynamometer", "robot_log", "joint_log", "scan", "profile", "slopes", "poses")
 # What describes a cut in a row of runs.csv: settings as text, as numbers, and records of it.
 OF_A_CUT = (
     *("operation", "direction", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm"),
-    *("orbit_rpm", "dynamometer", "scan", "profile", "slopes", "poses", "stable"),
+    *("orbit_rpm", "dynamometer", "scan", "profile", "slopes", "poses", "targets", "stable"),
 )
 
 

@@ -31,7 +31,11 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "scan": ("run", "x_mm", "y_mm", "z_mm"),
     "profile": ("run", "x_mm", "z_mm"),
     "slopes": ("run", "line", "x1_mm", "y1_mm", "x2_mm", "y2_mm", "slope_urad"),
-    "poses": ("run", *POSITIONS, "x_mm", "y_mm", "z_mm", "t_s", "temperature_c", "sigma_mm", "target"),
+    "poses": (
+        *("run", *POSITIONS, "x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg", "q1", "q2", "q3", "q4"),
+        *("t_s", "temperature_c", "sigma_mm", "sigma_x_mm", "sigma_y_mm", "sigma_z_mm", "target", "point"),
+    ),
+    "targets": ("run", *POSITIONS),
     "hit": (
         "test",
         "position",

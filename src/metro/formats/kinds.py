@@ -42,6 +42,8 @@ class Kind:
         return (*self.required, *self.optional)
 
 
+SIGMAS = ("sigma_x_mm", "sigma_y_mm", "sigma_z_mm")
+OF_A_POSE = ("t_s", "temperature_c", "sigma_mm", *SIGMAS, "target", "point")
 KINDS: dict[str, Kind] = {
     "force": Kind("a force record", ("t_s", "fx_n", "fy_n", "fz_n"), ("spindle_deg",), rising="t_s"),
     "robot": Kind("a robot log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of_cut),
@@ -58,10 +60,11 @@ KINDS: dict[str, Kind] = {
     "poses": Kind(
         "measured poses",
         ("x_mm", "y_mm", "z_mm"),
-        (*POSITIONS, "t_s", "temperature_c", "sigma_mm", "target"),
-        whole=("target",),
+        (*POSITIONS, "rx_deg", "ry_deg", "rz_deg", "q1", "q2", "q3", "q4", *OF_A_POSE),
+        whole=("target", "point"),
         fault=fault_of_poses,
     ),
+    "targets": Kind("joint targets", (), POSITIONS, least=1, fault=fault_of_poses),
     "cloud": Kind("a point cloud", ("x_mm", "y_mm", "z_mm"), least=3),
     "record": Kind("a hammer record", ("t_s", "force_n", "response"), rising="t_s"),
     "frf": Kind("an FRF", ("frequency_hz", "real", "imag"), ("coherence",), rising="frequency_hz"),
@@ -69,7 +72,11 @@ KINDS: dict[str, Kind] = {
 
 
 # Column → what its values lie between, where nothing else is possible.
-RANGES = {"frequency_hz": (0.0, np.inf), "coherence": (0.0, 1.0 + 1e-6), "sigma_mm": (0.0, np.inf)}
+RANGES = {
+    "frequency_hz": (0.0, np.inf),
+    "coherence": (0.0, 1.0 + 1e-6),
+    **dict.fromkeys(("sigma_mm", *SIGMAS), (0.0, np.inf)),
+}
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ _NUMBERED = re.compile(r"(?:q|j|a|joint|axis|angle|theta)[ _\[(]*(\d)[\])]?", re
 _POSITION = re.compile(
     r"(?:(?:measure[a-z]*|meas|actual|tracker|laser|leica|faro|camera|target)[ _]*)?([xyz])", re.IGNORECASE
 )
+_SIGMA = re.compile(r"(?:\w*_)?(?:std|sigma|sd)_?([xyz])", re.IGNORECASE)
 _TEMPERATURE = re.compile(r"(?:\w*_)?(?:temperature|temp)(?:_c)?", re.IGNORECASE)
 
 
@@ -32,6 +33,9 @@ def measured_poses(seen: Seen) -> Proposal | None:
         return None
     found = {f"q{at}_deg": column for at, column in enumerate(joints, start=1)}
     found |= {f"{axis}_mm": position[axis] for axis in "xyz"}
+    scatter = {match[1].lower(): column for column, bare, _ in names if (match := _SIGMA.fullmatch(bare))}
+    if set(scatter) == set("xyz"):
+        found |= {f"sigma_{axis}_mm": scatter[axis] for axis in "xyz"}
     units = {column.label: column.unit or unit for column, _, unit in names}
     stated = {name: unit for name, column in found.items() if (unit := units[column.label])}
     warm = next((column for column, bare, _ in names if _TEMPERATURE.fullmatch(bare)), None)

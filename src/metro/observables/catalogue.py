@@ -41,13 +41,13 @@ def names() -> tuple[str, ...]:
 
 def title(observable: str) -> str:
     """Return the title of an observable; that of one which is not known is its name in words."""
-    known = {each.name: each.title for each in descriptions()}
+    known = {each.name: each.title for each in (*descriptions(), *BESIDE)}
     return known.get(observable, observable.replace("_", " "))
 
 
 def assumptions(observable: str) -> str:
     """Return what the base model of an observable assumes; empty where the observable is not known."""
-    return next((each.assumes for each in descriptions() if each.name == observable), "")
+    return next((each.assumes for each in (*descriptions(), *BESIDE) if each.name == observable), "")
 
 
 def observed_tables() -> tuple[str, ...]:

@@ -50,7 +50,12 @@ class Results:
         }
 
     def _honest(self, entry: JSON) -> JSON:
-        """Drop the intervals over held-out runs where these are repeats of one condition."""
+        """Drop the intervals over held-out runs where these are repeats of one condition.
+
+        Parts of runs that were held out have intervals of their own.
+        """
+        if "held_out" in entry:
+            return entry
         known = self.batch.runs["condition"].to_dict() if "condition" in self.batch.runs else {}
         if len({known.get(run, run) for run in entry.get("held_out_runs") or []}) > 1:
             return entry

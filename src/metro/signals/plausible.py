@@ -80,14 +80,17 @@ def angles(names: list[str], values_deg: Array) -> str:
     return f"{fault}, expected a continuous angle: {why}; export it unwrapped"
 
 
-def poses(names: list[str], values_deg: Array, points_mm: Array) -> str:
-    """Check the units of measured poses: joint angles (m, k) in degrees, positions (m, 3) in millimetres."""
+def turns(names: list[str], values_deg: Array) -> str:
+    """Check the unit of joint angles (m, k) in degrees."""
     most = float(np.abs(values_deg).max()) if names else TURN + 1.0
-    if 0.0 < most <= TURN:
-        fault = f"columns {names[0]} …: all angles lie within ±{most:.4g}"
-        return (
-            f"{fault}: they seem to be in radians, expected degrees: state the unit under files in batch.yaml"
-        )
+    if not 0.0 < most <= TURN:
+        return ""
+    fault = f"columns {names[0]} …: all angles lie within ±{most:.4g}"
+    return f"{fault}: they seem to be in radians, expected degrees: state the unit under files in batch.yaml"
+
+
+def positions(points_mm: Array) -> str:
+    """Check the unit of the positions (m, 3) of measured poses in millimetres."""
     size, (low, high) = float(np.ptp(points_mm, axis=0).max()), WORKSPACE_MM
     if low <= size <= high:
         return ""

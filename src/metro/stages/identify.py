@@ -27,6 +27,7 @@ from metro.observables.loads import observable as loads
 from metro.observables.observable import Observable
 from metro.observables.poses import TABLES as POSES
 from metro.observables.poses import observable as poses
+from metro.observables.poses.calibrated_arm import with_calibrated_arm
 from metro.observables.problem import Problem, Refusal
 from metro.observables.published import TABLES as PRINTED
 from metro.observables.published import observable as published
@@ -104,13 +105,18 @@ class _State:
 def identify(processed: Path, settings: JSON, code: str) -> None:
     """Write the observed tables of a batch, its problems, and ``identified.json``: no effect is in them.
 
+    An arm that a series of measured poses has calibrated takes the place of the declared one in all else.
     All are observed before problems are posed, since a problem may need the tables of several; but some
     tables need the cutting coefficients, which are identified first.
 
     ``settings``: ``model_form_budget``.
     """
-    batch = read_batch(processed)
-    state = _identified(batch, Processed(processed), settings["model_form_budget"], observables())
+    batch, read = read_batch(processed), Processed(processed)
+    pose_tables, pose_blocks = poses.observe(batch, read)
+    batch = with_calibrated_arm(batch, pose_blocks)
+    state = _identified(batch, read, settings["model_form_budget"], observables())
+    state.observed |= pose_tables
+    state.add(pose_blocks)
     slips = [slip.row for slip in _slips(state)]
     state.identified |= {"slips": slips} if slips else {}
     for observable in observables():
@@ -128,7 +134,7 @@ def identify(processed: Path, settings: JSON, code: str) -> None:
         posed = {task.observable: Posed(task, state.base_model.sampled(task), printed=True) for task in tasks}
     state.add(printed_study(batch, state.observed))
     state.add(calibration(batch, state.read))
-    for measured in (loads, levelling, texture, poses):
+    for measured in (loads, levelling, texture):
         tables, blocks = measured.observe(batch, state.read)
         state.observed |= tables
         state.add(blocks)

@@ -20,6 +20,7 @@ from metro.batch.processed import Processed, read_batch, read_json, read_table, 
 from metro.batch.provenance import write_made
 from metro.effects.effect import Effect
 from metro.effects.library import described, library
+from metro.loop import measured_poses
 from metro.loop.causes.witnesses import Closed
 from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.held_out import COMPARISON, comparison, held_out, identified_fit, typed
@@ -34,6 +35,8 @@ from metro.loop.verdict.verdict import judge
 from metro.loop.verdict.verification import noise_scale
 from metro.observables.labelled import Labelled
 from metro.observables.observable import Observable
+from metro.observables.poses import ERRORS as POSE_ERRORS
+from metro.observables.poses.calibrated_arm import with_calibrated_arm
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.observables.published import TABLES as PRINTED
 from metro.observables.registry import by_name, observables
@@ -162,13 +165,14 @@ def closed(
 
     ``limits`` of settings, [least, largest] by column of the run table, within which runs may be proposed.
     """
-    batch = read_batch(processed)
+    identified = read_json(processed / "identified.json")
+    batch = with_calibrated_arm(read_batch(processed), identified)
     state = Closing(
         batch=replace(batch, manifest={**batch.manifest, "limits": limits}) if limits else batch,
         processed=processed,
         gates=gates,
         prediction=read_table(processed / "prediction.parquet"),
-        identified=read_json(processed / "identified.json"),
+        identified=identified,
         observed=_read_observed(processed),
     )
     for name, posed in read_problems(processed).items():
@@ -178,7 +182,20 @@ def closed(
             posed.task.handled_by(Loop(state, posed.base, posed.task))
         else:
             _close(state, by_name(name), posed, anew=bool(limits))
+    if only is None or measured_poses.NAME in only:
+        _judge_poses(state)
     return state
+
+
+def _judge_poses(state: Closing) -> None:
+    """Judge the arm by measured poses, which ``identify`` has fitted and tested already."""
+    errors = read_table(state.processed / f"{POSE_ERRORS}.parquet")
+    found = measured_poses.judged(state.identified.get("pose") or {}, errors, state.gates.seed)
+    if found:
+        verdict, story, rows = found
+        state.tables.append(rows)
+        state.verdicts[measured_poses.NAME] = verdict
+        state.stories[measured_poses.NAME] = story
 
 
 def _close(state: Closing, observable: Observable[Any], posed: Posed, *, anew: bool) -> None:

@@ -24,6 +24,7 @@ from metro.units import Array
 
 FORCES = ("fx_n", "fy_n", "fz_n")
 POINT = ("x_mm", "y_mm", "z_mm")
+ORIENTATION = (("rx_deg", "ry_deg", "rz_deg"), ("q1", "q2", "q3", "q4"))
 PIECE = 1 << 19  # samples of a force record in memory at a time
 
 
@@ -113,22 +114,47 @@ def slopes(batch: Batch, recordings: Recordings) -> Iterator[Part]:
 
 def poses(batch: Batch, recordings: Recordings) -> Iterator[Part]:
     """Yield the measured poses of each series, in the order in which they were taken."""
-    arm = Axes(linear_axes(batch.cell))
     for run, file in files(batch, "poses"):
         table = recordings.table(file, "poses")
         if table is None:
             continue
-        own = axes_in([str(name) for name in table])
-        wrong = ""
-        if len(arm) and own != arm:
-            wrong = (
-                f"has {listed(own.positions)}, expected {listed(arm.positions)}: one for each joint of the "
-                "arm that moves"
-            )
-        turns = [name for name, linear in zip(own.positions, own.linear, strict=True) if not linear]
-        wrong = wrong or plausible.poses(turns, table[turns].to_numpy(), table[list(POINT)].to_numpy())
+        wrong = (
+            _joints_at_odds(batch, table)
+            or _half_turned(table)
+            or plausible.positions(table[list(POINT)].to_numpy())
+        )
         if not recordings.doubt(file, wrong):
             yield {"run": run, **{str(name): table[name].astype(float) for name in table}}
+
+
+def targets(batch: Batch, recordings: Recordings) -> Iterator[Part]:
+    """Yield the joint targets of each table of them, in the order in which they are approached."""
+    for run, file in files(batch, "targets"):
+        table = recordings.table(file, "targets")
+        if table is not None and not recordings.doubt(file, _joints_at_odds(batch, table)):
+            yield {"run": run, **{str(name): table[name].astype(float) for name in table}}
+
+
+def _half_turned(table: pd.DataFrame) -> str:
+    """Say that an orientation is not whole, or stated twice; "" where it is once or not at all."""
+    stated = [[name for name in names if name in table] for names in ORIENTATION]
+    whole = [len(own) == len(names) for own, names in zip(stated, ORIENTATION, strict=True)]
+    if not any(stated) or (sum(whole) == 1 and sum(map(bool, stated)) == 1):
+        return ""
+    found = ", ".join(name for own in stated for name in own)
+    return f"has {found}, expected an orientation once: rx_deg, ry_deg and rz_deg, or q1 to q4"
+
+
+def _joints_at_odds(batch: Batch, table: pd.DataFrame) -> str:
+    """Say that a table's joints are not those of the arm, or not in degrees; "" where they are."""
+    arm, own = Axes(linear_axes(batch.cell)), axes_in([str(name) for name in table])
+    if len(arm) and own != arm:
+        return (
+            f"has {listed(own.positions)}, expected {listed(arm.positions)}: one for each joint of the "
+            "arm that moves"
+        )
+    turns = [name for name, linear in zip(own.positions, own.linear, strict=True) if not linear]
+    return plausible.turns(turns, table[turns].to_numpy())
 
 
 def hit(batch: Batch, impacts: pd.DataFrame, recordings: Recordings) -> Iterator[Part]:

@@ -46,6 +46,7 @@ RUN_FILES = {
     "profile": ("profile",),
     "slopes": ("slopes",),
     "poses": ("poses",),
+    "targets": ("targets",),
 }
 
 OF_THE_TABLES = "contract"  # the check, in the quality table, that findings on the batch's tables are of
@@ -212,6 +213,7 @@ def _tables(loaded: Loaded, recordings: Recordings) -> Iterator[tuple[str, Itera
     yield "profile", parts.profile(batch, recordings)
     yield "slopes", parts.slopes(batch, recordings)
     yield "poses", parts.poses(batch, recordings)
+    yield "targets", parts.targets(batch, recordings)
     yield "hit", parts.hit(batch, loaded.impacts, recordings)
     yield "frf", parts.frf(loaded.impacts, recordings)
     yield "pickups", _whole(_pickups(loaded.impacts))

@@ -73,6 +73,8 @@ def verdict_in_words(verdict: JSON) -> str:
     ----------
     verdict : its entry of verdict.json.
     """
+    if verdict.get("words"):
+        return str(verdict["words"])
     effects = listed([entry["effect"] for entry in verdict["effects"]] or [""])
     rivals = "; ".join(plain(" or ".join(pair)) for pair in verdict["indistinguishable"])
     status = "contradicted" if verdict.get("contradicted") else verdict["status"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from metro.wording import candidates, causes, experiments, labels, residual
+from metro.wording import candidates, causes, experiments, labels, poses, residual
 from metro.wording.candidates import Sentence
 
 SENTENCES: Mapping[str, Sentence] = {
@@ -14,6 +14,7 @@ SENTENCES: Mapping[str, Sentence] = {
     **experiments.SENTENCES,
     **labels.SENTENCES,
     **causes.SENTENCES,
+    **poses.SENTENCES,
 }
 
 

@@ -33,8 +33,8 @@ def causes(closed: Mapping[str, Closed], verdicts: JSON, gates: Gates) -> list[J
     for name, verdict in verdicts.items():
         for effect in verdict.get("effects") or []:
             key = (effect["effect"], str(effect["parameters"].get("joint", "all")))
-            if key in single:  # named upstream, and handed on with the coefficients
-                single[key]["seen_in"].append(name)
+            if key in single:  # named upstream, and handed on with the coefficients; or in another series
+                single[key]["seen_in"] += [name] if name not in single[key]["seen_in"] else []
             elif key not in judged_together:
                 single[key] = _single(name, effect)
     return sorted([*several, *single.values()], key=lambda entry: -entry["probability"])

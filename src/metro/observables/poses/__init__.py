@@ -1,7 +1,8 @@
 """Poses of an arm that an instrument measured: calibrated, and proven on poses that were left out.
 
-``TABLES``: the tables that ``observe`` may write.
+``TABLES``: the tables that ``observe`` may write; ``ERRORS``: that of errors on left-out poses.
 """
 
 NAME = "pose"
-TABLES = ("pose_errors", "pose_curves", "pose_next")
+ERRORS = "pose_errors"
+TABLES = (ERRORS, "pose_curves", "pose_next", "pose_targets")

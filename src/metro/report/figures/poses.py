@@ -21,6 +21,7 @@ SHOWN = (
 )
 BINS = 80
 CELLS = 24
+OUTER = 0.002  # of the poses at each side that a map leaves out: one far away would make it small
 GAP = 3.0  # steps between readings from which on a curve is interrupted
 
 
@@ -33,7 +34,7 @@ def _distance(errors: pd.DataFrame, stage: str) -> Array:
 def distances(errors: pd.DataFrame) -> Figure:
     """Draw histograms of the distances; ``errors``: rows of ``pose_errors``."""
     with style.style():
-        figure, ((axes,),) = style.new_figure(2.4)
+        figure, ((axes,),) = style.new_figure(2.1)
         most = float(np.percentile(_distance(errors, "nominal"), 99.5)) or 1.0
         edges = list(np.linspace(0.0, most, BINS + 1))
         for stage, label, colour in SHOWN:
@@ -55,7 +56,7 @@ def distances(errors: pd.DataFrame) -> Figure:
 def maps(errors: pd.DataFrame) -> Figure:
     """Draw the mean distance over two projections of the workspace, before and after."""
     with style.style():
-        figure, grid = style.new_figure(5.6, 2, 2)
+        figure, grid = style.new_figure(3.9, 2, 2)
         for row, (first, second) in zip(grid, (("x", "y"), ("x", "z")), strict=True):
             for axes, (stage, label, _) in zip(row, (SHOWN[0], SHOWN[2]), strict=True):
                 _map(figure, axes, errors, (first, second), stage)
@@ -64,27 +65,31 @@ def maps(errors: pd.DataFrame) -> Figure:
 
 
 def _map(figure: Figure, axes: Axes, errors: pd.DataFrame, plane: tuple[str, str], stage: str) -> None:
+    places = errors[[f"{axis}_mm" for axis in plane]]
+    errors = errors[((places >= places.quantile(OUTER)) & (places <= places.quantile(1 - OUTER))).all(axis=1)]
     across, up = (errors[f"{axis}_mm"].to_numpy(dtype=float) for axis in plane)
     drawn = axes.hexbin(
         across,
         up,
         C=_distance(errors, stage),
-        gridsize=CELLS,
+        gridsize=int(np.clip(np.sqrt(len(errors)) / 2.0, 6, CELLS)),
         cmap=style.SEQUENTIAL,
         linewidths=0.1,
         mincnt=1,
     )
+    cells = np.asarray(drawn.get_array(), dtype=float)
+    drawn.set_clim(float(cells.min()), float(np.percentile(cells, 98)))
     axes.set_aspect("equal")
     axes.set_xlabel(f"{plane[0]} (mm)")
     axes.set_ylabel(f"{plane[1]} (mm)")
-    figure.colorbar(drawn, ax=axes, label="mm", fraction=0.04, pad=0.01)
+    figure.colorbar(drawn, ax=axes, label="mm", fraction=0.04, pad=0.01, extend="max")
 
 
 def curves(table: pd.DataFrame) -> Figure:
     """Draw the curve of each joint with its 95 % interval; ``table``: rows of ``pose_curves`` of a run."""
     joints = list(dict.fromkeys(table["joint"]))
     with style.style():
-        figure, grid = style.new_figure(0.3 + 1.15 * len(joints), len(joints), sharex=True)
+        figure, grid = style.new_figure(0.3 + 0.85 * len(joints), len(joints), sharex=True)
         for (axes,), joint in zip(grid, joints, strict=True):
             own = table[table["joint"] == joint]
             reading, error, sigma = (

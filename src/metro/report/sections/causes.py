@@ -19,13 +19,18 @@ STATUS = {
     "alone": "the others cannot tell",
     "one_observable": "no other can show it",
 }
+ALONE = ["pose"]  # what measured poses alone show has a section of its own
 SAID = ("together", "contradiction")  # statements that the verdicts of single observables do not contain
 
 
 def with_causes(summary: Section, results: Results) -> Section:
     """Return the first page with the causes of the batch behind the verdicts, where there are several."""
     facts = results.loop.get("effects") or {}
-    causes = [with_own(cause, "cause", facts) for cause in results.loop.get("causes") or []]
+    causes = [
+        with_own(cause, "cause", facts)
+        for cause in results.loop.get("causes") or []
+        if cause["seen_in"] != ALONE
+    ]
     if not causes or len(results.verdicts()) < 2:
         return summary
     items = list(summary.items)

@@ -35,6 +35,9 @@ def comparison(results: Results) -> Section:
         merit = force_items(results) if observable == "force" else []
         items += _values(frame, title(observable), merit, alone=len(compared) == 1)
         items += [*pairing_items(frame), *along_path(results, "faces")] if observable == "flatness" else []
+    if "pose" in results.verdicts():
+        text = "Poses that no fit saw: section “The arm by measured poses”."
+        items.append(Paragraph(text))
     if not items:
         nothing = "No held-out run has both a measurement and a prediction: there is nothing to compare."
         return Section("Predicted against measured", [Paragraph(nothing)])

@@ -40,8 +40,11 @@ def _observable(observable: str, entry: JSON, record: JSON, left: str) -> list[I
     items: list[Item] = [Paragraph(story or verdict_words(observable, entry, left))]
     if noise:
         items.append(Paragraph(_noise_words(noise, shown)))
-    items += _added(entry)
-    items += _candidates(record.get("candidates") or entry.get("candidates") or [], shown)
+    if "held_out" in entry:
+        items.append(Paragraph("Effects with their values, and what was tried: “The arm by measured poses”."))
+    else:
+        items += _added(entry)
+        items += _candidates(record.get("candidates") or entry.get("candidates") or [], shown)
     items += _path(record.get("path") or [], entry, shown)
     return [*items, *_residual_items(entry, record, left)]
 
@@ -132,7 +135,8 @@ def _path(path: list[JSON], entry: JSON, shown: str | None) -> list[Item]:
     """Table of the model's growth: the base model, then each added effect, with the errors of each step."""
     if len(path) < 2:
         return []
-    rms = [("before_rms", "rms, identification runs"), ("held_out_rms", "rms, held-out runs")]
+    tested = "poses left out" if "held_out" in entry else "held-out runs"
+    rms = [("before_rms", "rms, identification runs"), ("held_out_rms", f"rms, {tested}")]
     known = [(key, f"{name} ({printed(shown)})") for key, name in rms if any(step.get(key) for step in path)]
     rows = [
         [

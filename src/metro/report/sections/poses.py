@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import pandas as pd
@@ -10,6 +11,7 @@ from metro.report.content import Bullets, Facts, Heading, Item, Paragraph, Pictu
 from metro.report.figures import poses as figures
 from metro.report.numbers import listing, number, percent, quantity
 from metro.report.results import Results
+from metro.report.sections.pose_targets import corrected_targets, joint_titles
 from metro.units import JSON
 
 KINDS = {"random": "at random", "region": "by region", "time": "by time"}
@@ -26,6 +28,8 @@ ABOUT_CORRECTIONS = (
     "number {condition}, observability index O1 {o1} mm per correction of 5 mm or 5 mrad."
 )
 MOST_REPEATED, MOST_NEXT = 12, 8
+LEAST_CHANCE = 1e-4
+LEAST_OF_NOISE = 0.2  # adds 2 % to it
 ABOUT_NEXT = (
     "Poses to measure next, in this order: they lower the standard errors of the geometry most (D-optimal, "
     "within the ranges of joints and positions so far). Left: geometric mean of the standard errors over "
@@ -37,7 +41,8 @@ ABOUT_REPEATS = (
 )
 ABOUT_EFFECTS = (
     "What the effects move the measured point by (rms over the poses, less what a change of the geometry "
-    "would do alike), and by how much each made the squared residual of left-out regions smaller."
+    "would do alike), by how much each made the squared residual of left-out regions smaller (with its "
+    "standard error), and how often regions gain as much by luck (p: of 16 regions 0.00002 at least)."
 )
 
 
@@ -46,10 +51,12 @@ def poses(results: Results) -> Section | None:
     block = results.identified.get("pose") or {}
     series = {run: one for run, one in block.items() if run != "not_identified"}
     items: list[Item] = []
-    for run, one in series.items():
+    for at, (run, one) in enumerate(series.items()):
         items += [Heading(f"Series {run}, {one['poses']} poses")] if len(series) > 1 else []
-        items += [Paragraph(said(one)), _errors_table(one), *_drawn(results, run)]
-        items += [*_effects(one), *_repeats(one), _corrections(one), *_next(results, run)]
+        items += [Paragraph(said(one)), _errors_table(one)]
+        items += [*([] if at == 0 else _histogram(_left_out(results, run))), *_drawn(results, run)]
+        items += [*_effects(one), *_repeats(one), _corrections(one), *corrected_targets(results, one)]
+        items += _next(results, run)
     reasons = [f"{run}: {reason}." for run, reason in (block.get("not_identified") or {}).items()]
     items += [Paragraph("No calibration by these poses:"), Bullets(reasons)] if reasons else []
     return Section("The arm by measured poses", items) if items else None
@@ -66,7 +73,7 @@ def first_poses(results: Results) -> list[Item]:
         (f"{words}, {run}", quantity(errors[stage]["median"]), "median distance, left out by region")
         for stage, words in STAGES.items()
     ]
-    return [Facts(facts), Paragraph(said(block[run])), *_histogram(_left_out(results, run))]
+    return [Facts(facts), *_histogram(_left_out(results, run))]
 
 
 def said(one: JSON) -> str:
@@ -79,10 +86,29 @@ def said(one: JSON) -> str:
         if chosen
         else "No effect beyond the geometry predicts left-out regions better. "
     )
+    noise = (one.get("noise") or {}).get("value") or 0.0
+    scatter = one["scatter"]["value"]
+    beyond = " beyond that of the instrument" if noise else ""
+    left = (
+        "What stays is no more than the noise of the instrument."
+        if scatter < LEAST_OF_NOISE * noise
+        else f"What stays has a standard deviation of {number(scatter, 2)} mm in a coordinate{beyond}."
+    )
+    serves = (
+        " What else this batch computes with the arm uses the corrected geometry, without the effects."
+        if one.get("serves")
+        else ""
+    )
+    rounding = one.get("rounding")
+    rounded = (
+        f" The readings of joints {listing(list(rounding['steps']))} are rounded, which makes "
+        f"{number(rounding['moves']['value'], 2)} mm of that."
+        if rounding and rounding["moves"]["value"] > LEAST_OF_NOISE * scatter
+        else ""
+    )
     return (
         f"The median error on left-out regions falls from {before} mm with the nominal geometry to "
-        f"{corrected} mm with its corrections and to {after} mm with effects. {found}What stays has a "
-        f"standard deviation of {number(one['scatter']['value'], 2)} mm in a coordinate."
+        f"{corrected} mm with its corrections and to {after} mm with effects. {found}{left}{rounded}{serves}"
     )
 
 
@@ -109,11 +135,18 @@ def _effects(one: JSON) -> list[Item]:
     rows = []
     for effect in one["effects"]:
         trial = gains[effect["title"]]
-        gain = f"{number(100 * trial['gain'], 2)} ± {number(100 * trial['error'], 2)}"
-        rows.append([effect["title"], quantity(effect["moves"], with_unit=False), gain])
-    header = ["effect", "moves, mm", "gain, % (standard error)"]
+        less = math.exp(-trial["gain"])  # the loss is the logarithm of the squared residual
+        gain = f"{number(100 * (1 - less), 2)} ± {number(100 * less * trial['error'], 2)}"
+        values = listing([f"{name} {quantity(value)}" for name, value in effect["parameters"].items()])
+        chance = "< 0.0001" if trial["p_value"] < LEAST_CHANCE else number(trial["p_value"], 2)
+        moves = quantity(effect["moves"], with_unit=False)
+        rows.append([effect["title"], moves, gain, chance, values or "drawn"])
+    header = ["effect", "moves, mm", "gain, %", "p", "values"]
     missed = _grouped([trial["effect"] for trial in one["tried"] if not trial["kept"]])
-    items: list[Item] = [Table(header, rows, ABOUT_EFFECTS, [2.2, 1.2, 1.2])]
+    items: list[Item] = [Table(header, rows, ABOUT_EFFECTS, [2.0, 1.2, 0.8, 0.7, 3.4], small=True)]
+    if one.get("rivals"):
+        pairs = [f"{first} or {second}" for first, second in one["rivals"]]
+        items.append(Paragraph(f"As good in the place of another: {listing(pairs)}."))
     if missed:
         items.append(Paragraph(f"Tried without a gain: {listing(missed)}.", "note"))
     return items
@@ -188,7 +221,7 @@ def _next(results: Results, run: str) -> list[Item]:
         ]
         for _, row in mine.head(MOST_NEXT).iterrows()
     ]
-    header = ["pose", *(name.replace("_", ", ").replace("deg", "°") for name in joints), "left"]
+    header = ["pose", *joint_titles(joints), "left"]
     return [Table(header, rows, ABOUT_NEXT, numeric=list(range(len(header))), small=True)]
 
 
@@ -207,10 +240,10 @@ def _drawn(results: Results, run: str) -> list[Item]:
     items: list[Item] = []
     errors, curves = _left_out(results, run), results.tables.get("pose_curves")
     if errors is not None:
-        items += _histogram(errors)
         caption = (
             "Error over the workspace, of poses left out by region: mean distance in each cell, in two "
-            "planes of the instrument's frame."
+            "planes of the instrument's frame, without the outermost 0.2 % of the poses. Each map has its "
+            "own colours: 2 % of the cells are above them."
         )
         items.append(Picture(figures.maps(errors), caption, caption))
     if curves is not None and (mine := curves[curves["run"] == run]).size:

@@ -59,7 +59,8 @@ def summary(results: Results) -> Section:
             )
         )
     drawn = _one_run(results) if len(verdicts) <= MOST_DRAWN else []
-    return Section("Summary", [*items, *drawn, *([] if verdicts else _identified(results))])
+    arm = first_poses(results) if set(verdicts) == {"pose"} else []
+    return Section("Summary", [*items, *drawn, *arm, *([] if verdicts else _identified(results))])
 
 
 def first_words(results: Results) -> list[Item]:
@@ -222,21 +223,21 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
                     (
                         "verdict",
                         STATUS.get(str(entry.get("status")), "–"),
-                        count_of(len(entry.get("held_out_runs") or []), "held-out run"),
+                        held_out_words(entry),
                     ),
                     (
                         "error before",
                         error_text(before, entry.get("unit")),
-                        _share(before),
+                        _share(before, entry),
                     ),
                     (
                         "error after",
                         error_text(after, entry.get("unit")),
-                        _share(after),
+                        _share(after, entry),
                     ),
                     (
                         "noise floor",
-                        f"{number(entry.get('noise_floor'))}{unit_after(entry)}",
+                        _floor(entry),
                         "rms of the compared value",
                     ),
                 ]
@@ -250,7 +251,8 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
             error_text(entry.get("after"), None),
             number(entry.get("noise_floor")),
             unit_after(entry).strip() or "1",
-            listing([words(str(e["effect"])) for e in entry.get("effects") or []]) or "none",
+            listing(list(dict.fromkeys(words(str(e["effect"])) for e in entry.get("effects") or [])))
+            or "none",
         ]
         for name, entry in verdicts.items()
     ]
@@ -269,7 +271,27 @@ def _key_numbers(verdicts: dict[str, JSON]) -> list[Item]:
     )
 
 
-def _share(error: JSON) -> str:
-    """Write an error as a share of the signal, with the reason if it has no interval."""
+def held_out_words(entry: JSON) -> str:
+    """Say what tested a verdict: held-out runs, or measured poses that were left out."""
+    poses = (entry.get("held_out") or {}).get("poses")
+    return (
+        count_of(len(entry.get("held_out_runs") or []), "held-out run")
+        if poses is None
+        else f"{poses} poses left out"
+    )
+
+
+def _floor(entry: JSON) -> str:
+    floor = entry.get("noise_floor")
+    return "not stated" if floor is None else f"{number(floor)}{unit_after(entry)}"
+
+
+def _share(error: JSON, entry: JSON) -> str:
+    """Write an error as a share of the signal, with the reason if it has no interval.
+
+    A position has no size that its error could be a share of.
+    """
+    if "held_out" in entry:
+        return "rms in a coordinate"
     point = error.get("rms") is not None and known_interval(error) is None
     return f"{percent(error.get('nrmse'))} of the signal{'; one condition: no interval' if point else ''}"

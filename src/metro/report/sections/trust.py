@@ -88,6 +88,8 @@ def _reach(observable: str, entry: JSON) -> str:
     if status == "insufficient":
         return f"{name}: {_undecided(verification)}."
     size = _size(entry)
+    if "held_out" in entry:
+        return f"{name}: predictions of poses among those that were measured are off by up to {size}."
     if status in HOLDS and verification.get("holds", True):
         model = "with what was added, predictions" if entry.get("effects") else "predictions"
         return f"{name}: {model} hold to {size}."
@@ -121,6 +123,8 @@ def _size(entry: JSON) -> str:
     high, alone = max([rms, *ends]), "" if ends else "; one condition: no interval"
     if unit == "1" or not unit:
         return f"{number(high, 2)} rms of the probability"
+    if "held_out" in entry:
+        return f"{number(high, 2)} {unit} rms in a coordinate"
     share = after.get("nrmse")
     of_signal = f" rms ({percent(share * high / rms)} of the signal{alone})" if share and rms else " rms"
     return f"{number(high, 2)} {unit}{of_signal}"
@@ -164,11 +168,20 @@ def _range(values: list[float]) -> str:
 def _causes(entry: JSON) -> str:
     """Distinguish the causes that are almost certain from those that are only the likeliest."""
     certain: dict[bool, list[str]] = {True: [], False: []}
-    for effect in entry.get("effects") or []:
-        chance = effect.get("probability")
-        name = f"{words(str(effect['effect']))} (probability {probability(chance)})"
-        certain[chance is not None and chance >= SURE].append(name)
+    for (name, sure), effects in _alike(entry.get("effects") or []).items():
+        chances = [effect.get("probability") for effect in effects]
+        least = min((chance for chance in chances if chance is not None), default=None)
+        certain[sure].append(f"{words(name)} (probability {probability(least)})")
     finding = f"A finding: {listing(certain[True])}." if certain[True] else ""
     lead = f"A lead, not a finding: {listing(certain[False])}." if certain[False] else ""
     lowered = LOWERED if any(effect.get("lowered") for effect in entry.get("effects") or []) else ""
     return " ".join(filter(None, [finding, lead, lowered]))
+
+
+def _alike(effects: list[JSON]) -> dict[tuple[str, bool], list[JSON]]:
+    """Gather effects of one name, those of several joints, by whether they count as identified."""
+    found: dict[tuple[str, bool], list[JSON]] = {}
+    for effect in effects:
+        chance = effect.get("probability")
+        found.setdefault((str(effect["effect"]), chance is not None and chance >= SURE), []).append(effect)
+    return found

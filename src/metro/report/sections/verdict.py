@@ -23,6 +23,8 @@ STATUS = {
 def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
     """Say the verdict on an observable in a few sentences, with its numbers; ``left`` is the residual."""
     start, status = heading(observable), str(entry.get("status"))
+    if entry.get("words"):
+        return f"{start}: {STATUS[status]}. {entry['words']} {_residual(entry, left)}".strip()
     whole, part = _attribution(entry, "the difference"), _attribution(entry, "part of the difference")
     verified = (entry.get("verification") or {}).get("words", "")
     says = {
@@ -73,7 +75,12 @@ def known_interval(error: JSON) -> list[float | None] | None:
 def change(label: str, entry: JSON) -> Change | None:
     """Errors relative to the signal (%), before and after, for the figures; None if they are not known."""
     before, after = entry.get("before") or {}, entry.get("after") or {}
-    if before.get("nrmse") is None or after.get("nrmse") is None or _dimensionless(entry):
+    if (
+        before.get("nrmse") is None
+        or after.get("nrmse") is None
+        or _dimensionless(entry)
+        or "held_out" in entry
+    ):
         return None
     scale = 100 * before["nrmse"] / before["rms"] if before.get("rms") else None
     floor = entry.get("noise_floor")

@@ -31,7 +31,7 @@ class Determined:
     o1: float
 
 
-def determined(derivatives: Array, allowed: np.ndarray, scatter: float) -> Determined:
+def determined(derivatives: Array, allowed: np.ndarray, scatter: float, head: int = FRAMES) -> Determined:
     """Eliminate what poses do not determine.
 
     In the order base, tool, lengths, twists, tilts, link offsets, offsets, a parameter is dropped where what
@@ -41,11 +41,12 @@ def determined(derivatives: Array, allowed: np.ndarray, scatter: float) -> Deter
     Parameters
     ----------
     derivatives : (m, 3, 9 + 5 n) of :func:`metro.robot.calibration.model.jacobian`.
-    allowed : which may be freed. scatter : standard deviation of a coordinate, m.
+    allowed : which may be freed. scatter : standard deviation of a coordinate, m. head : number of the
+        parameters of base and points.
     """
-    joints = (derivatives.shape[-1] - FRAMES) // len(KINDS)
-    by_kind = [FRAMES + len(KINDS) * joint + KINDS.index(kind) for kind in ORDER for joint in range(joints)]
-    order = [place for place in (*range(FRAMES), *by_kind) if allowed[place]]
+    joints = (derivatives.shape[-1] - head) // len(KINDS)
+    by_kind = [head + len(KINDS) * joint + KINDS.index(kind) for kind in ORDER for joint in range(joints)]
+    order = [place for place in (*range(head), *by_kind) if allowed[place]]
     design = derivatives.reshape(-1, derivatives.shape[-1])[:, order] * PLAUSIBLE
     _, reduced = np.linalg.qr(design)
     directions: list[Array] = []

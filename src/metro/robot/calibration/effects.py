@@ -144,7 +144,7 @@ def _base_tilt(links: Sequence[Link], up: Array) -> Basis:
     """Turn of the base by a compliance, alike about all horizontal axes, times the moments of the links."""
 
     def basis(poses: Poses, state: State) -> Array:
-        lever = state.position(poses.q) - state.base[:3, 3]
+        lever = state.position(poses.q, poses.point) - state.base[:3, 3]
         return np.stack([np.cross(turn, lever) for turn in _moments(links, poses, state, up)], axis=-1)
 
     return basis
@@ -153,7 +153,7 @@ def _base_tilt(links: Sequence[Link], up: Array) -> Basis:
 def _side(joint: int, up: Array) -> Basis:
     def basis(poses: Poses, state: State) -> Array:
         frames, _ = state.frames(poses.q)
-        point = frames[-1][:, :3, :3] @ state.tool + frames[-1][:, :3, 3]
+        point = state.position(poses.q)
         torque = np.cross(point - frames[joint][:, :3, 3], -state.base[:3, :3] @ up)
         return np.asarray(np.sign(np.sum(torque * frames[joint][:, :3, 2], axis=1)))[:, None]
 
@@ -198,7 +198,7 @@ def _drift(by: Callable[[Poses], Array]) -> Basis:
 
 def _warmth(by: Callable[[Poses], Array]) -> Basis:
     def basis(poses: Poses, state: State) -> Array:
-        lever = state.position(poses.q) - state.base[:3, 3]
+        lever = state.position(poses.q, poses.point) - state.base[:3, 3]
         axes = np.broadcast_to(np.eye(3), (len(poses), 3, 3))
         return np.asarray(by(poses)[:, None, None] * np.concatenate([axes, lever[..., None]], axis=-1))
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from metro.robot.calibration.effects import PLAUSIBLE, Effect
 from metro.robot.calibration.model import State, jacobian, moved, turning
-from metro.robot.calibration.poses import Poses, regions
+from metro.robot.calibration.poses import Poses
 from metro.units import Array
 
 TAILS = 4.0  # degrees of freedom of Student's t
@@ -65,7 +65,7 @@ def predicted(
             q[:, effect.joint] += effect.basis(poses, state) @ own
         else:
             shift += effect.basis(poses, state) @ own
-    return state.position(q) + shift, q
+    return state.position(q, poses.point) + shift, q
 
 
 def columns(state: State, derivatives: Array, effects: Sequence[Effect], poses: Poses) -> list[Array]:
@@ -102,13 +102,13 @@ def fitted(
     count, start = int(free.sum()), state
     values = [np.zeros(effect.basis(poses, state).shape[-1]) for effect in effects]
     widths = [np.full(len(own), effect.prior) for own, effect in zip(values, effects, strict=True)]
-    of_rows = np.where(np.arange(len(free)) < 9, np.inf, prior)[free]
+    of_rows = np.where(np.arange(len(free)) < start.head, np.inf, prior)[free]
     precision = np.concatenate([of_rows, *widths]) ** -2.0
     for _ in range(STEPS):
         at, q = predicted(state, effects, values, poses)
         residuals = poses.at - at
         weight, out, scale = weights_of(residuals, poses.sigma)
-        _, derivatives = jacobian(state, q)
+        _, derivatives = jacobian(state, q, poses.point)
         parts = [derivatives[..., free], *columns(state, derivatives, effects, poses)]
         design = np.concatenate(parts, axis=-1)
         now = np.concatenate([_change(state, start)[free], *values])
@@ -124,13 +124,13 @@ def fitted(
         if float(np.max(step**2 * np.diag(information))) < SETTLED**2:
             break
     scores = np.einsum("mik,mi->mk", design, residuals * weight[:, None])
-    covariance = _covariance(scores, out, information, regions(poses.at, HALVINGS))
+    covariance = _covariance(scores, out, information, poses.parted(HALVINGS))
     return Fit(state, free, tuple(effects), tuple(values), scale, covariance)
 
 
 def _change(state: State, start: State) -> Array:
     """Corrections of the rows, in the order of the parameters; 0 of base and tool, which have no prior."""
-    return np.concatenate([np.zeros(9), (state.rows - start.rows).ravel()])
+    return np.concatenate([np.zeros(state.head), (state.rows - start.rows).ravel()])
 
 
 def _covariance(scores: Array, out: Array, information: Array, region: np.ndarray) -> Array:

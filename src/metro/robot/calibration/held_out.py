@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.robot.calibration.fit import Fit
-from metro.robot.calibration.poses import Poses, evenly, regions
+from metro.robot.calibration.poses import Poses
 from metro.units import Array
 
 MOST = 5000  # poses of which some are left out; of more, every so many
@@ -25,7 +25,7 @@ class HeldOut:
 
     Attributes
     ----------
-    kind : random, region or time. which : (m,) numbers of the poses.
+    kind : random, region or time. which : (m,) numbers of the rows, of the first point alone.
     errors : (fits, m, 3) m, measured less predicted, by one fit after the other.
     """
 
@@ -44,7 +44,7 @@ def held_out(poses: Poses, fits: Fitting) -> tuple[HeldOut, ...]:
 
     ``fits``: all that is fitted, the choice of effects included, from the poses that it is given.
     """
-    chosen = evenly(len(poses), MOST)
+    chosen = poses.evenly(MOST)
     some = poses.of(chosen)
     found = []
     for kind, folds in _folds(some):
@@ -53,7 +53,8 @@ def held_out(poses: Poses, fits: Fitting) -> tuple[HeldOut, ...]:
             left = fits(some.of(~out))
             parts.append(np.stack([some.at[out] - fit.predicted(some.of(out)) for fit in left]))
         which = np.concatenate([chosen[out] for out in folds])
-        found.append(HeldOut(kind, which, np.concatenate(parts, axis=1)))
+        first = poses.point[which] == 0
+        found.append(HeldOut(kind, which[first], np.concatenate(parts, axis=1)[:, first]))
     return tuple(found)
 
 
@@ -62,9 +63,10 @@ def _folds(poses: Poses) -> Iterator[tuple[str, list[np.ndarray]]]:
 
     A random fifth; each quarter of the workspace; each quarter of the time.
     """
-    shuffled = np.random.default_rng(0).permutation(len(poses))
-    yield "random", [shuffled % FIFTH == 0]
-    quarter = regions(poses.at, 2)
+    _, pose = np.unique(poses.pose, return_inverse=True)
+    shuffled = np.random.default_rng(0).permutation(int(pose.max()) + 1)
+    yield "random", [shuffled[pose] % FIFTH == 0]
+    quarter = poses.parted(2)
     yield "region", [quarter == one for one in np.unique(quarter)]
     order = np.empty(len(poses), dtype=int)
     order[np.argsort(poses.time, kind="stable")] = np.arange(len(poses))

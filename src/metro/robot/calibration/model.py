@@ -31,7 +31,8 @@ class State:
     ----------
     rows : (n, 5) θ₀, α (rad), d, a (m), β (rad), corrections included.
     prismatic : (n,) bool.
-    base : (4, 4) of the rows' base in the frame of the measurement. tool : (3,) m, in the last frame.
+    base : (4, 4) of the rows' base in the frame of the measurement. tool : (3,) m, in the last frame; of
+        several points (k, 3).
     """
 
     rows: Array
@@ -63,25 +64,43 @@ class State:
             frames.append(frame)
         return np.array(frames), np.array(normals)
 
-    def position(self, q: Array) -> Array:
-        """Position (m, 3) of the point on the flange, m, at joints ``q`` (m, n)."""
+    @property
+    def head(self) -> int:
+        """Number of the parameters of base and points, which those of the rows follow."""
+        return len(BASE) + self.tool.size
+
+    def arm_to(self, point: np.ndarray | None, count: int) -> Array:
+        """Return where the point of each of ``count`` rows is in the last frame, (m, 3); None: the first."""
+        points = np.atleast_2d(self.tool)
+        return np.asarray(points[np.zeros(count, dtype=int) if point is None else point])
+
+    def position(self, q: Array, point: np.ndarray | None = None) -> Array:
+        """Position (m, 3) of a point on the flange, m, at joints ``q`` (m, n); ``point`` (m,): which one."""
         last = self.frames(q)[0][-1]
-        return np.asarray(last[:, :3, :3] @ self.tool + last[:, :3, 3])
+        arm = self.arm_to(point, len(q))
+        return np.asarray(np.einsum("mij,mj->mi", last[:, :3, :3], arm) + last[:, :3, 3])
 
 
 def names(state: State) -> tuple[str, ...]:
     """Return the parameters in the order of :func:`jacobian`: base, tool, then five for each joint."""
-    return (*BASE, *TOOL, *(f"joint {i} {kind}" for i in range(1, len(state.rows) + 1) for kind in KINDS))
+    count = state.tool.size // len(TOOL)
+    tools = TOOL if count == 1 else tuple(f"{one} of point {k}" for k in range(1, count + 1) for one in TOOL)
+    return (*BASE, *tools, *(f"joint {i} {kind}" for i in range(1, len(state.rows) + 1) for kind in KINDS))
 
 
-def jacobian(state: State, q: Array) -> tuple[Array, Array]:
-    """Return the positions (m, 3), and derivatives (m, 3, 9 + 5 n) by the parameters of :func:`names`."""
+def jacobian(state: State, q: Array, which: np.ndarray | None = None) -> tuple[Array, Array]:
+    """Return the positions (m, 3), and derivatives (m, 3, head + 5 n) by the parameters of :func:`names`.
+
+    ``which``: (m,) point on the flange, from 0; None: the first.
+    """
     frames, normals = state.frames(q)
     last = frames[-1]
-    point = last[:, :3, :3] @ state.tool + last[:, :3, 3]
+    point = np.einsum("mij,mj->mi", last[:, :3, :3], state.arm_to(which, len(q))) + last[:, :3, 3]
+    own = np.zeros(len(q), dtype=int) if which is None else which
     columns = [np.broadcast_to(axis, point.shape) for axis in np.eye(3)]
     columns += [np.cross(axis, point - state.base[:3, 3]) for axis in np.eye(3)]
-    columns += [last[:, :3, k] for k in range(3)]
+    for one in range(state.tool.size // len(TOOL)):
+        columns += [last[:, :3, k] * (own == one)[:, None] for k in range(3)]
     for i in range(len(state.rows)):
         axis, lever = frames[i][:, :3, 2], point - frames[i][:, :3, 3]
         tip = point - frames[i + 1][:, :3, 3]
@@ -92,28 +111,29 @@ def jacobian(state: State, q: Array) -> tuple[Array, Array]:
 
 def turning(state: State, derivatives: Array) -> Array:
     """Return of :func:`jacobian` the columns (m, 3, n) of the joints themselves: per rad, or m of shift."""
-    first = len(BASE) + len(TOOL)
+    first = state.head
     columns = [first + len(KINDS) * i + (2 if shifts else 0) for i, shifts in enumerate(state.prismatic)]
     return derivatives[..., columns]
 
 
 def moved(state: State, step: Array) -> State:
-    """Return the state after a step (9 + 5 n) of the parameters of :func:`names`."""
+    """Return the state after a step (head + 5 n) of the parameters of :func:`names`."""
     from scipy.spatial.transform import Rotation
 
     base = state.base.copy()
     base[:3, :3] = Rotation.from_rotvec(step[3:6]).as_matrix() @ base[:3, :3]
     base[:3, 3] += step[:3]
-    rows = state.rows + step[9:].reshape(-1, len(KINDS))
-    return replace(state, base=base, tool=state.tool + step[6:9], rows=rows)
+    rows = state.rows + step[state.head :].reshape(-1, len(KINDS))
+    tool = state.tool + step[len(BASE) : state.head].reshape(state.tool.shape)
+    return replace(state, base=base, tool=tool, rows=rows)
 
 
 def free_of_geometry(state: State) -> np.ndarray:
-    """Return which parameters a calibration may free, (9 + 5 n) bool: a tilt at nearly parallel axes alone.
+    """Return which parameters a calibration may free, (head + 5 n): a tilt at nearly parallel axes alone.
 
     Where axes are not parallel the tilt is no more than a combination of the others.
     """
     near = np.abs(np.sin(state.rows[:, 1])) < NEAR_PARALLEL
     per_joint = np.ones((len(state.rows), len(KINDS)), dtype=bool)
     per_joint[:, -1] = near
-    return np.concatenate([np.ones(len(BASE) + len(TOOL), dtype=bool), per_joint.ravel()])
+    return np.concatenate([np.ones(state.head, dtype=bool), per_joint.ravel()])

@@ -51,23 +51,39 @@ def repeated(poses: Poses, target: Array, fits: tuple[Fit, ...]) -> tuple[Repeat
     return tuple(found)
 
 
+def spread(poses: Poses, target: Array) -> tuple[float, int]:
+    """Return the standard deviation of a coordinate among repeats of a pose, m, and its degrees of freedom.
+
+    Repeats that came from the same directions; (0, 0) without any.
+    """
+    square, freedom = 0.0, 0
+    for number in np.unique(target[np.isfinite(target)]):
+        own = poses.of(target == number)
+        ways = np.unique(own.came, axis=0, return_inverse=True)[1].ravel()
+        for way in np.unique(ways):
+            at = own.at[ways == way]
+            square += float(np.sum((at - at.mean(axis=0)) ** 2))
+            freedom += 3 * (len(at) - 1)
+    return (float(np.sqrt(square / freedom)), freedom) if freedom else (0.0, 0)
+
+
 def _figures(number: int, own: Poses, errors: tuple[Array, ...]) -> Repeated:
-    spread = own.at - own.at.mean(axis=0)
+    apart_by = own.at - own.at.mean(axis=0)
     freedom = 3 * (len(own) - 1)
-    sd = float(np.sqrt(np.sum(spread**2) / freedom))
+    sd = float(np.sqrt(np.sum(apart_by**2) / freedom))
     accuracy = tuple(float(np.linalg.norm(each.mean(axis=0))) for each in errors)
     ways = np.unique(own.came, axis=0, return_inverse=True)[1].ravel()
     centres = np.array([own.at[ways == way].mean(axis=0) for way in np.unique(ways)])
     apart = np.linalg.norm(centres[:, None] - centres, axis=2)
     directional = float(apart.max()) if len(centres) > 1 else float("nan")
-    return Repeated(number, len(own), accuracy, sd / np.sqrt(len(own)), _rp(spread, freedom), directional)
+    return Repeated(number, len(own), accuracy, sd / np.sqrt(len(own)), _rp(apart_by, freedom), directional)
 
 
-def _rp(spread: Array, freedom: int) -> tuple[float, float, float]:
+def _rp(apart_by: Array, freedom: int) -> tuple[float, float, float]:
     """Return RP, and its interval by chi-squared: that of the spread of a coordinate, alike in all axes."""
     from scipy.stats import chi2
 
-    distances = np.linalg.norm(spread, axis=1)
+    distances = np.linalg.norm(apart_by, axis=1)
     rp = float(distances.mean() + 3.0 * distances.std(ddof=1))
     low, high = (float(np.sqrt(freedom / chi2.ppf(p, freedom))) for p in (0.975, 0.025))
     return rp, rp * low, rp * high

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,8 @@ class Poses:
     time : (m,) s, or the number of the pose where no time is known.
     temperature : (m,) °C; NaN where it is not known.
     came : (m, n) direction in which each joint moved last, −1, 1, or 0 where it is not known.
+    pose : (m,) which rows are of one pose, that of several points on the flange; each its own where left out.
+    point : (m,) which point on the flange it is, from 0; all the first where left out.
     """
 
     q: Array
@@ -32,23 +34,47 @@ class Poses:
     time: Array
     temperature: Array
     came: Array
+    pose: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    point: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    def __post_init__(self) -> None:
+        if len(self.pose) != len(self.q):
+            object.__setattr__(self, "pose", np.arange(len(self.q)))
+        if len(self.point) != len(self.q):
+            object.__setattr__(self, "point", np.zeros(len(self.q), dtype=int))
 
     def __len__(self) -> int:
         return len(self.q)
 
     def of(self, chosen: np.ndarray) -> Poses:
         """Return some of the poses; from where each was approached stays known."""
-        fields = ("q", "at", "sigma", "time", "temperature", "came")
+        fields = ("q", "at", "sigma", "time", "temperature", "came", "pose", "point")
         return replace(self, **{name: getattr(self, name)[chosen] for name in fields})
 
     def thinned(self, count: int) -> Poses:
-        """Return at most so many of the poses, every so many where there are more."""
-        return self.of(evenly(len(self), count))
+        """Return poses with at most so many rows, every so many where there are more."""
+        return self.of(self.evenly(count))
+
+    def evenly(self, count: int) -> np.ndarray:
+        """Return the numbers of at most ``count`` rows, those of poses at equal distances; none is parted."""
+        _, pose = np.unique(self.pose, return_inverse=True)
+        total = int(pose.max()) + 1
+        return np.flatnonzero(np.isin(pose, evenly(total, count * total // len(self))))
+
+    def parted(self, halvings: int) -> np.ndarray:
+        """Return of each row in which of 2^halvings regions of the workspace its pose is, (m,) int."""
+        _, first, pose = np.unique(self.pose, return_index=True, return_inverse=True)
+        return np.asarray(regions(self.at[first], halvings)[pose])
 
     @cached_property
     def regions(self) -> np.ndarray:
-        """Return of each pose which of sixteen regions of the workspace it is in, (m,) int."""
-        return regions(self.at, 4)
+        """Return of each row which of sixteen regions of the workspace it is in, (m,) int."""
+        return self.parted(4)
+
+    @property
+    def first(self) -> Poses:
+        """The rows of the first point."""
+        return self.of(self.point == 0)
 
 
 def evenly(total: int, count: int) -> np.ndarray:

@@ -37,14 +37,30 @@ class Trial:
     label, code : of it.
     gain, error : mean over the left-out regions of what the loss falls by, and its standard error: the share
         of the squared residual that the effect takes away, while this is small.
-    kept : whether it stays.
+    luck : how often the regions gain as much by chance, see :func:`by_luck`.
+    kept : whether it stays. joint : from 0; −1 where it moves the point as a whole.
     """
 
     label: str
     code: str
     gain: float
     error: float
+    luck: float
     kept: bool
+    joint: int
+
+
+@dataclass(frozen=True)
+class Found:
+    """The outcome of a search: effects that stay, what became of each, and which could take another's place.
+
+    ``rivals``: pairs of labels, of an effect that stays and one that does as well in its place; only of
+    those that have a shape, since a curve can take the place of any.
+    """
+
+    effects: tuple[Effect, ...]
+    trials: tuple[Trial, ...]
+    rivals: tuple[tuple[str, str], ...]
 
 
 @dataclass
@@ -132,18 +148,15 @@ class _Search:
         return np.asarray(self.residuals - self.design[..., have] @ values)
 
 
-def search(poses: Poses, fit: Fit, effects: Sequence[Effect]) -> tuple[tuple[Effect, ...], tuple[Trial, ...]]:
-    """Return the effects that stay, and what became of each.
-
-    ``fit``: of the geometry alone.
-    """
+def search(poses: Poses, fit: Fit, effects: Sequence[Effect]) -> Found:
+    """Search for the effects that stay; ``fit`` is of the geometry alone."""
     some = poses.thinned(MOST)
     state = fit.state
-    at, derivatives = jacobian(state, some.q)
+    at, derivatives = jacobian(state, some.q, some.point)
     parts = [derivatives[..., fit.free], *columns(state, derivatives, effects, some)]
     ends = np.cumsum([0, *(part.shape[-1] for part in parts)])
     blocks = [np.arange(a, b) for a, b in pairwise(ends)]
-    geometry = np.where(np.flatnonzero(fit.free) < 9, np.inf, PLAUSIBLE)
+    geometry = np.where(np.flatnonzero(fit.free) < state.head, np.inf, PLAUSIBLE)
     priors = [geometry, *(np.full(len(own), one.prior) for own, one in zip(blocks[1:], effects, strict=True))]
     design = np.concatenate(parts, axis=-1)
     model = _Search(
@@ -155,7 +168,11 @@ def search(poses: Poses, fit: Fit, effects: Sequence[Effect]) -> tuple[tuple[Eff
     for candidates in (early, late, early + late):
         _forward(model, effects, candidates, trials)
     _backward(model, effects, early, trials)
-    return tuple(effects[one] for one in sorted(model.chosen)), tuple(trials[one] for one in sorted(trials))
+    return Found(
+        tuple(effects[one] for one in sorted(model.chosen)),
+        tuple(trials[one] for one in sorted(trials)),
+        _rivals(model, effects, early),
+    )
 
 
 def _forward(
@@ -190,11 +207,26 @@ def _backward(
         model.chosen.remove(min(useless, key=lambda one: found[one].gain))
 
 
+def _rivals(model: _Search, effects: Sequence[Effect], candidates: list[int]) -> tuple[tuple[str, str], ...]:
+    """Return which effects would stay in the place of one that does, and lose no more than by chance."""
+    found = []
+    others = [one for one in candidates if one not in model.chosen]
+    with_all, _ = model.left_out(model.chosen)
+    for one in (each for each in candidates if each in model.chosen):
+        without, instead = model.left_out([other for other in model.chosen if other != one], others)
+        for other, loss in zip(others, instead, strict=True):
+            if by_luck(loss - with_all) >= CHANCE and _trial(effects[other], without, loss).kept:
+                found.append((effects[one].label, effects[other].label))
+    return tuple(found)
+
+
 def _trial(effect: Effect, without: Array, with_it: Array) -> Trial:
     """Judge an effect by the losses of left-out regions without and with it."""
     gains = without - with_it
     gain, error = float(np.mean(gains)), float(np.std(gains, ddof=1) / np.sqrt(len(gains)))
-    return Trial(effect.label, effect.code, gain, error, gain > MATERIAL and by_luck(gains) < CHANCE)
+    luck = by_luck(gains)
+    kept = gain > MATERIAL and luck < CHANCE
+    return Trial(effect.label, effect.code, gain, error, luck, kept, effect.joint)
 
 
 @cache

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from metro.robot.calibration.fit import Fit, fitted
@@ -20,11 +22,21 @@ def nominal(poses: Poses, geometry: Geometry) -> tuple[Fit, Array]:
     A geometry's own base frame has the vertical as its z.
     """
     rows, place, prismatic = standard_rows(geometry)
+    count, first = int(poses.point.max()) + 1, poses.first
     state = State(np.column_stack([rows, np.zeros(len(rows))]), prismatic, np.eye(4), np.zeros(3))
-    state = State(state.rows, prismatic, _laid_on(state.position(poses.q), poses.at), state.tool)
-    free = np.zeros(9 + 5 * len(rows), dtype=bool)
-    free[:9] = True
+    base = _laid_on(state.position(first.q), first.at)
+    state = replace(state, base=base, tool=_points(replace(state, base=base), poses, count))
+    free = np.arange(state.head + 5 * len(rows)) < state.head
     return fitted(poses, state, free), place[2, :3]
+
+
+def _points(state: State, poses: Poses, count: int) -> Array:
+    """Return where to start with the points on the flange: (3,) of one, (count, 3) of several."""
+    if count == 1:
+        return np.zeros(3)
+    last = state.frames(poses.q)[0][-1]
+    seen = np.einsum("mji,mj->mi", last[:, :3, :3], poses.at - last[:, :3, 3])
+    return np.array([np.median(seen[poses.point == one], axis=0) for one in range(count)])
 
 
 def _laid_on(points: Array, onto: Array) -> Array:

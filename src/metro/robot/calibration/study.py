@@ -12,7 +12,7 @@ from metro.robot.calibration.fit import Fit, columns, fitted, predicted
 from metro.robot.calibration.held_out import HeldOut, held_out
 from metro.robot.calibration.model import free_of_geometry, jacobian
 from metro.robot.calibration.poses import Poses
-from metro.robot.calibration.search import Trial, search
+from metro.robot.calibration.search import Found, search
 from metro.robot.calibration.start import nominal
 from metro.robot.kinematics import Geometry
 from metro.units import MM
@@ -29,12 +29,12 @@ class Calibration:
     Attributes
     ----------
     fits : of the nominal geometry (base and tool free), of its corrections, and of these with the effects.
-    determined : what the poses determine of the geometry. trials : what became of each effect.
+    determined : what the poses determine of the geometry. found : the search for effects.
     """
 
     fits: tuple[Fit, Fit, Fit]
     determined: Determined
-    trials: tuple[Trial, ...]
+    found: Found
 
     @property
     def final(self) -> Fit:
@@ -53,13 +53,17 @@ def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
     poses = poses.thinned(MOST)
     as_declared, up = nominal(poses, geometry)
     state = as_declared.state
-    known = determined(jacobian(state, poses.q)[1], free_of_geometry(state), as_declared.scale)
+    known = determined(
+        jacobian(state, poses.q, poses.point)[1], free_of_geometry(state), as_declared.scale, state.head
+    )
     if not known.kept[:6].all():
         scatter = f"they scatter by {as_declared.scale / MM:.3g} mm about the declared arm"
         raise ValueError(f"the poses do not determine where the arm stands: {scatter}")
     corrected = fitted(poses, state, known.kept)
-    chosen, trials = search(poses, corrected, library(poses, state, up))
-    return Calibration((as_declared, corrected, fitted(poses, state, known.kept, chosen)), known, trials)
+    found = search(poses, corrected, library(poses, state, up))
+    return Calibration(
+        (as_declared, corrected, fitted(poses, state, known.kept, found.effects)), known, found
+    )
 
 
 def left_out(poses: Poses, geometry: Geometry) -> tuple[HeldOut, ...]:
@@ -79,7 +83,7 @@ class Size:
 def sizes(fit: Fit, poses: Poses) -> tuple[Size, ...]:
     """Return how much each effect moves the point, less what corrections of the geometry would do alike."""
     _, q = predicted(fit.state, fit.effects, fit.values, poses)
-    _, derivatives = jacobian(fit.state, q)
+    _, derivatives = jacobian(fit.state, q, poses.point)
     geometry, _ = np.linalg.qr(derivatives[..., fit.free].reshape(3 * len(poses), -1))
     found = []
     for at, part in enumerate(columns(fit.state, derivatives, fit.effects, poses)):
