@@ -20,7 +20,7 @@ BASE = {"spelling", "units", "joint_columns", "__init__"}
 ROOMS = {
     "units": set(),
     "joint_columns": set(),
-    "__init__": set(),
+    "__init__": {"loaded", "effects"},
     "syntax": set(),
     "codehash": {"syntax"},
     "structure": set(),
@@ -58,6 +58,10 @@ ROOMS = {
     "progress": set(),
     "workflow": {"batch", "codehash"},
     "dataset": {"batch"},
+    "loaded": {
+        *("batch", "commands", "dataset", "report", "stages", "observables", "effects", "loop", "signals"),
+        *PHYSICS,
+    },
     "importing": {"batch", "formats"},
     "spelling": set(),
     "commands": {"importing", "batch", "report", "dataset", "workflow", "codehash", "observables"},
