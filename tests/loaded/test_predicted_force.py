@@ -36,10 +36,9 @@ NEW = [
 ]
 
 
-@pytest.mark.parametrize(("operation", "direction", "rpm", "feed", "depth", "radial"), NEW)
-def test_the_interval_holds_the_force_that_the_simulator_has(
-    loaded, operation, direction, rpm, feed, depth, radial
-):
+@pytest.mark.parametrize("cut", NEW, ids=lambda cut: f"{cut[0]}-{cut[1]}")
+def test_the_interval_holds_the_force_that_the_simulator_has(loaded, cut):
+    operation, direction, rpm, feed, depth, radial = cut
     force = loaded.force(
         operation=operation,
         direction=direction,

@@ -12,17 +12,19 @@ from metro.stages.verdict import verdict
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def closed_project(root, raw):
-    """Run the stages on a folder of raw files, in a project ``root``; return the project."""
+def closed_project(root, raw, closing=True):
+    """Run the stages on a folder of raw files, in a project ``root``; without ``closing`` the fits alone."""
     settings = load_config(ROOT / "config/config.yaml")
     processed, reports = (root / part / raw.name for part in ("data/processed", "reports"))
     for folder in (processed, reports, root / "data/raw"):
-        folder.mkdir(parents=True)
+        folder.mkdir(parents=True, exist_ok=True)
     if not raw.is_relative_to(root):
         (root / "data/raw" / raw.name).symlink_to(raw)
     budget = {"model_form_budget": settings["loop"]["model_form_budget"]}
     ingest(raw, ROOT / "config/cells", processed, {"holdout": settings["holdout"]}, "code")
     identify(processed, budget, "code")
+    if not closing:
+        return root
     predict(processed, {}, "code")
     loop(processed, reports, settings["loop"], "code")
     verdict(processed, reports, {}, "code")

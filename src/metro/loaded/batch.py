@@ -57,12 +57,12 @@ def load(batch: str | Path, project: str | Path = ".") -> LoadedBatch:
     if len(given.parts) > 1 or given.is_absolute():
         if not given.is_dir():
             raise ContractError([Finding("error", str(given), "there is no such folder")])
-        project = _project_of(given.resolve())
-        batch = given.resolve().name
+        project = _project_of(given.absolute())
+        batch = given.absolute().name
     processed, reports = project / "data/processed", project / "reports"
     name = batch_name(str(batch), processed, reports)
     if not (reports / name / REPORTS_FILE).is_file():
-        raise ContractError([Finding("error", name, "has no verdict yet: call metro run")])
+        raise ContractError([Finding("error", name, "has no verdict yet: call snakemake")])
     return LoadedBatch(name, processed / name, reports / name)
 
 
