@@ -38,6 +38,7 @@ ROOMS = {
     "slips": {"batch", "signals", "cutting", "observables"},
     "loop": {"observables", "effects", "kriging"},
     "wording": set(),
+    "decisions": {"cutting", "signals"},
     "memory": set(),
     "report": {"batch", "observables"},
     "stages": {
@@ -50,6 +51,7 @@ ROOMS = {
         "loop",
         "slips",
         "wording",
+        "decisions",
         "memory",
         "report",
         "structure",

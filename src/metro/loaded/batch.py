@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from metro.loaded.refit import FitReport
     from metro.stages.problem_file import Posed
 
+DECISIONS = [
+    *("quantity", "where", "value", "lo", "hi", "unit", "lower", "upper", "decision", "probability"),
+]
 COORDINATES = {
     "angle_deg": "spindle angle (°)",
     "s_mm": "path length (mm)",
@@ -177,6 +180,20 @@ class LoadedBatch:
     def candidates(self) -> pd.DataFrame:
         """Effects that were tried and not taken, with the reason."""
         return self._rows("candidates")
+
+    @property
+    def decisions(self) -> pd.DataFrame:
+        """Results against the tolerances of ``batch.yaml``, by ISO 14253-1; no rows where it states none."""
+        rows = [
+            {**entry, "lo": (entry["ci95"] or [None])[0], "hi": (entry["ci95"] or [None])[-1]}
+            for entry in self.verdict_json.get("decisions") or []
+        ]
+        return pd.DataFrame(rows, columns=DECISIONS)
+
+    @property
+    def recommended_cuts(self) -> pd.DataFrame:
+        """Stable cuts that remove most, by position; no rows where there are no lobes."""
+        return pd.DataFrame(self.verdict_json.get("recommended_cuts") or [])
 
     def force(self, run: str | None = None, **settings: Any) -> ForcePrediction:
         """Predict the cutting force over a revolution, with its 95 % interval.
