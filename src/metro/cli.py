@@ -43,7 +43,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
     help="Closed-loop metrology for robotic machining: predict, compare, trace what is left to its cause.",
-    epilog="`snakemake` brings every report up to date. Exit codes: 0 fine, 1 the input or a report is not "
+    epilog="`metro run` brings every report up to date. Exit codes: 0 fine, 1 the input or a report is not "
     "as it should be, 2 the call itself is wrong. Tab completion: `metro --install-completion`.",
 )
 
@@ -179,6 +179,29 @@ def simulate(
 
     folders = {"root": root, "truth": truth}
     write(name, kind=kind, effects=effect or [], seed=seed, style=style, as_json=as_json, **folders)
+
+
+@app.command()
+def run(
+    batch: Annotated[
+        list[str] | None, typer.Argument(help="Batches: their names, or folders of raw files; all, if none.")
+    ] = None,
+    *,
+    snakefile: Annotated[
+        Path | None, typer.Option(help="The workflow: of this folder, else the one that came with metro.")
+    ] = None,
+    cores: Annotated[int, typer.Option(min=0, help="Cores to use; 0: all.")] = 0,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run.")] = False,
+) -> None:
+    """Bring reports up to date in any folder that has batches in data/raw.
+
+    Calls snakemake with the workflow that came with metro: the folder needs no Snakefile and no settings.
+
+    Example: `metro run side-milling-17`
+    """
+    from metro.commands.run import run as call
+
+    raise typer.Exit(call(batch or [], snakefile, cores, dry_run))
 
 
 @app.command()
