@@ -27,7 +27,6 @@ def snakemake(monkeypatch):
 
 
 def test_a_folder_without_a_workflow_has_that_of_the_checkout(snakemake, own_campaign):
-    (own_campaign / "Snakefile").unlink()
     assert CliRunner().invoke(app, ["run"]).exit_code == 0
     (command,) = snakemake.asked
     assert command == [
