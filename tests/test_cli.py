@@ -12,7 +12,7 @@ from metro.codehash import code_hash
 from metro.formats import FormatError
 
 COMMANDS = ("check", "new-batch", "simulate", "run", "status", "explain", "next", "query", "verify")
-COMMANDS += ("frf-export",)
+COMMANDS += ("export", "frf-export")
 STAGES = ("ingest", "identify", "predict", "loop", "verdict", "report", "campaign")
 
 

@@ -65,8 +65,11 @@ ROOMS = {
         *PHYSICS,
     },
     "importing": {"batch", "formats"},
+    "exporting": set(),
     "spelling": set(),
-    "commands": {"importing", "batch", "report", "dataset", "workflow", "codehash", "observables"},
+    "commands": {
+        *("importing", "exporting", "batch", "report", "dataset", "workflow", "codehash", "observables"),
+    },
     "cli": {"stages", "commands", "batch", "formats", "codehash"},
 }
 

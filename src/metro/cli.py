@@ -321,6 +321,30 @@ def verify(
     raise typer.Exit(verify_command(batch or [], raw, processed, config, as_json))
 
 
+@app.command()
+def export(
+    batch: Annotated[
+        str, typer.Argument(help="The batch: its name, or a folder of it.", autocompletion=batches)
+    ],
+    out: Annotated[Path, typer.Option(help="The folder of the crate, or the XML file.")],
+    form: Annotated[
+        str, typer.Option("--as", help="ro-crate: the whole run, as a folder; d-si: the quantities, as XML.")
+    ] = "ro-crate",
+    processed: Root = Path("data/processed"),
+    reports: Results = Path("reports"),
+) -> None:
+    """Export a batch for other programs: the run as an RO-Crate, or its quantities as D-SI.
+
+    The crate follows the profile Workflow Run Crate 0.5 and holds raw files, report and workflow. D-SI is
+    what digital calibration certificates embed.
+
+    Example: `metro export kr160-side --out kr160-side.crate`
+    """
+    from metro.commands.export import export as write
+
+    typer.echo(write(batch, form, out, processed, reports))
+
+
 @app.command("frf-export")
 def frf_export(
     batch: Annotated[
