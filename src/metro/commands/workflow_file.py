@@ -10,6 +10,7 @@ from metro.commands.calls import wrong_call
 HERE = Path("Snakefile")
 CHECKOUT = Path(__file__).resolve().parents[3] / "Snakefile"
 DISTRIBUTION, INSTALLED = "metro-machining", "share/metro/Snakefile"
+TARGET = Path(__file__).resolve().parents[2] / INSTALLED  # of pip's --target, which moves it after its record
 
 
 def workflow_file(given: Path | None = None) -> Path:
@@ -28,7 +29,7 @@ def workflow_file(given: Path | None = None) -> Path:
         if not given.is_file():
             raise wrong_call("--snakefile", f"{given} is not there")
         return given
-    present = next((path for path in (HERE, CHECKOUT, *_installed()) if path.is_file()), None)
+    present = next((path for path in (HERE, CHECKOUT, TARGET, *_installed()) if path.is_file()), None)
     if present is None:
         message = "is not there: metro is installed without its workflow; name it with --snakefile"
         raise wrong_call(str(HERE), message)
