@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from metro import __version__
 from metro.commands.completion import batches, effects, observables
 from metro.commands.hidden import Style
+from metro.commands.project_calls import export, run
 from metro.commands.stage_calls import campaign, identify, ingest, loop, predict, report, verdict
 
 STAGES = "Stages, in their order (called by snakemake)"
@@ -181,27 +182,7 @@ def simulate(
     write(name, kind=kind, effects=effect or [], seed=seed, style=style, as_json=as_json, **folders)
 
 
-@app.command()
-def run(
-    batch: Annotated[
-        list[str] | None, typer.Argument(help="Batches: their names, or folders of raw files; all, if none.")
-    ] = None,
-    *,
-    snakefile: Annotated[
-        Path | None, typer.Option(help="The workflow: of this folder, else the one that came with metro.")
-    ] = None,
-    cores: Annotated[int, typer.Option(min=0, help="Cores to use; 0: all.")] = 0,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run.")] = False,
-) -> None:
-    """Bring reports up to date in any folder that has batches in data/raw.
-
-    Calls snakemake with the workflow that came with metro: the folder needs no Snakefile and no settings.
-
-    Example: `metro run side-milling-17`
-    """
-    from metro.commands.run import run as call
-
-    raise typer.Exit(call(batch or [], snakefile, cores, dry_run))
+app.command()(run)
 
 
 @app.command()
@@ -321,28 +302,7 @@ def verify(
     raise typer.Exit(verify_command(batch or [], raw, processed, config, as_json))
 
 
-@app.command()
-def export(
-    batch: Annotated[
-        str, typer.Argument(help="The batch: its name, or a folder of it.", autocompletion=batches)
-    ],
-    out: Annotated[Path, typer.Option(help="The folder of the crate, or the XML file.")],
-    form: Annotated[
-        str, typer.Option("--as", help="ro-crate: the whole run, as a folder; d-si: the quantities, as XML.")
-    ] = "ro-crate",
-    processed: Root = Path("data/processed"),
-    reports: Results = Path("reports"),
-) -> None:
-    """Export a batch for other programs: the run as an RO-Crate, or its quantities as D-SI.
-
-    The crate follows the profile Workflow Run Crate 0.5 and holds raw files, report and workflow. D-SI is
-    what digital calibration certificates embed.
-
-    Example: `metro export kr160-side --out kr160-side.crate`
-    """
-    from metro.commands.export import export as write
-
-    typer.echo(write(batch, form, out, processed, reports))
+app.command()(export)
 
 
 @app.command("frf-export")

@@ -31,7 +31,7 @@ MODULES = {
     (): (
         *("", "cli", "codehash", "batch.alike"),
         *(f"commands.{name}" for name in ("calls", "completion", "hidden", "output", "stage_calls")),
-        *("commands.which", "commands.run", "commands.workflow_file"),
+        *(f"commands.{name}" for name in ("which", "run", "workflow_file", "project_calls")),
     ),
     ("numpy",): ("commands.query", "commands.status", "dataset.results", "dataset.views"),
     ("numpy", "yaml"): ("workflow", "commands.simulate", "commands.verify"),

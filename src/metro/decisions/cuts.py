@@ -42,16 +42,16 @@ class Milling:
         tool = manifest.get("tool") or {}
         declared = manifest.get("coefficients") or {}
         waveform = (identified.get("force") or {}).get("waveform") or {}
-        known = [
+        ktc, kte = (
             declared.get(f"{name}_{unit}", (waveform.get(name) or {}).get("value"))
             for name, unit in (("ktc", "n_mm2"), ("kte", "n_mm"))
-        ]
-        if None in known or not {"diameter_mm", "teeth"} <= set(tool):
+        )
+        if ktc is None or kte is None or not {"diameter_mm", "teeth"} <= set(tool):
             return None
         edge = math.cos(math.radians(tool.get("helix_deg", 0.0))) if _per_arc(declared) else 1.0
         hole = 0.5 * float(manifest.get("hole_diameter_mm") or 0.0) * MM
         radius, teeth = 0.5 * tool["diameter_mm"] * MM, int(tool["teeth"])
-        return cls(radius, teeth, known[0] * N_MM2, known[1] / edge * N_MM, hole)
+        return cls(radius, teeth, ktc * N_MM2, kte / edge * N_MM, hole)
 
     def width(self, operation: str, radial_depth: float) -> float:
         """Width of the chip's section, m: volume over depth and feed. A hole is removed as a whole."""

@@ -152,19 +152,12 @@ class LoadedBatch:
 
     def quantity(self, name: str) -> Quantity:
         """Return an identified quantity by the name that :attr:`identified` has: ``force.waveform.ktc``."""
-        known = self.identified.set_index("name")
-        if name not in known.index:
-            raise ContractError(
-                [
-                    Finding(
-                        "error",
-                        name,
-                        f"{self.name} has no such quantity{suggestion(name, list(known.index))}",
-                    )
-                ]
-            )
-        value, low, high, unit = known.loc[name]
-        return Quantity(*(float("nan") if x is None else float(x) for x in (value, low, high)), str(unit))
+        known = {str(row.pop("name")): row for row in self.identified.to_dict("records")}
+        if name not in known:
+            words = f"{self.name} has no such quantity{suggestion(name, list(known))}"
+            raise ContractError([Finding("error", name, words)])
+        row: JSON = {str(key): value for key, value in known[name].items()}
+        return Quantity.of({**row, "ci95": [row["lo"], row["hi"]]})
 
     @property
     def verdicts(self) -> pd.DataFrame:

@@ -226,10 +226,9 @@ def _basis(model: ForceModel, setting: ForceSetting, beta: Array) -> Array:
 
 def _shown(asked: Batch) -> dict[str, Any]:
     """Return the settings of the cut asked for that are not blank."""
-    row = asked.runs.loc[ASKED]
-    return {
-        name: row[name] for name in COLUMNS if name in row and not (pd.isna(row[name]) or row[name] == "")
-    }
+    row: Any = asked.runs.loc[ASKED]
+    cells = {name: _plain(row[name]) for name in COLUMNS if name in row}
+    return {name: value for name, value in cells.items() if not (pd.isna(value) or value == "")}
 
 
 def _plain(value: Any) -> Any:

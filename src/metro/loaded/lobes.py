@@ -95,7 +95,7 @@ def predict_lobes(
     if tip is None:
         raise wrong(str(position), f"has no modes; expected one of: {', '.join(known)}")
     speeds = _speeds(batch, rpm)
-    first = asked.runs.loc[ASKED]
+    first: Any = asked.runs.loc[ASKED]
     lobes = stability.solve(tip, cutting, first, speeds, check=False)
     effects, left_out = found(entry, "lobes")
     table = stability.diagram(lobes)

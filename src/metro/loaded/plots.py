@@ -21,7 +21,8 @@ def axes_or_new(axes: Axes | None) -> Axes:
         return axes
     from matplotlib import pyplot as plt
 
-    return plt.gca()
+    current: Axes = plt.gca()
+    return current
 
 
 def force_axes(predicted: ForcePrediction, axes: Axes | None) -> Axes:

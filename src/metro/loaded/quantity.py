@@ -29,8 +29,10 @@ class Quantity:
     def of(cls, entry: JSON) -> Quantity:
         """Return the quantity that a block of ``identified.json`` or ``verdict.json`` holds."""
         low, high = entry.get("ci95") or (None, None)
-        numbers = (math.nan if number is None else float(number) for number in (entry["value"], low, high))
-        return cls(*numbers, str(entry.get("unit") or ""))
+        value, low, high = (
+            math.nan if number is None else float(number) for number in (entry["value"], low, high)
+        )
+        return cls(value, low, high, str(entry.get("unit") or ""))
 
     @property
     def half_width(self) -> float:

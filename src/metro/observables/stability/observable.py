@@ -152,9 +152,10 @@ def _solved(
 
 def _of_cut(lobes: stability.Lobes, runs: pd.DataFrame) -> pd.DataFrame:
     """Return a diagram with the settings of its cut, and the usual feed of the runs that share it."""
-    first = runs.iloc[0][["operation", "direction", "radial_depth_mm", "feed_direction_deg"]]
+    names = ("operation", "direction", "radial_depth_mm", "feed_direction_deg")
+    settings = {name: runs[name].iloc[0] for name in names}
     feed = float(runs["feed_per_tooth_mm"].median())
-    return stability.diagram(lobes).assign(**first.to_dict(), feed_per_tooth_mm=feed)
+    return stability.diagram(lobes).assign(**settings, feed_per_tooth_mm=feed)
 
 
 def _others(tips: list[Tip], pairs: list[tuple[pd.DataFrame, Tip]]) -> list[Tip]:

@@ -159,7 +159,8 @@ def _float(value: object) -> float:
 
 
 def _name(entry: JSON) -> str:
-    return NAMES.get(entry["quantity"], entry["quantity"])
+    name = str(entry["quantity"])
+    return NAMES.get(name, name)
 
 
 def _limit(value: float | None) -> str:
