@@ -21,6 +21,22 @@ RUNOUT = {"effect": "tool_runout", "parameters": {"radius_um": q(20.0, 0.5), "an
 ROTATED = {"effect": "dynamometer_rotation", "parameters": {"angle_deg": q(3.0, 0.2)}}
 
 
+SLOT = {"operation": "slot", "feed_per_tooth_mm": 0.09, "axial_depth_mm": 2.0, "radial_depth_mm": 12.0}
+
+
+def predicted(loaded, effects, spindle=None, **settings):
+    """Predict a cut of the loaded batch as if its verdict named these effects."""
+    entry = {**loaded.verdict_json["observables"]["force"], "effects": effects}
+    spindle = loaded.table("spindle") if spindle is None else spindle
+    known = loaded.description, None, loaded.identified_json
+    given = SLOT | {"spindle_rpm": 6000.0} | settings
+    return predict_force(*known, entry=entry, run=None, spindle=spindle, **given)
+
+
+def width(force):
+    return float((force.table["fx_hi_n"] - force.table["fx_lo_n"]).mean())
+
+
 def test_what_changes_the_reading_alone_is_left_out():
     taken, notes = found({"effects": [RUNOUT, ROTATED]}, "force")
     assert [each.effect.name for each in taken] == ["tool_runout"]
@@ -50,31 +66,23 @@ def test_runout_changes_the_force_as_it_does_in_the_simulator(loaded):
         ALUMINIUM,
     )
     true = forces(cut, t)[-360:].T
-    entry = {**loaded.verdict_json["observables"]["force"], "effects": [RUNOUT]}
-    settings = {
-        "operation": "slot",
-        "feed_per_tooth_mm": 0.09,
-        "axial_depth_mm": 2.0,
-        "radial_depth_mm": 12.0,
-    }
-    force, plain = (
-        predict_force(
-            loaded.description,
-            None,
-            loaded.identified_json,
-            entry=each,
-            run=None,
-            spindle=loaded.table("spindle"),
-            spindle_rpm=6000.0,
-            **settings,
-        )
-        for each in (entry, {**entry, "effects": []})
-    )
+    sure = {"effect": "tool_runout", "parameters": {"radius_um": q(20.0, None), "angle_deg": q(70.0, None)}}
+    force, known, plain = (predicted(loaded, effects) for effects in ([RUNOUT], [sure], []))
     assert force.effects == ("tool_runout",)
     first = [
         np.abs(np.fft.rfft(one)[1]) / 180.0 for one in (true[0], force.table["fx_n"], plain.table["fx_n"])
     ]
     assert first[1] == pytest.approx(first[0], rel=0.02)
     assert first[2] < 0.01 * first[0]
-    wide = (force.table["fx_hi_n"] - force.table["fx_lo_n"]).mean()
-    assert wide > 1.02 * (plain.table["fx_hi_n"] - plain.table["fx_lo_n"]).mean()
+    assert width(force) > 1.02 * width(known)  # the error of the radius counts
+
+
+def test_an_arm_that_gives_way_cuts_less_of_the_wall(loaded):
+    """The give that the mean force of the thinner cut makes is the one that makes it thinner."""
+    settings = {"operation": "side", "direction": "down", "axial_depth_mm": 4.0, "radial_depth_mm": 3.0}
+    spindle = loaded.table("spindle").assign(give_x_mm_n=0.0, give_y_mm_n=2e-3, give_z_mm_n=0.0)
+    soft = predicted(loaded, [], spindle, **settings)
+    give = 2e-3 * soft.mean_n["y"]
+    assert give > 0.1
+    rigid = predicted(loaded, [], **{**settings, "radial_depth_mm": 3.0 - give})
+    assert soft.table["fy_n"].to_numpy() == pytest.approx(rigid.table["fy_n"].to_numpy(), abs=0.05)
