@@ -85,4 +85,8 @@ def test_an_arm_that_gives_way_cuts_less_of_the_wall(loaded):
     give = 2e-3 * soft.mean_n["y"]
     assert give > 0.1
     rigid = predicted(loaded, [], **{**settings, "radial_depth_mm": 3.0 - give})
-    assert soft.table["fy_n"].to_numpy() == pytest.approx(rigid.table["fy_n"].to_numpy(), abs=0.05)
+    # The give is that of circular paths, whose mean force differs by less than a hundredth.
+    near = 0.01 * rigid.peak_n
+    assert soft.table["fy_n"].to_numpy() == pytest.approx(rigid.table["fy_n"].to_numpy(), abs=near)
+    hard = predicted(loaded, [], **settings)
+    assert (soft.table["fy_n"] - hard.table["fy_n"]).abs().max() > 10.0 * near
