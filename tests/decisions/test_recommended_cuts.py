@@ -26,18 +26,12 @@ def boundary(low=None):
     return table.assign(chatter_hz=640.0, feed_per_tooth_mm=0.1, **CUT)
 
 
-def table_of(depths=(), unstable=(), rpm=3000.0, **changed):
-    return pd.DataFrame(
-        {
-            "position": "1",
-            "own_modes": True,
-            "rpm": rpm,
-            "depth_mm": depths,
-            "unstable": unstable,
-            **CUT,
-            **changed,
-        }
-    )
+def table_of(depths=(), unstable=(), rpm=3000.0, ends=True, **changed):
+    """Return tests at these depths, and one that was far too deep at each end of the speeds."""
+    tests = pd.DataFrame({"rpm": rpm, "depth_mm": depths, "unstable": unstable})
+    deep = pd.DataFrame({"rpm": [RPM[0], RPM[-1]], "depth_mm": 9.0, "unstable": 1})
+    every = pd.concat([tests, deep] if ends else [tests], ignore_index=True)
+    return every.assign(position="1", own_modes=True, **{**CUT, **changed})
 
 
 def cuts(low=None, tested=None, status="clean", limits=None):
@@ -142,3 +136,10 @@ def test_one_chattering_test_among_many_stable_ones_is_chance():
     many = table_of([0.5] * 40, [1] + [0] * 39)
     assert cuts(tested=many)[0]["advice"] == "use"
     assert cuts(tested=table_of([0.5], [1]))[0]["advice"] == "do_not"
+
+
+def test_a_speed_outside_those_of_the_tests_is_tried_with_care():
+    tested = table_of([0.15] * 6, [0] * 6, rpm=2900.0, ends=False)
+    assert {(cut["advice"], cut["why"]) for cut in cuts(tested=tested)} == {
+        ("try", "no_test_at_such_a_speed")
+    }

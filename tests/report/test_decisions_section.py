@@ -56,7 +56,7 @@ def test_the_table_begins_with_what_does_not_conform():
     section = decisions(with_verdict(decisions=JUDGED))
     (table,) = [item for item in section.items if isinstance(item, Table)]
     assert [row[1] for row in table.rows] == ["r3", "r2", "r1"]
-    assert table.rows[0][2:] == ["60.0 ± 3.0", "–", "50.00", "µm", "does not conform", "< 0.001"]
+    assert table.rows[0][2:] == ["60.0 ± 3.0", "–", "50", "µm", "does not conform", "< 0.001"]
     assert list(table.strong) == [0]
 
 

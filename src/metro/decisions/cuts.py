@@ -23,6 +23,9 @@ PROBABILITY = 0.975  # of a stable cut, at the lower end of the band
 CONTRADICTED = 0.05  # chance of as many chattering tests below the band: under it the band is not believed
 # Columns of the run table that say which boundary a cut has.
 CUT = ("operation", "direction", "radial_depth_mm", "feed_direction_deg")
+# Stable tests below the band that confirm it by themselves: of a band at half of which cuts chatter, so many
+# would be stable with a probability of 3 %.
+CONFIRMING = 5
 SURE = ("clean", "explained", "partly_explained")
 
 
@@ -98,9 +101,13 @@ def recommended_cuts(
         line = rows.sort_values("rpm").reset_index(drop=True)
         if "operation" not in line or not line["feed_per_tooth_mm"].gt(0.0).all():
             continue
-        advice, why = _advice(status, _tested(line, tests[tests["position"] == position]))
+        known = _tested(line, tests[tests["position"] == position])
+        below, chattered = _below(line, known)
         pockets = sorted(_pockets(line, milling, limits), key=lambda cut: -cut["removal_cm3_min"])
-        found += [{"position": position, **cut, "advice": advice, "why": why} for cut in pockets[:MOST]]
+        for cut in pockets[:MOST]:
+            near = known["rpm"].min() <= cut["spindle_rpm"] <= known["rpm"].max()
+            advice, why = _advice(status, below, chattered, within=bool(near))
+            found.append({"position": position, **cut, "advice": advice, "why": why})
     return found
 
 
@@ -148,29 +155,42 @@ def _cut(row: pd.Series, depth_mm: float, milling: Milling) -> JSON:
     }
 
 
-def _tested(line: pd.DataFrame, tests: pd.DataFrame) -> tuple[int, int]:
-    """Count the tests of the same cut below the band of a boundary, and those of them that chattered."""
+def _tested(line: pd.DataFrame, tests: pd.DataFrame) -> pd.DataFrame:
+    """Return the tests of the cut of a boundary of which it is known whether they chattered."""
     cut = line.iloc[0]
     same = tests["operation"].eq(cut["operation"]) & tests["direction"].eq(cut["direction"])
     for name in CUT[2:]:
         both = tests[name].isna() & pd.isna(cut[name])
         same &= both | np.isclose(tests[name].to_numpy(float), cut[name])
-    known = tests[same & (tests["unstable"] >= 0) & tests["own_modes"].astype(bool)]
+    return tests[same & (tests["unstable"] >= 0) & tests["own_modes"].astype(bool)]
+
+
+def _below(line: pd.DataFrame, known: pd.DataFrame) -> tuple[int, int]:
+    """Count the tests below the band of a boundary, and those of them that chattered."""
     low = np.interp(known["rpm"].to_numpy(float), line["rpm"], line["depth_lo_mm"])
     below = known["depth_mm"].to_numpy(float) <= low
     return int(below.sum()), int((below & (known["unstable"].to_numpy() > 0)).sum())
 
 
-def _advice(status: str | None, tested: tuple[int, int]) -> tuple[str, str]:
-    """Return what to do with the pockets of a position, and why, as codes."""
-    below, chattered = tested
+def _advice(status: str | None, below: int, chattered: int, *, within: bool) -> tuple[str, str]:
+    """Return what to do with a pocket, and why, as codes.
+
+    Parameters
+    ----------
+    below, chattered : tests below the band, and those of them that chattered. within : whether the speed is
+        among those of the tests.
+    """
     if _chance(below, chattered) < CONTRADICTED:
         return "do_not", "tests_chatter_below_the_band"
     if status in ("unexplained", "undetermined", "contradicted"):
         return "do_not", f"verdict_{status}"
-    if status in SURE and below:
+    if not below:
+        return "try", "no_test_below_the_band"
+    if not within:
+        return "try", "no_test_at_such_a_speed"
+    if status in SURE or below - chattered >= CONFIRMING:
         return "use", "tests_confirm_the_band"
-    return "try", "no_test_below_the_band" if not below else "too_few_tests"
+    return "try", "too_few_tests"
 
 
 def _chance(tests: int, chattered: int) -> float:

@@ -13,8 +13,8 @@ from metro.units import JSON, printed
 
 NAMES = {
     "flatness": "flatness (minimum zone)",
-    "ra": "roughness R_a",
-    "rz": "roughness R_z",
+    "ra": "roughness Ra",
+    "rz": "roughness Rz",
     "force": "peak force",
     "wall_error": "wall error",
     "stable_depth": "lowest stable depth",
@@ -25,6 +25,7 @@ MOST = 16  # rows
 WHY = {
     "tests_confirm_the_band": "The test cuts below the limit of this boundary were stable.",
     "no_test_below_the_band": "No test cut confirms this boundary. Begin at half the depth and listen.",
+    "no_test_at_such_a_speed": "The test cuts were made at other speeds. Begin at half the depth and listen.",
     "too_few_tests": "Too few test cuts confirm this boundary. Begin at half the depth and listen.",
     "tests_chatter_below_the_band": "Do not use these cuts: test cuts below the limit chattered.",
     "verdict_unexplained": "Do not use these cuts: the tests contradict the boundary for an unknown reason.",
@@ -135,7 +136,7 @@ def _cuts(verdict: JSON) -> list[Item]:
         ["position", *COLUMNS, "advice"],
         rows,
         caption,
-        [1, 1, 1, 1, 1.2, 1, 1, 1, 1.2],
+        [1, 0.8, 0.8, 0.8, 1.3, 1, 0.9, 0.9, 1.3],
         numeric=list(range(1, 8)),
     )
     reasons = dict.fromkeys(WHY[str(cut["why"])] for cut in cuts)
@@ -164,4 +165,4 @@ def _name(entry: JSON) -> str:
 
 
 def _limit(value: float | None) -> str:
-    return "–" if value is None else number(value, 4)
+    return "–" if value is None else f"{value:g}".replace("-", "−")
