@@ -11,7 +11,8 @@ from metro.batch.findings import BatchError, Finding
 from metro.codehash import code_hash
 from metro.formats import FormatError
 
-COMMANDS = ("check", "new-batch", "simulate", "status", "explain", "next", "query", "verify", "frf-export")
+COMMANDS = ("check", "new-batch", "simulate", "run", "status", "explain", "next", "query", "verify")
+COMMANDS += ("export", "frf-export")
 STAGES = ("ingest", "identify", "predict", "loop", "verdict", "report", "campaign")
 
 

@@ -20,7 +20,7 @@ BASE = {"spelling", "units", "joint_columns", "__init__"}
 ROOMS = {
     "units": set(),
     "joint_columns": set(),
-    "__init__": set(),
+    "__init__": {"loaded", "effects"},
     "syntax": set(),
     "codehash": {"syntax"},
     "structure": set(),
@@ -38,6 +38,7 @@ ROOMS = {
     "slips": {"batch", "signals", "cutting", "observables"},
     "loop": {"observables", "effects", "kriging"},
     "wording": set(),
+    "decisions": {"cutting", "signals"},
     "memory": set(),
     "report": {"batch", "observables"},
     "stages": {
@@ -50,6 +51,7 @@ ROOMS = {
         "loop",
         "slips",
         "wording",
+        "decisions",
         "memory",
         "report",
         "structure",
@@ -58,9 +60,16 @@ ROOMS = {
     "progress": set(),
     "workflow": {"batch", "codehash"},
     "dataset": {"batch"},
+    "loaded": {
+        *("batch", "commands", "dataset", "report", "stages", "observables", "effects", "loop", "signals"),
+        *PHYSICS,
+    },
     "importing": {"batch", "formats"},
+    "exporting": set(),
     "spelling": set(),
-    "commands": {"importing", "batch", "report", "dataset", "workflow", "codehash", "observables"},
+    "commands": {
+        *("importing", "exporting", "batch", "report", "dataset", "workflow", "codehash", "observables"),
+    },
     "cli": {"stages", "commands", "batch", "formats", "codehash"},
 }
 

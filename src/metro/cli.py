@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from metro import __version__
 from metro.commands.completion import batches, effects, observables
 from metro.commands.hidden import Style
+from metro.commands.project_calls import export, run
 from metro.commands.stage_calls import campaign, identify, ingest, loop, predict, report, verdict
 
 STAGES = "Stages, in their order (called by snakemake)"
@@ -43,7 +44,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
     help="Closed-loop metrology for robotic machining: predict, compare, trace what is left to its cause.",
-    epilog="`snakemake` brings every report up to date. Exit codes: 0 fine, 1 the input or a report is not "
+    epilog="`metro run` brings every report up to date. Exit codes: 0 fine, 1 the input or a report is not "
     "as it should be, 2 the call itself is wrong. Tab completion: `metro --install-completion`.",
 )
 
@@ -181,6 +182,9 @@ def simulate(
     write(name, kind=kind, effects=effect or [], seed=seed, style=style, as_json=as_json, **folders)
 
 
+app.command()(run)
+
+
 @app.command()
 def status(
     snakefile: Annotated[
@@ -296,6 +300,9 @@ def verify(
     from metro.commands.verify import verify_command
 
     raise typer.Exit(verify_command(batch or [], raw, processed, config, as_json))
+
+
+app.command()(export)
 
 
 @app.command("frf-export")

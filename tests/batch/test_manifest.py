@@ -1,4 +1,7 @@
+import re
+
 import pytest
+import yaml
 from conftest import edit
 
 from metro.batch.axes import signed_axes
@@ -273,3 +276,40 @@ def test_the_columns_of_the_axes_are_the_directions_of_the_sensor():
 
 def test_a_batch_without_a_manifest_is_an_error(tmp_path):
     assert "batch.yaml: is not there" in str(errors(read_manifest(tmp_path)[1])[0])
+
+
+@pytest.mark.parametrize(
+    ("lines", "severity", "message"),
+    [
+        ("tolerances: {flatness_um: {upper: 50}}", None, ""),
+        (
+            "tolerances: {flatness_um: {lower: 60, upper: 50}}",
+            "error",
+            "the lower limit below",
+        ),
+        ("tolerances: {flatness: {upper: 50}}", "error", 'did you mean "?flatness_um'),
+        ("tolerances: {flatness_um: {}}", "error", "tolerances.flatness_um: found"),
+        ("tolerances: {flatness_um: 50}", "error", "expected keys with values"),
+        ("measurement: {operator: A. Smith, date: 2026-11-24, temperature_c: 20.5}", None, ""),
+        ("measurement: {date: 24.11.2026}", "error", "expected a date, YYYY-MM-DD"),
+        ("measurement: {temperature_c: 293}", "error", "measurement.temperature_c: found 293"),
+    ],
+)
+def test_tolerances_and_the_measurement_are_checked(batch, lines, severity, message):
+    edit(batch / "batch.yaml", "cell: bench", f"cell: bench\n{lines}")
+    found = [
+        f for f in read_manifest(batch)[1] if f.column and f.column.startswith(("tolerances", "measurement"))
+    ]
+    assert [f.severity for f in found] == ([severity] if severity else [])
+    assert not found or re.search(message, str(found[0]))
+
+
+def test_a_calibration_that_was_due_before_the_measurement_is_a_warning(batch):
+    edit(batch / "batch.yaml", "cell: bench", "cell: bench\nmeasurement: {date: 2026-11-24}")
+    content = yaml.safe_load((batch / "batch.yaml").read_text())
+    content["measurement"]["date"] = "2026-11-24"
+    for due, expected in (("2026-11-23", ["warning"]), ("2026-11-24", [])):
+        content["instruments"] = {"dynamometer": {"calibration_due": due}}
+        (batch / "batch.yaml").write_text(yaml.safe_dump(content))
+        found = [f for f in read_manifest(batch)[1] if str(f.column).endswith("calibration_due")]
+        assert [f.severity for f in found] == expected

@@ -31,11 +31,16 @@ MODULES = {
     (): (
         *("", "cli", "codehash", "batch.alike"),
         *(f"commands.{name}" for name in ("calls", "completion", "hidden", "output", "stage_calls")),
-        "commands.which",
+        *(f"commands.{name}" for name in ("which", "run", "workflow_file", "project_calls")),
     ),
     ("numpy",): ("commands.query", "commands.status", "dataset.results", "dataset.views"),
     ("numpy", "yaml"): ("workflow", "commands.simulate", "commands.verify"),
-    ("numpy", "pandas", "pyarrow"): ("commands.bars", "commands.explain", "stages.verdict"),
+    ("numpy", "pandas", "pyarrow"): (
+        "commands.export",
+        "commands.bars",
+        "commands.explain",
+        "stages.verdict",
+    ),
     ("numpy", "pandas", "pyarrow", "yaml"): (
         *("commands.check", "commands.import_files", "commands.next_runs"),
         *(f"stages.{name}" for name in ("ingest", "predict", "campaign", "frf_export")),

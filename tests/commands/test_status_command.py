@@ -98,7 +98,8 @@ def test_a_folder_of_its_own_has_the_workflow_of_the_checkout(snakemake, own_cam
 
 def test_a_folder_without_any_workflow_says_what_to_do(snakemake, own_campaign, monkeypatch):
     (own_campaign / "Snakefile").unlink()
-    monkeypatch.setattr("metro.commands.status.INSTALLED", own_campaign / "none")
+    monkeypatch.setattr("metro.commands.workflow_file.CHECKOUT", own_campaign / "none")
+    monkeypatch.setattr("metro.commands.workflow_file.DISTRIBUTION", "not-installed")
     result = CliRunner().invoke(app, ["status"])
     assert result.exit_code == 2
     assert "--snakefile" in result.stderr

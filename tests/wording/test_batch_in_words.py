@@ -2,9 +2,11 @@
 
 import json
 
+import pandas as pd
 import pytest
 
-from metro.batch.processed import write_json
+from metro.batch.batch import Batch
+from metro.batch.processed import write_batch, write_json, write_table
 from metro.batch.provenance import stages
 from metro.stages.verdict import verdict
 from metro.wording.batch import story_of, verdict_in_words, verdict_of
@@ -98,6 +100,9 @@ def test_a_contradiction_says_how_probable_such_differences_are():
 def test_the_stage_writes_both_files_and_with_which_code(tmp_path):
     processed, reports = tmp_path / "processed", tmp_path / "reports"
     write_json(processed / "findings.json", FINDINGS)
+    write_json(reports / "identified.json", {})
+    write_batch(processed, Batch("b", {}, {}, pd.DataFrame({"run": []}).set_index("run"), {}), {})
+    write_table(processed / "lobes_final.parquet", pd.DataFrame())
     verdict(processed, reports, {}, "c0de")
     assert json.loads((processed / "loop.json").read_text()) == story_of(FINDINGS)
     assert json.loads((reports / "verdict.json").read_text()) == verdict_of(FINDINGS)

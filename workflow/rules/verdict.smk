@@ -1,6 +1,11 @@
 rule verdict:
     input:
         rules.loop.output.findings,
+        rules.loop.output.identified,
+        rules.loop.output.lobes,
+        rules.ingest.output.batch,
+        rules.ingest.output.tables,
+        rules.identify.output.tables,
     output:
         loop="data/processed/{batch}/loop.json",
         made="data/processed/{batch}/verdict.made.json",

@@ -44,7 +44,7 @@ def read_manifest(folder: Path) -> tuple[JSON, list[Finding]]:
     for section, check in SECTIONS.items():
         if section in content and not any(_overlap(section, column) for column in faulty):
             findings += check(content[section])
-    return content, findings + _about_the_folder(content, folder)
+    return content, [*findings, *_overdue(content), *_about_the_folder(content, folder)]
 
 
 def with_defaults(manifest: JSON) -> JSON:
@@ -187,6 +187,27 @@ def _limits(limits: JSON) -> Iterator[Finding]:
             yield Finding("error", FILE, f"found {[low, high]}, expected the least first", column=column)
 
 
+def _tolerances(tolerances: JSON) -> Iterator[Finding]:
+    """Check that of two limits the lower one is the lower."""
+    for name, limits in tolerances.items():
+        low, high = limits.get("lower"), limits.get("upper")
+        if low is not None and high is not None and low >= high:
+            message = (
+                f"found lower: {low:g} and upper: {high:g}, expected the lower limit below the upper one"
+            )
+            yield Finding("error", FILE, message, column=f"tolerances.{name}")
+
+
+def _overdue(content: JSON) -> Iterator[Finding]:
+    """Warn of instruments whose calibration was due before the day of the measurement."""
+    day = entry(content, "measurement.date")
+    for name, instrument in (content.get("instruments") or {}).items():
+        due = instrument.get("calibration_due") if isinstance(instrument, dict) else None
+        if isinstance(day, str) and isinstance(due, str) and due < day:
+            message = f"was due on {due}, before the measurement on {day}: calibrate, or correct the date"
+            yield Finding("warning", FILE, message, column=f"instruments.{name}.calibration_due")
+
+
 def _rotation_fault(matrix: Array) -> str | None:
     """Describe what keeps a (3, 3) matrix from being a rotation."""
     if np.abs(matrix.T @ matrix - np.eye(3)).max() > ORTHONORMAL:
@@ -225,6 +246,7 @@ def _not_metres(least: float) -> Callable[[Any], str | None]:
 SECTIONS: dict[str, Callable[[JSON], Iterable[Finding]]] = {
     "known": _known,
     "limits": _limits,
+    "tolerances": _tolerances,
     "files": mapping_findings,
 }
 # Semantic checks of what a schema cannot express: path of keys → rule(value) → message or None.

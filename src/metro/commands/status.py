@@ -15,14 +15,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from metro.batch.findings import ContractError, Finding
-from metro.commands.calls import wrong_call
 from metro.commands.output import print_json, print_table
+from metro.commands.workflow_file import workflow_file
 
 STAGES = ("ingest", "identify", "predict", "loop", "verdict", "report")
 COLUMNS = ("output_file", "rule", "status", "plan")
 LAST_LINES = 20
-# The workflow of this folder, and that of the checkout metro is installed from.
-HERE, INSTALLED = Path("Snakefile"), Path(__file__).resolve().parents[3] / "Snakefile"
 
 
 @dataclass
@@ -44,7 +42,7 @@ def status_command(snakefile: Path | None, reports: Path, as_json: bool) -> None
     ----------
     snakefile : the workflow; None: the one of this folder, else that of the checkout metro is installed from.
     """
-    workflow = _workflow(snakefile)
+    workflow = workflow_file(snakefile)
     batches, summary = planned(_ask_snakemake(workflow))
     for name, batch in batches.items():
         batch.verdicts = verdicts(reports / name)
@@ -117,19 +115,6 @@ def verdicts(reports: Path) -> dict[str, str]:
         return {}
     content = json.loads(path.read_text(encoding="utf-8"))
     return {name: str(entry.get("status")) for name, entry in (content.get("observables") or {}).items()}
-
-
-def _workflow(snakefile: Path | None) -> Path:
-    """Return the file of the workflow."""
-    if snakefile is not None:
-        if not snakefile.is_file():
-            raise wrong_call("--snakefile", f"{snakefile} is not there")
-        return snakefile
-    present = next((path for path in (HERE, INSTALLED) if path.is_file()), None)
-    if present is None:
-        message = "is not there: call metro where you call snakemake, or name the workflow with --snakefile"
-        raise wrong_call(str(HERE), message)
-    return present
 
 
 def _look_for_refused(unread: Mapping[str, BatchStatus], workflow: Path) -> None:

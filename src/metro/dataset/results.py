@@ -80,13 +80,23 @@ def rows(view: str, processed: Path, reports: Path) -> list[Row]:
             if key != "format"
             for quantity in quantities(block, key)
         ]
-    make = {"verdicts": _verdict, "effects": _effects, "candidates": _candidates}[view]
     return [
         row
         for path in _of_all(reports, "verdict.json")
-        for observable, entry in (_read(path).get("observables") or {}).items()
-        for row in make(path.parent.name, observable, entry)
+        for row in rows_of(view, path.parent.name, _read(path))
     ]
+
+
+def rows_of(view: str, batch: str, verdict: JSON) -> list[Row]:
+    """Return the rows of ``verdicts``, ``effects`` or ``candidates`` that a ``verdict.json`` holds."""
+    make = {"verdicts": _verdict, "effects": _effects, "candidates": _candidates}[view]
+    entries = (verdict.get("observables") or {}).items()
+    return [row for observable, entry in entries for row in make(batch, observable, entry)]
+
+
+def columns_of(view: str) -> list[str]:
+    """Return the names of the columns of a view of :data:`COLUMNS`."""
+    return [column.rstrip("!#") for column in COLUMNS[view]]
 
 
 def _verdict(batch: str, observable: str, entry: JSON) -> Iterator[Row]:

@@ -14,6 +14,7 @@ from metro.report.sections.calibration import calibration
 from metro.report.sections.causes import upstream, with_causes
 from metro.report.sections.comparison import comparison
 from metro.report.sections.contradictions import with_contradictions
+from metro.report.sections.decisions import decisions, with_decisions
 from metro.report.sections.identification import identification
 from metro.report.sections.levelling import levelling
 from metro.report.sections.loop import loop
@@ -39,8 +40,10 @@ def report_pdf(results: Results, sections: Sequence[Section]) -> bytes:
 
 def report_sections(results: Results) -> list[Section]:
     """Return the sections that a batch's report has."""
+    first = with_causes(with_decisions(summary(results), results), results)
     sections = [
-        with_contradictions(with_flags(with_causes(summary(results), results), results), results),
+        with_contradictions(with_flags(first, results), results),
+        decisions(results),
         setup(results),
         quality(results),
         published(results),

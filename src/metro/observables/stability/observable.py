@@ -33,6 +33,7 @@ _COLUMNS: dict[str, tuple[str, ...]] = {
     "lobes": (
         *("position", "rpm", "depth_mm", "depth_lo_mm", "depth_hi_mm", "depth_p05_mm", "depth_p95_mm"),
         *("chatter_hz", "kind", "error_mm", "interpolated"),
+        *("operation", "direction", "radial_depth_mm", "feed_direction_deg", "feed_per_tooth_mm"),
     ),
     "lobe_runs": (
         *("run", "position", "own_modes", "rpm", "depth_mm", "boundary_mm", "predicted_hz"),
@@ -139,7 +140,7 @@ def _solved(
                 solved.append(lobes)
                 feed = float(same["feed_per_tooth_mm"].iloc[0]) * MM
                 deepest = stability.deepest(lobes, same)
-                parts["lobes"].append(stability.diagram(lobes))
+                parts["lobes"].append(_of_cut(lobes, same))
                 parts["lobe_methods"].append(lobe_methods.methods(lobes, cutting.tool, feed))
                 notes += lobe_methods.left_out(parts["lobe_methods"][-1], cutting.tool)
                 parts["lobe_islands"].append(lobe_methods.islands(lobes, deepest))
@@ -147,6 +148,14 @@ def _solved(
     parts["lobe_stations"].append(lobe_methods.stations(solved, where))
     notes += stability.worth(solved)
     return parts
+
+
+def _of_cut(lobes: stability.Lobes, runs: pd.DataFrame) -> pd.DataFrame:
+    """Return a diagram with the settings of its cut, and the usual feed of the runs that share it."""
+    names = ("operation", "direction", "radial_depth_mm", "feed_direction_deg")
+    settings = {name: runs[name].iloc[0] for name in names}
+    feed = float(runs["feed_per_tooth_mm"].median())
+    return stability.diagram(lobes).assign(**settings, feed_per_tooth_mm=feed)
 
 
 def _others(tips: list[Tip], pairs: list[tuple[pd.DataFrame, Tip]]) -> list[Tip]:
@@ -169,7 +178,7 @@ def _elsewhere(
     solved = [stability.solve(tip, cutting, most.iloc[0], rpm, check=False) for tip in tips]
     solved = [lobes for lobes in solved if np.any(np.isfinite(lobes.boundary.depth))]
     for lobes in solved:
-        parts["lobes"].append(stability.diagram(lobes))
+        parts["lobes"].append(_of_cut(lobes, most))
         parts["lobe_methods"].append(lobe_methods.methods(lobes, cutting.tool, feed, check=False))
     return solved
 

@@ -10,6 +10,7 @@ from metro.observables.catalogue import assumptions, title
 from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
 from metro.report.phrases import sentence
 from metro.report.results import Results
+from metro.report.sections.identity import identity
 from metro.units import JSON
 
 LONGEST, SHORT, DIGITS = 240, 16, 12
@@ -17,7 +18,7 @@ LONGEST, SHORT, DIGITS = 240, 16, 12
 
 def provenance(results: Results) -> Section:
     """Write limits of the models, code and settings of every stage, versions, source files."""
-    parts = _limits(results), _approval(), _code(results), _sources(results)
+    parts = _limits(results), identity(results), _approval(), _code(results), _sources(results)
     return Section("Provenance", [item for part in parts for item in part])
 
 

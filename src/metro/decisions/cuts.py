@@ -1,0 +1,200 @@
+"""Cuts to use: the stable pockets of a boundary, with what they remove, their torque, power and chatter.
+
+A pocket is a speed at which more material can be removed, surely stable, than at the speeds about it. Its
+depth is the lower end of the boundary's 95 % band, at the worst of the speed itself and its neighbours on the
+diagram: a spindle does not turn exactly as it is told.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from metro.cutting.engagement import engagement
+from metro.units import JSON, MM, N_MM, N_MM2, RPM, Array
+
+MOST = 3  # pockets of a position
+PROBABILITY = 0.975  # of a stable cut, at the lower end of the band
+CONTRADICTED = 0.05  # chance of as many chattering tests below the band: under it the band is not believed
+# Columns of the run table that say which boundary a cut has.
+CUT = ("operation", "direction", "radial_depth_mm", "feed_direction_deg")
+# Stable tests below the band that confirm it by themselves: of a band at half of which cuts chatter, so many
+# would be stable with a probability of 3 %.
+CONFIRMING = 5
+SURE = ("clean", "explained", "partly_explained")
+
+
+@dataclass(frozen=True)
+class Milling:
+    """Tool and coefficients of a batch, SI; ``hole_radius`` of helical cuts."""
+
+    radius: float
+    teeth: int
+    ktc: float
+    kte: float
+    hole_radius: float = 0.0
+
+    @classmethod
+    def of(cls, manifest: JSON, identified: JSON) -> Milling | None:
+        """Return tool and coefficients, declared or identified; None where they are not known."""
+        tool = manifest.get("tool") or {}
+        declared = manifest.get("coefficients") or {}
+        waveform = (identified.get("force") or {}).get("waveform") or {}
+        ktc, kte = (
+            declared.get(f"{name}_{unit}", (waveform.get(name) or {}).get("value"))
+            for name, unit in (("ktc", "n_mm2"), ("kte", "n_mm"))
+        )
+        if ktc is None or kte is None or not {"diameter_mm", "teeth"} <= set(tool):
+            return None
+        edge = math.cos(math.radians(tool.get("helix_deg", 0.0))) if _per_arc(declared) else 1.0
+        hole = 0.5 * float(manifest.get("hole_diameter_mm") or 0.0) * MM
+        radius, teeth = 0.5 * tool["diameter_mm"] * MM, int(tool["teeth"])
+        return cls(radius, teeth, ktc * N_MM2, kte / edge * N_MM, hole)
+
+    def width(self, operation: str, radial_depth: float) -> float:
+        """Width of the chip's section, m: volume over depth and feed. A hole is removed as a whole."""
+        if operation == "helical":
+            return self.hole_radius**2 / (2.0 * (self.hole_radius - self.radius))
+        return 2.0 * self.radius if operation == "slot" else radial_depth
+
+    def torque(self, operation: str, direction: str, radial_depth: float, feed: float) -> float:
+        """Mean torque per axial depth, N m/m: N R/(2π) × (K_tc c (cos φ_s − cos φ_e) + K_te (φ_e − φ_s)).
+
+        Altintas, Manufacturing Automation, 2nd ed., chapter 2. ``feed`` per tooth, m.
+        """
+        arc = engagement(operation, direction, radial_depth, self.radius)
+        chip = feed * (math.cos(arc.entry) - math.cos(arc.exit))
+        length = arc.exit - arc.entry
+        return self.teeth * self.radius / (2.0 * math.pi) * (self.ktc * chip + self.kte * length)
+
+
+def _per_arc(declared: JSON) -> bool:
+    return "kte_n_mm" in declared and declared.get("edge_length", "axial") != "axial"
+
+
+def recommended_cuts(
+    lobes: pd.DataFrame, tests: pd.DataFrame, status: str | None, milling: Milling, limits: Mapping[str, Any]
+) -> list[JSON]:
+    """Return the cuts to use at each position, the largest removal rate first, or why there are none.
+
+    Parameters
+    ----------
+    lobes : table ``lobes_final``. tests : table ``lobe_runs`` with the columns :data:`CUT` of the run table.
+    status : of the verdict on stability; None: no cut was tested.
+    limits : of ``batch.yaml``: least and greatest, by column of ``runs.csv``.
+
+    Returns
+    -------
+    list of JSON
+        ``position``, ``spindle_rpm``, ``axial_depth_mm``, the other settings, ``probability_stable`` (at
+        least), ``removal_cm3_min``, ``torque_nm``, ``power_kw``, ``chatter_hz`` (at the boundary there),
+        ``advice``: ``use``, ``try`` (begin at half the depth and listen: no test confirms it) or ``do_not``;
+        ``why`` as a code.
+    """
+    found = []
+    for position, rows in lobes.groupby("position", sort=False):
+        line = rows.sort_values("rpm").reset_index(drop=True)
+        if "operation" not in line or not line["feed_per_tooth_mm"].gt(0.0).all():
+            continue
+        known = _tested(line, tests[tests["position"] == position])
+        below, chattered = _below(line, known)
+        pockets = sorted(_pockets(line, milling, limits), key=lambda cut: -cut["removal_cm3_min"])
+        for cut in pockets[:MOST]:
+            near = known["rpm"].min() <= cut["spindle_rpm"] <= known["rpm"].max()
+            advice, why = _advice(status, below, chattered, within=bool(near))
+            found.append({"position": position, **cut, "advice": advice, "why": why})
+    return found
+
+
+def _pockets(line: pd.DataFrame, milling: Milling, limits: Mapping[str, Any]) -> Iterator[JSON]:
+    """Yield the surely stable cut of each speed at which removal has a local maximum."""
+    rpm, low = line["rpm"].to_numpy(float), line["depth_lo_mm"].to_numpy(float)
+    least, most = limits.get("spindle_rpm") or (-math.inf, math.inf)
+    shallow, deepest = limits.get("axial_depth_mm") or (0.0, math.inf)
+    depth = np.minimum(_worst_about(low), deepest)
+    removal = np.where((rpm >= least) & (rpm <= most) & (depth >= shallow), rpm * depth, -math.inf)
+    higher = np.concatenate([[-math.inf], removal, [-math.inf]])
+    peaks = np.flatnonzero((removal > higher[:-2]) & (removal >= higher[2:]) & np.isfinite(removal))
+    for at in peaks:
+        row = line.iloc[int(at)]
+        yield _cut(row, float(depth[at]), milling)
+
+
+def _worst_about(values: Array) -> Array:
+    """Least of each value and its two neighbours."""
+    padded = np.concatenate([values[:1], values, values[-1:]])
+    return np.asarray(np.minimum(np.minimum(padded[:-2], padded[1:-1]), padded[2:]))
+
+
+def _cut(row: pd.Series, depth_mm: float, milling: Milling) -> JSON:
+    """Return a cut with what it removes and takes."""
+    operation, direction = str(row["operation"]), str(row["direction"]) or "slot"
+    radial = float(row["radial_depth_mm"])
+    radial_m = 2.0 * milling.radius if math.isnan(radial) else radial * MM
+    feed, depth, speed = float(row["feed_per_tooth_mm"]) * MM, depth_mm * MM, float(row["rpm"]) * RPM
+    torque = depth * milling.torque(operation, direction, radial_m, feed)
+    feed_rate = feed * milling.teeth * speed / (2.0 * math.pi)
+    removal = milling.width(operation, radial_m) * depth * feed_rate
+    return {
+        "spindle_rpm": float(row["rpm"]),
+        "axial_depth_mm": depth_mm,
+        "operation": operation,
+        "direction": direction,
+        "radial_depth_mm": None if math.isnan(radial) else radial,
+        "feed_per_tooth_mm": float(row["feed_per_tooth_mm"]),
+        "probability_stable": PROBABILITY,
+        "removal_cm3_min": 60.0 * removal * 1e6,
+        "torque_nm": torque,
+        "power_kw": torque * speed / 1e3,
+        "chatter_hz": float(row["chatter_hz"]),
+    }
+
+
+def _tested(line: pd.DataFrame, tests: pd.DataFrame) -> pd.DataFrame:
+    """Return the tests of the cut of a boundary of which it is known whether they chattered."""
+    cut = line.iloc[0]
+    same = tests["operation"].eq(cut["operation"]) & tests["direction"].eq(cut["direction"])
+    for name in CUT[2:]:
+        both = tests[name].isna() & pd.isna(cut[name])
+        same &= both | np.isclose(tests[name].to_numpy(float), cut[name])
+    return tests[same & (tests["unstable"] >= 0) & tests["own_modes"].astype(bool)]
+
+
+def _below(line: pd.DataFrame, known: pd.DataFrame) -> tuple[int, int]:
+    """Count the tests below the band of a boundary, and those of them that chattered."""
+    low = np.interp(known["rpm"].to_numpy(float), line["rpm"], line["depth_lo_mm"])
+    below = known["depth_mm"].to_numpy(float) <= low
+    return int(below.sum()), int((below & (known["unstable"].to_numpy() > 0)).sum())
+
+
+def _advice(status: str | None, below: int, chattered: int, *, within: bool) -> tuple[str, str]:
+    """Return what to do with a pocket, and why, as codes.
+
+    Parameters
+    ----------
+    below, chattered : tests below the band, and those of them that chattered. within : whether the speed is
+        among those of the tests.
+    """
+    if _chance(below, chattered) < CONTRADICTED:
+        return "do_not", "tests_chatter_below_the_band"
+    if status in ("unexplained", "undetermined", "contradicted"):
+        return "do_not", f"verdict_{status}"
+    if not below:
+        return "try", "no_test_below_the_band"
+    if not within:
+        return "try", "no_test_at_such_a_speed"
+    if status in SURE or below - chattered >= CONFIRMING:
+        return "use", "tests_confirm_the_band"
+    return "try", "too_few_tests"
+
+
+def _chance(tests: int, chattered: int) -> float:
+    """Probability of so many or more chattering tests, where each does so with what the band leaves."""
+    share = 1.0 - PROBABILITY
+    fewer = (math.comb(tests, k) * share**k * (1.0 - share) ** (tests - k) for k in range(chattered))
+    return 1.0 - sum(fewer)
