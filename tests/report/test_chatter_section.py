@@ -84,7 +84,7 @@ def test_every_kind_is_drawn_where_it_was_cut_and_wrong_labels_are_circled():
     drawn = {c.get_label(): c.get_offsets().tolist() for c in axes.collections}
     assert drawn["chatter (Hopf)"] == [[1500.0, 1.5]]
     assert drawn["chatter (flip)"] == [[2000.0, 1.8]]
-    assert drawn["unknown kind, or cannot be told"] == [[2500.0, 1.2]]
+    assert drawn["kind unknown or not determined"] == [[2500.0, 1.2]]
     assert drawn["stable"] == [[1500.0, 0.5], [3000.0, 1.0]]
     assert drawn["labelled otherwise"] == [[1500.0, 1.5]]
 

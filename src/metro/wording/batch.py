@@ -16,16 +16,19 @@ BRIEF = (
     "seen_in",
 )  # what verdict.json has of a cause
 STATUSES = {
-    "clean": "The identification runs show nothing that the base model lacks; nothing was added.",
+    "clean": "The identification runs show no effect beyond the base model; nothing was added.",
     "explained": "The residual is explained by {effects}.",
-    "partly_explained": "Part of the residual is explained by {effects}, proven on left-out conditions; "
-    "a significant rest remains that no effect of the library accounts for.",
+    "partly_explained": "Part of the residual is explained by {effects}, as left-out conditions confirm. "
+    "A significant residual remains that no effect of the library explains.",
     "undetermined": "Several effects explain the residual equally well with these data: {rivals}.",
-    "unexplained": "There is a significant residual that no effect of the library accounts for; "
-    "nothing was added.",
-    "contradicted": "The data contradict what the batch declares; nothing is attributed to a cause.",
-    "insufficient": "There are too few runs to tell: nothing can be said about the residual.",
+    "unexplained": "There is a significant residual that no effect of the library explains; nothing was "
+    "added.",
+    "contradicted": "The data contradict the declaration of the batch; no cause was sought.",
+    "insufficient": "There are too few runs to decide whether the residual is significant.",
 }
+
+
+REMAINING = " Remaining error: "  # begins the last sentence of a verdict, which the report draws instead
 
 
 def verdict_of(findings: JSON) -> JSON:
@@ -85,4 +88,4 @@ def verdict_in_words(verdict: JSON) -> str:
         sentence += f" and {after['rms']:.3g}{unit} after."
     if verdict.get("verification"):
         sentence += f" {verdict['verification']['words']}"
-    return sentence + (f" What is left: {residual['signature']}." if residual else "")
+    return sentence + (f"{REMAINING}{residual['signature']}." if residual else "")

@@ -19,7 +19,7 @@ KINDS = {
     "hopf": ("X", style.BEFORE, "chatter (Hopf)"),
     "flip": ("P", style.PURPLE, "chatter (flip)"),
     "low_frequency": ("D", style.YELLOW, "chatter in a mode of the robot"),
-    "unknown": ("*", style.MEASURED, "unknown kind, or cannot be told"),
+    "unknown": ("*", style.MEASURED, "kind unknown or not determined"),
 }
 STABLE = ((0, style.GREEN, "stable"), (1, style.BEFORE, "chatter"))
 NUMBERED = 25  # most tests of which each has its probability next to it

@@ -142,12 +142,14 @@ def _words(tests: pd.DataFrame) -> list[str]:
     hidden = [str(run) for run in tests["run"][~tests["separable"].astype(bool)]]
     if hidden:
         words.append(
-            f"Not separable at this speed: {listing(hidden)}. Something stands on an order of the spindle, "
-            "where chatter and runout share their lines; another speed tells."
+            f"Not separable at this speed: {listing(hidden)}. A line lies on an order of the spindle, where "
+            "chatter and runout coincide. Repeat the test at another speed."
         )
     late = [str(run) for run in tests["run"][(tests["unstable"] < 0) & tests["separable"].astype(bool)]]
     if late:
-        words.append(f"Chatter may begin at the end of the record of {listing(late)}; a longer cut tells.")
+        words.append(
+            f"Chatter may begin at the end of the record of {listing(late)}. Repeat with a longer cut."
+        )
     return words
 
 
@@ -162,8 +164,8 @@ def _records(results: Results, tests: pd.DataFrame) -> list[Item]:
     }
     cuts = " and in ".join(kind for kind, there in kinds.items() if there)
     caption = (
-        f"Force in {cuts}: spectrum of the whole steady cut, and its last turns. What chatters stands "
-        "between the orders of the spindle."
+        f"Force in {cuts}: spectrum of the whole steady cut, and the record of its last turns. Chatter "
+        "appears between the orders of the spindle."
     )
     chart = figures.records_chart(records, tests, int(results.batch.manifest["tool"]["teeth"]))
     return [Picture(chart, caption, caption)]

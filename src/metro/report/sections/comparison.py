@@ -19,6 +19,7 @@ from metro.report.sections.lobes import cut_items
 from metro.units import printed
 
 LONGEST, SHORT = 30, 6
+WHAT_IS_DRAWN = "Measured {} and predictions, held-out runs."
 ABREAST = 2  # runs in one figure, so that figures break over pages
 FEWEST = 3  # values of a run along an axis that make a curve
 
@@ -89,11 +90,14 @@ def _curves(frame: pd.DataFrame, name: str, words: str, *, alone: bool) -> list[
     items: list[Item] = []
     for i in range(0, len(shown), abreast):
         runs_here = shown[i : i + abreast]
-        about = f"{findings.left(frame)} Measured {name} and predictions, held-out runs.{part}{repeats}"
+        about = f"{findings.left(frame)} {WHAT_IS_DRAWN.format(name)}{part}{repeats}"
         items.append(
             Picture(
                 figures.overlay(frame[frame["run"].isin(runs_here)], name, alone=alone),
-                f"The same of {listing(runs_here)}." if i else about,
+                f"{findings.left(frame[frame['run'].isin(runs_here)])} {WHAT_IS_DRAWN.format(name)} Runs "
+                f"{listing(runs_here)}."
+                if i
+                else about,
                 f"Measured and predicted {name} for {listing(runs_here)}; {words}.",
             )
         )

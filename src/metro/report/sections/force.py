@@ -41,8 +41,8 @@ def force_items(results: Results) -> list[Item]:
         metrics_table(metrics),
         Picture(
             figures.spectrum(orders, teeth),
-            f"{findings.peak_order(orders)} Order spectrum, measured and what the predictions leave, rms "
-            f"over the held-out runs. Ticks stand at the tooth passing, every {teeth} orders.",
+            f"{findings.peak_order(orders)} Order spectra of the measured force and of the residuals, rms "
+            f"over the held-out runs. The ticks mark the tooth passing, every {teeth} orders.",
             _spectrum_words(orders),
         ),
         Picture(

@@ -95,4 +95,4 @@ def _run_words(runs: pd.DataFrame) -> str:
             f"{logs}"
         )
     kept = f"{made}, {recorded} recorded, {held} of them held out"
-    return f"{kept}: no model saw those before it was judged.{logs}"
+    return f"{kept}: no fit used those.{logs}"

@@ -34,7 +34,7 @@ def modes(identified: list[JSON], tables: Mapping[str, pd.DataFrame]) -> list[It
     header = ["position", "direction", *(name for _, name in KEYS)]
     caption = "Modes with 95 % intervals; the frequency is the undamped one."
     if any(not mode.get("resolved", True) for mode in shown):
-        caption += " * not resolved: the data tell damping or stiffness no better than to a third."
+        caption += " * not resolved: damping or stiffness is known no better than to a third."
     rows = [_row(mode) for mode in shown[:LONGEST]]
     if len(rows) < len(identified):
         caption += f" The first {len(rows)} of {len(identified)} are shown; identified.json has all."

@@ -100,8 +100,8 @@ def advice(identified: JSON) -> list[Item]:
     best, count = advised["configurations"][0], len(advised["configurations"])
     text = (
         f"Of {count} planned configurations of faces, none of them cut, {best['configuration']} is predicted "
-        f"to be the flattest: X_m {quantity(best['xm_predicted'])}, the best with probability "
-        f"{probability(best['probability_best'])}. Nothing was measured of these."
+        f"to be the flattest: X_m {quantity(best['xm_predicted'])}. It is the best of them with probability "
+        f"{probability(best['probability_best'])}. These configurations have not been measured."
     )
     return [Paragraph(text)]
 
@@ -162,9 +162,11 @@ def _peak(mode: JSON) -> float:
 
 def no_verdict(results: Results) -> str:
     """Say that nothing was compared, and which quantities were identified instead."""
-    nothing = "No held-out measurement could be compared with a prediction in this batch: no verdict."
+    nothing = (
+        "This batch has no verdict, because no held-out measurement could be compared with a prediction."
+    )
     if set(results.identified.get("pose") or {}) - {"not_identified"}:
-        nothing = "The arm was fitted to measured poses and tested on others. There was no cut to judge."
+        nothing = "The arm model was fitted to measured poses and tested on others. The batch has no cuts."
     return f"{nothing} {_identified_words(results.identified)}".strip()
 
 
@@ -197,8 +199,8 @@ def print_check(results: Results) -> list[Item]:
     text = f"{len(table)} printed values were transcribed"
     if pairs:
         text += f", {pairs} of them with a prediction beside them; every printed error was recomputed"
-    text += f". {f'{flagged} cannot' if flagged else 'All can'} be right as printed"
-    text += f"; for {errata} an erratum is stated." if errata else "."
+    text += f". {f'{flagged} printed values are' if flagged else 'No printed value is'} inconsistent"
+    text += f"; {errata} carry an erratum." if errata else "."
     return [Paragraph(text), *_printed_modes(table)]
 
 

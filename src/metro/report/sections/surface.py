@@ -132,7 +132,7 @@ def _by_noise_alone(faces: dict[str, pd.DataFrame]) -> list[Item]:
         if not high > 0 or not (alone or (unfiltered and bias > value / 2)):
             continue
         face = with_interval(corrected, [low, high])
-        judged = "is not told from flat" if alone else "is the rest"
+        judged = "cannot be distinguished from flat" if alone else "accounts for the remainder"
         said.append(
             f"{run}: X_m reads {number(value)} µm, but {number(bias)} µm of that is what noise of "
             f"{number(sigma, 2)} µm per point makes of {int(part['points'].iloc[0])} points. The face "

@@ -26,19 +26,23 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
     whole, part = _attribution(entry, "the difference"), _attribution(entry, "part of the difference")
     verified = (entry.get("verification") or {}).get("words", "")
     says = {
-        "clean": f"{start}: the identification runs show nothing that the base model lacks. {_fall(entry)} "
-        f"{verified}",
+        "clean": f"{start}: the base model explains the identification runs; no effect is missing. "
+        f"{_fall(entry)} {verified}",
         "explained": f"{start}: {whole} {_fall(entry)} {verified}",
         "partly_explained": f"{start}: {part} {_fall(entry)} {verified} A significant residual remains. "
         f"{_residual(entry, left)}",
-        "undetermined": f"{start}: something is missing from the base model, but these data do not "
-        f"determine what. {_rivals(entry)}{_fall(entry)} {verified}",
-        "unexplained": f"{start}: the base model leaves a significant error, and no effect of the library "
-        f"accounts for it. {_fall(entry)} {verified} {_residual(entry, left)}",
-        "insufficient": f"{start}: too few runs to decide. {_fall(entry)} {verified}",
+        "undetermined": f"{start}: the base model lacks an effect, but these runs do not determine which "
+        f"one. {_rivals(entry)}{_fall(entry)} {verified}",
+        "unexplained": f"{start}: the base model has a significant error that no effect of the library "
+        f"explains. {_fall(entry)} {verified} {_residual(entry, left)}",
+        "insufficient": f"{start}: there are too few runs to decide whether an effect is missing. "
+        f"{_fall(entry)} {verified}",
     }
     if entry.get("contradicted"):
-        return f"{start}: the data contradict what the batch declares; nothing is attributed. {_fall(entry)}"
+        return (
+            f"{start}: the data contradict the declaration of the batch, so no cause was sought. "
+            f"{_fall(entry)}"
+        )
     return says.get(status, f"{start}: {words(status)}.").strip()
 
 
@@ -46,13 +50,12 @@ def _attribution(entry: JSON, what: str) -> str:
     """Say to which causes ``what`` is traced, and which ones are only the likeliest of the library."""
     effects = entry.get("effects") or []
     sure = [effect_words(one) for one in effects if (one.get("probability") or 0.0) >= SURE]
-    leads = [effect_words(one) for one in effects if (one.get("probability") or 0.0) < SURE]
+    possible = [effect_words(one) for one in effects if (one.get("probability") or 0.0) < SURE]
     traced = f"{what} from the base model is traced to {listing(sure)}." if sure else ""
-    if not leads:
+    if not possible:
         return traced
-    so_much = "more of it" if sure else f"{what} from the base model"
-    likeliest = f"{listing(leads)} would account for {so_much}; this is a lead, not a finding."
-    return f"{traced} {likeliest}".strip()
+    so_much = "a further part of it" if sure else f"{what} from the base model"
+    return f"{traced} A possible cause of {so_much} is {listing(possible)}.".strip()
 
 
 def error_text(error: JSON | None, unit_name: str | None) -> str:
@@ -120,19 +123,20 @@ def _fall(entry: JSON) -> str:
     share_before, share_after = percent(before.get("nrmse")), percent(after.get("nrmse"))
     what = "the error"
     if _dimensionless(entry):
-        what = "the error of the predicted probability of chatter (rms, against 0 or 1 as found)"
+        what = "the error of the predicted probability of chatter (rms, against the outcomes 0 and 1)"
     if before["rms"] == after["rms"]:
         share = "" if _dimensionless(entry) else f" ({share_before} of the signal)"
         return f"{where} {what} is {old}{share}."
-    share = "" if _dimensionless(entry) else f" ({share_before} → {share_after} of the signal)"
-    return f"{where} {what} goes from {old} to {new}{share}."
+    share = "" if _dimensionless(entry) else f" ({share_before} to {share_after} of the signal)"
+    verb = "falls" if after["rms"] < before["rms"] else "rises"
+    return f"{where} {what} {verb} from {old} to {new}{share}."
 
 
 def _residual(entry: JSON, left: str) -> str:
     unexplained = entry.get("unexplained") or {}
     if not unexplained.get("signature"):
         return ""
-    return f"What is left: {left or plain(str(unexplained['signature']))}."
+    return f"The remaining error appears {left or plain(str(unexplained['signature']))}."
 
 
 def left_words(results: Results, observable: str) -> str:
@@ -145,11 +149,11 @@ def _rivals(entry: JSON) -> str:
     groups = [
         " or ".join(words(str(name)) for name in group) for group in entry.get("indistinguishable") or []
     ]
-    return f"It may be {'; or '.join(groups)}. " if groups else ""
+    return f"Possible causes: {'; or '.join(groups)}. " if groups else ""
 
 
 def next_words(entry: JSON) -> str:
     """Say what to measure next, and whether the verdict does not need it; empty if there is nothing."""
     text = plain(str(entry.get("next_experiment") or "")).rstrip(".")
     needless = entry.get("status") in HOLDS
-    return f"{text} (the verdict does not need it)" if text and needless else text
+    return f"{text} (optional: the verdict does not depend on it)" if text and needless else text

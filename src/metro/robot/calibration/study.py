@@ -56,7 +56,7 @@ def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
     known = determined(jacobian(state, poses.q)[1], free_of_geometry(state), as_declared.scale)
     if not known.kept[:6].all():
         scatter = f"they scatter by {as_declared.scale / MM:.3g} mm about the declared arm"
-        raise ValueError(f"the poses do not determine where the arm stands: {scatter}")
+        raise ValueError(f"the poses do not determine the place of the arm's base: {scatter}")
     corrected = fitted(poses, state, known.kept)
     chosen, trials = search(poses, corrected, library(poses, state, up))
     return Calibration((as_declared, corrected, fitted(poses, state, known.kept, chosen)), known, trials)
