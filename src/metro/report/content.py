@@ -96,6 +96,14 @@ Simple = Paragraph | Bullets | Table | Picture | Facts | Heading
 Item = Simple | Abreast
 
 
+def gathered(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Join the rows of a table that differ only in their first cell: r01, r02 and r05 share a row."""
+    shared: dict[tuple[str, ...], list[str]] = {}
+    for first, *cells in rows:
+        shared.setdefault(tuple(cells), []).append(first)
+    return [[", ".join(names), *cells] for cells, names in shared.items()]
+
+
 def abreast(items: Sequence[Table | Picture]) -> list[Item]:
     """Arrange items in pairs, side by side."""
     return [Abreast(items[i : i + 2]) for i in range(0, len(items), 2)]

@@ -72,7 +72,7 @@ def _probabilities(axes: Axes, tests: pd.DataFrame) -> None:
     for _, test in tests.iterrows():
         place = (test["rpm"], test["depth_mm"])
         axes.annotate(
-            f"{test['probability']:.2f}", place, (7, 0), textcoords="offset points", va="center", fontsize=6.5
+            f"{test['probability']:.2f}", place, (7, 0), textcoords="offset points", va="center", fontsize=8
         )
 
 

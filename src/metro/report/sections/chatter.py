@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from metro.report.content import Bullets, Heading, Item, Picture, Table
+from metro.report.content import Bullets, Heading, Item, Picture, Table, gathered
 from metro.report.figures import chatter as figures
 from metro.report.numbers import listing, number, probability
 from metro.report.results import Results
@@ -30,9 +30,9 @@ def chatter_items(results: Results) -> list[Item]:
     items: list[Item] = [Heading("Chatter in the records")]
     boundary = results.tables.get("lobes_final")
     if boundary is None and (tests["unstable"] == 0).all() and not tests["wrong_label"].any():
-        return [*items, Bullets([f"None of {len(tests)} records that could be judged holds chatter."])]
+        return [*items, Bullets([f"None of the {len(tests)} records that could be judged shows chatter."])]
     if boundary is not None and tests["position"].notna().any():
-        caption = "Test cuts on the stability boundary, by what their own records say"
+        caption = "Test cuts on the stability boundary, classified by their own records"
         caption += ", with the probability of chatter." if len(tests) <= figures.NUMBERED else "."
         items.append(Picture(figures.tests_chart(boundary, tests), caption, caption))
     items += [_table(tests, results.batch.manifest), *_confusion(tests), Bullets(_words(tests))]
@@ -73,7 +73,7 @@ def _tests(results: Results) -> pd.DataFrame | None:
 
 def _table(tests: pd.DataFrame, manifest: JSON) -> Table:
     teeth = int(manifest["tool"]["teeth"])
-    rows = [_row(row, teeth) for _, row in tests.head(LONGEST).iterrows()]
+    rows = gathered([_row(row, teeth) for _, row in tests.head(LONGEST).iterrows()])
     header = [
         "run",
         "speed (rpm)",
@@ -86,8 +86,9 @@ def _table(tests: pd.DataFrame, manifest: JSON) -> Table:
     ]
     more = f" The first {LONGEST} of {len(tests)}." if len(tests) > LONGEST else ""
     caption = (
-        "Chatter by the records: probability, kind, frequency with its standard deviation; phase of the "
-        f"vibration from tooth to tooth (cycles), and as predicted at the boundary.{more}"
+        "Chatter identified from the records: probability, kind, frequency with its standard deviation; "
+        "phase of the "
+        f"vibration from tooth to tooth (cycles), and the phase predicted at the boundary.{more}"
     )
     widths = [1, 1, 1, 1, 1.5, 1.4, 0.8, 0.8]
     return Table(header, rows, caption, widths, numeric=[1, 2, 3, 5, 6, 7])

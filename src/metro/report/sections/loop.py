@@ -48,7 +48,10 @@ def _observable(observable: str, entry: JSON, record: JSON, left: str) -> list[I
 
 
 def _runs(name: str, record: JSON, shown: str | None) -> list[Picture]:
-    blocks = [b for b in record.get("blocks") or [] if b.get("rms_before") is not None]
+    drawn = ("identify", "validate")  # load tests are evidence too, but no runs
+    blocks = [
+        b for b in record.get("blocks") or [] if b.get("role") in drawn and b.get("rms_before") is not None
+    ]
     if not blocks:
         return []
     alt = f"rms residual of {len(blocks)} runs before and after, in the order of cutting."

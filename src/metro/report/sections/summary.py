@@ -1,4 +1,4 @@
-"""The first page: measurements, verdicts, what to trust, what to measure next, key numbers."""
+"""The first page: main results, verdicts, what to trust, what to do next, and a figure."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from metro.report.results import Results, heading
 from metro.report.sections import findings
 from metro.report.sections.areal import first_areal
 from metro.report.sections.joint_words import joint_facts, joint_next, joint_words
+from metro.report.sections.key_results import key_results
 from metro.report.sections.levelling import first_levelled
-from metro.report.sections.loads import first_loaded
 from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
 from metro.report.sections.poses import first_poses
-from metro.report.sections.surface import first_faces
+from metro.report.sections.surface import noise_of_faces
 from metro.report.sections.texture import first_traces
 from metro.report.sections.trust import static_deflection, trust
 from metro.report.sections.verdict import (
@@ -42,28 +42,25 @@ MOST_MODES = 12  # printed frequencies that are listed on the first page
 
 
 def summary(results: Results) -> Section:
-    """Write the first page: text, key numbers, errors before and after, the run with the largest error."""
+    """Write the first page: results, verdicts with their errors, what to trust, what to do, one figure."""
     verdicts = results.verdicts()
-    items = [*first_words(results), *_key_numbers(verdicts)]
-    drawn_changes = [
-        c for c in (change(title(name), entry) for name, entry in verdicts.items()) if c is not None
-    ]
-    if drawn_changes:
-        items.append(
-            Picture(
-                figures.changes(drawn_changes, "error on held-out runs (% of the signal)"),
-                f"{findings.changed(drawn_changes)} Errors with 95 % intervals, and the noise floor.",
-                "; ".join(
-                    f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in drawn_changes
-                ),
-            )
-        )
+    items = first_words(results)
     drawn = _one_run(results) if len(verdicts) <= MOST_DRAWN else []
-    return Section("Summary", [*items, *drawn, *([] if verdicts else _identified(results))])
+    return Section("Results", [*items, *(drawn or _changes(verdicts))])
+
+
+def _changes(verdicts: Mapping[str, JSON]) -> list[Item]:
+    """Draw the errors before and after of all observables."""
+    rows = [c for c in (change(title(name), entry) for name, entry in verdicts.items()) if c is not None]
+    if not rows:
+        return []
+    caption = f"{findings.changed(rows)} Errors with 95 % intervals, and the noise floor."
+    alt = "; ".join(f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in rows)
+    return [Picture(figures.changes(rows, "error on held-out runs (% of the signal)"), caption, alt)]
 
 
 def first_words(results: Results) -> list[Item]:
-    """Say what was measured, the verdicts, what to trust and what to measure next."""
+    """Give the results, then the verdicts, what to trust and what to do next."""
     verdicts = results.verdicts()
     texts = [verdict_words(name, entry, left_words(results, name)) for name, entry in verdicts.items()]
     nexts = [f"{title(n)}: {words_next}" for n, e in verdicts.items() if (words_next := next_words(e))]
@@ -71,9 +68,12 @@ def first_words(results: Results) -> list[Item]:
     if not verdicts and lacking and results.identified.get("modes"):
         nexts = [f"For a verdict on {title('lobes')}: {lacking}"]
     nexts += list(joint_next(results))
-    measure: list[Item] = [Heading("What to measure next"), Bullets([sentence(text) for text in nexts])]
+    measure: list[Item] = [Heading("What to do next"), Bullets([sentence(text) for text in nexts])]
     return [
         Paragraph(measured_words(results)),
+        *key_results(results),
+        *([] if verdicts else _identified(results)),
+        *_key_numbers(verdicts),
         *(Paragraph(text, "verdict") for text in texts or [no_verdict(results)]),
         Heading("What to trust"),
         Bullets([*trust(results), *static_deflection(results)]),
@@ -124,40 +124,17 @@ def _one_run(results: Results) -> list[Item]:
 
 
 def _identified(results: Results) -> list[Item]:
-    """Give the most compliant mode, and the boundary or the response that shows the identification."""
-    shown = [
+    """Give the results of single sections, and the boundary or the response that shows the identification."""
+    return [
         *joint_facts(results),
-        *first_loaded(results),
-        *first_faces(results),
         *first_levelled(results),
         *first_poses(results),
         *first_areal(results),
         *first_traces(results),
+        *noise_of_faces(results),
         *boundary_items(results),
         *largest_response(results.tables),
     ]
-    yielding = [mode for mode in results.identified.get("modes") or [] if _peak(mode) > 0.0]
-    if not yielding:
-        return shown
-    softest = max(yielding, key=_peak)
-    where = f"position {softest['position']}, direction {softest['direction']}"
-    facts = Facts(
-        [
-            ("mode that yields most", quantity(softest["frequency"]), where),
-            ("damping ratio", quantity(softest["damping"], with_unit=False), "of critical damping"),
-            ("stiffness", quantity(softest["stiffness"]), "at the driving point"),
-            ("receptance at its peak", f"{number(_peak(softest))} m/N", "1 / (2 damping ratio · stiffness)"),
-        ]
-    )
-    return [facts, *shown]
-
-
-def _peak(mode: JSON) -> float:
-    """Receptance of a single mode at its peak, m/N; 0 if its stiffness is not known."""
-    stiffness, damping = ((mode.get(name) or {}).get("value") for name in ("stiffness", "damping"))
-    if not stiffness or not damping or not mode.get("resolved", True):
-        return 0.0
-    return float(1.0 / (2.0 * damping * stiffness))
 
 
 def no_verdict(results: Results) -> str:
