@@ -52,7 +52,7 @@ def test_every_part_is_there(pages):
         *("Identification", "Predicted against measured", "The closed loop", "Provenance", "Not identified"),
         *("3 samples missing", "no impacts.csv", "absorbed", "K_tc", "958.9 ± 6.0", "(7.255 ± 0.040)·10⁶"),
         *(
-            "Cannot be seen in this batch",
+            "These effects cannot be detected in this batch",
             "from the column role of runs.csv",
             "grows along the path",
         ),
@@ -121,11 +121,11 @@ def test_modes_without_a_driving_point_have_no_stiffness_and_the_first_page_show
 @pytest.mark.parametrize(
     ("status", "words"),
     [
-        ("clean", "show nothing that the base model lacks"),
+        ("clean", "the base model explains the identification runs"),
         ("explained", "traced to tool runout (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°)"),
         ("partly_explained", "A significant residual remains"),
-        ("undetermined", "It may be tool wear or charge drift."),
-        ("unexplained", "no effect of the library accounts for it"),
+        ("undetermined", "Possible causes: tool wear or charge drift."),
+        ("unexplained", "no effect of the library explains"),
         ("insufficient", "too few runs to decide"),
     ],
 )
@@ -139,13 +139,15 @@ def test_every_status_has_its_sentence(status, words):
 def test_a_cause_that_is_not_certain_is_a_lead_and_nothing_is_traced_to_it():
     doubtful = {**synthetic.RUNOUT, "probability": 0.63}
     alone = verdict_words("force", synthetic.observable("explained", effects=[doubtful]))
-    assert "tool runout (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°) would account for the difference" in alone
-    assert "a lead, not a finding" in alone
+    assert (
+        "a possible cause of the difference from the base model is tool runout (radius 9.83 ± 0.31 µm, angle "
+        "41.2 ± 2.4°)."
+    ) in alone
     assert "traced to" not in alone
     beside = {**doubtful, "effect": "tool_wear"}
     both = verdict_words("force", synthetic.observable("explained", effects=[synthetic.RUNOUT, beside]))
     assert "traced to tool runout" in both
-    assert "tool wear (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°) would account for more of it" in both
+    assert "A possible cause of a further part of it is tool wear (radius 9.83 ± 0.31 µm" in both
 
 
 def test_an_error_that_did_not_change_is_said_once():

@@ -162,4 +162,4 @@ def test_where_nothing_chatters_and_nothing_is_predicted_a_sentence_is_enough(fo
     quiet = RUNS.assign(probability=0.02, labelled=-1, separable=True)
     items = chatter_items(forces(quiet))
     assert not tables_of(items)
-    assert "None of 5" in items[-1].items[0]
+    assert "None of the 5" in items[-1].items[0]

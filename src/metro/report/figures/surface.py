@@ -107,8 +107,8 @@ def _extremes(axes: Axes, part: pd.DataFrame) -> None:
     """Mark the highest and the lowest point of a face, with their deviations (µm)."""
     known = part[part["deviation_um"].notna()]
     middle = float(known["x_mm"].mean())
-    for place in (known["deviation_um"].idxmax(), known["deviation_um"].idxmin()):
-        x, y, deviation = (float(known.loc[place, name]) for name in ("x_mm", "y_mm", "deviation_um"))
+    for end in (known.nlargest(1, "deviation_um"), known.nsmallest(1, "deviation_um")):
+        x, y, deviation = (float(end[name].iloc[0]) for name in ("x_mm", "y_mm", "deviation_um"))
         axes.plot(x, y, "+", ms=6, mew=1.0, color=style.MEASURED, clip_on=False)
         side = "right" if x > middle else "left"
         axes.annotate(

@@ -73,7 +73,7 @@ def _tests(results: Results) -> pd.DataFrame | None:
 
 def _table(tests: pd.DataFrame, manifest: JSON) -> Table:
     teeth = int(manifest["tool"]["teeth"])
-    rows = gathered([_row(row, teeth) for _, row in tests.head(LONGEST).iterrows()])
+    rows = [_row(row, teeth) for _, row in tests.head(LONGEST).iterrows()]
     header = [
         "run",
         "speed (rpm)",
@@ -90,8 +90,8 @@ def _table(tests: pd.DataFrame, manifest: JSON) -> Table:
         "phase of the "
         f"vibration from tooth to tooth (cycles), and the phase predicted at the boundary.{more}"
     )
-    widths = [1, 1, 1, 1, 1.5, 1.4, 0.8, 0.8]
-    return Table(header, rows, caption, widths, numeric=[1, 2, 3, 5, 6, 7])
+    widths = [1.4, 1, 1, 1, 1.5, 1.4, 0.8, 0.8]
+    return Table(header, gathered(rows), caption, widths, numeric=[1, 2, 3, 5, 6, 7])
 
 
 def _row(row: pd.Series, teeth: int) -> list[str]:

@@ -94,7 +94,8 @@ def _boundary(results: Results) -> Iterator[Row]:
     if table is not None and table["depth_mm"].notna().any():
         own = table[table["position"].astype(str) == str(lowest.get("position"))]
         own = own if len(own) and own["depth_mm"].notna().any() else table
-        speed = f"at {number(float(own.loc[own['depth_mm'].idxmin(), 'rpm']), 4)} rpm"
+        worst = own.nsmallest(1, "depth_mm")["rpm"].iloc[0]
+        speed = f"at {number(float(worst), 4)} rpm"
     count = f"the lowest of {len(blocks)} positions" if len(blocks) > 1 else ""
     yield (
         "lowest stable depth",

@@ -124,17 +124,18 @@ def _one_run(results: Results) -> list[Item]:
 
 
 def _identified(results: Results) -> list[Item]:
-    """Give the results of single sections, and the boundary or the response that shows the identification."""
-    return [
+    """Give the results of single sections, and the one figure that shows the identification best."""
+    shown = [
         *joint_facts(results),
         *first_levelled(results),
         *first_poses(results),
         *first_areal(results),
         *first_traces(results),
         *noise_of_faces(results),
-        *boundary_items(results),
-        *largest_response(results.tables),
     ]
+    pictures = [item for item in shown if isinstance(item, Picture)]
+    others = [item for item in shown if not isinstance(item, Picture)]
+    return [*others, *[*boundary_items(results), *largest_response(results.tables), *pictures][:1]]
 
 
 def no_verdict(results: Results) -> str:

@@ -6,7 +6,7 @@ import math
 
 import pandas as pd
 
-from metro.report.content import Bullets, Item, Paragraph, Picture, Section, Table, gathered
+from metro.report.content import Bullets, Item, Paragraph, Picture, Section, Table, common, gathered
 from metro.report.figures import surface as figures
 from metro.report.numbers import listing, number, with_interval
 from metro.report.results import Results
@@ -150,9 +150,11 @@ def _noise(faces: dict[str, pd.DataFrame]) -> list[Item]:
     )
     if not all(part["crop_holds"].iloc[0] for part in faces.values()):
         caption += " * With one more millimetre cropped X_m changes by more than 5 %: the edge rules it."
-    header = ["run", "noise", "from", "local", "points", "rejected", "pitch", "crop"]
-    widths, numeric = [1.6, 0.7, 2.6, 0.7, 0.9, 0.9, 0.7, 0.7], [1, 3, 4, 5, 6, 7]
-    return [Table(header, gathered(rows), caption, widths, numeric=numeric, small=True)]
+    header, rows, same = common(
+        ["run", "noise", "source", "local", "points", "rejected", "pitch", "crop"], rows
+    )
+    numeric = [i for i, name in enumerate(header) if name not in ("run", "source")]
+    return [Table(header, gathered(rows), caption + same, numeric=numeric, small=True)]
 
 
 def _zones(faces: dict[str, pd.DataFrame], contacts: pd.DataFrame | None) -> list[Item]:

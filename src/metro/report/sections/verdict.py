@@ -55,7 +55,8 @@ def _attribution(entry: JSON, what: str) -> str:
     if not possible:
         return traced
     so_much = "a further part of it" if sure else f"{what} from the base model"
-    return f"{traced} A possible cause of {so_much} is {listing(possible)}.".strip()
+    article = "A" if traced else "a"
+    return f"{traced} {article} possible cause of {so_much} is {listing(possible)}.".strip()
 
 
 def error_text(error: JSON | None, unit_name: str | None) -> str:

@@ -48,7 +48,7 @@ def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
     Raises
     ------
     ValueError
-        Where the poses do not determine even where the arm stands.
+        Where the poses do not determine even the place of the base.
     """
     poses = poses.thinned(MOST)
     as_declared, up = nominal(poses, geometry)
