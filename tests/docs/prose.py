@@ -60,29 +60,41 @@ class Found(NamedTuple):
 
 
 def strings(source: str, file: str) -> Iterator[Text]:
-    """Yield the strings of a Python module that hold more than one word, docstrings aside."""
+    """Yield the strings of a Python module that hold more than one word, docstrings aside.
+
+    What a formatted string fills in is written as three dots.
+    """
     tree = ast.parse(source)
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    docstrings = {
+    passed = {
         id(node.body[0].value)
         for node in ast.walk(tree)
         if isinstance(node, documented) and node.body and isinstance(node.body[0], ast.Expr)
     }
     for node in ast.walk(tree):
-        text = node.value if isinstance(node, ast.Constant) and id(node) not in docstrings else ""
-        if isinstance(text, str) and " " in text.strip():
+        if isinstance(node, ast.JoinedStr):
+            passed |= {id(part) for part in node.values}
+            text = "".join(str(part.value) if isinstance(part, ast.Constant) else "…" for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in passed:
+            text = node.value
+        else:
+            continue
+        if " " in text.strip():
             yield Text(file, node.lineno, text)
 
 
 def blocks(source: str, file: str) -> Iterator[Text]:
     """Yield the paragraphs, items of lists and rows of tables of a Markdown page, code aside."""
     kept: list[str] = []
-    begun, fenced = 1, False
+    begun, fenced, listed = 1, False, False
     for number, line in enumerate([*source.splitlines(), ""], start=1):
         bare = line.strip()
         fence = bare.startswith("```")
-        own = bare.startswith(("|", "#")) or re.match(r"(?:[-*]|\d+\.) ", bare) is not None
-        code = fenced or fence or (line.startswith("    ") and not kept)
+        item = re.match(r"(?:[-*]|\d+\.) ", bare) is not None
+        own = item or bare.startswith(("|", "#"))
+        # Inside a list four spaces continue an item, elsewhere they are code.
+        listed = item or (listed and (not bare or line.startswith("  ")))
+        code = fenced or fence or (line.startswith("    ") and not kept and not listed)
         if kept and (not bare or own or fence):
             yield Text(file, begun, " ".join(kept))
             kept = []
