@@ -110,7 +110,7 @@ def _spectrum(axes: Axes, lines: pd.DataFrame, test: pd.Series, teeth: int) -> N
     shown = lines[lines["x"] <= last]
     for on_order, colour, label in (
         (True, style.GREY, "orders of the spindle"),
-        (False, style.AFTER, "rest"),
+        (False, style.AFTER, "remaining force"),
     ):
         height = shown["value"].where(shown["on_order"].astype(bool) == on_order, 0.0)
         axes.vlines(shown["x"], 0.0, height, color=colour, lw=0.9, label=label)

@@ -56,7 +56,7 @@ def _values(frame: pd.DataFrame, name: str, merit: list[Item], *, alone: bool) -
 
     def parity() -> Picture:
         by_axis = ", axis by axis," if len(figures.axes_of(frame)) > 1 else ","
-        about = f"Parity on held-out runs{by_axis} and distribution of the residual beside the noise."
+        about = f"Parity on held-out runs{by_axis} and distribution of the residual and of the noise."
         return Picture(
             figures.parity(frame, name),
             f"{whole}. {findings.scatter(frame)} {about}",
@@ -105,8 +105,9 @@ def _curves(frame: pd.DataFrame, name: str, words: str, *, alone: bool) -> list[
         items.append(
             Picture(
                 surface.face_points(frame),
-                f"{findings.left(frame)} Deviation at path points of the first held-out runs, and what each "
-                "prediction leaves.",
+                f"{findings.left(frame)} Deviation at path points of the first held-out runs, and the "
+                "residual of each "
+                "prediction.",
                 f"Maps of measured deviation and of both residuals; {words}.",
             )
         )

@@ -49,7 +49,7 @@ def force_items(results: Results) -> list[Item]:
             figures.tooth_peaks(peaks),
             f"{findings.tooth_peaks(peaks)} Largest magnitude within each pitch, the {teeth} teeth of a run "
             "in the order of passing; whiskers: 95 % interval of predicted less measured.".lstrip(),
-            f"Bars of the measured peak of each of {teeth} teeth, and the predicted ones beside them.",
+            f"Measured and predicted peaks of each of {teeth} teeth.",
         ),
     ]
 

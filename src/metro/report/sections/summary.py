@@ -176,7 +176,7 @@ def print_check(results: Results) -> list[Item]:
     errata = int(table["note"].fillna("").str.contains("erratum: ").sum())
     text = f"{len(table)} printed values were transcribed"
     if pairs:
-        text += f", {pairs} of them with a prediction beside them; every printed error was recomputed"
+        text += f", {pairs} of them with a predicted value; every printed error was recomputed"
     text += f". {f'{flagged} printed values are' if flagged else 'No printed value is'} inconsistent"
     text += f"; {errata} carry an erratum." if errata else "."
     return [Paragraph(text), *_printed_modes(table)]

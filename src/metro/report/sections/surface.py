@@ -181,8 +181,8 @@ def _maps(results: Results, contacts: pd.DataFrame | None) -> list[Item]:
     heights, runs = frame["deviation_um"].to_numpy(float), frame["run"].to_numpy()
     low, high = int(heights.argmin()), int(heights.argmax())
     caption = (
-        f"The faces lie {number(-heights[low])} µm below their planes at most ({runs[low]}) and "
-        f"{number(heights[high])} µm above ({runs[high]}). Deviation from the least-squares planes; + marks "
+        f"The deviations range from −{number(-heights[low])} µm ({runs[low]}) to +{number(heights[high])} µm "
+        f"({runs[high]}). Deviation from the least-squares planes; + marks "
         "the highest and the lowest point (µm)"
     )
     caption += f", {figures.MAPS} of {number_of}" if number_of > figures.MAPS else ""
