@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 
@@ -102,10 +101,5 @@ def _observables(effects: Iterable[Effect]) -> str:
 
 
 def _what(*forms: Effect) -> str:
-    """Say what effects are: the first lines of their files, without a title of one or two words."""
-    told = []
-    for effect in forms:
-        line = (sys.modules[effect.apply.__module__].__doc__ or "").partition("\n")[0]
-        name, _, rest = line.partition(": ")
-        told.append(rest[:1].upper() + rest[1:] if rest and name.count(" ") < 2 else line)
-    return " ".join(dict.fromkeys(told))
+    """Say what effects are, each sentence once."""
+    return " ".join(dict.fromkeys(effect.meaning for effect in forms))

@@ -175,3 +175,22 @@ def test_single_values_per_run_and_axis_are_tabulated_and_not_drawn_as_curves():
     assert "Errors on held-out runs, rms (mm)" in text
     assert "Parity on held-out runs" in text
     assert "residual of all held-out runs" not in text
+
+
+def test_a_cause_is_explained_in_a_sentence_and_each_explanation_is_given_once():
+    forms = [{**synthetic.RUNOUT, "probability": p, "meaning": "The axes differ."} for p in (0.99, 0.99)]
+    said = verdict_words("force", synthetic.observable("explained", effects=forms))
+    assert said.count("The axes differ.") == 1
+
+
+def test_an_effect_that_the_held_out_runs_do_not_ask_for_is_said_to_come_from_the_others():
+    within = "within the noise floor there; the effect was identified from the other runs"
+    entry = synthetic.observable("explained", before=1.0, after=0.9)
+    assert within in verdict_words("force", {**entry, "noise_floor": 1.1})
+    assert within not in verdict_words("force", {**entry, "noise_floor": 0.95})
+
+
+def test_of_stability_the_tests_on_the_predicted_side_come_before_the_error_of_a_probability():
+    entry = synthetic.observable("clean", 0.4, 0.2, unit="1", verification={"words": "28 of 32 are right."})
+    said = verdict_words("lobes", entry)
+    assert said.index("28 of 32") < said.index("0.40")

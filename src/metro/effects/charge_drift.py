@@ -1,4 +1,4 @@
-"""Charge drift: the zero of a piezoelectric sensor wanders while it measures."""
+"""Charge drift: the zero of a piezoelectric sensor drifts during the measurement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fixture bow: the clamped work is bent while it is cut or springs back, so that the plane is none."""
+"""Fixture bow: the clamped work is bent while it is cut, or springs back, so that the face is curved."""
 
 from __future__ import annotations
 

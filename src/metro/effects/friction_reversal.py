@@ -1,4 +1,4 @@
-"""A joint whose Coulomb friction is not that of the idle run."""
+"""Friction reversal: the Coulomb friction of a joint differs from that of the idle run."""
 
 from __future__ import annotations
 

@@ -35,12 +35,17 @@ def library(observable: str | None = None) -> tuple[Effect, ...]:
 def described() -> JSON:
     """Return what a campaign and a report need to know of each effect of the library, by its name.
 
-    ``belongs_to``, ``comparable`` and ``per`` of :class:`Effect`; the last one as a list, since the forms of
-    an effect may differ in it.
+    ``meaning``, ``belongs_to``, ``comparable`` and ``per`` of :class:`Effect`; the last one as a list, since
+    the forms of an effect may differ in it. The meaning is that of the first form.
     """
     facts: JSON = {}
     for effect in library():
-        known = {"belongs_to": list(effect.belongs_to), "comparable": effect.comparable, "per": []}
+        known = {
+            "meaning": effect.meaning,
+            "belongs_to": list(effect.belongs_to),
+            "comparable": effect.comparable,
+            "per": [],
+        }
         kinds = facts.setdefault(effect.name, known)["per"]
         kinds += [effect.per] if effect.per and effect.per not in kinds else []
     return facts

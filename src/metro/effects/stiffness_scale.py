@@ -1,4 +1,4 @@
-"""Stiffness in the cut that is not the stiffness of the load tests: of the whole machine, or of one joint."""
+"""Stiffness scale: the stiffness in the cut differs from that of the load tests, in all joints or in one."""
 
 from __future__ import annotations
 

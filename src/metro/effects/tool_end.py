@@ -1,4 +1,4 @@
-"""The tool's end: a ball or a corner radius that the manifest does not state."""
+"""Tool end: the tool has a ball end or a corner radius that batch.yaml does not declare."""
 
 from __future__ import annotations
 

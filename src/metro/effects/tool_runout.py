@@ -1,4 +1,4 @@
-"""Runout: the tool's axis is not the axis of rotation, so the teeth cut chips of different thickness."""
+"""Tool runout: the axis of the tool is not the axis of rotation, so the teeth cut unequal chips."""
 
 from __future__ import annotations
 

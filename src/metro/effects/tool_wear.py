@@ -1,4 +1,4 @@
-"""Wear: the edges get blunt with every metre cut, so the edge forces grow."""
+"""Tool wear: the edges become blunt with the length cut, so the edge forces grow."""
 
 from __future__ import annotations
 

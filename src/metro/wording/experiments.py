@@ -58,9 +58,9 @@ def _describe_again(values: JSON) -> str:
 
 def _show(values: JSON) -> str:
     hidden = values["hidden"]
-    parts = [f"to check for {listed(one['effects'])}: {one['proposal']}" for one in values["shown"]]
+    parts = [f"to check for {listed(one['effects'])}, use {one['proposal']}" for one in values["shown"]]
     if hidden:
-        parts.append(f"to check for {plain(hidden[0])}: {values['experiment']}")
+        parts.append(f"to check for {plain(hidden[0])}, use {values['experiment']}")
     if len(hidden) > 1:
         parts.append(f"no run of the kinds considered shows {listed(hidden[1:])}")
     return "; ".join(parts)

@@ -25,18 +25,18 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
     start, status = heading(observable), str(entry.get("status"))
     whole, part = _attribution(entry, "the difference"), _attribution(entry, "part of the difference")
     verified = (entry.get("verification") or {}).get("words", "")
+    # Of a probability the count of tests on the right side says more than the rms.
+    tested = " ".join([verified, _fall(entry)] if _dimensionless(entry) else [_fall(entry), verified])
     says = {
-        "clean": f"{start}: the base model explains the identification runs; no effect is missing. "
-        f"{_fall(entry)} {verified}",
-        "explained": f"{start}: {whole} {_fall(entry)} {verified}",
-        "partly_explained": f"{start}: {part} {_fall(entry)} {verified} A significant residual remains. "
+        "clean": f"{start}: the base model explains the identification runs; no effect is missing. {tested}",
+        "explained": f"{start}: {whole} {tested}{_within_floor(entry)}",
+        "partly_explained": f"{start}: {part} {tested} A significant residual remains. "
         f"{_residual(entry, left)}",
         "undetermined": f"{start}: the base model lacks an effect, but these runs do not determine which "
-        f"one. {_rivals(entry)}{_fall(entry)} {verified}",
+        f"one. {_rivals(entry)}{tested}",
         "unexplained": f"{start}: the base model has a significant error that no effect of the library "
-        f"explains. {_fall(entry)} {verified} {_residual(entry, left)}",
-        "insufficient": f"{start}: there are too few runs to decide whether an effect is missing. "
-        f"{_fall(entry)} {verified}",
+        f"explains. {tested} {_residual(entry, left)}",
+        "insufficient": f"{start}: there are too few runs to decide whether an effect is missing. {tested}",
     }
     if entry.get("contradicted"):
         return (
@@ -50,13 +50,25 @@ def _attribution(entry: JSON, what: str) -> str:
     """Say to which causes ``what`` is traced, and which ones are only the likeliest of the library."""
     effects = entry.get("effects") or []
     sure = [effect_words(one) for one in effects if (one.get("probability") or 0.0) >= SURE]
+    meanings = " ".join(dict.fromkeys(str(one["meaning"]) for one in effects if one.get("meaning")))
     possible = [effect_words(one) for one in effects if (one.get("probability") or 0.0) < SURE]
     traced = f"{what} from the base model is traced to {listing(sure)}." if sure else ""
     if not possible:
-        return traced
+        return f"{traced} {meanings}".strip()
     so_much = "a further part of it" if sure else f"{what} from the base model"
     article = "A" if traced else "a"
-    return f"{traced} {article} possible cause of {so_much} is {listing(possible)}.".strip()
+    return f"{traced} {article} possible cause of {so_much} is {listing(possible)}. {meanings}".strip()
+
+
+def _within_floor(entry: JSON) -> str:
+    """Say where the held-out runs by themselves would not have asked for an effect."""
+    before, floor = (entry.get("before") or {}).get("rms"), entry.get("noise_floor")
+    if before is None or floor is None or before > floor:
+        return ""
+    return (
+        " The error of the base model is within the noise floor there; the effect was identified from the "
+        "other runs."
+    )
 
 
 def error_text(error: JSON | None, unit_name: str | None) -> str:
