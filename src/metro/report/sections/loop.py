@@ -169,5 +169,5 @@ def _residual_items(entry: JSON, record: JSON, left: str) -> list[Item]:
         alike = [plain(f"{listing(names)}: {why}".rstrip(": ")) for why, names in hidden.items()]
         items += [Paragraph("These effects cannot be detected in this batch:"), Bullets(alike)]
     if next_run := next_words(entry):
-        items.append(Paragraph(f"Measure next: {next_run}."))
+        items.append(Paragraph(f"What to do next: {next_run}."))
     return items
