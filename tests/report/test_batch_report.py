@@ -114,7 +114,7 @@ def test_modes_without_a_driving_point_have_no_stiffness_and_the_first_page_show
     tables = {"frf_used": synthetic.responses().assign(response="9x")}
     some = replace(synthetic.results(), tables=tables, identified={"modes": modes}, verdict={}, loop={})
     first = text_of(pdf_of(some))[0]
-    assert "mode that yields most" not in first
+    assert "most flexible mode" not in first
     assert "The highest response" in first
 
 

@@ -71,5 +71,5 @@ def test_a_note_becomes_a_sentence_and_symbols_stay(text, told):
 
 
 def test_units_are_set_as_in_print():
-    assert plain("it shows from 12 um/min on") == "it shows from 12 µm/min on"
+    assert plain("it can be detected from 12 um/min on") == "it can be detected from 12 µm/min on"
     assert plain("a column thrust_um") == "a column thrust_um"

@@ -68,8 +68,7 @@ def test_the_story_ends_with_the_verdict_in_a_sentence():
     assert story["notes"] == ["as it is"]
     assert story["words"] == (
         "There is a significant residual that no effect of the library explains; nothing was added. "
-        "On held-out runs the error is 12.3 µm rms before and 12.3 µm after. "
-        "Remaining error: more of the error remains unexplained with it than it explains; b."
+        "On held-out runs the error is 12.3 µm rms before and 12.3 µm after."
     )
     assert content["causes"][0]["words"] == (
         "tool wear of joint 3: seen in joint force; no other observable of this batch could show it."

@@ -28,9 +28,6 @@ STATUSES = {
 }
 
 
-REMAINING = " Remaining error: "  # begins the last sentence of a verdict, which the report draws instead
-
-
 def verdict_of(findings: JSON) -> JSON:
     """Return the content of verdict.json.
 
@@ -70,7 +67,7 @@ def story_of(findings: JSON) -> JSON:
 
 
 def verdict_in_words(verdict: JSON) -> str:
-    """Say the verdict on an observable as an engineer would.
+    """Say the verdict on an observable as an engineer would, without what remains unexplained.
 
     Parameters
     ----------
@@ -81,11 +78,11 @@ def verdict_in_words(verdict: JSON) -> str:
     status = "contradicted" if verdict.get("contradicted") else verdict["status"]
     sentence = STATUSES[status].format(effects=effects, rivals=rivals)
     sentence += "".join(f" {one['lowered']}." for one in verdict["effects"] if one.get("lowered"))
-    before, after, residual = verdict["before"], verdict["after"], verdict["unexplained"]
+    before, after = verdict["before"], verdict["after"]
     if before and after:
         unit = f" {printed(verdict['unit'])}".rstrip()
         sentence += f" On held-out runs the error is {before['rms']:.3g}{unit} rms before"
         sentence += f" and {after['rms']:.3g}{unit} after."
     if verdict.get("verification"):
         sentence += f" {verdict['verification']['words']}"
-    return sentence + (f"{REMAINING}{residual['signature']}." if residual else "")
+    return sentence

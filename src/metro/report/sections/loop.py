@@ -13,7 +13,6 @@ from metro.report.results import Results, heading
 from metro.report.sections import findings
 from metro.report.sections.verdict import STATUS, error_text, left_words, next_words, verdict_words
 from metro.units import JSON, printed
-from metro.wording.batch import REMAINING
 
 LONGEST = 16
 
@@ -37,7 +36,7 @@ def loop(results: Results) -> Section:
 def _observable(observable: str, entry: JSON, record: JSON, left: str) -> list[Item]:
     shown = entry.get("unit") or record.get("unit")
     noise = record.get("noise") or {}
-    story = str(record.get("words") or "").partition(REMAINING)[0]
+    story = str(record.get("words") or "")
     items: list[Item] = [Paragraph(story or verdict_words(observable, entry, left))]
     if noise:
         items.append(Paragraph(_noise_words(noise, shown)))
