@@ -87,7 +87,7 @@ def _unseen(values: JSON) -> str:
 def _above_floor(values: JSON) -> str:
     return (
         f"the prediction of left-out conditions has {values['ratio']:.2g} times the error that noise "
-        f"explains (p = {_chance(values['p_value'])}), the largest in {values['condition']}"
+        f"explains ({_chance(values['p_value'])}), the largest in {values['condition']}"
     )
 
 
@@ -100,12 +100,12 @@ def _verification(values: JSON) -> str:
     elif values["holds"]:
         words = (
             f"Verification on {runs}: the error is {ratio}, which noise alone can explain "
-            f"(p = {_chance(values['p_value'])})."
+            f"({_chance(values['p_value'])})."
         )
     else:
         words = (
             f"Verification on {runs} contradicts the model: the error is {ratio} "
-            f"(p = {_chance(values['p_value'])}) and largest in condition {values['condition']}."
+            f"({_chance(values['p_value'])}) and largest in condition {values['condition']}."
         )
     if values["worse_runs"]:
         unit = printed(values["unit"])
@@ -119,7 +119,7 @@ def _verification(values: JSON) -> str:
 
 
 def _chance(p_value: float) -> str:
-    return f"{p_value:.2g}" if p_value >= LEAST_CHANCE else f"below {LEAST_CHANCE:g}"
+    return f"p = {p_value:.2g}" if p_value >= LEAST_CHANCE else f"p < {LEAST_CHANCE:g}"
 
 
 def _noise(values: JSON) -> str:

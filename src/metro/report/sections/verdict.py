@@ -49,15 +49,17 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
 def _attribution(entry: JSON, what: str) -> str:
     """Say to which causes ``what`` is traced, and which ones are only the likeliest of the library."""
     effects = entry.get("effects") or []
-    sure = [effect_words(one) for one in effects if (one.get("probability") or 0.0) >= SURE]
-    meanings = " ".join(dict.fromkeys(str(one["meaning"]) for one in effects if one.get("meaning")))
+    identified = [one for one in effects if (one.get("probability") or 0.0) >= SURE]
+    sure = [effect_words(one) for one in identified]
+    meanings = dict.fromkeys(str(one["meaning"]) for one in identified if one.get("meaning"))
     possible = [effect_words(one) for one in effects if (one.get("probability") or 0.0) < SURE]
     traced = f"{what} from the base model is traced to {listing(sure)}." if sure else ""
+    traced = " ".join([traced, *meanings])
     if not possible:
-        return f"{traced} {meanings}".strip()
+        return traced
     so_much = "a further part of it" if sure else f"{what} from the base model"
     article = "A" if traced else "a"
-    return f"{traced} {article} possible cause of {so_much} is {listing(possible)}. {meanings}".strip()
+    return f"{traced} {article} possible cause of {so_much} is {listing(possible)}.".strip()
 
 
 def _within_floor(entry: JSON) -> str:
