@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 
@@ -11,19 +10,19 @@ from metro.effects.library import library
 from metro.units import printed
 
 HEAD = """\
-What the loop tries where a base model leaves something over ([reading a verdict](verdict.md)). Each effect is
-a file of `src/metro/effects`; [adding an effect](effects.md) says how to make another. Signs and zeros: [data
-contract](data-contract.md#signs-frames-and-zeros). `metro simulate` hides effects in batches to try.
+The loop tries these effects where a base model has a residual ([reading a verdict](verdict.md)). Each effect
+is a file of `src/metro/effects`; [adding an effect](effects.md) says how to make another. Signs and zeros:
+[data contract](data-contract.md#signs-frames-and-zeros). `metro simulate` hides effects in batches to try.
 
-An **effect** is named in a verdict, and the model is corrected by it. A **likeness** is tried in the same
-way, so that no effect is taken for it, but the model is never corrected by it: the verdict says what the rest
-resembles.
+An **effect** is named in a verdict, and the model is corrected for it. An **alternative explanation** is
+tried in the same way, so that it is not mistaken for an effect, but the model is never corrected for it: it
+describes the remaining error in the verdict.
 
-A parameter is sought between the two bounds; several effects move them to what a batch can show. *Per joint*
-means that each of the joints of an arm is tried by itself, and the verdict names the joint. [K] is one of
-the [three publications](errata.md#the-publications).
+A parameter is searched for between the two bounds; several effects move them to what a batch can show.
+*Per joint* means that each of the joints of an arm is tried by itself, and the verdict names the joint. [K]
+is one of the [three publications](errata.md#the-publications).
 """
-EFFECTS, LIKENESSES = "## Effects", "## Likenesses"
+EFFECTS, LIKENESSES = "## Effects", "## Alternative explanations"
 
 
 def effects_page(note: str, meanings: Mapping[str, str]) -> str:
@@ -102,10 +101,5 @@ def _observables(effects: Iterable[Effect]) -> str:
 
 
 def _what(*forms: Effect) -> str:
-    """Say what effects are: the first lines of their files, without a title of one or two words."""
-    told = []
-    for effect in forms:
-        line = (sys.modules[effect.apply.__module__].__doc__ or "").partition("\n")[0]
-        name, _, rest = line.partition(": ")
-        told.append(rest[:1].upper() + rest[1:] if rest and name.count(" ") < 2 else line)
-    return " ".join(dict.fromkeys(told))
+    """Say what effects are, each sentence once."""
+    return " ".join(dict.fromkeys(effect.meaning for effect in forms))

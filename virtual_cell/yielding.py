@@ -47,8 +47,9 @@ def yielding_force(cut: Cut, t: Array) -> Array:
 
 
 def _dense(cut: Cut, t: Array, past: Path, guess: Array) -> Array:
-    """Return (4, n, N·S) of a tool displaced by ``guess`` (2, n): chip, sine and cosine of the immersion,
-    width of the slice that is engaged.
+    """Return what a tool that is displaced by ``guess`` (2, n) cuts, (4, n, N·S).
+
+    Chip, sine and cosine of the immersion, and the width of the slice that is engaged.
     """
     engagement = cut.engagement
     teeth, levels = engagement.tool.teeth, len(engagement.slices)

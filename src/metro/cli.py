@@ -43,7 +43,8 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
-    help="Closed-loop metrology for robotic machining: predict, compare, trace what is left to its cause.",
+    help="Closed-loop metrology for robotic machining: predict, compare, and trace the residual to its "
+    "cause.",
     epilog="`metro run` brings every report up to date. Exit codes: 0 fine, 1 the input or a report is not "
     "as it should be, 2 the call itself is wrong. Tab completion: `metro --install-completion`.",
 )

@@ -101,17 +101,18 @@ def test_names_that_the_contract_has_in_words_are_no_errors(batch):
     [
         (
             {"tool_runout": {"radius_um": 7.0}},
-            "The base model is not told of tool runout: batch.yaml, known, has radius_um 7.0; expected "
-            "radius_um, angle_deg.",
+            "The base model does not include tool runout: batch.yaml has radius_um 7.0 under known; "
+            "expected radius_um, angle_deg.",
         ),
         (
             {"dynamometer_resonance": {"frequency_hz": [900, 800], "damping": 0.03}},
-            "The base model is not told of dynamometer resonance: batch.yaml, known, has frequency_hz "
-            "[900, 800], damping 0.03; expected frequency_hz (3 values, or one), damping (3 values, or one).",
+            "The base model does not include dynamometer resonance: batch.yaml has frequency_hz [900, "
+            "800], damping 0.03 under known; expected frequency_hz (3 values, or one), damping (3 values, "
+            "or one).",
         ),
         (
             {"charge_drift": {}},
-            "The base model is not told of charge drift: batch.yaml, known, has no parameter; expected "
+            "The base model does not include charge drift: batch.yaml has no parameter under known; expected "
             "time_constant_s (3 values, or one) or slope_n_s (3 values, or one).",
         ),
     ],

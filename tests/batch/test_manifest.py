@@ -106,7 +106,7 @@ def test_a_manifest_that_follows_the_contract_has_no_findings(batch):
             "known: {tool_runot: {}}",
             'known.tool_runot: is not a known key (did you mean "tool_run',
         ),
-        ("hole_diameter_mm: 16", "cell: bench", 'line 6: key "cell" stands twice'),
+        ("hole_diameter_mm: 16", "cell: bench", 'line 6: key "cell" appears twice'),
         ("hole_diameter_mm: 16", "hole_diameter_mm: [16", "line 7:"),
         ("hole_diameter_mm: 16", "\thole_diameter_mm: 16", "line 6:"),
     ],

@@ -67,7 +67,7 @@ def test_rows_that_follow_the_contract_pass(tmp_path, name, text):
         (
             "impacts",
             IMPACTS + "t,1,1x,7z,1,frf,a.csv,m\nt,1,2x,7z,1,frf,a.csv,m\n",
-            '"a.csv" stands in row 2 too',
+            '"a.csv" is also in row 2',
         ),
         (
             "loads",
@@ -94,7 +94,7 @@ def test_rows_that_follow_the_contract_pass(tmp_path, name, text):
         (
             "stations",
             STATIONS + "1,0,0,0,1,2,3\n1,0,0,9,1,2,3\n",
-            'row 3 (1): column position: position "1" stands',
+            'row 3 (1): column position: position "1" appears',
         ),
         (
             "stations",

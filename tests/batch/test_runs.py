@@ -24,8 +24,8 @@ def table(folder, *rows):
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        ("r1,,,2,slot,,,,,,", "column order: 2 stands in row 2 too"),
-        ("r0,,,,slot,,,,,,", 'column run: "r0" stands in row 2 too'),
+        ("r1,,,2,slot,,,,,,", "column order: 2 is also in row 2"),
+        ("r0,,,,slot,,,,,,", 'column run: "r0" is also in row 2'),
         (
             "r1,,,,side,,,12,up,,",
             "column radial_depth_mm: found 12, expected no more than tool.diameter_mm, 10",

@@ -28,7 +28,7 @@ def test_it_says_what_the_report_says(explain, campaign):
     entry = json.loads((campaign / "reports/late/verdict.json").read_text())["observables"]["force"]
     assert verdict_words("force", entry) in printed
     assert "Batch late" in printed
-    assert f"Measure next: {next_words(entry)}." in printed
+    assert f"What to do next: {next_words(entry)}." in printed
     assert "a slot at twice the feed" in printed
 
 

@@ -97,7 +97,7 @@ def _faults(kind, form):
         ),
         case("times in ms, and said so", lambda found: {time: ("ms", found[time][1] * 1000)}, "read"),
         case(
-            "a channel stands twice",
+            "a channel appears twice",
             lambda found: {column: ("", found[name][1])},
             says=[column, "2 times", "expected once"],
         ),

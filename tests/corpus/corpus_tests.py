@@ -76,7 +76,7 @@ def _frf():
             "frequency_hz",
             "line 2",
         ),
-        case("all nought", times(0.0), "flagged", "stands at 0", "left out"),
+        case("all nought", times(0.0), "flagged", "stays at 0", "left out"),
         case(
             "a coherence of percents",
             lambda t: t.assign(coherence=98.0),

@@ -132,7 +132,7 @@ def _faults(kind, form, column):
         case("a row of units below the header", _units, says=[either("row 2", "line 2"), "expected"]),
         case("a required column is missing", _without(must), says=[must, "expected"]),
         case("a required column is named otherwise", _header(must, f"my {must}"), says=[must, "expected"]),
-        case("a column stands twice", _twice(column), says=[column]),
+        case("a column appears twice", _twice(column), says=[column]),
         case("columns in another order", _lines(lambda rows: [row[::-1] for row in rows]), "read"),
         case("a blank cell", _cell(must, ""), says=[row, must, "expected"]),
         case("text in a number", _cell(column, "high"), says=[*at, "high", "expected a"]),

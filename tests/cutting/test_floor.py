@@ -1,4 +1,4 @@
-"""The floor that an orbit leaves on a helix, against a disc that is moved about, and forces slice by slice."""
+"""The floor that an orbit leaves on a helix, against a disc that is moved, and forces slice by slice."""
 
 import math
 
@@ -62,8 +62,7 @@ def test_forces_on_a_helix_are_those_of_slices_below_the_floor(helix, turning):
         assert np.all(np.abs(found[row] - force) < (2e-3 * largest if helix else step)), row
 
 
-def test_a_floor_far_above_the_edges_takes_nothing():
-    """An orbit so large that the wall is straight: half the pitch at the middle of the arc, all at the wall."""
+def test_before_a_tool_on_a_very_wide_orbit_all_of_the_pitch_is_left():
     floor = Floor(PITCH, 1e3, RADIUS, 1.0)
     assert floor_at(floor, 1.0, 0.0) == pytest.approx(PITCH, rel=1e-5)
 

@@ -53,9 +53,9 @@ def is_own(effect):
 
 def test_every_effect_is_on_the_page_with_all_that_tells_it():
     page = reference["pages"]()["reference-effects.md"]
-    effects, likenesses = page.split("\n## Likenesses")
+    effects, alternatives = page.split("\n## Alternative explanations")
     for effect in filter(is_own, library()):
-        part = likenesses if effect.resembled else effects
+        part = alternatives if effect.resembled else effects
         section = re.search(rf"^### {effect.name}$.*?(?=^###|\Z)", part, re.DOTALL | re.MULTILINE)[0]
         told = (effect.signature, effect.experiment, effect.literature, *effect.observables)
         assert [each for each in told if each not in section] == []

@@ -1,7 +1,7 @@
 """The force effects in the data of an independent simulator: found where they are, and nowhere else.
 
-Of tool_wear, chip_size_effect, pitch_error, orbit_stiffness, charge_drift, charge_leak, dynamometer_resonance,
-dynamometer_rotation and dynamometer_crosstalk; from metro.effects by their names.
+Of tool_wear, chip_size_effect, pitch_error, orbit_stiffness, charge_drift, charge_leak,
+dynamometer_resonance, dynamometer_rotation and dynamometer_crosstalk; from metro.effects by their names.
 """
 
 import math

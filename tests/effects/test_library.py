@@ -34,6 +34,8 @@ def test_an_observable_gets_the_effects_that_change_its_model():
 @pytest.mark.parametrize("effect", library(), ids=lambda effect: effect.name)
 def test_every_effect_is_described_and_can_be_started(effect):
     assert effect.signature
+    assert effect.meaning.endswith(".")
+    assert effect.meaning[0].isupper()
     assert effect.literature
     assert effect.experiment
     for parameter in effect.parameters:

@@ -139,8 +139,8 @@ def test_the_base_model_is_told_of_it():
     assert told.base.cutter.helix == pytest.approx(0.57)
     assert np.diag(told.base.sensor.axes) == pytest.approx([1.01, 0.98, 1.005])
     assert told.notes == (
-        "The base model is told of sensor gain (batch.yaml, known).",
-        "The base model is told of helix error (batch.yaml, known).",
+        "The base model includes sensor gain, as declared in batch.yaml under known.",
+        "The base model includes helix error, as declared in batch.yaml under known.",
     )
 
 

@@ -29,7 +29,7 @@ def test_a_verdict_that_is_contradicted_has_no_cause_and_says_what_to_do():
     assert content["status"] == "unexplained"
     assert content["contradicted"] is True
     assert content["effects"] == content["indistinguishable"] == []
-    assert "correct what the batch declares" in content["next_experiment"]
+    assert "correct the declaration as proposed on page one" in content["next_experiment"]
     assert "contradict" in content["unexplained"]["signature"]
 
 

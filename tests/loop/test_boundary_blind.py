@@ -76,7 +76,7 @@ def test_what_softens_with_speed_or_yields_with_depth_is_told_by_the_next_test()
     assert verdict["status"] == "undetermined"
     assert verdict["indistinguishable"] == [["spindle_speed_softening", "depth_yielding"]]
     assert "it may be a depth yielding" in verdict["unexplained"]["signature"]
-    assert "its label tells most about whether it is" in verdict["next_experiment"]
+    assert "its result best distinguishes" in verdict["next_experiment"]
 
 
 def test_no_effect_is_found_where_there_is_none():

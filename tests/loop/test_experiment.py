@@ -62,7 +62,7 @@ def test_the_paragraph_names_the_run_its_probability_and_the_pair():
     _, verdict, tried = judged(task, (BEND, STOP))
     assert verdict["status"] == "undetermined"
     text = verdict["next_experiment"]
-    assert text.startswith("feed 8: this tells")
+    assert text.startswith("feed 8: this distinguishes")
     assert "more than 0.99" in text
     assert "an experiment" not in text
     best = tried["experiments"][0]

@@ -173,11 +173,11 @@ def test_without_an_effect_the_prediction_stays_as_it_was():
 def test_labels_that_contradict_every_hypothesis_are_unexplained():
     task_rows, verdict, _, _ = closed(Line(shift=1.8), (SLOPE,))
     assert verdict["status"] == "unexplained"
-    assert verdict["unexplained"]["signature"].startswith("labels against the predicted boundary")
+    assert "tests contradict the predicted boundary" in verdict["unexplained"]["signature"]
     assert len(task_rows) == len(verdict["held_out_runs"])
 
 
 def test_too_few_tests_are_insufficient_for_effects():
     _, verdict, story, _ = closed(Line(), (SHIFT, SLOPE), seed=3, rpm=np.array([4000.0, 5000.0]))
     assert verdict["candidates"] == []
-    assert "effects of the boundary need" in story["noise"]["words"]
+    assert "speeds, not held out, are needed" in story["noise"]["words"]

@@ -82,7 +82,7 @@ def test_an_undecided_batch_gets_its_runs_as_a_run_table(ask, tmp_path):
     out = tmp_path / "next.csv"
     result = ask(undecided(), (BEND, STOP), "--out", out)
     assert result.exit_code == 0, result.output
-    assert "force: feed 8: this tells" in result.output
+    assert "force: feed 8: this distinguishes" in result.output
     assert "more than 0.99" in result.output
     table = pd.read_csv(out)
     assert list(table.columns) == [column.name for column in RUNS]

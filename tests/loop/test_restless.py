@@ -56,7 +56,7 @@ def test_a_session_that_drifts_while_repeats_are_mixed_is_not_called_clean():
     assert closed(task)["status"] == "clean"
     verdict = closed(drifting(task, 0.05))
     assert verdict["status"] == "unexplained"
-    assert "times what is usual" in verdict["unexplained"]["signature"]
+    assert "times the usual value" in verdict["unexplained"]["signature"]
     assert not verdict["effects"]
 
 

@@ -83,7 +83,7 @@ def test_two_effects_that_are_the_same_leave_the_cause_undetermined():
     assert {*verdict["indistinguishable"][0]} == {"bend", "twin"}
     assert "an experiment for twin" in verdict["next_experiment"]
     (rival,) = verdict["candidates"]
-    assert rival["why_not"] == f"these runs do not tell it from {outcome.names[0]}"
+    assert rival["why_not"] == f"these runs do not distinguish it from {outcome.names[0]}"
 
 
 def test_what_passes_every_gate_and_is_not_added_says_why():
@@ -183,15 +183,17 @@ def test_an_effect_that_helps_one_condition_alone_is_not_added():
 
 def test_an_effect_smaller_than_half_of_what_stays_unexplained_is_not_added():
     evidence = Evidence(statistic=50.0, p_value=1e-6, held_out={}, size=0.02, missed=0.05)
-    assert "5 % stay unexplained" in in_words(trial_room._why_not(evidence, 0.0, GATES, 0.004))
+    assert "5 % of the signal remain unexplained" in in_words(
+        trial_room._why_not(evidence, 0.0, GATES, 0.004)
+    )
     assert trial_room._why_not(replace(evidence, missed=0.03), 0.0, GATES, 0.004) is None
 
 
 def test_a_small_p_value_among_many_candidates_is_told_with_what_it_is_among_so_many():
     evidence = Evidence(statistic=9.0, p_value=0.006, held_out={}, size=0.02, missed=0.0)
-    assert "(q = 0.06)" in in_words(trial_room._why_not(evidence, 0.06, GATES, 0.004))
+    assert "(q = 0.06 over" in in_words(trial_room._why_not(evidence, 0.06, GATES, 0.004))
     weak = in_words(trial_room._why_not(replace(evidence, p_value=0.4), 0.9, GATES, 0.004))
-    assert weak == "no evidence: p = 0.4 over the runs of the fit"
+    assert weak == "not significant: p = 0.4 over the identification runs"
 
 
 def test_what_is_not_of_the_library_is_told_as_a_likeness_and_not_added():

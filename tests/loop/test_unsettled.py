@@ -27,7 +27,7 @@ def test_a_fit_is_settled_and_one_that_is_not_is_told():
     found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
     assert unsettled(found) is None
     assert unsettled(replace(found, step=0.4)) is None  # nothing that its interval would show
-    assert "did not converge: a step more would move a parameter by 3" in in_words(
+    assert "did not converge (next step: 3 standard deviations)" in in_words(
         unsettled(replace(found, step=3.0))
     )
 
@@ -110,7 +110,7 @@ def test_a_held_out_run_beyond_the_model_is_said_and_decides_nothing():
         rows = verdict.comparison(task, *(verdict.held_out(task, f) for f in (outcome.base, outcome.final)))
         told = in_words(verdict.judge(task, outcome, rows, GATES))
         assert told["status"] == "explained"
-        assert ("A held-out run is beyond the model" in told["verification"]["words"]) is beyond
+        assert ("The model cannot predict one held-out run" in told["verification"]["words"]) is beyond
 
 
 def test_of_a_base_that_did_not_converge_nothing_is_called_clean():

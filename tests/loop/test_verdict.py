@@ -93,7 +93,7 @@ def test_a_probability_that_an_unexplained_residual_lowers_says_so_with_its_part
     """Half of the wave is bent, a fifth of it is a spike that the library lacks: power 0.5² beside 0.2²."""
     outcome, _, verdict = closed(*CASES["partly_explained"])
     (effect,) = verdict["effects"]
-    assert "of the residual is explained" in effect["lowered"]
+    assert "of the residual" in effect["lowered"]
     assert effect["lowered"] in verdict_in_words(verdict)
     weight, share = (float(number) for number in re.findall(r"[0-9.]*[0-9]", effect["lowered"])[:2])
     assert weight == pytest.approx(outcome.weight["bend"], abs=0.006)
@@ -161,7 +161,9 @@ def test_a_residual_that_only_conditions_left_out_of_the_fit_show_is_stated():
     rows = comparison(task, held_out(task, blind.base), held_out(task, blind.final))
     verdict = in_words(judge(task, blind, rows, GATES))
     assert verdict["status"] == "unexplained"
-    assert verdict["unexplained"]["signature"].startswith("only where a condition is left out of the fit: ")
+    assert verdict["unexplained"]["signature"].startswith(
+        "only in conditions that were left out of the fit: "
+    )
     check_entry(verdict)
 
 
@@ -301,7 +303,7 @@ def test_runs_that_the_effects_make_worse_are_named():
     assert [found["effect"] for found in verdict["effects"]] == ["bend"]
     worse = [one["run"] for one in verdict["verification"]["worse_runs"]]
     assert worse == [block.run for block in straight.role("validate")]
-    assert "With the effects the error grows in" in verdict["verification"]["words"]
+    assert "With the effects the error increases in" in verdict["verification"]["words"]
     assert not closed(bent, (BEND,))[2]["verification"]["worse_runs"]
     assert len(rows)
 
@@ -310,7 +312,7 @@ def test_a_rival_that_is_no_effect_of_the_library_leaves_words_and_no_error():
     _, rows, verdict = closed(problem(9, truth=Wave(bend=0.1)), (BEND, replace(TWIN, resembled=True)))
     assert len(rows)
     assert [found["effect"] for found in verdict["effects"]] == ["bend"]
-    assert "it may be no bend but a twin" in verdict["unexplained"]["signature"]
+    assert "alternative explanation to bend: a twin" in verdict["unexplained"]["signature"]
     assert verdict["unexplained"]["rms"] is None  # nothing is left over
 
 

@@ -103,7 +103,7 @@ def test_sizes_that_differ_are_a_contradiction_in_words(other):
     assert cause["parameters"] == {}
     words = cause_in_words(in_words(cause))
     assert "bend 0.2 ±" in words
-    assert "not one cause of one size" in words
+    assert "not one common cause" in words
 
 
 def test_an_error_that_all_runs_of_one_share_is_no_contradiction():
@@ -116,7 +116,10 @@ def test_an_error_that_all_runs_of_one_share_is_no_contradiction():
 def test_one_that_cannot_tell_neither_confirms_nor_contradicts():
     (cause,) = story(one=bent(1, 0.05), two=noisy(bent(1001, 0.0, repeats=1), 6.0, 1))
     assert cause["status"] == "alone"
-    assert [told["says"] for told in in_words(cause["witnesses"])] == ["found it", "cannot tell"]
+    assert [told["says"] for told in in_words(cause["witnesses"])] == [
+        "identified it",
+        "is not sensitive enough",
+    ]
     assert cause["seen_in"] == ["one"]
 
 

@@ -109,7 +109,8 @@ def test_an_arm_of_unknown_stiffness_is_said_to_be_one(cell):
     assert any("less what the arm gives way" in note for note in force.problem(batch, observed, {}).notes)
     stiff = observed | {"spindle": observed["spindle"].assign(give_mm=0.0)}
     assert any(
-        "gives way in side cuts is not known" in note for note in force.problem(batch, stiff, {}).notes
+        "deflection of the arm in side cuts is not known" in note
+        for note in force.problem(batch, stiff, {}).notes
     )
     machine = replace(batch, cell={"cell": "mill"})
     assert not any("arm" in note for note in force.problem(machine, stiff, {}).notes)

@@ -411,7 +411,7 @@ def test_a_joint_that_the_load_tests_do_not_see_is_rigid_give_or_take(cell, buil
     known = [block for block in task.role("calibrate") if block.run == "known joints"]
     assert len(known) == 1
     assert list(known[0].axis) == ["joint 6"]
-    assert any("do not tell joint 6" in note for note in task.notes)
+    assert any("do not determine joint 6" in note for note in task.notes)
 
 
 def test_the_report_holds_the_truth_within_its_intervals_and_is_json(cell, built):

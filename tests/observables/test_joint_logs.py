@@ -128,7 +128,7 @@ def test_a_short_log_and_joints_that_stand_still_are_said(tmp_path):
 
     tables, _ = observed(seven(tmp_path / "still", columns=still), tmp_path / "out2")
     third = tables["joint_log"].set_index(["run", "joint"]).loc[("bare", 3)]
-    assert third["remark"] == "too slow for the encoder to tell which way"
+    assert third["remark"] == "too slow for the encoder to resolve the direction"
     assert np.isnan(third["coulomb"])
 
 

@@ -119,7 +119,7 @@ def test_what_the_loads_do_not_see_is_named_with_the_load_that_would():
     assert load.after < 0.05
     sentence = in_words(told, load, MODEL.arm.axes)
     assert "do not see joint 1 " in sentence
-    assert "would tell joint 1 to" in sentence
+    assert "would determine joint 1 to" in sentence
 
 
 def test_loads_that_tell_every_joint_name_the_one_they_tell_least():
@@ -128,7 +128,7 @@ def test_loads_that_tell_every_joint_name_the_one_they_tell_least():
     found = fitted_loads(MODEL, loads)
     np.testing.assert_allclose(told.relative, found.sd / found.value, rtol=1e-6)
     assert load.joint == told.worst
-    assert f"joint {told.worst + 1} least" in in_words(told, load, MODEL.arm.axes)
+    assert f"joint {told.worst + 1} is the least certain" in in_words(told, load, MODEL.arm.axes)
     blocks, notes = calibration(batch(), MODEL, loads)
     assert in_words(told, load, MODEL.arm.axes) in notes
     assert len(blocks) == 5

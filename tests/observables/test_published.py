@@ -61,7 +61,7 @@ def test_the_misprints_of_the_face_milling_tables_are_the_only_flags():
     inertia = ("machining head", "moment of inertia")
     indices = {("case 5", "X_m"), ("case 7", "X_m"), ("case 3", "X_g")}
     assert set(flagged.index) == indices | {gauge, inertia}
-    assert "0.97 mm stands out of the other 7 points, 0.081 to 0.139" in flagged.loc[gauge, "flag"]
+    assert "0.97 mm is an outlier among the other 7 points, 0.081 to 0.139" in flagged.loc[gauge, "flag"]
     assert "3.122 exceeds the sum of the other two, 2.367" in flagged.loc[inertia, "flag"]
     assert flagged.loc[("case 5", "X_m"), "of_predicted_percent"] == pytest.approx(12.06, abs=0.005)
     assert flagged.loc[("case 7", "X_m"), "of_predicted_percent"] == pytest.approx(23.88, abs=0.005)

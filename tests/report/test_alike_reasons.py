@@ -48,5 +48,5 @@ def test_what_several_batches_are_to_measure_is_told_once_and_what_verdicts_need
     verdicts = {"a": same, "b": same, "c": verdict("unexplained", "x")}
     (section,) = [one for one in campaign_sections(verdicts, {}) if one.title == "What to measure next"]
     (told,) = section.items
-    needless = "a and b, cutting force: a slot (the verdict does not need it)"
+    needless = "a and b, cutting force: a slot (optional: the verdict does not depend on it)"
     assert list(told.items) == ["c, cutting force: x", needless]

@@ -52,7 +52,7 @@ def test_every_part_is_there(pages):
         *("Identification", "Predicted against measured", "The closed loop", "Provenance", "Not identified"),
         *("3 samples missing", "no impacts.csv", "absorbed", "K_tc", "958.9 ± 6.0", "(7.255 ± 0.040)·10⁶"),
         *(
-            "Cannot be seen in this batch",
+            "These effects cannot be detected in this batch",
             "from the column role of runs.csv",
             "grows along the path",
         ),
@@ -114,18 +114,18 @@ def test_modes_without_a_driving_point_have_no_stiffness_and_the_first_page_show
     tables = {"frf_used": synthetic.responses().assign(response="9x")}
     some = replace(synthetic.results(), tables=tables, identified={"modes": modes}, verdict={}, loop={})
     first = text_of(pdf_of(some))[0]
-    assert "mode that yields most" not in first
+    assert "most flexible mode" not in first
     assert "The highest response" in first
 
 
 @pytest.mark.parametrize(
     ("status", "words"),
     [
-        ("clean", "show nothing that the base model lacks"),
+        ("clean", "the base model explains the identification runs"),
         ("explained", "traced to tool runout (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°)"),
         ("partly_explained", "A significant residual remains"),
-        ("undetermined", "It may be tool wear or charge drift."),
-        ("unexplained", "no effect of the library accounts for it"),
+        ("undetermined", "Possible causes: tool wear or charge drift."),
+        ("unexplained", "no effect of the library explains"),
         ("insufficient", "too few runs to decide"),
     ],
 )
@@ -139,13 +139,15 @@ def test_every_status_has_its_sentence(status, words):
 def test_a_cause_that_is_not_certain_is_a_lead_and_nothing_is_traced_to_it():
     doubtful = {**synthetic.RUNOUT, "probability": 0.63}
     alone = verdict_words("force", synthetic.observable("explained", effects=[doubtful]))
-    assert "tool runout (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°) would account for the difference" in alone
-    assert "a lead, not a finding" in alone
+    assert (
+        "a possible cause of the difference from the base model is tool runout (radius 9.83 ± 0.31 µm, angle "
+        "41.2 ± 2.4°)."
+    ) in alone
     assert "traced to" not in alone
     beside = {**doubtful, "effect": "tool_wear"}
     both = verdict_words("force", synthetic.observable("explained", effects=[synthetic.RUNOUT, beside]))
     assert "traced to tool runout" in both
-    assert "tool wear (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°) would account for more of it" in both
+    assert "A possible cause of a further part of it is tool wear (radius 9.83 ± 0.31 µm" in both
 
 
 def test_an_error_that_did_not_change_is_said_once():
@@ -173,3 +175,22 @@ def test_single_values_per_run_and_axis_are_tabulated_and_not_drawn_as_curves():
     assert "Errors on held-out runs, rms (mm)" in text
     assert "Parity on held-out runs" in text
     assert "residual of all held-out runs" not in text
+
+
+def test_a_cause_is_explained_in_a_sentence_and_each_explanation_is_given_once():
+    forms = [{**synthetic.RUNOUT, "probability": p, "meaning": "The axes differ."} for p in (0.99, 0.99)]
+    said = verdict_words("force", synthetic.observable("explained", effects=forms))
+    assert said.count("The axes differ.") == 1
+
+
+def test_an_effect_that_the_held_out_runs_do_not_ask_for_is_said_to_come_from_the_others():
+    within = "within the noise floor there; the effect was identified from the other runs"
+    entry = synthetic.observable("explained", before=1.0, after=0.9)
+    assert within in verdict_words("force", {**entry, "noise_floor": 1.1})
+    assert within not in verdict_words("force", {**entry, "noise_floor": 0.95})
+
+
+def test_of_stability_the_tests_on_the_predicted_side_come_before_the_error_of_a_probability():
+    entry = synthetic.observable("clean", 0.4, 0.2, unit="1", verification={"words": "28 of 32 are right."})
+    said = verdict_words("lobes", entry)
+    assert said.index("28 of 32") < said.index("0.40")

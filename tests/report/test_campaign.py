@@ -66,7 +66,7 @@ def test_the_stage_writes_its_files_and_the_pdf_names_what_could_not_be_told(tmp
     )
     for words in (
         "2 batches, 4 verdicts",
-        "fixture bow or thermal growth cannot be told apart",
+        "fixture bow or thermal growth cannot be distinguished",
         "no runs.csv",
         "modes-only",
     ):

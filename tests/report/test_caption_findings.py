@@ -17,15 +17,16 @@ def change(label, before, after):
 
 
 def test_what_is_left_is_the_rms_of_the_rest_with_and_without_effects():
-    assert findings.left(compared((0.0,) * 4)) == "The base model leaves 3.54 N rms of 3.54 N measured."
-    told = findings.left(compared((2.0, -3.0, 3.0, -4.0)))
-    assert told.endswith("of 3.54 N measured, with the effects found 0.707 N.")
+    alone = findings.left(compared((0.0,) * 4))
+    assert alone == "The error of the base model is 3.54 N rms, for a measured signal of 3.54 N rms."
+    both = findings.left(compared((2.0, -3.0, 3.0, -4.0)))
+    assert both.endswith("and 0.707 N with the effects found, for a measured signal of 3.54 N rms.")
 
 
 def test_the_run_that_is_missed_most_is_told_by_its_own_values():
     told = findings.missed(compared((2.0, -3.0, 3.0, -4.0)), "b")
-    assert told.startswith("Of the held-out runs the base model misses b most: it leaves 3.54 N")
-    assert told.endswith("with the effects found 0 N.")
+    assert told.startswith("Held-out run b has the largest error of the base model: 3.54 N rms")
+    assert "and 0 N with the effects found" in told
 
 
 def test_offsets_are_means_by_axis_to_the_digits_of_the_rest():
@@ -33,8 +34,9 @@ def test_offsets_are_means_by_axis_to_the_digits_of_the_rest():
 
 
 def test_differences_are_put_beside_those_of_noise_alone():
-    assert "within 4.00 N of the base model; noise alone puts them within 0.980 N" in findings.scatter(
-        compared((0.0,) * 4)
+    assert (
+        "within 4.00 N of the base model; with noise alone they would lie within 0.980 N"
+        in findings.scatter(compared((0.0,) * 4))
     )
 
 
@@ -42,9 +44,9 @@ def test_differences_are_put_beside_those_of_noise_alone():
     ("rows", "told"),
     [
         ([("a", 8.0, 2.0)], "falls from 8.0 % to 2.0 % of the signal"),
-        ([("a", 8.0, 8.0)], "8.0 % of the signal, nothing was added"),
-        ([("a", 8.0, 2.0), ("b", 5.0, 5.0)], "fall in 1 of 2 cases; the largest that is left is 5.0 %"),
-        ([("a", 8.0, 8.0), ("b", 5.0, 5.0)], "No held-out error fell"),
+        ([("a", 8.0, 8.0)], "8.0 % of the signal; no effect was added"),
+        ([("a", 8.0, 2.0), ("b", 5.0, 5.0)], "fall in 1 of 2 cases; the largest remaining error is 5.0 %"),
+        ([("a", 8.0, 8.0), ("b", 5.0, 5.0)], "No effect was added"),
     ],
 )
 def test_errors_before_and_after_are_told_in_a_sentence(rows, told):
@@ -58,14 +60,14 @@ def test_runs_above_the_noise_floor_are_counted_and_the_worst_is_named():
     ]
     assert (
         findings.above_floor(blocks, 2.5, "N")
-        == "1 of 3 runs lies above the noise floor; b leaves most, 3.00 N."
+        == "1 of 3 runs exceeds the noise floor; b has the largest residual, 3.00 N."
     )
-    assert findings.above_floor(blocks, 9.0, "N").startswith("None of 3 runs lies above")
+    assert findings.above_floor(blocks, 9.0, "N").startswith("None of 3 runs exceeds")
 
 
 def test_the_order_and_the_tooth_that_are_missed_most_are_named():
     orders = pd.DataFrame({"order": [0, 3], "axis": ["x", "z"], "after": [0.1, 0.4], "measured": [9.0, 8.0]})
-    assert "at order 3 along z: 0.400 N of 8.00 N" in findings.peak_order(orders)
+    assert "at order 3 along z: 0.400 N, for 8.00 N" in findings.peak_order(orders)
     peaks = pd.DataFrame(
         {"model": "before", "percent": [1.0, -5.0, 2.0], "run": ["a", "b", "c"], "axis": "y"}
     )

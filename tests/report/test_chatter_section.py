@@ -84,7 +84,7 @@ def test_every_kind_is_drawn_where_it_was_cut_and_wrong_labels_are_circled():
     drawn = {c.get_label(): c.get_offsets().tolist() for c in axes.collections}
     assert drawn["chatter (Hopf)"] == [[1500.0, 1.5]]
     assert drawn["chatter (flip)"] == [[2000.0, 1.8]]
-    assert drawn["unknown kind, or cannot be told"] == [[2500.0, 1.2]]
+    assert drawn["kind unknown or not determined"] == [[2500.0, 1.2]]
     assert drawn["stable"] == [[1500.0, 0.5], [3000.0, 1.0]]
     assert drawn["labelled otherwise"] == [[1500.0, 1.5]]
 
@@ -162,4 +162,4 @@ def test_where_nothing_chatters_and_nothing_is_predicted_a_sentence_is_enough(fo
     quiet = RUNS.assign(probability=0.02, labelled=-1, separable=True)
     items = chatter_items(forces(quiet))
     assert not tables_of(items)
-    assert "None of 5" in items[-1].items[0]
+    assert "None of the 5" in items[-1].items[0]

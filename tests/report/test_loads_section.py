@@ -1,11 +1,11 @@
-"""Load tests in the report: every point, and the softest direction on page one."""
+"""Load tests in the report: every point, with a dash where nothing was loaded."""
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.report.results import Results
-from metro.report.sections.loads import first_loaded, load_points
+from metro.report.sections.loads import load_points
 
 BATCH = Batch("b", {}, {}, pd.DataFrame(), {})
 
@@ -22,14 +22,6 @@ def results(*points):
     return Results(BATCH, tables, {}, {}, {})
 
 
-def test_page_one_gives_the_softest_direction_that_was_loaded():
-    (facts,) = first_loaded(results(point("A", "P1", 2.0, np.nan, 1.0), point("A", "P2", 2.0, 0.5, 3.0)))
-    ((name, value, where),) = facts.items
-    assert name == "least stiffness at rest, along y"
-    assert value == "0.500 ± 0.010 N/µm"
-    assert where == "A, P2, of 12 load tests at 2 points"
-
-
 def test_every_point_has_a_row_and_a_dash_where_nothing_was_loaded():
     _, table = load_points(results(point("A", "P1", 2.0, np.nan, 1.0), point("", "", 2.0, 0.5, 3.0)))
     assert [row[0] for row in table.rows] == ["A, P1", "not named"]
@@ -37,5 +29,4 @@ def test_every_point_has_a_row_and_a_dash_where_nothing_was_loaded():
 
 
 def test_nothing_is_said_without_load_tests():
-    assert load_points(results()) == first_loaded(results()) == []
-    assert first_loaded(results(point("A", "P", np.nan, np.nan, np.nan))) == []
+    assert load_points(results()) == []

@@ -80,7 +80,7 @@ def test_a_trend_is_told_with_its_size_its_doubt_and_the_next_value():
     ("clocks", "words"),
     [
         (["hours", "days"], "in which their first runs started."),
-        (["batches", "batches"], "in the order of their names: not all"),
+        (["batches", "batches"], "in the order of their names, because"),
         (["hours", "batches"], "those of 1 in the order of their names"),
     ],
 )
@@ -98,7 +98,7 @@ def test_a_step_names_the_batches_that_it_lies_between():
     ("more", "words"),
     [
         ({}, "thermal growth, rate is 0.50 ± 0.20 µm/min by 6 batches together"),
-        ({"shown": False, "below_budget": True}, "smaller than what a model may get wrong by itself"),
+        ({"shown": False, "below_budget": True}, "within the stated model accuracy"),
         ({"shown": False}, "All batches together show no effect that none shows alone."),
     ],
 )

@@ -59,7 +59,8 @@ def test_errors_are_tabulated_and_drawn_by_distance():
     assert isinstance(picture, Picture)
     assert table.rows[0] == ["0", "2", "100", "3.0 … 4.0 … 5.0", "2.0 … 2.5 … 3.0"]
     assert table.rows[2] == ["1700", "1", "5.0", "25", "20"]
-    assert "leave 3.0 % to 5.0 % of a response, at 1700 mm 25 % in the median" in picture.caption
+    said = "the error of the modes is 3.0 % to 5.0 % of a response, at 1700 mm 25 % in the median"
+    assert said in picture.caption
     drawn = picture.figure.axes[0].get_lines()[0]
     np.testing.assert_allclose(drawn.get_xydata(), [[0, 3], [900, 6], [1700, 25]])
     assert to_svg(picture.figure)

@@ -43,7 +43,7 @@ def test_what_is_not_significant_is_not_told():
 
 def test_axes_stand_in_the_order_of_their_size():
     entries = [place("x", "all", 0.1, 2.0), place("z", "all", 0.7, 9.0)]
-    assert residual_words(entries, 0) == "throughout (z 70 % and x 10 % of the signal)"
+    assert residual_words(entries, 0) == "over the whole record (z 70 % and x 10 % of the signal)"
 
 
 def test_sentences_of_the_verdict_lose_their_jargon():
@@ -51,8 +51,8 @@ def test_sentences_of_the_verdict_lose_their_jargon():
     assert plain(told) == (
         "8 times per revolution in y (28 %); a constant offset in x (2 %) and smaller parts at 66 more places"
     )
-    assert plain(f"repeats spread over the session, to describe what is left: {told}") == (
-        "repeats spread over the session, to describe what is left"
+    assert plain(f"repeats spread over the session, to characterise the remaining error: {told}") == (
+        "repeats spread over the session, to characterise the remaining error"
     )
     assert plain("a test beside run c08") == "a test beside run c08"
 
@@ -71,5 +71,5 @@ def test_a_note_becomes_a_sentence_and_symbols_stay(text, told):
 
 
 def test_units_are_set_as_in_print():
-    assert plain("it shows from 12 um/min on") == "it shows from 12 µm/min on"
+    assert plain("it can be detected from 12 um/min on") == "it can be detected from 12 µm/min on"
     assert plain("a column thrust_um") == "a column thrust_um"

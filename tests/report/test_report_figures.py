@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 import synthetic_results as synthetic
 
 from metro.report.figures import comparison, face_pairing, surface, verdicts
@@ -116,6 +117,25 @@ def test_maps_have_a_colour_scale_symmetric_about_zero():
     figure = surface.face_maps(synthetic.tables()["face_map"])
     low, high = figure.axes[0].collections[0].get_clim()
     assert low == -high
+
+
+def test_a_groove_in_a_face_does_not_set_the_scale_and_its_depth_is_written_at_its_place():
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(20.0), np.arange(20.0)))
+    flat = pd.DataFrame({"run": "a", "x_mm": x, "y_mm": y, "deviation_um": 5.0 * np.cos(x / 4)})
+    grooved = flat.assign(run="b", deviation_um=flat["deviation_um"].where(x > 0, -200.0))
+    figure = surface.face_maps(pd.concat([flat, flat.assign(run="c"), grooved]))
+    (_, high), grooved_axes = figure.axes[0].collections[0].get_clim(), figure.axes[2]
+    assert high <= 5.0
+    assert grooved_axes.get_title(loc="left") == "b"
+    groove = next(text for text in grooved_axes.texts if text.get_text() == "−200")
+    assert groove.xy[0] == 0.0
+    assert "+4.8" in {text.get_text() for text in grooved_axes.texts}
+
+
+def test_deviations_at_points_of_the_path_are_drawn_in_micrometres():
+    figure = surface.face_points(synthetic.face_rows())
+    measured = figure.axes[0].collections[0].get_array()
+    assert np.ptp(measured) == pytest.approx(1e3 * np.ptp(synthetic.face_rows()["measured"]))
 
 
 def test_the_parity_of_faces_bears_the_unit_of_the_comparison():

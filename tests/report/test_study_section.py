@@ -89,7 +89,7 @@ def test_effects_stand_with_intervals_and_the_significant_ones_stand_out():
 def test_what_the_runs_cannot_tell_apart_is_said():
     told = " ".join(" ".join(item.items) for item in of_kind(study(results(measured())), Bullets))
     assert "wrist and pose vary together" in told
-    assert "wrist × depth cannot be told from wrist in part" in told
+    assert "wrist × depth cannot be separated from wrist in part" in told
 
 
 def test_the_ranking_has_both_predictions_and_says_how_far_they_agree():

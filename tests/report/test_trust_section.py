@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 import synthetic_results as synthetic
 
+from metro.report.content import Picture, Table
 from metro.report.results import Results
 from metro.report.sections.summary import first_words, summary
 from metro.report.sections.trust import IDENTIFIED, MEASURED, UNTESTED, trust, trust_in, untested
@@ -36,7 +37,7 @@ def entry(status="clean", runs=("r2", "r3", "r4"), **more):
 
 def test_a_prediction_holds_to_the_upper_end_of_its_interval_for_the_cuts_that_tested_it():
     (said,) = trust(results(force=entry()))
-    assert said.startswith("Cutting force: predictions hold to 2.2 N rms (1.8 % of the signal).")
+    assert said.startswith("Cutting force: the predictions are accurate to 2.2 N rms (1.8 % of the signal).")
     assert "side and slot cuts, direction down and up" in said
     assert "feed per tooth 0.05 to 0.12 mm and radial depth 4 and 12 mm" in said
     assert said.endswith("at one axial depth (2 mm) and spindle speed (6000 rpm) only.")
@@ -44,7 +45,7 @@ def test_a_prediction_holds_to_the_upper_end_of_its_interval_for_the_cuts_that_t
 
 def test_without_an_interval_it_is_said_that_there_is_none():
     (said,) = trust(results(force=entry(runs=["r2"])))
-    assert "hold to 2.0 N rms (1.7 % of the signal; one condition: no interval)." in said
+    assert "accurate to 2.0 N rms (1.7 % of the signal; one condition: no interval)." in said
 
 
 def test_a_setting_of_which_one_level_alone_was_tested_is_named():
@@ -65,12 +66,15 @@ def test_a_setting_that_the_whole_batch_shares_is_no_limit_of_the_test():
 @pytest.mark.parametrize("status", ["partly_explained", "undetermined", "unexplained"])
 def test_predictions_that_miss_something_are_not_to_be_relied_on(status):
     (said,) = trust(results(force=entry(status, noise_floor=0.5)))
-    assert "the measured values, not the predictions" in said
+    assert "do not use the predictions" in said
     assert "4.0 times the noise" in said
 
 
 def test_without_enough_runs_nothing_is_to_be_relied_on():
-    assert "nothing; no prediction was tested" in trust(results(force=entry("insufficient", runs=[])))[0]
+    assert (
+        "no prediction was tested, so none can be relied on"
+        in trust(results(force=entry("insufficient", runs=[])))[0]
+    )
 
 
 def test_a_sure_cause_is_a_finding_and_a_likely_one_a_lead():
@@ -79,9 +83,9 @@ def test_a_sure_cause_is_a_finding_and_a_likely_one_a_lead():
         {"effect": "tool_wear", "probability": 0.6, "parameters": {}},
     ]
     said = trust_in(results(force=entry("explained", effects=effects)), "force")
-    assert "A finding: tool runout (probability 0.990)." in said
-    assert "A lead, not a finding: tool wear (probability 0.600)." in said
-    assert "with what was added, predictions hold" in said
+    assert "Identified cause: tool runout (probability 0.990)." in said
+    assert "Possible cause: tool wear (probability 0.600)." in said
+    assert "the predictions with the effects found are accurate" in said
 
 
 def test_verdicts_that_the_same_cuts_tested_share_a_paragraph():
@@ -110,7 +114,10 @@ def test_what_was_not_identified_does_not_hold_within_an_interval():
 
 
 def test_what_to_measure_next_says_where_the_verdict_does_without():
-    assert next_words(entry("clean", next_experiment="a slot.")) == "a slot (the verdict does not need it)"
+    assert (
+        next_words(entry("clean", next_experiment="a slot."))
+        == "a slot (optional: the verdict does not depend on it)"
+    )
     assert next_words(entry("unexplained", next_experiment="a slot.")) == "a slot"
     assert next_words(entry("clean", next_experiment=None)) == ""
 
@@ -122,9 +129,12 @@ def test_the_first_page_of_a_batch_without_a_verdict_gives_the_mode_that_yields_
     silent = replace(
         results(), identified={"modes": [stiff, soft]}, tables={"frf_used": synthetic.responses()}
     )
-    facts, picture = summary(silent).items[-2:]
-    told = {label: value for label, value, _ in facts.items}
-    assert told["receptance at its peak"] == "5.00·10⁻⁶ m/N"  # 1 / (2 · 0.05 · 2e6)
+    items = summary(silent).items
+    (table,) = (item for item in items if isinstance(item, Table))
+    ((name, value, _),) = table.rows
+    assert name == "most flexible mode"
+    assert "receptance 5.00·10⁻⁶ m/N" in value  # 1 / (2 · 0.05 · 2e6)
+    (picture,) = (item for item in items if isinstance(item, Picture))
     assert "highest response" in picture.caption
     assert any("Identified: 2 modes" in getattr(item, "text", "") for item in first_words(silent))
 
@@ -134,8 +144,8 @@ def test_where_nothing_can_be_decided_the_held_out_tests_are_told_of_all_the_sam
     tested = {**entry("insufficient", runs=["r07"]), "verification": {"holds": holds}}
     said = trust(results(force=tested))[0]
     assert words in said
-    assert "too few tests have the role identify" in said
-    assert ("not the predictions" in said) is not holds
+    assert "Too few tests have the role identify" in said
+    assert ("do not use the predictions" in said) is not holds
 
 
 def test_a_verification_that_fails_says_not_to_use_the_predictions_whatever_the_status():
@@ -144,5 +154,5 @@ def test_a_verification_that_fails_says_not_to_use_the_predictions_whatever_the_
             trust(results(force={**entry(status, runs=["r07"]), "verification": {"holds": holds}}))[0]
             for holds in (True, False)
         )
-        assert "predictions hold to" in good
-        assert "the measured values, not the predictions" in bad
+        assert "predictions are accurate to" in good
+        assert "do not use the predictions" in bad

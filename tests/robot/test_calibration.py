@@ -265,7 +265,7 @@ def test_poses_that_do_not_place_the_arm_are_refused_with_the_reason():
     with pytest.raises(ValueError, match="along one line at most"):
         calibrated(poses(q, measured(q) + noise), rows_rad())
     q = drawn(60)
-    with pytest.raises(ValueError, match="do not determine where the arm stands: they scatter by"):
+    with pytest.raises(ValueError, match="do not determine the place of the arm's base: they scatter by"):
         calibrated(poses(q, measured(q, sigma=0.2)), rows_rad())
 
 

@@ -104,7 +104,7 @@ def test_a_joint_that_adds_next_to_nothing_is_left_out():
 
 def test_three_joints_that_leave_an_axis_open_are_refused():
     jacobian = np.tile(np.array([[1.0, 0.5, 0.3], [0.0, 0.4, 0.1], [0.0, 0.0, 0.0]]), (4, 1, 1))
-    with pytest.raises(ValueError, match="joints 1, 2, 3 do not tell the three axes apart"):
+    with pytest.raises(ValueError, match="joints 1, 2, 3 do not determine all three axes"):
         tip_force(np.ones((4, 3)), np.ones((4, 3)), jacobian, np.full(3, 5.0))
 
 

@@ -75,5 +75,5 @@ def test_no_compliance_comes_out_negative():
 
 def test_too_few_displacements_are_refused():
     design, displacement = loads_in(1)
-    with pytest.raises(ValueError, match="3 measured displacements cannot tell the joints apart"):
+    with pytest.raises(ValueError, match="3 measured displacements cannot separate the joints"):
         joint_compliances(design[:1], displacement[:1])

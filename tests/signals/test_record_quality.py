@@ -106,4 +106,4 @@ def test_a_flat_top_that_lies_half_in_one_piece_and_half_in_the_next(cuts):
     values[4997:5003, 1] = 130.0
     found = gathered(time, values, cuts).channels()[3]
     assert not found.ok
-    assert "stands at 130 for 6 samples" in found.message
+    assert "stays at 130 for 6 samples" in found.message

@@ -48,7 +48,7 @@ def test_other_pairs_are_not_compared():
     ("factor", "words"),
     [
         (lambda f: 9.80665 + 0 * f, "response in g"),
-        (lambda f: 0.1 + 0 * f, "sensitivity of the accelerometer or the hammer, off by 10"),
+        (lambda f: 0.1 + 0 * f, "sensitivity of the accelerometer or the hammer, wrong by a factor of 10"),
         (lambda f: -1.0 + 0 * f, "points the other way"),
         (lambda f: 2j * np.pi * f, "an acceleration, m/s², given as a velocity"),
         (lambda f: 1.0 / (2j * np.pi * f), "an acceleration, m/s², given as a velocity"),

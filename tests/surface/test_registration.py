@@ -120,7 +120,7 @@ def test_the_outline_of_a_lone_face_is_biased_by_half_a_pitch():
 def test_a_waved_lone_face_is_not_taken_for_sides():
     rng = np.random.default_rng(2)
     scanned = moved(block((), rng, bow=300e-6), rng)
-    with pytest.raises(ValueError, match="do not tell where the block lies"):
+    with pytest.raises(ValueError, match="do not determine the place of the block"):
         found(scanned)
 
 
@@ -130,7 +130,7 @@ def test_a_few_patches_of_something_beside_a_lone_face_are_no_datum():
     wall = np.column_stack([along + 0.03, np.full(along.size, -0.0003), -down - 0.0005])
     truth = np.vstack([block((), rng), wall, wall[:, [1, 0, 2]]])
     assert {"x-", "y-"} <= see_block(truth, SIZE).faces.keys()
-    with pytest.raises(ValueError, match="do not tell where the block lies"):
+    with pytest.raises(ValueError, match="do not determine the place of the block"):
         found(moved(truth, rng, turn=0.02))
 
 

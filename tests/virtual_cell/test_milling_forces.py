@@ -136,7 +136,7 @@ def test_spindle_power_is_the_mean_tangential_power():
 
 
 def left_by_a_disc(orbit, radius, pitch, immersion):
-    """Height of the floor before a disc that is fed along +y at (orbit, 0): how long ago it was last there."""
+    """Height of the floor before a disc that is fed along +y at (orbit, 0): since it was last there."""
     back = np.linspace(0.0, 2.0 * math.pi, 20_001)[1:]
     place = orbit + radius * (1j * math.sin(immersion) - math.cos(immersion))
     covered = np.abs(orbit * np.exp(-1j * back) - place) < radius

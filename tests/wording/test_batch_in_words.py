@@ -53,8 +53,11 @@ def test_the_verdict_holds_sentences_and_of_a_cause_what_is_brief():
     content = verdict_of(FINDINGS)
     assert list(content) == ["format", "batch", "metro", "observables", "causes"]
     entry = content["observables"]["force"]
-    assert entry["unexplained"]["signature"] == "more stays unexplained with it than it explains; b"
-    assert entry["candidates"][0]["why_not"].startswith("passed every gate")
+    assert (
+        entry["unexplained"]["signature"]
+        == "more of the error remains unexplained with it than it explains; b"
+    )
+    assert entry["candidates"][0]["why_not"].startswith("passed every test")
     assert entry["next_experiment"].startswith("tests with a stable or unstable label")
     (cause,) = content["causes"]
     assert list(cause) == ["cause", "where", "status", "probability", "parameters", "seen_in"]
@@ -66,9 +69,8 @@ def test_the_story_ends_with_the_verdict_in_a_sentence():
     story = content["observables"]["force"]
     assert story["notes"] == ["as it is"]
     assert story["words"] == (
-        "There is a significant residual that no effect of the library accounts for; nothing was added. "
-        "On held-out runs the error is 12.3 µm rms before and 12.3 µm after. "
-        "What is left: more stays unexplained with it than it explains; b."
+        "There is a significant residual that no effect of the library explains; nothing was added. "
+        "On held-out runs the error is 12.3 µm rms before and 12.3 µm after."
     )
     assert content["causes"][0]["words"] == (
         "tool wear of joint 3: seen in joint force; no other observable of this batch could show it."
@@ -92,8 +94,8 @@ def test_a_contradiction_says_how_probable_such_differences_are():
     words = cause_in_words({**cause, "or_else": ["pitch error"]})
     assert "force found it (radius 1 ± 0.5 µm)" in words
     assert words.endswith(
-        "not one cause of one size (it may as well be pitch error) (p = 0.0012): one of them has another "
-        "cause besides, or a wrong input."
+        "not one common cause (alternative explanation: pitch error) (p = 0.0012): one of them has a "
+        "further cause, or a wrong input."
     )
 
 

@@ -41,7 +41,7 @@ def test_every_statement_has_a_sentence_and_every_sentence_is_stated():
 def test_statements_are_put_into_words_wherever_they_are_the_inner_ones_first():
     inner = Statement("no_prediction", {"run": "r1", "why": "it breaks"})
     content = {"a": [Statement("unseen", {"places": inner})], "b": {"code": 1}, "c": None}
-    outer = "only where a condition is left out of the fit: in r1 it breaks"
+    outer = "only in conditions that were left out of the fit: in r1 it breaks"
     assert in_words(content) == {"a": [outer], "b": {"code": 1}, "c": None}
 
 
@@ -56,7 +56,12 @@ def test_a_number_that_is_not_finite_comes_through_json(gain, words):
 
 
 @pytest.mark.parametrize(
-    ("step", "words"), [(3.14159, "by 3.1 of"), (234.5, "by 234 of"), (np.inf, "by inf of")]
+    ("step", "words"),
+    [
+        (3.14159, "next step: 3.1 standard"),
+        (234.5, "next step: 234 standard"),
+        (np.inf, "next step: inf standard"),
+    ],
 )
 def test_a_step_is_written_to_its_digits(step, words):
     assert words in in_words(Statement("not_converged", {"step": step}))

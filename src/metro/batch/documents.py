@@ -76,7 +76,7 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> JSON:
         before, number = key, written if written and _BEFORE_COMMA.fullmatch(written) else ""
         if key in content:
             raise yaml.constructor.ConstructorError(
-                None, None, f'key "{key}" stands twice', key_node.start_mark
+                None, None, f'key "{key}" appears twice', key_node.start_mark
             )
         content[key] = loader.construct_object(value_node, deep=True)
     return content

@@ -143,7 +143,7 @@ def _of_effect(effect: str, values: JSON, can: JSON, file: str) -> Iterator[Find
         yield Finding(severity, file, message, column=f"known.{effect}.{name}")
     if not whole and (not strange or effect in UNNAMED):
         missing = ", ".join(name for name in forms[0] if name not in values)
-        message = f"lacks {missing}, {expected}: else the base model is not told of it"
+        message = f"lacks {missing}, {expected}: without it the base model does not include this effect"
         yield Finding("warning", file, message, column=f"known.{effect}")
     for name in (name for name in names if name in values):
         if fault := _fault(name, values[name], can["choices"].get(name, [])):

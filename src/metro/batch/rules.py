@@ -43,9 +43,7 @@ def load_findings(table: Table) -> Iterator[Finding]:
         if not any(math.isfinite(row[name]) for name in POSITIONS) and not all(
             math.isfinite(row[name]) for name in ("x_mm", "y_mm", "z_mm")
         ):
-            message = (
-                "neither joint angles nor x_mm, y_mm, z_mm: the row tells nothing of where it was loaded"
-            )
+            message = "neither joint angles nor x_mm, y_mm, z_mm: the row does not say where the load acted"
             yield table.finding(position, "", message, "warning")
         if not any(row[name] for name in ("fx_n", "fy_n", "fz_n")):
             yield table.finding(position, "fx_n", "the load is zero, expected a force")
@@ -226,7 +224,7 @@ def station_findings(table: Table) -> Iterator[Finding]:
     """Check that no station is tabulated twice, and that each resists a push in every direction."""
     for position, name in enumerate(table.frame["position"]):
         if name in list(table.frame["position"][:position]):
-            yield table.finding(position, "position", f'position "{name}" stands twice')
+            yield table.finding(position, "position", f'position "{name}" appears twice')
     for position, row in table.sound():
         size = np.array([row[f"k{axis}_n_um"] for axis in "xyz"], dtype=float)
         across = {(a, b): row[f"k{a}{b}_n_um"] for a, b in itertools.permutations("xyz", 2)}
@@ -249,7 +247,7 @@ def _twice(table: Table, columns: tuple[str, ...]) -> Iterator[Finding]:
         other = first.setdefault(key, position)
         if any(key) and other != position:
             names = ", ".join(f'{column} "{value}"' for column, value in zip(columns, key, strict=True))
-            message = f"{names} stands in row {table.rows[other]} too, expected each once"
+            message = f"{names} is also in row {table.rows[other]}, expected each once"
             yield table.finding(position, columns[0], message)
 
 
@@ -259,6 +257,4 @@ def _named_twice(table: Table) -> Iterator[Finding]:
     for position, name in enumerate(files):
         first = files.index(name)
         if name and first < position and not name.lower().endswith(SELF_DESCRIBING):
-            yield table.finding(
-                position, "file", f'"{name}" stands in row {table.rows[first]} too', "warning"
-            )
+            yield table.finding(position, "file", f'"{name}" is also in row {table.rows[first]}', "warning")

@@ -115,8 +115,8 @@ def design_findings(runs: pd.DataFrame, file: str) -> Iterator[Finding]:
     changes = (runs["condition"] != runs["condition"].shift()).sum()
     if repeats.any() and changes == runs["condition"].nunique() > 1:
         message = (
-            "the repeats of each condition were cut back to back: what changes along the session (wear, "
-            "warm-up) cannot be told from conditions; spread the repeats over the session"
+            "the repeats of each condition were cut back to back: a change along the session (wear, "
+            "warm-up) cannot be separated from the conditions; spread the repeats over the session"
         )
         yield Finding("note", file, message, column="order")
     unknown = int(runs["cut_length_mm"].isna().sum())
@@ -160,7 +160,7 @@ def _twice(table: Table, column: str, values: pd.Series) -> Iterator[Finding]:
         if other != position and position not in table.faulty:
             shown = f"{value:g}" if isinstance(value, float) else f'"{value}"'
             yield table.finding(
-                position, column, f"{shown} stands in row {table.rows[other]} too, expected each once"
+                position, column, f"{shown} is also in row {table.rows[other]}, expected each once"
             )
 
 

@@ -137,7 +137,9 @@ def _read_csv(path: Path) -> tuple[list[str], list[Row], list[Finding]]:
                 message = f"found {len(cells)} values, expected {len(header)} ({DECIMAL})"
                 findings.append(Finding("error", file, message, row, cells[0]))
             elif len(cells) < len(header):
-                message = f"found {len(cells)} values, expected {len(header)}: the rest is taken as blank"
+                message = (
+                    f"found {len(cells)} values, expected {len(header)}: missing values are taken as blank"
+                )
                 findings.append(Finding("warning", file, message, row, cells[0]))
             rows.append((row, dict(zip(header, cells + [""] * len(header), strict=False))))
     except csv.Error as fault:
@@ -194,7 +196,7 @@ def _header_findings(file: str, header: list[str], columns: tuple[Column, ...]) 
             yield Finding("error", file, message)
             return
     for name in dict.fromkeys(name for name in header if header.count(name) > 1 and name):
-        yield Finding("error", file, "stands twice", column=name)
+        yield Finding("error", file, "appears twice", column=name)
     for name in header:
         if name and name not in known:
             message = f"is not a known column and is not read{suggestion(name, known)}"

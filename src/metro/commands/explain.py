@@ -18,6 +18,7 @@ from metro.report.content import Item, Paragraph, Section, Table
 from metro.report.numbers import number, probability, words
 from metro.report.results import Results
 from metro.report.sections.causes import with_causes
+from metro.report.sections.key_results import key_results
 from metro.report.sections.measured import measured_words
 from metro.report.sections.quality import with_flags
 from metro.report.sections.summary import advice, no_verdict, print_check
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 FEW = 5  # candidates shown where all observables are
 # What the first page tells besides verdicts; a table without rows is left out, as in a report.
-TABLES = ("published_errors", "qc", "chatter_runs", "lobes_final", "lobe_runs")
+TABLES = ("published_errors", "qc", "chatter_runs", "lobes_final", "lobe_runs", "load_points")
 COLOURS = {"clean": "green", "explained": "green", "insufficient": "yellow", "undetermined": "yellow"}
 
 
@@ -129,6 +130,7 @@ def _parts(
 
     yield Text(results.title, style="bold")
     yield Text(measured_words(results))
+    yield from _shown(key_results(results))
     if not chosen:
         yield Text(f"\n{no_verdict(results)}\n{' '.join(trust(results))}")
     yield from _shown(_flags(results))
@@ -143,7 +145,7 @@ def _parts(
         yield from _candidates(results, name, entry, most)
         yield Text(f"To trust: {trust_in(results, name).partition(': ')[2]}")
         if measurement := next_words(entry):
-            yield Text(f"Measure next: {measurement}.", style="bold")
+            yield Text(f"What to do next: {measurement}.", style="bold")
     yield from _shown(_causes(results, "" if most else next(iter(chosen))))
 
 

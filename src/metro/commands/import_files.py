@@ -132,7 +132,7 @@ def _prompt(question: Question) -> str:
         answer = str(typer.prompt(question.words, default="", show_default=False)).strip()
         if not answer and not question.optional:
             none = "; none, where it is not known" if question.leaves_out else ""
-            typer.echo(f"an answer is needed, since no file says it and it decides a number{none}")
+            typer.echo(f"an answer is needed: no file states this value, and results depend on it{none}")
             continue
         expected = question.expected(answer) if answer else ""
         if not expected:

@@ -61,7 +61,7 @@ def simulate(
     if as_json:
         print_json({"batch": name, "folder": str(folder), "truth": str(secret)})
         return
-    sys.stdout.write(f"{folder} is there. What it hides stands in {secret}. Call: snakemake\n")
+    sys.stdout.write(f"Created {folder}. The hidden effects are listed in {secret}. Next: run snakemake.\n")
 
 
 def _call(kind: str, folder: Path, options: Sequence[str]) -> None:

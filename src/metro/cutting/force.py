@@ -77,7 +77,7 @@ def _general_table(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool) -> A
 
 
 def _lost_at_the_floor(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool) -> Array:
-    """Return what the floor of a helix takes from the table of a cylinder: its ends are far below the floor."""
+    """Return what the floor of a helix takes from the table of a cylinder: rounded ends are far below it."""
     cylinder, level = replace(cutter, corner=0.0, taper=0.0), replace(cut, pitch=0.0)
     with_floor, without = (force_basis(cylinder, law, each, true_path) for each in (cut, level))
     return np.asarray(with_floor - without)

@@ -1,4 +1,4 @@
-"""Charge drift: the zero of a piezoelectric sensor wanders while it measures."""
+"""Charge drift: the zero of a piezoelectric sensor drifts during the measurement."""
 
 from __future__ import annotations
 
@@ -76,8 +76,8 @@ EFFECT = Effect(
     belongs_to=("instrument",),
     per="axis",
     signature=(
-        "A mean that moves along every record by the same newtons per second, in the air as in the cut. "
-        "Wear within a run looks alike but needs the cut."
+        "The mean force changes at the same rate in every record, in the air as in the cut. "
+        "Wear within a run has a similar signature but appears only in the cut."
     ),
     literature="Kistler, Piezoelectric Measurement: drift of charge amplifiers",
     experiment="an air cut before and after the same run, as long as the run itself",

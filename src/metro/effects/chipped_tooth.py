@@ -53,8 +53,8 @@ EFFECT = Effect(
     adapt=adapt,
     resembled=True,
     signature=(
-        "Force at spindle orders that are no multiple of the number of teeth: one tooth cuts less and the "
-        "next more, in a part of the depth. Runout looks alike, but all teeth take part."
+        "Force at spindle orders that are not multiples of the number of teeth: over part of the depth, one "
+        "tooth cuts less and the next cuts more. Runout has a similar signature, but involves all teeth."
     ),
     literature="Altintas and Yellowley, J. Eng. Ind. 111 (1989) 157: detection of tooth failure in milling",
     experiment="the teeth under a microscope",

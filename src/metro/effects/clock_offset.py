@@ -1,4 +1,4 @@
-"""The robot's clock is not that of the dynamometer."""
+"""Clock offset: the clock of the robot differs from that of the dynamometer."""
 
 from __future__ import annotations
 

@@ -42,8 +42,8 @@ EFFECT = Effect(
     apply=apply,
     belongs_to=("instrument",),
     signature=(
-        "The waveform of one axis in another, by the same share in every run and at all orders. In a hole the "
-        "forces of the plane turn with the orbit: their share in z comes and goes once per orbit."
+        "The waveform of one axis in another, by the same share in every run and at all orders. In a hole "
+        "the forces of the plane turn with the orbit: their share in z comes and goes once per orbit."
     ),
     literature="Kistler, data sheets of multicomponent dynamometers: crosstalk of up to 2 to 3 %",
     experiment="a known force along each axis of the table in turn, all channels recorded",

@@ -1,4 +1,4 @@
-"""Dynamometer resonance: the sensor with the work on it swings where the teeth excite it."""
+"""Dynamometer resonance: the sensor and the work on it vibrate when the teeth excite them."""
 
 from __future__ import annotations
 

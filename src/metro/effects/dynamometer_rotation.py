@@ -1,4 +1,4 @@
-"""Dynamometer rotation: the sensor stands turned on the table against what the manifest says."""
+"""Dynamometer rotation: the sensor is mounted at an angle that differs from the declaration."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -126,8 +127,15 @@ class Effect:
         return self.prior / self.sought
 
     @property
+    def meaning(self) -> str:
+        """What it is, in a sentence: the first line of its file, without a title of one or two words."""
+        line = (sys.modules[self.apply.__module__].__doc__ or "").partition("\n")[0]
+        title, _, sentence = line.partition(": ")
+        return sentence[:1].upper() + sentence[1:] if sentence and title.count(" ") < 2 else line
+
+    @property
     def key(self) -> tuple[str, str]:
-        """What tells it from every other effect and form: its name and its form."""
+        """What distinguishes it from every other effect and form: its name and its form."""
         return self.name, self.form
 
     @property

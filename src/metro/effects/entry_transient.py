@@ -1,4 +1,4 @@
-"""Entry transient: behind the edge of the block every pass begins high, and comes down over some way."""
+"""Entry transient: every pass begins too high at the edge of the block and settles over some distance."""
 
 from __future__ import annotations
 

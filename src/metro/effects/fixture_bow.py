@@ -1,4 +1,4 @@
-"""Fixture bow: the clamped work is bent while it is cut or springs back, so that the plane is none."""
+"""Fixture bow: the clamped work is bent while it is cut, or springs back, so that the face is curved."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ EFFECT = Effect(
     adapt=adapt,
     signature=(
         "The same curvature over the work in every face, whatever the depth of cut, the direction of the "
-        "passes and the pose. A stiffness that varies over the face looks alike, but goes with the force."
+        "passes and the pose. A stiffness that varies over the face is similar, but scales with the force."
     ),
     literature="Nee, Tao and Kumar, An Advanced Treatise on Fixture Design and Planning (2004)",
     experiment="the face scanned clamped and released; or faces at a third and three times the depth of cut",

@@ -1,4 +1,4 @@
-"""A joint whose Coulomb friction is not that of the idle run."""
+"""Friction reversal: the Coulomb friction of a joint differs from that of the idle run."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ def _of(joint: int) -> Effect:
         apply=apply,
         part="drives",
         signature=(
-            "Torque of one joint off by a constant that changes its sign where the joint turns round, and a "
-            "wall off by what that twists the joint; a joint that turns one way in every run shows it as a "
-            "force that does not go with the cut."
+            "The torque of one joint has a constant error that changes sign where the joint reverses, and "
+            "the "
+            "wall has the deviation by which that torque twists the joint. A joint that turns one way in "
+            "every run shows a force that does not depend on the cut."
         ),
         literature="[K] section 4: waviness and force error at the reversal of joint 6",
         experiment="a path on which the joint turns round in the middle of the cut, cut and idle, both ways",

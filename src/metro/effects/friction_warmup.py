@@ -1,4 +1,4 @@
-"""A joint whose Coulomb friction changes while the cut goes on."""
+"""Friction warm-up: the Coulomb friction of a joint changes during the cut."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A gear whose torque comes and goes with the joint's angle while it is loaded."""
+"""Gear ripple: the torque of a loaded gear varies with the angle of the joint."""
 
 from __future__ import annotations
 

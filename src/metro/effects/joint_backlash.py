@@ -1,4 +1,4 @@
-"""A gap between the gear teeth of one joint, which the force of the cut closes to one side."""
+"""Joint backlash: the gear teeth of one joint have a gap, which the force of the cut closes to one side."""
 
 from __future__ import annotations
 

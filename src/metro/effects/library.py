@@ -35,12 +35,17 @@ def library(observable: str | None = None) -> tuple[Effect, ...]:
 def described() -> JSON:
     """Return what a campaign and a report need to know of each effect of the library, by its name.
 
-    ``belongs_to``, ``comparable`` and ``per`` of :class:`Effect`; the last one as a list, since the forms of
-    an effect may differ in it.
+    ``meaning``, ``belongs_to``, ``comparable`` and ``per`` of :class:`Effect`; the last one as a list, since
+    the forms of an effect may differ in it. The meaning is that of the first form.
     """
     facts: JSON = {}
     for effect in library():
-        known = {"belongs_to": list(effect.belongs_to), "comparable": effect.comparable, "per": []}
+        known = {
+            "meaning": effect.meaning,
+            "belongs_to": list(effect.belongs_to),
+            "comparable": effect.comparable,
+            "per": [],
+        }
         kinds = facts.setdefault(effect.name, known)["per"]
         kinds += [effect.per] if effect.per and effect.per not in kinds else []
     return facts
@@ -62,12 +67,13 @@ def with_declared(problem: Problem, known: Mapping[str, Mapping[str, Any]]) -> P
         if matching:
             given = {key: value for key, value in values.items() if key not in matching.where}
             base = matching.apply(base, matching.spread(given))
-            notes.append(f"The base model is told of {words} (batch.yaml, known).")
+            notes.append(f"The base model includes {words}, as declared in batch.yaml under known.")
         elif forms:
             said = ", ".join(f"{key} {value}" for key, value in values.items()) or "no parameter"
             expected = " or ".join(dict.fromkeys(map(_expected, forms)))
             notes.append(
-                f"The base model is not told of {words}: batch.yaml, known, has {said}; expected {expected}."
+                f"The base model does not include {words}: batch.yaml has {said} under known; expected "
+                f"{expected}."
             )
         elif name in unable:
             notes.append(f"batch.yaml declares {words}, but {unable[name]}.")
@@ -78,7 +84,7 @@ def not_modelled(observable: str, known: Mapping[str, Mapping[str, Any]]) -> lis
     """Return a note for each declared effect that the model of stability lacks: all but the tool's runout."""
     names = {effect.name for effect in library(observable)} & set(known) - {"tool_runout"}
     return [
-        f"batch.yaml declares {name.replace('_', ' ')}, but the model of stability is not told of it."
+        f"batch.yaml declares {name.replace('_', ' ')}, but the stability model cannot include it."
         for name in sorted(names)
     ]
 

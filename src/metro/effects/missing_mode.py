@@ -54,7 +54,7 @@ EFFECT = Effect(
     apply=apply,
     signature=(
         "Chatter below the predicted boundary at some speeds, at a frequency near which the impact test has "
-        "no mode. Labels without frequencies hardly tell it from turned or softer modes."
+        "no mode. Labels without frequencies hardly separate it from turned or softer modes."
     ),
     literature="Altintas, Manufacturing Automation (2012), ch. 4: the boundary is set by every flexible mode",
     experiment=(

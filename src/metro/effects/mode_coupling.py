@@ -1,4 +1,4 @@
-"""Mode coupling: the modes do not move along the directions in which the structure was struck."""
+"""Mode coupling: the modes do not vibrate along the directions in which the structure was hit."""
 
 from __future__ import annotations
 

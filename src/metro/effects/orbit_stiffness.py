@@ -1,4 +1,4 @@
-"""Orbit stiffness: a robot is not equally stiff all the way round a helical hole, nor is its axial force."""
+"""Orbit stiffness: the stiffness of a robot, and with it the axial force, varies around a helical hole."""
 
 from __future__ import annotations
 

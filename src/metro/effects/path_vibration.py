@@ -1,4 +1,4 @@
-"""Path vibration: the tip swings at a frequency of its own while it travels."""
+"""Path vibration: the tip vibrates at a frequency of its own along the path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A mass on the flange in the cut that the idle run did not carry."""
+"""Payload error: the flange carries a mass in the cut that it did not carry in the idle run."""
 
 from __future__ import annotations
 

@@ -50,8 +50,8 @@ EFFECT = Effect(
     per="tooth",
     adapt=adapt,
     signature=(
-        "Force at spindle orders that are no multiple of the number of teeth, in proportion to the feed. "
-        "Runout looks alike but does not depend on the feed."
+        "Force at spindle orders that are not multiples of the number of teeth, in proportion to the feed. "
+        "Runout has a similar signature but does not depend on the feed."
     ),
     literature="Altintas, Engin and Budak, J. Manuf. Sci. Eng. 121 (1999) 173: cutters with variable pitch",
     experiment="runs at two feeds that differ by a factor of three or more, and the pitch under a microscope",

@@ -26,8 +26,8 @@ EFFECT = Effect(
     apply=apply,
     belongs_to=("tool", "work"),
     signature=(
-        "Cuts stay stable above the predicted boundary, the more the slower the spindle; nothing changes at "
-        "high speed. Modes that stiffen with speed the other way round look alike."
+        "Cuts stay stable above the predicted boundary, increasingly so at low spindle speed; nothing "
+        "changes at high speed. Modes that soften with speed have a similar signature."
     ),
     literature=(
         "Altintas, Eynian and Onozuka, CIRP Ann. 57 (2008) 371; Budak and Tunc, CIRP Ann. 59 (2010) 407"

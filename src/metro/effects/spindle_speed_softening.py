@@ -1,4 +1,4 @@
-"""Softening: the spindle at speed is not as stiff as the one that was struck at rest."""
+"""Speed softening: the stiffness of the spindle at speed differs from that of the hammer test at rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Spindle tilt: the spindle does not stand square to the plane of the passes, so each pass is a groove."""
+"""Spindle tilt: the spindle is not perpendicular to the plane of the passes, so each pass is a groove."""
 
 from __future__ import annotations
 

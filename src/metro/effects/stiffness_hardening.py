@@ -1,4 +1,4 @@
-"""A joint that gets stiffer the further it is twisted, in the cut and in the load tests."""
+"""Stiffness hardening: a joint becomes stiffer with its twist, in the cut and in the load tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stiffness in the cut that is not the stiffness of the load tests: of the whole machine, or of one joint."""
+"""Stiffness scale: the stiffness in the cut differs from that of the load tests, in all joints or in one."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ OF_MACHINE = Effect(
     ),
     literature="Abele et al., Prod. Eng. 1 (2007) 387: stiffness under process load against static tests",
     experiment=(
-        "load tests at the force level of the cut, and a dynamometer in one cut to part force from stiffness"
+        "load tests at the force level of the cut, and a dynamometer in one cut to separate force and "
+        "stiffness"
     ),
 )
 
@@ -62,8 +63,8 @@ def _of(joint: int) -> Effect:
         observables=("deformation",),
         apply=of_joint,
         signature=(
-            "Deformation in proportion to the part of one joint, which is a constant share of the whole in "
-            "cuts that load the arm alike: then no joint is told from another."
+            "Deformation in proportion to the contribution of one joint. In cuts that load the arm in the "
+            "same way this is a constant share of the whole, and the joints cannot be distinguished."
         ),
         experiment="cuts in poses, or in directions of feed, in which the joints' shares are others",
         adapt=with_joints,

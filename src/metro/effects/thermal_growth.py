@@ -1,4 +1,4 @@
-"""Thermal growth: tool and spindle get longer while a face is cut, so that later passes cut deeper."""
+"""Thermal growth: tool and spindle become longer while a face is cut, so that later passes cut deeper."""
 
 from __future__ import annotations
 

@@ -25,8 +25,8 @@ EFFECT = Effect(
     part="drift",
     resembled=True,  # of what drifts, and when, the walls say nothing: arm, work and room all do
     signature=(
-        "Walls that lie further off from run to run, the same way in the work frame whatever the force. "
-        "Where one load always comes late in the session, a gap of a joint looks alike."
+        "The deviation of the walls grows from run to run, in one direction of the work frame and whatever "
+        "the force. Where one load always comes late in the session, backlash of a joint is similar."
     ),
     literature="ISO 230-3:2020, tests of thermal effects: drift of the tool against the work",
     experiment="the first cut once more at the end of the session, and the tip against a fixed gauge between",

@@ -24,7 +24,7 @@ EFFECT = Effect(
     resembled=True,  # of what is soft between flange and edge, the walls say nothing
     signature=(
         "Deformation in proportion to the force on the wall, whatever the pose of the arm. Where all cuts "
-        "are in one pose, joints that are softer than in the load tests look alike."
+        "are in one pose, joints that are softer than in the load tests have the same signature."
     ),
     literature="Kivanc and Budak, Int. J. Mach. Tools Manuf. 44 (2004) 1151: tool, clamping and holder",
     experiment="load tests with force and displacement at the edge of the tool, not at the flange",

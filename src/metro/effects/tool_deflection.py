@@ -1,4 +1,4 @@
-"""Tool deflection: the tool yields to the cut, so that it does not cut where it was sent."""
+"""Tool deflection: the tool bends under the force of the cut, so that it cuts beside its programmed path."""
 
 from __future__ import annotations
 

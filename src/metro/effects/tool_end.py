@@ -1,4 +1,4 @@
-"""The tool's end: a ball or a corner radius that the manifest does not state."""
+"""Tool end: the tool has a ball end or a corner radius that batch.yaml does not declare."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
     depths = [block.setting.cut.axial_depth for block in problem.role("identify")]
     if max(depths) < LEAST_RATIO * min(depths):
         return Refusal(
-            "all runs were cut at nearly one depth, where coefficients take up what a corner radius does"
+            "all runs were cut at nearly one depth, where the coefficients absorb the effect of a corner "
+            "radius"
         )
     most = base.cutter.radius / MM
     (corner,) = effect.parameters
@@ -54,8 +55,8 @@ EFFECT = Effect(
     adapt=adapt,
     signature=(
         "Axial force that grows less than in proportion to the depth while the force in the plane does not: "
-        "near the tip the chip presses the tool along its axis. A drift or a zero that is off looks alike in "
-        "the means, but does not depend on the depth."
+        "near the tip the chip presses the tool along its axis. A drift or an offset of the sensor has a "
+        "similar signature in the means, but does not depend on the depth."
     ),
     literature=(
         "Lee and Altintas, Int. J. Mach. Tools Manuf. 36 (1996) 1059: ball ends; "

@@ -1,4 +1,4 @@
-"""A tool tip that is not where it was declared to be."""
+"""Tool offset: the tip of the tool is not at its declared place."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runout: the tool's axis is not the axis of rotation, so the teeth cut chips of different thickness."""
+"""Tool runout: the axis of the tool is not the axis of rotation, so the teeth cut unequal chips."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ EFFECT = Effect(
     apply=apply,
     belongs_to=("tool",),
     signature=(
-        "Force at spindle orders that are no multiple of the number of teeth; the first order does not "
-        "depend on the feed, and the mean stays while every tooth cuts. A chipped tooth or unequal pitch "
-        "look alike, but grow with the feed."
+        "Force at spindle orders that are not multiples of the number of teeth. The first order does not "
+        "depend on the feed, and the mean is unchanged while every tooth cuts. A chipped tooth and unequal "
+        "pitch have similar signatures, but grow with the feed."
     ),
     literature=(
         "Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983) 123; "

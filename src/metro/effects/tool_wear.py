@@ -1,4 +1,4 @@
-"""Wear: the edges get blunt with every metre cut, so the edge forces grow."""
+"""Tool wear: the edges become blunt with the length cut, so the edge forces grow."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ EFFECT = Effect(
     belongs_to=("tool", "work"),
     adapt=adapt,
     signature=(
-        "Force that grows along the session at every feed by the same amount, most in the radial and axial "
-        "edge terms. Where conditions were cut one after another it cannot be told from what these change."
+        "Force that grows along the session by the same amount at every feed, most in the radial and axial "
+        "edge terms. Where conditions were cut one after another, their effects cannot be separated from it."
     ),
     literature="Teitenberg, Bayoumi and Yucesan, Wear 154 (1992) 287",
     experiment="the first condition again at the end of the session, with an air cut before and after",

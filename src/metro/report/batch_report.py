@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from metro import __version__
 from metro.report.content import Section
@@ -34,8 +33,7 @@ from metro.report.sections.texture import texture
 def report_pdf(results: Results, sections: Sequence[Section]) -> bytes:
     """Return the report as a PDF; the same bytes for the same results."""
     cover = Cover(results.title, results.batch.name, f"metro {__version__}")
-    first, second, *others = sections
-    return compile_pdf(cover, [first, replace(second, page=True), *others])
+    return compile_pdf(cover, sections)
 
 
 def report_sections(results: Results) -> list[Section]:

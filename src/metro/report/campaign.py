@@ -97,7 +97,7 @@ def campaign_sections(
         *largest_residuals(entries),
         *rankings(identified),
         *memory_section(memory or {}),
-        Section("What could not be told", _undetermined(entries, identified)),
+        Section("What could not be determined", _undetermined(entries, identified)),
     ]
 
 
@@ -217,13 +217,13 @@ def _undetermined(entries: list[tuple[str, str, JSON]], identified: Mapping[str,
     for batch, name, entry in entries:
         row = _row(batch, name, entry)
         if row["rivals"]:
-            sentences.append(f"{batch}, {title(name)}: {row['rivals']} cannot be told apart.")
+            sentences.append(f"{batch}, {title(name)}: {row['rivals']} cannot be distinguished.")
         if row["unexplained"]:
-            sentences.append(f"{batch}, {title(name)}: unexplained rest, {plain(row['unexplained'])}.")
+            sentences.append(f"{batch}, {title(name)}: unexplained residual, {plain(row['unexplained'])}.")
         if row["status"] == "insufficient":
-            sentences.append(f"{batch}, {title(name)}: too few runs to tell.")
+            sentences.append(f"{batch}, {title(name)}: there are too few runs to decide.")
     missing = _missing(identified)
-    items: list[Item] = [Bullets(sentences)] if sentences else [Paragraph("Every residual was told.")]
+    items: list[Item] = [Bullets(sentences)] if sentences else [Paragraph("Every residual was explained.")]
     if missing:
         caption = "What was not identified, and why."
         items.append(Table(["reason", "not identified", "batches"], missing, caption, [2, 1.8, 2.6]))

@@ -96,6 +96,27 @@ Simple = Paragraph | Bullets | Table | Picture | Facts | Heading
 Item = Simple | Abreast
 
 
+def gathered(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Join the rows of a table that differ only in their first cell: r01, r02 and r05 share a row."""
+    shared: dict[tuple[str, ...], list[str]] = {}
+    for first, *cells in rows:
+        shared.setdefault(tuple(cells), []).append(first)
+    return [[", ".join(names), *cells] for cells, names in shared.items()]
+
+
+def common(header: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[list[str], list[list[str]], str]:
+    """Take the columns with one value in all rows out of a table, and say these values in a sentence."""
+    columns = list(zip(*rows, strict=True))
+    same = [i for i, column in enumerate(columns) if i and len(rows) > 1 and len(set(column)) == 1]
+    kept = [i for i in range(len(header)) if i not in same]
+    said = "; ".join(f"{header[i]} {rows[0][i]}" for i in same)
+    return (
+        [header[i] for i in kept],
+        [[row[i] for i in kept] for row in rows],
+        f" All rows: {said}." if said else "",
+    )
+
+
 def abreast(items: Sequence[Table | Picture]) -> list[Item]:
     """Arrange items in pairs, side by side."""
     return [Abreast(items[i : i + 2]) for i in range(0, len(items), 2)]

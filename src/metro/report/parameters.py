@@ -8,7 +8,7 @@ from metro.report.numbers import quantity, words
 from metro.units import JSON, printed_name
 
 AXES = "xyz"
-NOT_IDENTIFIED = "not told"  # an interval that holds whatever the parameter may be
+NOT_IDENTIFIED = "not determined"  # an interval that holds whatever the parameter may be
 
 
 def effect_words(effect: JSON) -> str:

@@ -39,9 +39,9 @@ def plain(text: str) -> str:
 
     The part on what an experiment is to describe is removed, because the report says it next to it.
     """
-    text = re.sub(r"(, to describe what is left):.*$", r"\1", text)
+    text = re.sub(r"(, to characterise the remaining error):.*$", r"\1", text)
     text = re.sub(r"(?<=\d )um\b", "µm", text)
-    text = re.sub(r"\ball along in (\w+)", r"throughout in \1", text)
+    text = re.sub(r"\bwhole record in (\w+)", r"over the whole record in \1", text)
     text = re.sub(r"\bmean in (\w+)", r"a constant offset in \1", text)
     text = re.sub(r"\border 1 in (\w+)", r"once per revolution in \1", text)
     text = re.sub(r"\border (\d+) in (\w+)", r"\1 times per revolution in \2", text)
@@ -55,7 +55,7 @@ def _kind(label: str, teeth: int) -> str:
         return f"{'the mean' if steady == 'mean' else _kind(steady, teeth)}, changing {how}"
     match = re.fullmatch(r"order (\d+)", label)
     if match is None:
-        return {"all": "throughout", "mean": "a constant offset"}.get(label, label)
+        return {"all": "over the whole record", "mean": "a constant offset"}.get(label, label)
     order = int(match[1])
     if teeth > 1 and order % teeth == 0:
         return "at the tooth passing and its harmonics"

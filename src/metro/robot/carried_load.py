@@ -74,7 +74,7 @@ def carried_load(evidence: Sequence[Sequence[Evidence]], drives: Array) -> Load:
     """
     joints = np.array([j for j, parts in enumerate(evidence) if parts], dtype=int)
     if not len(joints):
-        raise ValueError("no joint moves fast enough for its encoder to tell which way")
+        raise ValueError("no joint moves fast enough for its encoder to resolve the direction")
     parts = [_joint(evidence[j]) for j in joints]
     size = np.sqrt(np.maximum(sum(np.diag(part.normal) for part in parts), np.finfo(float).tiny))
     kept = next((k for k in (PARAMETERS, STATIC) if _told(parts, size, k)), 0)

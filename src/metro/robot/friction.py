@@ -220,7 +220,7 @@ def _of_its_own_joint(values: Array) -> Array:
 def _fit(log: Motion, own: Array, others: Array) -> Estimate:
     """Least squares over the samples of moving joints, each joint by its own noise."""
     if not log.moving.any():
-        raise ValueError("no joint moves fast enough for its encoder to tell which way")
+        raise ValueError("no joint moves fast enough for its encoder to resolve the direction")
     columns = np.concatenate([own, others], axis=-1)
     spread = log.torque.std(axis=0)
     noise = spread = np.where(spread > 0, spread, 1.0)

@@ -72,8 +72,8 @@ def identify_payload(
         values, covariance, left, dof = _weighted(own[..., :STATIC], nuisance, torque)
     if values is None:
         raise ValueError(
-            "the poses do not tell mass and centre of gravity of the load: expected torques with and without "
-            "it, in poses that tilt the flange in several directions"
+            "the poses do not determine mass and centre of gravity of the load: expected torques with and "
+            "without it, in poses that tilt the flange in several directions"
         )
     return carried_of(values, covariance, left, dof)
 

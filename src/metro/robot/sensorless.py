@@ -155,7 +155,7 @@ def choose_joints(
     singular = (values[..., 0] <= SINGULAR * values[..., -1]).any(axis=1)
     named = f"joints {', '.join(str(j + 1) for j in passing)}"
     if singular.all():
-        raise ValueError(f"{named} do not tell the three axes apart")
+        raise ValueError(f"{named} do not determine all three axes")
     errors = np.full(len(sets), np.inf)
     errors[~singular] = np.sqrt((1.0 / values[~singular]).sum(axis=-1).mean(axis=-1))
     of_all = np.sqrt((1.0 / np.linalg.eigvalsh(part.sum(axis=0))).sum(axis=-1).mean())

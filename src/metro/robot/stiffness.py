@@ -59,7 +59,7 @@ def joint_compliances(
     seen = distinguishable(design)
     dof = len(target) - int(seen.sum())
     if dof < 1 or not seen.any():
-        raise ValueError(f"{len(target)} measured displacements cannot tell the joints apart")
+        raise ValueError(f"{len(target)} measured displacements cannot separate the joints")
     size = np.linalg.norm(design[:, seen], axis=0)
     scaled = design[:, seen] / size
     if not (np.isfinite(scaled).all() and np.isfinite(target).all()):

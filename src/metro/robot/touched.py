@@ -101,7 +101,8 @@ def calibrate(touches: Touches, tip: Array | None = None) -> Placed:
     dof = len(left) - len(unknown)
     if not stated and dof < 1:
         raise ValueError(
-            f"{len(left)} measured coordinates for {len(unknown)} unknowns leave no error to tell"
+            f"{len(left)} measured coordinates for {len(unknown)} unknowns leave no residual for an error "
+            "estimate"
         )
     variance = 1.0 if stated else float(left @ left) / dof
     covariance = variance * np.linalg.inv(jacobian.T @ jacobian)

@@ -126,7 +126,7 @@ def flat_tops(
     ok = longest < FLAT_TOP_SAMPLES
     message = f"{name} is not clipped"
     if not ok:
-        fault = f"{name} stands at {level:.5g} for {longest} samples in a row"
+        fault = f"{name} stays at {level:.5g} for {longest} samples in a row"
         message = f"{fault}: the amplifier's range was exceeded; measure again with a larger range"
     return Finding("clipping", float(longest), float(FLAT_TOP_SAMPLES), ok, message)
 
@@ -139,7 +139,7 @@ def dead(name: str, values: Array) -> Finding:
 def moving(name: str, span: float, first: float) -> Finding:
     """Check that a channel moves at all, by the span of its values and the first of them."""
     ok = span > 0.0
-    fault = f"{name} stands at {first:.5g} throughout: is the channel connected?"
+    fault = f"{name} stays at {first:.5g} throughout: is the channel connected?"
     message = f"{name} moves" if ok else fault
     return Finding("dead channel", span, 0.0, ok, message)
 

@@ -62,8 +62,9 @@ def segments(record: Turns, settling: int) -> Segments:
     """Find the steady cut and the air in a record by the level of the force in each revolution.
 
     The level is the rms of all channels about the air's zero, less the noise there. Revolutions below 12 % of
-    the typical level are air; the cut is the longest run above half of it. Where the record shows an end of the cut, what the tool
-    needs to get wholly in or out is cut away there: the force looks steady well before the engagement is.
+    the typical level are air; the cut is the longest run above half of it. Where the record shows an end of
+    the cut, what the tool needs to get wholly in or out is cut away there: the force looks steady well before
+    the engagement is.
 
     Parameters
     ----------

@@ -87,7 +87,7 @@ def coefficients_text(coefficients: Coefficients, chip: float) -> str:
     sums = [coefficients.of(_total(place, chip))[0] / N_MM for place in range(3)]
     named = zip(("K_tc h + K_te", "K_rc h + K_re", "K_ac h + K_ae"), sums, strict=True)
     listed = ", ".join(f"{name} {value:.3g}" for name, value in named)
-    return f"{listed} N/mm at the mean chip h = {chip * 1e3:.2g} mm (the runs do not part shear from edge)"
+    return f"{listed} N/mm at the mean chip h = {chip * 1e3:.2g} mm (the runs do not separate shear and edge)"
 
 
 def _total(place: int, chip: float) -> Array:

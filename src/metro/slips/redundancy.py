@@ -17,8 +17,8 @@ APART = 4.0
 GAINS = {
     9.80665: "the response in g (response_unit: g in impacts.csv)",
     1000.0: "the response in mm/s² (write m/s²), or a hammer in kN (write N)",
-    10.0: "the sensitivity of the accelerometer or the hammer, off by 10",
-    100.0: "the sensitivity of the accelerometer or the hammer, off by 100",
+    10.0: "the sensitivity of the accelerometer or the hammer, wrong by a factor of 10",
+    100.0: "the sensitivity of the accelerometer or the hammer, wrong by a factor of 100",
     4.44822: "the hammer's force in lbf (write N)",
 }
 NEAR = 1.25  # factor within which a gain of the list is named as the likely one

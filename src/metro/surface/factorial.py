@@ -115,7 +115,7 @@ def _mixed(design: Design, y: Array, block: np.ndarray) -> Fitted:
         model = MixedLM(y, x, groups=block).fit(reml=True)
     between, scale = float(model.cov_re[0, 0]), float(model.scale)
     if not (math.isfinite(between) and math.isfinite(scale) and scale > 0):
-        raise ValueError("the scatter between plates cannot be told from that within them")
+        raise ValueError("the scatter between plates cannot be separated from that within them")
     labels = np.unique(block, return_inverse=True)[1]
     plates = np.eye(labels.max() + 1)[labels]
     weight = np.linalg.inv(scale * np.eye(len(y)) + between * plates @ plates.T)

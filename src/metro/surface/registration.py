@@ -131,7 +131,8 @@ def _wanted(block: Block, condition: float) -> str:
     seen = ", ".join(f"{name} {len(face)}" for name, face in sorted(block.faces.items())) or "none"
     half = block.pitch / 2 / UM
     return (
-        f"the faces seen (flat patches: {seen}) do not tell where the block lies in x and y (condition "
+        f"the faces seen (flat patches: {seen}) do not determine the place of the block in x and y "
+        "(condition "
         f"{condition:.1g}, at least {CONDITION:.0g} needed): scan the top together with 5 mm or more of a "
         "long and of a short side, the scan's axes about along the work's, or give "
         "instruments.scanner.to_work; the edge of the points is no datum: it lies half a pitch "

@@ -16,15 +16,15 @@ BRIEF = (
     "seen_in",
 )  # what verdict.json has of a cause
 STATUSES = {
-    "clean": "The identification runs show nothing that the base model lacks; nothing was added.",
+    "clean": "The identification runs show no effect beyond the base model; nothing was added.",
     "explained": "The residual is explained by {effects}.",
-    "partly_explained": "Part of the residual is explained by {effects}, proven on left-out conditions; "
-    "a significant rest remains that no effect of the library accounts for.",
+    "partly_explained": "Part of the residual is explained by {effects}, as left-out conditions confirm. "
+    "A significant residual remains that no effect of the library explains.",
     "undetermined": "Several effects explain the residual equally well with these data: {rivals}.",
-    "unexplained": "There is a significant residual that no effect of the library accounts for; "
-    "nothing was added.",
-    "contradicted": "The data contradict what the batch declares; nothing is attributed to a cause.",
-    "insufficient": "There are too few runs to tell: nothing can be said about the residual.",
+    "unexplained": "There is a significant residual that no effect of the library explains; nothing was "
+    "added.",
+    "contradicted": "The data contradict the declaration of the batch; no cause was sought.",
+    "insufficient": "There are too few runs to decide whether the residual is significant.",
 }
 
 
@@ -67,7 +67,7 @@ def story_of(findings: JSON) -> JSON:
 
 
 def verdict_in_words(verdict: JSON) -> str:
-    """Say the verdict on an observable as an engineer would.
+    """Say the verdict on an observable as an engineer would, without what remains unexplained.
 
     Parameters
     ----------
@@ -80,11 +80,11 @@ def verdict_in_words(verdict: JSON) -> str:
     status = "contradicted" if verdict.get("contradicted") else verdict["status"]
     sentence = STATUSES[status].format(effects=effects, rivals=rivals)
     sentence += "".join(f" {one['lowered']}." for one in verdict["effects"] if one.get("lowered"))
-    before, after, residual = verdict["before"], verdict["after"], verdict["unexplained"]
+    before, after = verdict["before"], verdict["after"]
     if before and after:
         unit = f" {printed(verdict['unit'])}".rstrip()
         sentence += f" On held-out runs the error is {before['rms']:.3g}{unit} rms before"
         sentence += f" and {after['rms']:.3g}{unit} after."
     if verdict.get("verification"):
         sentence += f" {verdict['verification']['words']}"
-    return sentence + (f" What is left: {residual['signature']}." if residual else "")
+    return sentence

@@ -9,11 +9,12 @@ from metro.wording.candidates import Sentence
 from metro.wording.names import plain
 
 ENDS = {
-    "together": "too weak to be named by any of them alone, and beyond chance in all together; the models "
-    "are not corrected for it",
-    "contradiction": "the estimates differ beyond their errors, so that it is not one cause of one size",
+    "together": "no observable shows it significantly by itself, but all together do; the models are not "
+    "corrected for it",
+    "contradiction": "the estimates differ by more than their uncertainties, so they are not one common "
+    "cause",
     "confirmed": "and the estimates agree",
-    "alone": "the other observables that could show it cannot tell",
+    "alone": "the other observables are not sensitive enough to confirm it",
     "one_observable": "no other observable of this batch could show it",
 }
 
@@ -26,10 +27,10 @@ def cause_in_words(cause: JSON) -> str:
     witnesses = "; ".join(f"{plain(one['observable'])} {_says(one)}" for one in cause["witnesses"])
     text = f"{named}: {witnesses}; {ENDS[cause['status']]}"
     if cause["or_else"]:
-        text += f" (it may as well be {' or '.join(cause['or_else'])})"
+        text += f" (alternative explanation: {' or '.join(cause['or_else'])})"
     if cause["status"] == "contradiction":
         p_value = cause["agreement"]["p_value"]
-        text += f" (p = {p_value:.2g}): one of them has another cause besides, or a wrong input"
+        text += f" (p = {p_value:.2g}): one of them has a further cause, or a wrong input"
     return text + "."
 
 
@@ -38,9 +39,9 @@ def split_in_words(split: JSON) -> str:
     unit = printed(split["unit"])
     sentences = [
         f"{when.capitalize()}, the error with the predicted force is {parts['total']:.3g} {unit} rms "
-        f"and with the measured force {parts['own']:.3g} {unit}: the force accounts for "
-        f"{parts['upstream']:.3g} {unit}, of which {parts['doubt']:.2g} {unit} (one standard "
-        "deviation) may be the error of the measured force."
+        f"and with the measured force {parts['own']:.3g} {unit}. The predicted force contributes "
+        f"{parts['upstream']:.3g} {unit}, with a standard uncertainty of {parts['doubt']:.2g} {unit} from "
+        "the measured force."
         for when, parts in (("before", split["before"]), ("after", split["after"]))
     ]
     return " ".join(sentences)
@@ -70,7 +71,7 @@ def _cause(values: JSON) -> str:
 
 SENTENCES: Mapping[str, Sentence] = {
     "cause": _cause,
-    "names_it": "found it",
-    "sees_it": "sees it",
-    "cannot_tell": "cannot tell",
+    "names_it": "identified it",
+    "sees_it": "shows it",
+    "cannot_tell": "is not sensitive enough",
 }

@@ -8,6 +8,9 @@ from metro.units import JSON
 from metro.wording.candidates import Sentence
 from metro.wording.names import chance, cut, listed, pair, plain
 
+# Joins an experiment to the residual that it is to characterise, which the report states beside it.
+TO_CHARACTERISE = ", to characterise the remaining error: "
+
 
 def _decide(values: JSON) -> str:
     return "; ".join(values["parts"])
@@ -15,7 +18,7 @@ def _decide(values: JSON) -> str:
 
 def _decides(values: JSON) -> str:
     runs = " and ".join(map(cut, values["runs"]))
-    return f"{runs}: this tells {_pairs(values['pairs'])}"
+    return f"{runs}: this distinguishes {_pairs(values['pairs'])}"
 
 
 def _pairs(pairs: Sequence[JSON]) -> str:
@@ -27,70 +30,70 @@ def _pairs(pairs: Sequence[JSON]) -> str:
 
 def _nearly_decides(values: JSON) -> str:
     return (
-        f"{cut(values['run'])}: the best of the runs tried to tell {pair(values['pair'])}, "
-        f"but it decides with a probability of {chance(values['probability'])} only"
+        f"{cut(values['run'])}: the best of the runs considered to distinguish {pair(values['pair'])}, "
+        f"but it decides only with a probability of {chance(values['probability'])}"
     )
 
 
 def _own_experiments(values: JSON) -> str:
     names = " or ".join(map(pair, values["pairs"]))
-    tried = f"no run of the kinds tried tells {names}; " if values["tried"] else ""
+    tried = f"no run of the kinds considered distinguishes {names}; " if values["tried"] else ""
     return tried + "; or ".join(f"for {plain(name)}: {text}" for name, text in values["experiments"].items())
 
 
 def _none_decides(values: JSON) -> str:
-    return f"no run that may be made tells the rivals apart; {values['otherwise']}"
+    return f"no permitted run distinguishes the rival causes; {values['otherwise']}"
 
 
 def _describe(values: JSON) -> str:
     return (
-        f"condition {values['condition']} again, its repeats spread over the session, to describe what is "
-        f"left: {values['residual']}"
+        f"repeat condition {values['condition']} several times, spread over the session"
+        f"{TO_CHARACTERISE}{values['residual']}"
     )
 
 
 def _describe_again(values: JSON) -> str:
-    return f"condition {values['condition']} again, to describe what is left: {values['residual']}"
+    return f"repeat condition {values['condition']}{TO_CHARACTERISE}{values['residual']}"
 
 
 def _show(values: JSON) -> str:
     hidden = values["hidden"]
-    parts = [f"to see {listed(one['effects'])}: {one['proposal']}" for one in values["shown"]]
+    parts = [f"to check for {listed(one['effects'])}, use {one['proposal']}" for one in values["shown"]]
     if hidden:
-        parts.append(f"to see {plain(hidden[0])}: {values['experiment']}")
+        parts.append(f"to check for {plain(hidden[0])}, use {values['experiment']}")
     if len(hidden) > 1:
-        parts.append(f"no run of the kinds tried shows {listed(hidden[1:])}")
+        parts.append(f"no run of the kinds considered shows {listed(hidden[1:])}")
     return "; ".join(parts)
 
 
 def _would_show(values: JSON) -> str:
     return (
-        f"{cut(values['run'])}: this would show {listed(values['effects'])}, which these runs cannot, if of "
-        f"the usual size with a probability of {chance(values['probability'])}"
+        f"{cut(values['run'])}: this would show {listed(values['effects'])}, which these runs cannot show. "
+        f"An effect of the usual size is detected with a probability of {chance(values['probability'])}"
     )
 
 
 def _none_shows(values: JSON) -> str:
     experiments = values["experiments"]
     texts = "; ".join(f"for {plain(name)}: {text}" for name, text in experiments.items())
-    return f"no run of the kinds tried shows {listed(list(experiments))}; {texts}"
+    return f"no run of the kinds considered shows {listed(list(experiments))}; {texts}"
 
 
 def _tightens(values: JSON) -> str:
     return (
-        f"{cut(values['run'])}: what is not known of the parameters, {values['parameter']} above all, makes "
-        f"{100 * values['share']:.0f} % of the variance of predictions, and this leaves "
-        f"{100 * values['remaining']:.0f} % of that"
+        f"{cut(values['run'])}: the uncertainty of the parameters, mainly of {values['parameter']}, causes "
+        f"{100 * values['share']:.0f} % of the variance of predictions, and this run reduces it to "
+        f"{100 * values['remaining']:.0f} % of its value"
     )
 
 
 def _more_runs(values: JSON) -> str:
     lacking = []
     if values["identify"]:
-        there = "one there is" if values["conditions"] else "there is none"
-        lacking.append(f"at least two conditions to identify on, each repeated ({there} now)")
+        there = "one" if values["conditions"] else "none"
+        lacking.append(f"at least two conditions for identification, each repeated (the batch has {there})")
     if values["validate"]:
-        lacking.append("at least one condition that no fit sees (role validate), repeated")
+        lacking.append("at least one held-out condition (role validate), repeated")
     return "cut " + ", and ".join(lacking)
 
 
@@ -107,6 +110,6 @@ SENTENCES: Mapping[str, Sentence] = {
     "none_shows": _none_shows,
     "tightens": _tightens,
     "more_runs": _more_runs,
-    "correct_first": "correct what the batch declares, as page one says, and run it again; no new cut is "
-    "needed before that",
+    "correct_first": "correct the declaration as proposed on page one and run the batch again; no new cut "
+    "is needed before that",
 }

@@ -12,16 +12,16 @@ from metro.wording.names import plain
 def _wrong_labels(values: JSON) -> str:
     runs = values["runs"]
     named = f": {', '.join(runs)}" if runs else ""
-    return f"labels against the predicted boundary in {len(runs)} of {values['tests']} tests{named}"
+    return f"{len(runs)} of {values['tests']} tests contradict the predicted boundary{named}"
 
 
 def _likeness_of_labels(values: JSON) -> str:
-    return f"{_perhaps(values)}a {plain(values['effect'])}, which is no effect of the library"
+    return f"{_perhaps(values)}a {plain(values['effect'])}, which is not an effect of the library"
 
 
 def _lacking(values: JSON) -> str:
     factors = ", ".join(f"{one['factor']:.2g} at {one['rpm']:.0f} rev/min" for one in values["factors"])
-    cause = "a cause that the library lacks: the depth of the boundary times"
+    cause = "a cause outside the library, which multiplies the stable depth by"
     return f"{_perhaps(values)}{cause} {factors}"
 
 
@@ -36,31 +36,31 @@ def _test(values: JSON) -> str:
 def _next_test(values: JSON) -> str:
     names = " or ".join(map(plain, values["names"]))
     return (
-        f"{values['test']}: its label tells most about whether it is {names} ({values['information']:.2f} "
-        f"bit); the cause that leads after it is expected to have a probability of {values['leading']:.2f} "
-        f"({values['leading_now']:.2f} now)"
+        f"{values['test']}: its result best distinguishes {names} ({values['information']:.2f} bit). The "
+        f"probability of the most probable cause is expected to rise from {values['leading_now']:.2f} to "
+        f"{values['leading']:.2f}"
     )
 
 
 def _test_beside(values: JSON) -> str:
     return (
-        f"a test beside run {values['run']}, where the prediction is least sure "
+        f"a test near the settings of run {values['run']}, where the prediction is least certain "
         f"(P unstable = {values['probability']:.2f})"
     )
 
 
 def _surprise(values: JSON) -> str:
     return (
-        f"Effects of the boundary are weighed by {values['weighed']} tests at {values['speeds']} speeds; "
-        f"with probability {values['nothing']:.2g} nothing is missing. {_verified(values)}"
+        f"{values['weighed']} tests at {values['speeds']} speeds were used to compare causes; with a "
+        f"probability of {values['nothing']:.2g} no effect is missing. {_verified(values)}"
     )
 
 
 def _surprise_alone(values: JSON) -> str:
     tests, speeds = values["tests_needed"], values["speeds_needed"]
     return (
-        f"{values['weighed']} labelled tests may decide; effects of the boundary need {tests} of them that "
-        f"are not held out, at {speeds} speeds or more. {_verified(values)}"
+        f"{values['weighed']} labelled tests are available to compare causes; at least {tests} at {speeds} "
+        f"speeds, not held out, are needed. {_verified(values)}"
     )
 
 
@@ -68,20 +68,17 @@ def _verified(values: JSON) -> str:
     if not values["verified"]:
         return "No held-out test verifies the boundary."
     return (
-        f"Labels of the {values['verified']} held-out tests drawn from the prediction would be as unlikely "
-        f"as those measured with probability {values['before']:.2g} for the base model and "
-        f"{values['after']:.2g} with what was found."
+        f"If the prediction is right, {values['verified']} held-out results as unlikely as those observed "
+        f"occur with a probability of {values['before']:.2g} for the base model and {values['after']:.2g} "
+        "with the effects found."
     )
 
 
 def _verification_of_labels(values: JSON) -> str:
     right = f"{values['right']} of {values['tests']} held-out tests are on the predicted side of the boundary"
     if values["holds"]:
-        return f"Verification: {right}; such labels are to be expected (chance {values['p_value']:.2g})."
-    return (
-        f"Verification contradicts the boundary: {right}; labels as unlikely would occur with a chance of "
-        f"{values['p_value']:.2g}."
-    )
+        return f"Verification: {right}, which agrees with the prediction (p = {values['p_value']:.2g})."
+    return f"Verification contradicts the boundary: {right} (p = {values['p_value']:.2g})."
 
 
 SENTENCES: Mapping[str, Sentence] = {

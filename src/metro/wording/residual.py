@@ -18,13 +18,13 @@ def _residual(values: JSON) -> str:
 
 def _residual_and_likeness(values: JSON) -> str:
     rms = f"{values['rms']:.3g} {printed(values['unit'])} rms"
-    return f"{values['residual']}; with that the error would be {rms}"
+    return f"{values['residual']}; with this effect the error would be {rms}"
 
 
 def _places(values: JSON) -> str:
     places = values["places"]
     parts = [
-        f"{'all along' if place['label'] == 'all' else place['label']} in {place['axis']} "
+        f"{'whole record' if place['label'] == 'all' else place['label']} in {place['axis']} "
         f"({100 * place['relative']:.2g} % of the signal there)"
         for place in places[:MOST_PLACES]
     ]
@@ -35,9 +35,11 @@ def _places(values: JSON) -> str:
 def _lowered(values: JSON) -> str:
     name = plain(values["effect"])
     return (
-        f"{name[:1].upper()}{name[1:]} has {values['weight']:.2f} against the other effects; its probability "
-        f"is lower because {100 * values['explained']:.0f} % of the residual is explained and the rest may "
-        "look like it"
+        f"{name[:1].upper()}{name[1:]} has a weight of {values['weight']:.2f} among the effects of the "
+        "library. "
+        f"Its probability is lower because it explains only {100 * values['explained']:.0f} % of the "
+        "residual; "
+        "an unknown cause may have the same signature"
     )
 
 
@@ -48,14 +50,14 @@ def _step(values: JSON) -> str:
 def _between(values: JSON) -> str:
     return (
         f"the base parameters differ between conditions by {100 * values['relative']:.2g} % of the signal, "
-        f"more than repeats scatter, most in {values['condition']}"
+        f"which exceeds the scatter of repeats; the difference is largest in {values['condition']}"
     )
 
 
 def _restless(values: JSON) -> str:
     return (
-        f"runs scatter by {100 * values['relative']:.2g} % of the signal, {values['times']:.0f} times what "
-        "is usual: something changes from run to run (a drift, another clamping)"
+        f"runs scatter by {100 * values['relative']:.2g} % of the signal, {values['times']:.0f} times the "
+        "usual value: something changes from run to run (for example a drift or the clamping)"
     )
 
 
@@ -64,13 +66,13 @@ def _like(values: JSON) -> str:
 
 
 def _may_be(values: JSON) -> str:
-    return f"it may be no {plain(values['effect'])} but a {_resembled(values['others'])}"
+    return f"alternative explanation to {plain(values['effect'])}: a {_resembled(values['others'])}"
 
 
 def _resembled(effects: Sequence[JSON]) -> str:
     """Name effects that are not of the library, with their values."""
     named = [f"{plain(effect['name'])} ({', '.join(map(_value, effect['values']))})" for effect in effects]
-    return f"{' and a '.join(named)}, which is no effect of the library"
+    return f"{' and a '.join(named)}, which is not an effect of the library"
 
 
 def _value(entry: JSON) -> str:
@@ -79,13 +81,13 @@ def _value(entry: JSON) -> str:
 
 
 def _unseen(values: JSON) -> str:
-    return f"only where a condition is left out of the fit: {values['places']}"
+    return f"only in conditions that were left out of the fit: {values['places']}"
 
 
 def _above_floor(values: JSON) -> str:
     return (
-        f"a condition that is left out of the fit is predicted with {values['ratio']:.2g} times the error "
-        f"that the noise explains (chance {_chance(values['p_value'])}), the largest in {values['condition']}"
+        f"the prediction of left-out conditions has {values['ratio']:.2g} times the error that noise "
+        f"explains ({_chance(values['p_value'])}), the largest in {values['condition']}"
     )
 
 
@@ -97,39 +99,40 @@ def _verification(values: JSON) -> str:
         words = f"Verification on {runs}: the error is {ratio}."
     elif values["holds"]:
         words = (
-            f"Verification on {runs}: the error is {ratio}; by noise alone it would be as large with a "
-            f"chance of {_chance(values['p_value'])}."
+            f"Verification on {runs}: the error is {ratio}, which noise alone can explain "
+            f"({_chance(values['p_value'])})."
         )
     else:
         words = (
-            f"Verification on {runs} contradicts the model: the error is {ratio} (chance by noise alone "
-            f"{_chance(values['p_value'])}), most in condition {values['condition']}."
+            f"Verification on {runs} contradicts the model: the error is {ratio} "
+            f"({_chance(values['p_value'])}) and largest in condition {values['condition']}."
         )
     if values["worse_runs"]:
         unit = printed(values["unit"])
         each = (
             f"{one['run']} ({one['before']:.2g} to {one['after']:.2g} {unit})" for one in values["worse_runs"]
         )
-        words += f" With the effects the error grows in {', '.join(each)}."
+        words += f" With the effects the error increases in {', '.join(each)}."
     if values["without"]:
-        words += f" A held-out run is beyond the model: {values['without']}."
+        words += f" The model cannot predict one held-out run: {values['without']}."
     return words
 
 
 def _chance(p_value: float) -> str:
-    return f"{p_value:.2g}" if p_value >= LEAST_CHANCE else f"below {LEAST_CHANCE:g}"
+    return f"p = {p_value:.2g}" if p_value >= LEAST_CHANCE else f"p < {LEAST_CHANCE:g}"
 
 
 def _noise(values: JSON) -> str:
     words = (
-        f"From run to run the base parameters scatter by {values['scatter_percent']:.2g} % (from repeats, "
-        f"drawn towards {100 * values['prior']:.2g} %); differences below {100 * values['budget']:.2g} % of "
-        "the signal are the declared model-form budget and nobody's effect."
+        f"The base parameters scatter by {values['scatter_percent']:.2g} % from run to run (estimated from "
+        f"repeats, with a prior of {100 * values['prior']:.2g} %). Differences below "
+        f"{100 * values['budget']:.2g} % of the signal are within the stated model accuracy and are not "
+        "attributed to any effect."
     )
     if values["systematic"]:
         words += (
-            f" All runs may share an error of {100 * values['systematic']:.2g} % that the inputs of the "
-            "model have; an effect must change the prediction by more than twice that."
+            f" The inputs of the model may cause a common error of {100 * values['systematic']:.2g} % in all "
+            "runs; an effect must change the prediction by more than twice that."
         )
     return words
 
@@ -151,35 +154,37 @@ KINDS = {
     "arc": "a cause at the entry or the exit, such as another engagement than declared",
     "travel": "a cause that grows while cutting, such as wear or heat",
 }
-LEAST_PART = 0.05  # of the residual, that is told
+LEAST_PART = 0.05  # of the residual, that is stated
 
 
 def _ceiling(values: JSON) -> str:
     """Say how much any cause could explain, how it changes with the cut, and of which kind it is."""
-    told = [(name, share) for name, share in values["parts"].items() if share >= LEAST_PART and name in PARTS]
-    if not told or values["share"] <= 0.0:
+    named = [
+        (name, share) for name, share in values["parts"].items() if share >= LEAST_PART and name in PARTS
+    ]
+    if not named or values["share"] <= 0.0:
         return (
-            "How much of that any cause could explain cannot be seen from these runs: none is predicted by "
-            "the others."
+            "The part of it that a cause could explain cannot be estimated: no condition is predicted by the "
+            "others."
         )
     low, high = (100 * max(end, 0.0) for end in values["ci95"])
-    parts = [f"{100 * share:.0f} % {PARTS[name]}" for name, share in told]
+    parts = [f"{100 * share:.0f} % {PARTS[name]}" for name, share in named]
     held = "".join(
-        f", {100 * max(one['share'], 0.0):.0f} % in held-out run {one['run']} (which leaves "
-        f"{100 * one['of_signal']:.0f} % of its signal)"
+        f", {100 * max(one['share'], 0.0):.0f} % in held-out run {one['run']} (whose error is "
+        f"{100 * one['of_signal']:.0f} % of the signal)"
         for one in values["held_out"][:MOST_PLACES]
     )
     places = listed([f"{place['label']} in {place['axis']}" for place in values["places"]])
     # A share that may be nothing says of no kind that it is there.
     kind = (
-        f"This points to {KINDS[told[0][0]]}."
+        f"This points to {KINDS[named[0][0]]}."
         if values["ci95"][0] > 0.0
-        else "That may be chance: it points to no kind of cause."
+        else "That may be chance, so no kind of cause can be named."
     )
     return (
-        f"Of what the base model leaves, {listed([*parts, _alone(values)])}. Whatever the cause, the other "
-        f"conditions predict {100 * values['share']:.0f} % ({low:.0f} to {high:.0f} %) of it in one that is "
-        f"left out{held}. It is largest at {places}. {kind}"
+        f"Of the error of the base model, {listed([*parts, _alone(values)])}. The other conditions predict "
+        f"{100 * values['share']:.0f} % ({low:.0f} to {high:.0f} %) of it in a left-out condition{held}, "
+        f"which is as much as a cause could explain. It is largest at {places}. {kind}"
     )
 
 
@@ -202,5 +207,5 @@ SENTENCES: Mapping[str, Sentence] = {
     "above_floor": _above_floor,
     "verification": _verification,
     "noise": _noise,
-    "contradiction": "not judged: the data contradict what the batch declares",
+    "contradiction": "not judged, because the data contradict the declaration of the batch",
 }

@@ -49,7 +49,7 @@ EFFECT = Effect(
     apply=_apply,
     signature="The boundary lies higher or lower, by a factor that changes slowly with speed and depth.",
     literature="Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425: inadequacy as a smooth function",
-    experiment="what would tell the effects of the library apart",
+    experiment="a test that distinguishes the effects of the library",
     resembled=True,
 )
 

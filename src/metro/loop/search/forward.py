@@ -1,10 +1,10 @@
 """The strategy of the search: forward with backward elimination, then every effect against its rivals.
 
 Forward: each effect of the library is fitted jointly with what the model has already; the best that passes
-every gate is added. An effect that is small beside what stays unexplained may be a part of that: where no other
-is left it is added on trial, and in the end only those stay that are not small beside what the whole model
-leaves. (Several causes of one size hide each other otherwise.) Backward: an effect that a later one made idle is
-dropped for good. Then each is weighed against its rivals.
+every gate is added. An effect that is small beside what stays unexplained may be a part of that: where no
+other is left it is added on trial, and in the end only those stay that are not small beside what the whole
+model leaves. (Several causes of one size hide each other otherwise.) Backward: an effect that a later one made
+idle is dropped for good. Then each is weighed against its rivals.
 """
 
 from __future__ import annotations

@@ -115,7 +115,7 @@ def force_of_all(one: Sensorless, shared: Common) -> TipForce:
     Raises
     ------
     ValueError
-        If the joints do not tell the three axes apart.
+        If the joints do not determine all three axes.
     """
     variance = beyond_noise(one.torques.variance, shared.friction, shared.wander)
     return tip_force_of(one.torques.level, variance, one.moves, one.index, 0.0)

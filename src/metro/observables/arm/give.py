@@ -35,7 +35,7 @@ class GivingArm:
             return cut
         rows = self.loads[self.loads["pose"] == batch.runs.loc[run, "pose"]]
         if rows.empty:
-            return Refusal("no robot_log, and no load test in its pose: where the arm stood is not known")
+            return Refusal("no robot_log, and no load test in its pose: the pose of the arm is not known")
         return in_one_pose(joint_places(rows, self.model.arm)[0], face, self.model.arm)
 
     def give(self, log: Log | Refusal, face: Wall, force: Array) -> float:

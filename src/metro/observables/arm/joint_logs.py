@@ -26,7 +26,7 @@ from metro.units import DEG, JSON, MM, UM, Array
 
 LEAST_SAMPLES = 200  # some for each of the thirty stretches that the errors are from
 BINS = 12  # of speed, per direction, in the figure
-NO_ARM = "the cell has no arm (arm.dh or arm.urdf in cell.yaml): weight and friction are not told apart"
+NO_ARM = "the cell has no arm (arm.dh or arm.urdf in cell.yaml): weight and friction cannot be separated"
 QUANTITIES = ("coulomb", "viscous", "offset", "gravity", "inertia")
 UNITS = {
     "coulomb": "N m",
@@ -225,7 +225,7 @@ def _unfitted(log: JointLog, joint: int, arm: Arm | None) -> str:
         return "neither torque nor current was logged, or it is a linear axis"
     if not log.long:
         return f"the log has {len(log.time)} samples, at least {LEAST_SAMPLES} are needed"
-    return NO_ARM if arm is None else "too slow for the encoder to tell which way"
+    return NO_ARM if arm is None else "too slow for the encoder to resolve the direction"
 
 
 def _of_fit(log: JointLog, fit: JointFit, drives: Drives) -> JSON:

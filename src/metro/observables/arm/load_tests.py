@@ -59,12 +59,16 @@ def calibration(
         if known is None:
             value, sd = np.zeros(len(weak)), np.full(len(weak), tests.value.max())
             notes.append(
-                f"The load tests do not tell joint {names}: taken as rigid, give or take the softest joint."
+                f"The load tests do not determine joint {names}: taken as rigid, with the compliance of the "
+                "softest joint as its uncertainty."
             )
         else:
             value = 1.0 / np.asarray(known, dtype=float)[weak]
             sd = KNOWN * value
-            notes.append(f"The load tests do not tell joint {names}: from the cell file, within {KNOWN:.0%}.")
+            notes.append(
+                f"The load tests do not determine joint {names}: its stiffness is taken from the cell file, "
+                f"within {KNOWN:.0%}."
+            )
         blocks.append(_known_block(weak, value, sd))
     return blocks, tuple(notes)
 
@@ -121,16 +125,16 @@ def in_words(joints: Identifiability, load: NextLoad, axes: Axes) -> str:
         known = f"The load tests do not see joint {', '.join(unseen)} apart from the others."
     else:
         known = (
-            f"The load tests tell every joint; joint {joints.worst + 1} least, "
-            f"to {100 * joints.relative[joints.worst]:.2g} %."
+            f"The load tests determine the stiffness of every joint; joint {joints.worst + 1} is the least "
+            f"certain, to {100 * joints.relative[joints.worst]:.2g} %."
         )
     places = [f"{value:.0f}" for value in load.joints / axes.units]
     turning = f"({', '.join(places[place] for place in axes.turning)})°"
     shifted = [f"axis {i + 1} at {place} mm" for i, place in enumerate(places) if axes.linear[i]]
     pull = ", ".join(f"{value:.0f}" for value in load.force)
     return (
-        f"{known} A load of ({pull}) N on the tip in the pose {', '.join([turning, *shifted])} would tell "
-        f"joint {load.joint + 1} "
+        f"{known} A load of ({pull}) N on the tip in the pose {', '.join([turning, *shifted])} would "
+        f"determine joint {load.joint + 1} "
         f"to {100 * load.after:.2g} %."
     )
 

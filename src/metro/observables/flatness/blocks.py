@@ -70,7 +70,7 @@ def pose_of_loads(pose: str, loads: pd.DataFrame, mass: pd.DataFrame, modes: pd.
     rows = z_rows(position[:, 0], position[:, 1], force, displacement)
     entries = visible_entries(rows)
     if not entries.any():
-        return Refusal(f"the load tests at pose {pose} do not tell what moves the tip along z")
+        return Refusal(f"the load tests at pose {pose} do not determine the compliance of the tip along z")
     basis, error = choose_basis(rows, entries)
     loaded, residual = fit_z_row(rows, basis, entries)
     notes = _linearity(pose, loads)

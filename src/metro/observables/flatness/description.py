@@ -37,7 +37,7 @@ def needs(stock: Stock) -> tuple[Capability, ...]:
 
 DESCRIPTION = Description(
     name=NAME,
-    title="flatness of the face",
+    title="deviation of the face",
     assumes=(
         "The face is the answer of the tip to the mean force at each path point; transients at entry "
         "and exit are in the base model where mass.csv gives the arm's mass."

@@ -161,7 +161,7 @@ def _limits(batch: Batch) -> list[str]:
     placed = "to_work" in batch.instrument("scanner")
     return [
         "The face is compared where the cutter is fully engaged (one radius from entry and exit); the "
-        "spindle stands square to it. Where no impacts at the pose tell the damping of the arm, its modes "
+        "spindle is square to it. Where no impact test at the pose gives the damping of the arm, its modes "
         "share one ratio of 5 %, known to a factor of two.",
         "Scans are placed by the declared scanner-to-work transform (offset and tilts known to 10 µm)."
         if placed

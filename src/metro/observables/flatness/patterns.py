@@ -33,7 +33,7 @@ def _of_passes(number: np.ndarray) -> Iterator[tuple[str, Array]]:
     yield "grows with the pass number", rank[:, None]
     yield "grows with the pass number, along a bent line", np.column_stack([rank**2, rank**3])
     for one in passes[1:-1]:
-        yield f"pass {one} is off the others", (number == one).astype(float)[:, None]
+        yield f"pass {one} differs from the others", (number == one).astype(float)[:, None]
     for one in passes[2:-1]:
         yield f"steps at pass {one}", (number >= one).astype(float)[:, None]
     yield "differs from pass to pass", (number[:, None] == passes).astype(float)

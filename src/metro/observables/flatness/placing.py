@@ -79,7 +79,10 @@ def _as_it_lies(cloud: Points, path: Array | None, size: list[float] | None, why
         return Placed(cloud, "", unknown, why)
     misses = np.abs([corner[:2] - due for corner, due in zip(box(cloud), (low, high), strict=True)])
     if misses.max() > WITHIN:
-        reason = f"its scan does not lie on the work's outline (off by {misses.max() / MM:.3g} mm), and {why}"
+        reason = (
+            f"its scan does not lie on the work's outline (it misses by {misses.max() / MM:.3g} mm), and "
+            f"{why}"
+        )
         return Placed(cloud, "", unknown, f"instruments.scanner.to_work is not given, {reason}")
     off = misses.max() / MM
     remark = f"its scan is taken as it lies: its outline is that of the work within {off:.2g} mm"

@@ -53,6 +53,6 @@ def noise_by_repeats(batch: Batch, read: Tables) -> Callable[[str], Noise | str 
         try:
             return repeat_noise([cloud_of(read, run) for run in runs], nesting)
         except ValueError as error:
-            return f"its repeat scans tell no noise: {error}"
+            return f"its repeat scans give no noise: {error}"
 
     return lambda run: of_group(groups[run]) if run in groups else None

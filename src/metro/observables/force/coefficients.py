@@ -89,7 +89,7 @@ def mean_coefficients(
     scaled = circular / np.maximum(size, 1e-300)
     if not _parted(scaled):
         return Refusal(
-            "the mean forces of one feed cannot part shear from edge coefficients: cut a second feed"
+            "the mean forces of one feed cannot separate shear and edge coefficients: cut a second feed"
         )
     solve = np.linalg.pinv(scaled.reshape(-1, 6))
     beta = solve @ target.ravel()

@@ -108,8 +108,8 @@ def _give_note(batch: Batch, spindle: pd.DataFrame) -> tuple[str, ...]:
         )
     if "arm" in batch.cell and any(wall(batch, name).normal.any() for name in spindle["run"]):
         return (
-            "How far the arm gives way in side cuts is not known (no load tests of it where it stood): their "
-            "radial depth is taken as programmed, and what the arm gives way is in the forces of up and "
+            "The deflection of the arm in side cuts is not known, because it has no load tests in this pose. "
+            "The radial depth is taken as programmed; the deflection then appears in the forces of up and "
             "down milling with opposite signs.",
         )
     return ()
@@ -175,8 +175,8 @@ def report(
     lacking = {name: value.reason for name, value in results.items() if isinstance(value, Refusal)}
     if turned and fit:
         lacking["ktc"] = lacking["krc"] = lacking["kte"] = lacking["kre"] = (
-            "all runs are helical and where on the orbit their records begin is not known: the force in the "
-            "plane is told but for a rotation; cut one slot"
+            "all runs are helical, and the place on the orbit where their records begin is not known: the "
+            "force in the plane is determined except for a rotation; cut one slot"
         )
     if model.bottom_edges == ("kfae",):
         lacking["kfac"] = (

@@ -85,13 +85,13 @@ def _remark(friction: Friction, joint: int, value: Array) -> str:
     """Say why the runs do not identify a joint's friction; empty if they do."""
     forward, backward = friction.forward[joint], friction.backward[joint]
     if not (forward or backward):
-        return "too slow for the encoder to tell which way"
+        return "too slow for the encoder to resolve the direction"
     if np.isfinite(value[:2]).all():
         return ""
     if not (forward and backward):
         both = "" if np.isfinite(value[1]) else ", and at too few speeds for viscous friction"
-        return f"one way only, so that Coulomb friction looks like weight{both}"
-    return "speeds that differ too little to part Coulomb from viscous friction"
+        return f"one way only, so that Coulomb friction cannot be separated from weight{both}"
+    return "speeds that differ too little to separate Coulomb and viscous friction"
 
 
 def _curve(friction: Friction, log: Motion) -> pd.DataFrame:

@@ -178,9 +178,9 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         "The torques of the cut less those of the idle run at the same place are what the dynamometer's "
         "force asks of the joints; friction and gravity are those of the idle run.",
         "The sensorless force is solved from all joints by weighted least squares.",
-        "All torques may be off by one factor, and those of each joint and the force along each axis by "
-        f"{CALIBRATED:.0%} besides, the same in all runs; each axis of the dynamometer may show "
-        f"{CROSSTALK:.1%} of the force along the others.",
+        "All torques may have one common scale error. The torques of each joint and the force along each "
+        f"axis may have another of {CALIBRATED:.0%}, the same in all runs. Each axis of the dynamometer may "
+        f"show {CROSSTALK:.1%} of the force along the others.",
         *(
             f"Run {run}: the robot log is of another time than the dynamometer's record; it is taken to "
             "start with it."

@@ -56,7 +56,7 @@ def outlying(table: pd.DataFrame, load: pd.Series) -> pd.Series:
             continue
         others = np.exp(np.delete(sizes, place))
         flags[rows.index[place]] = (
-            f"{rows['measured'].iloc[place]:g} {rows['unit'].iloc[place]} stands out of the other "
+            f"{rows['measured'].iloc[place]:g} {rows['unit'].iloc[place]} is an outlier among the other "
             f"{len(others)} points, {others.min():g} to {others.max():g} (Grubbs, p = {probability:.1g}); "
             "it is left out of the compliance"
         )

@@ -31,10 +31,10 @@ INDICES = (PRIMARY, "X_a", "X_g")
 CANNOT = (
     "Every case is printed once: the scatter of a repeat is not known, interactions are taken as scatter, so "
     "that an interaction that is really there widens every interval here.",
-    "How many of the repeats, or which of them, a printed value stands for is not said; nor what the "
-    "scanner's noise adds to it, which is more in X_m than in X_a or X_g and the same in all cases.",
+    "The source does not state which repeats a printed value represents, nor what the scanner's noise "
+    "adds to it, which is more in X_m than in X_a or X_g and the same in all cases.",
     "A ratio of measured to simulated that is the same in all cases may come from the model or from the "
-    "scan: the table cannot tell which.",
+    "scan: the table cannot distinguish these.",
 )
 
 

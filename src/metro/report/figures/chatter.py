@@ -19,7 +19,7 @@ KINDS = {
     "hopf": ("X", style.BEFORE, "chatter (Hopf)"),
     "flip": ("P", style.PURPLE, "chatter (flip)"),
     "low_frequency": ("D", style.YELLOW, "chatter in a mode of the robot"),
-    "unknown": ("*", style.MEASURED, "unknown kind, or cannot be told"),
+    "unknown": ("*", style.MEASURED, "kind unknown or not determined"),
 }
 STABLE = ((0, style.GREEN, "stable"), (1, style.BEFORE, "chatter"))
 NUMBERED = 25  # most tests of which each has its probability next to it
@@ -72,7 +72,7 @@ def _probabilities(axes: Axes, tests: pd.DataFrame) -> None:
     for _, test in tests.iterrows():
         place = (test["rpm"], test["depth_mm"])
         axes.annotate(
-            f"{test['probability']:.2f}", place, (7, 0), textcoords="offset points", va="center", fontsize=6.5
+            f"{test['probability']:.2f}", place, (7, 0), textcoords="offset points", va="center", fontsize=8
         )
 
 
@@ -110,7 +110,7 @@ def _spectrum(axes: Axes, lines: pd.DataFrame, test: pd.Series, teeth: int) -> N
     shown = lines[lines["x"] <= last]
     for on_order, colour, label in (
         (True, style.GREY, "orders of the spindle"),
-        (False, style.AFTER, "rest"),
+        (False, style.AFTER, "remaining force"),
     ):
         height = shown["value"].where(shown["on_order"].astype(bool) == on_order, 0.0)
         axes.vlines(shown["x"], 0.0, height, color=colour, lw=0.9, label=label)

@@ -47,7 +47,7 @@ def levelled(heights: pd.DataFrame, readings: pd.DataFrame) -> Figure:
                 if len(stations) <= WRITTEN or at in extremes:
                     text = f"{row['z_um']:.2g}".replace("-", "−")
                     place = (row["x_mm"], row["y_mm"])
-                    axes.annotate(text, place, (3, 3), textcoords="offset points", fontsize=6)
+                    axes.annotate(text, place, (3, 3), textcoords="offset points", fontsize=8)
             axes.set_aspect("equal")
             axes.margins(0.08)
             axes.set_title(str(run), loc="left")

@@ -118,11 +118,11 @@ def shapes(residues: pd.DataFrame, alike: pd.DataFrame) -> Figure:
             axes.plot(at, value["imag"] / most, "x:", color=style.BEFORE, ms=3, lw=0.7, label="a quarter off")
             star = "" if value["resolved"].all() else " *"
             axes.set_title(
-                f"{number(part['frequency_hz'].iloc[0], 4)} Hz{star}", loc="left", fontsize=7.5, pad=2
+                f"{number(part['frequency_hz'].iloc[0], 4)} Hz{star}", loc="left", fontsize=8, pad=2
             )
-            axes.set_xticks(at, points, fontsize=7)
+            axes.set_xticks(at, points, fontsize=8)
             axes.set(ylim=(-1.15, 1.15))
-            axes.tick_params(labelsize=7)
+            axes.tick_params(labelsize=8)
         for axes in grid.flat[len(panels) :]:
             axes.set_visible(False)
         left.supylabel("shape, largest 1", fontsize=9)
@@ -138,8 +138,8 @@ def _alike(part: SubFigure, alike: pd.DataFrame) -> None:
     image = axes.imshow(matrix, vmin=0, vmax=1, cmap=style.SEQUENTIAL, origin="lower")
     place = np.arange(len(matrix))
     names = [number(float(frequency), 4) for frequency in matrix.index]
-    axes.set_xticks(place, names, rotation=90, fontsize=6.5)
-    axes.set_yticks(place, names, fontsize=6.5)
+    axes.set_xticks(place, names, rotation=90, fontsize=8)
+    axes.set_yticks(place, names, fontsize=8)
     axes.grid(visible=False)
     axes.set_xlabel("mode (Hz)")
     part.colorbar(image, ax=axes, location="top", label="MAC", shrink=0.8)

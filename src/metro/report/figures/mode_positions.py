@@ -94,7 +94,7 @@ def by_distance(pickups: pd.DataFrame) -> Figure:
             axes.set_xlabel("distance from the blow (mm)")
             axes.set_yticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
             axes.minorticks_off()
-        row[0].set_ylabel("left by the modes (%)")
+        row[0].set_ylabel("error of the modes (%)")
         handles, labels = row[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=4)
     return figure

@@ -59,7 +59,7 @@ def force(records: pd.DataFrame, spindle: pd.DataFrame | None) -> Figure:
                         cut["zero_at_s"], color=style.BEFORE, lw=1.0, ls="--", label="zero, from the air"
                     )
             axes.set_title(str(run), loc="left", fontsize=8, pad=2)
-            axes.tick_params(labelsize=7)
+            axes.tick_params(labelsize=8)
             axes.margins(x=0)
         for axes in flat[len(panels) :]:
             axes.set_visible(False)

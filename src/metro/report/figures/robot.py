@@ -86,7 +86,7 @@ def stations(surface: pd.DataFrame, dots: pd.DataFrame) -> Figure:
                 value = part[column].to_numpy(float).reshape(len(x), len(y)).T
                 filled = axes.contourf(x, y, value, levels=steps, cmap=style.SEQUENTIAL, extend="both")
                 lines = axes.contour(x, y, value, levels=steps[1::2], colors="white", linewidths=0.5)
-                axes.clabel(lines, fontsize=6)
+                axes.clabel(lines, fontsize=8)
                 near = dots[(dots[third] - level).abs() < reach]
                 axes.plot(near[first], near[second], "o", color=style.MEASURED, mfc="white", ms=2.5, mew=0.6)
                 axes.grid(visible=False)

@@ -57,7 +57,7 @@ def _pair(axes: Axes, ranking: Sequence[JSON], across: str, beside: str) -> None
     axes.set_xticks(list(places.values()), list(places))
     axes.set_xlim(-0.35, len(places) - 0.65)
     axes.set_xlabel(across)
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=8)
 
 
 def _level(factor: str, level: str) -> str:

@@ -9,13 +9,16 @@ import pandas as pd
 
 from metro.report import style
 from metro.report.figures.comparison import predictions
-from metro.units import Array, printed
+from metro.report.numbers import number
+from metro.units import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 RUNS = 2
+IN_UM = {"mm": 1e3, "um": 1.0}
+SHARE = 0.95  # of the points of a face lie within the scale of colours; the others are in its end colours
 MAPS = 16
 
 
@@ -27,7 +30,7 @@ def face_points(frame: pd.DataFrame) -> Figure:
     frame : rows of comparison.parquet of flatness, with ``x_mm`` and ``y_mm``.
     """
     runs = [str(run) for run in frame["run"].drop_duplicates()][:RUNS]
-    unit = printed(str(frame["unit"].iloc[0]))
+    scale = IN_UM[str(frame["unit"].iloc[0])]
     kinds = predictions(frame)
     with style.style():
         figure, grid = style.new_figure(
@@ -35,10 +38,11 @@ def face_points(frame: pd.DataFrame) -> Figure:
         )
         for row, run in zip(grid, runs, strict=True):
             part = frame[frame["run"] == run]
-            values = [part["measured"] - part["measured"].mean()]
-            values += [part["measured"] - part[kind.column] for kind in kinds]
+            measured = part["measured"] * scale
+            values = [measured - measured.mean()]
+            values += [measured - part[kind.column] * scale for kind in kinds]
             limit = float(np.nanquantile(np.abs(np.array(values)), 0.99)) or 1.0
-            titles = [f"{run}: measured, less its mean", *(f"left by: {kind.label}" for kind in kinds)]
+            titles = [f"{run}: measured, less its mean", *(f"residual, {kind.label}" for kind in kinds)]
             for axes, value, title in zip(row, values, titles, strict=True):
                 dots = axes.scatter(
                     *(part["x_mm"], part["y_mm"]),
@@ -51,7 +55,7 @@ def face_points(frame: pd.DataFrame) -> Figure:
                 )
                 axes.set_title(title, loc="left")
             row[0].set_ylabel("y (mm)")
-            figure.colorbar(dots, ax=row, label=f"deviation ({unit})", fraction=0.03, pad=0.01)
+            figure.colorbar(dots, ax=row, label="deviation (µm)", extend="both", fraction=0.03, pad=0.01)
         for axes in grid[-1]:
             axes.set_xlabel("x (mm)")
     return figure
@@ -69,7 +73,8 @@ def face_maps(frame: pd.DataFrame, contacts: pd.DataFrame | None = None) -> Figu
     columns = min(len(runs), 2 if len(runs) <= 4 else 4)
     rows = -(-len(runs) // columns)
     frame = frame[frame["run"].isin(runs)]
-    limit = float(np.nanquantile(np.abs(frame["deviation_um"]), 0.995)) or 1.0
+    # The median over the faces, so that a groove in one of them does not set the scale of all.
+    limit = float(frame["deviation_um"].abs().groupby(frame["run"]).quantile(SHARE).median()) or 1.0
     shape = float(np.ptp(frame["y_mm"]) / (np.ptp(frame["x_mm"]) or 1.0))
     height = 0.45 + min(max(shape, 0.25), 1.2) * 4.8 / columns
     with style.style():
@@ -81,6 +86,7 @@ def face_maps(frame: pd.DataFrame, contacts: pd.DataFrame | None = None) -> Figu
                 x, y, z, cmap=style.DIVERGING, vmin=-limit, vmax=limit, shading="nearest", rasterized=True
             )
             _mark(axes, contacts, run)
+            _extremes(axes, frame[frame["run"] == run])
             axes.set_title(run, loc="left")
             axes.set(aspect="equal")
             axes.grid(visible=False)
@@ -91,8 +97,30 @@ def face_maps(frame: pd.DataFrame, contacts: pd.DataFrame | None = None) -> Figu
         for axes in flat[max(0, len(runs) - columns) : len(runs)]:
             axes.set_xlabel("x (mm)")
             axes.tick_params(labelbottom=True)
-        figure.colorbar(image, ax=flat[: len(runs)], label="deviation (µm)", fraction=0.03, pad=0.01)
+        figure.colorbar(
+            image, ax=flat[: len(runs)], label="deviation (µm)", extend="both", fraction=0.03, pad=0.01
+        )
     return figure
+
+
+def _extremes(axes: Axes, part: pd.DataFrame) -> None:
+    """Mark the highest and the lowest point of a face, with their deviations (µm)."""
+    known = part[part["deviation_um"].notna()]
+    middle = float(known["x_mm"].mean())
+    for end in (known.nlargest(1, "deviation_um"), known.nsmallest(1, "deviation_um")):
+        x, y, deviation = (float(end[name].iloc[0]) for name in ("x_mm", "y_mm", "deviation_um"))
+        axes.plot(x, y, "+", ms=6, mew=1.0, color=style.MEASURED, clip_on=False)
+        side = "right" if x > middle else "left"
+        axes.annotate(
+            f"{'+' if deviation > 0 else ''}{number(deviation, 2)}",
+            (x, y),
+            (-5 if side == "right" else 5, 0),
+            textcoords="offset points",
+            ha=side,
+            va="center",
+            fontsize=8,
+            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "alpha": 0.7, "linewidth": 0},
+        )
 
 
 def _mark(axes: Axes, contacts: pd.DataFrame | None, run: str) -> None:

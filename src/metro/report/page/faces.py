@@ -82,7 +82,7 @@ def point_maps(results: Results, budget: int) -> JSON | None:
             residual = measured - predicted
             layers += [
                 _layer(f"predicted: {kind.label}", predicted, predicted, half, middle),
-                _layer(f"left by: {kind.label}", residual, residual, half),
+                _layer(f"residual, {kind.label}", residual, residual, half),
             ]
         places = {"x": packed(part["x_mm"].to_numpy(float)), "y": packed(part["y_mm"].to_numpy(float))}
         faces.append({"key": [run], "said": run, "columns": 0, **places, "layers": layers})

@@ -30,7 +30,7 @@ def response_curves(results: Results, budget: int) -> JSON | None:
         at = kept([measured, modal], after)
         thinned |= len(at) < len(x)
         pair = f"{reference} → {response}"
-        left = f", the modes leave {percent(float(rows['error'].iloc[0]))}" if "error" in rows else ""
+        left = f", error of the modes {percent(float(rows['error'].iloc[0]))}" if "error" in rows else ""
         curves.append(
             {
                 "key": [str(position), pair],

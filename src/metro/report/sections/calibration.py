@@ -119,7 +119,8 @@ def _touching(block: JSON) -> str:
         return ""
     rms = quantity(touching["rms"])
     return (
-        f"The touched points leave {rms} (rms, {touching['dof']} degrees of freedom); errors from "
+        f"The residual of the touched points is {rms} (rms, {touching['dof']} degrees of freedom); errors "
+        "from "
         f"{touching['errors_from']}."
     )
 
@@ -160,7 +161,7 @@ def _torques(block: JSON) -> str:
     if not carried:
         return ""
     left = ", ".join("–" if value is None else number(value, 2) for value in carried["rms"])
-    inertia = "" if "inertia" in carried else " Torques at rest do not tell the moments of inertia."
+    inertia = "" if "inertia" in carried else " Torques at rest do not determine the moments of inertia."
     joints = carried["joints"]
     where = f"joints {joints[0]} to {joints[-1]}"
-    return f"Torques with and without the load leave {left} N m at {where} (rms).{inertia}"
+    return f"The residual of the torques with and without the load is {left} N m at {where} (rms).{inertia}"

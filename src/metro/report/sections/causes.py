@@ -13,11 +13,11 @@ from metro.report.results import Results, with_own
 from metro.units import JSON, printed
 
 STATUS = {
-    "together": "seen by several together",
+    "together": "significant only together",
     "contradiction": "contradiction",
     "confirmed": "confirmed",
-    "alone": "the others cannot tell",
-    "one_observable": "no other can show it",
+    "alone": "others not sensitive enough",
+    "one_observable": "no other could show it",
 }
 ALONE = ["pose"]  # what measured poses alone show has a section of its own
 SAID = ("together", "contradiction")  # statements that the verdicts of single observables do not contain
@@ -50,10 +50,8 @@ def _story(causes: list[JSON]) -> list[Item]:
         ]
         for cause in causes
     ]
-    header = ["cause", "seen in", "all together", "probability", "others"]
-    caption = (
-        "The causes in this batch over all observables; parameters that they share, with 95 % intervals."
-    )
+    header = ["cause", "seen in", "combined estimate", "probability", "other observables"]
+    caption = "Causes identified in this batch, with parameters from all observables and 95 % intervals."
     table = Table(header, rows, caption, [1.5, 1.9, 2.0, 0.9, 1.4], numeric=[3])
     notes = [str(cause["words"]) for cause in causes if cause["status"] in SAID]
     return [table, *(Paragraph(sentence(note), "warning") for note in notes)]
@@ -70,7 +68,7 @@ def cause_name(cause: JSON) -> str:
 
 def _values(cause: JSON) -> str:
     if cause["status"] == "contradiction":
-        return "not one value"
+        return "no common value"
     return ", ".join(parameter_words(cause)) or "–"
 
 
@@ -90,16 +88,16 @@ def upstream(results: Results) -> Section | None:
     if not rows:
         return None
     text = (
-        "In held-out runs with a dynamometer the force is both predicted and measured. The error of what "
-        "follows from the force is split: what the predicted force adds, and what is left with the measured "
-        "one. Where the verdict starts from the measured force, its error is the latter. A dynamometer that "
-        "is off moves as much from one part to the other as stands under known to."
+        "In held-out runs with a dynamometer the force is both predicted and measured. The table separates "
+        "the error from the predicted force and the error that remains with the measured force. Where the "
+        "verdict starts from the measured force, its error is the latter. A calibration error of the "
+        "dynamometer shifts error between the two by at most the value given under uncertainty."
     )
     header = ["observable", "loop", "with predicted force", "from the force", "with measured force"]
-    header += ["known to", "share"]
+    header += ["uncertainty", "share"]
     caption = (
-        "Rms error by where it comes from. Share: of the mean square error that goes when the measured force "
-        "is put in; below zero where the two errors make up for each other. Known to: one standard deviation."
+        "Rms error by origin. Share: part of the mean square error that vanishes when the measured force is "
+        "used; negative where the two errors compensate. Uncertainty: one standard deviation."
     )
     table = Table(header, rows, caption, [1.5, 0.7, 1.2, 1.1, 1.2, 0.9, 0.7], numeric=[2, 3, 4, 5, 6])
     return Section("From force to shape", [Paragraph(text), table])

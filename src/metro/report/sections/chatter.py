@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from metro.report.content import Bullets, Heading, Item, Picture, Table
+from metro.report.content import Bullets, Heading, Item, Picture, Table, gathered
 from metro.report.figures import chatter as figures
 from metro.report.numbers import listing, number, probability
 from metro.report.results import Results
@@ -30,9 +30,9 @@ def chatter_items(results: Results) -> list[Item]:
     items: list[Item] = [Heading("Chatter in the records")]
     boundary = results.tables.get("lobes_final")
     if boundary is None and (tests["unstable"] == 0).all() and not tests["wrong_label"].any():
-        return [*items, Bullets([f"None of {len(tests)} records that could be judged holds chatter."])]
+        return [*items, Bullets([f"None of the {len(tests)} records that could be judged shows chatter."])]
     if boundary is not None and tests["position"].notna().any():
-        caption = "Test cuts on the stability boundary, by what their own records say"
+        caption = "Test cuts on the stability boundary, classified by their own records"
         caption += ", with the probability of chatter." if len(tests) <= figures.NUMBERED else "."
         items.append(Picture(figures.tests_chart(boundary, tests), caption, caption))
     items += [_table(tests, results.batch.manifest), *_confusion(tests), Bullets(_words(tests))]
@@ -86,11 +86,12 @@ def _table(tests: pd.DataFrame, manifest: JSON) -> Table:
     ]
     more = f" The first {LONGEST} of {len(tests)}." if len(tests) > LONGEST else ""
     caption = (
-        "Chatter by the records: probability, kind, frequency with its standard deviation; phase of the "
-        f"vibration from tooth to tooth (cycles), and as predicted at the boundary.{more}"
+        "Chatter identified from the records: probability, kind, frequency with its standard deviation; "
+        "phase of the "
+        f"vibration from tooth to tooth (cycles), and the phase predicted at the boundary.{more}"
     )
-    widths = [1, 1, 1, 1, 1.5, 1.4, 0.8, 0.8]
-    return Table(header, rows, caption, widths, numeric=[1, 2, 3, 5, 6, 7])
+    widths = [1.4, 1, 1, 1, 1.5, 1.4, 0.8, 0.8]
+    return Table(header, gathered(rows), caption, widths, numeric=[1, 2, 3, 5, 6, 7])
 
 
 def _row(row: pd.Series, teeth: int) -> list[str]:
@@ -142,12 +143,14 @@ def _words(tests: pd.DataFrame) -> list[str]:
     hidden = [str(run) for run in tests["run"][~tests["separable"].astype(bool)]]
     if hidden:
         words.append(
-            f"Not separable at this speed: {listing(hidden)}. Something stands on an order of the spindle, "
-            "where chatter and runout share their lines; another speed tells."
+            f"Not separable at this speed: {listing(hidden)}. A line lies on an order of the spindle, where "
+            "chatter and runout coincide. Repeat the test at another speed."
         )
     late = [str(run) for run in tests["run"][(tests["unstable"] < 0) & tests["separable"].astype(bool)]]
     if late:
-        words.append(f"Chatter may begin at the end of the record of {listing(late)}; a longer cut tells.")
+        words.append(
+            f"Chatter may begin at the end of the record of {listing(late)}. Repeat with a longer cut."
+        )
     return words
 
 
@@ -162,8 +165,8 @@ def _records(results: Results, tests: pd.DataFrame) -> list[Item]:
     }
     cuts = " and in ".join(kind for kind, there in kinds.items() if there)
     caption = (
-        f"Force in {cuts}: spectrum of the whole steady cut, and its last turns. What chatters stands "
-        "between the orders of the spindle."
+        f"Force in {cuts}: spectrum of the whole steady cut, and the record of its last turns. Chatter "
+        "appears between the orders of the spindle."
     )
     chart = figures.records_chart(records, tests, int(results.batch.manifest["tool"]["teeth"]))
     return [Picture(chart, caption, caption)]

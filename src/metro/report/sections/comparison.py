@@ -19,6 +19,7 @@ from metro.report.sections.lobes import cut_items
 from metro.units import printed
 
 LONGEST, SHORT = 30, 6
+WHAT_IS_DRAWN = "Measured {} and predictions, held-out runs."
 ABREAST = 2  # runs in one figure, so that figures break over pages
 FEWEST = 3  # values of a run along an axis that make a curve
 
@@ -58,7 +59,7 @@ def _values(frame: pd.DataFrame, name: str, merit: list[Item], *, alone: bool) -
 
     def parity() -> Picture:
         by_axis = ", axis by axis," if len(figures.axes_of(frame)) > 1 else ","
-        about = f"Parity on held-out runs{by_axis} and distribution of the residual beside the noise."
+        about = f"Parity on held-out runs{by_axis} and distribution of the residual and of the noise."
         return Picture(
             figures.parity(frame, name),
             f"{whole}. {findings.scatter(frame)} {about}",
@@ -92,11 +93,14 @@ def _curves(frame: pd.DataFrame, name: str, words: str, *, alone: bool) -> list[
     items: list[Item] = []
     for i in range(0, len(shown), abreast):
         runs_here = shown[i : i + abreast]
-        about = f"{findings.left(frame)} Measured {name} and predictions, held-out runs.{part}{repeats}"
+        about = f"{findings.left(frame)} {WHAT_IS_DRAWN.format(name)}{part}{repeats}"
         items.append(
             Picture(
                 figures.overlay(frame[frame["run"].isin(runs_here)], name, alone=alone),
-                f"The same of {listing(runs_here)}." if i else about,
+                f"{findings.left(frame[frame['run'].isin(runs_here)])} {WHAT_IS_DRAWN.format(name)} Runs "
+                f"{listing(runs_here)}."
+                if i
+                else about,
                 f"Measured and predicted {name} for {listing(runs_here)}; {words}.",
             )
         )
@@ -104,8 +108,9 @@ def _curves(frame: pd.DataFrame, name: str, words: str, *, alone: bool) -> list[
         items.append(
             Picture(
                 surface.face_points(frame),
-                f"{findings.left(frame)} Deviation at path points of the first held-out runs, and what each "
-                "prediction leaves.",
+                f"{findings.left(frame)} Deviation at path points of the first held-out runs, and the "
+                "residual of each "
+                "prediction.",
                 f"Maps of measured deviation and of both residuals; {words}.",
             )
         )

@@ -15,6 +15,7 @@ from metro.units import JSON, Array, printed
 MODELS = {"before": "the base model", "after": "the effects found"}
 NORMAL = 1.96
 _SHARE = 0.95
+_OF_BASE_MODEL = "The error of the base model is "
 
 
 def changed(rows: Sequence[Change]) -> str:
@@ -24,27 +25,26 @@ def changed(rows: Sequence[Change]) -> str:
     if len(rows) == 1:
         (row,) = rows
         if not fell:
-            return f"Held-out error: {_percent(row.after)} of the signal, nothing was added."
+            return f"The held-out error is {_percent(row.after)} of the signal; no effect was added."
         return f"The held-out error falls from {_percent(row.before)} to {_percent(row.after)} of the signal."
-    least = f"the largest that is left is {_percent(largest.after)} of the signal, {largest.label}."
+    least = f"the largest remaining error is {_percent(largest.after)} of the signal, {largest.label}."
     if not fell:
-        return f"No held-out error fell, as nothing was added; {least}"
+        return f"No effect was added; {least}"
     return f"Held-out errors fall in {len(fell)} of {len(rows)} cases; {least}"
 
 
 def left(frame: pd.DataFrame) -> str:
     """Say the residual of the predictions and the signal, rms over the values of a comparison table."""
-    signal = f"of {_with_unit(_rms(frame['measured']), frame)} measured"
+    signal = f"for a measured signal of {_with_unit(_rms(frame['measured']), frame)} rms"
     before, *after = (_with_unit(_rms(_residual(frame, k.column)), frame) for k in predictions(frame))
-    if not after:
-        return f"The base model leaves {before} rms {signal}."
-    return f"The base model leaves {before} rms {signal}, with the effects found {after[0]}."
+    with_effects = f" and {after[0]} with the effects found" if after else ""
+    return f"{_OF_BASE_MODEL}{before} rms{with_effects}, {signal}."
 
 
 def missed(frame: pd.DataFrame, run: str) -> str:
     """Say the residual of the run for which the base model has the largest error."""
-    said = left(frame[frame["run"] == run]).removeprefix("The base model leaves ")
-    return f"Of the held-out runs the base model misses {run} most: it leaves {said}"
+    said = left(frame[frame["run"] == run]).removeprefix(_OF_BASE_MODEL)
+    return f"Held-out run {run} has the largest error of the base model: {said}"
 
 
 def scatter(frame: pd.DataFrame) -> str:
@@ -57,8 +57,8 @@ def scatter(frame: pd.DataFrame) -> str:
         ]
     )
     noise = NORMAL * _rms(frame["sigma"]) if frame["sigma"].notna().all() else 0.0
-    beside = f"; noise alone puts them within {_with_unit(noise, frame)}" if noise else ""
-    return f"{percent(_SHARE)} of the values are within {limits}{beside}."
+    beside = f"; with noise alone they would lie within {_with_unit(noise, frame)}" if noise else ""
+    return f"{percent(_SHARE)} of the values lie within {limits}{beside}."
 
 
 def offsets(frame: pd.DataFrame) -> str:
@@ -74,15 +74,15 @@ def offsets(frame: pd.DataFrame) -> str:
         ]
         name = "base model" if kind.column == "before" else "with the effects found"
         averages.append(f"{name} {', '.join(sizes)}{_unit(frame)}")
-    return f"Measured less predicted, on the average: {'; '.join(averages)}."
+    return f"Mean of measured minus predicted: {'; '.join(averages)}."
 
 
 def peak_order(orders: pd.DataFrame) -> str:
     """Say at which order of the spindle, and along which axis, the residual is largest."""
     row = orders.iloc[int(orders["after"].argmax())]
     return (
-        f"Most is left at order {row['order']:g} along {row['axis']}: {number(row['after'])} N "
-        f"of {number(row['measured'])} N measured there."
+        f"The largest residual is at order {row['order']:g} along {row['axis']}: {number(row['after'])} N, "
+        f"for {number(row['measured'])} N measured there."
     )
 
 
@@ -95,21 +95,21 @@ def tooth_peaks(peaks: pd.DataFrame) -> str:
         if size.notna().any():
             worst = part.iloc[int(np.nanargmax(size))]
             share = f"{number(size.median(), 2)} % in the median, {number(size.max(), 2)} % at worst"
-            said.append(f"with {name} by {share} ({worst['run']}, {worst['axis']})")
-    unlike = len(said) > 1 and said[0].partition(" by ")[2] != said[1].partition(" by ")[2]
-    return f"The peaks of single teeth are missed {listing(said if unlike else said[:1])}." if said else ""
+            said.append(f"with {name} {share} ({worst['run']}, {worst['axis']})")
+    unlike = len(said) > 1 and said[0].partition(MODELS["before"])[2] != said[1].partition(MODELS["after"])[2]
+    return f"The error of the tooth peaks is {listing(said if unlike else said[:1])}." if said else ""
 
 
 def above_floor(blocks: Sequence[JSON], floor: float | None, shown: str | None) -> str:
     """Say how many runs have a residual above the noise floor, and which has the largest."""
     residuals = {str(b["run"]): float(b.get("rms_after") or b["rms_before"]) for b in blocks}
     worst = max(residuals, key=lambda run: residuals[run])
-    most = f"{worst} leaves most, {number(residuals[worst])} {printed(shown)}".rstrip()
+    most = f"{worst} has the largest residual, {number(residuals[worst])} {printed(shown)}".rstrip()
     if floor is None:
         return f"Run {most}."
     above = sum(residual > floor for residual in residuals.values())
     some = (
-        f"{above or 'None'} of {len(residuals)} runs {'lie' if above > 1 else 'lies'} above the noise floor"
+        f"{above or 'None'} of {len(residuals)} runs {'exceed' if above > 1 else 'exceeds'} the noise floor"
     )
     return f"{some}; {most}."
 

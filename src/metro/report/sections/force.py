@@ -41,15 +41,15 @@ def force_items(results: Results) -> list[Item]:
         metrics_table(metrics),
         Picture(
             figures.spectrum(orders, teeth),
-            f"{findings.peak_order(orders)} Order spectrum, measured and what the predictions leave, rms "
-            f"over the held-out runs. Ticks stand at the tooth passing, every {teeth} orders.",
+            f"{findings.peak_order(orders)} Order spectra of the measured force and of the residuals, rms "
+            f"over the held-out runs. The ticks mark the tooth passing, every {teeth} orders.",
             _spectrum_words(orders),
         ),
         Picture(
             figures.tooth_peaks(peaks),
             f"{findings.tooth_peaks(peaks)} Largest magnitude within each pitch, the {teeth} teeth of a run "
             "in the order of passing; whiskers: 95 % interval of predicted less measured.".lstrip(),
-            f"Bars of the measured peak of each of {teeth} teeth, and the predicted ones beside them.",
+            f"Measured and predicted peaks of each of {teeth} teeth.",
         ),
     ]
 

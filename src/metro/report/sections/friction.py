@@ -24,8 +24,8 @@ def friction(results: Results) -> list[Item]:
         return []
     rows = [_row(r) for _, r in table.iterrows()]
     caption = (
-        "Friction of the joints, from all idle runs together, with 95 % intervals; the weight of the links "
-        "is fitted along. At top speed: the viscous part there. Rest: rms of what is left of the torque "
+        "Friction of the joints from all idle runs together, with 95 % intervals; the weight of the links "
+        "is fitted with it. At top speed: the viscous part there. Residual: rms of the remaining torque "
         "while the joint moves."
     )
     items: list[Item] = [

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import pandas as pd
 
 from metro.observables.catalogue import title
-from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table, abreast
+from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table, abreast, gathered
 from metro.report.numbers import listing, number, quantity, words
 from metro.report.results import Results
 from metro.report.sections.force import mean_items
@@ -181,13 +180,12 @@ def _yielding(table: pd.DataFrame | None, denied: str) -> list[Item]:
     items: list[Item] = [Heading("Deflection feedback")]
     items += [Paragraph(f"{denied[0].upper()}{denied[1:]}.", "warning")] if denied else []
     if "difference_n" in table:
-        rows = [
-            [", ".join(runs), *cells]
-            for cells, runs in _alike(
-                (str(row["run"]), [*(number(row[f"plane_{entry}_n_um"]) for entry in PLANE), *_feedback(row)])
+        rows = gathered(
+            [
+                [str(row["run"]), *(number(row[f"plane_{entry}_n_um"]) for entry in PLANE), *_feedback(row)]
                 for _, row in table[table["refused"] == ""].iterrows()
-            )
-        ]
+            ]
+        )
         head = ["runs", "k_xx (N/µm)", "k_xy", "k_yx", "k_yy"]
         head += ["iterations", "plain scheme", "entry (N)", "last (N)"]
         caption = (
@@ -199,14 +197,6 @@ def _yielding(table: pd.DataFrame | None, denied: str) -> list[Item]:
     refused = table[table["refused"] != ""].groupby("refused")["run"].agg(", ".join)
     items += [Bullets([f"{runs}: {reason}." for reason, runs in refused.items()])] if len(refused) else []
     return items
-
-
-def _alike(rows: Iterable[tuple[str, list[str]]]) -> list[tuple[list[str], list[str]]]:
-    """Return the cells that rows share, with the names of those rows, in the order of the first."""
-    shared: dict[tuple[str, ...], list[str]] = {}
-    for name, cells in rows:
-        shared.setdefault(tuple(cells), []).append(name)
-    return [(list(cells), names) for cells, names in shared.items()]
 
 
 def _feedback(row: pd.Series) -> list[str]:

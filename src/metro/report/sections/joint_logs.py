@@ -68,7 +68,7 @@ def _motion(table: pd.DataFrame) -> Table:
     if followed:
         flange = table.groupby("run")["flange_um"].first().dropna()
         off = listing([f"{number(value, 2)} µm in run {run}" for run, value in flange.items()])
-        caption += f" The flange is off its commanded place by {off} (rms)." if len(flange) else ""
+        caption += f" The flange deviates from its commanded position by {off} (rms)." if len(flange) else ""
     else:
         caption += " The logs hold no set-points: how well the arm follows cannot be said."
     widths = [1.2, 0.6, 0.8, 0.8, 1, 1.2, *([1.1] if followed else []), *([1.1, 0.9, 1] if tested else [])]

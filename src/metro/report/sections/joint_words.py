@@ -67,7 +67,10 @@ def joint_next(results: Results) -> Iterator[str]:
     if not block or table is None:
         return
     if table["remark"].str.contains("arm.dh").any():
-        yield "the joints: the arm's geometry (arm.dh or arm.urdf in cell.yaml), to tell friction from weight"
+        yield (
+            "the joints: the arm's geometry (arm.dh or arm.urdf in cell.yaml), to separate friction and "
+            "weight"
+        )
     elif "condition" not in table:
         yield "the joints: a longer log in which every joint turns both ways at several speeds"
     elif (table["unit"] == "A").any():

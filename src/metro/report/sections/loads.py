@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-from metro.report.content import Facts, Heading, Item, Table
+from metro.report.content import Heading, Item, Table
 from metro.report.numbers import number, with_interval
 from metro.report.results import Results
 from metro.report.sections.stiffness import LONGEST, more
@@ -33,18 +31,6 @@ def load_points(results: Results) -> list[Item]:
         Heading("Stiffness by load tests"),
         Table(header, rows, ABOUT + more(len(points)), [1.4, 0.6, 0.8, 1.4, 1.4, 1.4, 0.9], small=True),
     ]
-
-
-def first_loaded(results: Results) -> list[Item]:
-    """Give the softest of the directions that were loaded, of all points."""
-    points = _points(results)
-    known = [(row, axis) for row in points for axis in "xyz" if math.isfinite(row[f"k{axis}_n_um"])]
-    if not known:
-        return []
-    row, axis = min(known, key=lambda one: float(one[0][f"k{one[1]}_n_um"]))
-    tests = sum(int(each["tests"]) for each in points)
-    about = f"{_name(row)}, of {tests} load tests at {len(points)} point{'' if len(points) == 1 else 's'}"
-    return [Facts([(f"least stiffness at rest, along {axis}", f"{_stiffness(row, axis)} N/µm", about)])]
 
 
 def _points(results: Results) -> list[JSON]:

@@ -211,8 +211,8 @@ def tested_boundary(results: Results, frame: pd.DataFrame) -> list[Picture]:
         return []
     right = {k: int(((frame[k] > 0.5) == (frame["measured"] > 0.5)).sum()) for k in ("before", "after")}
     caption = (
-        f"Stability boundary and held-out test cuts. On the right side of it: {right['before']} of "
-        f"{len(frame)} with the base model, {right['after']} with the effects found."
+        f"Stability boundary and held-out test cuts. The predicted side is right for {right['before']} of "
+        f"{len(frame)} cuts with the base model and for {right['after']} with the effects found."
     )
     chart = figures.lobes_chart(boundary, placed(results, frame), results.tables.get("lobe_islands"))
     return [Picture(chart, caption, caption)]

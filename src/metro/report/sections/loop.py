@@ -27,16 +27,16 @@ def loop(results: Results) -> Section:
         items += _observable(observable, entry, record, left_words(results, observable))
         pictures += [*_runs(name, record, entry.get("unit")), *_signature(name, record)]
     if not items:
-        nothing = "There was no residual to trace: no held-out run has both a measurement and a prediction."
+        nothing = "No residual was traced, because no held-out run has both a measurement and a prediction."
         return Section("The closed loop", [Paragraph(nothing)])
-    drawn = [Heading("What is left, run by run and by pattern"), *abreast(pictures)] if pictures else []
+    drawn = [Heading("Residuals by run and by pattern"), *abreast(pictures)] if pictures else []
     return Section("The closed loop", [*items, *drawn])
 
 
 def _observable(observable: str, entry: JSON, record: JSON, left: str) -> list[Item]:
     shown = entry.get("unit") or record.get("unit")
     noise = record.get("noise") or {}
-    story = str(record.get("words") or "").partition(" What is left: ")[0]
+    story = str(record.get("words") or "")
     items: list[Item] = [Paragraph(story or verdict_words(observable, entry, left))]
     if noise:
         items.append(Paragraph(_noise_words(noise, shown)))
@@ -50,7 +50,10 @@ def _observable(observable: str, entry: JSON, record: JSON, left: str) -> list[I
 
 
 def _runs(name: str, record: JSON, shown: str | None) -> list[Picture]:
-    blocks = [b for b in record.get("blocks") or [] if b.get("rms_before") is not None]
+    drawn = ("identify", "validate")  # load tests are evidence too, but no runs
+    blocks = [
+        b for b in record.get("blocks") or [] if b.get("role") in drawn and b.get("rms_before") is not None
+    ]
     if not blocks:
         return []
     alt = f"rms residual of {len(blocks)} runs before and after, in the order of cutting."
@@ -66,10 +69,10 @@ def _signature(name: str, record: JSON) -> list[Picture]:
         return []
     full = [f"{e.get('axis') or ''} {e['label']}".strip() for e in entries if e.get("significant")]
     significant_places = (
-        f"{len(full)} of {len(entries)} places stand" if full else f"None of {len(entries)} places stands"
+        f"{len(full)} of {len(entries)} parts exceed" if full else f"None of {len(entries)} parts exceeds"
     )
     bars = " (full bars)" if full else ""
-    caption = f"{name}: what is left, by pattern and axis. {significant_places} out of the noise{bars}."
+    caption = f"{name}: residual by pattern and axis. {significant_places} the noise{bars}."
     alt = "Significant: " + (", ".join(full[:6]) if full else "nothing") + "."
     return [Picture(figures.signature(entries), caption, alt)]
 
@@ -118,8 +121,8 @@ def _candidates(candidates: list[JSON], shown: str | None) -> list[Item]:
     strong = [i for i, c in enumerate(candidates[:LONGEST]) if c.get("verdict") == "added"]
     header = ["effect tried", *(name for name, _ in columns), "outcome"]
     caption = (
-        "Every candidate, fitted with the base model. Gain: log-likelihood on conditions left out; "
-        "size: share of the signal."
+        "Effects that were tried, each fitted together with the base model. Gain: log-likelihood on left-out "
+        "conditions; size: share of the signal."
     )
     numeric = list(range(1, len(columns) + 1))
     widths = [1.6, *([0.8] * len(columns)), 3.6]
@@ -147,7 +150,7 @@ def _path(path: list[JSON], entry: JSON, shown: str | None) -> list[Item]:
         for step in path
     ]
     header = ["model", *(name for _, name in known), "of the signal"]
-    caption = f"How the model grew. Final held-out error {error_text(entry.get('after'), shown)}."
+    caption = f"Error after each added effect. Final held-out error: {error_text(entry.get('after'), shown)}."
     numeric = list(range(1, len(header)))
     return [Table(header, rows, caption, [2.4, *([1.4] * len(known)), 1], numeric=numeric)]
 
@@ -161,13 +164,13 @@ def _residual_items(entry: JSON, record: JSON, left: str) -> list[Item]:
         items.append(Paragraph(str(unexplained["ceiling"]["words"])))
     groups = [" and ".join(words(str(n)) for n in group) for group in entry.get("indistinguishable") or []]
     if groups:
-        items.append(Paragraph("Cannot be told apart with these data: " + "; ".join(groups) + "."))
+        items.append(Paragraph("These runs do not distinguish: " + "; ".join(groups) + "."))
     hidden: dict[str, list[str]] = {}
     for one in record.get("cannot_be_seen") or []:
         hidden.setdefault(str(one.get("why") or ""), []).append(words(str(one["effect"])))
     if hidden:
         alike = [plain(f"{listing(names)}: {why}".rstrip(": ")) for why, names in hidden.items()]
-        items += [Paragraph("Cannot be seen in this batch:"), Bullets(alike)]
+        items += [Paragraph("These effects cannot be detected in this batch:"), Bullets(alike)]
     if next_run := next_words(entry):
-        items.append(Paragraph(f"Measure next: {next_run}."))
+        items.append(Paragraph(f"What to do next: {next_run}."))
     return items

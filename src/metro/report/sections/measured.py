@@ -94,5 +94,4 @@ def _run_words(runs: pd.DataFrame) -> str:
             f"{made} {'was' if one else 'were'} made; no record of {'it' if one else 'them'} is in the batch."
             f"{logs}"
         )
-    kept = f"{made}, {recorded} recorded, {held} of them held out"
-    return f"{kept}: no model saw those before it was judged.{logs}"
+    return f"{made}, {recorded} of them recorded and {held} held out from all fits.{logs}"

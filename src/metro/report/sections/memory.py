@@ -75,7 +75,7 @@ def _order(series: Sequence[JSON]) -> str:
     timed = [row["clock"] != "batches" for row in series]
     if all(timed):
         return "The batches are in the order in which their first runs started."
-    names = "in the order of their names: not all of them tell by started_at when they began"
+    names = "in the order of their names, because started_at is not given for all of them"
     if not any(timed):
         return f"The batches are {names}."
     return (
@@ -148,8 +148,8 @@ def _pooled(pooled: Sequence[JSON]) -> list[Item]:
     if below:
         named = listing(sorted({f"{_name(row)} ({row['owner']})" for row in below}))
         sentences.append(
-            "Consistent over the batches, but smaller than what a model may get wrong by itself, and so "
-            f"nobody's: {named}."
+            "Consistent over the batches, but within the stated model accuracy and therefore not "
+            f"attributed: {named}."
         )
     if not sentences:
         sentences = ["All batches together show no effect that none shows alone."]
@@ -213,7 +213,7 @@ def _undecided(undecided: Sequence[JSON]) -> list[Item]:
     for row in undecided:
         known = [f"{words(name)} in {k} of {n}" for name, (k, n) in row["elsewhere"].items()]
         sentences.append(
-            f"{row['batch']}, {title(row['observable'])}: what it cannot tell apart was claimed elsewhere in "
-            f"the cell, {listing(known)} batches. Its own verdict stays."
+            f"{row['batch']}, {title(row['observable'])}: of the causes that it cannot distinguish, other "
+            f"batches of the cell identified {listing(known)} batches. Its own verdict is unchanged."
         )
     return [Bullets(sentences)] if sentences else []

@@ -85,15 +85,15 @@ def reconstruction(tables: Mapping[str, pd.DataFrame]) -> list[Item]:
             errors = [_between(part[name]) for name in ("error", "noise")]
             rows.append([number(float(str(distance))), str(len(part)), level, *errors])
         caption = (
-            "What the modes leave of the responses, rms over rms, by distance from the blow: least, median "
-            "and greatest; beside it the scatter of the repeated hits, and the level: the response "
-            "beside that of the driving point."
+            "Error of the modal model, rms over rms of the response, by distance from the hit: least, median "
+            "and greatest, with the scatter of repeated hits. Level: the response relative to that of the "
+            "driving point."
         )
         header = [
             "distance (mm)",
             "responses",
             "level (%)",
-            "left by the modes (%)",
+            "error of the modes (%)",
             "scatter of the hits (%)",
         ]
         about = f"{_by_distance(known)} Error of reconstruction of every response over its distance."
@@ -121,6 +121,6 @@ def _by_distance(known: pd.DataFrame) -> str:
     least, most = (f"{number(float(part['distance_mm'].iloc[0]))} mm" for part in (near, far))
     low, high = (percent(float(x)) for x in (near["error"].min(), near["error"].max()))
     return (
-        f"At {least} from the blow the modes leave {low} to {high} of a response, at {most} "
+        f"At {least} from the hit the error of the modes is {low} to {high} of a response, at {most} "
         f"{percent(float(far['error'].median()))} in the median."
     )

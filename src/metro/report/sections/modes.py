@@ -34,7 +34,7 @@ def modes(identified: list[JSON], tables: Mapping[str, pd.DataFrame]) -> list[It
     header = ["position", "direction", *(name for _, name in KEYS)]
     caption = "Modes with 95 % intervals; the frequency is the undamped one."
     if any(not mode.get("resolved", True) for mode in shown):
-        caption += " * not resolved: the data tell damping or stiffness no better than to a third."
+        caption += " * not resolved: damping or stiffness is known no better than to a third."
     rows = [_row(mode) for mode in shown[:LONGEST]]
     if len(rows) < len(identified):
         caption += f" The first {len(rows)} of {len(identified)} are shown; identified.json has all."
@@ -59,10 +59,12 @@ def _of(table: pd.DataFrame, positions: list[str]) -> pd.DataFrame:
 
 def _responses(drawn: pd.DataFrame) -> Picture:
     alt = f"Measured frequency responses ({len(drawn)} lines) with the modal model over them."
-    caption = "Measured frequency responses and what the modes reconstruct"
+    caption = "Measured frequency responses and the modal model"
     if "error" in drawn:
         most = percent(float(drawn["error"].max()))
-        caption = f"The modes leave at most {most} of a response. {caption} (in brackets: what they leave)"
+        caption = (
+            f"The error of the modal model is at most {most} of a response. {caption} (error in brackets)"
+        )
     return Picture(figures.responses(drawn), f"{caption}.", alt)
 
 
@@ -90,7 +92,7 @@ def largest_response(tables: Mapping[str, pd.DataFrame]) -> list[Item]:
     what = "response of a driving point" if driving.any() else "response"
     about = (
         f"The highest {what}, {number(highest['measured_m_n'])} m/N at "
-        f"{number(highest['frequency_hz'], 4)} Hz. Measured, and what the modes reconstruct."
+        f"{number(highest['frequency_hz'], 4)} Hz. Measured response and modal model."
     )
     return [Picture(figures.responses(part), about, about)]
 

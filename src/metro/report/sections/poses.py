@@ -24,7 +24,7 @@ ABOUT_ERRORS = (
 )
 ABOUT_CORRECTIONS = (
     "Corrections of the Denavit-Hartenberg rows with 95 % intervals, by the scatter between poses and "
-    "between regions. Those that these poses cannot tell from others are left at 0: {redundant}. Condition "
+    "between regions. Those that these poses cannot separate are left at 0: {redundant}. Condition "
     "number {condition}, observability index O1 {o1} mm per correction of 5 mm or 5 mrad."
 )
 MOST_REPEATED, MOST_NEXT = 12, 8

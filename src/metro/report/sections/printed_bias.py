@@ -17,9 +17,9 @@ LEAST = 3  # pairs of one quantity and axis, all of one sign
 LEAST_LINE = 10  # pairs of either sign
 SURE = 0.05  # over all quantities of a table (Holm)
 CANNOT = (
-    "A printed value has no error of its own: the rows are taken as repeats, and their scatter is all that "
-    "an interval can be made of. Whether a gain is the model's (stiffness, coefficients, the frame that "
-    "forces are turned into) or the instrument's, the pairs cannot tell."
+    "The printed values have no stated uncertainty. The rows are taken as repeats, and the intervals follow "
+    "from their scatter. A scale error may come from the model (stiffness, coefficients, orientation of the "
+    "force) or from the instrument; these values do not distinguish the two."
 )
 Estimate = tuple[float, float, float, float]  # value, low and high end of 95 %, p-value
 

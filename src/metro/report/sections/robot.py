@@ -132,7 +132,7 @@ def _waves(blocks: JSON) -> Table:
         text = quantity(alike, with_unit=False) if isinstance(alike, dict) else number(alike, 2)
         rows.append([str(run), *cells, text])
     names = [f"{wave.capitalize()} {kind}" for wave in shown for kind in ("wall", "told")]
-    caption = "Waviness (µm) of the wall and as told by the model, with 95 % intervals where known."
+    caption = "Measured waviness of the wall (µm) and the prediction, with 95 % intervals where known."
     header = ["run", *names, "correlation"]
     return Table(header, rows, caption + more(len(blocks)), [0] * len(header), small=True)
 

@@ -55,9 +55,9 @@ def largest_residuals(entries: Iterable[tuple[str, str, JSON]]) -> list[Section]
     if not ranked:
         return []
     above = sum(ratio > 1 for ratio, *_ in ranked)
-    said = f"Larger than the noise floor: {above} of {len(ranked)}. What that means, the verdict says."
-    header = ["batch", "observable", "rest", "of the signal", "times the noise"]
-    caption = "What is left on held-out runs after the loop, the largest in units of the noise floor first."
+    said = f"{above} of {len(ranked)} residuals exceed the noise floor; see their verdicts."
+    header = ["batch", "observable", "residual", "of the signal", "times the noise"]
+    caption = "Residuals on held-out runs after the loop, the largest in units of the noise floor first."
     if len(ranked) > WORST:
         caption += f" The first {WORST}."
     table = Table(header, _rows(ranked[:WORST]), caption, [1.6, 1.8, 1.2, 1, 1], numeric=[2, 3, 4])

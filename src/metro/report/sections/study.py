@@ -53,7 +53,7 @@ def _strongest(entry: JSON) -> str:
         for level in term.get("levels") or []
     ]
     if not levels:
-        return "No factor stands out of the scatter. "
+        return "No factor exceeds the scatter. "
     term, level = max(levels, key=lambda item: abs(math.log(item[1]["factor"]["value"])))
     return (
         f"The largest influence has {term}: {listing(level['level'])} over {level['over']} multiplies X_m by "
@@ -117,12 +117,12 @@ def _difference(level: JSON) -> str:
 
 def _aliases(entry: JSON) -> list[str]:
     same = [
-        f"{listing([factor['name'], *factor['same_as']])} vary together: their effects cannot be told apart."
+        f"{listing([factor['name'], *factor['same_as']])} vary together: their effects cannot be separated."
         for factor in entry.get("factors") or []
         if factor.get("same_as")
     ]
     mixed = [
-        f"{alias['term']} cannot be told from {listing(list(alias['from'])) or 'the mean'}"
+        f"{alias['term']} cannot be separated from {listing(list(alias['from'])) or 'the mean'}"
         f"{' in part' if alias.get('in_part') else ''}: these runs lack the combinations that would."
         for alias in entry.get("not_separable") or []
     ]
@@ -219,7 +219,7 @@ def _bias(entry: JSON) -> list[Item]:
     carries = (
         f"It depends on {listing(moving)}."
         if moving
-        else "No factor moves it significantly: these cases do not tell which one carries the bias."
+        else "No factor moves it significantly: these cases do not determine which one carries the bias."
     )
     text = (
         f"Measured X_m is {with_interval(mean['value'], mean['ci95'])} times the simulated one over all "

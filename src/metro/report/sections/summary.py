@@ -1,4 +1,4 @@
-"""The first page: measurements, verdicts, what to trust, what to measure next, key numbers."""
+"""The first page: main results, verdicts, what to trust, what to do next, and a figure."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from metro.report.results import Results, heading
 from metro.report.sections import findings
 from metro.report.sections.areal import first_areal
 from metro.report.sections.joint_words import joint_facts, joint_next, joint_words
+from metro.report.sections.key_results import key_results
 from metro.report.sections.levelling import first_levelled
-from metro.report.sections.loads import first_loaded
 from metro.report.sections.lobes import boundary_items, tested_boundary
 from metro.report.sections.measured import count_of, measured_words
 from metro.report.sections.modes import largest_response
 from metro.report.sections.poses import first_poses
-from metro.report.sections.surface import first_faces
+from metro.report.sections.surface import noise_of_faces
 from metro.report.sections.texture import first_traces
 from metro.report.sections.trust import static_deflection, trust
 from metro.report.sections.verdict import (
@@ -42,29 +42,26 @@ MOST_MODES = 12  # printed frequencies that are listed on the first page
 
 
 def summary(results: Results) -> Section:
-    """Write the first page: text, key numbers, errors before and after, the run with the largest error."""
+    """Write the first page: results, verdicts with their errors, what to trust, what to do, one figure."""
     verdicts = results.verdicts()
-    items = [*first_words(results), *_key_numbers(verdicts)]
-    drawn_changes = [
-        c for c in (change(title(name), entry) for name, entry in verdicts.items()) if c is not None
-    ]
-    if drawn_changes:
-        items.append(
-            Picture(
-                figures.changes(drawn_changes, "error on held-out runs (% of the signal)"),
-                f"{findings.changed(drawn_changes)} Errors with 95 % intervals, and the noise floor.",
-                "; ".join(
-                    f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in drawn_changes
-                ),
-            )
-        )
+    items = first_words(results)
     drawn = _one_run(results) if len(verdicts) <= MOST_DRAWN else []
     arm = first_poses(results) if set(verdicts) == {"pose"} else []
-    return Section("Summary", [*items, *drawn, *arm, *([] if verdicts else _identified(results))])
+    return Section("Results", [*items, *(arm or drawn or _changes(verdicts))])
+
+
+def _changes(verdicts: Mapping[str, JSON]) -> list[Item]:
+    """Draw the errors before and after of all observables."""
+    rows = [c for c in (change(title(name), entry) for name, entry in verdicts.items()) if c is not None]
+    if not rows:
+        return []
+    caption = f"{findings.changed(rows)} Errors with 95 % intervals, and the noise floor."
+    alt = "; ".join(f"{c.label}: {c.before:.2g} % before, {c.after:.2g} % after" for c in rows)
+    return [Picture(figures.changes(rows, "error on held-out runs (% of the signal)"), caption, alt)]
 
 
 def first_words(results: Results) -> list[Item]:
-    """Say what was measured, the verdicts, what to trust and what to measure next."""
+    """Give the results, then the verdicts, what to trust and what to do next."""
     verdicts = results.verdicts()
     texts = [verdict_words(name, entry, left_words(results, name)) for name, entry in verdicts.items()]
     nexts = [f"{title(n)}: {words_next}" for n, e in verdicts.items() if (words_next := next_words(e))]
@@ -72,9 +69,12 @@ def first_words(results: Results) -> list[Item]:
     if not verdicts and lacking and results.identified.get("modes"):
         nexts = [f"For a verdict on {title('lobes')}: {lacking}"]
     nexts += list(joint_next(results))
-    measure: list[Item] = [Heading("What to measure next"), Bullets([sentence(text) for text in nexts])]
+    measure: list[Item] = [Heading("What to do next"), Bullets([sentence(text) for text in nexts])]
     return [
         Paragraph(measured_words(results)),
+        *key_results(results),
+        *([] if verdicts else _identified(results)),
+        *_key_numbers(verdicts),
         *(Paragraph(text, "verdict") for text in texts or [no_verdict(results)]),
         Heading("What to trust"),
         Bullets([*trust(results), *static_deflection(results)]),
@@ -101,8 +101,8 @@ def advice(identified: JSON) -> list[Item]:
     best, count = advised["configurations"][0], len(advised["configurations"])
     text = (
         f"Of {count} planned configurations of faces, none of them cut, {best['configuration']} is predicted "
-        f"to be the flattest: X_m {quantity(best['xm_predicted'])}, the best with probability "
-        f"{probability(best['probability_best'])}. Nothing was measured of these."
+        f"to be the flattest: X_m {quantity(best['xm_predicted'])}. It is the best of them with probability "
+        f"{probability(best['probability_best'])}. These configurations have not been measured."
     )
     return [Paragraph(text)]
 
@@ -125,47 +125,27 @@ def _one_run(results: Results) -> list[Item]:
 
 
 def _identified(results: Results) -> list[Item]:
-    """Give the most compliant mode, and the boundary or the response that shows the identification."""
+    """Give the results of single sections, and the one figure that shows the identification best."""
     shown = [
         *joint_facts(results),
-        *first_loaded(results),
-        *first_faces(results),
         *first_levelled(results),
         *first_poses(results),
         *first_areal(results),
         *first_traces(results),
-        *boundary_items(results),
-        *largest_response(results.tables),
+        *noise_of_faces(results),
     ]
-    yielding = [mode for mode in results.identified.get("modes") or [] if _peak(mode) > 0.0]
-    if not yielding:
-        return shown
-    softest = max(yielding, key=_peak)
-    where = f"position {softest['position']}, direction {softest['direction']}"
-    facts = Facts(
-        [
-            ("mode that yields most", quantity(softest["frequency"]), where),
-            ("damping ratio", quantity(softest["damping"], with_unit=False), "of critical damping"),
-            ("stiffness", quantity(softest["stiffness"]), "at the driving point"),
-            ("receptance at its peak", f"{number(_peak(softest))} m/N", "1 / (2 damping ratio · stiffness)"),
-        ]
-    )
-    return [facts, *shown]
-
-
-def _peak(mode: JSON) -> float:
-    """Receptance of a single mode at its peak, m/N; 0 if its stiffness is not known."""
-    stiffness, damping = ((mode.get(name) or {}).get("value") for name in ("stiffness", "damping"))
-    if not stiffness or not damping or not mode.get("resolved", True):
-        return 0.0
-    return float(1.0 / (2.0 * damping * stiffness))
+    pictures = [item for item in shown if isinstance(item, Picture)]
+    others = [item for item in shown if not isinstance(item, Picture)]
+    return [*others, *[*boundary_items(results), *largest_response(results.tables), *pictures][:1]]
 
 
 def no_verdict(results: Results) -> str:
     """Say that nothing was compared, and which quantities were identified instead."""
-    nothing = "No held-out measurement could be compared with a prediction in this batch: no verdict."
+    nothing = (
+        "This batch has no verdict, because no held-out measurement could be compared with a prediction."
+    )
     if set(results.identified.get("pose") or {}) - {"not_identified"}:
-        nothing = "The arm was fitted to measured poses and tested on others. There was no cut to judge."
+        nothing = "The arm model was fitted to measured poses and tested on others. The batch has no cuts."
     return f"{nothing} {_identified_words(results.identified)}".strip()
 
 
@@ -197,9 +177,9 @@ def print_check(results: Results) -> list[Item]:
     errata = int(table["note"].fillna("").str.contains("erratum: ").sum())
     text = f"{len(table)} printed values were transcribed"
     if pairs:
-        text += f", {pairs} of them with a prediction beside them; every printed error was recomputed"
-    text += f". {f'{flagged} cannot' if flagged else 'All can'} be right as printed"
-    text += f"; for {errata} an erratum is stated." if errata else "."
+        text += f", {pairs} of them with a predicted value; every printed error was recomputed"
+    text += f". {f'{flagged} printed values are' if flagged else 'No printed value is'} inconsistent"
+    text += f"; {errata} carry an erratum." if errata else "."
     return [Paragraph(text), *_printed_modes(table)]
 
 

@@ -6,9 +6,9 @@ import math
 
 import pandas as pd
 
-from metro.report.content import Bullets, Facts, Item, Paragraph, Picture, Section, Table
+from metro.report.content import Bullets, Item, Paragraph, Picture, Section, Table, common, gathered
 from metro.report.figures import surface as figures
-from metro.report.numbers import listing, number, quantity, with_interval
+from metro.report.numbers import listing, number, with_interval
 from metro.report.results import Results
 
 LONGEST = 24
@@ -39,29 +39,11 @@ def flatness(results: Results) -> Section | None:
     return Section("Flatness", items)
 
 
-def first_faces(results: Results) -> list[Item]:
-    """Give the flatness of the faces with the largest and the least X_m, and what of it is noise alone."""
-    found = {
-        run: face
-        for run, face in (results.identified.get("faces") or {}).items()
-        if isinstance(face, dict) and face.get("xm")
-    }
-    if not found:
-        return []
-    by_size = sorted(found, key=lambda run: float(found[run]["xm"]["value"]), reverse=True)
-    facts = []
-    for run in dict.fromkeys([by_size[0], by_size[-1]]):
-        face = found[run]
-        freed = (face.get("noise_corrected") or {}).get("xm")
-        facts.append((f"X_m of {run}", quantity(face["xm"]), "range of the points as scanned"))
-        if freed:
-            facts.append(("without the noise", quantity(freed), f"X_m of {run}"))
-        if len(found) == 1 and face.get("minimum_zone"):
-            facts.append(("minimum zone", quantity(face["minimum_zone"]), f"of {run}"))
+def noise_of_faces(results: Results) -> list[Item]:
+    """Say for which faces the noise of the scan accounts for the flatness."""
     table = results.tables.get("face_indices")
     parts = {} if table is None else dict(tuple(table.groupby("run", sort=False)))
-    noisy = _by_noise_alone({str(run): part.set_index("index_name") for run, part in parts.items()})
-    return [Facts(facts), *noisy]
+    return _by_noise_alone({str(run): part.set_index("index_name") for run, part in parts.items()})
 
 
 def _indices(
@@ -132,7 +114,7 @@ def _by_noise_alone(faces: dict[str, pd.DataFrame]) -> list[Item]:
         if not high > 0 or not (alone or (unfiltered and bias > value / 2)):
             continue
         face = with_interval(corrected, [low, high])
-        judged = "is not told from flat" if alone else "is the rest"
+        judged = "cannot be distinguished from flat" if alone else "accounts for the remainder"
         said.append(
             f"{run}: X_m reads {number(value)} µm, but {number(bias)} µm of that is what noise of "
             f"{number(sigma, 2)} µm per point makes of {int(part['points'].iloc[0])} points. The face "
@@ -163,14 +145,16 @@ def _noise(faces: dict[str, pd.DataFrame]) -> list[Item]:
             ]
         )
     caption = (
-        "Noise of a point (µm) and where it is from; of that, what differs from point to point (local); "
-        "points within the crop, points rejected by their neighbours, pitch and crop (mm)."
+        "Noise of a point (µm) and its source; the part that differs from point to point (local); number of "
+        "points within the crop and of rejected points; pitch and crop (mm)."
     )
     if not all(part["crop_holds"].iloc[0] for part in faces.values()):
         caption += " * With one more millimetre cropped X_m changes by more than 5 %: the edge rules it."
-    header = ["run", "noise", "from", "local", "points", "rejected", "pitch", "crop"]
-    widths, numeric = [0.6, 0.7, 3, 0.7, 0.9, 0.9, 0.7, 0.7], [1, 3, 4, 5, 6, 7]
-    return [Table(header, rows, caption, widths, numeric=numeric, small=True)]
+    header, rows, same = common(
+        ["run", "noise", "source", "local", "points", "rejected", "pitch", "crop"], rows
+    )
+    numeric = [i for i, name in enumerate(header) if name not in ("run", "source")]
+    return [Table(header, gathered(rows), caption + same, numeric=numeric, small=True)]
 
 
 def _zones(faces: dict[str, pd.DataFrame], contacts: pd.DataFrame | None) -> list[Item]:
@@ -185,7 +169,7 @@ def _zones(faces: dict[str, pd.DataFrame], contacts: pd.DataFrame | None) -> lis
             for side in ("upper", "lower")
         ]
         rows.append([run, *places])
-    caption = "Points that the two planes of the minimum zone touch: x, y (mm). No tilt brings them closer."
+    caption = "Points that the two planes of the minimum zone touch: x, y (mm)."
     return [Table(["run", "upper plane", "lower plane"], rows, caption, [0.5, 2, 2], small=True)]
 
 
@@ -197,8 +181,9 @@ def _maps(results: Results, contacts: pd.DataFrame | None) -> list[Item]:
     heights, runs = frame["deviation_um"].to_numpy(float), frame["run"].to_numpy()
     low, high = int(heights.argmin()), int(heights.argmax())
     caption = (
-        f"The faces lie {number(-heights[low])} µm below their planes at most ({runs[low]}) and "
-        f"{number(heights[high])} µm above ({runs[high]}). Deviation from the least-squares planes"
+        f"The deviations range from −{number(-heights[low])} µm ({runs[low]}) to +{number(heights[high])} µm "
+        f"({runs[high]}). Deviation from the least-squares planes; + marks "
+        "the highest and the lowest point (µm)"
     )
     caption += f", {figures.MAPS} of {number_of}" if number_of > figures.MAPS else ""
     caption += (

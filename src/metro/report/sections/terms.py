@@ -7,49 +7,51 @@ from metro.report.results import Results
 from metro.report.sections.verdict import STATUS
 
 INTERVALS = (
-    "Uncertainty. Every ± is half of a 95 % interval, and “a (b … c)” gives the ends of one that is not "
-    "symmetric; numbers are rounded to two digits of it. It holds the scatter of the data, and what "
-    "batch.yaml declares of inputs and instruments. An error on held-out runs has the interval that drawing "
-    "whole runs anew gives (bootstrap), and at least that of a mean square of as many independent values as "
-    "the noise leaves these runs. A number without an interval is a reading, or its uncertainty is not known."
+    "Uncertainty. Every ± is half of a 95 % interval, and “a (b … c)” gives the ends of an asymmetric one; "
+    "values are rounded to two digits of the interval. It includes the scatter of the data and the "
+    "uncertainties that batch.yaml declares for inputs and instruments. The interval of an error on held-out "
+    "runs comes from a bootstrap over whole runs. It is at least that of a mean square of as many "
+    "independent "
+    "values as these runs contain. A number without an interval is a reading, or its uncertainty is unknown."
 )
 ALWAYS = {
-    "held out": "put aside before any signal was read: no fit, no search and no decision sees it; it "
-    "verifies the result. What a prediction needs of the run itself is taken from it (its speed, its start "
-    "phase, the zero of the sensor, joint angles; for a wall or a face the force that was measured there)",
-    "error": "rms of measured less predicted; NRMSE: the same over the rms of the measured values",
-    "noise floor": "error that a right model would still have here: noise, scatter of whole runs, declared "
-    "accuracy of a simple model",
+    "held out": "set aside before any signal was read: no fit and no decision uses it; it verifies the "
+    "result. A prediction takes from the run itself only what it needs (speed, start phase, sensor offset, "
+    "joint angles; for a wall or a face the measured force)",
+    "error": "rms of measured minus predicted; NRMSE: the same divided by the rms of the measured values",
+    "noise floor": "error that a correct model would have here: noise, scatter between runs, stated accuracy "
+    "of the model",
 }
 OF_THE_LOOP = {
-    "effect": "a cause that the base model lacks, with its own equations and parameters",
-    "p, q": "chance of evidence as strong without the effect; q counts all effects that were tried",
-    "held-out gain": "log-likelihood gained on conditions that neither fit has seen",
-    "size": "what the effect changes of the prediction, rms over the rms of the signal",
-    "weight, probability": "weight among effects that these runs cannot tell apart; probability: against "
-    "these, none and what the library lacks",
+    "effect": "a cause that the base model does not include, with its own equations and parameters",
+    "p, q": "probability of evidence as strong without the effect; q accounts for all effects tried",
+    "held-out gain": "log-likelihood gained on conditions that neither fit has used",
+    "size": "change of the prediction by the effect, rms over the rms of the signal",
+    "weight, probability": "weight among effects that these runs do not distinguish; the probability also "
+    "accounts for no effect and for causes outside the library",
 }
 VERDICTS = {
-    "clean": "the runs of the identification show nothing that the base model lacks",
-    "explained": "the effects named were missing; with them nothing significant is left",
-    "partly_explained": "the effects named are there, and something else too",
+    "clean": "the base model explains the identification runs",
+    "explained": "the model lacked the effects named; with them no significant residual remains",
+    "partly_explained": "the effects named are present, and a significant residual remains",
     "undetermined": "several causes explain these runs equally well",
-    "unexplained": "something is there that no effect of the library accounts for",
-    "insufficient": "too few runs to tell; nothing is claimed",
+    "unexplained": "a significant residual that no effect of the library explains",
+    "insufficient": "too few runs to decide; nothing is claimed",
 }
 OF_MODES = {
     "frequency, damping": "undamped frequency √(k/m), and ratio of the damping to the critical one",
     "stiffness, mass": "of the mode, at the driving point",
     "receptance": "displacement over force, as a function of frequency",
-    "MAC": "modal assurance criterion: 1 where two shapes are alike at the points that were measured",
+    "MAC": "modal assurance criterion: 1 where two shapes agree at the measured points",
 }
 OF_FACES = {
     "X_m, X_a, X_g": "range, arithmetic and geometric mean of the deviations from the least-squares plane",
     "FLTt, FLTp, FLTv, FLTq": "flatness by ISO 12781-1: peak to valley, peak, valley and rms",
 }
 OF_STABILITY = {
-    "P(chatter)": "probability that a cut chatters, by the modes, the forces and the error of the boundary; "
-    "the error of stability is the rms of it less what was found (1 chatter, 0 stable)",
+    "P(chatter)": "probability that a cut chatters, from the modes, the forces and the error of the "
+    "boundary; "
+    "the error of stability is the rms of P minus the outcome (1 chatter, 0 stable)",
 }
 
 

@@ -78,10 +78,11 @@ def _spectra(results: Results) -> list[Item]:
     table, lines = results.tables.get("robot_spectra"), results.tables.get("robot_lines")
     if table is None:
         return []
-    finding = "No line stands" if lines is None else f"{len(lines)} lines stand"
+    finding = "No line is" if lines is None else f"{len(lines)} lines are"
     caption = (
-        f"{finding} out of the noise at a chance of one in a hundred per spectrum. Spectra of the tip's path "
-        "error by the encoders (multitaper), all runs: over time and along the path. Marks: such lines."
+        f"{finding} significant at the 1 % level per spectrum. Multitaper spectra of the tip's path error "
+        "from "
+        "the encoders, all runs, over time and along the path. Markers show significant lines."
     )
     items: list[Item] = [
         Heading("Spectra of the path error"),

@@ -15,19 +15,20 @@ SURE = 0.95  # probability from which on a cause counts as identified
 HOLDS = ("clean", "explained")
 UNTESTED = "No prediction was tested here."
 IDENTIFIED = (
-    f"{UNTESTED} The identified values hold within their intervals for the set-up as declared; how well they "
-    "predict a cut is not known."
+    f"{UNTESTED} The identified values are valid within their intervals for the declared set-up. How well "
+    "they predict a cut is not known."
 )
 MEASURED = (
-    f"{UNTESTED} The figures describe the surface that was measured, where it was measured; their intervals "
-    "hold what is said beside them, and nothing of how it was cut."
+    f"{UNTESTED} The values describe the measured part of the surface only. Their intervals include the "
+    "contributions that are stated with them."
 )
 LOWERED = (
-    "Much of the error stays unexplained and may look like these causes, which lowers their probability."
+    "Much of the error remains unexplained. An unknown cause may have the same signature, which lowers the "
+    "probability of the causes named."
 )
 POSED = (
-    "The identified arm was tested on poses that no fit saw, whose errors are stated; how well it predicts a "
-    "cut is not known."
+    "The identified arm model was tested on poses that were not used in the fit; their errors are given in "
+    "the report. How well it predicts a cut is not known."
 )
 OF_SURFACES = ("faces", "levelling", "texture", "areal")
 ABOUT = ("format", "batch", "metro", "not_identified")
@@ -72,7 +73,10 @@ def static_deflection(results: Results) -> list[str]:
         low, high = (number(end) for end in found["modes_hz"])
         figures.append(f"teeth at {number(found['tooth_hz'])} Hz, modes at {low} to {high} Hz")
     runs = f"{len(found['runs'])} run{'s' if len(found['runs']) > 1 else ''}"
-    return [f"No static deflection of the machine: it has no meaning in {runs} ({'; '.join(figures)})."]
+    return [
+        f"Do not use a static deflection of the machine for {runs}: the tooth passing excites its modes "
+        f"({'; '.join(figures)})."
+    ]
 
 
 def trust_in(results: Results, observable: str) -> str:
@@ -91,25 +95,29 @@ def _reach(observable: str, entry: JSON) -> str:
     if "held_out" in entry:
         return f"{name}: predictions of poses among those that were measured are off by up to {size}."
     if status in HOLDS and verification.get("holds", True):
-        model = "with what was added, predictions" if entry.get("effects") else "predictions"
-        return f"{name}: {model} hold to {size}."
+        model = "predictions with the effects found" if entry.get("effects") else "predictions"
+        return f"{name}: the {model} are accurate to {size}."
     after, floor = (entry.get("after") or {}).get("rms"), entry.get("noise_floor")
-    times = f", {number(after / floor, 2)} times the noise" if after and floor and after > floor else ""
-    return f"{name}: the measured values, not the predictions; these are off by up to {size}{times}."
+    times = f", {number(after / floor, 2)} times the noise floor" if after and floor and after > floor else ""
+    return (
+        f"{name}: do not use the predictions, which have an error of up to {size}{times}. The measured "
+        "values "
+        "are usable."
+    )
 
 
 def _undecided(verification: JSON) -> str:
     """Say what can be trusted where there are too few runs to decide whether something is missing."""
     if not verification:
-        return "nothing; no prediction was tested"
+        return "no prediction was tested, so none can be relied on"
     if verification["holds"]:
         return (
-            "the held-out tests agree with the prediction. Whether a cause is missing cannot be decided: too "
-            "few tests have the role identify"
+            "the held-out tests agree with the prediction. Too few tests have the role identify to decide "
+            "whether an effect is missing"
         )
     return (
-        "the measured values, not the predictions, which the held-out tests contradict. No cause can be "
-        "sought: too few tests have the role identify"
+        "do not use the predictions, which the held-out tests contradict. The measured values are usable. "
+        "Too few tests have the role identify to look for a cause"
     )
 
 
@@ -172,8 +180,8 @@ def _causes(entry: JSON) -> str:
         chances = [effect.get("probability") for effect in effects]
         least = min((chance for chance in chances if chance is not None), default=None)
         certain[sure].append(f"{words(name)} (probability {probability(least)})")
-    finding = f"A finding: {listing(certain[True])}." if certain[True] else ""
-    lead = f"A lead, not a finding: {listing(certain[False])}." if certain[False] else ""
+    finding = f"Identified cause: {listing(certain[True])}." if certain[True] else ""
+    lead = f"Possible cause: {listing(certain[False])}." if certain[False] else ""
     lowered = LOWERED if any(effect.get("lowered") for effect in entry.get("effects") or []) else ""
     return " ".join(filter(None, [finding, lead, lowered]))
 

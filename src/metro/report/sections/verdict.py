@@ -27,34 +27,52 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
         return f"{start}: {STATUS[status]}. {entry['words']} {_residual(entry, left)}".strip()
     whole, part = _attribution(entry, "the difference"), _attribution(entry, "part of the difference")
     verified = (entry.get("verification") or {}).get("words", "")
+    # Of a probability the count of tests on the right side says more than the rms.
+    tested = " ".join([verified, _fall(entry)] if _dimensionless(entry) else [_fall(entry), verified])
     says = {
-        "clean": f"{start}: the identification runs show nothing that the base model lacks. {_fall(entry)} "
-        f"{verified}",
-        "explained": f"{start}: {whole} {_fall(entry)} {verified}",
-        "partly_explained": f"{start}: {part} {_fall(entry)} {verified} A significant residual remains. "
+        "clean": f"{start}: the base model explains the identification runs; no effect is missing. {tested}",
+        "explained": f"{start}: {whole} {tested}{_within_floor(entry)}",
+        "partly_explained": f"{start}: {part} {tested} A significant residual remains. "
         f"{_residual(entry, left)}",
-        "undetermined": f"{start}: something is missing from the base model, but these data do not "
-        f"determine what. {_rivals(entry)}{_fall(entry)} {verified}",
-        "unexplained": f"{start}: the base model leaves a significant error, and no effect of the library "
-        f"accounts for it. {_fall(entry)} {verified} {_residual(entry, left)}",
-        "insufficient": f"{start}: too few runs to decide. {_fall(entry)} {verified}",
+        "undetermined": f"{start}: the base model lacks an effect, but these runs do not determine which "
+        f"one. {_rivals(entry)}{tested}",
+        "unexplained": f"{start}: the base model has a significant error that no effect of the library "
+        f"explains. {tested} {_residual(entry, left)}",
+        "insufficient": f"{start}: there are too few runs to decide whether an effect is missing. {tested}",
     }
     if entry.get("contradicted"):
-        return f"{start}: the data contradict what the batch declares; nothing is attributed. {_fall(entry)}"
+        return (
+            f"{start}: the data contradict the declaration of the batch, so no cause was sought. "
+            f"{_fall(entry)}"
+        )
     return says.get(status, f"{start}: {words(status)}.").strip()
 
 
 def _attribution(entry: JSON, what: str) -> str:
     """Say to which causes ``what`` is traced, and which ones are only the likeliest of the library."""
     effects = entry.get("effects") or []
-    sure = [effect_words(one) for one in effects if (one.get("probability") or 0.0) >= SURE]
-    leads = [effect_words(one) for one in effects if (one.get("probability") or 0.0) < SURE]
+    identified = [one for one in effects if (one.get("probability") or 0.0) >= SURE]
+    sure = [effect_words(one) for one in identified]
+    meanings = dict.fromkeys(str(one["meaning"]) for one in identified if one.get("meaning"))
+    possible = [effect_words(one) for one in effects if (one.get("probability") or 0.0) < SURE]
     traced = f"{what} from the base model is traced to {listing(sure)}." if sure else ""
-    if not leads:
+    traced = " ".join([traced, *meanings])
+    if not possible:
         return traced
-    so_much = "more of it" if sure else f"{what} from the base model"
-    likeliest = f"{listing(leads)} would account for {so_much}; this is a lead, not a finding."
-    return f"{traced} {likeliest}".strip()
+    so_much = "a further part of it" if sure else f"{what} from the base model"
+    article = "A" if traced else "a"
+    return f"{traced} {article} possible cause of {so_much} is {listing(possible)}.".strip()
+
+
+def _within_floor(entry: JSON) -> str:
+    """Say where the held-out runs by themselves would not have asked for an effect."""
+    before, floor = (entry.get("before") or {}).get("rms"), entry.get("noise_floor")
+    if before is None or floor is None or before > floor:
+        return ""
+    return (
+        " The error of the base model is within the noise floor there; the effect was identified from the "
+        "other runs."
+    )
 
 
 def error_text(error: JSON | None, unit_name: str | None) -> str:
@@ -127,19 +145,20 @@ def _fall(entry: JSON) -> str:
     share_before, share_after = percent(before.get("nrmse")), percent(after.get("nrmse"))
     what = "the error"
     if _dimensionless(entry):
-        what = "the error of the predicted probability of chatter (rms, against 0 or 1 as found)"
+        what = "the error of the predicted probability of chatter (rms, against the outcomes 0 and 1)"
     if before["rms"] == after["rms"]:
         share = "" if _dimensionless(entry) else f" ({share_before} of the signal)"
         return f"{where} {what} is {old}{share}."
-    share = "" if _dimensionless(entry) else f" ({share_before} → {share_after} of the signal)"
-    return f"{where} {what} goes from {old} to {new}{share}."
+    share = "" if _dimensionless(entry) else f" ({share_before} to {share_after} of the signal)"
+    verb = "falls" if after["rms"] < before["rms"] else "rises"
+    return f"{where} {what} {verb} from {old} to {new}{share}."
 
 
 def _residual(entry: JSON, left: str) -> str:
     unexplained = entry.get("unexplained") or {}
     if not unexplained.get("signature"):
         return ""
-    return f"What is left: {left or plain(str(unexplained['signature']))}."
+    return f"The remaining error appears {left or plain(str(unexplained['signature']))}."
 
 
 def left_words(results: Results, observable: str) -> str:
@@ -152,11 +171,11 @@ def _rivals(entry: JSON) -> str:
     groups = [
         " or ".join(words(str(name)) for name in group) for group in entry.get("indistinguishable") or []
     ]
-    return f"It may be {'; or '.join(groups)}. " if groups else ""
+    return f"Possible causes: {'; or '.join(groups)}. " if groups else ""
 
 
 def next_words(entry: JSON) -> str:
     """Say what to measure next, and whether the verdict does not need it; empty if there is nothing."""
     text = plain(str(entry.get("next_experiment") or "")).rstrip(".")
     needless = entry.get("status") in HOLDS
-    return f"{text} (the verdict does not need it)" if text and needless else text
+    return f"{text} (optional: the verdict does not depend on it)" if text and needless else text

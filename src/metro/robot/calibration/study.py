@@ -48,7 +48,7 @@ def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
     Raises
     ------
     ValueError
-        Where the poses do not determine even where the arm stands.
+        Where the poses do not determine even the place of the base.
     """
     poses = poses.thinned(MOST)
     as_declared, up = nominal(poses, geometry)
@@ -58,7 +58,7 @@ def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
     )
     if not known.kept[:6].all():
         scatter = f"they scatter by {as_declared.scale / MM:.3g} mm about the declared arm"
-        raise ValueError(f"the poses do not determine where the arm stands: {scatter}")
+        raise ValueError(f"the poses do not determine the place of the arm's base: {scatter}")
     corrected = fitted(poses, state, known.kept)
     found = search(poses, corrected, library(poses, state, up))
     return Calibration(
