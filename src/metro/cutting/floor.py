@@ -1,7 +1,7 @@
 """The floor that the orbit before left in helical milling, and how far it is above the tip.
 
-A tool that sinks on a helix has material before it up to the floor on which it stood last. Near the hole's axis,
-where it stands all the time, there is none; at the wall it is a whole pitch: it was there an orbit ago.
+A tool that sinks on a helix has material before it up to the floor on which it stood last. Near the hole's
+axis, where it stands all the time, there is none; at the wall it is a whole pitch: it was there an orbit ago.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 Forward: each effect of the library is fitted jointly with what the model has already; the best that passes
 every gate is added. An effect that is small beside what stays unexplained may be a part of that: where no
 other is left it is added on trial, and in the end only those stay that are not small beside what the whole
-model leaves. (Several causes of one size hide each other otherwise.) Backward: an effect that a later one made
-idle is dropped for good. Then each is weighed against its rivals.
+model leaves. (Several causes of one size hide each other otherwise.) Backward: an effect that a later one
+made idle is dropped for good. Then each is weighed against its rivals.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from metro.loop.search.strategy import Choice, SearchSpace
 from metro.loop.search.trial import Trial, small_beside_residual, tried, without
 from metro.loop.statement import Statement
 
-MOST_EFFECTS = 6
+MOST_EFFECTS = 4
 
 
 def forward(space: SearchSpace) -> Choice:
