@@ -21,7 +21,13 @@ from proof.score import joint
 LEAST_GAIN = 2.0  # log-likelihood per effect: with less the runs of the fit do not identify it
 
 
-def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect], budget: float) -> JSON:
+def oracle(
+    task: Problem,
+    hidden: Mapping[str, JSON],
+    effects: Sequence[Effect],
+    budget: float,
+    also: Mapping[str, JSON] | None = None,
+) -> JSON:
     """Fit base and true effects to the identification runs; judge them on the held-out ones.
 
     Effects that leave those runs as likely as they are without any keep their true parameters: a fit would
@@ -32,6 +38,7 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
     hidden : true effects and their parameters, as in the contract's table.
     effects : the library.
     budget : relative model-form budget.
+    also : what a cell always has a little of: it is fitted beside the hidden effects, and its size not asked.
 
     Returns
     -------
@@ -47,26 +54,32 @@ def oracle(task: Problem, hidden: Mapping[str, JSON], effects: Sequence[Effect],
     able, _ = fitted_to(tuple(effects), task)
     known = [_at_truth(able, name, values) for name, values in hidden.items()]
     acting = [effect for effect in known if effect is not None]
-    if len(acting) < len(hidden):
-        rows = _rows(task, base, replace(base, noise=prior))
-        before, expected = _rms(rows["measured"] - rows["before"]), _rms(rows["sigma"])
-        floor = _rms(_rows(_all_identified(task), base, replace(base, noise=prior))["sigma"])
-        size = float(np.sqrt(max(0.0, before**2 - expected**2))) / floor
-        return {"before": before, "after": None, "floor": floor, "sizes": dict.fromkeys(hidden, size)}
+    beside = [_at_truth(able, name, values) for name, values in (also or {}).items()]
+    always = [effect for effect in beside if effect is not None]
 
     def fitted(chosen: list[Effect]) -> Fit:
-        return fit(Candidate(task.base, tuple(chosen)), blocks, prior, base) if chosen else base
+        whole = (*chosen, *always)
+        return fit(Candidate(task.base, whole), blocks, prior, base) if whole else base
+
+    if len(acting) < len(hidden):
+        without = replace(fitted([]), noise=prior)
+        rows = _rows(task, base, without)
+        left, expected = _rms(rows["measured"] - rows["after"]), _rms(rows["sigma"])
+        floor = _rms(_rows(_all_identified(task), base, without)["sigma"])
+        size = float(np.sqrt(max(0.0, left**2 - expected**2))) / floor
+        before = _rms(rows["measured"] - rows["before"])
+        return {"before": before, "after": None, "floor": floor, "sizes": dict.fromkeys(hidden, size)}
 
     full = fitted(acting)
-    if full.total - base.total < LEAST_GAIN * len(acting):
-        acting = [_kept(effect) for effect in acting]
+    if full.total - base.total < LEAST_GAIN * (len(acting) + len(always)):
+        acting, always = ([_kept(effect) for effect in some] for some in (acting, always))
         full = fitted(acting)
     rows = _rows(task, base, full)
     floor = _rms(_rows(_all_identified(task), base, full)["sigma"])
     sizes = {}
     for effect in acting:
-        without = _rows(task, fitted([other for other in acting if other is not effect]), full)
-        sizes[effect.name] = _rms(without["after"] - without["before"]) / floor
+        lacking = _rows(task, fitted([other for other in acting if other is not effect]), full)
+        sizes[effect.name] = _rms(lacking["after"] - lacking["before"]) / floor
     return {
         "before": _rms(rows["measured"] - rows["before"]),
         "after": _rms(rows["measured"] - rows["after"]),

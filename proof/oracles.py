@@ -20,6 +20,7 @@ from proof.limit import OutOfTimeError, bounded
 from proof.oracle import oracle
 from proof.progress import tracked
 from proof.run import CHECKOUT
+from proof.suite import ABSORBED
 
 UNKNOWN: JSON = {"before": None, "after": None, "floor": None, "sizes": {}}  # so that all counts as seen
 
@@ -43,7 +44,7 @@ def oracles(out: Layout, truths: JSON, jobs: int, about: str, limit: float | Non
     hiding = [name for name, truth in truths.items() if truth["effects"]]
     waiting = [name for name in hiding if _stale(out, name)]
     with ProcessPoolExecutor(jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
-        futures = [pool.submit(_ask, out, name, truths[name]["effects"], about, limit) for name in waiting]
+        futures = [pool.submit(_ask, out, truths[name], about, limit) for name in waiting]
         for future in tracked(futures, "asking the oracle"):
             future.result()
     files = {name: _file(out, name) for name in hiding}
@@ -66,7 +67,10 @@ def _stale(out: Layout, name: str) -> bool:
     return problems.is_file() and problems.stat().st_mtime > known
 
 
-def _ask(out: Layout, name: str, hidden: JSON, about: str, limit: float | None) -> None:
+def _ask(out: Layout, truth: JSON, about: str, limit: float | None) -> None:
+    name, hidden = truth["batch"], truth["effects"]
+    # What is wholly confounded with the base model would take it anywhere.
+    also = {effect: at for effect, at in truth.get("always_on", {}).items() if effect not in ABSORBED}
     task, settings = posed(out.processed / name, about).task, gates()
     result = UNKNOWN
     try:
@@ -74,7 +78,7 @@ def _ask(out: Layout, name: str, hidden: JSON, about: str, limit: float | None) 
             if isinstance(task, LabelProblem):
                 result = label_oracle(task, hidden, library(about), settings["held_out_gain"])
             elif isinstance(task, Problem):
-                result = oracle(task, hidden, library(about), settings["model_form_budget"])
+                result = oracle(task, hidden, library(about), settings["model_form_budget"], also)
     except OutOfTimeError:
         pass
     write_json(_file(out, name), result)

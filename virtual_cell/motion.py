@@ -131,4 +131,4 @@ class Orbit:
         side = math.copysign(1.0, self.rate)
         outward = np.sin(direction) * sine * side - np.cos(direction) * cosine * side
         across = np.cos(direction) * sine + np.sin(direction) * cosine
-        return np.arctan2(np.abs(reach * across), self.radius + reach * outward)
+        return np.asarray(np.arctan2(np.abs(reach * across), self.radius + reach * outward))

@@ -40,6 +40,32 @@ RUNOUT = truth("one", tool_runout={"radius_um": 5.0})
 BOTH = truth("two", tool_runout={"radius_um": 5.0}, tool_wear={"edge_growth_per_m": 0.1})
 
 
+ALWAYS = RUNOUT | {"always_on": {"tool_end": {"corner_radius_mm": 0.2}}}
+
+
+def test_what_a_cell_always_has_is_neither_demanded_nor_false():
+    asked = oracle(tool_runout=3.0)
+    with_it = scored(ALWAYS, asked, verdict("explained", ("tool_end", 0.99), ("tool_runout", 0.98)))
+    without = scored(ALWAYS, asked, verdict("explained", ("tool_runout", 0.98)))
+    for one in (with_it, without):
+        assert one.exact
+        assert not one.surely_wrong
+        assert list(one.named) == ["tool_runout"]
+    assert with_it.stated == ((0.99, True), (0.98, True))
+    assert not scored(RUNOUT, asked, verdict("explained", ("tool_end", 0.99), ("tool_runout", 0.98))).exact
+
+
+def test_where_nothing_is_hidden_only_what_is_not_there_counts_as_added():
+    nothing = truth("none") | {"always_on": {"tool_end": {"corner_radius_mm": 0.2}}}
+    assert not scored(nothing, None, verdict("explained", ("tool_end", 0.99))).added
+    assert scored(nothing, None, verdict("explained", ("tool_end", 0.99), ("tool_wear", 0.95))).added
+
+
+def test_nothing_is_demanded_of_the_probability_of_what_is_always_there_and_not_named():
+    one = scored(ALWAYS, oracle(tool_runout=3.0), verdict("clean", candidates=[("tool_end", 0.02)]))
+    assert one.rejected == ()
+
+
 def test_one_effect_named_alone_is_right():
     one = scored(RUNOUT, oracle(tool_runout=3.0), verdict("explained", ("tool_runout", 0.99)))
     assert one.exact

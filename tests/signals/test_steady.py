@@ -74,3 +74,41 @@ def test_a_record_shorter_than_a_revolution_has_none():
     assert (found.samples, found.mean.shape, found.square.shape) == (50, (0, 3), (0, 3))
     with pytest.raises(ValueError, match="50 samples, fewer than the 60000 of one revolution"):
         segments(found, 0)
+
+
+@pytest.mark.parametrize("zero", [0.0, 20.0, 60.0, -90.0])
+def test_air_is_found_whatever_the_zero_of_the_amplifier(zero):
+    """A charge amplifier that was reset long before the record begins far from nought."""
+    signal = record(20, 10, 60, zero=zero)
+    found = segments(turns([signal], TURN), settling=10 * TURN)
+    assert found.quiet[:19].all()
+    assert not found.quiet[21:].any()
+    assert found.turns.mean[found.quiet].mean(axis=0) == pytest.approx([zero, zero], abs=0.1)
+    assert 30 * TURN <= found.steady.start <= 36 * TURN
+
+
+def test_noise_is_no_force_beside_a_zero_that_is_off():
+    """In each revolution it has an eighth of the force: more than what counts as air without its noise."""
+    rng = np.random.default_rng(2)
+    signal = record(20, 2, 60, zero=40.0) + 10.0 * rng.normal(size=(82 * TURN, 2))
+    found = segments(turns([signal], TURN), settling=2 * TURN)
+    assert found.quiet[:19].all()
+    assert not found.quiet[22:].any()
+
+
+def test_a_cut_before_chatter_sets_in_is_no_air():
+    """It swings far less than what follows, about the same mean force."""
+    calm, loud = record(steady=20), record(steady=40)
+    swing = np.sin(0.7 * np.arange(len(loud)))[:, None] * 600.0
+    found = segments(turns([np.concatenate([calm, loud + swing])], TURN), settling=0)
+    assert not found.quiet.any()
+
+
+def test_a_cut_on_a_helix_before_chatter_sets_in_is_no_air():
+    """Its mean turns with the orbit, so that it differs from that of the chatter."""
+    count = 60 * TURN
+    angle = np.linspace(0.0, 1.5 * np.pi, count)
+    mean = 80.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    swing = np.where(np.arange(count) < 20 * TURN, 6.0, 120.0)[:, None]
+    signal = mean + swing * np.sin(0.7 * np.arange(count))[:, None]
+    assert not segments(turns([signal], TURN), settling=0).quiet.any()
