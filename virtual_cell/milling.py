@@ -100,7 +100,7 @@ def engaged(engagement: Engagement, traced: Chips) -> Array | float:
     """Width (m) of the slices of the traced points, or of what is below the floor that an orbit left."""
     dz = engagement.depth / len(engagement.slices)
     motion = engagement.motion
-    if not isinstance(motion, Orbit):
+    if not isinstance(motion, Orbit) or not motion.pitch:
         return dz
     above = motion.ceiling(motion.direction(traced.t), traced.sin, traced.cos, traced.radius)
     return np.clip(above - traced.level * dz, 0.0, dz)

@@ -27,8 +27,8 @@ def _hammer():
         case("a double hit", double, "flagged", "double hit", "left out"),
         case("no hit", lambda t: t.assign(force_n=quiet), "flagged", "no force pulse", "left out"),
         case("forces in kN", times("force_n", 1e-3), "refused", "force_n", "kN"),
-        case("a dead hammer", lambda t: t.assign(force_n=0.0), "flagged", "hammer force stands at 0"),
-        case("a dead accelerometer", lambda t: t.assign(response=0.0), "flagged", "response stands at 0"),
+        case("a dead hammer", lambda t: t.assign(force_n=0.0), "flagged", "hammer force stays at 0"),
+        case("a dead accelerometer", lambda t: t.assign(response=0.0), "flagged", "response stays at 0"),
         case("a clipped accelerometer", clipped("response", 0.3), "flagged", "overloaded", "left out"),
         case(
             "one channel twice",

@@ -97,12 +97,12 @@ def _dynamometer():
     return [
         case("forces in kN", times(1e-3), "refused", "fx_n", "kN", "expected"),
         case("forces in µN", times(1e6), "refused", "fx_n", "expected"),
-        case("a dead channel", lambda t: t.assign(fz_n=0.0), "flagged", "Fz stands at 0", "left out"),
+        case("a dead channel", lambda t: t.assign(fz_n=0.0), "flagged", "Fz stays at 0", "left out"),
         case(
-            "a stuck channel", lambda t: t.assign(fy_n=-4999.0), "flagged", "Fy stands at -4999", "left out"
+            "a stuck channel", lambda t: t.assign(fy_n=-4999.0), "flagged", "Fy stays at -4999", "left out"
         ),
-        case("a clipped channel", clipped("fx_n", 0.2), "flagged", "Fx stands at", "range", "left out"),
-        case("a channel at full scale", flat, "flagged", "Fx stands at 5000", "range", "left out"),
+        case("a clipped channel", clipped("fx_n", 0.2), "flagged", "Fx stays at", "range", "left out"),
+        case("a channel at full scale", flat, "flagged", "Fx stays at 5000", "range", "left out"),
         case("a channel twice", lambda t: t.assign(fy_n=t["fx_n"]), "flagged", "Fx and Fy", "left out"),
         case(
             "a channel twice, turned round",
@@ -158,7 +158,7 @@ def _robot():
         case("an encoder that jumps", jump, "refused", "q3_deg", "jumps", "expected"),
         case("angles that are not those commanded", actual, "refused", "q3_deg", "q3_set_deg", "expected"),
         case("an arm that does not move", still, "flagged", "no joint moves", "left out"),
-        case("a dead torque", lambda t: t.assign(tau2_nm=0.0), "flagged", "tau2_nm stands at 0", "left out"),
+        case("a dead torque", lambda t: t.assign(tau2_nm=0.0), "flagged", "tau2_nm stays at 0", "left out"),
         case(
             "a torque twice",
             lambda t: t.assign(tau3_nm=t["tau2_nm"]),
@@ -166,7 +166,7 @@ def _robot():
             "tau2_nm and tau3_nm",
             "left out",
         ),
-        case("a clipped torque", clipped("tau1_nm", 0.985), "flagged", "tau1_nm stands at", "left out"),
+        case("a clipped torque", clipped("tau1_nm", 0.985), "flagged", "tau1_nm stays at", "left out"),
         Case("idle_log", "CSV", "another path", shifted, "refused", place),
         Case("idle_log", "CSV", "angles in radians", idle_radians, "refused", ("q1_set_deg", "radians")),
         Case(
@@ -225,8 +225,8 @@ def _profile():
             "micrometres",
         ),
         case("heights in metres", lambda t: t.assign(z_mm=t["z_mm"] * 1e-3), "refused", "z_mm", "metres"),
-        case("a dead stylus", lambda t: t.assign(z_mm=0.5), "flagged", "z stands at 0.5", "left out"),
-        case("a stylus at its stop", clipped("z_mm", 0.6), "flagged", "z stands at", "left out"),
+        case("a dead stylus", lambda t: t.assign(z_mm=0.5), "flagged", "z stays at 0.5", "left out"),
+        case("a stylus at its stop", clipped("z_mm", 0.6), "flagged", "z stays at", "left out"),
         case("the length for the height", lambda t: t.assign(z_mm=t["x_mm"]), "refused", "z_mm", "expected"),
     ]
 

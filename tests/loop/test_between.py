@@ -63,7 +63,7 @@ def test_what_passes_for_scatter_is_unexplained_where_repeats_do_not_scatter():
     verdict = closed(scaled(task, 3.0, 1.08))
     assert verdict["status"] == "unexplained"
     assert "differ between conditions" in verdict["unexplained"]["signature"]
-    assert "most in identify-3" in verdict["unexplained"]["signature"]
+    assert "largest in identify-3" in verdict["unexplained"]["signature"]
     signal = np.sqrt(np.mean([block.measured**2 for block in task.role("validate")]))
     assert verdict["unexplained"]["rms"] == pytest.approx(0.035 * signal, rel=0.3)
 

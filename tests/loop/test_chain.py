@@ -93,7 +93,7 @@ def test_what_the_measured_force_may_be_off_by_is_the_doubt_of_the_parts():
     told = split(problem, {"before": fitted, "after": fitted}, {"v": fed})
     for when in ("before", "after"):
         assert told[when]["doubt"] == pytest.approx(5.0 * COMPLIANCE, rel=1e-3)
-    assert f"{5.0 * COMPLIANCE:.2g} mm (one standard deviation)" in split_in_words(told)
+    assert f"{5.0 * COMPLIANCE:.2g} mm from the measured force" in split_in_words(told)
     without = split(problem, {"before": fitted, "after": fitted}, {"v": dict(list(fed.items())[:3])})
     assert without["before"]["doubt"] == 0.0
     assert without["before"]["upstream"] == told["before"]["upstream"]

@@ -48,7 +48,7 @@ def test_what_no_effect_does_is_laid_to_none_and_described():
     assert verdict["status"] == "unexplained"
     assert verdict["effects"] == []
     assert change is None
-    assert "a cause that the library lacks" in verdict["unexplained"]["signature"]
+    assert "a cause outside the library" in verdict["unexplained"]["signature"]
 
 
 @pytest.mark.parametrize("true", [Line(slope=0.8), Line(slope=-0.8)])

@@ -48,7 +48,8 @@ def test_what_only_an_effect_laid_bare_is_there_all_the_same(bent):
 def test_the_share_explained_is_of_the_power_within_and_between_runs(bent):
     base = {"base_lines": (line(0.3),), "base_restless": Restless(0.4, 9.0, 0.0), "base_between": None}
     left = {"lines": (line(0.1),), "restless": Restless(0.2, 5.0, 0.0), "between": Between(0.1, "c", 0.0)}
-    assert replace(bent, **base, **left).explained == pytest.approx(1 - 0.06 / 0.25)
+    # The difference between conditions came to light with the effects, and is held neither for nor against.
+    assert replace(bent, **base, **left).explained == pytest.approx(1 - 0.05 / 0.25)
     assert replace(bent, **base, lines=(), restless=None, between=None).explained == 1.0
 
 

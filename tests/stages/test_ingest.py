@@ -173,7 +173,7 @@ def test_quality_is_judged_on_the_sensor_s_own_channels(folder, tmp_path):
     qc = ingested(folder, tmp_path)["qc"]
     failed = qc[(qc["file"] == "force.csv") & ~qc["ok"]]
     assert failed["check"].tolist() == ["sampling rate", "clipping"]
-    assert failed["message"].iloc[1].startswith("Fx stands at 10.5")
+    assert failed["message"].iloc[1].startswith("Fx stays at 10.5")
     assert failed["run"].tolist() == ["a", "a"]
 
 

@@ -49,9 +49,9 @@ def _of_series(one: JSON, start: str) -> str:
         parts.append(f"Found: {listed(grouped(sure))}.")
     if torn:
         pairs = [f"{plain(first)} from {plain(second)}" for first, second in one["rivals"]]
-        parts.append(f"These poses do not tell {listed(pairs)}.")
+        parts.append(f"These poses cannot distinguish {listed(pairs)}.")
     elif leads:
-        parts.append(f"A lead, not a finding: {listed(grouped(leads))}.")
+        parts.append(f"Possible cause: {listed(grouped(leads))}.")
     if not one["effects"]:
         parts.append("Nothing beyond the declared geometry was found.")
     return " ".join(parts)
@@ -112,7 +112,7 @@ def _of_ceiling(one: JSON, where: str) -> str:
     )
     if not told or one["ci95"][0] <= 0.0:
         return (
-            f"What is left {where}repeats with no joint, pose, time or temperature as far as these poses "
+            f"The residual {where}repeats with no joint, pose, time or temperature as far as these poses "
             f"show, so that no cause of these kinds can explain it.{instrument}"
         )
     joints = {name.split()[1]: share for name, share in told.items() if name.startswith("joint")}
@@ -120,7 +120,7 @@ def _of_ceiling(one: JSON, where: str) -> str:
     parts = [_of_joints(joints), *parts] if joints else parts
     alone = f"{100 * one['parts']['alone']:.0f} % does not repeat"
     return (
-        f"Of what is left {where}{listed([*parts, alone])}. Whatever the cause, other poses predict "
+        f"Of the residual {where}{listed([*parts, alone])}. Whatever the cause, other poses predict "
         f"{100 * max(one['share'], 0.0):.0f} % ({low:.0f} to {high:.0f} %) of it at one that is left out."
         f"{instrument} This points to {_kind(next(iter(told)))}."
     )
@@ -141,18 +141,18 @@ def _kind(name: str) -> str:
 
 def _next(values: JSON) -> str:
     rivals = dict.fromkeys(tuple(each) for each in values["rivals"])
-    parts = [f"to tell {pair(each)}: {_telling(each)}" for each in rivals]
+    parts = [f"to distinguish {pair(each)}: {_telling(each)}" for each in rivals]
     for run, kind in values["rest"].items():
         if kind.startswith("joint"):
             parts.append(
-                f"for what is left of {run}: {kind} alone in steps of 0.2°, both ways, all others at rest"
+                f"for the residual of {run}: {kind} alone in steps of 0.2°, both ways, all others at rest"
             )
         elif kind in ("time", "temperature"):
-            parts.append(f"for what is left of {run}: one pose again and again while the arm warms up")
+            parts.append(f"for the residual of {run}: one pose again and again while the arm warms up")
         elif kind == "pose":
-            parts.append(f"for what is left of {run}: the poses again with another load on the flange")
+            parts.append(f"for the residual of {run}: the poses again with another load on the flange")
     if values["without_noise"]:
-        parts.append("a few poses five times each or sigma_mm, to know what of the rest is noise")
+        parts.append("a few poses five times each or sigma_mm, to know how much of the residual is noise")
     return "; ".join(parts) or "the poses of table pose_next, which lower the errors of the geometry most"
 
 

@@ -93,7 +93,7 @@ def _reach(observable: str, entry: JSON) -> str:
         return f"{name}: {_undecided(verification)}."
     size = _size(entry)
     if "held_out" in entry:
-        return f"{name}: predictions of poses among those that were measured are off by up to {size}."
+        return f"{name}: the predictions of poses among those that were measured are accurate to {size}."
     if status in HOLDS and verification.get("holds", True):
         model = "predictions with the effects found" if entry.get("effects") else "predictions"
         return f"{name}: the {model} are accurate to {size}."
