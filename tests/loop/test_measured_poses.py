@@ -99,7 +99,7 @@ def test_a_rival_makes_a_lead_of_a_finding_and_both_are_named():
     assert chances["gravity_elasticity"] == 0.5
     assert chances["kinematic_error"] > 0.999
     assert found["indistinguishable"] == [["gravity_elasticity (joint 2)", "base_tilt"]]
-    assert "do not tell gravity elasticity (joint 2) from base tilt" in in_words(found["words"])
+    assert "cannot distinguish gravity elasticity (joint 2) from base tilt" in in_words(found["words"])
     assert "a point on the base" in in_words(found["next_experiment"])
 
 

@@ -13,6 +13,7 @@ rule ingest:
                 "profile",
                 "slopes",
                 "poses",
+                "targets",
                 "hit",
                 "frf",
                 "loads",
