@@ -98,9 +98,7 @@ def _dynamometer():
         case("forces in kN", times(1e-3), "refused", "fx_n", "kN", "expected"),
         case("forces in µN", times(1e6), "refused", "fx_n", "expected"),
         case("a dead channel", lambda t: t.assign(fz_n=0.0), "flagged", "Fz stays at 0", "left out"),
-        case(
-            "a stuck channel", lambda t: t.assign(fy_n=-4999.0), "flagged", "Fy stays at -4999", "left out"
-        ),
+        case("a stuck channel", lambda t: t.assign(fy_n=-4999.0), "flagged", "Fy stays at -4999", "left out"),
         case("a clipped channel", clipped("fx_n", 0.2), "flagged", "Fx stays at", "range", "left out"),
         case("a channel at full scale", flat, "flagged", "Fx stays at 5000", "range", "left out"),
         case("a channel twice", lambda t: t.assign(fy_n=t["fx_n"]), "flagged", "Fx and Fy", "left out"),
