@@ -133,7 +133,7 @@ def test_the_verdict_names_the_longer_link_with_errors_on_poses_left_out(found, 
     assert effect["parameters"]["length_mm"] == found[0]["pose"]["r01"]["corrections"]["joint 2 length"]
     assert judged["unexplained"] is None
     assert judged["noise_floor"] is None
-    assert "to know what of the rest is noise" in judged["next_experiment"]
+    assert "to know how much of the residual is noise" in judged["next_experiment"]
     assert {one["effect"] for one in judged["candidates"]} >= {"gear_eccentricity", "gravity_elasticity"}
 
 
@@ -151,7 +151,7 @@ def test_page_one_says_the_verdict_and_what_it_is_worth(found):
     for text in found[1:2]:
         assert "The arm by measured poses: explained. Of poses left out by region the median error is" in text
         assert "Found: kinematic error (joint 2)." in text
-        assert "predictions of poses among those that were measured are off by up to" in text
+        assert "the predictions of poses among those that were measured are accurate to" in text
 
 
 def test_the_next_poses_are_a_table_in_the_contracts_columns_and_on_the_report(found):
