@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, runtime_checkable
+from functools import cache
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
 
@@ -137,10 +138,16 @@ class Batched(Protocol):
         ...
 
 
+@cache  # asked for each prediction: what ``isinstance`` does for a protocol takes longer than some of these
+def _is_batched(kind: type) -> bool:
+    """Whether models of a kind predict at many nuisances in one call."""
+    return issubclass(kind, Batched)
+
+
 def predictions(model: Model, block: Block, nuisances: Array, beta: Array) -> Array:
     """Return the prediction (k, n) of a block at each of ``nuisances`` (k, m), by any model, SI."""
-    if isinstance(model, Batched):
-        return model.predictions(block, nuisances, beta)
+    if _is_batched(type(model)):
+        return cast(Batched, model).predictions(block, nuisances, beta)
     designs = [model.design(block, nuisance, beta) for nuisance in nuisances]
     return np.array([offset + matrix @ beta for matrix, offset in designs]).reshape(-1, len(block.measured))
 
@@ -174,9 +181,17 @@ class Moved(Protocol):
         ...
 
 
+@cache
+def _is_moved(kind: type) -> bool:
+    """Whether models of a kind are computed faster as a small change of another one."""
+    return issubclass(kind, Moved)
+
+
 def moved_from(model: Model, origin: Model) -> Model:
     """Return a model as a small change of another one; as it is where that makes nothing faster."""
-    return model.moved_from(origin) if isinstance(model, Moved) and type(model) is type(origin) else model
+    if type(model) is type(origin) and _is_moved(type(model)):
+        return cast(Moved, model).moved_from(origin)
+    return model
 
 
 @runtime_checkable

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -103,14 +104,13 @@ def linearised(
 
     ``known`` of the parameters beforehand; None: :func:`weakly_known`.
     """
-    model = candidate.model(state.theta)
-    moved = moved_models(candidate, state.theta) if derivatives == "all" else []
+    point = _point(candidate, tuple(state.theta.tolist()), tuple(state.beta.tolist()))
     rows: list[Rows] = []
     whiteners: list[Whitener] = []
     log_likelihood, chi2 = {}, {}
     for block in blocks:
-        nuisance = state.nuisance[block.run]
-        matrix, offset = model.design(block, nuisance, state.beta)
+        nuisance = tuple(state.nuisance[block.run].tolist())
+        matrix, offset = _design(point, block, nuisance)
         predicted = offset + matrix @ state.beta
         directions = noise_room.shared(block, noise, matrix, state.beta)
         whiten = noise_room.whitener(noise_room.diagonal(block, noise), directions)
@@ -120,13 +120,53 @@ def linearised(
         determinant = noise_room.log_determinant(block, noise, directions, whiten)
         log_likelihood[block.run] = -0.5 * (chi2[block.run] + determinant)
         if derivatives != "none":
-            effect, own = sensitivities(model, moved, block, nuisance, state.beta)
+            effect, own = _slopes(point, block, nuisance, by_effects=derivatives == "all")
             whitened = whiten(np.hstack([matrix, effect, own]))
             p, q = matrix.shape[1], matrix.shape[1] + effect.shape[1]
             rows.append((residual, whitened[:, :p], whitened[:, p:q], whitened[:, q:]))
     known = known or weakly_known(candidate, len(state.beta))
     at = np.concatenate([state.beta, state.theta])
     return System(rows, whiteners, log_likelihood, chi2, at, at - known.mean, known.precision)
+
+
+class _Point:
+    """A candidate at values of effect and base parameters; a point is equal to itself alone."""
+
+    def __init__(self, candidate: Candidate, theta: Array, beta: Array) -> None:
+        self.candidate, self.theta, self.beta = candidate, theta, beta
+        self.model = candidate.model(theta)
+
+    @cached_property
+    def moved(self) -> list[tuple[Model, float]]:
+        """The model with each effect parameter moved."""
+        return moved_models(self.candidate, self.theta)
+
+
+# The same point comes again and again: with another noise, at the end of a descent for its covariance, and
+# at the start of every fit that leaves a condition out.
+@lru_cache(maxsize=64)
+def _point(candidate: Candidate, theta: tuple[float, ...], beta: tuple[float, ...]) -> _Point:
+    return _Point(candidate, np.array(theta), np.array(beta))
+
+
+@lru_cache(maxsize=512)
+def _design(point: _Point, block: Block, nuisance: tuple[float, ...]) -> tuple[Array, Array]:
+    return _kept(*point.model.design(block, np.array(nuisance), point.beta))
+
+
+@lru_cache(maxsize=512)
+def _slopes(
+    point: _Point, block: Block, nuisance: tuple[float, ...], *, by_effects: bool
+) -> tuple[Array, Array]:
+    moved = point.moved if by_effects else []
+    return _kept(*sensitivities(point.model, moved, block, np.array(nuisance), point.beta))
+
+
+def _kept(first: Array, second: Array) -> tuple[Array, Array]:
+    """Return two arrays that nobody may write to, since others will be given them too."""
+    first, second = np.asarray(first).view(), np.asarray(second).view()
+    first.flags.writeable = second.flags.writeable = False
+    return first, second
 
 
 def sensitivities(

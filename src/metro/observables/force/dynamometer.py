@@ -94,6 +94,7 @@ class Recording:
         return float(np.sinc(self.orbit * self.span / (2.0 * math.pi)))
 
 
+@lru_cache(maxsize=1024)
 def transfer(sensor: Dynamometer, recording: Recording, orders: int) -> ComplexArray:
     """Map of the force to the reading at the orders 0…, in the comparison's frame: (blocks, orders, 3, 3)."""
     still = replace(sensor, resonances=(), slope=(0.0, 0.0, 0.0))  # what the maps below depend on
@@ -101,6 +102,7 @@ def transfer(sensor: Dynamometer, recording: Recording, orders: int) -> ComplexA
     gain = _gain(sensor, recording.speed, orders)
     seen = (gain @ by_channel.reshape(len(by_channel), 3, 9)).reshape(-1, orders, 3, 3)
     seen[:, 0] = _steady(still, recording)
+    seen.flags.writeable = False
     return np.asarray(seen)
 
 
