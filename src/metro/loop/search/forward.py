@@ -16,7 +16,7 @@ from metro.loop.checks.evidence import compare, hold_out, leave_out
 from metro.loop.fitting.fit import Fit
 from metro.loop.search.rivals import believed, contested
 from metro.loop.search.strategy import Choice, SearchSpace
-from metro.loop.search.trial import Trial, small_beside_residual, tried, without
+from metro.loop.search.trial import Trial, parted, small_beside_residual, tried, without
 from metro.loop.statement import Statement
 
 MOST_EFFECTS = 4
@@ -59,10 +59,10 @@ def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str
     """Drop, the smallest first, effects that are small beside what stays unexplained; say why of each."""
     dropped: dict[tuple[str, str], Statement] = {}
     while current.candidate.effects:
-        evidences = {}
-        for effect in current.candidate.effects:
-            kept = tuple(e for e in current.candidate.effects if e is not effect)
-            evidences[effect] = compare(without(space.base, kept, space.prior), current)
+        evidences = {
+            effect: compare(*parted(space.base, current, effect, space.prior))
+            for effect in current.candidate.effects
+        }
         least = min(evidences, key=lambda effect: evidences[effect].size)
         why = small_beside_residual(evidences[least])
         if why is None:
@@ -83,8 +83,7 @@ def _pruned(current: Fit, space: SearchSpace) -> tuple[Fit, set[str]]:
     """Drop effects that the latest addition made idle."""
     dropped: set[str] = set()
     for effect in current.candidate.effects[:-1]:
-        kept = tuple(e for e in current.candidate.effects if e is not effect)
-        smaller = without(space.base, kept, space.prior)
+        smaller, current = parted(space.base, current, effect, space.prior)
         evidence = compare(smaller, current)
         if evidence.size >= space.least:
             evidence = hold_out(evidence, leave_out(smaller, space.prior), current, space.prior)

@@ -14,7 +14,7 @@ from metro.loop.checks.evidence import leave_out, weights
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import BEHIND, Fit, fit
 from metro.loop.fitting.noise import Noise
-from metro.loop.search.trial import Gates, unlike, without
+from metro.loop.search.trial import Gates, parted, unlike
 
 RIVAL_WEIGHT = 0.05
 
@@ -83,12 +83,11 @@ def _round(
     weight: dict[str, float] = {}
     rivals: list[Rival] = []
     better: Fit | None = None
-    out = leave_out(current, prior) if current.candidate.effects else {}
     for effect in current.candidate.effects:
-        smaller = without(base, tuple(e for e in current.candidate.effects if e is not effect), prior)
+        smaller, current = parted(base, current, effect, prior)
         others = _replaced(current, smaller, effects, prior)
         in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
-        left_out = [leave_out(smaller, prior), out, *(leave_out(fitted, prior) for fitted in others)]
+        left_out = [leave_out(fitted, prior) for fitted in (smaller, current, *others)]
         share = weights(left_out, gates.seed, prior=[1.0, *(one.odds for one in in_place)])[1:]
         weight[effect.name] = float(share[0])
         for fitted, other in zip(others, share[1:], strict=True):

@@ -194,3 +194,17 @@ def without(base: Fit, kept: tuple[Effect, ...], prior: Noise) -> Fit:
         candidate = Candidate(base.candidate.base, (*fitted.candidate.effects, effect))
         fitted = fit(candidate, base.blocks, prior, fitted)
     return fitted
+
+
+def parted(base: Fit, current: Fit, effect: Effect, prior: Noise) -> tuple[Fit, Fit]:
+    """Return the fit without one of its effects, and the fit with it.
+
+    A model is at least as likely as one that it contains. Where it is not, its noise was estimated from a
+    start that leads astray: it is fitted again from where the smaller one ended.
+    """
+    smaller = without(base, tuple(one for one in current.candidate.effects if one is not effect), prior)
+    if smaller.total > current.total:
+        whole = Candidate(base.candidate.base, (*smaller.candidate.effects, effect))
+        again = fit(whole, base.blocks, prior, smaller)
+        current = again if again.total > current.total else current
+    return smaller, current
