@@ -8,10 +8,10 @@ from toy import BEND, GATES, block, problem
 from toy_knee import STOP, Knee
 
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import BEHIND, fit
+from metro.loop.fitting.fit import fit
 from metro.loop.fitting.noise import first_noise
 from metro.loop.planning.decide import Pair, decided, plan
-from metro.loop.search.rivals import RIVAL_WEIGHT
+from metro.loop.search.rivals import HOPELESS, RIVAL_WEIGHT
 from metro.observables.problem import Made, Proposal
 
 
@@ -52,7 +52,7 @@ def test_one_condition_among_many_that_are_silent_speaks_less_loudly():
     # is to be below 0.05; for n = 7, g = 6 it is about 6 ln 2 / 42 = 0.10, for g = 40 about 0.015.
     rng = np.random.default_rng(0)
     assert decided(np.zeros(6), np.array([[6.0]]), 0.0, 0.0, rng) == 0.0
-    assert decided(np.zeros(6), np.array([[6.0]]), BEHIND - 5.0, 0.0, rng) == 1.0
+    assert decided(np.zeros(6), np.array([[6.0]]), HOPELESS - 5.0, 0.0, rng) == 1.0
     assert decided(np.zeros(6), np.array([[40.0]]), -50.0, 0.0, rng) == 1.0
 
 

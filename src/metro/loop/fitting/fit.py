@@ -24,8 +24,8 @@ from metro.loop.fitting.descent import (
     free,
     polish,
 )
+from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
-from metro.loop.fitting.starts import costs_of, first_beta, search_nuisance
 from metro.loop.fitting.system import (
     State,
     condition,
@@ -34,12 +34,11 @@ from metro.loop.fitting.system import (
     normal_equations,
     solution,
 )
-from metro.observables.problem import Block
+from metro.observables.problem import Block, Model, predictions
 from metro.units import Array
 
 FOLLOWED = 4  # starts of new effect parameters that are followed to the end
 FIRST_STEPS, KEPT = 3, 2  # where little is left to explain, after so many steps so many are kept
-BEHIND = 12.0  # log-likelihood by which a fit may be behind its rival and still count for something
 HOPELESS = 1.0  # and none, where twice the log-likelihood has not gained that much per parameter: chance does
 ALIKE = 1e-9  # relative difference of the sums of squares of starts that are the same
 UNDECIDED = 0.1  # differences in twice the log-likelihood that the noise, once known better, may turn round
@@ -113,47 +112,36 @@ class _End(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def fit(
-    candidate: Candidate,
-    blocks: tuple[Block, ...],
-    prior: Noise,
-    start: Fit | None = None,
-    rival: Fit | None = None,
-) -> Fit:
+def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fit | None = None) -> Fit:
     """Fit a candidate to blocks: base parameters, effect parameters and nuisances jointly.
 
     ``start``, a fit of the same or of a simpler candidate, gives the base parameters and the noise to begin
     with; effect parameters that it lacks are started from all combinations of their starting values, group
     after group, and the best few are followed.
-
-    ``rival``, another fit of the same blocks: this one is given up, as it is, where it stays behind that by
-    more than ``BEHIND``, under the noise to begin with. With the noise re-estimated it is farther behind:
-    a sum of squares s costs n·log s then, which is steeper than s where the noise has become less.
     """
     noise = start.noise if start else prior
     known = start.theta if start else np.zeros(0)
     fresh = candidate.parameters[len(known) :]
     theta = np.concatenate([known, [parameter.neutral for parameter in fresh]])
-    beta = start.beta if start else first_beta(candidate, blocks, noise)
+    beta = start.beta if start else _first_beta(candidate, blocks, noise)
     around = start.nuisance if start and fresh else None
     best = [State(theta, beta, {})]
     for places in candidate.groups(len(known)) or [[]]:
         trials: list[tuple[float, State]] = []
         for given in started(candidate, best[0].theta, places):
             state = State(given, beta.copy(), {})
-            trials.append((search_nuisance(candidate, blocks, noise, state, around), state))
+            trials.append((_search_nuisance(candidate, blocks, noise, state, around), state))
         best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
-    limit = _cost(rival, noise) + 2.0 * BEHIND if rival else np.inf
     if start and fresh:
-        first = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS, limit=limit)
+        first = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS)
         best = _distinct(first, ENOUGH)
         if all(missed < noise.budget for missed in noise.misfit.values()):
             best = best[:KEPT]
-            if _cost(start, noise) - first[0][0] < HOPELESS * len(fresh):
+            here = State(start.theta, start.beta, dict(start.nuisance))
+            without = linearised(start.candidate, blocks, noise, here, derivatives="none").cost
+            if without - first[0][0] < HOPELESS * len(fresh):
                 return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
-    reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS, limit=limit)
-    if reached[0][0] > limit:
-        return _refined(candidate, blocks, prior, noise, reached[0][1], rounds=0)
+    reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS)
     near = _distinct([one for one in reached if one[0] < reached[0][0] + UNDECIDED], ENOUGH)
     refined = [_refined(candidate, blocks, prior, noise, state, rounds=ROUNDS) for state in near]
     return max(refined, key=lambda fitted: fitted.total)
@@ -168,31 +156,17 @@ def _distinct(reached: Sequence[tuple[float, State]], apart: float) -> list[Stat
     return [state for (cost, state), lower in zip(reached, costs, strict=False) if cost - lower > apart]
 
 
-def _cost(fitted: Fit, noise: Noise) -> float:
-    """Twice the negative log-likelihood of a fit under another noise than its own, as in a descent."""
-    here = State(fitted.theta, fitted.beta, dict(fitted.nuisance))
-    return linearised(fitted.candidate, fitted.blocks, noise, here, derivatives="none").cost
-
-
 def _lowest_first(
-    candidate: Candidate,
-    blocks: Sequence[Block],
-    noise: Noise,
-    states: Sequence[State],
-    *,
-    steps: int,
-    limit: float,
+    candidate: Candidate, blocks: Sequence[Block], noise: Noise, states: Sequence[State], *, steps: int
 ) -> list[tuple[float, State]]:
     """Follow each state some steps down; return where they lead, with the cost there.
 
-    They are given up when they cannot come below the ``limit``; once one has been followed to its end, others
-    when they cannot come as low.
+    Once one has been followed to its end, others are given up when they cannot come as low.
     """
     reached: list[tuple[float, State]] = []
     for state in states:
         lowest = min((cost for cost, _ in reached), default=np.inf) if steps == ITERATIONS else np.inf
-        rival = min(lowest + UNDECIDED, limit)
-        end, cost = descend(candidate, blocks, noise, state, steps, rival=rival)
+        end, cost = descend(candidate, blocks, noise, state, steps, rival=lowest + UNDECIDED)
         reached.append((cost, end))
     return sorted(reached, key=lambda pair: pair[0])
 
@@ -220,11 +194,71 @@ def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
     for block in blocks:
         starts = model.nuisance_starts(block)
         states = [State(state.theta, state.beta, {block.run: start}) for start in starts]
-        costs = costs_of(model, block, noise, state.beta, starts).tolist()
+        costs = _costs(model, block, noise, state.beta, starts).tolist()
         near = _distinct(sorted(zip(costs, states, strict=True), key=lambda one: one[0]), ALIKE * min(costs))
         reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
         state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
     return _finished(candidate, blocks, noise, state, _End(fitted.covariance, fitted.step, fitted.condition))
+
+
+def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> Array:
+    """Fit the base parameters, each block's nuisance at the start that fits the block alone best."""
+    theta = np.array([parameter.starts[0] for parameter in candidate.parameters])
+    model = candidate.model(theta)
+    rows, right = [], []
+    for block in blocks:
+        weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
+        best, kept = np.inf, None
+        for nuisance in model.nuisance_starts(block):
+            matrix, offset = model.design(block, nuisance, None)
+            scaled, target = matrix * weight[:, None], (block.measured - offset) * weight
+            solution = np.linalg.lstsq(scaled, target, rcond=None)[0]
+            cost = float(np.sum((target - scaled @ solution) ** 2))
+            if cost < best:
+                best, kept = cost, (scaled, target)
+        if kept is not None:
+            rows.append(kept[0])
+            right.append(kept[1])
+    return least_squares(np.vstack(rows), np.concatenate(right))
+
+
+def _search_nuisance(
+    candidate: Candidate,
+    blocks: Sequence[Block],
+    noise: Noise,
+    state: State,
+    around: Mapping[str, Array] | None = None,
+) -> float:
+    """Put each block's nuisance at the best of its starts for the state's parameters; return the cost.
+
+    The starts are those of the model, or only the symmetric images of ``around``; an unknown that ``around``
+    lacks, since it is of a simpler candidate, takes all of its starts.
+    """
+    model = candidate.model(state.theta)
+    total = 0.0
+    for block in blocks:
+        starts = model.nuisance_starts(block)
+        starts = _images(block, around[block.run], starts) if around else starts
+        costs = _costs(model, block, noise, state.beta, starts)
+        best = int(np.argmin(costs))
+        state.nuisance[block.run] = np.asarray(starts[best], dtype=float)
+        total += float(costs[best])
+    return total
+
+
+def _costs(model: Model, block: Block, noise: Noise, beta: Array, starts: Array) -> Array:
+    """Weighted sum of squares that each of a block's nuisances leaves, (starts,)."""
+    weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
+    left = (block.measured - predictions(model, block, starts, beta)) * weight
+    return np.asarray(np.sum(left**2, axis=1))
+
+
+def _images(block: Block, nuisance: Array, starts: Array) -> Array:
+    images = nuisance[None] if block.symmetries is None else nuisance + block.symmetries
+    lacking = np.unique(starts[:, len(nuisance) :], axis=0)
+    if not lacking.size:
+        return images
+    return np.hstack([np.repeat(images, len(lacking), axis=0), np.tile(lacking, (len(images), 1))])
 
 
 def _refined(

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.loop.checks.evidence import leave_out
-from metro.loop.fitting.fit import BEHIND, Fit
+from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.planning.experiment import ENOUGH, MOST_REPEATS, expected
-from metro.loop.search.rivals import RIVAL_WEIGHT
+from metro.loop.search.rivals import HOPELESS, RIVAL_WEIGHT
 from metro.observables.problem import Proposal
 from metro.units import Array
 
@@ -166,5 +166,5 @@ def decided(known: Array, new: Array, ahead: float, prior: float, rng: np.random
     share = rng.dirichlet(np.ones(count), size=DRAWS) * count
     gain = np.clip(np.hstack([np.tile(known, (len(new), 1)), new]), -FAR, FAR)
     weight = np.mean(1.0 / (1.0 + np.exp(np.clip(gain @ share.T + prior, -500.0, 500.0))), axis=1)
-    behind = ahead + new.sum(axis=1) > BEHIND
+    behind = ahead + new.sum(axis=1) > HOPELESS
     return float(np.mean((weight <= RIVAL_WEIGHT) | behind))

@@ -12,11 +12,12 @@ from dataclasses import dataclass, field
 from metro.effects.effect import Effect
 from metro.loop.checks.evidence import leave_out, weights
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import BEHIND, Fit, fit
+from metro.loop.fitting.fit import Fit, fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.search.trial import Gates, parted, unlike
 
 RIVAL_WEIGHT = 0.05
+HOPELESS = 12.0  # log-likelihood on the runs of the fit by which a rival may be behind and still be weighed
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Nois
     for effect in effects:
         if effect.name not in others and effect.key not in present:
             candidate = Candidate(current.candidate.base, (*smaller.candidate.effects, effect))
-            fitted = fit(candidate, current.blocks, prior, smaller, current)
-            if fitted.total > current.total - BEHIND and not unlike(effect, fitted):
+            fitted = fit(candidate, current.blocks, prior, smaller)
+            if fitted.total > current.total - HOPELESS and not unlike(effect, fitted):
                 fits.append(fitted)
     return fits
