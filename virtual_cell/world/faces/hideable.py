@@ -14,6 +14,7 @@ from virtual_cell.units import MM, UM
 from virtual_cell.world.faces.finish import FaceRun
 
 Applied = tuple[Workshop, float]
+_LEFT = 0.45  # of the noise of a point, in the mean over a disc
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,12 @@ def seen_noise(cell: Workshop) -> float:
     """
     scanner = cell.scanner
     placed = scanner.shift if scanner.place == "declared" else 0.0
-    return 0.45 * math.hypot(scanner.sigma, placed) / UM
+    return _LEFT * math.hypot(scanner.sigma, placed) / UM
+
+
+def disc_noise(cell: Workshop) -> float:
+    """Return the noise of the mean over a disc, m."""
+    return _LEFT * cell.scanner.sigma
 
 
 def sized(rng: np.random.Generator, cell: Workshop, shown: float, most: float) -> float:
