@@ -1,7 +1,8 @@
 """What is always there of the library's effects in a batch of faces, in the contract's terms.
 
 Each thing is seen by itself: what it does to the faces of the session, on a grid, cut by a tip that does not
-give way. The plane of each face is left out: no scan tells it to better than some tens of micrometres.
+give way. Its form is read with the noise of the means over discs; how high a face lies and how it is tilted,
+against the mean of all, is read where the place of the scans is declared, with what differs between scans.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from virtual_cell.world.present import Term, term
 
 _EVERY = 7  # of the points of the grid: enough for an rms
 _LENGTHS = np.geomspace(2.0, 150.0, 60) * MM  # of a transient, among which the best one is
+_DISC = 10.0 * MM  # about what one mean is taken over
 _MRAD = 1e-3
 
 
@@ -36,19 +38,19 @@ def in_contract_terms(cell: Workshop, session: Sequence[FaceRun]) -> dict[str, l
 
 
 def done_by(cell: Workshop, cause: Cause | None, session: Sequence[FaceRun]) -> Array:
-    """Height (faces, n), m, that a cause alone leaves as form on the grid of each face."""
+    """Height (faces, n), m, that a cause alone leaves on the grid of each face."""
     points = _grid(cell)
     rng = np.random.default_rng(0)
     influences = [cause.in_face(run, rng) if cause else Influence() for run in session]
-    faces = [_finished(run, one, points) for run, one in zip(session, influences, strict=True)]
-    return formed(cell, np.array(faces))
+    return np.array([_finished(run, one, points) for run, one in zip(session, influences, strict=True)])
 
 
-def formed(cell: Workshop, faces: Array) -> Array:
-    """Return the form of faces (m, n), m, on the grid: what is no plane."""
+def parted(cell: Workshop, faces: Array) -> tuple[Array, Array]:
+    """Return form (m, n), m, of faces on the grid, and their planes (m, 3): height, m, and slopes."""
     points = _grid(cell)
-    plane = np.column_stack([np.ones(len(points)), points])
-    return np.asarray(faces - (plane @ np.linalg.lstsq(plane, faces.T, rcond=None)[0]).T)
+    plane = np.column_stack([np.ones(len(points)), points - np.array(cell.size) / 2.0])
+    found = np.linalg.lstsq(plane, faces.T, rcond=None)[0]
+    return np.asarray(faces - (plane @ found).T), np.asarray(found.T)
 
 
 def _grid(cell: Workshop) -> Array:
@@ -74,7 +76,14 @@ class _Alone:
 
 
 def _term(cell: Workshop, parameters: dict[str, float], does: Array, told: Array) -> Term:
-    return term(parameters, does, told, disc_noise(cell))
+    (form, planes), (told_form, told_planes) = parted(cell, does), parted(cell, told)
+    discs = len(does) * cell.size[0] * cell.size[1] / _DISC**2
+    in_form = term(parameters, form, told_form, disc_noise(cell), discs)
+    if cell.scanner.place != "declared":
+        return in_form
+    height, turn = cell.scanner.again
+    lie, told_lie = ((one - one.mean(axis=0)) / [height, turn, turn] for one in (planes, told_planes))
+    return max(in_form, term(parameters, lie, told_lie, 1.0, lie.size), key=lambda one: one.gain)
 
 
 def _tilt(cell: Workshop, session: Sequence[FaceRun]) -> Term:
@@ -99,7 +108,7 @@ def _bow(cell: Workshop, session: Sequence[FaceRun]) -> Term:
     entries, _ = fixture.second_degree(steady.shape(points, cell.size), points, cell.size)
     u, v = fixture.over_plate(points, cell.size)
     form = np.column_stack([u * u, u * v, v * v]) @ entries
-    does, told = done_by(cell, steady, session[:1]), formed(cell, form[None])
+    does, told = done_by(cell, steady, session), np.tile(form, (len(session), 1))
     names = ("xx_um", "xy_um", "yy_um")
     parameters = {name: digits(float(v) / UM) for name, v in zip(names, entries, strict=True)}
     return _term(cell, parameters, does, told)
@@ -131,7 +140,7 @@ def _stiffness(cell: Workshop, session: Sequence[FaceRun]) -> Term:
     for run in session:
         force = run.force(np.array([0.5 * run.passes.length]))[0]
         faces.append(cell.poses[f"{run.wrist}{run.location}"].tested(points)[:, 2] @ force)
-    tip = formed(cell, np.array(faces))
+    tip = np.array(faces)
     factor = 1.0 + cell.loads.gain
     does = tip * (1.0 - factor)
     return _term(cell, {"factor": round(factor, 4)}, does, does)
