@@ -93,7 +93,8 @@ def make(
 def _climbs(ladder: Ladder, programme: Programme) -> Climbs:
     first = np.flatnonzero(ladder.step == 0)
     directions = tuple(ladder.plan.direction[i] for i in first)
-    return Climbs(ladder.plan.rpm[first], directions, programme.depths[1] / programme.depths[0])
+    turns = _RECORDED if programme.records else 0
+    return Climbs(ladder.plan.rpm[first], directions, programme.depths[1] / programme.depths[0], turns)
 
 
 def _drawn(

@@ -21,27 +21,41 @@ from virtual_cell.world.present import Term, term
 
 _LINES = 1500  # frequencies at which a boundary is looked for
 _ANGLES = 90
+_OTHER = 0.06  # relative change of a frequency that no change of stiffness makes
 _NEVER_FREE = 1.0  # m, by which work would spring back
 
 
 @dataclass(frozen=True, eq=False)
 class Climbs:
-    """Ladders of tests: ``rpm`` (c,), ``direction`` (c,), and the ``ratio`` of the depths of two rungs."""
+    """Ladders of tests: ``rpm`` (c,), ``direction`` (c,), and the ``ratio`` of the depths of two rungs.
+
+    ``turns``: of the spindle that are recorded, from which a frequency of chatter can be read; 0: none.
+    """
 
     rpm: Array
     direction: tuple[str, ...]
     ratio: float
+    turns: int
 
 
 def in_contract_terms(cell: Cell, climbs: Climbs) -> dict[str, list[Term]]:
     """Return, by the contract's names, what there is of each effect at a machine."""
     s = cell.session
-    noise = math.hypot(math.log(climbs.ratio) / math.sqrt(12.0), s.depth_sd / cell.level, s.common, s.drift)
+    rung = math.log(climbs.ratio) / math.sqrt(12.0)
+    in_depth = math.hypot(rung, s.depth_sd / cell.level, s.common, s.drift)
 
     def seen(parameters: Parameters, bare: Cell, told: Cell) -> Term:
         less, does, made = (np.log(boundary(one, climbs)) for one in (bare, cell, told))
-        shifts = [_apart(one - less) for one in (does, made)]
-        return term(parameters, shifts[0], shifts[1], noise, len(climbs.rpm))
+        depth = [_apart(one[0] - less[0]) for one in (does, made)]
+        by_depth = term(parameters, *depth, in_depth, len(climbs.rpm))
+        if not climbs.turns:
+            return by_depth
+        line = climbs.rpm / 60.0 / climbs.turns / np.exp(less[1])  # of a spectrum, its width over its place
+        in_hz = np.hypot(line, s.warming)
+        same = np.abs(does[1] - less[1]) < _OTHER  # at others it is another resonance that rings
+        hz = [((one[1] - less[1]) / in_hz)[same] for one in (does, made)]
+        by_hz = term(parameters, *hz, 1.0, int(same.sum())) if same.any() else by_depth
+        return max(by_depth, by_hz, key=lambda one: one.gain)
 
     return {
         "process_damping": [seen(*_flank(cell, climbs.rpm))],
@@ -90,7 +104,7 @@ def _headings(cell: Cell) -> Told:
 
 
 def boundary(cell: Cell, climbs: Climbs) -> Array:
-    """Depth (c,), m, at which each speed begins to chatter, by the mean of the cut."""
+    """Depth, m, and frequency, Hz, at which each speed begins to chatter, by the mean of the cut: (2, c)."""
     middle = np.full(len(climbs.rpm), 0.5)
     a, b, c = state_matrices(
         cell.resonances,
@@ -105,22 +119,24 @@ def boundary(cell: Cell, climbs: Climbs) -> Array:
             _lowest(cell, s, c @ np.linalg.solve(s[:, None, None] * np.eye(len(one)) - one, b), rpm, way)
             for one, rpm, way in zip(a, climbs.rpm, climbs.direction, strict=True)
         ]
-    )
+    ).T
 
 
-def _lowest(cell: Cell, s: Array, felt: Array, rpm: float, direction: str) -> float:
-    """Lowest depth, m, at which a vibration e^{st} neither grows nor fades: its loop is one."""
+def _lowest(cell: Cell, s: Array, felt: Array, rpm: float, direction: str) -> tuple[float, float]:
+    """Lowest depth, m, at which a vibration e^{st} neither grows nor fades, its loop is one; and its Hz."""
     surface_speed = rpm * RPM * 0.5 * cell.tool.diameter
     chip, land = _mean_cut(cell, direction, surface_speed)
     again = 1.0 - np.exp(-s * 60.0 / rpm / cell.tool.teeth)
     loop = felt @ (again[:, None, None] * chip + (s / surface_speed)[:, None, None] * land)
-    lowest = math.inf
+    found = [(math.inf, 1.0)]
+    hz = s.imag / (2.0 * math.pi)
     for depth in _followed(1.0 / np.linalg.eigvals(loop)).T:
         turns = np.flatnonzero(depth.imag[1:] * depth.imag[:-1] < 0.0)
         share = depth.imag[turns] / (depth.imag[turns] - depth.imag[turns + 1])
         real = depth.real[turns] + share * (depth.real[turns + 1] - depth.real[turns])
-        lowest = min([lowest, *real[real > 0.0].tolist()])
-    return lowest
+        at = hz[turns] + share * (hz[turns + 1] - hz[turns])
+        found += [(float(d), float(f)) for d, f in zip(real, at, strict=True) if d > 0.0]
+    return min(found)
 
 
 def _followed(pairs: Array) -> Array:
