@@ -19,9 +19,10 @@ from virtual_cell.world.boundary.resonances import state_matrices
 from virtual_cell.world.draws import digits
 from virtual_cell.world.present import Term, term
 
-_LINES = 1500  # frequencies at which a boundary is looked for
+_LINES = 1400  # frequencies at which a boundary is looked for
 _ANGLES = 90
 _OTHER = 0.06  # relative change of a frequency that no change of stiffness makes
+_DEEPEST = 8.0  # times the lowest boundary: nobody goes deeper
 _NEVER_FREE = 1.0  # m, by which work would spring back
 
 
@@ -112,7 +113,7 @@ def boundary(cell: Cell, climbs: Climbs) -> Array:
         1.0 + cell.spindle.damped * climbs.rpm / cell.fast,
         np.zeros(len(climbs.rpm)),
     )
-    hz = np.linspace(0.6 * cell.resonances.hz.min(), 1.6 * cell.resonances.hz.max(), _LINES)
+    hz = np.linspace(0.6 * cell.resonances.hz.min(), 1.7 * cell.resonances.hz.max(), _LINES)
     s = 2j * math.pi * hz
     return np.array(
         [
@@ -128,7 +129,7 @@ def _lowest(cell: Cell, s: Array, felt: Array, rpm: float, direction: str) -> tu
     chip, land = _mean_cut(cell, direction, surface_speed)
     again = 1.0 - np.exp(-s * 60.0 / rpm / cell.tool.teeth)
     loop = felt @ (again[:, None, None] * chip + (s / surface_speed)[:, None, None] * land)
-    found = [(math.inf, 1.0)]
+    found = [(_DEEPEST * cell.level, 1.0)]
     hz = s.imag / (2.0 * math.pi)
     for depth in _followed(1.0 / np.linalg.eigvals(loop)).T:
         turns = np.flatnonzero(depth.imag[1:] * depth.imag[:-1] < 0.0)

@@ -14,7 +14,6 @@ from virtual_cell.units import MM, UM
 from virtual_cell.world.faces.finish import FaceRun
 
 Applied = tuple[Workshop, float]
-_LEFT = 0.45  # of the noise of a point, in the mean over a disc
 
 
 @dataclass(frozen=True)
@@ -38,12 +37,16 @@ def seen_noise(cell: Workshop) -> float:
     """
     scanner = cell.scanner
     placed = scanner.shift if scanner.place == "declared" else 0.0
-    return _LEFT * math.hypot(scanner.sigma, placed) / UM
+    return _over_disc(math.hypot(scanner.sigma, placed)) / UM
 
 
 def disc_noise(cell: Workshop) -> float:
     """Return the noise of the mean over a disc, m."""
-    return _LEFT * cell.scanner.sigma
+    return _over_disc(cell.scanner.sigma)
+
+
+def _over_disc(noise: float) -> float:
+    return 0.45 * noise
 
 
 def sized(rng: np.random.Generator, cell: Workshop, shown: float, most: float) -> float:

@@ -22,7 +22,7 @@ from virtual_cell.world.present import Term, term
 
 _EVERY = 7  # of the points of the grid: enough for an rms
 _LENGTHS = np.geomspace(2.0, 150.0, 60) * MM  # of a transient, among which the best one is
-_DISC = 10.0 * MM  # about what one mean is taken over
+_DISC = 11.0 * MM  # about what one mean is taken over
 _MRAD = 1e-3
 
 
