@@ -4,22 +4,27 @@ What a thing does is taken from what the simulator makes with it and without it;
 put into the contract's formulas. The two share nothing.
 """
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from virtual_cell.recipes import arm, arm_world, arm_world_programme, boundary_world, faces_world
+from metro.effects.library import library
+from virtual_cell.blind import RECIPES
+from virtual_cell.recipes import arm_world, arm_world_programme, boundary_world, faces_world
 from virtual_cell.recipes.boundary_world_draws import drawn_cell, drawn_programme
 from virtual_cell.recipes.faces_world_draws import drawn as drawn_faces
 from virtual_cell.units import DEG, MM
 from virtual_cell.world.arm import terms as of_arm
+from virtual_cell.world.arm.told import Gauges, Run
 from virtual_cell.world.boundary import terms as of_boundary
 from virtual_cell.world.boundary.cell import Plan
 from virtual_cell.world.boundary.cell import made as made_cuts
 from virtual_cell.world.boundary.chatter import march
 from virtual_cell.world.faces import fixture, warmth
 from virtual_cell.world.faces import terms as of_faces
+from virtual_cell.world.faces.finish import over_plate
 from virtual_cell.world.present import LEAST, listed, term
 
 NONE = np.zeros(6)
@@ -56,7 +61,7 @@ def faces():
 def face(cell, run, cause):
     """Form of one face (n,), m, that a cause leaves, with coordinates of its points over the plate."""
     form, _ = of_faces.parted(cell, of_faces.done_by(cell, cause, [run]))
-    return form[0], fixture.over_plate(fixture.grid(cell.size)[:: of_faces._EVERY], cell.size)
+    return form[0], over_plate(fixture.grid(cell.size)[:: of_faces._EVERY], cell.size)
 
 
 def test_the_bow_that_is_told_is_the_form_of_the_free_plate(faces):
@@ -70,7 +75,7 @@ def test_the_bow_that_is_told_is_the_form_of_the_free_plate(faces):
     made = p["xx_um"] * u**2 + p["xy_um"] * u * v + p["yy_um"] * v**2
     made, _ = of_faces.parted(cell, made[None])
     assert np.sqrt(np.mean((form - made[0]) ** 2)) < 0.15 * np.sqrt(np.mean(form**2))
-    flat = replace(bent, moments=(0.0, 0.0), twist=0.0)
+    flat = replace(bent, moments=(1e-12, 0.0), twist=0.0)
     flat_cell = replace(cell, always=replace(cell.always, bow=flat))
     assert not of_faces.in_contract_terms(flat_cell, session)["fixture_bow"][0].present
 
@@ -94,7 +99,7 @@ def test_a_spindle_out_of_square_is_told_and_a_squared_one_is_not(faces):
         now = replace(cell, always=replace(cell.always, tilt=tilt))
         (told,) = of_faces.in_contract_terms(now, session)["spindle_tilt"]
         assert told.present is there
-        # Three pads at 120°, of which one is higher by h, and one by half of it: by |h (e₁ + ½ e₃)| over 1½ radii.
+        # Of three pads at 120° one is higher by h, and one by half of it: |h (e₁ + ½ e₃)| over 1½ radii.
         size = np.hypot(*told.parameters.values())
         assert size == pytest.approx(1e3 * angle * np.sqrt(0.75) / 1.5, rel=0.01)
         assert not there or told.rest < 1e-6
@@ -131,11 +136,11 @@ def runs_of(robot, bench, session, count=4):
 
         courses = [day.course(one, 12.0 * MM, cutting=cutting, start=NONE) for cutting in (True, False)]
         cut, air = (arm_world.done(robot, c, force if c.cutting else None) for c in courses)
-        made.append(of_arm.Run(cut, air, 0.0, (courses[0].warmth, courses[1].warmth)))
+        made.append(Run(cut, air, 0.0, (courses[0].warmth, courses[1].warmth)))
     return made
 
 
-GAUGES = of_arm.Gauges(np.zeros(3), 0.0, 3e-7, 2e-6)
+GAUGES = Gauges(np.zeros(3), 0.0, 3e-7, 2e-6)
 
 
 @pytest.fixture(scope="module")
@@ -171,6 +176,13 @@ def test_friction_that_goes_with_the_load_is_the_torque_that_the_cut_has_more(wo
         assert abs(one["torque_nm"]) > 0.1 * robot.recorder.torque_noise
     assert told
     assert "friction_reversal" not in of("joint_force", off, bench, session)
+
+
+def test_without_logs_of_the_air_no_friction_is_told(world):
+    robot, bench, session = world
+    runs = [replace(run, air=None) for run in runs_of(robot, bench, session)]
+    told = listed(of_arm.in_contract_terms("joint_force", robot, runs, GAUGES), {})
+    assert not {"friction_reversal", "friction_by_speed"} & set(told)
 
 
 def test_grease_that_is_warmer_in_the_cut_is_friction_by_speed(world):
@@ -272,12 +284,23 @@ def test_an_error_of_a_gear_is_a_wave_of_the_wall(world):
 def test_a_batch_of_an_arm_tells_what_its_observable_reads(about, tmp_path, monkeypatch):
     few = replace(arm_world_programme.HABITS["c"], identify=(3, 3), validate=(1, 1))
     monkeypatch.setitem(arm_world_programme.HABITS, "c", few)
-    truth = arm.make(
-        tmp_path / "one", {"joint_backlash": {"joint": 2, "angle_mdeg": 8.0}}, 4, "c", about=about
-    )
+    hidden = {"joint_backlash": {"joint": 2, "angle_mdeg": 8.0}}
+    truth = RECIPES[about].make(tmp_path / "one", hidden, 4, "c")
+    json.dumps(truth)
     for name, values in truth["always_on"].items():
-        assert all(1 <= one["joint"] <= 6 for one in values if one["joint"] != "all")
+        assert all(one["joint"] == "all" or 1 <= one["joint"] <= 6 for one in values)
         assert name != "joint_backlash" or all(one["joint"] != 2 for one in values)
+
+
+@pytest.mark.parametrize("about", ["joint_force", "deformation", "waviness"])
+def test_what_is_told_are_parameters_of_a_form_of_the_library(about, world):
+    robot, bench, session = world
+    known = {(effect.name, effect.where.get("joint")): effect for effect in library(about)}
+    told = of_arm.in_contract_terms(about, robot, runs_of(robot, bench, session), GAUGES)
+    for name, some in told.items():
+        for one in some:
+            effect = known[name, one.parameters.get("joint")]
+            assert set(one.parameters) == {*effect.names, *effect.where}
 
 
 # -- tests on either side of the boundary

@@ -24,13 +24,13 @@ from virtual_cell.session import Plan, write_force
 from virtual_cell.side_force import SideForce, side_force
 from virtual_cell.units import DEG, MM, Array
 from virtual_cell.wall import feed_marks
-from virtual_cell.world.arm import terms
+from virtual_cell.world.arm import told
 from virtual_cell.world.arm.cause import During
 from virtual_cell.world.arm.causes import ARM_CAUSES
 from virtual_cell.world.arm.made import Made
 from virtual_cell.world.arm.robot import Course, Done, Robot, Way, done, logged
 from virtual_cell.world.arm.robot import way as statics
-from virtual_cell.world.arm.terms import Gauges, in_contract_terms
+from virtual_cell.world.arm.terms import in_contract_terms
 from virtual_cell.world.present import listed
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_signal, write_yaml
 
@@ -170,12 +170,12 @@ def _row(run: _Run, replicate: int, before: int) -> Row:
     return row | {"cut_length_mm": round(run.wall.length / MM, 3)}
 
 
-def _gauges(day: _Day) -> Gauges:
+def _gauges(day: _Day) -> told.Gauges:
     gains, stylus = day.bench.calibration, day.session.stylus
-    return Gauges(gains[:3], float(gains[3]), stylus.noise, stylus.zero)
+    return told.Gauges(gains[:3], float(gains[3]), stylus.noise, stylus.zero)
 
 
-def _made(day: _Day, run: _Run, folder: Path, own: list[np.random.Generator]) -> tuple[Row, terms.Run]:
+def _made(day: _Day, run: _Run, folder: Path, own: list[np.random.Generator]) -> tuple[Row, told.Run]:
     """Cut a run: force, logs and trace, each its own noise; return the files and what the arm did."""
     robot, session, (cutting, idling, sensing, logging, tracing) = day.robot, day.session, own
     force = _force(day, run, cutting)
@@ -198,7 +198,7 @@ def _made(day: _Day, run: _Run, folder: Path, own: list[np.random.Generator]) ->
     files["dynamometer"] = write_force(folder, run.name, *_sensed(day, run, force, cut.during, sensing))
     files["profile"] = f"profile/{run.name}.parquet"
     write_signal(folder / files["profile"], _traced(day, run, cut, tracing))
-    return dict(files), terms.Run(cut, air, late, (course.warmth, idle))
+    return dict(files), told.Run(cut, air, late, (course.warmth, idle))
 
 
 def _force(day: _Day, run: _Run, rng: np.random.Generator) -> SideForce:

@@ -52,7 +52,7 @@ def listed(
 
     Of an effect of single joints a hidden one excludes its own joint alone.
     """
-    found = {}
+    found: dict[str, list[Parameters]] = {}
     for name, some in terms.items():
         own = [one.parameters for one in some if one.present]
         own = [one for one in own if name not in hidden or one.get("joint") != hidden[name].get("joint")]

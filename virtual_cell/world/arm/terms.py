@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from virtual_cell.hidden import Parameters
 from virtual_cell.units import DEG, MM, MS, Array
 from virtual_cell.world.arm.gears import Springs
-from virtual_cell.world.arm.robot import Done, Robot
+from virtual_cell.world.arm.robot import Robot
+from virtual_cell.world.arm.told import Gauges, Run, Told, along, dry, signs, strongest, wave
 from virtual_cell.world.draws import digits
 from virtual_cell.world.present import Term, term
 
@@ -24,33 +25,6 @@ _OWN_M = 1.1 * MM  # of a trace, after which its noise is another
 _WAVES = (0.8 * MM, 8.0 * MM)  # of a wall that are waviness: shorter is roughness, longer is form
 _CYCLES = 2.0  # that a run must show of a wave
 _LOADS = 640.0  # N, of usual load tests
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """What an arm did in a cut and, where there is a log of it, in the air; ``late`` s of the log's clock.
-
-    ``warmth`` of the joints in the cut and in the air.
-    """
-
-    cut: Done
-    air: Done | None
-    late: float
-    warmth: tuple[float, float]
-
-
-@dataclass(frozen=True, eq=False)
-class Gauges:
-    """Errors of what measures: ``gains`` (3,) of the force along the work's axes, ``load`` of the load tests.
-
-    ``noise`` of the trace, m, and ``zero``, m, of its height in each run.
-    """
-
-    gains: Array
-    load: float
-    noise: float
-    zero: float
-
 
 Terms = dict[str, list[Term]]
 
@@ -68,28 +42,20 @@ def in_contract_terms(about: str, robot: Robot, runs: Sequence[Run], gauges: Gau
 def _of_torque(robot: Robot, runs: Sequence[Run], _: Gauges) -> Terms:
     logs = [run for run in runs if run.air is not None]
     joints = range(6)
+    rubbing = joints if logs else range(0)
     return {
-        "friction_reversal": [_torque(robot, logs, *_rubbing(robot, logs, j)) for j in joints]
-        if logs
-        else [],
-        "friction_by_speed": [_torque(robot, logs, *_viscous(robot, logs, j)) for j in joints]
-        if logs
-        else [],
+        "friction_reversal": [_torque(robot, logs, *_rubbing(robot, logs, joint)) for joint in rubbing],
+        "friction_by_speed": [_torque(robot, logs, *_viscous(robot, logs, joint)) for joint in rubbing],
         "gear_ripple": [
             one
             for joint in joints
-            for one in _strongest([_torque(robot, runs, *wave) for wave in _ripples(robot, runs, joint)])
+            for one in strongest([_torque(robot, runs, *line) for line in _ripples(robot, runs, joint)])
         ],
         "clock_offset": [_clock(robot, runs)],
     }
 
 
-Told = tuple[dict[str, float], Array, Array]  # parameters, what the thing does, and what they make of it
-
-
-def _torque(
-    robot: Robot, runs: Sequence[Run], parameters: dict[str, float], does: Array, told: Array
-) -> Term:
+def _torque(robot: Robot, runs: Sequence[Run], parameters: Parameters, does: Array, told: Array) -> Term:
     step = robot.recorder.current_step
     joint = int(parameters.get("joint", 1)) - 1
     noise = math.hypot(robot.recorder.torque_noise, float(step[joint]) / math.sqrt(12.0))
@@ -99,25 +65,10 @@ def _torque(
 
 def _rubbing(robot: Robot, runs: Sequence[Run], joint: int) -> Told:
     """Dry friction of the cut less that of the air: more under a load, less when warm."""
-    does = np.concatenate([_dry(robot, run.cut, run.warmth[0], joint) for run in runs])
-    air = [_dry(robot, run.air, run.warmth[1], joint) for run in runs if run.air is not None]
+    does = np.concatenate([dry(robot, run.cut, run.warmth[0], joint) for run in runs])
+    air = [dry(robot, run.air, run.warmth[1], joint) for run in runs if run.air is not None]
     does = does - np.concatenate(air)
-    return _along("torque_nm", joint, does, _signs(runs, joint))
-
-
-def _dry(robot: Robot, made: Done, warmth: float, joint: int) -> Array:
-    level = robot.joints.level(made.during.rate, made.outside, warmth)
-    return np.asarray((level * made.during.sliding)[:, joint])
-
-
-def _signs(runs: Sequence[Run], joint: int) -> Array:
-    return np.concatenate([np.sign(run.cut.during.rate[:, joint]) for run in runs])
-
-
-def _along(name: str, joint: int, does: Array, unit: Array) -> Told:
-    """Tell a thing by so many times a unit."""
-    size = float(unit @ does) / max(float(unit @ unit), 1e-30)
-    return {"joint": joint + 1, name: digits(size)}, does, size * unit
+    return along("torque_nm", joint, does, signs(runs, joint))
 
 
 def _viscous(robot: Robot, runs: Sequence[Run], joint: int) -> Told:
@@ -125,7 +76,7 @@ def _viscous(robot: Robot, runs: Sequence[Run], joint: int) -> Told:
     lost = float(robot.joints.viscous[joint]) * robot.joints.thinning
     rates = [run.cut.during.rate[:, joint] for run in runs]
     does = [-lost * (run.warmth[0] - run.warmth[1]) * rate for run, rate in zip(runs, rates, strict=True)]
-    return _along("torque_nm_s", joint, np.concatenate(does), np.concatenate(rates))
+    return along("torque_nm_s", joint, np.concatenate(does), np.concatenate(rates))
 
 
 def _ripples(robot: Robot, runs: Sequence[Run], joint: int) -> Iterator[Told]:
@@ -138,29 +89,11 @@ def _ripples(robot: Robot, runs: Sequence[Run], joint: int) -> Iterator[Told]:
     pace = max(float(np.abs(run.cut.during.rate[:, joint]).max()) for run in runs)
     for order, size, phase in zip(wheel.order[joint], wheel.size[joint], wheel.phase[joint], strict=True):
         if _CYCLES * 2.0 * math.pi < order * shown and order * pace * robot.recorder.period < 0.5 * math.pi:
-            yield _wave(joint, float(order), q, -load * size * order * np.cos(order * q + phase), 1.0)
+            yield wave(joint, float(order), q, -load * size * order * np.cos(order * q + phase), 1.0)
 
 
 def _loads(run: Run) -> Array:
     return run.cut.during.torque
-
-
-def _wave(joint: int, order: float, q: Array, does: Array, unit: float) -> Told:
-    """Tell a wave over the angle by the torque that makes it: ``unit`` of it per N m."""
-    both = unit * np.stack([np.sin(order * q), np.cos(order * q)], axis=1)
-    sine, cosine = np.linalg.lstsq(both, does, rcond=None)[0]
-    parameters = {
-        "joint": joint + 1,
-        "order": round(order, 3),
-        "torque_nm": digits(math.hypot(sine, cosine)),
-        "phase_deg": round(math.degrees(math.atan2(cosine, sine)), 1),
-    }
-    return parameters, does, both @ np.array([sine, cosine])
-
-
-def _strongest(terms: Sequence[Term]) -> list[Term]:
-    """Return the term of largest gain among those that are there, where there is any."""
-    return sorted((one for one in terms if one.present), key=lambda one: -one.gain)[:1]
 
 
 def _clock(robot: Robot, runs: Sequence[Run]) -> Term:
@@ -196,7 +129,7 @@ def _of_waves(robot: Robot, runs: Sequence[Run], gauges: Gauges) -> Terms:
         "gear_ripple": [
             one
             for joint in range(6)
-            for one in _strongest([seen(wave) for wave in _uneven(robot, runs, joint)])
+            for one in strongest([seen(line) for line in _uneven(robot, runs, joint)])
         ],
         "joint_backlash": [seen(_lost(robot, runs, joint, _short)) for joint in range(6)],
         "friction_reversal": [seen(_behind(robot, runs, joint, _short)) for joint in range(6)],
@@ -246,7 +179,7 @@ def _lost(robot: Robot, runs: Sequence[Run], joint: int, sieve: Filter) -> Told:
     twists = [robot.springs.hysteresis(run.cut.outside)[:, joint] for run in runs]
     sides = [0.5 * _MDEG * np.sign(run.cut.during.torque[:, joint]) for run in runs]
     does, unit = (_heights(runs, joint, some, sieve) for some in (twists, sides))
-    told = _along("angle_mdeg", joint, does, unit)
+    told = along("angle_mdeg", joint, does, unit)
     gap = told[0]["angle_mdeg"]
     return told if gap > 0.0 else (told[0], does, 0.0 * does)
 
@@ -255,16 +188,17 @@ def _behind(robot: Robot, runs: Sequence[Run], joint: int, sieve: Filter) -> Tol
     """Friction behind the gear twists the spring, and no encoder sees it."""
     soft = 1.0 / float(robot.arm.stiffness[joint])
     share = float(robot.joints.behind[joint]) * soft
-    twists = [-share * _dry(robot, run.cut, run.warmth[0], joint) for run in runs]
+    twists = [-share * dry(robot, run.cut, run.warmth[0], joint) for run in runs]
     sides = [-soft * np.sign(run.cut.during.rate[:, joint]) for run in runs]
     does, unit = (_heights(runs, joint, some, sieve) for some in (twists, sides))
-    return _along("torque_nm", joint, does, unit)
+    return along("torque_nm", joint, does, unit)
 
 
 def _softer(robot: Robot, runs: Sequence[Run], gauges: Gauges) -> Told:
     """Tell the gains of dynamometer and load cell: by them walls give way more than they are told to."""
     soft = 1.0 / robot.arm.stiffness
-    true, expected = [], []
+    true: list[Array] = []
+    expected: list[Array] = []
     for run in runs:
         on, turn = _on_wall(run), robot.turn
         read = run.cut.during.force @ turn * (1.0 + gauges.gains) @ turn.T * (1.0 + gauges.load)
@@ -274,7 +208,7 @@ def _softer(robot: Robot, runs: Sequence[Run], gauges: Gauges) -> Told:
             heights.append((levers * twist).sum(axis=1)[on])
     h, p = np.concatenate(true), np.concatenate(expected)
     factor = float(p @ p) / float(p @ h)
-    return {"factor": round(factor, 4), "joint": "all"}, h - p, p / factor - p  # type: ignore[dict-item]
+    return {"factor": round(factor, 4), "joint": "all"}, h - p, p / factor - p
 
 
 def _hardening(robot: Robot, runs: Sequence[Run], joint: int) -> Told:
@@ -310,7 +244,7 @@ def _uneven(robot: Robot, runs: Sequence[Run], joint: int) -> Iterator[Told]:
             wheel.line(angle, run.cut.during.sliding[:, joint], joint, k)
             for angle, run in zip(q, runs, strict=True)
         ]
-        parameters, twist, told = _wave(joint, float(order), np.concatenate(q), np.concatenate(waves), -soft)
+        parameters, twist, told = wave(joint, float(order), np.concatenate(q), np.concatenate(waves), -soft)
         sizes = np.cumsum([len(one) for one in q])[:-1]
         does, made = (_heights(runs, joint, np.split(one, sizes), _same) for one in (twist, told))
         yield parameters, does, made

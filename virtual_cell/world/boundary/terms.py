@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from virtual_cell.hidden import Parameters
 from virtual_cell.units import DEG, RPM, Array
@@ -19,6 +20,7 @@ from virtual_cell.world.boundary.resonances import state_matrices
 from virtual_cell.world.draws import digits
 from virtual_cell.world.present import Term, term
 
+Complex = npt.NDArray[np.complex128]
 _LINES = 1400  # frequencies at which a boundary is looked for
 _ANGLES = 90
 _OTHER = 0.06  # relative change of a frequency that no change of stiffness makes
@@ -47,15 +49,17 @@ def in_contract_terms(cell: Cell, climbs: Climbs) -> dict[str, list[Term]]:
 
     def seen(parameters: Parameters, bare: Cell, told: Cell) -> Term:
         less, does, made = (np.log(boundary(one, climbs)) for one in (bare, cell, told))
-        depth = [_apart(one[0] - less[0]) for one in (does, made)]
-        by_depth = term(parameters, *depth, in_depth, len(climbs.rpm))
+        moved, told_moved = (_apart(one[0] - less[0]) for one in (does, made))
+        by_depth = term(parameters, moved, told_moved, in_depth, len(climbs.rpm))
         if not climbs.turns:
             return by_depth
         line = climbs.rpm / 60.0 / climbs.turns / np.exp(less[1])  # of a spectrum, its width over its place
         in_hz = np.hypot(line, s.warming)
         same = np.abs(does[1] - less[1]) < _OTHER  # at others it is another resonance that rings
-        hz = [((one[1] - less[1]) / in_hz)[same] for one in (does, made)]
-        by_hz = term(parameters, *hz, 1.0, int(same.sum())) if same.any() else by_depth
+        if not same.any():
+            return by_depth
+        rings, told_rings = (((one[1] - less[1]) / in_hz)[same] for one in (does, made))
+        by_hz = term(parameters, rings, told_rings, 1.0, int(same.sum()))
         return max(by_depth, by_hz, key=lambda one: one.gain)
 
     return {
@@ -123,7 +127,7 @@ def boundary(cell: Cell, climbs: Climbs) -> Array:
     ).T
 
 
-def _lowest(cell: Cell, s: Array, felt: Array, rpm: float, direction: str) -> tuple[float, float]:
+def _lowest(cell: Cell, s: Complex, felt: Complex, rpm: float, direction: str) -> tuple[float, float]:
     """Lowest depth, m, at which a vibration e^{st} neither grows nor fades, its loop is one; and its Hz."""
     surface_speed = rpm * RPM * 0.5 * cell.tool.diameter
     chip, land = _mean_cut(cell, direction, surface_speed)
@@ -131,7 +135,7 @@ def _lowest(cell: Cell, s: Array, felt: Array, rpm: float, direction: str) -> tu
     loop = felt @ (again[:, None, None] * chip + (s / surface_speed)[:, None, None] * land)
     found = [(_DEEPEST * cell.level, 1.0)]
     hz = s.imag / (2.0 * math.pi)
-    for depth in _followed(1.0 / np.linalg.eigvals(loop)).T:
+    for depth in _followed(1.0 / np.linalg.eigvals(loop).astype(complex)).T:
         turns = np.flatnonzero(depth.imag[1:] * depth.imag[:-1] < 0.0)
         share = depth.imag[turns] / (depth.imag[turns] - depth.imag[turns + 1])
         real = depth.real[turns] + share * (depth.real[turns + 1] - depth.real[turns])
@@ -140,7 +144,7 @@ def _lowest(cell: Cell, s: Array, felt: Array, rpm: float, direction: str) -> tu
     return min(found)
 
 
-def _followed(pairs: Array) -> Array:
+def _followed(pairs: Complex) -> Complex:
     """Put pairs (n, 2) of values in the order in which each goes on from the one before."""
     on = np.abs(np.diff(pairs, axis=0)).sum(axis=1)
     crossed = np.abs(pairs[1:, ::-1] - pairs[:-1]).sum(axis=1)

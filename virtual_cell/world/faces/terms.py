@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from virtual_cell.hidden import Parameters
 from virtual_cell.recipes.faces_world_draws import Workshop
 from virtual_cell.units import MM, UM, Array
 from virtual_cell.world.draws import digits
 from virtual_cell.world.faces import fixture
-from virtual_cell.world.faces.finish import Cause, Cutting, FaceRun, Influence, finished
+from virtual_cell.world.faces.finish import Cause, Cutting, FaceRun, Influence, finished, over_plate
 from virtual_cell.world.faces.hideable import disc_noise
 from virtual_cell.world.present import Term, term
 
@@ -75,7 +76,7 @@ class _Alone:
         return Influence(height=self.height)
 
 
-def _term(cell: Workshop, parameters: dict[str, float], does: Array, told: Array) -> Term:
+def _term(cell: Workshop, parameters: Parameters, does: Array, told: Array) -> Term:
     (form, planes), (told_form, told_planes) = parted(cell, does), parted(cell, told)
     discs = len(does) * cell.size[0] * cell.size[1] / _DISC**2
     in_form = term(parameters, form, told_form, disc_noise(cell), discs)
@@ -106,7 +107,7 @@ def _bow(cell: Workshop, session: Sequence[FaceRun]) -> Term:
     points = _grid(cell)
     steady = replace(cell.always.bow, repeat=0.0)
     entries, _ = fixture.second_degree(steady.shape(points, cell.size), points, cell.size)
-    u, v = fixture.over_plate(points, cell.size)
+    u, v = over_plate(points, cell.size)
     form = np.column_stack([u * u, u * v, v * v]) @ entries
     does, told = done_by(cell, steady, session), np.tile(form, (len(session), 1))
     names = ("xx_um", "xy_um", "yy_um")
