@@ -21,7 +21,7 @@ from virtual_cell.world.draws import digits
 from virtual_cell.world.present import Term, term
 
 Complex = npt.NDArray[np.complex128]
-_LINES = 1400  # frequencies at which a boundary is looked for
+_LINES = 5200  # frequencies at which a boundary is looked for
 _ANGLES = 90
 _OTHER = 0.06  # relative change of a frequency that no change of stiffness makes
 _DEEPEST = 8.0  # times the lowest boundary: nobody goes deeper
@@ -119,12 +119,11 @@ def boundary(cell: Cell, climbs: Climbs) -> Array:
     )
     hz = np.linspace(0.6 * cell.resonances.hz.min(), 1.7 * cell.resonances.hz.max(), _LINES)
     s = 2j * math.pi * hz
-    return np.array(
-        [
-            _lowest(cell, s, c @ np.linalg.solve(s[:, None, None] * np.eye(len(one)) - one, b), rpm, way)
-            for one, rpm, way in zip(a, climbs.rpm, climbs.direction, strict=True)
-        ]
-    ).T
+    found = []
+    for one, rpm, way in zip(a, climbs.rpm, climbs.direction, strict=True):
+        felt = c @ np.linalg.solve(s[:, None, None] * np.eye(len(one)) - one, b)
+        found.append(_lowest(cell, s, np.asarray(felt, dtype=np.complex128), rpm, way))
+    return np.array(found).T
 
 
 def _lowest(cell: Cell, s: Complex, felt: Complex, rpm: float, direction: str) -> tuple[float, float]:
@@ -135,8 +134,9 @@ def _lowest(cell: Cell, s: Complex, felt: Complex, rpm: float, direction: str) -
     loop = felt @ (again[:, None, None] * chip + (s / surface_speed)[:, None, None] * land)
     found = [(_DEEPEST * cell.level, 1.0)]
     hz = s.imag / (2.0 * math.pi)
-    for depth in _followed(1.0 / np.linalg.eigvals(loop).astype(complex)).T:
-        turns = np.flatnonzero(depth.imag[1:] * depth.imag[:-1] < 0.0)
+    for depth in _followed(np.asarray(1.0 / np.linalg.eigvals(loop), dtype=np.complex128)).T:
+        steady = np.abs(np.diff(depth)) < 0.5 * np.abs(depth[1:])  # else it has jumped to the other value
+        turns = np.flatnonzero(steady & (depth.imag[1:] * depth.imag[:-1] < 0.0))
         share = depth.imag[turns] / (depth.imag[turns] - depth.imag[turns + 1])
         real = depth.real[turns] + share * (depth.real[turns + 1] - depth.real[turns])
         at = hz[turns] + share * (hz[turns + 1] - hz[turns])
