@@ -48,7 +48,11 @@ class _Boundary:
 
 
 def label_oracle(
-    task: LabelProblem, hidden: Mapping[str, JSON], effects: Sequence[Effect], gain: float
+    task: LabelProblem,
+    hidden: Mapping[str, JSON],
+    effects: Sequence[Effect],
+    gain: float,
+    also: Mapping[str, JSON] | None = None,
 ) -> JSON:
     """Compute how large the hidden effects are, and how well held-out labels can be predicted.
 
@@ -57,6 +61,7 @@ def label_oracle(
     hidden : true effects and their parameters, as in the contract's table.
     effects : the library.
     gain : log-likelihood that an effect must gain, in the loop.
+    also : what a cell always has a little of: it acts beside the hidden effects, and its size is not asked.
 
     Returns
     -------
@@ -86,17 +91,19 @@ def label_oracle(
         before, floor = _errors(held, base, deviations)
         sizes = dict.fromkeys(hidden, max(0.0, size))
         return result | {"before": before, "after": None, "floor": floor, "sizes": sizes}
-    truth = _boundary_of(task, known, hidden)
+    always = {name: values for name, values in (also or {}).items() if name in known}
+    truth = _boundary_of(task, known, {**hidden, **always})
     drawn_labels = _drawn(task, mine, truth, DRAWS)
     full = np.array([_evidence(one, truth, deviations) for one in drawn_labels])
     sizes = {}
     for name in hidden:
-        without = _boundary_of(task, known, {other: hidden[other] for other in hidden if other != name})
+        others = {other: values for other, values in hidden.items() if other != name}
+        without = _boundary_of(task, known, {**others, **always})
         ratio = full - [_evidence(one, without, deviations) for one in drawn_labels]
         sizes[name] = max(0.0, float(np.quantile(ratio, ASSURED))) / gain
     before, _ = _errors(held, base, deviations)
     exact, floor = _errors(held, truth, deviations)
-    after = _rms(held, _learnt(task, [known[name] for name in hidden], held, deviations))
+    after = _rms(held, _learnt(task, [known[name] for name in (*hidden, *always)], held, deviations))
     return result | {"before": before, "after": after, "exact": exact, "floor": floor, "sizes": sizes}
 
 

@@ -16,7 +16,7 @@ from metro.loop.fitting.held_out import comparison, held_out
 from metro.loop.fitting.noise import first_noise
 from metro.observables.problem import Problem
 from metro.units import JSON
-from proof.score import joint
+from proof.score import forms, joint
 
 LEAST_GAIN = 2.0  # log-likelihood per effect: with less the runs of the fit do not identify it
 
@@ -26,7 +26,7 @@ def oracle(
     hidden: Mapping[str, JSON],
     effects: Sequence[Effect],
     budget: float,
-    also: Mapping[str, JSON] | None = None,
+    also: Mapping[str, JSON | list[JSON]] | None = None,
 ) -> JSON:
     """Fit base and true effects to the identification runs; judge them on the held-out ones.
 
@@ -38,7 +38,9 @@ def oracle(
     hidden : true effects and their parameters, as in the contract's table.
     effects : the library.
     budget : relative model-form budget.
-    also : what a cell always has a little of: it is fitted beside the hidden effects, and its size not asked.
+    also : what a cell always has a little of, in one joint or in several: it is fitted beside the hidden
+        effects, and its size not asked. What only resembles an effect of the library is not: no fit can part
+        the two.
 
     Returns
     -------
@@ -54,7 +56,8 @@ def oracle(
     able, _ = fitted_to(tuple(effects), task)
     known = [_at_truth(able, name, values) for name, values in hidden.items()]
     acting = [effect for effect in known if effect is not None]
-    beside = [_at_truth(able, name, values) for name, values in (also or {}).items()]
+    sure = [effect for effect in able if not effect.resembled]
+    beside = [_at_truth(sure, name, one) for name, values in (also or {}).items() for one in forms(values)]
     always = [effect for effect in beside if effect is not None]
 
     def fitted(chosen: list[Effect]) -> Fit:

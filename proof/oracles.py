@@ -76,7 +76,7 @@ def _ask(out: Layout, truth: JSON, about: str, limit: float | None) -> None:
     try:
         with bounded(limit):
             if isinstance(task, LabelProblem):
-                result = label_oracle(task, hidden, library(about), settings["held_out_gain"])
+                result = label_oracle(task, hidden, library(about), settings["held_out_gain"], also)
             elif isinstance(task, Problem):
                 result = oracle(task, hidden, library(about), settings["model_form_budget"], also)
     except OutOfTimeError:

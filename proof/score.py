@@ -165,14 +165,18 @@ def score(truth: JSON, oracle: JSON | None, said: JSON | None, *, teeth: int, ob
     said : what a program says of the observable (:func:`proof.answers.answer`); None where it failed.
     """
     hidden: JSON = truth["effects"]
-    also = frozenset(truth.get("always_on", ()))
+    always: JSON = truth.get("always_on", {})
+    entries = [(name, one) for name, values in always.items() for one in forms(values)]
+    also = frozenset(attributed(name, one, hidden, always) for name, one in entries) - set(hidden)
+    beside = frozenset(always) - set(hidden)
     oracle = oracle or {"after": None, "floor": None, "sizes": {}}
     if said is None:
         return Score(truth["batch"], truth["kind"], tuple(hidden), oracle["sizes"], FAILED, {})
-    pairs = [[_without_form(name, hidden) for name in group] for group in said["indistinguishable"]]
+    pairs = [[_without_form(name, hidden, always) for name in group] for group in said["indistinguishable"]]
     groups = tuple(frozenset(group) for group in pairs)
     effects = [
-        one | {"effect": attributed(one["effect"], one["parameters"], hidden)} for one in said["effects"]
+        one | {"effect": attributed(one["effect"], one["parameters"], hidden, always)}
+        for one in said["effects"]
     ]
     # What is claimed without a probability is claimed for sure.
     every = {one["effect"]: 1.0 if one["probability"] is None else one["probability"] for one in effects}
@@ -208,7 +212,7 @@ def score(truth: JSON, oracle: JSON | None, said: JSON | None, *, teeth: int, ob
             for one in estimates(effect["effect"], hidden[effect["effect"]], effect["parameters"], teeth)
         ),
         stated=_stated(effects, {*hidden, *also}, oracle["sizes"]),
-        rejected=_rejected(said["candidates"], hidden, also, oracle["sizes"], observable),
+        rejected=_rejected(said["candidates"], hidden, beside, oracle["sizes"], observable),
         cannot_be_seen=tuple(said["cannot_be_seen"]),
         p_value=said["p_value"],
         seconds=said["seconds"],
@@ -220,18 +224,32 @@ def joint(parameters: Mapping[str, Any]) -> Any:
     return parameters.get("joint", "all")
 
 
-def attributed(effect: str, parameters: Mapping[str, Any], hidden: JSON) -> str:
-    """Name an effect of a verdict: one that is hidden in another joint is not the one that is hidden."""
-    other = effect in hidden and joint(parameters) != joint(hidden[effect])
-    return ELSEWHERE.format(effect) if other else effect
+def forms(values: JSON | list[JSON]) -> list[JSON]:
+    """Return the parameters of each form of an effect that is always there: of one, or of several joints."""
+    return values if isinstance(values, list) else [values]
 
 
-def _without_form(name: str, hidden: JSON) -> str:
+def attributed(effect: str, parameters: Mapping[str, Any], hidden: JSON, always: JSON) -> str:
+    """Name an effect of a verdict: one that is there in another joint alone is not the one that is there.
+
+    One that is hidden in one joint and always there in another is named with that joint.
+    """
+    mine = joint(parameters)
+    there = {joint(one) for one in forms(always.get(effect, []))}
+    if effect in hidden:
+        if mine == joint(hidden[effect]):
+            return effect
+        return f"{effect}, joint {mine}" if mine in there else ELSEWHERE.format(effect)
+    return ELSEWHERE.format(effect) if there and mine not in there else effect
+
+
+def _without_form(name: str, hidden: JSON, always: JSON) -> str:
     """Name an effect of which a verdict writes the joint behind its name."""
     match = _FORM.fullmatch(name)
     if not match:
         return name
-    return attributed(match["name"], {"joint": int(match["joint"])} if match["joint"] else {}, hidden)
+    where = {"joint": int(match["joint"])} if match["joint"] else {}
+    return attributed(match["name"], where, hidden, always)
 
 
 @cache

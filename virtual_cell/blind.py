@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -54,7 +55,11 @@ def _named(effects: Mapping[str, Parametrised], names: Iterable[str] = ()) -> di
 RECIPES = {
     "force": Recipe(force.make, _named(EFFECTS), _named(force_world.HARDER)),
     **{
-        observable: Recipe(arm.make, _named(ARM_EFFECTS, names), _named(ARM_CAUSES, WORLD_SHOWN[observable]))
+        observable: Recipe(
+            partial(arm.make, about=observable),
+            _named(ARM_EFFECTS, names),
+            _named(ARM_CAUSES, WORLD_SHOWN[observable]),
+        )
         for observable, names in SHOWN.items()
     },
     "flatness": Recipe(faces.make, _named(FACE_EFFECTS), _named(FACE_CAUSES)),

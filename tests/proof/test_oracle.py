@@ -105,6 +105,21 @@ def test_of_an_effect_of_one_joint_the_oracle_is_told_the_form_of_that_joint():
     assert oracle(task, {"gap": {"joint": 3, "ripple": 0.9}}, (bump, ripple), BUDGET)["after"] is None
 
 
+def test_what_is_always_there_of_several_joints_is_fitted_beside_what_is_hidden():
+    twist, ripple = (
+        replace(e, name="gap", form=f"joint {i}", where={"joint": i}) for i, e in enumerate(LIBRARY[0:3:2], 1)
+    )
+    task, hidden = problem(Wave(twist=0.2, bump=0.6, ripple=0.9)), {"bump": {"bump": 0.6}}
+    effects = (twist, ripple, LIBRARY[1])
+    always = {"gap": [{"joint": 1, "twist": 0.2}, {"joint": 2, "ripple": 0.9}]}
+    without, beside = (oracle(task, hidden, effects, BUDGET, also) for also in (None, always))
+    assert beside["after"] == pytest.approx(SIGMA, rel=0.1)
+    assert without["after"] == pytest.approx(np.hypot(SIGMA, 0.9 / np.sqrt(2.0)), rel=0.1)
+    assert set(beside["sizes"]) == {"bump"}
+    alike = tuple(replace(effect, resembled=True) for effect in (twist, ripple))
+    assert oracle(task, hidden, (*alike, LIBRARY[1]), BUDGET, always) == without
+
+
 def test_what_the_library_lacks_has_no_oracle_but_a_size():
     found = oracle(problem(Wave(bump=0.6)), {"chip": {"length_um": 20.0}}, LIBRARY[:1], BUDGET)
     assert found["after"] is None

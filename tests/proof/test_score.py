@@ -66,6 +66,51 @@ def test_nothing_is_demanded_of_the_probability_of_what_is_always_there_and_not_
     assert one.rejected == ()
 
 
+REVERSAL = truth("one", friction_reversal={"joint": 4, "torque_nm": 9.0}) | {
+    "always_on": {
+        "friction_reversal": [{"joint": 1, "torque_nm": 2.0}, {"joint": 2, "torque_nm": 3.0}],
+        "joint_backlash": [{"joint": 3, "angle_mdeg": 0.4}],
+    }
+}
+
+
+def of_joints(*named, groups=()):
+    """Return what a verdict says that names effects (name, joint)."""
+    found = verdict("explained", *((name, 0.99) for name, _ in named), groups=groups)
+    for one, (_, joint) in zip(found["observables"]["force"]["effects"], named, strict=True):
+        one["parameters"] = {"joint": joint}
+    return found
+
+
+def test_what_is_always_there_in_one_joint_is_false_in_another():
+    asked = oracle(friction_reversal=3.0)
+    hidden = ("friction_reversal", 4)
+    for beside in (("friction_reversal", 2), ("joint_backlash", 3)):
+        one = scored(REVERSAL, asked, of_joints(hidden, beside))
+        assert list(one.named) == ["friction_reversal"]
+        assert one.exact
+        assert one.stated == ((0.99, True), (0.99, True))
+    for beside in (("friction_reversal", 3), ("joint_backlash", 5)):
+        one = scored(REVERSAL, asked, of_joints(hidden, beside))
+        assert len(one.extra) == 1
+        assert not one.exact
+        assert one.surely_wrong
+        assert one.stated == ((0.99, True), (0.99, False))
+
+
+def test_naming_what_is_always_there_does_not_find_what_is_hidden():
+    one = scored(REVERSAL, oracle(friction_reversal=3.0), of_joints(("friction_reversal", 1)))
+    assert one.named == {}
+    assert not one.both
+    assert not one.extra
+
+
+def test_a_rival_of_what_is_always_there_is_no_false_one():
+    alike = [["friction_reversal (joint 2)", "joint_backlash (joint 6)"]]
+    found = of_joints(("friction_reversal", 4), ("joint_backlash", 6), groups=alike)
+    assert not scored(REVERSAL, oracle(friction_reversal=3.0), found).extra
+
+
 def test_one_effect_named_alone_is_right():
     one = scored(RUNOUT, oracle(tool_runout=3.0), verdict("explained", ("tool_runout", 0.99)))
     assert one.exact

@@ -61,10 +61,18 @@ class _Run:
         return np.stack([self.wall.along, self.wall.across, np.array([0.0, 0.0, 1.0])])
 
 
-def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style: str = "a") -> Row:
+def make(
+    folder: Path,
+    hidden: Mapping[str, Parameters | None],
+    seed: int,
+    style: str = "a",
+    *,
+    about: str = "joint_force",
+) -> Row:
     """Write a batch that hides effects (name → parameters, or None: drawn by the seed); return the truth.
 
-    Styles ``c`` and ``d`` are of the harder world, :mod:`virtual_cell.recipes.arm_world`.
+    Styles ``c`` and ``d`` are of the harder world, :mod:`virtual_cell.recipes.arm_world`, in which there is
+    always a little of some effects: the truth says what an observable, ``about``, reads of them.
 
     Raises
     ------
@@ -72,7 +80,7 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
         For an effect that is not known.
     """
     if style in HABITS:
-        return arm_world.make(folder, hidden, seed, style)
+        return arm_world.make(folder, hidden, seed, style, about)
     rng = np.random.default_rng([seed, 23])
     cell, bench = drawn(rng, style)
     effects = {name: given or ARM_EFFECTS[name].draw(rng, cell) for name, given in hidden.items()}

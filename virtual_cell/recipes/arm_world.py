@@ -24,11 +24,14 @@ from virtual_cell.session import Plan, write_force
 from virtual_cell.side_force import SideForce, side_force
 from virtual_cell.units import DEG, MM, Array
 from virtual_cell.wall import feed_marks
+from virtual_cell.world.arm import told
 from virtual_cell.world.arm.cause import During
 from virtual_cell.world.arm.causes import ARM_CAUSES
 from virtual_cell.world.arm.made import Made
 from virtual_cell.world.arm.robot import Course, Done, Robot, Way, done, logged
 from virtual_cell.world.arm.robot import way as statics
+from virtual_cell.world.arm.terms import in_contract_terms
+from virtual_cell.world.present import listed
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_signal, write_yaml
 
 _ORBIT = 0.5  # radius of the orbit of a helical entry over that of the tool
@@ -85,8 +88,12 @@ class _Day:
         )
 
 
-def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style: str) -> Row:
+def make(
+    folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style: str, about: str = "joint_force"
+) -> Row:
     """Write a batch that hides causes (name → parameters, or None: drawn by the seed); return the truth.
+
+    ``about``: the observable of which the truth says what is always there.
 
     Raises
     ------
@@ -101,18 +108,19 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
     fresh_folder(folder)
     day = _Day(robot, bench, session, seed)
     lines = {wall: statics(robot, along) for wall, along in bench.lines.items()}
-    rows, cuts = _entries(day), []
+    rows, runs = _entries(day), []
     for order, (plan, replicate) in enumerate(session.runs, start=1):
         own = rng.spawn(5)
         wall = side(bench, way(plan))
         run = _Run(plan, session.cut(plan, own[0]), wall, lines[way(plan)], order)
-        row, during = _made(day, run, folder, own)
+        row, made = _made(day, run, folder, own)
         rows.append(_row(run, replicate, session.entries) | row)
-        cuts.append(during)
+        runs.append(made)
     write_csv(folder / "runs.csv", rows, RUN_COLUMNS)
     write_csv(folder / "loads.csv", tested(day, rng))
     write_yaml(folder / "cell.yaml", {"cell": "cutting-arm", "arm": {"dh": [list(row) for row in DH]}})
     write_yaml(folder / "batch.yaml", manifest(folder.name, day))
+    cuts = [run.cut.during for run in runs]
     effects: Row = {}
     errors: Row = {}
     for name, values in given.items():
@@ -126,6 +134,7 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
         "style": style,
         "effects": effects,
         "translation_error": errors,
+        "always_on": listed(in_contract_terms(about, robot, runs, _gauges(day)), effects),
         "turning": [joint + 1 for joint in robot.moves.turning],
         "world": in_plain_units(robot, bench, session),
     }
@@ -161,7 +170,12 @@ def _row(run: _Run, replicate: int, before: int) -> Row:
     return row | {"cut_length_mm": round(run.wall.length / MM, 3)}
 
 
-def _made(day: _Day, run: _Run, folder: Path, own: list[np.random.Generator]) -> tuple[Row, During]:
+def _gauges(day: _Day) -> told.Gauges:
+    gains, stylus = day.bench.calibration, day.session.stylus
+    return told.Gauges(gains[:3], float(gains[3]), stylus.noise, stylus.zero)
+
+
+def _made(day: _Day, run: _Run, folder: Path, own: list[np.random.Generator]) -> tuple[Row, told.Run]:
     """Cut a run: force, logs and trace, each its own noise; return the files and what the arm did."""
     robot, session, (cutting, idling, sensing, logging, tracing) = day.robot, day.session, own
     force = _force(day, run, cutting)
@@ -175,15 +189,16 @@ def _made(day: _Day, run: _Run, folder: Path, own: list[np.random.Generator]) ->
     late = robot.clock_offset + cutting.normal(0.0, robot.recorder.slip)
     files = {"robot_log": f"robot/{run.name}-cut.parquet"}
     write_signal(folder / files["robot_log"], logged(robot, cut, course.warmth, logging, late=late))
+    air, idle = None, 0.0
     if run.order not in session.without_idle:
         files["idle_log"] = f"robot/{run.name}-idle.parquet"
         free = day.course(run, idling.uniform(*_BEGIN), cutting=False, start=idling.uniform(-1.0, 1.0, 6))
-        air = done(robot, free, None)
+        air, idle = done(robot, free, None), free.warmth
         write_signal(folder / files["idle_log"], logged(robot, air, free.warmth, idling, late=0.0))
     files["dynamometer"] = write_force(folder, run.name, *_sensed(day, run, force, cut.during, sensing))
     files["profile"] = f"profile/{run.name}.parquet"
     write_signal(folder / files["profile"], _traced(day, run, cut, tracing))
-    return dict(files), cut.during
+    return dict(files), told.Run(cut, air, late, (course.warmth, idle))
 
 
 def _force(day: _Day, run: _Run, rng: np.random.Generator) -> SideForce:

@@ -19,6 +19,8 @@ from virtual_cell.world.boundary import ears, hammer
 from virtual_cell.world.boundary.cell import Cell, Plan, made
 from virtual_cell.world.boundary.chatter import Course, march
 from virtual_cell.world.boundary.effects import HARDER_EFFECTS, told
+from virtual_cell.world.boundary.terms import Climbs, in_contract_terms
+from virtual_cell.world.present import listed
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, impact_row, write_csv, write_signal, write_yaml
 
 STYLES = ("c", "d")
@@ -75,6 +77,7 @@ def make(
     write_csv(folder / "impacts.csv", _impacts(folder, cell, programme, rng))
     write_yaml(folder / "batch.yaml", _manifest(folder.name, cell, programme))
     tested = np.unique(ladder.plan.rpm[kept])
+    always = in_contract_terms(cell, _climbs(ladder, programme))
     translated = {name: told(name, cell, parameters, tested) for name, parameters in asked.items()}
     return {
         "batch": folder.name,
@@ -82,8 +85,16 @@ def make(
         "style": style,
         "effects": {name: parameters for name, (parameters, _) in translated.items()},
         "translation_error": {name: error for name, (_, error) in translated.items()},
+        "always_on": listed(always, asked),
         "world": _world(cell, programme, scatter, len(kept)),
     }
+
+
+def _climbs(ladder: Ladder, programme: Programme) -> Climbs:
+    first = np.flatnonzero(ladder.step == 0)
+    directions = tuple(ladder.plan.direction[i] for i in first)
+    turns = _RECORDED if programme.records else 0
+    return Climbs(ladder.plan.rpm[first], directions, programme.depths[1] / programme.depths[0], turns)
 
 
 def _drawn(

@@ -27,6 +27,8 @@ from virtual_cell.world.draws import uniform
 from virtual_cell.world.faces import load_test, scan, structure
 from virtual_cell.world.faces.causes import applied
 from virtual_cell.world.faces.finish import FaceRun, Influence, Span, finished, gain
+from virtual_cell.world.faces.terms import in_contract_terms
+from virtual_cell.world.present import listed
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_ply, write_yaml
 
 _HAMMER_HZ = np.arange(1.0, 55.0, 0.25)
@@ -67,6 +69,7 @@ def make(folder: Path, hidden: Mapping[str, Parameters | None], seed: int, style
         "batch": folder.name,
         "effects": effects,
         "translation_error": errors,
+        "always_on": listed(in_contract_terms(cell, session), effects),
         "world": world(cell, placed),
         "seed": seed,
         "style": style,

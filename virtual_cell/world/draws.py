@@ -38,3 +38,8 @@ def towards(rng: np.random.Generator) -> Array:
     """Direction (3,), evenly drawn."""
     drawn = rng.standard_normal(3)
     return np.asarray(drawn / np.linalg.norm(drawn))
+
+
+def digits(value: float) -> float:
+    """Round to three digits."""
+    return float(f"{value:.3g}")

@@ -18,8 +18,9 @@ from virtual_cell.hidden import JOINT, Parameters, drawn_angle, drawn_signed, dr
 from virtual_cell.units import DEG, MM, MS, UM, Array
 from virtual_cell.world.arm.cause import Cause, During, on_joint
 from virtual_cell.world.arm.give import GIVE
-from virtual_cell.world.arm.made import Made, Translated, digits, drawn_joint, moving
+from virtual_cell.world.arm.made import Made, Translated, drawn_joint, moving
 from virtual_cell.world.arm.robot import Robot
+from virtual_cell.world.draws import digits
 
 
 def _likely(rng: np.random.Generator, robot: Robot) -> int:

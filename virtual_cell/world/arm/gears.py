@@ -10,7 +10,7 @@ Autom. 12 (1996) 368; Taghirad and Belanger, J. Dyn. Sys. Meas. Control 120 (199
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,14 @@ class Transmission:
         wave = self.size * np.sin(self._angle(q))
         sides = 1.0 - self.flank + self.flank * sliding[..., None]
         return np.asarray((wave * sides).sum(axis=-1))
+
+    def line(self, q: Array, sliding: Array, joint: int, wave: int) -> Array:
+        """Angle (n,), rad, of one wave of a joint (from 0) at its angles and sliding (n,)."""
+        only = np.zeros_like(self.size)
+        only[joint, wave] = self.size[joint, wave]
+        alone = replace(self, size=only)
+        at, way = (np.outer(values, np.eye(6)[joint]) for values in (q, sliding))
+        return np.asarray(alone.error(at, way)[:, joint])
 
     def slope(self, q: Array) -> Array:
         """Return the slope (n, 6) of the error by the angle: by virtual work, the torque it adds."""

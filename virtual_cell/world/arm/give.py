@@ -15,8 +15,9 @@ import numpy as np
 from virtual_cell.hidden import JOINT, Parameters, drawn_signed, drawn_size
 from virtual_cell.units import DEG, MM
 from virtual_cell.world.arm.cause import During
-from virtual_cell.world.arm.made import Made, Translated, digits, drawn_joint, put
+from virtual_cell.world.arm.made import Made, Translated, drawn_joint, put
 from virtual_cell.world.arm.robot import Robot
+from virtual_cell.world.draws import digits
 
 _MDEG = 1e-3 * DEG
 

@@ -42,8 +42,3 @@ def put(values: Array, joint: int, value: float | Array) -> Array:
     changed = np.array(values)
     changed[joint - 1] = value
     return changed
-
-
-def digits(value: float) -> float:
-    """Round to three digits."""
-    return float(f"{value:.3g}")

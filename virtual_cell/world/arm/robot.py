@@ -131,10 +131,12 @@ class Course:
 class Done:
     """What an arm did: ``torque`` (n, 6) N m of the motors, ``strayed`` (n, 6) rad as the encoders have it.
 
-    ``tip`` (n, 3) m, base frame: where the tip is against the line, by all that moved it.
+    ``tip`` (n, 3) m, base frame: where the tip is against the line, by all that moved it. ``outside`` (n, 6)
+    N m: of the cut and the weight, on the links.
     """
 
     during: During
+    outside: Array
     torque: Array
     strayed: Array
     tip: Array
@@ -167,7 +169,7 @@ def done(robot: Robot, course: Course, force: Callable[[Array], Array] | None) -
     joints = twist - weight[middle] + error - error[middle] + strayed
     tip = np.einsum("nai,ni->na", during.jacobian, joints) + np.einsum("nab,nb->na", rest, during.force)
     tip = robot.links.followed(tip, during.dt) + robot.total("tip", during)
-    return Done(during, motors, strayed, tip)
+    return Done(during, outside, motors, strayed, tip)
 
 
 def _lengths(course: Course, during: During) -> Array:

@@ -37,7 +37,16 @@ def seen_noise(cell: Workshop) -> float:
     """
     scanner = cell.scanner
     placed = scanner.shift if scanner.place == "declared" else 0.0
-    return 0.45 * math.hypot(scanner.sigma, placed) / UM
+    return _over_disc(math.hypot(scanner.sigma, placed)) / UM
+
+
+def disc_noise(cell: Workshop) -> float:
+    """Return the noise of the mean over a disc, m."""
+    return _over_disc(cell.scanner.sigma)
+
+
+def _over_disc(noise: float) -> float:
+    return 0.45 * noise
 
 
 def sized(rng: np.random.Generator, cell: Workshop, shown: float, most: float) -> float:
