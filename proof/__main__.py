@@ -64,7 +64,8 @@ def _parser() -> argparse.ArgumentParser:
     baseline.add_argument("name", choices=BASELINES)
     scoring = commands.add_parser("score", help="compare the answers of another program with the truth")
     commands.add_parser("board", help="make the page of all judgements anew")
-    for command in (make, run, opening, faces, planned, joint, campaign, baseline, scoring):
+    consistent = commands.add_parser("consistent", help="whether reports contradict themselves")
+    for command in (make, run, consistent, opening, faces, planned, joint, campaign, baseline, scoring):
         command.add_argument("out", type=Path, help="folder of this proof")
     scoring.add_argument("answers", type=Path, help="folder with <batch>.json for each batch")
     scoring.add_argument("--name", required=True, help="of the program")
@@ -98,6 +99,16 @@ def _open(out: Layout, options: argparse.Namespace) -> None:
     missed = [figure.label for figure in demanded(scores) if figure.missed_for_sure]
     if options.strict and missed:
         raise SystemExit("missed by more than chance: " + "; ".join(missed))
+
+
+def _consistent(out: Layout, _: argparse.Namespace) -> None:
+    from proof.consistency import checked
+
+    found = checked(out.reports)
+    broken = [f"{batch}: {words}" for batch, each in found.items() for words in each]
+    print(f"{len(found)} batches, {len(broken)} contradictions")
+    if broken:
+        raise SystemExit("\n".join(broken))
 
 
 def _faces(out: Layout, options: argparse.Namespace) -> None:
@@ -185,6 +196,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "make": _make,
     "run": _run,
     "open": _open,
+    "consistent": _consistent,
     "faces": _faces,
     "next": _next,
     "joint": _joint,

@@ -94,12 +94,12 @@ def _above_floor(values: JSON) -> str:
 def _verification(values: JSON) -> str:
     """Say how the final model does on the held-out runs; nothing is decided by it."""
     runs = f"{values['runs']} held-out run{'s' if values['runs'] > 1 else ''}"
-    ratio = f"{values['ratio']:.2g} times the noise floor"
+    ratio = f"{values['ratio']:.2g} times that expected from noise and uncertain parameters"
     if values["ratio"] <= 1.0:
         words = f"Verification on {runs}: the error is {ratio}."
     elif values["holds"]:
         words = (
-            f"Verification on {runs}: the error is {ratio}, which noise alone can explain "
+            f"Verification on {runs}: the error is {ratio}, which chance can explain "
             f"({_chance(values['p_value'])})."
         )
     else:
@@ -107,8 +107,11 @@ def _verification(values: JSON) -> str:
             f"Verification on {runs} contradicts the model: the error is {ratio} "
             f"({_chance(values['p_value'])}) and largest in condition {values['condition']}."
         )
+    unit = printed(values["unit"])
+    if values.get("grew"):
+        before, after = (f"{rms:.3g}" for rms in values["grew"])
+        words += f" With the effects the error increases from {before} to {after} {unit}."
     if values["worse_runs"]:
-        unit = printed(values["unit"])
         each = (
             f"{one['run']} ({one['before']:.2g} to {one['after']:.2g} {unit})" for one in values["worse_runs"]
         )

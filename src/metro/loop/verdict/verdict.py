@@ -29,10 +29,11 @@ LOWERED = 0.01  # by which an unexplained residual lowers a probability: below, 
 def error(rows: pd.DataFrame, column: str, seed: int) -> JSON:
     """Rms and relative rms of measured less predicted, the interval by bootstrap over runs (not samples)."""
     square = (rows["measured"] - rows[column]) ** 2
-    by_run = square.groupby(rows["run"]).mean().to_numpy()
+    by_run = square.groupby(rows["run"]).agg(["sum", "count"]).to_numpy(float)
     signal = float(np.sqrt((rows["measured"] ** 2).mean()))
     drawn = np.random.default_rng(seed).integers(0, len(by_run), size=(DRAWS, len(by_run)))
-    low, high = np.quantile(np.sqrt(by_run[drawn].mean(axis=1)), [0.025, 0.975])
+    total, count = by_run[drawn].sum(axis=1).T
+    low, high = np.quantile(np.sqrt(total / count), [0.025, 0.975])
     rms = float(np.sqrt(square.mean()))
     return {"rms": rms, "nrmse": rms / signal if signal > 0 else 0.0, "ci95": [float(low), float(high)]}
 

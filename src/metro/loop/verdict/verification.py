@@ -15,6 +15,7 @@ from metro.loop.statement import Statement
 from metro.observables.problem import Block, Problem
 from metro.units import JSON
 
+WHENS = ("before", "after")
 WORSE = 1.1  # times the error without effects: a run that is predicted worse with them by more is named
 
 
@@ -36,6 +37,7 @@ def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON
     assert error is not None  # there are rows
     holds = error.p_value >= ABOVE
     worse = _worse(rows) if outcome.names else []
+    before, after = (float(((rows["measured"] - rows[when]) ** 2).mean() ** 0.5) for when in WHENS)
     without = beyond(outcome.final, problem.role("validate"))
     values = {
         "runs": len(problem.role("validate")),
@@ -45,6 +47,7 @@ def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON
         "holds": holds,
         "condition": error.condition,
         "worse_runs": worse,
+        "grew": [before, after] if outcome.names and after > before else None,
         "unit": problem.unit,
         "without": without,
     }
