@@ -34,7 +34,7 @@ class Problem:
     rss: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curve:
     """A model that is linear about the parameters."""
 
