@@ -23,8 +23,8 @@ starts, followed to its end (`polish`). Made by `python benchmarks/strd.py > doc
 are certified of the nonlinear sets, up to 15 of the linear ones; the count is of the parameter where fewest
 agree.
 
-A fit says three things of itself: what another step would gain (`Fit.ahead`, in units of twice the
-log-likelihood; more than 0.1 is not converged), the condition of its scaled columns (`Fit.condition`; beyond
+A fit says three things of itself: how far another step would move a parameter (`Fit.step`, in its standard
+deviations; 0.5 or more is not converged), the condition of its scaled columns (`Fit.condition`; beyond
 10⁶ the normal matrix of the columns, in double precision, no longer tells a parameter: it is taken as not
 determined, and its variance is infinite), and how many parameters it determines (`Fit.rank`). An end that is
 not converged or not determined is *refused* here.
