@@ -23,11 +23,11 @@ step leads down) from NIST's two starts, followed to its end (`polish`).
 Made by `python benchmarks/strd.py > docs/numerics.md`. Eleven digits are certified of the nonlinear sets,
 up to 15 of the linear ones; the count is of the parameter where fewest agree.
 
-A fit says three things of itself: what another step would gain (`Fit.ahead`, in units of twice the
-log-likelihood; more than 0.1 is not converged), the condition of its scaled columns (`Fit.condition`;
-beyond 10⁶ the normal matrix of the columns, in double precision, no longer determines a parameter: it is
-taken as not determined, and its variance is infinite), and how many parameters it determines (`Fit.rank`).
-An end that is not converged or not determined is *refused* here.
+A fit says three things of itself: how far another step would move a parameter (`Fit.step`, in its standard
+deviations; 0.5 or more is not converged), the condition of its scaled columns (`Fit.condition`; beyond
+10⁶ the normal matrix of the columns, in double precision, no longer determines a parameter: it is taken as not
+determined, and its variance is infinite), and how many parameters it determines (`Fit.rank`). An end that is
+not converged or not determined is *refused* here.
 """
 LINEAR = """
 *Allowed* are the digits of the exact solution, in whole fractions, of the same columns: what the rounding

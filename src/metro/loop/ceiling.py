@@ -22,7 +22,7 @@ from metro.units import JSON, Array, ComplexArray
 
 SAME, ALONE = "same", "alone"  # the same in every run; of one run alone, so that it does not repeat
 VARIES = 1e-3  # relative range of a circumstance that is more than its rounding
-LEAST_CONDITIONS = 3
+LEAST_CONDITIONS = 3  # two are predicted from one each, which shows no change with a circumstance
 STEPS, SETTLED = 2000, 1e-5  # of expectation and maximisation; least change, relative to the power
 MOST_PLACES = 6  # that are named
 CARRIED = 0.8  # share of the explained power that these carry at most

@@ -9,7 +9,7 @@ import numpy as np
 
 from metro.units import Array
 
-IN_AIR, CUTTING = 0.12, 0.5
+IN_AIR, CUTTING = 0.12, 0.5  # shares of the typical force: below is the air, above is the cut
 # Within a revolution the force of a cut swings at least this many times as much as in the air, and its mean
 # moves by at least this share of that swing. Chatter swings more as well, but about the same mean.
 LIVELIER, MOVED = 3.0, 0.3

@@ -18,7 +18,7 @@ from metro.loop.search.trial import LEAST_BETTER, Gates
 CONTRADICTION = 0.01  # p-value of the differences below which observables do not speak of one thing
 SPEAKS = 0.05  # p-value below which an observable that did not name a cause bears witness of it
 AS_GOOD = 2.0 * math.log(20.0)  # twice the log-likelihood within which two causes are confounded
-SEVERAL = 2
+SEVERAL = 2  # observables that must show a cause which none of them named alone
 MANY = 20.0  # logarithm of the odds beyond which nobody counts
 
 

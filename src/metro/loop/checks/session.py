@@ -12,8 +12,8 @@ from metro.loop.fitting.fit import Fit
 from metro.observables.problem import Block
 from metro.units import Array
 
-PERMUTATIONS = 1999
-LEAST_RUNS = 6
+PERMUTATIONS = 1999  # the least p-value is 1/2000, a tenth of the level at which a step counts
+LEAST_RUNS = 6  # looked at from here on; a p-value that counts needs 11 at least
 
 
 @dataclass(frozen=True)

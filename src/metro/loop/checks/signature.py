@@ -15,8 +15,8 @@ from metro.loop.statement import Statement
 from metro.observables.problem import Block
 from metro.units import Array
 
-FALSE_DISCOVERY = 0.01
-LEAST_RATIO = 1.5
+FALSE_DISCOVERY = 0.01  # rate over all places at which a residual is significant
+LEAST_RATIO = 1.5  # of its mean square to that of the noise, below which a place does not count
 # Of the least residual that counts: what the inputs of a model share scales its prediction, and few patterns
 # are of that shape.
 SHAPED = 0.35

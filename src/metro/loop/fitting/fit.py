@@ -43,7 +43,7 @@ HOPELESS = 1.0  # and none, where twice the log-likelihood has not gained that m
 ALIKE = 1e-9  # relative difference of the sums of squares of starts that are the same
 UNDECIDED = 0.1  # differences in twice the log-likelihood that the noise, once known better, may turn round
 ROUNDS, SETTLED = 12, 0.2  # of noise estimation and descent; gain in twice the log-likelihood that ends them
-EM_STEPS = 8
+EM_STEPS = 8  # of expectation and maximisation in each round
 # Where a prediction is rough (that of a tool too soft to be in balance) no step leads on down, although the
 # derivatives promise one. An interval that is off by half a deviation holds the truth in 92 cases of 100.
 CONVERGED = 0.5

@@ -20,8 +20,8 @@ import numpy as np
 from metro.observables.problem import Block
 from metro.units import Array
 
-PRIOR_RUNS = 4
-MISFIT_CORRELATION = 12.0
+PRIOR_RUNS = 4  # for which what is declared of scatter and zeros counts
+MISFIT_CORRELATION = 12.0  # neighbouring elements of a misfit that count as one piece of evidence
 # Of the way to the misfit estimated: a larger one lets the elements that are measured best weigh less, and is
 # then estimated smaller, so that whole steps would go to and fro about the point where it stays.
 MISFIT_STEP = 0.5

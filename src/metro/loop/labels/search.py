@@ -25,14 +25,14 @@ from metro.loop.statement import Statement
 from metro.observables.labelled import Labelled
 from metro.units import JSON, Array
 
-LEAST_TESTS, LEAST_SPEEDS = 6, 3
-PAIR_TESTS, PAIR_SPEEDS = 16, 5
-PRIOR_NOTHING, PRIOR_PAIRS = 0.5, 0.1
+LEAST_TESTS, LEAST_SPEEDS = 6, 3  # fewer decide nothing
+PAIR_TESTS, PAIR_SPEEDS = 16, 5  # fewer cannot bear two effects at once
+PRIOR_NOTHING, PRIOR_PAIRS = 0.5, 0.1  # probabilities before any test: of no effect, of all pairs together
 PRIOR_LACKING = 0.08  # of each cause that the library lacks, times its own prior
-SURE = 1.0 - RIVAL_WEIGHT
+SURE = 1.0 - RIVAL_WEIGHT  # probability from which an effect is believed: no rival has a weight that counts
 WORTH = 0.25  # of the likeliest hypothesis: below it, effects that are sure are not enough by themselves
 MATERIAL = 0.05  # least change of a predicted probability, rms over the tests
-DEVIATIONS = 128
+DEVIATIONS = 128  # errors of the base model that are drawn
 NOTHING = "nothing"
 
 

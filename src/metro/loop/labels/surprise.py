@@ -15,7 +15,7 @@ from metro.loop.labels.evidence import OF_SPEED, OF_TEST, Labels, log_evidence, 
 from metro.loop.labels.hypotheses import Hypothesis
 from metro.units import Array
 
-DRAWS = 400
+DRAWS = 400  # sets of labels: a p-value of 0.01 is known to 0.005
 _BOUNDARIES = 12  # of a hypothesis, by their weights
 
 

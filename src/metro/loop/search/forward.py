@@ -19,7 +19,7 @@ from metro.loop.search.strategy import Choice, SearchSpace
 from metro.loop.search.trial import Trial, parted, small_beside_residual, tried, without
 from metro.loop.statement import Statement
 
-MOST_EFFECTS = 4
+MOST_EFFECTS = 4  # of a model
 
 
 def forward(space: SearchSpace) -> Choice:

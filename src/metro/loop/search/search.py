@@ -25,11 +25,11 @@ from metro.loop.statement import Statement
 from metro.observables.problem import Problem
 
 STRATEGY: Strategy = forward  # the one in use
-NOT_VISIBLE = 0.02
-DIM = 0.1
+NOT_VISIBLE = 0.02  # share of a signature that the base parameters leave, below which it is not tried
+DIM = 0.1  # share that the zeros of the runs leave, below which an effect is listed as hidden by them
 EVEN = 0.5  # least share explained by effects that are claimed
 SESSION = 0.005  # p-value of a step along the session that counts
-SESSION_SIZE = 0.01
+SESSION_SIZE = 0.01  # and its least size, relative to the parameter
 CONDITIONS = 0.001  # p-value of differences between conditions that count
 RUNS = 0.001  # p-value of a scatter between runs that counts
 

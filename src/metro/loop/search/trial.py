@@ -17,7 +17,7 @@ from metro.loop.statement import Statement
 from metro.observables.problem import Block, Limited
 from metro.units import Array
 
-LEAST_BETTER = 0.4
+LEAST_BETTER = 0.4  # share of the left-out conditions that an effect must predict better
 HALF_INTERVAL = 2.0  # standard deviations: half a 95 % interval
 OF_THE_RESIDUAL = 0.5  # an effect smaller than this share of what stays unexplained may be part of that
 

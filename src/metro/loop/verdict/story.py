@@ -14,7 +14,7 @@ from metro.loop.verdict.verdict import error, estimates, gain, held_out_rms, par
 from metro.observables.problem import Block, Problem
 from metro.units import JSON, Array
 
-MOST_PROPOSALS = 5
+MOST_PROPOSALS = 5  # that are listed
 
 
 def story(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> JSON:

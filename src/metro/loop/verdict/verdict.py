@@ -22,7 +22,7 @@ from metro.observables.problem import Problem
 from metro.observables.quantity import quantity
 from metro.units import JSON, Array
 
-DRAWS = 2000
+DRAWS = 2000  # of runs, for intervals of errors; of labels, for the p-value of those held out
 LOWERED = 0.01  # by which an unexplained residual lowers a probability: below, no printed digit shows it
 
 
