@@ -23,11 +23,11 @@ step leads down) from NIST's two starts, followed to its end (`polish`).
 Made by `python benchmarks/strd.py > docs/numerics.md`. Eleven digits are certified of the nonlinear sets,
 up to 15 of the linear ones; the count is of the parameter where fewest agree.
 
-A fit says three things of itself: how far another step would move a parameter (`Fit.step`, in its standard
-deviations; 0.5 or more is not converged), the condition of its scaled columns (`Fit.condition`; beyond
-10⁶ the normal matrix of the columns, in double precision, no longer determines a parameter: it is taken as not
-determined, and its variance is infinite), and how many parameters it determines (`Fit.rank`). An end that is
-not converged or not determined is *refused* here.
+A fit says three things of itself: how far another step would move a parameter (`Fit.step`, in its
+standard deviations; 0.5 or more is not converged), the condition of its scaled columns (`Fit.condition`;
+beyond 10⁶ the normal matrix of the columns, in double precision, no longer determines a parameter: it is
+taken as not determined, and its variance is infinite), and how many parameters it determines
+(`Fit.rank`). An end that is not converged or not determined is *refused* here.
 """
 LINEAR = """
 *Allowed* are the digits of the exact solution, in whole fractions, of the same columns: what the rounding
@@ -56,10 +56,11 @@ standard error; the table above follows it on.
 | `dynamics/modal.py` | modes that are not needed are removed | refused where it still falls after 90 steps |
 
 The likelihood of the loop has several maxima in its noise: a small misfit with a large scatter of the
-coefficients, or the other way round. A model is at least as likely as one that it contains. Where a fit is
-not, it is done again from the end of the smaller one (`parted` in `loop/search/trial.py`). In one of ten
-tuning batches of the cutting force an effect that was there had been dropped for lack of this: 100 in
-log-likelihood were missing, the held-out error was 4.4 N and is 3.4 N.
+coefficients, or the other way round. A model is at least as likely as one that it contains. Where a fit
+is not, it is done again from the end of the smaller one (`parted` in `loop/search/trial.py`).
+
+In one of ten tuning batches of the cutting force an effect that was there had been dropped for lack of
+this: 100 in log-likelihood were missing, the held-out error was 4.4 N and is 3.4 N.
 
 ## What must not matter
 

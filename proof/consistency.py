@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 
 from metro.batch.processed import read_json
@@ -47,9 +48,8 @@ def _text(pdf: Path) -> str:
     """Text of a report in one line; empty where there is none."""
     if not pdf.is_file():
         return ""
-    import pypdfium2  # type: ignore[import-not-found, import-untyped, unused-ignore]
-
-    pages = [page.get_textpage().get_text_bounded() for page in pypdfium2.PdfDocument(pdf)]
+    document = import_module("pypdfium2").PdfDocument(pdf)
+    pages = [page.get_textpage().get_text_bounded() for page in document]
     return " ".join(" ".join(pages).split())
 
 

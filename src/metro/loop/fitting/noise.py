@@ -3,7 +3,7 @@
 The covariance of a block is ``D + U Uᵀ``. ``D`` is diagonal: the standard error within the run, and the
 declared budget for what a simple model never gets exactly right. ``U`` holds what a whole run shares: each
 base parameter a little off (its column of the design times the scatter), and the zeros. Without ``U``, 10^5
-samples make everything significant (loop.md).
+samples make everything significant.
 """
 
 from __future__ import annotations
