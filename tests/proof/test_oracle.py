@@ -1,12 +1,16 @@
 """The oracle on a problem whose answers are known in closed form."""
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from metro.batch.processed import read_json
 from metro.effects.effect import Effect, EffectParameter
 from metro.observables.problem import Block, Parameter, Problem
+from proof import oracles as oracles_room
+from proof.layout import Layout
 from proof.oracle import oracle
 
 POINTS, SIGMA, BUDGET = 40, 0.1, 1e-6
@@ -150,3 +154,12 @@ def test_an_effect_that_the_runs_of_the_fit_do_not_tell_keeps_its_true_size():
     found = oracle(problem(Wave(late=0.3)), {"late": {"late": 0.3}}, LIBRARY, BUDGET)
     assert found["sizes"]["late"] == pytest.approx(0.3 / np.sqrt(2.0) / SIGMA, rel=0.05)
     assert found["after"] == pytest.approx(SIGMA, rel=0.1)
+
+
+def test_without_held_out_runs_the_oracle_has_no_figures_that_json_cannot_hold(tmp_path, monkeypatch):
+    lacking = replace(problem(Wave(bump=1.0)), blocks=problem(Wave(bump=1.0)).role("identify"))
+    monkeypatch.setattr(oracles_room, "posed", lambda *_: SimpleNamespace(task=lacking))
+    out = Layout(tmp_path)
+    out.oracle.mkdir()
+    oracles_room._ask(out, {"batch": "b1", "effects": {"bump": {"bump": 1.0}}}, "force", None)
+    assert read_json(out.oracle / "b1.json") == oracles_room.UNKNOWN
