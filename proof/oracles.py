@@ -77,9 +77,7 @@ def _ask(out: Layout, truth: JSON, about: str, limit: float | None) -> None:
         with bounded(limit):
             if isinstance(task, LabelProblem):
                 result = label_oracle(task, hidden, library(about), settings["held_out_gain"], also)
-            elif isinstance(task, Problem) and task.role(
-                "validate"
-            ):  # else there is nothing to be right about
+            elif isinstance(task, Problem) and task.role("validate"):  # else nothing can be compared
                 result = oracle(task, hidden, library(about), settings["model_form_budget"], also)
     except OutOfTimeError:
         pass
