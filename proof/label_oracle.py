@@ -33,6 +33,7 @@ from metro.loop.labels.surprise import drawn as labels_drawn
 from metro.observables.labelled import Labelled
 from metro.observables.stability.problem import LabelProblem
 from metro.units import JSON, Array
+from proof.score import forms
 
 DEVIATIONS, DRAWS, ASSURED = 128, 100, 0.05
 LONG, ALARM = 400, 0.01  # draws for, and the share of, what is unlikely by chance
@@ -52,7 +53,7 @@ def label_oracle(
     hidden: Mapping[str, JSON],
     effects: Sequence[Effect],
     gain: float,
-    also: Mapping[str, JSON] | None = None,
+    also: Mapping[str, JSON | list[JSON]] | None = None,
 ) -> JSON:
     """Compute how large the hidden effects are, and how well held-out labels can be predicted.
 
@@ -91,7 +92,8 @@ def label_oracle(
         before, floor = _errors(held, base, deviations)
         sizes = dict.fromkeys(hidden, max(0.0, size))
         return result | {"before": before, "after": None, "floor": floor, "sizes": sizes}
-    always = {name: values for name, values in (also or {}).items() if name in known}
+    # A boundary has no joints: what is always there has one form.
+    always = {name: forms(values)[0] for name, values in (also or {}).items() if name in known}
     truth = _boundary_of(task, known, {**hidden, **always})
     drawn_labels = _drawn(task, mine, truth, DRAWS)
     full = np.array([_evidence(one, truth, deviations) for one in drawn_labels])

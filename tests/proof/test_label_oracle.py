@@ -72,9 +72,11 @@ def size(moved, **settings):
 
 def test_what_is_always_there_acts_beside_what_is_hidden_and_has_no_size():
     task, hidden = problem(1.0), {"raised": {"raised": 0.6}}
-    alone, beside = (
-        label_oracle(task, hidden, LIBRARY, 3.0, also) for also in (None, {"more": {"more": 0.4}})
+    alone, beside, listed = (
+        label_oracle(task, hidden, LIBRARY, 3.0, also)
+        for also in (None, {"more": {"more": 0.4}}, {"more": [{"more": 0.4}]})
     )
+    assert listed == beside
     assert set(beside["sizes"]) == {"raised"}
     # The boundary is at 0.6 and 0.4 together: labels of the truth are predicted by both, and not by one.
     assert beside["exact"] < alone["exact"]
