@@ -100,12 +100,13 @@ def _verification(entry: JSON) -> Iterator[str]:
 
 def _probabilities(entry: JSON) -> Iterator[str]:
     named = {one["effect"] for one in entry["effects"]}
+    known = named.union(*entry["indistinguishable"])
     for one in (*entry["effects"], *entry["candidates"]):
         value = one.get("probability")
         if value is not None and not 0.0 <= value <= 1.0:
             yield f"{one['effect']} has the probability {value:g}"
     for one in entry["candidates"]:
-        if one["effect"] not in named and not one.get("why_not"):
+        if named and one["effect"] not in known and not one.get("why_not"):
             yield f"{one['effect']} is neither named nor is it said why not"
     for one in entry["effects"]:
         for name, value in one["parameters"].items():

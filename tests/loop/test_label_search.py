@@ -8,7 +8,8 @@ from scipy.stats import norm
 from metro.effects.effect import EffectParameter
 from metro.loop.labels.hypotheses import quantile
 from metro.loop.labels.next_test import next_tests
-from metro.loop.labels.search import NOTHING, search_labels
+from metro.loop.labels.search import NOTHING, search_labels, tried
+from metro.loop.statement import Statement
 
 
 def searched(true, effects, seed=1, **more):
@@ -64,6 +65,15 @@ def test_the_chatter_frequency_tells_what_labels_do_not():
 def test_two_effects_are_found_together():
     _, outcome = searched(Line(shift=0.8, slope=0.9), (SHIFT, SLOPE))
     assert set(outcome.lead.names) == {"shift", "slope"}
+    for entry in tried(outcome):  # every other hypothesis says why it is not the one
+        assert bool(entry["why_not"]) != (set(entry["effect"].split(" + ")) == {"shift", "slope"})
+
+
+def test_no_hypothesis_is_beaten_where_none_is_added():
+    for seed in range(8):
+        _, outcome = searched(Line(), (SHIFT, SLOPE), seed)
+        reasons = [entry["why_not"] for entry in tried(outcome)]
+        assert not any(isinstance(one, Statement) and one.code == "beaten" for one in reasons)
 
 
 def test_a_second_effect_that_is_needed_but_not_known_is_open():

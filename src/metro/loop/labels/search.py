@@ -253,7 +253,15 @@ def tried(outcome: LabelOutcome) -> list[JSON]:
             "probability": one.probability,
             "held_out_gain": one.gain,
             "size": one.size,
-            "why_not": one.rejected or "",
+            "why_not": one.rejected or _beaten(one, outcome) or "",
         }
         for one in outcome.weighed[1:]
     ]
+
+
+def _beaten(one: Weighed, outcome: LabelOutcome) -> Statement | None:
+    """Return that the lead explains the tests better than a hypothesis that is no rival of it, if it does."""
+    lead = outcome.lead
+    if lead is None or lead.rejected or one is lead or set(one.names) & set(outcome.rivals):
+        return None
+    return Statement("beaten")

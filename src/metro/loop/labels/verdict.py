@@ -223,7 +223,7 @@ def _effects(judged: _Judged) -> list[JSON]:
 def _candidates(judged: _Judged) -> list[JSON]:
     claimed = {entry["effect"] for entry in _effects(judged)}
     entries = tried(judged.outcome) if judged.outcome else []
-    return [entry for entry in entries if entry["effect"] not in claimed]
+    return [entry for entry in entries if not set(entry["effect"].split(" + ")) <= claimed]
 
 
 def _next(judged: _Judged) -> Statement:
