@@ -65,8 +65,10 @@ def test_the_chatter_frequency_tells_what_labels_do_not():
 def test_two_effects_are_found_together():
     _, outcome = searched(Line(shift=0.8, slope=0.9), (SHIFT, SLOPE))
     assert set(outcome.lead.names) == {"shift", "slope"}
-    for entry in tried(outcome):  # every other hypothesis says why it is not the one
-        assert bool(entry["why_not"]) != (set(entry["effect"].split(" + ")) == {"shift", "slope"})
+    for entry in tried(outcome):  # every other hypothesis is a rival, or says why it is not the one
+        names = set(entry["effect"].split(" + "))
+        assert bool(entry["why_not"]) != (names == {"shift", "slope"} or bool(names & set(outcome.rivals)))
+    assert sum(getattr(entry["why_not"], "code", "") == "beaten" for entry in tried(outcome))
 
 
 def test_no_hypothesis_is_beaten_where_none_is_added():
