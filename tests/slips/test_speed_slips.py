@@ -1,8 +1,12 @@
 """The speed in a force record against the declared one."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pandas as pd
 import pytest
 
+from metro.slips import force as force_room
 from metro.slips.speed import period, repeats_per_revolution, turns_as_declared
 
 RATE, RPM, TEETH = 10000.0, 6000.0, 3
@@ -76,3 +80,16 @@ def test_a_speed_that_is_off_leaves_no_line_at_the_declared_orders(declared, run
     signal = record(runout=runout, seconds=2.0)
     found = period(signal, RATE, 60.0 / declared)
     assert not turns_as_declared(signal, RATE, 60.0 / declared, found)
+
+
+@pytest.mark.parametrize(("stable", "slips"), [("yes", 1), ("undecided", 1), (None, 1), ("no", 0)])
+def test_a_cut_that_is_declared_to_chatter_says_nothing_of_the_speed(monkeypatch, stable, slips):
+    turn = np.arange(0.0, 2.0, 1.0 / RATE) * RPM / 60.0
+    wave = 20.0 * np.sin(2 * np.pi * 0.3343 * turn)  # no line of the teeth is left
+    signal = np.column_stack([wave, 0.6 * np.roll(wave, 7)])
+    stretch = SimpleNamespace(tacho=np.full(len(wave), np.nan), signal=signal)
+    record = SimpleNamespace(samples=len(wave), rate=RATE, stretches=lambda _: iter([stretch]))
+    monkeypatch.setattr(force_room, "LongRecord", lambda *_: record)
+    runs = pd.DataFrame({"spindle_rpm": [RPM], "orbit_rpm": [np.nan], "stable": [stable]}, index=["t1"])
+    batch = SimpleNamespace(runs=runs, manifest={"tool": {"teeth": 3}}, with_files=lambda _: ["t1"])
+    assert len(force_room.speed_slips(batch, None)) == slips

@@ -187,6 +187,8 @@ def _spread(found: Mapping[str, float]) -> float:
 def _passes(batch: Batch, read: Tables, run: str) -> float | None:
     """Repeats per declared revolution of a run's record, where no cutter has as many; None else."""
     row: Any = batch.runs.loc[run]
+    if row["stable"] == "no":  # the force of a cut that chatters repeats as the vibration does
+        return None
     # in a hole the feed turns against the spindle: the teeth pass it as fast as both together
     record, rpm = LongRecord(read, run), float(row["spindle_rpm"]) + or_zero(float(row["orbit_rpm"]))
     if record.samples < 100 or not rpm > 0.0:
