@@ -274,6 +274,17 @@ def test_of_a_right_model_the_rest_is_as_large_as_sigma_says():
     assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.2)
 
 
+def test_the_interval_of_an_error_weighs_runs_by_their_length_as_the_error_does():
+    lengths, errors = (400, 10, 10, 10), (3.0, 0.5, 0.5, 0.5)
+    rows = pd.DataFrame({"run": np.repeat(list("abcd"), lengths), "before": 0.0})
+    rows["measured"] = np.repeat(errors, lengths)
+    found = error(rows, "before", seed=1)
+    # The highest ends are of the long run drawn three times of four; unweighted, they would be at 2.6.
+    assert found["ci95"][0] == pytest.approx(0.5)
+    assert found["ci95"][1] == pytest.approx(np.sqrt((3 * 400 * 9 + 10 * 0.25) / 1210), abs=0.02)
+    assert found["ci95"][0] < found["rms"] < found["ci95"][1]
+
+
 def test_intervals_count_runs_not_samples_and_keep_within_bounds():
     task, library = CASES["explained"]
     outcome, _, verdict = closed(task, library)
@@ -304,6 +315,9 @@ def test_runs_that_the_effects_make_worse_are_named():
     worse = [one["run"] for one in verdict["verification"]["worse_runs"]]
     assert worse == [block.run for block in straight.role("validate")]
     assert "With the effects the error increases in" in verdict["verification"]["words"]
+    before, after = (f"{verdict[when]['rms']:.3g}" for when in ("before", "after"))
+    assert f"the error increases from {before} to {after} N." in verdict["verification"]["words"]
+    assert "increases" not in closed(bent, (BEND,))[2]["verification"]["words"]
     assert not closed(bent, (BEND,))[2]["verification"]["worse_runs"]
     assert len(rows)
 
