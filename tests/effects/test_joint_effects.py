@@ -1,6 +1,7 @@
 """What one joint does: found where it is hidden, of the right joint; absent where not; confusions named."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import elastic_arm
@@ -20,6 +21,7 @@ from metro.effects.library import library, with_declared
 from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
 from metro.loop.verdict.verdict import parameters
+from metro.observables.deformation.blocks import wall_error
 from metro.observables.deformation.model import CutWall, DeformationModel
 from metro.observables.deformation.proposals import feasible
 from metro.observables.problem import Refusal
@@ -82,7 +84,8 @@ def test_proposed_walls_part_joints_that_the_cuts_do_not():
         return DeformationModel(ARM).per_newton(setting, softness)
 
     walls = [block for block in task.blocks if isinstance(block.setting, CutWall)]
-    proposals = feasible(walls, task.role("calibrate"), ARM, per_newton)
+    error = partial(wall_error, per_newton=per_newton, lack_of_fit=0.0)
+    proposals = feasible(walls, task.role("calibrate"), ARM, error)
     outcome = search(task, joint_backlash.EFFECT, GATES)
     best = prospects(outcome.final, outcome.rivals[0].fit, proposals)[0]
     assert best.decides

@@ -146,9 +146,9 @@ def log_determinant(block: Block, noise: Noise, directions: Array, whiten: White
 def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
     """Directions of the errors that the whole block shares, (n, k), each of one standard deviation."""
     zeros = block.zeros * (block.zero_sd * noise.zero_factor)
-    if block.role == "calibrate":
-        return zeros
     unidentified = zeros[:, :0] if block.unidentified is None else block.unidentified
+    if block.role == "calibrate":
+        return np.hstack([zeros, unidentified])
     at = noise.scattering
     return np.hstack([design[:, at] * (beta[at] * noise.scatter[at]), zeros, unidentified])
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.joint_columns import Axes
+from metro.observables.arm.lack_of_fit import LackOfFit, directions, lack_of_fit
 from metro.observables.deformation.model import DeformationModel, KnownJoints, LoadTest
 from metro.observables.problem import Block, Refusal
 from metro.robot import identifiability
@@ -45,12 +49,18 @@ def calibration(
         value = 1.0 / np.asarray(known, dtype=float)
         note = f"Joint stiffnesses are those of the cell file, taken to be within {KNOWN:.0%}."
         return [_known_block(np.arange(len(value)), value, KNOWN * value)], (note,)
-    sigma = max(tests.scatter, GAUGE) * _relative(loads)
+    beside = lacking(model, loads)
+    sigma = max(beside.scatter, GAUGE) * _relative(loads)
+    _, force, moved = _load_arrays(loads, model.arm)
+    per_newton = beside.share * math.sqrt(np.nanmean(moved**2) / np.mean(np.sum(force**2, axis=1)))
     blocks = [
-        _load_block(str(pose), loads.iloc[at], sigma[at], model.arm)
+        _load_block(str(pose), loads.iloc[at], sigma[at], model.arm, per_newton)
         for pose, at in loads.groupby("pose", sort=False, dropna=False).indices.items()
     ]
-    notes = [f"Load tests scatter by {tests.scatter / UM:.2g} µm about linear joints ({tests.dof} dof)."]
+    notes = [
+        f"Load tests scatter by {tests.scatter / UM:.2g} µm about linear joints ({tests.dof} dof); "
+        f"{100 * beside.share:.2g} % of the displacement is linear in the force, but not made by the joints."
+    ]
     seen = joint_observability(model, loads)
     notes += [] if isinstance(seen, Refusal) else [in_words(*seen, model.arm.axes)]
     weak = np.flatnonzero(tests.sd > tests.value.max())
@@ -91,6 +101,21 @@ def fitted_loads(model: DeformationModel, loads: pd.DataFrame) -> Compliances | 
         return joint_compliances(model.contributions(joints, force), moved, _relative(loads))
     except ValueError as error:
         return Refusal(f"loads.csv: {error}")
+
+
+def lacking(model: DeformationModel, loads: pd.DataFrame) -> LackOfFit:
+    """Return what load tests show beside elastic joints; nothing where they tell nothing of the joints."""
+    tests = fitted_loads(model, loads)
+    if isinstance(tests, Refusal):
+        return LackOfFit(0.0, 0.0)
+    joints, force, moved = _load_arrays(loads, model.arm)
+    relative = _relative(loads)
+    residual = moved - model.contributions(joints, force) @ tests.value
+    return lack_of_fit(_poses(loads), force, residual / relative, moved / relative, int(tests.seen.sum()))
+
+
+def _poses(loads: pd.DataFrame) -> list[np.ndarray]:
+    return [np.asarray(at) for at in loads.groupby("pose", sort=False, dropna=False).indices.values()]
 
 
 def joint_observability(
@@ -155,18 +180,20 @@ def _relative(loads: pd.DataFrame) -> Array:
     return np.asarray(np.where(np.isfinite(stated), stated / np.nanmean(stated), 1.0)[:, None])
 
 
-def _load_block(pose: str, loads: pd.DataFrame, sigma: Array, arm: Arm) -> Block:
+def _load_block(pose: str, loads: pd.DataFrame, sigma: Array, arm: Arm, per_newton: float) -> Block:
+    """Return the tests of one pose; ``per_newton``: deviation of the tip's compliance beside the joints."""
     joints, force, moved = _load_arrays(loads, arm)
     measured = np.isfinite(moved)
     axis = np.broadcast_to(["load x", "load y", "load z"], moved.shape)[measured]
     name = f"load tests {pose}"
-    return _evidence(
+    block = _evidence(
         name,
         moved[measured],
         np.broadcast_to(sigma, moved.shape)[measured],
         LoadTest(joints, force, measured),
         axis,
     )
+    return replace(block, unidentified=directions(force, measured, per_newton))
 
 
 def _known_block(joints: np.ndarray, value: Array, sd: Array) -> Block:

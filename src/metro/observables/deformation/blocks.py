@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,8 +24,10 @@ from metro.units import MM, UM, Array
 # Relative error of the force of a run, and of the error that all runs share, by the source of the force. The
 # force from a repeat with a dynamometer is as accurate as repeats agree.
 SYSTEMATIC = {**tip_force.SYSTEMATIC, "repeat": 0.02}
-ZERO = 5 * UM  # standard error of a profile's zero against the programmed wall
+ZERO = 5 * UM  # standard error of a profile's zero against the programmed wall, before repeats show theirs
+DECLARED = 4  # walls for which that counts
 PerNewton = Callable[[CutWall], Array]
+WallError = Callable[[CutWall, float], Array]  # :func:`wall_error` of an arm
 
 
 def cutoff(batch: Batch) -> float:
@@ -32,11 +36,11 @@ def cutoff(batch: Batch) -> float:
 
 
 def wall_blocks(
-    batch: Batch, observed: Mapping[str, pd.DataFrame], per_newton: PerNewton
+    batch: Batch, observed: Mapping[str, pd.DataFrame], error: WallError
 ) -> tuple[list[Block], tuple[str, ...]]:
     """Return a block per wall that was traced, and sentences on the runs that have none.
 
-    For ``per_newton`` see :meth:`metro.observables.deformation.model.DeformationModel.per_newton`.
+    ``error``: of a wall for a relative error of its force, see :func:`wall_error`.
     """
     refused = observed["deformation_refused"].groupby(["what", "reason"], sort=False)["run"]
     notes = [f"No {what} of {', '.join(runs)}: {reason}." for (what, reason), runs in refused]
@@ -46,12 +50,33 @@ def wall_blocks(
     for name, table in points.groupby("run", sort=False):
         run = str(name)
         if run in forces and batch.runs.loc[run, "role"] in {"identify", "validate"}:
-            block = _wall_block(batch, run, table, forces[run], per_newton)
+            block = _wall_block(batch, run, table, forces[run], error)
             if block is None:
                 notes.append(f"Run {run}: the wall is too short for the filter.")
             else:
                 blocks.append(block)
-    return blocks, tuple(notes)
+    return _with_zeros(blocks), tuple(notes)
+
+
+def _with_zeros(blocks: Sequence[Block]) -> list[Block]:
+    """Put the error of each wall as a whole among what is not identified, as large as repeats show it.
+
+    Walls cut alike differ by the zero of the trace, and by what brings the joints to rest elsewhere. Only
+    those that identify are compared.
+    """
+    groups: dict[str, list[float]] = {}
+    for block in blocks:
+        if block.role == "identify":
+            groups.setdefault(block.condition, []).append(float(block.measured.mean()))
+    square = sum(len(means) * float(np.var(means)) for means in groups.values())
+    repeats = sum(len(means) - 1 for means in groups.values())
+    zero = math.sqrt((DECLARED * ZERO**2 + square) / (DECLARED + repeats))
+    return [_beside(block, np.full((len(block.measured), 1), zero)) for block in blocks]
+
+
+def _beside(block: Block, zero: Array) -> Block:
+    known = [] if block.unidentified is None else [block.unidentified]
+    return replace(block, unidentified=np.hstack([zero, *known]))
 
 
 def _wall_block(
@@ -59,7 +84,7 @@ def _wall_block(
     run: str,
     points: pd.DataFrame,
     force: pd.DataFrame,
-    per_newton: PerNewton,
+    error: WallError,
 ) -> Block | None:
     """Wall points away from the filter's and the wall's ends; half a cut-off apart their noise is white.
 
@@ -95,11 +120,21 @@ def _wall_block(
         axis=np.full(count, "z"),
         zeros=np.zeros((count, 0)),
         zero_sd=np.zeros(0),
-        unidentified=np.column_stack([np.full(count, ZERO), force_error(setting, off, per_newton)]),
+        unidentified=error(setting, off),
         coordinates={"axis": np.full(count, "z"), "s_mm": x[kept] / MM, "x_mm": x[kept] / MM},
     )
 
 
-def force_error(setting: CutWall, relative: float, per_newton: PerNewton) -> Array:
-    """Return the error of a wall for an error in x, y or z by a share of the whole force, (n, 3) m."""
-    return relative * float(np.linalg.norm(setting.force, axis=1).max()) * per_newton(setting)
+def wall_error(setting: CutWall, relative: float, per_newton: PerNewton, lack_of_fit: float) -> Array:
+    """Return the error of a wall for an error in x, y or z by a share of the whole force, (n, 3) m.
+
+    The arm gives way in each direction by another share than its joints say, too, which is an error as that
+    of a force in that direction.
+
+    Parameters
+    ----------
+    per_newton : see :meth:`metro.observables.deformation.model.DeformationModel.per_newton`.
+    lack_of_fit : relative rms, over all directions of force (:mod:`metro.observables.arm.lack_of_fit`).
+    """
+    each = math.hypot(relative, lack_of_fit / math.sqrt(3.0))
+    return each * float(np.linalg.norm(setting.force, axis=1).max()) * per_newton(setting)

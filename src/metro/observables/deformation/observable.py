@@ -13,13 +13,13 @@ from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
 from metro.observables.arm.give import GivingArm, giving_arm
-from metro.observables.arm.load_tests import best_compliance, calibration
+from metro.observables.arm.load_tests import best_compliance, calibration, lacking
 from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall, wall
 from metro.observables.arm.wall_profile import wall_points
 from metro.observables.deformation import NAME, TABLES
-from metro.observables.deformation.blocks import SYSTEMATIC, cutoff, wall_blocks
+from metro.observables.deformation.blocks import SYSTEMATIC, cutoff, wall_blocks, wall_error
 from metro.observables.deformation.model import DeformationModel
 from metro.observables.deformation.proposals import feasible
 from metro.observables.deformation.report import arm_block, tip_forces
@@ -120,8 +120,9 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         return Refusal(no_arm(batch.cell))
     model = DeformationModel(arm)
     softness = best_compliance(batch, model, observed["arm_loads"])
-    per_newton = partial(model.per_newton, compliance=softness)
-    walls, notes = wall_blocks(batch, observed, per_newton)
+    missed = lacking(model, observed["arm_loads"]).share
+    error = partial(wall_error, per_newton=partial(model.per_newton, compliance=softness), lack_of_fit=missed)
+    walls, notes = wall_blocks(batch, observed, error)
     if not walls:
         return Refusal("; ".join(notes) or "no run has a profile")
     evidence = calibration(batch, model, observed["arm_loads"])
@@ -138,11 +139,11 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         *said,
         *notes,
     )
-    systematic = math.hypot(max(SYSTEMATIC[source] for source in used), LOADED)
+    systematic = math.hypot(max(SYSTEMATIC[source] for source in used), LOADED, missed / math.sqrt(3.0))
     scatter = np.full(len(model.parameters), SCATTER)
     return Problem(
         NAME, "mm", MM, model, (*calibrate, *walls), scatter, systematic, tuple(notes),
-        feasible(walls, calibrate, model.arm, per_newton),
+        feasible(walls, calibrate, model.arm, error),
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from metro.observables.cut.conditions import turn_about_z
-from metro.observables.deformation.blocks import ZERO, PerNewton, force_error
+from metro.observables.deformation.blocks import ZERO, WallError
 from metro.observables.deformation.model import CutWall, LoadTest
 from metro.observables.problem import Block, Made, Proposal
 from metro.robot.kinematics import Arm
@@ -23,7 +23,7 @@ TURNS = (0.0, 90.0 * DEG)  # of the feed; half a turn only reverses the load on 
 
 
 def feasible(
-    walls: Sequence[Block], tests: Sequence[Block], arm: Arm, per_newton: PerNewton
+    walls: Sequence[Block], tests: Sequence[Block], arm: Arm, error: WallError
 ) -> tuple[Proposal, ...]:
     """Return walls and load tests that could be made after those of a batch.
 
@@ -33,16 +33,15 @@ def feasible(
     Parameters
     ----------
     walls, tests : blocks of the batch; ``tests`` those of load tests and of joints known beforehand.
-    per_newton : see :meth:`metro.observables.deformation.model.DeformationModel.per_newton`.
+    error : of a wall for a relative error of its force, see
+        :func:`metro.observables.deformation.blocks.wall_error`.
     """
     loaded = [block for block in tests if isinstance(block.setting, LoadTest)]
     made = [block for block in walls if block.role == "identify"]
-    return (*_walls(made, loaded, arm, per_newton), *map(_heavier, loaded))
+    return (*_walls(made, loaded, arm, error), *map(_heavier, loaded))
 
 
-def _walls(
-    made: Sequence[Block], loaded: Sequence[Block], arm: Arm, per_newton: PerNewton
-) -> Iterator[Proposal]:
+def _walls(made: Sequence[Block], loaded: Sequence[Block], arm: Arm, error: WallError) -> Iterator[Proposal]:
     """Propose walls at two depths.
 
     The depth distinguishes a gap from a spring; pose and direction distinguish the joints.
@@ -64,7 +63,7 @@ def _walls(
                     f"a wall as that of {like.condition} at half and at twice the depth, in {place}, "
                     f"feed at {feed}°, with a dynamometer"
                 )
-                blocks = (_block(like, here, depth, words, per_newton) for depth in (SHALLOW, DEEP))
+                blocks = (_block(like, here, depth, words, error) for depth in (SHALLOW, DEEP))
                 given: dict[str, float | str] = {"feed_direction_deg": feed}
                 given |= {"pose": pose} if pose else {}
                 rows = (Made(like.run, {"axial_depth_mm": depth}, given) for depth in (SHALLOW, DEEP))
@@ -107,13 +106,11 @@ def _turned(setting: CutWall, joints: Array, turn: float) -> CutWall:
     )
 
 
-def _block(like: Block, setting: CutWall, depth: float, words: str, per_newton: PerNewton) -> Block:
+def _block(like: Block, setting: CutWall, depth: float, words: str, error: WallError) -> Block:
     """Return the wall at a relative depth; the mean force is proportional to it."""
     setting = replace(setting, force=depth * setting.force)
     name = f"proposed: {words}, {depth:g}"
-    unidentified = np.column_stack(
-        [np.full(len(like.axis), ZERO), force_error(setting, MEASURED, per_newton)]
-    )
+    unidentified = np.column_stack([np.full(len(like.axis), ZERO), error(setting, MEASURED)])
     return replace(like, run=name, condition=name, setting=setting, unidentified=unidentified)
 
 
@@ -126,5 +123,6 @@ def _heavier(like: Block) -> Proposal:
         run=f"proposed: {words}",
         condition=words,
         setting=replace(setting, force=HEAVIER * setting.force),
+        unidentified=None if like.unidentified is None else HEAVIER * like.unidentified,
     )
     return Proposal(words, (block,))

@@ -101,11 +101,11 @@ def wall_figures(model: DeformationModel, block: Block, fit: BaseFit) -> JSON:
     setting: CutWall = block.setting
     matrix, offset = model.design(block, np.zeros(0), fit.beta)
     row = matrix.mean(axis=0)
-    force = np.zeros(1) if block.unidentified is None else block.unidentified.mean(axis=0)
+    zero, *force = np.array([ZERO]) if block.unidentified is None else block.unidentified.mean(axis=0)
     predicted = float(offset.mean() + row @ fit.beta)
-    sd = math.sqrt(float(row @ fit.covariance @ row + force @ force))
+    sd = math.sqrt(float(row @ fit.covariance @ row) + float(np.sum(np.square(force))))
     measured = float(block.measured.mean())
-    read = math.hypot(float(np.sqrt(np.mean(block.sigma**2) / len(block.sigma))), ZERO)
+    read = math.hypot(float(np.sqrt(np.mean(block.sigma**2) / len(block.sigma))), zero)
     twist = model.twists(setting, fit.beta)
     flange, turned, tip = (
         part[setting.kept].mean(axis=0) for part in deflections(model.arm, setting.commanded, twist)
