@@ -14,7 +14,7 @@ from dataclasses import replace
 from metro.effects.effect import Effect
 from metro.loop.checks.evidence import compare, hold_out, leave_out
 from metro.loop.fitting.fit import Fit
-from metro.loop.search.rivals import believed, contested
+from metro.loop.search.rivals import Contest, believed, contested
 from metro.loop.search.strategy import Choice, SearchSpace
 from metro.loop.search.trial import Trial, parted, small_beside_residual, tried, without
 from metro.loop.statement import Statement
@@ -23,22 +23,36 @@ MOST_EFFECTS = 4  # of a model
 
 
 def forward(space: SearchSpace) -> Choice:
-    """Add the best effect that passes every gate until none does, and weigh what was added."""
-    current, steps, trials = _added(space)
-    current, small = _large_enough(current, space)
-    trials |= {key: replace(trials[key], why_not=why) for key, why in small.items()}
-    steps = [step for step in steps if set(step.candidate.effects) <= set(current.candidate.effects)]
-    compared = contested(space.base, current, space.effects, space.prior, space.gates)
-    if compared.final is not current:
-        current, dropped = _pruned(compared.final, space)
-        if dropped:
-            compared = contested(space.base, current, space.effects, space.prior, space.gates)
-    return Choice(compared.final, tuple(steps), tuple(trials.values()), compared.weight, compared.rivals)
+    """Add the best effect that passes every gate until none does, and weigh what was added.
+
+    Where a rival takes the place of an effect, others may explain what it leaves: they are tried again.
+    """
+    current, steps = space.base, list[Fit]()
+    trials: dict[tuple[str, str], Trial] = {}
+    contest: Contest | None = None
+    weighed: set[frozenset[Effect]] = set()
+    while True:
+        grown, further, latest = _added(current, space)
+        steps, trials = steps + further, trials | latest
+        if contest is not None and grown is current:
+            break
+        current, small = _large_enough(grown, space)
+        trials |= {key: replace(trials[key], why_not=why) for key, why in small.items()}
+        contest = contested(space.base, current, space.effects, space.prior, space.gates)
+        weighed.add(frozenset(current.candidate.effects))
+        better = contest.final
+        if frozenset(better.candidate.effects) in weighed:
+            break
+        current, dropped = _pruned(better, space)
+        contest = None if dropped else contest
+    chosen = set(contest.final.candidate.effects)
+    steps = [step for step in steps if set(step.candidate.effects) <= chosen]
+    return Choice(contest.final, tuple(steps), tuple(trials.values()), contest.weight, contest.rivals)
 
 
-def _added(space: SearchSpace) -> tuple[Fit, list[Fit], dict[tuple[str, str], Trial]]:
-    """Add effects one by one; return the last fit, the fit after each addition, and the last trials."""
-    current, steps = space.base, []
+def _added(current: Fit, space: SearchSpace) -> tuple[Fit, list[Fit], dict[tuple[str, str], Trial]]:
+    """Add effects to a fit one by one; return the last fit, that after each addition, and the last trials."""
+    steps: list[Fit] = []
     trials: dict[tuple[str, str], Trial] = {}
     barred: set[str] = set()
     while len(current.candidate.effects) < MOST_EFFECTS:
