@@ -15,6 +15,10 @@ from metro.surface.points import Points, box
 from metro.units import JSON, MM, UM, Array
 
 MAP_CELLS = 60
+# Times the usual scatter within a disc, from which a disc holds more than the face: a wall beside it, a burr,
+# a chip. Of the fewest points that a disc is read from, noise alone goes beyond four once in a million.
+BROKEN = 5.0
+LEAST_SCATTER = 1 * UM  # that counts: a cloud that was computed has none
 
 POINT_COLUMNS: tuple[str, ...] = (
     *("run", "point", "pass", "x_mm", "y_mm", "s_mm"),
@@ -137,14 +141,16 @@ def _map(run: str, points: Array, deviations: Array) -> pd.DataFrame:
 
 
 def _points(run: str, cloud: Points, outliers: np.ndarray, path: pd.DataFrame, points: Array) -> pd.DataFrame:
-    """Heights in the discs of the path points; standard errors allow for noise correlated over a disc."""
+    """Heights in the discs of the path points; standard errors allow for noise correlated over a disc.
+
+    A disc that holds more than the face has no height.
+    """
     sampled = sample(cloud, points[:, 0], points[:, 1], without=outliers)
     number = path["pass"].to_numpy()
     step = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(number) == 0)
     alone = sampled.sd / np.sqrt(np.maximum(sampled.count, 1))
-    known = alone[np.isfinite(alone)]  # none where the cloud is too coarse for a disc to hold points
-    typical = float(np.median(known)) if known.size else float("nan")
-    correlated = _noise_along_passes(sampled.height - points[:, 2], number) / typical
+    height = np.where(sampled.sd > BROKEN * max(_median(sampled.sd), LEAST_SCATTER), np.nan, sampled.height)
+    correlated = _noise_along_passes(height - points[:, 2], number) / _median(alone)
     sigma = alone * max(1.0, correlated) if np.isfinite(correlated) else alone
     return pd.DataFrame(
         {
@@ -155,12 +161,18 @@ def _points(run: str, cloud: Points, outliers: np.ndarray, path: pd.DataFrame, p
             "y_mm": points[:, 1] / MM,
             "s_mm": np.concatenate([[0.0], np.cumsum(step)]) / MM,
             "programmed_z_mm": points[:, 2] / MM,
-            "z_mm": sampled.height / MM,
+            "z_mm": height / MM,
             "sigma_mm": sigma / MM,
             "k": sampled.count,
             "coverage": sampled.coverage,
         }
     )
+
+
+def _median(values: Array) -> float:
+    """Median of what is known; NaN where nothing is, as where a cloud is too coarse for discs."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else float("nan")
 
 
 def _noise_along_passes(deviation: Array, number: np.ndarray) -> float:
