@@ -258,6 +258,31 @@ def next_runs(
 
 
 @app.command()
+def watch(
+    folder: Annotated[str, typer.Argument(help="The batch: its folder of raw files, or its name.")],
+    *,
+    once: Annotated[bool, typer.Option("--once", help="Judge the files that are there, and end.")] = False,
+    page: Annotated[
+        bool, typer.Option("--page", help="Write reports/BATCH/watch.html too, which reloads itself.")
+    ] = False,
+    processed: Root = Path("data/processed"),
+    reports: Results = Path("reports"),
+    as_json: AsJson = False,
+) -> None:
+    """Judge each new file of a finished batch as soon as it is complete: as predicted, or off by how much.
+
+    A force record that a row of runs.csv names is compared with the batch's model; the answer says what a
+    difference looks like, and whether to go on. Other files are checked. What was judged is kept in
+    reports/BATCH/watch.json. The exit code of --once is 1 where a file is off or cannot be used.
+
+    Example: `metro watch data/raw/side-milling-17 --page`
+    """
+    from metro.watch.command import watch as watch_folder
+
+    raise typer.Exit(watch_folder(folder, processed, reports, once=once, page=page, as_json=as_json))
+
+
+@app.command()
 def query(
     sql: Annotated[
         str, typer.Argument(help="One SELECT (DuckDB's SQL); without it, the views are listed.")
