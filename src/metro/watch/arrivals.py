@@ -1,8 +1,8 @@
 """When a file is complete: it has not changed for a while, and nobody on this machine has it open to write.
 
 A copy over a network may pause, and some programs give a file its full size before they fill it. No waiting
-time is safe against all of that. So a file must also be readable, and one that is not is given
-:data:`PATIENCE_S` before that is said.
+time is safe against all of that. So a file must also be readable and hold the whole cut; one that is not is
+given :data:`PATIENCE_S` before that is said, and so is a text that ends within a line.
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 POLL_S = 0.25
-# Programs write at least once in some tenths of a second while they copy; two polls more leave a judgement
-# well within three seconds of the last byte.
-QUIET_S = 0.75
+# Programs that copy write several times a second. Where the system says that nobody has the file open to
+# write, a short rest is enough; where it cannot say so, the rest is as long as three seconds from the last
+# byte to the judgement allow.
+QUIET_S, UNSURE_S = 0.75, 1.5
 PATIENCE_S = 5.0
+TEXTS = {".csv", ".txt", ".asc", ".dat"}
 
 
 class Stamp(NamedTuple):
@@ -51,6 +53,15 @@ class Arrivals:
         self._since[path] = stamp, since
         return now - since
 
+    def complete(self, path: Path) -> bool:
+        """Tell whether a file has been at rest for long enough to be read."""
+        quiet = self.quiet(path)
+        if quiet < QUIET_S:
+            return False
+        if quiet < UNSURE_S and being_written(path) is None:
+            return False
+        return quiet >= PATIENCE_S or not _ends_within_a_line(path)
+
 
 def stamp_of(path: Path) -> Stamp | None:
     """Return the stamp of a file; None where there is none."""
@@ -61,25 +72,38 @@ def stamp_of(path: Path) -> Stamp | None:
     return Stamp(status.st_ino, status.st_size, status.st_mtime_ns)
 
 
-def being_written(path: Path) -> bool:
-    """Tell whether a process of this machine has a file open to write, as far as the system can say.
+def being_written(path: Path) -> bool | None:
+    """Tell whether a process of this machine has a file open to write; None where the system cannot say.
 
     Linux grants a read lease of a file only while nobody has it open to write. Other systems, file systems
-    of a network and files of other users grant none: then only the waiting time tells.
+    of a network and files of other users grant none.
     """
     if not hasattr(fcntl, "F_SETLEASE"):
-        return False
+        return None
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     except OSError:
-        return False
+        return None
     try:
         # Who opens the file meanwhile makes the system send a signal, which must be one that ends no process.
         fcntl.fcntl(handle, fcntl.F_SETSIG, signal.SIGURG)
         fcntl.fcntl(handle, fcntl.F_SETLEASE, fcntl.F_RDLCK)
         fcntl.fcntl(handle, fcntl.F_SETLEASE, fcntl.F_UNLCK)
     except OSError as error:
-        return error.errno == errno.EAGAIN
+        return True if error.errno == errno.EAGAIN else None
     finally:
         os.close(handle)
     return False
+
+
+def _ends_within_a_line(path: Path) -> bool:
+    """Tell whether a text lacks the end of its last line, as most texts do that are not all there."""
+    if path.suffix.lower() not in TEXTS:
+        return False
+    try:
+        with path.open("rb") as stream:
+            end = stream.seek(0, os.SEEK_END)
+            stream.seek(max(end - 1, 0))
+            return stream.read(1) not in (b"\n", b"\r")
+    except OSError:
+        return True

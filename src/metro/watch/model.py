@@ -71,12 +71,13 @@ class Finished:
         return {name: table for name, table in tables.items() if len(table.columns)}
 
     @cached_property
-    def sources(self) -> frozenset[str]:
-        """Names of the files that its tables were made from."""
+    def sources(self) -> Mapping[str, str]:
+        """SHA-256 of the files that its tables were made from, by name."""
         import pyarrow.parquet as pq
 
         metadata = pq.read_schema(self.processed / "runs.parquet").metadata or {}
-        return frozenset(json.loads(metadata.get(b"metro.sources", b"{}")))
+        sources: dict[str, str] = json.loads(metadata.get(b"metro.sources", b"{}"))
+        return sources
 
     @property
     def read(self) -> Processed:

@@ -10,8 +10,9 @@ from functools import partial
 from pathlib import Path
 
 from metro.batch.findings import ContractError
+from metro.batch.provenance import sha256 as _sha256
 from metro.batch.sources import SECTION, files_of, parted
-from metro.watch.arrivals import PATIENCE_S, QUIET_S, Arrivals, Stamp, stamp_of
+from metro.watch.arrivals import PATIENCE_S, Arrivals, Stamp, stamp_of
 from metro.watch.figures import compared
 from metro.watch.journal import FILE, Journal
 from metro.watch.judgement import Judgement, faulty, not_compared, of_force
@@ -101,7 +102,7 @@ class Watcher:
         stamp = stamp_of(path)
         if quiet < 0.0 or stamp is None:
             return
-        if quiet < QUIET_S:
+        if not self._arrivals.complete(path):
             self.waiting = True
             return
         key = self._key(file, stamp, row, path)
@@ -121,13 +122,16 @@ class Watcher:
         self.journal.add(judgement)
         yield judgement
 
+    def _copied(self, path: Path) -> str:
+        """Return the file of the batch that has the same content; "" where none has."""
+        content = _sha256(path)
+        return next((file for file, known in self.done.sources.items() if known == content), "")
+
     def _key(self, file: str, stamp: Stamp, row: str, path: Path) -> str:
         """Return what identifies a file, its content and its row; what has not changed is not read again."""
         place = file, stamp, row
         if place not in self._keys:
-            with path.open("rb") as stream:
-                content = hashlib.file_digest(stream, "sha256").hexdigest()
-            text = "\n".join((file, content, row))
+            text = "\n".join((file, _sha256(path), row))
             self._keys[place] = hashlib.sha256(text.encode()).hexdigest()[:24]
         return self._keys[place]
 
@@ -137,20 +141,23 @@ class Watcher:
         if not path.resolve().is_relative_to(self.folder.resolve()):
             message = "it is outside the batch's folder"
             return faulty(named.file, named.run, message, "Copy it into the folder, and name it there.")
+        if copied := self._copied(path):
+            message = f"it has the same content as {copied}, expected a recording of its own"
+            return faulty(named.file, named.run, message, "Copy the file of this run.")
         try:
-            with temporary() as place:
-                read = read_file(self.done, self.folder, tables, named, Path(place))
-                if named.column != "dynamometer":
-                    kind = KINDS[named.column]
-                    why = f"{kind} is not compared here; metro run compares it with the rest of the batch"
-                    return not_compared(named, why, read.warnings)
-                if self.done.force is None:
-                    return not_compared(named, self.done.lacking, read.warnings)
-                block = force_block(self.done, tables, named.run, read)
-        except NotReadError as error:
-            return faulty(named.file, named.run, str(error), AGAIN)
-        except ContractError as error:
+            return self._compared(tables, named)
+        except (NotReadError, ContractError) as error:
             return faulty(named.file, named.run, str(error).replace("\n", "; "), AGAIN)
+
+    def _compared(self, tables: Tables, named: Named) -> Judgement:
+        with temporary() as place:
+            read = read_file(self.done, self.folder, tables, named, Path(place))
+            if named.column != "dynamometer":
+                why = f"{KINDS[named.column]} is not compared here; metro run compares it with the batch"
+                return not_compared(named, why, read.warnings)
+            if self.done.force is None:
+                return not_compared(named, self.done.lacking, read.warnings)
+            block = force_block(self.done, tables, named.run, read)
         result = compared(self.done.force, block)
         causes = () if result.as_predicted else likenesses(result)
         judgement = of_force(named, result, causes)
@@ -159,7 +166,7 @@ class Watcher:
     def _settled_tables(self) -> Tables | None:
         """Return the tables of the folder, read again where they changed; None while they are written."""
         paths = [self.folder / name for name in (*RUNS, *IMPACTS)]
-        if any(0.0 <= self._arrivals.quiet(path) < QUIET_S for path in paths):
+        if any(stamp_of(path) and not self._arrivals.complete(path) for path in paths):
             return None
         stamps = tuple(stamp_of(path) for path in paths)
         if self._tables is None or self._tables[0] != stamps:
