@@ -41,9 +41,10 @@ READERS: dict[str, Reader] = {
     "targets": recordings.targets,
 }
 TABLE = {column: table for table, columns in RUN_FILES.items() for column in columns}
-# Of the cut that its settings describe, the share that the steady part of a record covers, relative to the
-# least share of the batch's own records: less is missing because the export or the copy ended early.
+# Share of the steady cut of the batch's shortest record that a new one holds at least: where there is less,
+# the export or the copy ended early.
 WHOLE = 0.8
+ALIKE = 0.5  # (largest less least) over the mean, of what records have in common
 
 
 class NotReadError(Exception):
@@ -77,7 +78,7 @@ class Tables:
         found = []
         for row in self.runs.to_dict("records"):
             files = {column: str(row[column]) for column in READERS if row[column]}
-            settings = repr({str(k): v for k, v in row.items() if k not in READERS})
+            settings = repr({str(k): v for k, v in row.items() if k not in {*READERS, "role"}})
             found += [Named(file, str(row["run"]), column, settings) for column, file in files.items()]
         for row in self.impacts.to_dict("records"):
             if row["file"]:
@@ -192,26 +193,38 @@ def _others(table: pd.DataFrame, run: str) -> pd.DataFrame:
 
 
 def _require_whole(done: Finished, batch: Batch, run: str, spindle: pd.DataFrame) -> None:
-    """Refuse a record whose cut ends long before it should, by the records that the batch has."""
-    known = _covered(batch, _others(done.observed["spindle"], run))
-    (share,) = _covered(batch, spindle)
-    least = float(np.nanmin(known)) if np.isfinite(known).any() else np.nan
-    if share < WHOLE * least:
-        row: Any = batch.runs.loc[run]
-        length = float(row["cut_length_mm"])
-        raise NotReadError(
-            f"holds {share * length:.3g} mm of steady cut, expected at least {least * length:.3g} mm of the "
-            f"{length:g} mm that runs.csv states, as in the other runs: the end of the record is missing; "
-            "export or copy it again"
-        )
+    """Refuse a record whose cut ends long before it should, by the records that the batch has.
+
+    Some record each cut for the same time, others the same part of its length: the measure is the one that is
+    more alike in the records of the same operation. Where neither is, nothing is known of a new one.
+    """
+    others = _others(done.observed["spindle"], run)
+    operation = batch.runs["operation"]
+    others = others[operation.reindex(others["run"]).to_numpy() == operation[run]]
+    if others.empty:
+        return
+    known, new = _covered(batch, others), _covered(batch, spindle)
+    spread = {name: float(np.ptp(values) / np.mean(values)) for name, values in known.items()}
+    name = min(spread, key=lambda each: spread[each] if np.isfinite(spread[each]) else np.inf)
+    least = WHOLE * float(np.min(known[name]))
+    if not spread[name] < ALIKE or not new[name][0] < least:
+        return
+    row: Any = batch.runs.loc[run]
+    size, unit = (1.0, "s") if name == "time" else (float(row["cut_length_mm"]), "mm")
+    raise NotReadError(
+        f"holds {size * new[name][0]:.3g} {unit} of steady cut, expected at least {size * least:.3g} {unit} "
+        f"as in the runs of the batch (operation {operation[run]}): the end of the record is missing; "
+        "export or copy it again"
+    )
 
 
-def _covered(batch: Batch, spindle: pd.DataFrame) -> np.ndarray:
-    """Return of each run the share of the cut's length that the steady part of its record covers."""
+def _covered(batch: Batch, spindle: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Return the time, s, of the steady cut in each record, and its share of the length of the cut."""
     runs = [str(run) for run in spindle["run"]]
     seconds = (spindle["steady_to_s"] - spindle["steady_from_s"]).to_numpy()
     length = batch.runs.loc[runs, "cut_length_mm"].to_numpy(dtype=float) * MM
-    return np.asarray(seconds * np.array([feed(batch, run) for run in runs]) / length)
+    share = seconds * np.array([feed(batch, run) for run in runs]) / length
+    return {"time": seconds, "length": np.asarray(share)}
 
 
 def temporary() -> tempfile.TemporaryDirectory[str]:
