@@ -15,6 +15,7 @@ from metro.commands.completion import batches, effects, observables
 from metro.commands.hidden import Style
 from metro.commands.project_calls import export, run
 from metro.commands.stage_calls import campaign, identify, ingest, loop, predict, report, verdict
+from metro.watch.call import watch
 
 STAGES = "Stages, in their order (called by snakemake)"
 
@@ -257,29 +258,7 @@ def next_runs(
         plan(name, observable, most=runs, limits=limit or [], out=out, seed=seed, as_json=as_json, **folders)
 
 
-@app.command()
-def watch(
-    folder: Annotated[str, typer.Argument(help="The batch: its folder of raw files, or its name.")],
-    *,
-    once: Annotated[bool, typer.Option("--once", help="Judge the files that are there, and end.")] = False,
-    page: Annotated[
-        bool, typer.Option("--page", help="Write reports/BATCH/watch.html too, which reloads itself.")
-    ] = False,
-    processed: Root = Path("data/processed"),
-    reports: Results = Path("reports"),
-    as_json: AsJson = False,
-) -> None:
-    """Judge each new file of a finished batch as soon as it is complete: as predicted, or off by how much.
-
-    A force record that a row of runs.csv names is compared with the batch's model; the answer says what a
-    difference looks like, and whether to go on. Other files are checked. What was judged is kept in
-    reports/BATCH/watch.json. The exit code of --once is 1 where a file is off or cannot be used.
-
-    Example: `metro watch data/raw/side-milling-17 --page`
-    """
-    from metro.watch.command import watch as watch_folder
-
-    raise typer.Exit(watch_folder(folder, processed, reports, once=once, page=page, as_json=as_json))
+app.command()(watch)
 
 
 @app.command()

@@ -57,7 +57,7 @@ def test_the_effect_that_is_hidden_is_put_back_and_held_out_runs_are_predicted(f
 
 
 def test_what_the_base_model_misses_is_expected_of_the_next_run_too(folders):
-    """Without the runout every run is off; that of the next one is no news."""
+    """Without the runout every run differs; that the next one does, too, is no news."""
     assert stated(folders, []).scale > 2.0
 
 

@@ -45,8 +45,8 @@ def test_a_force_a_fifth_too_high_is_off_in_proportion(place):
     rms = float(np.sqrt((table[FORCES].iloc[4000:] ** 2).to_numpy().mean()))
     table[FORCES] *= 1.2
     said = judged(place, table)
-    assert said.status == "off"
-    assert said.headline.startswith("off by ")
+    assert said.status == "differs"
+    assert said.headline.startswith("differs by ")
     assert said.figures["all"]["rms_n"] == pytest.approx(0.2 * rms, rel=0.05)
     assert said.causes[0] == "proportion"
     assert "a force that is 20 % larger in proportion" in said.reasons[1]
@@ -61,7 +61,7 @@ def test_a_deeper_cut_than_the_table_states_is_in_proportion_until_the_table_is_
     place.drop("r90", place.record("r90", deeper))
     watcher = place.watcher()
     (said,) = place.later(watcher)
-    assert (said.status, said.causes[0]) == ("off", "proportion")
+    assert (said.status, said.causes[0]) == ("differs", "proportion")
     table = pd.read_csv(place.raw / "runs.csv")
     table.loc[table["run"] == "r90", "axial_depth_mm"] = 2.3
     table.to_csv(place.raw / "runs.csv", index=False)
@@ -78,7 +78,7 @@ def test_a_force_that_is_a_third_too_low_is_smaller(place):
 
 def test_a_tool_that_runs_out_is_told_by_its_force_once_per_revolution(place):
     said = judged(place, place.record("r90", SLOT, runout_um=10.0))
-    assert (said.status, said.causes) == ("off", ("runout",))
+    assert (said.status, said.causes) == ("differs", ("runout",))
     assert "once per revolution" in said.reasons[1]
     assert "clamping of the tool" in said.advice
 
@@ -105,7 +105,7 @@ def test_a_difference_of_no_known_shape_is_named_after_nothing(place):
     # Twice per revolution of the tool, across it: none of the causes has that.
     table["fz_n"] += 25.0 * np.sin(2.0 * np.pi * 200.0 * table["t_s"])
     said = judged(place, table)
-    assert (said.status, said.causes) == ("off", ())
+    assert (said.status, said.causes) == ("differs", ())
     assert "One run does not show what it is" in said.reasons[1]
     assert said.advice.startswith("Cut again")
     assert "most in z" in said.headline

@@ -52,7 +52,7 @@ def test_it_is_killed_and_goes_on_without_saying_or_losing_anything_twice(place)
     done = call(place, "--once")
     assert done.returncode == 1, done.stderr
     assert "r90" not in done.stdout
-    assert "force/r91.parquet (r91): off by" in done.stdout
+    assert "force/r91.parquet (r91): differs by" in done.stdout
     again = call(place, "--once")
     assert (again.returncode, again.stdout) == (0, "")
     process, lines = watching(place)
@@ -106,9 +106,11 @@ def test_a_wrong_folder_is_a_wrong_call(place, name, code):
 def test_the_page_shows_the_newest_first_reloads_itself_and_needs_no_network():
     at = "2026-01-02T10:00:0{}+00:00"
     first = Judgement("force/a<b.csv", "r1", "as predicted", "as predicted: 1 N", at=at.format(1))
-    last = Judgement("force/c.csv", "r2", "off", "off by 9 N", ("By axis: …",), "Cut again.", at=at.format(2))
+    last = Judgement(
+        "force/c.csv", "r2", "differs", "differs by 9 N", ("By axis: …",), "Cut again.", at=at.format(2)
+    )
     text = page("some-batch", [first, last])
-    assert text.index("off by 9 N") < text.index("as predicted: 1 N")
+    assert text.index("differs by 9 N") < text.index("as predicted: 1 N")
     assert "force/a&lt;b.csv" in text
     assert re.search(r'http-equiv="refresh" content="\d"', text)
     assert 'name="viewport" content="width=device-width' in text

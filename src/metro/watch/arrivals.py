@@ -21,6 +21,7 @@ POLL_S = 0.25
 # write, a short rest is enough; where it cannot say so, the rest is as long as three seconds from the last
 # byte to the judgement allow.
 QUIET_S, UNSURE_S = 0.75, 1.5
+HEAD_START_S = 0.2  # of rest, after which a file is read on trial: nothing is said until it has rested enough
 PATIENCE_S = 5.0
 TEXTS = {".csv", ".txt", ".asc", ".dat"}
 

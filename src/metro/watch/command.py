@@ -29,7 +29,7 @@ def watch(
 
     Returns
     -------
-    code : 1 where a file that was judged now is off or cannot be used, else 0.
+    code : 1 where a file that was judged now differs or cannot be used, else 0.
     """
     raw = raw_folder(folder)
     name = raw.resolve().name
@@ -47,7 +47,7 @@ def watch(
         while True:
             for each in watcher.look():
                 typer.echo(json.dumps(each.content, ensure_ascii=False) if as_json else told(each))
-                code |= int(each.status in ("off", "error"))
+                code |= int(each.status in ("differs", "error"))
                 if page:
                     write_page(reports / name, name, watcher.journal.judgements)
             if once and not watcher.waiting:

@@ -11,7 +11,7 @@ from metro.watch.figures import Compared, Figure
 from metro.watch.record import Named
 from metro.watch.resemblance import Likeness
 
-Status = Literal["as predicted", "off", "checked", "error"]
+Status = Literal["as predicted", "differs", "checked", "error"]
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ MEANING = {
         "a dynamometer that is turned about z against the batch",
         "the mounting of the dynamometer and feed_direction_deg",
     ),
-    "zero": ("a zero of the dynamometer that is off", "the reset of the charge amplifier before the cut"),
+    "zero": ("a zero of the dynamometer that is wrong", "the reset of the charge amplifier before the cut"),
     "drift": (
         "a force that drifts along the run",
         "the drift of the charge amplifier, the temperature and the edges",
@@ -98,12 +98,14 @@ def of_force(named: Named, compared: Compared, causes: Sequence[Likeness]) -> Ju
             named.file, named.run, "as predicted", headline, (f"By axis: {by_axis}.",), GO_ON, figures
         )
     worst = compared.worst
-    headline = f"off by {number(whole.rms_n)} N rms ({whole.ratio:.1f} times the expected error)"
+    headline = f"differs by {number(whole.rms_n)} N rms ({whole.ratio:.1f} times the expected error)"
     if worst.ratio > 1.5 * whole.ratio:
         headline += f", most in {worst.axis} ({worst.ratio:.1f} times)"
     reasons = [f"By axis: {by_axis}.", *likeness_words(causes)]
     codes = tuple(each.code for each in causes)
-    return Judgement(named.file, named.run, "off", headline, tuple(reasons), _advice(codes), figures, codes)
+    return Judgement(
+        named.file, named.run, "differs", headline, tuple(reasons), _advice(codes), figures, codes
+    )
 
 
 def likeness_words(causes: Sequence[Likeness]) -> list[str]:
@@ -143,7 +145,7 @@ def _sized(cause: Likeness) -> str:
 
 def _advice(codes: Sequence[str]) -> str:
     if not codes:
-        return "Cut again; if the repeat is off as well, stop and plan runs with metro next."
+        return "Cut again; if the repeat differs as well, stop and plan runs with metro next."
     checks = "; ".join(dict.fromkeys(MEANING[code][1] for code in codes))
     if set(codes) <= INSTRUMENT:
         return f"Check {checks}, then cut again."

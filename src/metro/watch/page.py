@@ -12,7 +12,7 @@ from metro.watch.judgement import Judgement
 FILE = "watch.html"
 RELOAD_S = 2
 SHOWN = 50
-COLOUR = {"as predicted": "#1a7f37", "off": "#b35900", "error": "#b3261e", "checked": "#57606a"}
+COLOUR = {"as predicted": "#1a7f37", "differs": "#b35900", "error": "#b3261e", "checked": "#57606a"}
 STYLE = """
 :root { color-scheme: light dark; --ink: #1f2328; --soft: #57606a; --page: #f6f8fa; --card: #fff; }
 @media (prefers-color-scheme: dark) {

@@ -180,6 +180,10 @@ def force_block(done: Finished, tables: Tables, run: str, read: Read) -> Block:
         for name, table in done.observed.items()
         if name in observed
     }
+    # What the block of a run depends on: its own orders, what holes the fits had, and the zeros of all runs.
+    holes = batch.runs.index[batch.runs["operation"] == "helical"]
+    needed = {run, *holes} if run in holes else {run}
+    joined["orders"] = joined["orders"][joined["orders"]["run"].isin(needed)]
     posed = problem(batch, joined, done.identified)
     blocks = posed.blocks if isinstance(posed, Problem) else ()
     found = [block for block in blocks if block.run == run]

@@ -12,7 +12,7 @@ from pathlib import Path
 from metro.batch.findings import ContractError
 from metro.batch.provenance import sha256 as _sha256
 from metro.batch.sources import SECTION, files_of, parted
-from metro.watch.arrivals import PATIENCE_S, Arrivals, Stamp, stamp_of
+from metro.watch.arrivals import HEAD_START_S, PATIENCE_S, Arrivals, Stamp, stamp_of
 from metro.watch.figures import compared
 from metro.watch.journal import FILE, Journal
 from metro.watch.judgement import Judgement, faulty, not_compared, of_force
@@ -70,8 +70,8 @@ class Watcher:
         self.journal = Journal(reports / FILE, self._name)
         self.waiting = False
         self._tables: tuple[tuple[Stamp | None, ...], Tables] | None = None
-        self._keys: dict[tuple[str, Stamp, str], str] = {}
-        self._doubtful: dict[str, Judgement] = {}
+        self._keys: dict[tuple[str, str], tuple[Stamp, str]] = {}
+        self._on_trial: dict[tuple[str, str], tuple[str, Judgement]] = {}
 
     def look(self) -> Iterator[Judgement]:
         """Look once; yield what is to be said of files that are complete by now, each kept before."""
@@ -95,45 +95,53 @@ class Watcher:
             yield from self._said(file, "", partial(faulty, file, "", message, NO_ROW))
 
     def _said(self, file: str, row: str, judge: Callable[[], Judgement]) -> Iterator[Judgement]:
-        """Judge a file if it is there, complete and not judged yet; what is wrong with it is said later."""
-        name, _ = parted(self.folder, file)
-        path = self.folder / name
+        """Say what is to be said of a file that is there, once it is complete; what is wrong with it, later.
+
+        It is judged while it rests. The judgement holds if the file is the same when it has rested enough.
+        """
+        path = self.folder / parted(self.folder, file)[0]
         quiet = self._arrivals.quiet(path)
         stamp = stamp_of(path)
         if quiet < 0.0 or stamp is None:
             return
-        if not self._arrivals.complete(path):
+        if quiet < HEAD_START_S:
             self.waiting = True
             return
-        key = self._key(file, stamp, row, path)
-        if self.journal.has(key):
+        try:
+            key = self._key(file, stamp, row, path)
+            if self.journal.has(key):
+                return
+            known, judgement = self._on_trial.get((file, row), ("", None))
+            if judgement is None or known != key:
+                judgement = judge()
+                self._on_trial[file, row] = key, judgement
+        except OSError:  # it is gone, or not readable yet
+            self.waiting = True
             return
-        judgement = self._doubtful.get(key) or judge()
-        if stamp_of(path) != stamp:
-            self.waiting = True  # it changed while it was read: what was read may be a mixture
-            return
-        if judgement.status == "error" and quiet < PATIENCE_S:
-            self._doubtful[key] = judgement
+        complete = self._arrivals.complete(path) and stamp_of(path) == stamp
+        quiet = self._arrivals.quiet(path)
+        if not complete or (judgement.status == "error" and quiet < PATIENCE_S):
             self.waiting = True
             return
         now = datetime.now().astimezone().isoformat(timespec="seconds")
-        seconds = round(max(self._arrivals.quiet(path), 0.0), 2)
-        judgement = replace(judgement, at=now, seconds=seconds, key=key)
+        judgement = replace(judgement, at=now, seconds=round(quiet, 2), key=key)
         self.journal.add(judgement)
+        del self._on_trial[file, row]
         yield judgement
+
+    def _key(self, file: str, stamp: Stamp, row: str, path: Path) -> str:
+        """Return what identifies a file, its content and its row; what has not changed is not read again."""
+        known, key = self._keys.get((file, row), (None, ""))
+        if known != stamp:
+            text = "\n".join((file, _sha256(path), row))
+            key = hashlib.sha256(text.encode()).hexdigest()[:24]
+            self._keys[file, row] = stamp, key
+        return key
 
     def _copied(self, path: Path) -> str:
         """Return the file of the batch that has the same content; "" where none has."""
         content = _sha256(path)
         return next((file for file, known in self.done.sources.items() if known == content), "")
-
-    def _key(self, file: str, stamp: Stamp, row: str, path: Path) -> str:
-        """Return what identifies a file, its content and its row; what has not changed is not read again."""
-        place = file, stamp, row
-        if place not in self._keys:
-            text = "\n".join((file, _sha256(path), row))
-            self._keys[place] = hashlib.sha256(text.encode()).hexdigest()[:24]
-        return self._keys[place]
 
     def _judged(self, tables: Tables, named: Named) -> Judgement:
         """Read a file, and compare it with the model where there is one for it."""
