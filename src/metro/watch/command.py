@@ -38,12 +38,12 @@ def watch(
     if page:
         path = write_page(reports / name, name, earlier)
         _note(f"Page: {path}", as_json)
-    if not once:
-        for each in earlier[-EARLIER:]:
-            _note(f"Judged before: {line(each)}", as_json)
-        _note(_beginning(watcher, raw), as_json)
     code = 0
     try:
+        if not once:
+            for each in earlier[-EARLIER:]:
+                _note(f"Judged before: {line(each)}", as_json)
+            _note(_beginning(watcher, raw), as_json)
         while True:
             for each in watcher.look():
                 typer.echo(json.dumps(each.content, ensure_ascii=False) if as_json else told(each))
