@@ -11,8 +11,8 @@ from metro.batch.findings import BatchError, Finding
 from metro.codehash import code_hash
 from metro.formats import FormatError
 
-COMMANDS = ("check", "new-batch", "simulate", "run", "status", "explain", "next", "query", "verify")
-COMMANDS += ("export", "frf-export")
+COMMANDS = ("check", "new-batch", "simulate", "run", "status", "explain", "next", "watch")
+COMMANDS += ("query", "verify", "export", "frf-export")
 STAGES = ("ingest", "identify", "predict", "loop", "verdict", "report", "campaign")
 
 

@@ -64,13 +64,14 @@ ROOMS = {
         *("batch", "commands", "dataset", "report", "stages", "observables", "effects", "loop", "signals"),
         *PHYSICS,
     },
+    "watch": {"batch", "commands", "stages", "observables", "effects", "loop", "cutting"},
     "importing": {"batch", "formats"},
     "exporting": set(),
     "spelling": set(),
     "commands": {
         *("importing", "exporting", "batch", "report", "dataset", "workflow", "codehash", "observables"),
     },
-    "cli": {"stages", "commands", "batch", "formats", "codehash"},
+    "cli": {"stages", "commands", "batch", "formats", "codehash", "watch"},
 }
 
 

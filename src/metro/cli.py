@@ -15,6 +15,7 @@ from metro.commands.completion import batches, effects, observables
 from metro.commands.hidden import Style
 from metro.commands.project_calls import export, run
 from metro.commands.stage_calls import campaign, identify, ingest, loop, predict, report, verdict
+from metro.watch.call import watch
 
 STAGES = "Stages, in their order (called by snakemake)"
 
@@ -255,6 +256,9 @@ def next_runs(
     name = checked_call(batch, observable, limit or [], **folders)
     with at_work(f"{name}: planning runs, as long as a loop takes"):
         plan(name, observable, most=runs, limits=limit or [], out=out, seed=seed, as_json=as_json, **folders)
+
+
+app.command()(watch)
 
 
 @app.command()

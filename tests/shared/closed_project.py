@@ -1,5 +1,7 @@
 """A project folder in which a bundled batch has been through the pipeline, up to its verdict."""
 
+import json
+import shutil
 from pathlib import Path
 
 from metro.batch.config import load_config
@@ -29,3 +31,11 @@ def closed_project(root, raw, closing=True):
     loop(processed, reports, settings["loop"], "code")
     verdict(processed, reports, {}, "code")
     return root
+
+
+def without_effects(root, name):
+    """Write the results of a batch in which the search would find nothing, without the time that it takes."""
+    reports, processed = root / "reports" / name, root / "data/processed" / name
+    reports.mkdir(parents=True, exist_ok=True)
+    shutil.copy(processed / "identified.json", reports)
+    (reports / "verdict.json").write_text(json.dumps({"observables": {"force": {"effects": []}}}))
