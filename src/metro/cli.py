@@ -258,6 +258,36 @@ def next_runs(
 
 
 @app.command()
+def propose(
+    batch: Annotated[
+        str, typer.Argument(help="The batch: its name, or a folder of it.", autocompletion=batches)
+    ],
+    *,
+    write: Annotated[
+        Path | None, typer.Option(help="Write the proposal here, as a draft of an effect with its tests.")
+    ] = None,
+    processed: Root = Path("data/processed"),
+    reports: Results = Path("reports"),
+    as_json: AsJson = False,
+) -> None:
+    """Propose a term for what stays unexplained in the cutting force: formula, parameters, evidence.
+
+    Searches a grammar of terms that physics admits, by the gates of the loop, on identification runs alone.
+    Nothing is added to a model: you read the draft, test it, and accept it by installing it.
+
+    Example: `metro propose side-milling-17 --write effects/speed`
+    """
+    from metro.commands.next_runs import at_work
+    from metro.commands.propose import checked_call
+    from metro.stages.propose import propose as search
+
+    folders = {"processed": processed, "reports": reports}
+    name = checked_call(batch, **folders)
+    with at_work(f"{name}: searching for a term, up to a minute"):
+        search(name, write=write, as_json=as_json, **folders)
+
+
+@app.command()
 def query(
     sql: Annotated[
         str, typer.Argument(help="One SELECT (DuckDB's SQL); without it, the views are listed.")
