@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
-from metro.discovery.blueprint import kinds, written
+from metro.discovery.blueprint import Blueprint, kinds, written
 from metro.discovery.entry import LITERATURE, Entry
 from metro.discovery.example import Workshop
 from metro.discovery.words import parameter_lines
@@ -76,7 +76,7 @@ from metro.effects.effect import Effect, EffectParameter
 
 def apply(model, values):
     """Return the force model with the term on top of what it has; a size of zero changes nothing."""
-    term = {written(entry.plan)}
+    term = {_call(entry.plan)}
     return model.with_term(term)
 
 
@@ -91,6 +91,12 @@ EFFECT = Effect(
     experiment="{_experiment(said)}",
 )
 '''
+
+
+def _call(plan: Blueprint) -> str:
+    """Return the code of a call with an argument in each line."""
+    arguments = "".join(f"        {name}={written(one)},\n" for name, one in plan.arguments)
+    return f"{plan.kind.__name__}(\n{arguments}    )"
 
 
 def _values(term: JSON) -> dict[str, float]:

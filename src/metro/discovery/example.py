@@ -78,7 +78,7 @@ def _run(model: ForceModel, shop: Workshop, order: int, rng: np.random.Generator
     cut = Cut(feed, depth, Engagement(entry, end))
     setting = ForceSetting(cut, 0.0, HIGHEST, recording, travel)
     orders = 2 * HIGHEST + 1
-    table = pd.MultiIndex.from_product([middles, "xyz", range(orders)])
+    table = pd.MultiIndex.from_product([middles, list("xyz"), range(orders)])
     axis = table.get_level_values(1).to_numpy().astype(str)
     mean = table.get_level_values(2).to_numpy() == 0
     count = len(axis)

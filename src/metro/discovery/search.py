@@ -23,9 +23,9 @@ from metro.loop.search.trial import Gates, Trial, tried
 from metro.observables.problem import Problem
 from metro.units import JSON
 
-FITTED, ALIKE = 10, 2  # terms that are fitted; of these, that differ by their form alone
+FITTED, ALIKE = 6, 2  # terms that are fitted; of these, that differ by their form alone
 HALF = 0.5  # of what any cause could explain, that a proposal explains at least
-LEAST_SHARE = 0.05  # of the residual: a ceiling below says that nothing repeats from condition to condition
+LEAST_SHARE = 0.05  # of the residual, that is explainable at least
 EVEN = 1e-6  # rad by which the pitch of teeth differs where they are not alike
 
 
@@ -175,8 +175,8 @@ def _gain(trial: Trial) -> float:
 
 
 def _explainable(known: JSON | None) -> float:
-    """Share of the residual that could be explained; without a ceiling all that is no noise."""
+    """Share of the residual that could be explained; all that is no noise where the ceiling may be chance."""
     if known is None:
         return 1.0
-    share = float(known["share"])
-    return share if share > LEAST_SHARE else max(LEAST_SHARE, 1.0 - float(known["noise_share"]))
+    beyond = max(LEAST_SHARE, 1.0 - float(known["noise_share"]))
+    return float(known["share"]) if known["ci95"][0] > 0.0 else beyond

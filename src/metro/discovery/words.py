@@ -29,7 +29,13 @@ def _limits(entry: JSON) -> str:
     known = entry["ceiling"]
     if known is None:
         return words + " How much any cause could explain is not known."
-    low, high = (max(0.0, end) for end in known["ci95"])
+    low, high = known["ci95"]
+    if low <= 0.0:
+        return (
+            f"{words} What the waveforms of other conditions predict of the residual may be chance "
+            f"({_percent(known['share'])}, 95 %: {_percent(low)} to {_percent(high)}). A term has to explain "
+            f"half of the {_percent(entry['explainable'])} that are not noise."
+        )
     return (
         f"{words} Any cause could explain at most {_percent(known['share'])} of the residual of a condition "
         f"that was left out (95 %: {_percent(low)} to {_percent(high)})."
