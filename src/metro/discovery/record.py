@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from metro.discovery.search import Search, Tried
+from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.held_out import comparison, held_out
 from metro.loop.planning.experiment import prospects
 from metro.loop.verdict.verdict import parameters
@@ -28,7 +29,7 @@ def record(search: Search, problem: Problem) -> JSON:
         entry["proposal"] = {
             "name": chosen.entry.name,
             "as_good": [one.entry.name for one in _as_good(search, chosen)],
-            "verification": _verification(search, chosen, problem),
+            "verification": verified(search.current, chosen.trial.fit, problem),
             "test": _test(search, chosen, problem),
         }
     return entry
@@ -66,11 +67,11 @@ def _as_good(search: Search, chosen: Tried) -> list[Tried]:
     return [one for one in search.terms if one is not chosen and one.passed and one.trial.weight > AS_GOOD]
 
 
-def _verification(search: Search, chosen: Tried, problem: Problem) -> JSON | None:
-    """Return the rms error on the held-out runs without and with the term, and by run."""
+def verified(current: Fit, larger: Fit, problem: Problem) -> JSON | None:
+    """Return the rms error on the held-out runs of a fit and of a larger one, as a whole and by run."""
     if not problem.role("validate"):
         return None
-    rows = comparison(problem, held_out(problem, search.current), held_out(problem, chosen.trial.fit))
+    rows = comparison(problem, held_out(problem, current), held_out(problem, larger))
     squares = rows.assign(
         before=(rows["measured"] - rows["before"]) ** 2, after=(rows["measured"] - rows["after"]) ** 2
     )

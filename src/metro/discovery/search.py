@@ -96,6 +96,14 @@ def searched(problem: Problem, base: Fit, found: list[JSON], gates: Gates) -> Se
     return Search(current, prior, len(entries), tuple(ordered), known, _explainable(known))
 
 
+def tried_term(search: Search, entry: Entry) -> Fit:
+    """Fit one term on top of what the model has, from the step by which it is screened."""
+    (one,) = screened(search.current, [entry], search.current.nuisance)
+    effects = (*search.current.candidate.effects, entry.effect(one.sizes, 1.0))
+    candidate = Candidate(search.current.candidate.base, effects)
+    return fit(candidate, search.current.blocks, search.prior, search.current)
+
+
 def with_found(problem: Problem, base: Fit, found: list[JSON], prior: Noise) -> Fit:
     """Return the fit with the effects of a verdict, begun where the verdict has them."""
     able, _ = fitted_to(library(problem.observable), problem)
