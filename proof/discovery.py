@@ -50,6 +50,13 @@ RIGHT: Mapping[str, Right] = {
     "hard_skin": Right(frozenset({"height"}), r"top_layer"),
     "slanted_blank": Right(frozenset({"path", "time"}), r"depth_by_path"),
     "heat_softening": Right(frozenset({"speed"}), r"shear_force_by_speed"),
+    "chipped_tooth": Right(frozenset({"tooth"}), r"tooth_\d"),
+    "hard_spot": Right(frozenset({"path", "time"}), r"(shear|tangential)_force_by_time_step"),
+    "speed_dependence": Right(frozenset({"speed"}), r"shear_force_by_speed"),
+    "sensor_lag": Right(frozenset({"frequency"}), r"lag_of_first_order"),
+    "second_orbit_stiffness": Right(frozenset({"orbit"}), ""),
+    "slow_growth": Right(frozenset({"travel"}), r"depth_by_travel(_saturating)?"),
+    "tilted_surface": Right(frozenset({"path", "time"}), r"depth_by_path"),
     "filter_left_on": Right(frozenset({"frequency"}), r"lag_of_second_order"),
 }
 

@@ -32,9 +32,9 @@ class Fact:
         """Range of the values."""
         return float(np.ptp(self.values))
 
-    def between(self) -> list[float]:
-        """Return places between runs at which a step may be."""
-        levels = np.unique(self.by_run)
+    def places(self, *, within: bool) -> list[float]:
+        """Return places between runs at which a step may be; or ``within`` records, between their blocks."""
+        levels = np.unique(self.values if within else self.by_run)
         gaps = 0.5 * (levels[:-1] + levels[1:])
         return sorted({rounded(float(gaps[int(share * (len(gaps) - 1))])) for share in PLACES})
 

@@ -76,8 +76,8 @@ def functions(name: str, fact: Fact) -> Iterator[Function]:
         yield _function("saturating" if name == "travel" else "decay", name, fact, share * fact.span)
     if name == "path":
         yield _function("square", name, fact)
-    if name == "travel":
-        for place in fact.between():
+    if name in ("travel", "time"):
+        for place in fact.places(within=name == "time"):
             yield _function("step", name, fact, place)
 
 
@@ -122,7 +122,8 @@ def grammar(batch: Setting) -> list[Entry]:
         for tooth in range(1 if batch.alike else batch.teeth):
             entries += [_tooth(tooth, None), *(_tooth(tooth, one) for one in travel if one.form == "step")]
         entries += [_wave(order) for order in WAVES if order % batch.teeth]
-    slow = [one for one in single if one.variable in ("travel", "time")]
+    slow = [one for one in travel if one.form != "saturating"]
+    slow += [one for one in single if one.variable == "time"]
     entries += [_push(axis, one) for axis in "xyz" for one in slow]
     for axis, largest in batch.readings.items():
         entries += [_bend(axis, sign, rounded(share * largest)) for sign in (1.0, -1.0) for share in PRELOADS]
