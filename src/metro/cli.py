@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 from metro import __version__
 from metro.commands.completion import batches, effects, observables
 from metro.commands.hidden import Style
-from metro.commands.project_calls import export, run
+from metro.commands.project_calls import export, new_batch, run
 from metro.commands.stage_calls import campaign, identify, ingest, loop, predict, report, verdict
 
 STAGES = "Stages, in their order (called by snakemake)"
@@ -97,25 +97,7 @@ def check(
     raise typer.Exit(check_batches(folders, one, as_json))
 
 
-@app.command("new-batch")
-def new_batch(
-    name: Annotated[str, typer.Argument(help="The batch's name: small letters, digits, hyphens.")],
-    root: Annotated[Path, typer.Option(help="Where the batch's folder is made.")] = Path("data/raw"),
-    as_json: AsJson = False,
-) -> None:
-    """Write a commented template of a batch, to be filled in with your measurement.
-
-    Example: `metro new-batch side-milling-17`
-    """
-    from metro.batch.template import new_batch as write
-    from metro.commands.calls import require_name
-
-    require_name(name)
-    folder = write(root, name)
-    if as_json:
-        typer.echo(json.dumps({"batch": name, "folder": str(folder)}))
-        return
-    typer.echo(f"{folder} is there. Fill it in, then call: metro check {folder}")
+app.command("new-batch")(new_batch)
 
 
 @app.command("import")
