@@ -14,7 +14,7 @@ from metro.units import JSON
 
 WIDTH = 100
 REVIEW = (
-    "Nobody has explained it yet: find the cause that it stands for, give the effect its name and its "
+    "Nobody has explained it yet: find the cause behind it, give the effect its name and its "
     "literature, and correct its bounds."
 )
 
