@@ -4,6 +4,7 @@
 does ``faces``: what is compared is the faces that are predicted with those that are scanned. ``next`` asks
 for runs where a verdict is undetermined, cuts them, and counts how often they decide; ``joint`` puts all
 observables together against each alone; ``campaign`` follows a tool that wears and a machine that gets warm.
+``discovery`` asks ``metro propose`` about a suite that was run and kept.
 
 ``judge`` makes, runs and opens batches for the commit that is checked out and writes down what came of it;
 ``score`` does the last of this for another program, ``baseline`` is three such programs (docs/protocol.md).
@@ -51,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     joint = commands.add_parser("joint", help="what all observables say together against each alone")
     joint.add_argument("--batches", type=int, default=32)
     joint.add_argument("--seed", type=int, default=1)
+    discovery = commands.add_parser("discovery", help="what `metro propose` says of a suite that was run")
     campaign = commands.add_parser("campaign", help="whether wear and warm-up over batches are followed")
     campaign.add_argument("--seed", type=int, default=1)
     judge = commands.add_parser("judge", help="judge the commit that is checked out, and log it")
@@ -65,7 +67,19 @@ def _parser() -> argparse.ArgumentParser:
     scoring = commands.add_parser("score", help="compare the answers of another program with the truth")
     commands.add_parser("board", help="make the page of all judgements anew")
     consistent = commands.add_parser("consistent", help="whether reports contradict themselves")
-    for command in (make, run, consistent, opening, faces, planned, joint, campaign, baseline, scoring):
+    for command in (
+        make,
+        run,
+        consistent,
+        opening,
+        faces,
+        planned,
+        joint,
+        campaign,
+        baseline,
+        scoring,
+        discovery,
+    ):
         command.add_argument("out", type=Path, help="folder of this proof")
     scoring.add_argument("answers", type=Path, help="folder with <batch>.json for each batch")
     scoring.add_argument("--name", required=True, help="of the program")
@@ -138,6 +152,14 @@ def _joint(out: Layout, options: argparse.Namespace) -> None:
     printed(tables(attributed(out, options.batches, options.seed, options.jobs)), Console())
 
 
+def _discovery(out: Layout, _: argparse.Namespace) -> None:
+    from proof.discovery import discoveries, printed, written
+
+    found = discoveries(out)
+    written(found, out)
+    print(printed(found))
+
+
 def _campaign(out: Layout, options: argparse.Namespace) -> None:
     from rich.console import Console
 
@@ -201,6 +223,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "next": _next,
     "joint": _joint,
     "campaign": _campaign,
+    "discovery": _discovery,
     "coverage": _coverage,
     "judge": _judge,
     "baseline": _baseline,

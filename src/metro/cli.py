@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 from metro import __version__
 from metro.commands.completion import batches, effects, observables
 from metro.commands.hidden import Style
-from metro.commands.project_calls import export, run
+from metro.commands.project_calls import export, new_batch, run
 from metro.commands.stage_calls import campaign, identify, ingest, loop, predict, report, verdict
 from metro.watch.call import watch
 
@@ -98,25 +98,7 @@ def check(
     raise typer.Exit(check_batches(folders, one, as_json))
 
 
-@app.command("new-batch")
-def new_batch(
-    name: Annotated[str, typer.Argument(help="The batch's name: small letters, digits, hyphens.")],
-    root: Annotated[Path, typer.Option(help="Where the batch's folder is made.")] = Path("data/raw"),
-    as_json: AsJson = False,
-) -> None:
-    """Write a commented template of a batch, to be filled in with your measurement.
-
-    Example: `metro new-batch side-milling-17`
-    """
-    from metro.batch.template import new_batch as write
-    from metro.commands.calls import require_name
-
-    require_name(name)
-    folder = write(root, name)
-    if as_json:
-        typer.echo(json.dumps({"batch": name, "folder": str(folder)}))
-        return
-    typer.echo(f"{folder} is there. Fill it in, then call: metro check {folder}")
+app.command("new-batch")(new_batch)
 
 
 @app.command("import")
@@ -259,6 +241,36 @@ def next_runs(
 
 
 app.command()(watch)
+
+
+@app.command()
+def propose(
+    batch: Annotated[
+        str, typer.Argument(help="The batch: its name, or a folder of it.", autocompletion=batches)
+    ],
+    *,
+    write: Annotated[
+        Path | None, typer.Option(help="Write the proposal here, as a draft of an effect with its tests.")
+    ] = None,
+    processed: Root = Path("data/processed"),
+    reports: Results = Path("reports"),
+    as_json: AsJson = False,
+) -> None:
+    """Propose a term for what stays unexplained in the cutting force: formula, parameters, evidence.
+
+    Searches a grammar of terms that physics admits, by the gates of the loop, on identification runs alone.
+    Nothing is added to a model: you read the draft, test it, and accept it by installing it.
+
+    Example: `metro propose side-milling-17 --write effects/speed`
+    """
+    from metro.commands.next_runs import at_work
+    from metro.commands.propose import checked_call
+    from metro.stages.propose import propose as search
+
+    folders = {"processed": processed, "reports": reports}
+    name = checked_call(batch, **folders)
+    with at_work(f"{name}: searching for a term, up to a minute"):
+        search(name, write=write, as_json=as_json, **folders)
 
 
 @app.command()

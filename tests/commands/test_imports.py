@@ -33,7 +33,7 @@ MODULES = {
         *(f"commands.{name}" for name in ("calls", "completion", "hidden", "output", "stage_calls")),
         *(f"commands.{name}" for name in ("which", "run", "workflow_file", "project_calls")),
     ),
-    ("numpy",): ("commands.query", "commands.status", "dataset.results", "dataset.views"),
+    ("numpy",): ("commands.query", "commands.status", "commands.propose", "dataset.results", "dataset.views"),
     ("numpy", "yaml"): ("workflow", "commands.simulate", "commands.verify"),
     ("numpy", "pandas", "pyarrow"): (
         "commands.export",

@@ -1,13 +1,34 @@
-"""Two commands as they are declared: to run the workflow in a project, and to hand on what it gave."""
+"""Commands as they are declared: to begin a batch, to run the workflow, and to hand on what it gave."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from metro.commands.completion import batches
+
+
+def new_batch(
+    name: Annotated[str, typer.Argument(help="The batch's name: small letters, digits, hyphens.")],
+    root: Annotated[Path, typer.Option(help="Where the batch's folder is made.")] = Path("data/raw"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")] = False,
+) -> None:
+    """Write a commented template of a batch, to be filled in with your measurement.
+
+    Example: `metro new-batch side-milling-17`
+    """
+    from metro.batch.template import new_batch as write
+    from metro.commands.calls import require_name
+
+    require_name(name)
+    folder = write(root, name)
+    if as_json:
+        typer.echo(json.dumps({"batch": name, "folder": str(folder)}))
+        return
+    typer.echo(f"{folder} is there. Fill it in, then call: metro check {folder}")
 
 
 def run(

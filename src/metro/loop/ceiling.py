@@ -36,6 +36,7 @@ class Run:
     ----------
     residual : (channels, harmonics) that the base model leaves, SI. noise : its power by noise alone.
     signal : power of what was measured. circumstances : settings of the run, SI.
+    shift : of the angle of the first tooth, rad, by which it was chosen.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Run:
     noise: float
     signal: float
     circumstances: Mapping[str, float]
+    shift: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +107,19 @@ def ceiling(problem: Problem, base: Fit) -> JSON | None:
     return entry | {"words": Statement("ceiling", entry)}
 
 
+def aligned(problem: Problem, fitted: Fit) -> dict[str, Array]:
+    """Return the unknowns of the runs of a fit, the first tooth of each chosen so that residuals agree."""
+    if not isinstance(problem.base, Overlaid):
+        return dict(fitted.nuisance)
+    runs = _overlaid(problem.base, fitted, [block for block in fitted.blocks if block.role != "calibrate"])
+    return {**fitted.nuisance, **{run.name: _turned(fitted.nuisance[run.name], run.shift) for run in runs}}
+
+
+def _turned(nuisance: Array, shift: float) -> Array:
+    """Return the unknowns of a run with another tooth as the first one: their first one is its angle."""
+    return np.concatenate([nuisance[:1] + shift, nuisance[1:]])
+
+
 def _overlaid(
     model: Overlaid,
     fitted: Fit,
@@ -133,14 +148,16 @@ def _overlaid(
             for run in runs:
                 wanted += run.residual / math.sqrt(_power(run.residual))
         agreement = [float(np.sum(image * np.conj(wanted)).real) for image in images]
+        best = int(np.argmax(agreement))
         runs.append(
             Run(
                 name=block.run,
                 condition=block.condition,
-                residual=images[int(np.argmax(agreement))],
+                residual=images[best],
                 noise=float(np.sum(block.error**2)) / block.repeats**2,
                 signal=float(np.sum(block.measured**2)) / block.repeats,
                 circumstances=settings,
+                shift=float(shifts[best, 0]) if shifts.size else 0.0,
             )
         )
     return runs

@@ -5,31 +5,32 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from metro.cutting.chipped import Chipped
 from metro.cutting.cutter import Cutter
 from metro.cutting.engagement import with_wall_proud
-from metro.cutting.force import COEFFICIENTS, Cut, force_basis
+from metro.cutting.force import COEFFICIENTS, Cut
 from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped, turn
 from metro.cutting.law import EdgeLaw
-from metro.cutting.yielding_steady import NotBalancedError, yielding
+from metro.observables.force import terms as added
 from metro.observables.force.dynamometer import Dynamometer, Recording, transfer
+from metro.observables.force.order_basis import (
+    FEEDS,
+    Orders,
+    Soft,
+    order_basis,
+    shares_of_feeds,
+    yielding_orders,
+)
 from metro.observables.problem import Block, Parameter
-from metro.signals.orders import amplitudes, from_amplitudes, to_orders
+from metro.signals.orders import amplitudes, from_amplitudes
 from metro.units import N_MM, N_MM2, Array, ComplexArray
 
 PHASES_PER_PITCH = 12
 ORBIT_PHASES = 12
 LAID_OVER = 24  # highest order at which runs are laid over one another: most records have it
-FEEDS = (
-    0.0,
-    math.pi / 3.0,
-    2.0 * math.pi / 3.0,
-)  # these three directions suffice, because a spring repeats after half a turn
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,7 @@ class ForceModel:
     immersion). A block's nuisance is the angle of tooth 0 at the record's start, rad, and in helical milling
     also the direction of feed there. ``bottom_edges`` names those of K_Fac and K_Fae that the helical runs
     can identify. ``end_declared``: whether the cutter's end is that of the manifest, else it is assumed flat.
+    ``terms``: what the model has beside these parts (:mod:`metro.observables.force.terms`).
     ``origin``: the model that this one hardly differs from, such as for a derivative: the deflection of a
     tool that yields is found from that of the origin, by one step.
     """
@@ -94,11 +96,16 @@ class ForceModel:
     sensor: Dynamometer = field(default_factory=Dynamometer)
     chipped: tuple[Chipped, ...] = ()
     end_declared: bool = False
+    terms: tuple[added.Term, ...] = ()
     origin: ForceModel | None = None
 
     def moved_from(self, origin: ForceModel) -> ForceModel:
         """Return the model as a small change of another."""
         return replace(self, origin=origin)
+
+    def with_term(self, term: added.Term) -> ForceModel:
+        """Return the model with one more term."""
+        return replace(self, terms=(*self.terms, term))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -126,12 +133,19 @@ class ForceModel:
         rigid.
         """
         force = self._force(block.setting, beta)
-        return self._rows(force, block.setting, nuisance[None])[0], self._drift(block)
+        rows = self._rows(force, block.setting, nuisance[None])[0]
+        bent = None if beta is None else added.bent(self.terms, (rows @ beta)[None], block)
+        if bent is None or beta is None:
+            return rows, self._offset(block)
+        more = added.bent_columns(bent[1][0], rows, block)
+        return rows + more, self._offset(block) + bent[0][0] - more @ beta
 
     def predictions(self, block: Block, nuisances: Array, beta: Array) -> Array:
         """Return the prediction (k, n) of a block at each of ``nuisances`` (k, m)."""
         force = self._force(block.setting, beta) @ beta
-        return self._rows(force[..., None], block.setting, nuisances)[..., 0] + self._drift(block)
+        read = self._rows(force[..., None], block.setting, nuisances)[..., 0]
+        bent = added.bent(self.terms, read, block)
+        return (read if bent is None else read + bent[0]) + self._offset(block)
 
     def overlaid(self, block: Block, nuisance: Array, values: Array) -> ComplexArray:
         """Amplitudes (3, orders) of values of a block at phase 0; empty in helical milling."""
@@ -159,31 +173,42 @@ class ForceModel:
         return "xyz"[channel], f"order {harmonic}" if harmonic else "mean"
 
     def _force(self, setting: ForceSetting, beta: Array | None) -> ComplexArray:
-        """Amplitudes of the force at phase 0, (feeds, H+1, 3, coefficients), with x along the feed."""
-        worn = np.repeat([setting.feed_ratio, self.law.edge(setting.cut_length)], 3)
-        force = self._orders(self._cutting(setting), beta) * worn
+        """Amplitudes of the force at phase 0, x along the feed: (feeds, blocks or 1, H+1, 3, p)."""
+        force = np.asarray(self._orders(self._cutting(setting), beta) * self._worn(setting), complex)
         if setting.helix is not None:
             force = ramped(force.reshape(-1, *force.shape[2:]), setting.helix.ramp).reshape(force.shape)
         if self.bottom_edges:
             bottom = np.zeros((*force.shape[:3], len(self.bottom_edges)), complex)
             bottom[:, 0, 2] = self._bottom(setting)
             force = np.concatenate([force, bottom], axis=3)
-        return np.asarray(force)
+        return added.acted(self.terms, force, self, setting)
+
+    def of_cut(self, setting: ForceSetting, cut: Cut, cutter: Cutter | None = None) -> ComplexArray:
+        """Amplitudes (H+1, 3, 6) of the force of another cut, or tool, in the place of a setting's own."""
+        return order_basis(
+            cutter or self.cutter, self.law, cut, setting.highest, self.true_path
+        ) * self._worn(setting)
+
+    def _worn(self, setting: ForceSetting) -> Array:
+        return np.repeat([setting.feed_ratio, self.law.edge(setting.cut_length)], 3)
 
     def _rows(self, force: ComplexArray, setting: ForceSetting, nuisances: Array) -> Array:
-        """Return what the sensor reads of a force (feeds, H+1, 3, p) at nuisances (k, m): (k, n, p)."""
-        recording, orders, p = setting.recording, force.shape[1], force.shape[-1]
+        """Return what is read of a force (feeds, blocks or 1, H+1, 3, p) at nuisances (k, m): (k, n, p)."""
+        recording, orders, p = setting.recording, force.shape[2], force.shape[-1]
         phase, direction = nuisances[:, 0], np.full(len(nuisances), setting.feed_direction)
         if setting.helix is not None:
             direction = nuisances[:, 1]
         if len(force) > 1:
-            shares = _shares_of_feeds(recording, direction)
-            force = np.einsum("kbf,fhap->kbhap", shares, force)
+            shares = shares_of_feeds(recording, direction)
+            force = np.einsum(
+                "kbf,fchap->kbhap" if force.shape[1] == 1 else "kbf,fbhap->kbhap", shares, force
+            )
         elif self.sensor.ideal:
-            force = np.broadcast_to(force, (1, len(recording.middles), *force.shape[1:]))
+            force = np.broadcast_to(force, (1, len(recording.middles), *force.shape[2:]))
         turned = turn(direction)[:, None, None] @ force
         turned *= np.exp(1j * phase[:, None] * np.arange(orders))[:, None, :, None, None]
         seen = turned if self.sensor.ideal else transfer(self.sensor, recording, orders) @ turned
+        seen = added.read(self.terms, seen, self, setting)
         if setting.helix is not None and self.structure.orbit_amplitude:
             feed = direction[:, None] + recording.orbit * np.array(recording.middles)
             wave = recording.attenuation * np.cos(feed - self.structure.orbit_phase)
@@ -209,35 +234,35 @@ class ForceModel:
             return sound._orders(setting, beta) + self._lost(setting)
         tool, highest = (self.cutter, self.law, setting.cut), setting.highest
         if beta is None or not any(self.structure.compliance):
-            return _order_basis(*tool, highest, self.true_path)[None]
+            return order_basis(*tool, highest, self.true_path)[None]
         yielding = np.stack([each.orders for each in self._yielding(setting, beta)])
         if self.cutter.cylindrical:
             return yielding
         # What yielding changes is that of a cylinder of the same depth: a rounded end that is deflected is
         # not modelled.
-        rigid = (_order_basis(each, *tool[1:], highest, self.true_path) for each in self._ends())
+        rigid = (order_basis(each, *tool[1:], highest, self.true_path) for each in self._ends())
         return np.asarray(yielding + np.subtract(*rigid))
 
     def _ends(self) -> tuple[Cutter, Cutter]:
         """Return the cutter, and the cylinder that it would be with a flat end."""
         return self.cutter, replace(self.cutter, corner=0.0, taper=0.0)
 
-    def _yielding(self, setting: ForceSetting, beta: Array) -> list[_Orders]:
+    def _yielding(self, setting: ForceSetting, beta: Array) -> list[Orders]:
         """Return the force on a tool that yields, in each direction of feed that is computed."""
-        starts: Sequence[_Soft | None] = [None] * len(FEEDS)
+        starts: Sequence[Soft | None] = [None] * len(FEEDS)
         if self.origin and any(self.origin.structure.compliance):
             starts = self.origin._soft(setting, beta)
         return [
-            _yielding_orders(soft, setting.highest, start)
+            yielding_orders(soft, setting.highest, start)
             for soft, start in zip(self._soft(setting, beta), starts, strict=False)
         ]
 
-    def _soft(self, setting: ForceSetting, beta: Array) -> list[_Soft]:
+    def _soft(self, setting: ForceSetting, beta: Array) -> list[Soft]:
         """Return the tool that yields and its cut, in each direction of feed that is computed."""
         cut = self._cutting(setting).cut
         worn = tuple((beta[:6] * np.repeat([1.0, self.law.edge(setting.cut_length)], 3)).tolist())
         return [
-            _Soft(self._ends()[1], self.law, cut, self.structure.seen(feed), worn, self.true_path)
+            Soft(self._ends()[1], self.law, cut, self.structure.seen(feed), worn, self.true_path)
             for feed in (FEEDS if setting.helix else (setting.feed_direction,))
         ]
 
@@ -258,7 +283,7 @@ class ForceModel:
         for chipped in sorted(self.chipped, key=lambda one: -one.height):
             broken, low = chipped.change(tool, setting.cut)
             with_it, without = (
-                _order_basis(each, self.law, low, setting.highest, self.true_path) for each in (broken, tool)
+                order_basis(each, self.law, low, setting.highest, self.true_path) for each in (broken, tool)
             )
             changes.append(with_it - without)
             tool = broken
@@ -271,76 +296,12 @@ class ForceModel:
         thrust = dict(zip(BOTTOM_EDGES, bottom_thrust(self.cutter, setting.helix), strict=True))
         return [thrust[name] for name in self.bottom_edges]
 
-    def _drift(self, block: Block) -> Array:
-        """Offset (n,) from the drift of the sensor since its zero was read."""
+    def _offset(self, block: Block) -> Array:
+        """Offset (n,) from the drift of the sensor since its zero was read, and from terms."""
+        pushed = added.pushed(self.terms, self, block)
         if not any(self.sensor.slope):
-            return np.zeros(len(block.zeros))
+            return np.zeros(len(block.zeros)) + pushed
         recording: Recording = block.setting.recording
         since = np.array(recording.middles) - recording.zero_at
         each = len(block.zeros) // len(since)
-        return np.asarray(np.repeat(since, each) * (block.zeros @ self.sensor.drift))
-
-
-def _shares_of_feeds(recording: Recording, direction: Array) -> Array:
-    """Shares (k, blocks, feeds) of ``FEEDS`` in each time block of an orbit, by ``direction`` (k,) of feed.
-
-    A spring that does not turn with the feed changes the force nearly as a sinusoid of twice the direction of
-    feed. Three directions determine this sinusoid, and the time block averages it.
-    """
-    feed = direction[:, None] + recording.orbit * np.array(recording.middles)
-    attenuation = np.sinc(recording.orbit * recording.span / math.pi)
-    wave = attenuation * np.cos(2.0 * (feed[..., None] - np.array(FEEDS)))
-    return np.asarray((1.0 + 2.0 * wave) / len(FEEDS))
-
-
-@lru_cache(maxsize=4096)
-def _order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path: bool) -> ComplexArray:
-    basis = amplitudes(to_orders(force_basis(cutter, law, cut, true_path), highest))
-    basis.flags.writeable = False
-    return basis
-
-
-class _Soft(NamedTuple):
-    """A tool that yields, its cut, its compliance xx, yy, xy in the feed frame, and its coefficients."""
-
-    cutter: Cutter
-    law: EdgeLaw
-    cut: Cut
-    spring: tuple[float, float, float]
-    coefficients: tuple[float, ...]
-    true_path: bool
-
-
-class _Orders(NamedTuple):
-    """Amplitudes of the orders of a tool that yields; its deflection, None where it is not balanced."""
-
-    orders: ComplexArray
-    bent: Array | None
-
-    @property
-    def balanced(self) -> bool:
-        """Whether the orders are those of its whole compliance."""
-        return self.bent is not None
-
-
-@lru_cache(maxsize=1024)
-def _yielding_orders(soft: _Soft, highest: int, start: _Soft | None) -> _Orders:
-    """Return the orders of a tool that yields; the compliance is halved until the tool cuts steadily.
-
-    A search then has a slope to follow. A fit that ends there is not a result (``ForceModel.beyond``).
-    ``start``: a tool that hardly differs.
-    """
-    along, across, mixed = soft.spring
-    compliance, sharp = np.array([[along, mixed], [mixed, across]]), np.array(soft.coefficients)
-    tool, balanced = (soft.cutter, soft.law, soft.cut), True
-    bent = _yielding_orders(start, highest, None).bent if start else None
-    while True:
-        try:
-            found = yielding(*tool, sharp, compliance, true_path=soft.true_path, start=bent)
-        except NotBalancedError:
-            compliance, balanced = 0.5 * compliance, False
-        else:
-            break
-    orders = amplitudes(to_orders(found.basis, highest))
-    orders.flags.writeable = False
-    return _Orders(orders, found.bent if balanced else None)
+        return np.asarray(np.repeat(since, each) * (block.zeros @ self.sensor.drift)) + pushed

@@ -1,0 +1,89 @@
+"""Orders of the force on a tool, rigid or yielding, that the force model keeps for many fits."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from metro.cutting.cutter import Cutter
+from metro.cutting.force import Cut, force_basis
+from metro.cutting.law import EdgeLaw
+from metro.cutting.yielding_steady import NotBalancedError, yielding
+from metro.observables.force.dynamometer import Recording
+from metro.signals.orders import amplitudes, to_orders
+from metro.units import Array, ComplexArray
+
+FEEDS = (
+    0.0,
+    math.pi / 3.0,
+    2.0 * math.pi / 3.0,
+)  # these three directions suffice, because a spring repeats after half a turn
+
+
+def shares_of_feeds(recording: Recording, direction: Array) -> Array:
+    """Shares (k, blocks, feeds) of ``FEEDS`` in each time block of an orbit, by ``direction`` (k,) of feed.
+
+    A spring that does not turn with the feed changes the force nearly as a sinusoid of twice the direction of
+    feed. Three directions determine this sinusoid, and the time block averages it.
+    """
+    feed = direction[:, None] + recording.orbit * np.array(recording.middles)
+    attenuation = np.sinc(recording.orbit * recording.span / math.pi)
+    wave = attenuation * np.cos(2.0 * (feed[..., None] - np.array(FEEDS)))
+    return np.asarray((1.0 + 2.0 * wave) / len(FEEDS))
+
+
+@lru_cache(maxsize=4096)
+def order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path: bool) -> ComplexArray:
+    """Amplitudes of the orders of the force on a rigid tool, (orders, 3, 6): read-only, it is kept."""
+    basis = amplitudes(to_orders(force_basis(cutter, law, cut, true_path), highest))
+    basis.flags.writeable = False
+    return basis
+
+
+class Soft(NamedTuple):
+    """A tool that yields, its cut, its compliance xx, yy, xy in the feed frame, and its coefficients."""
+
+    cutter: Cutter
+    law: EdgeLaw
+    cut: Cut
+    spring: tuple[float, float, float]
+    coefficients: tuple[float, ...]
+    true_path: bool
+
+
+class Orders(NamedTuple):
+    """Amplitudes of the orders of a tool that yields; its deflection, None where it is not balanced."""
+
+    orders: ComplexArray
+    bent: Array | None
+
+    @property
+    def balanced(self) -> bool:
+        """Whether the orders are those of its whole compliance."""
+        return self.bent is not None
+
+
+@lru_cache(maxsize=1024)
+def yielding_orders(soft: Soft, highest: int, start: Soft | None) -> Orders:
+    """Return the orders of a tool that yields; the compliance is halved until the tool cuts steadily.
+
+    A search then has a slope to follow. A fit that ends there is not a result (``ForceModel.beyond``).
+    ``start``: a tool that hardly differs.
+    """
+    along, across, mixed = soft.spring
+    compliance, sharp = np.array([[along, mixed], [mixed, across]]), np.array(soft.coefficients)
+    tool, balanced = (soft.cutter, soft.law, soft.cut), True
+    bent = yielding_orders(start, highest, None).bent if start else None
+    while True:
+        try:
+            found = yielding(*tool, sharp, compliance, true_path=soft.true_path, start=bent)
+        except NotBalancedError:
+            compliance, balanced = 0.5 * compliance, False
+        else:
+            break
+    orders = amplitudes(to_orders(found.basis, highest))
+    orders.flags.writeable = False
+    return Orders(orders, found.bent if balanced else None)
