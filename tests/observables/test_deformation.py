@@ -18,6 +18,7 @@ from metro.batch.batch import Batch
 from metro.observables.arm import tip_force
 from metro.observables.arm.wall import wall
 from metro.observables.deformation import observable as deformation
+from metro.observables.deformation.blocks import ZERO, with_zeros
 from metro.observables.deformation.model import CutWall
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.robot.kinematics import arm_of_cell
@@ -493,3 +494,23 @@ def test_a_repeat_without_a_dynamometer_takes_the_force_of_the_one_that_had_it(c
     apart = replace(cell.batch, runs=runs.assign(condition=["a", "c", "b"]))
     assert deformation.by_repeat(apart, other, [table, other]) is other
     assert deformation.by_repeat(batch, table, [table, other]) is table
+
+
+def test_repeats_show_how_large_the_zero_of_a_trace_is(built):
+    _, task = built
+    walls = [replace(b, unidentified=None) for b in task.blocks if b.role in {"identify", "validate"}]
+    rng = np.random.default_rng(7)
+
+    def zero(sd, count):
+        """Zero that so many walls of two conditions each show, the heights of which scatter by ``sd``."""
+        made = [
+            replace(walls[0], condition=f"c{i % 2}", measured=walls[0].measured + sd * rng.normal())
+            for i in range(count)
+        ]
+        return with_zeros(made)[0].unidentified[0, 0]
+
+    assert zero(30e-6, 400) == pytest.approx(30e-6, rel=0.1)
+    assert zero(0.0, 2) == pytest.approx(ZERO)
+    assert zero(0.0, 400) < 0.2 * ZERO
+    verifying = [replace(walls[0], role="validate", measured=x * walls[0].measured) for x in (1.0, 9.0)]
+    assert with_zeros([*verifying, walls[0]])[0].unidentified[0, 0] == pytest.approx(ZERO)

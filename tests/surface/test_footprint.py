@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metro.surface.footprint import sample
+from metro.surface.footprint import of_the_face, sample
 
 RADIUS = 1.5
 
@@ -50,3 +50,26 @@ def test_coverage_is_whole_inside_half_at_an_edge_and_nothing_outside() -> None:
     assert found.coverage[0] == 1.0
     assert 0.4 <= found.coverage[1] <= 0.65
     assert (found.coverage[2], found.count[2]) == (0.0, 0)
+
+
+def test_a_disc_over_the_edge_of_a_block_reads_the_face_or_nothing() -> None:
+    rng, mm = np.random.default_rng(4), 1e-3
+    face = lattice(60.0, 0.5)
+    wall = np.column_stack([rng.uniform(-0.2, 0.0, 4000), rng.uniform(0, 60, 4000), rng.uniform(-3, 0, 4000)])
+    cloud = np.concatenate([face, wall]) * mm
+    cloud[:, 2] += rng.normal(0, 0.02 * mm, len(cloud))
+    along = np.array([-0.9, -0.3, 0.3, 0.9, *np.arange(3.0, 57.0, 3.0)])
+    x, y = np.tile(along, 20) * mm, np.repeat(np.linspace(5, 55, 20), len(along)) * mm
+    sampled = sample(cloud, x, y, RADIUS * mm)
+    heights = of_the_face(sampled)
+    assert np.nanmin(sampled.height) < -1.0 * mm
+    assert np.nanmin(heights) > -0.05 * mm
+    assert np.isfinite(heights[x >= 3.0 * mm]).all()
+
+
+def test_a_steep_face_without_noise_is_read_whole() -> None:
+    cloud = lattice() * 1e-3
+    cloud[:, 2] = 0.02 * cloud[:, 0]
+    x = np.linspace(5, 55, 50) * 1e-3
+    sampled = sample(cloud, x, np.full(50, 0.03), RADIUS * 1e-3)
+    assert np.array_equal(of_the_face(sampled), sampled.height)

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.surface.points import Points, slices
-from metro.units import MM, Array
+from metro.units import MM, UM, Array
 
 RADIUS = 1.5 * MM
 LEAST_POINTS = 5
+# Times the usual scatter within a disc, from which a disc holds more than the face. Of the fewest points that
+# a disc is read from, noise alone goes beyond four once in a million.
+BROKEN = 5.0
+LEAST_SCATTER = 1 * UM  # that counts: a cloud that was computed has none
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,13 @@ def sample(
         np.where(enough, sd, np.nan),
         discs.sector.mean(axis=1),
     )
+
+
+def of_the_face(sampled: Footprint) -> Array:
+    """Heights (n,), m, NaN where a disc holds more than the face: a wall beside it, a burr, a chip."""
+    known = sampled.sd[np.isfinite(sampled.sd)]
+    usual = max(float(np.median(known)), LEAST_SCATTER) if known.size else np.inf
+    return np.where(sampled.sd > BROKEN * usual, np.nan, sampled.height)
 
 
 @dataclass(frozen=True)

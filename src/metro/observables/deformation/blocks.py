@@ -55,10 +55,10 @@ def wall_blocks(
                 notes.append(f"Run {run}: the wall is too short for the filter.")
             else:
                 blocks.append(block)
-    return _with_zeros(blocks), tuple(notes)
+    return with_zeros(blocks), tuple(notes)
 
 
-def _with_zeros(blocks: Sequence[Block]) -> list[Block]:
+def with_zeros(blocks: Sequence[Block]) -> list[Block]:
     """Put the error of each wall as a whole among what is not identified, as large as repeats show it.
 
     Walls cut alike differ by the zero of the trace, and by what brings the joints to rest elsewhere. Only

@@ -10,15 +10,11 @@ from metro.observables.flatness.path import beside
 from metro.observables.flatness.placing import Placed, place
 from metro.surface.face import NESTING_INDEX, Face, measure_face
 from metro.surface.face_noise import Noise
-from metro.surface.footprint import RADIUS, sample
+from metro.surface.footprint import RADIUS, of_the_face, sample
 from metro.surface.points import Points, box
 from metro.units import JSON, MM, UM, Array
 
 MAP_CELLS = 60
-# Times the usual scatter within a disc, from which a disc holds more than the face: a wall beside it, a burr,
-# a chip. Of the fewest points that a disc is read from, noise alone goes beyond four once in a million.
-BROKEN = 5.0
-LEAST_SCATTER = 1 * UM  # that counts: a cloud that was computed has none
 
 POINT_COLUMNS: tuple[str, ...] = (
     *("run", "point", "pass", "x_mm", "y_mm", "s_mm"),
@@ -149,8 +145,10 @@ def _points(run: str, cloud: Points, outliers: np.ndarray, path: pd.DataFrame, p
     number = path["pass"].to_numpy()
     step = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(number) == 0)
     alone = sampled.sd / np.sqrt(np.maximum(sampled.count, 1))
-    height = np.where(sampled.sd > BROKEN * max(_median(sampled.sd), LEAST_SCATTER), np.nan, sampled.height)
-    correlated = _noise_along_passes(height - points[:, 2], number) / _median(alone)
+    height = of_the_face(sampled)
+    known = alone[np.isfinite(alone)]  # none where the cloud is too coarse for a disc to hold points
+    typical = float(np.median(known)) if known.size else float("nan")
+    correlated = _noise_along_passes(height - points[:, 2], number) / typical
     sigma = alone * max(1.0, correlated) if np.isfinite(correlated) else alone
     return pd.DataFrame(
         {
@@ -167,12 +165,6 @@ def _points(run: str, cloud: Points, outliers: np.ndarray, path: pd.DataFrame, p
             "coverage": sampled.coverage,
         }
     )
-
-
-def _median(values: Array) -> float:
-    """Median of what is known; NaN where nothing is, as where a cloud is too coarse for discs."""
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if known.size else float("nan")
 
 
 def _noise_along_passes(deviation: Array, number: np.ndarray) -> float:

@@ -1,0 +1,42 @@
+"""Where a rival takes the place of an effect, the other effects are tried again."""
+
+from toy import BEND, GAIN, GATES, RIPPLE, Wave, problem
+
+from metro.loop.checks.evidence import change
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
+from metro.loop.search import forward as room
+from metro.loop.search.rivals import Contest
+from metro.loop.search.strategy import SearchSpace
+from metro.loop.search.trial import without
+
+
+def test_others_are_tried_on_the_model_that_won(monkeypatch):
+    task = problem(2, truth=Wave(bend=0.1, ripple=0.1), phased=False)
+    blocks = task.role("identify")
+    prior = first_noise(GATES.model_form_budget, task.scatter, blocks)
+    base = fit(Candidate(task.base), blocks, prior)
+    space = SearchSpace(base, (BEND, RIPPLE, GAIN), prior, GATES, GATES.materiality)
+    started, added = [], room._added
+
+    def first_alone(current, space):
+        """Add one effect at first, as if the other had not passed beside it."""
+        started.append({effect.name for effect in current.candidate.effects})
+        return added(
+            current, SearchSpace(base, (BEND,), *(prior, GATES, space.least)) if len(started) == 1 else space
+        )
+
+    def swapped(base, current, *_):
+        """Put the ripple in the place of the bend at first, as if it explained the runs better."""
+        if [effect.name for effect in current.candidate.effects] != ["bend"]:
+            return Contest(current, {effect.name: 1.0 for effect in current.candidate.effects})
+        return Contest(without(base, (RIPPLE,), prior), {"ripple": 1.0})
+
+    monkeypatch.setattr(room, "_added", first_alone)
+    monkeypatch.setattr(room, "contested", swapped)
+    chosen = room.forward(space)
+    assert started[:2] == [set(), {"ripple"}]
+    assert {effect.name for effect in chosen.fit.candidate.effects} == {"ripple", "bend"}
+    assert set(chosen.weight) == {"ripple", "bend"}
+    assert change(base, chosen.fit) > GATES.materiality
