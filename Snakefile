@@ -16,9 +16,14 @@ from metro.workflow import COMPLETE, Plan, files_of
 
 min_version("9.0")
 
+
+report: "workflow/report/workflow.rst"
+
+
 show_progress(logger, workflow.output_settings, shorten=alike_as_one)
 try:
-    plan = Plan.read(Path(workflow.basedir), overrides=config)
+    # The folder of this file. `workflow.basedir` is that of the file which snakemake was called with.
+    plan = Plan.read(Path(str(workflow.current_basedir)), overrides=config)
 except ContractError as error:
     # As an error of snakemake it would be followed by where in the program it was raised.
     sys.exit(str(error))

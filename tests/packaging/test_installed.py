@@ -79,7 +79,8 @@ def metro(installed, tmp_path):
 
 
 def test_the_source_archive_has_what_a_package_is_built_from(archive):
-    for name in ("Snakefile", "workflow/rules/loop.smk", "config/config.yaml", "config/cells/kr160.yaml"):
+    workflow = ("Snakefile", "workflow/Snakefile", "workflow/rules/loop.smk")
+    for name in (*workflow, "config/config.yaml", "config/cells/kr160.yaml"):
         assert (archive / name).is_file(), name
 
 
@@ -92,6 +93,8 @@ def test_the_package_is_the_installed_one_and_brings_its_workflow(installed, tmp
     assert Path(workflow) == (installed / "share/metro/Snakefile").resolve()
     rules = {path.name for path in (installed / "share/metro/workflow/rules").iterdir()}
     assert rules == {path.name for path in (ROOT / "workflow/rules").iterdir()}
+    captions = {path.name for path in (installed / "share/metro/workflow/report").iterdir()}
+    assert captions == {path.name for path in (ROOT / "workflow/report").iterdir()}
 
 
 def test_it_checks_runs_and_exports_a_batch_in_a_folder_of_its_own(metro, tmp_path):

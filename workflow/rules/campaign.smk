@@ -13,8 +13,18 @@ rule campaign:
     output:
         "reports/summary.parquet",
         "reports/memory.json",
-        "reports/summary.pdf",
-        "reports/summary.html",
+        report(
+            "reports/summary.pdf",
+            caption="../report/summary.rst",
+            category="All batches",
+            labels={"content": "summary", "format": "PDF"},
+        ),
+        report(
+            "reports/summary.html",
+            caption="../report/summary.rst",
+            category="All batches",
+            labels={"content": "summary", "format": "HTML"},
+        ),
         touch("logs/campaign.complete"),
     log:
         "logs/campaign.log",

@@ -11,7 +11,13 @@ rule loop:
         lobes="data/processed/{batch}/lobes_final.parquet",
         findings="data/processed/{batch}/findings.json",
         made="data/processed/{batch}/loop.made.json",
-        identified="reports/{batch}/identified.json",
+        identified=report(
+            "reports/{batch}/identified.json",
+            caption="../report/identified.rst",
+            category="Batches",
+            subcategory="{batch}",
+            labels={"content": "identified quantities", "format": "JSON"},
+        ),
     log:
         "logs/loop/{batch}.log",
     conda:

@@ -10,8 +10,20 @@ rule report:
         rules.verdict.output.loop,
         rules.verdict.output.verdict,
     output:
-        "reports/{batch}/report.pdf",
-        "reports/{batch}/report.html",
+        report(
+            "reports/{batch}/report.pdf",
+            caption="../report/report.rst",
+            category="Batches",
+            subcategory="{batch}",
+            labels={"content": "report", "format": "PDF"},
+        ),
+        report(
+            "reports/{batch}/report.html",
+            caption="../report/report.rst",
+            category="Batches",
+            subcategory="{batch}",
+            labels={"content": "report", "format": "HTML"},
+        ),
         "reports/{batch}/provenance.json",
     log:
         "logs/report/{batch}.log",

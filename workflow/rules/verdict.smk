@@ -9,7 +9,13 @@ rule verdict:
     output:
         loop="data/processed/{batch}/loop.json",
         made="data/processed/{batch}/verdict.made.json",
-        verdict="reports/{batch}/verdict.json",
+        verdict=report(
+            "reports/{batch}/verdict.json",
+            caption="../report/verdict.rst",
+            category="Batches",
+            subcategory="{batch}",
+            labels={"content": "verdicts", "format": "JSON"},
+        ),
     log:
         "logs/verdict/{batch}.log",
     conda:
