@@ -7,6 +7,7 @@ import pytest
 from toy import BEND, GAIN, GATES, Wave, problem
 from worded import in_words
 
+from metro.loop.checks.left_out import left_out
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import fit
 from metro.loop.fitting.noise import first_noise
@@ -123,3 +124,33 @@ def test_of_a_base_that_did_not_converge_nothing_is_called_clean():
     assert told["status"] == "unexplained"
     assert "did not converge" in told["unexplained"]["signature"]
     assert np.isfinite(outcome.final.step)
+
+
+@dataclass(frozen=True)
+class Fragile(Wave):
+    """A wave that predicts the greatest feed only while its bend stays below a limit."""
+
+    limit: float = np.inf
+
+    def beyond(self, block, _beta):
+        return "too much bend" if block.setting.feed == 4.0 and self.bend > self.limit else None
+
+
+def test_an_effect_that_leaves_no_prediction_where_a_condition_is_left_out_is_not_added():
+    task = problem(2, truth=Wave(bend=0.1), phased=False)
+    blocks = task.role("identify")
+    prior = first_noise(GATES.model_form_budget, task.scatter, blocks)
+
+    def bends(limit):
+        """Bend of all runs, of those without the greatest feed, and why the trial is not added."""
+        base = fit(Candidate(Fragile(limit=limit)), blocks, prior)
+        (one,) = tried(base, [BEND], prior, GATES, GATES.materiality)
+        ((part,),) = [p for name, p in left_out(one.fit, prior).items() if name == "identify-4"]
+        return one.fit.theta[0], part.others.theta[0], one.why_not
+
+    whole, without, why = bends(np.inf)
+    assert why is None
+    assert without > whole  # so that the fit of all runs has a prediction
+    _, _, why = bends(0.5 * (whole + without))
+    assert why == Statement("no_prediction", {"run": "r4", "why": "too much bend"})
+    assert bends(1.01 * without)[2] is None

@@ -14,7 +14,7 @@ from metro.loop.checks.evidence import leave_out, weights
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, fit
 from metro.loop.fitting.noise import Noise
-from metro.loop.search.trial import Gates, parted, unlike
+from metro.loop.search.trial import Gates, beyond_left_out, parted, unlike
 
 RIVAL_WEIGHT = 0.05  # above it, another effect in the place of one that was chosen leaves it undecided
 HOPELESS = 12.0  # log-likelihood on the runs of the fit by which a rival may be behind and still be weighed
@@ -110,6 +110,7 @@ def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Nois
         if effect.name not in others and effect.key not in present:
             candidate = Candidate(current.candidate.base, (*smaller.candidate.effects, effect))
             fitted = fit(candidate, current.blocks, prior, smaller)
-            if fitted.total > current.total - HOPELESS and not unlike(effect, fitted):
+            near = fitted.total > current.total - HOPELESS and not unlike(effect, fitted)
+            if near and not beyond_left_out(fitted, prior):
                 fits.append(fitted)
     return fits

@@ -10,6 +10,7 @@ import numpy as np
 from metro.effects.effect import Effect
 from metro.loop.checks import signature as residual
 from metro.loop.checks.evidence import Evidence, compare, hold_out, leave_out, missed, weights
+from metro.loop.checks.left_out import left_out
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, fit
 from metro.loop.fitting.noise import Noise
@@ -93,6 +94,7 @@ def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> 
         trial if trial.why_not else replace(trial, evidence=hold_out(trial.evidence, out, trial.fit, prior))
         for trial in trials
     ]
+    trials = [replace(trial, why_not=trial.why_not or beyond_left_out(trial.fit, prior)) for trial in trials]
     weighed = [trial for trial in trials if not trial.why_not]
     nothing = dict.fromkeys(out, 0.0)
     odds = [1.0, *(trial.effect.odds for trial in weighed)]
@@ -150,6 +152,16 @@ def beyond(fitted: Fit, blocks: Sequence[Block]) -> Statement | None:
         return None
     reasons = ((block.run, model.beyond(block, fitted.beta)) for block in blocks)
     return next((Statement("no_prediction", {"run": run, "why": why}) for run, why in reasons if why), None)
+
+
+def beyond_left_out(fitted: Fit, prior: Noise) -> Statement | None:
+    """Return why conditions that are left out have no prediction; None: they have one.
+
+    A model that holds where it was fitted, and nowhere else, is no cause (a tool so soft that no other cut
+    would be steady).
+    """
+    parts = (part for each in left_out(fitted, prior).values() for part in each)
+    return next(filter(None, (beyond(part.others, part.blocks) for part in parts)), None)
 
 
 def _why_not(evidence: Evidence, q: float, gates: Gates, least: float) -> Statement | None:
