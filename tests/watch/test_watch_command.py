@@ -15,7 +15,9 @@ from metro.watch.page import page
 from virtual_cell.recipes.slot import PLANS
 
 SLOT = next(plan for plan in PLANS if plan.condition == "slot-0.11")
-CALL = [sys.executable, "-c", "from metro.cli import app; app()", "watch", "clean-slot"]
+# As a terminal starts it: what a script starts in the background ignores Ctrl-C, and so do its children.
+LISTEN = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+CALL = [sys.executable, "-c", f"{LISTEN}; from metro.cli import app; app()", "watch", "clean-slot"]
 
 
 def call(place, *options):
