@@ -214,3 +214,13 @@ def test_a_zero_that_hardly_shows_is_not_blown_up_to_explain_what_a_model_misses
     found = estimated(parts, first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts]))
     assert found.zero_factor <= 4.0
     assert found.misfit["x"] > 0.2
+
+
+def test_what_calibrates_shares_what_it_does_not_identify_and_no_scatter():
+    one = block("r1", 1.0, "identify", np.random.default_rng(3), phased=False)
+    beside = np.random.default_rng(4).normal(size=(POINTS, 2))
+    design, _ = Wave().design(one, np.zeros(0))
+    noise = Noise(0.0, np.array([0.01, 0.02]), {})
+    tests = replace(one, role="calibrate", unidentified=beside)
+    assert np.array_equal(shared(tests, noise, design, BETA), beside)
+    assert shared(replace(one, unidentified=beside), noise, design, BETA).shape[1] == 4

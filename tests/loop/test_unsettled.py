@@ -4,14 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from toy import BEND, GAIN, GATES, Wave, problem
+from toy import BEND, GAIN, GATES, TWIN, Wave, problem
 from worded import in_words
 
 from metro.loop.checks.left_out import left_out
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import fit
 from metro.loop.fitting.noise import first_noise
-from metro.loop.search import trial
+from metro.loop.search import rivals, trial
 from metro.loop.search.search import search
 from metro.loop.search.trial import tried, unsettled
 from metro.loop.statement import Statement
@@ -154,3 +154,16 @@ def test_an_effect_that_leaves_no_prediction_where_a_condition_is_left_out_is_no
     _, _, why = bends(0.5 * (whole + without))
     assert why == Statement("no_prediction", {"run": "r4", "why": "too much bend"})
     assert bends(1.01 * without)[2] is None
+
+
+def test_what_leaves_no_prediction_where_a_condition_is_left_out_is_no_rival(monkeypatch):
+    task = problem(2, truth=Wave(bend=0.1), phased=False)
+    blocks = task.role("identify")
+    prior = first_noise(GATES.model_form_budget, task.scatter, blocks)
+    base = fit(Candidate(task.base), blocks, prior)
+    bent = fit(Candidate(task.base, (BEND,)), blocks, prior, base)
+    found = rivals.contested(base, bent, (BEND, TWIN), prior, GATES).rivals
+    assert [rival.other for rival in found] == ["twin"]
+    why = Statement("no_prediction", {"run": "r4", "why": "too much bend"})
+    monkeypatch.setattr(rivals, "beyond_left_out", lambda *_: why)
+    assert not rivals.contested(base, bent, (BEND, TWIN), prior, GATES).rivals

@@ -35,7 +35,7 @@ class Entry:
 
     @property
     def family(self) -> tuple[str, tuple[str, ...]]:
-        """What entries that are told apart by their form alone have in common."""
+        """What entries that differ by their form alone have in common."""
         return self.plan.kind.__name__, self.variables
 
     @property

@@ -87,7 +87,7 @@ def verified(current: Fit, larger: Fit, problem: Problem) -> JSON | None:
 
 
 def _test(search: Search, chosen: Tried, problem: Problem) -> JSON | None:
-    """Return the runs that would best tell whether the term is there, and how surely they decide it."""
+    """Return the runs that would best show whether the term is there, and how surely they decide it."""
     if not problem.feasible:
         return None
     best = prospects(search.current, chosen.trial.fit, problem.feasible)[0]

@@ -46,7 +46,7 @@ def watch(
             _note(_beginning(watcher, raw), as_json)
         while True:
             for each in watcher.look():
-                typer.echo(json.dumps(each.content, ensure_ascii=False) if as_json else told(each))
+                typer.echo(json.dumps(each.content, ensure_ascii=False) if as_json else in_words(each))
                 code |= int(each.status in ("differs", "error"))
                 if page:
                     write_page(reports / name, name, watcher.journal.judgements)
@@ -64,7 +64,7 @@ def line(one: Judgement) -> str:
     return f"{one.at[11:19]}  {one.file}{run}: {one.headline}. {one.advice}".rstrip()
 
 
-def told(one: Judgement) -> str:
+def in_words(one: Judgement) -> str:
     """Return the line on a file and its reasons."""
     return "\n".join([line(one), *(f"          {reason}" for reason in one.reasons)])
 

@@ -85,7 +85,7 @@ def of_force(named: Named, compared: Compared, causes: Sequence[Likeness]) -> Ju
     """Return the judgement on a force record that was compared with its prediction."""
     whole = compared.whole
     figures = {each.axis or "all": _content(each) for each in (whole, *compared.axes)}
-    told = (
+    error = (
         f"measured less predicted is {number(whole.rms_n)} N rms, {whole.ratio:.1f} times the expected error "
         f"of {number(whole.expected_n)} N"
     )
@@ -93,7 +93,7 @@ def of_force(named: Named, compared: Compared, causes: Sequence[Likeness]) -> Ju
         f"{each.axis} {number(each.rms_n)} N ({each.ratio:.1f} times)" for each in compared.axes
     )
     if compared.as_predicted:
-        headline = f"as predicted: {told}"
+        headline = f"as predicted: {error}"
         return Judgement(
             named.file, named.run, "as predicted", headline, (f"By axis: {by_axis}.",), GO_ON, figures
         )

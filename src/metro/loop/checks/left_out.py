@@ -65,7 +65,7 @@ def left_out(fitted: Fit, prior: Noise) -> dict[str, tuple[LeftOut, ...]]:
 def _parts(
     fitted: Fit, held: Mapping[str, tuple[Block, ...]], prior: Noise
 ) -> dict[str, tuple[LeftOut, ...]]:
-    """Leave out conditions together; each by itself, or each run, where the rest does not tell enough."""
+    """Leave out conditions together; each by itself, or each run, where the other runs do not suffice."""
     runs = {block.run for blocks in held.values() for block in blocks}
     others = refit(fitted, [block for block in fitted.blocks if block.run not in runs], prior)
     if len(runs) == 1 or _determined(others) == _determined(fitted):

@@ -104,7 +104,7 @@ def fitted_loads(model: DeformationModel, loads: pd.DataFrame) -> Compliances | 
 
 
 def lacking(model: DeformationModel, loads: pd.DataFrame) -> LackOfFit:
-    """Return what load tests show beside elastic joints; nothing where they tell nothing of the joints."""
+    """Return what load tests show beside elastic joints; zero where they identify no joint."""
     tests = fitted_loads(model, loads)
     if isinstance(tests, Refusal):
         return LackOfFit(0.0, 0.0)
