@@ -22,8 +22,8 @@ from metro.observables.problem import Block
 from metro.units import MM, UM, Array
 
 # Relative error of the force of a run, and of the error that all runs share, by the source of the force. The
-# force from a repeat with a dynamometer is as accurate as repeats agree.
-SYSTEMATIC = {**tip_force.SYSTEMATIC, "repeat": 0.02}
+# force from a repeat with a dynamometer is as accurate as that, and as repeats agree (2 %).
+SYSTEMATIC = {**tip_force.SYSTEMATIC, "repeat": math.hypot(tip_force.SYSTEMATIC["dynamometer"], 0.02)}
 ZERO = 5 * UM  # standard error of a profile's zero against the programmed wall, before repeats show theirs
 DECLARED = 4  # walls for which that counts
 PerNewton = Callable[[CutWall], Array]
