@@ -113,6 +113,11 @@ EFFECTS: Mapping[str, Hidden[Session]] = {
     "chip_size_effect": Hidden(
         "exponent", lambda r, _: {"exponent": drawn_size(r, 0.06, 0.35)}, _size_effect
     ),
+    "entry_exit_force": Hidden(
+        "tangential radial",
+        lambda r, _: {"tangential": drawn_size(r, 0.05, 0.5), "radial": drawn_size(r, 0.05, 0.5)},
+        lambda s, p: replace(s, coefficients=replace(s.coefficients, jammed=(p["tangential"], p["radial"]))),
+    ),
     "tool_deflection": Hidden(
         "kx_n_um ky_n_um",
         lambda r, _: {"kx_n_um": drawn_size(r, 1.5, 12.0), "ky_n_um": drawn_size(r, 1.5, 12.0)},

@@ -22,7 +22,8 @@ class Coefficients:
     """Force law: shear (N/m²) and edge (N/m, per axial length) coefficients; K_c ∝ (h/h0)^−size_exponent.
 
     ``kfac`` and ``kfae`` belong to the bottom edges in helical milling; ``wear`` is the relative growth of
-    the edge coefficients per metre cut.
+    the edge coefficients per metre cut. ``jammed``: tangential and radial force of chips that are wedged
+    between tooth and wall where the tooth goes along the feed, in parts of K_tc × feed per tooth.
     """
 
     ktc: float
@@ -36,6 +37,7 @@ class Coefficients:
     size_exponent: float = 0.0
     size_reference: float = 1.0
     wear: float = 0.0
+    jammed: tuple[float, float] = (0.0, 0.0)
 
     def softened(self, factor: float) -> Coefficients:
         """Coefficients with the shear of the periphery times a factor."""
@@ -93,7 +95,24 @@ def _edges(cut: Cut, traced: Chips) -> tuple[Array, Array, Array]:
     """Tangential, radial and axial force (N) on the traced points of a tooth."""
     law = cut.coefficients.per_length(traced.thickness, cut.coefficients.worn(cut.metres(traced.t)))
     dz = engaged(cut.engagement, traced)
-    return law[0] * dz, law[1] * dz, law[2] * dz
+    tangential, radial = _wedged(cut, traced)
+    return (law[0] + tangential) * dz, (law[1] + radial) * dz, law[2] * dz
+
+
+def _wedged(cut: Cut, traced: Chips) -> tuple[Array, Array]:
+    """Tangential and radial force per axial length, N/m, of chips that a tooth drags along the wall.
+
+    The chip of a revolution is as long as the feed, and the wall wedges it where it faces the tooth.
+    """
+    turns, motion = cut.engagement.spindle / (2.0 * math.pi), cut.engagement.motion
+    per_tooth = motion.speed / (turns * cut.engagement.tool.teeth)
+    feed = motion.direction(traced.t)
+    across = traced.cos * np.cos(feed) - traced.sin * np.sin(feed)
+    along = np.where(traced.thickness > 0.0, across**2, 0.0)
+    tangential, radial = (
+        share * cut.coefficients.ktc * per_tooth * along for share in cut.coefficients.jammed
+    )
+    return tangential, radial
 
 
 def engaged(engagement: Engagement, traced: Chips) -> Array | float:

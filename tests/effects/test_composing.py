@@ -170,6 +170,7 @@ COMPOSED = {
         {"uuu_um": 2.0, "uuv_um": 4.0, "uvv_um": -6.0, "vvv_um": 3.0},
         added,
     ),
+    "entry_exit_force": ({"tangential": 0.2, "radial": -0.1}, {"tangential": 0.1, "radial": 0.3}, added),
     "depth_yielding": ({"growth_per_mm": 0.1}, {"growth_per_mm": 0.05}, added),
     "dynamometer_crosstalk": (
         {

@@ -1,6 +1,6 @@
 """The force effects in the data of an independent simulator: found where they are, and nowhere else.
 
-Of tool_wear, chip_size_effect, pitch_error, orbit_stiffness, charge_drift, charge_leak,
+Of tool_wear, chip_size_effect, entry_exit_force, pitch_error, orbit_stiffness, charge_drift, charge_leak,
 dynamometer_resonance, dynamometer_rotation and dynamometer_crosstalk; from metro.effects by their names.
 """
 
@@ -33,6 +33,7 @@ MODEL = ForceModel(Cutter(6e-3, 0.5, evenly_pitched(3)), EdgeLaw())
 HIDDEN = {
     "tool_wear": {"edge_growth_per_m": 0.15},
     "chip_size_effect": {"exponent": 0.2},
+    "entry_exit_force": {"tangential": 0.3, "radial": 0.2},
     "pitch_error": None,
     "orbit_stiffness": {"amplitude": 0.12, "phase_deg": 100.0},
     "charge_drift": {"slope_n_s": [8.0, -6.0, 5.0]},
@@ -41,7 +42,7 @@ HIDDEN = {
 
 
 # Each of these is searched for a minute or more; the others show the same of tool, work and instrument.
-LONG = {"chip_size_effect", "charge_drift", "pitch_error"}
+LONG = {"chip_size_effect", "entry_exit_force", "charge_drift", "pitch_error"}
 NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in sorted(HIDDEN)]
 
 

@@ -17,7 +17,7 @@ from metro.discovery.facts import Fact, rounded
 from metro.discovery.parameters import length, size, symbol, unit_of
 from metro.effects.effect import EffectParameter
 from metro.observables.force.shapes import CIRCUMSTANCES, Shape
-from metro.observables.force.terms import Bend, Depth, Factor, Lag, Layer, Push, Tooth, Wave
+from metro.observables.force.terms import AlongArc, Bend, Depth, Factor, Lag, Layer, Push, Tooth, Wave
 from metro.units import MM, MS, UM
 
 GROUPS: Mapping[str, tuple[tuple[str, ...], str, str]] = {
@@ -32,6 +32,11 @@ LENGTHS = (0.1, 0.4)  # of the range of a circumstance, at which its exponential
 LAYERS_MM = (0.2, 0.4, 0.8)
 PRELOADS = (0.0, 0.2, 0.5)  # of the largest reading of an axis
 WAVES = (1, 2, 3)  # per revolution of the spindle
+ALONG = {
+    "constant": ("1", "is as large everywhere in the arc"),
+    "cosine": ("cos φ", "has opposite signs where a tooth enters and leaves a slot"),
+    "ends": ("cos² φ", "is largest where a tooth enters and leaves a slot"),
+}
 SECOND_ORDER = 0.7  # damping of a low pass of second order that is flat
 
 
@@ -122,6 +127,7 @@ def grammar(batch: Setting) -> list[Entry]:
         for tooth in range(1 if batch.alike else batch.teeth):
             entries += [_tooth(tooth, None), *(_tooth(tooth, one) for one in travel if one.form == "step")]
         entries += [_wave(order) for order in WAVES if order % batch.teeth]
+    entries += [_along_arc(form) for form in ALONG]
     slow = [one for one in travel if one.form != "saturating"]
     slow += [one for one in single if one.variable == "time"]
     entries += [_push(axis, one) for axis in "xyz" for one in slow]
@@ -216,6 +222,17 @@ def _tooth(tooth: int, one: Function | None) -> Entry:
         one.form if one else "constant", (amount,), (),
         f"force of tooth {tooth} → force · (1 + change{factor})",
         f"The force of one tooth differs from that of the others{f' {one.words}' if one else ''}.",
+    )  # fmt: skip
+
+
+def _along_arc(form: str) -> Entry:
+    symbol, words = ALONG[form]
+    sizes = tuple(size(name, "1", 0.05, 1.5) for name in ("tangential", "radial"))
+    plan = Blueprint.of(AlongArc, form=form, tangential=Given("tangential"), radial=Given("radial"))
+    return Entry(
+        f"force_along_arc_{form}", plan, "force of each tooth", ("immersion angle",), form, sizes, (),
+        f"F_t → F_t + tangential · K_tc · f · {symbol}, F_r → F_r + radial · K_tc · f · {symbol}",
+        f"Each tooth has a force in proportion to the feed beside that of its chip, which {words}.",
     )  # fmt: skip
 
 

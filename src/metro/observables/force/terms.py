@@ -7,12 +7,14 @@ these (docs/discovery.md); ``metro propose`` searches them. Each changes nothing
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from metro.cutting.arc_force import arc_force
 from metro.cutting.force import COEFFICIENTS
 from metro.observables.force.shapes import Shape, product
 from metro.observables.problem import Block
@@ -20,6 +22,11 @@ from metro.signals.orders import order_matrix
 from metro.units import Array, ComplexArray
 
 DEPTH_STEP = 0.02  # relative change of the depth by which the force's derivative is taken
+ALONG: Mapping[str, tuple[tuple[int, float], ...]] = {  # multiples of the immersion angle, and their weights
+    "constant": ((0, 1.0),),
+    "cosine": ((1, 1.0),),
+    "ends": ((0, 0.5), (2, 0.5)),
+}
 SAMPLES = 4  # of a waveform for each of its highest order, where the reading is bent
 
 
@@ -128,6 +135,31 @@ class Tooth(Term):
         kept[_places(self.columns)] = 1.0
         own = model.of_cut(setting, setting.cut, alone) * kept
         return _with(force, self.size * product(self.shapes, model, setting), own)
+
+
+@dataclass(frozen=True)
+class AlongArc(Term):
+    """Each tooth has a force K_tc × feed × g(φ) of its own, ``tangential`` and ``radial``; φ: immersion.
+
+    ``form`` of g: constant 1, cosine cos φ, ends cos²φ. The force is in proportion to the feed like the shear
+    force, and does not vanish with the chip where a tooth enters and leaves.
+    """
+
+    form: Literal["constant", "cosine", "ends"]
+    tangential: float
+    radial: float
+
+    def force(self, force: ComplexArray, model: Any, setting: Any) -> ComplexArray:
+        """Add it to the column of K_tc."""
+        waves = [
+            weight * arc_force(model.cutter, setting.cut, multiple, setting.highest)
+            for multiple, weight in ALONG[self.form]
+        ]
+        feed = setting.cut.feed_per_tooth * setting.feed_ratio
+        changed = force.astype(complex)
+        along = np.sum(waves, axis=0) @ np.array([self.tangential, self.radial])
+        changed[..., COEFFICIENTS.index("ktc")] += feed * along
+        return changed
 
 
 @dataclass(frozen=True)
