@@ -32,6 +32,8 @@ def test_the_names_are_those_of_the_library():
     [
         "{tool_runout: {radius_um: 7.35, angle_deg: 40}}",
         "{charge_drift: {time_constant_s: 4}}",
+        "{entry_transient: {amplitude_um: 12, length_mm: 15}}",
+        "{entry_transient: {amplitude_um: 12, length_mm: 15, exit_um: -9}}",
         "{dynamometer_resonance: {frequency_hz: [900, 800, 1500], damping: 0.03}}",
         "{stiffness_scale: {joint: all, factor: 0.9}, tool_wear: {edge_growth_per_m: 0.1}}",
         "{missing_mode: {frequency_hz: 40, damping: 0.02, stiffness_n_um: 5, axis: y}}",

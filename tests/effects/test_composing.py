@@ -198,9 +198,9 @@ COMPOSED = {
     ),
     "dynamometer_rotation": ({"angle_deg": 3.0}, {"angle_deg": -5.0}, added),
     "entry_transient": (
-        {"amplitude_um": 12.0, "length_mm": 15.0},
-        {"amplitude_um": -30.0, "length_mm": 15.0},
-        only("amplitude_um"),
+        {"amplitude_um": 12.0, "length_mm": 15.0, "exit_um": -9.0},
+        {"amplitude_um": -30.0, "length_mm": 15.0, "exit_um": 20.0},
+        lambda a, b: only("amplitude_um")(only("exit_um")(a, b), b),
     ),
     "fixture_bow": (
         {"xx_um": 5.0, "xy_um": -3.0, "yy_um": 2.0},

@@ -177,7 +177,7 @@ def test_a_damping_that_nothing_tells_is_in_doubt_by_as_much_as_faces_of_arms_di
         y=y,
         first=np.arange(len(at_x)),
         passages=passages(make_path(path()), x, y, RADIUS),
-        pace=Pace(0.04, 10.0, np.zeros(3)),
+        pace=Pace(0.04, 10.0, np.zeros(3), np.ones(3), 0.01),
         size=(0.08, 0.03),
         force=np.array([0.0, 0.0, 1.0]),
         loaded=np.concatenate([np.zeros(6), soft * np.array([1.16, 0.16, 0.0])]),

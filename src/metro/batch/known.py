@@ -60,6 +60,11 @@ class Declarable(Protocol):
         ...
 
     @property
+    def left_out(self) -> Mapping[str, Any]:
+        """Values of the parameters that may be left out, by name."""
+        ...
+
+    @property
     def resembled(self) -> bool:
         """Whether it is no cause that can be known, but only what a residual may look like."""
         ...
@@ -76,8 +81,10 @@ def registry(effects: Iterable[Declarable]) -> JSON:
         if effect.resembled:
             continue
         entry = entries.setdefault(effect.name, {"forms": [], "choices": {}})
-        form = list(dict.fromkeys([*effect.where, *(parameter.name for parameter in effect.reported)]))
-        entry["forms"] += [form] if form not in entry["forms"] else []
+        every = list(dict.fromkeys([*effect.where, *(parameter.name for parameter in effect.reported)]))
+        needed = [name for name in every if name not in effect.left_out]
+        for form in (needed, every):
+            entry["forms"] += [form] if form not in entry["forms"] else []
         entry["choices"] |= {each.name: list(each.choices) for each in effect.reported if each.choices}
     for entry in entries.values():
         entry["forms"].sort(key=lambda form: (len(form), form))

@@ -40,6 +40,7 @@ class EffectParameter:
     choices : what the values 0, 1, … stand for, where the parameter is a choice among these.
     all_there_is : whether nothing can be beyond the bounds: no tool is rounder than a ball. A value at such a
         bound may be true, at any other the true one would be beyond it.
+    optional : whether those who declare the effect may leave it out; it is ``neutral`` then.
     local : whether it is another quantity in each observable (an amplitude along another axis): where one
         cause shows in several, the others are shared.
     """
@@ -58,6 +59,7 @@ class EffectParameter:
     choices: tuple[str, ...] = ()
     local: bool = False
     all_there_is: bool = False
+    optional: bool = False
 
 
 @dataclass(frozen=True)
@@ -153,17 +155,22 @@ class Effect:
         """Names of its values, each once."""
         return tuple(dict.fromkeys(parameter.name for parameter in self.reported))
 
+    @property
+    def left_out(self) -> dict[str, Any]:
+        """Values of what may be left out, by name."""
+        return {parameter.name: parameter.neutral for parameter in self.reported if parameter.optional}
+
     def spread(self, values: Values) -> Values:
         """Return values as ``apply`` takes them, of those that a person declares.
 
         Every list is as long as it must be: one number stands for all its entries. A word is its place among
-        the choices.
+        the choices. What may be left out is neutral.
         """
         lengths = {name: sum(p.name == name for p in self.reported) for name in self.names}
         choices = {parameter.name: parameter.choices for parameter in self.parameters}
         numbers = {
             name: choices[name].index(value) if value in choices[name] else value
-            for name, value in values.items()
+            for name, value in (self.left_out | dict(values)).items()
         }
         return {
             name: [value] * lengths[name] if lengths[name] > 1 and not isinstance(value, list) else value

@@ -30,7 +30,7 @@ EFFECT = Effect(
         "Chips that jam between tooth and wall would make it"
     ),
     experiment=(
-        "the same slot with an air blast or flood coolant, which clears the chips; and cuts at half immersion, "
+        "the same slot with an air blast or flood coolant, which clears the chips; cuts at half immersion, "
         "up and down, at two feeds"
     ),
 )

@@ -46,9 +46,9 @@ REPEATABLE = 0.1  # of the torque's noise: how well the friction of the cut is t
 LEAST_NOISE = 1e-3  # N m: floor for a log whose digits are coarser than its noise
 
 # Relative error that all runs may share, by the source of the force: friction that differs from the idle run;
-# gain, crosstalk and mounting of the dynamometer; a radial depth that differs from the nominal one, because
-# the tool yields. A dynamometer of a machining cell has gains that are off by 0.5 to 2 % (rms 1.3), 0.5 to 3 % of
-# each other axis in an axis (1.9), and is turned by 0.2 to 2° (2.1 % of each other axis): of a force of no
+# gain, crosstalk and mounting of the dynamometer; a radial depth that is not nominal, because the tool
+# yields. A dynamometer of a machining cell has gains that are off by 0.5 to 2 % (rms 1.3), reads 0.5 to 3 %
+# of each other axis in an axis (1.9), and is turned by 0.2 to 2° (2.1 % of each other axis): of a force of no
 # preferred direction, the rms error of an axis is √((1.3² + 2·1.9² + 2·2.1²)/3) = 2.4 % of the whole force.
 # Coefficients were fitted to such a dynamometer, and the depth adds 3 %.
 SYSTEMATIC = {"torque": 0.05, "dynamometer": 0.024, "coefficients": 0.038}

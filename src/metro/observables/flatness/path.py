@@ -71,13 +71,16 @@ class Pace:
     Attributes
     ----------
     speed : feed, m/s. period : from the start of a pass to that of the next, s.
-    edge : (passes,) way of the axis from the start of a pass to the block's edge, m; NaN if the size of the
-        work is not known.
+    edge, leaving : (passes,) way of the axis from the start of a pass to the block's edge, and to that where
+        it leaves the block, m; NaN if the size of the work is not known.
+    radius : of the cutter, m: the force falls while the front half of the cutter leaves.
     """
 
     speed: float
     period: float
     edge: Array
+    leaving: Array
+    radius: float
 
     def time(self, passages: Passages) -> Array:
         """Time of each passage from the start of the first pass, (n, k) s."""
@@ -86,6 +89,10 @@ class Pace:
     def inside(self, passages: Passages) -> Array:
         """Distance of the axis past the block's edge at each passage, (n, k) m."""
         return np.asarray(passages.along - self.edge[passages.number])
+
+    def outside(self, passages: Passages) -> Array:
+        """Distance of the axis past the edge where it leaves the block, (n, k) m; negative before."""
+        return np.asarray(passages.along - self.leaving[passages.number])
 
 
 def make_path(table: pd.DataFrame) -> Path:
@@ -165,7 +172,8 @@ def make_pace(batch: Batch, run: str, path: Path, tool: Cutter) -> Pace:
     way = float(path.length.max())
     pause = float(batch.runs["return_s"].astype(float)[run]) if "return_s" in batch.runs else math.nan
     period = way / speed + (pause if pause >= 0 else way / RETURN_SPEED + RETURN_PAUSE)
-    return Pace(speed, period, _corners(batch, path).min() - path.along(*path.start.T))
+    corners, start = _corners(batch, path), path.along(*path.start.T)
+    return Pace(speed, period, corners.min() - start, corners.max() - start, tool.radius)
 
 
 def work_size(batch: Batch) -> tuple[float, float]:

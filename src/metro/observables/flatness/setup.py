@@ -14,6 +14,9 @@ from metro.observables.flatness.path import Pace, Passages
 from metro.observables.waviness.model import Vibration
 from metro.units import Array
 
+LEFT = 400  # places behind the last chip at which the remainder of a step is computed, and
+NODES = 24  # of the Gauss rule for each: both to better than 1e-3 of the step
+
 
 @dataclass(frozen=True)
 class Setup:
@@ -28,7 +31,8 @@ class Setup:
     bow : (xx, xy, yy) of the work, m: height xx u² + xy u v + yy v², with u, v from −1 to 1 over the work.
     cubic : (uuu, uuv, uvv, vvv) of work or scanner, m: height uuu u³ + uuv u² v + uvv u v² + vvv v³.
     entry : transients: for each the additional height of the tip when the axis reaches the block's edge, m,
-        and the way over which it decays to 1/e, m.
+        the way over which it decays to 1/e, m, and the additional height where the force ends, m, which
+        decays alike.
     """
 
     tilt: tuple[float, float] = (0.0, 0.0)
@@ -36,7 +40,7 @@ class Setup:
     levels: tuple[float, ...] = ()
     bow: tuple[float, float, float] = (0.0, 0.0, 0.0)
     cubic: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    entry: tuple[tuple[float, float], ...] = ()
+    entry: tuple[tuple[float, float, float], ...] = ()
 
     def cuts(self, x: Array, y: Array, passages: Passages, pace: Pace) -> Array:
         """Additional height of the cut at the points ``x``, ``y`` (n,) at each passage, (n, k) m."""
@@ -49,9 +53,11 @@ class Setup:
         if any(self.levels):
             place = np.linspace(-1.0, 1.0, len(pace.edge)) if len(pace.edge) > 1 else np.zeros(1)
             higher = higher + np.polynomial.legendre.legval(place, [0.0, *self.levels])[passages.number]
-        for amplitude, length in self.entry:
+        for amplitude, length, exit_height in self.entry:
             inside = pace.inside(passages)
             higher = higher + amplitude * np.where(inside >= 0.0, np.exp(-np.abs(inside) / length), 0.0)
+            if exit_height:
+                higher = higher + exit_height * left(pace.outside(passages), pace.radius, length)
         return np.asarray(higher)
 
     def bowed(self, x: Array, y: Array, size: tuple[float, float]) -> Array:
@@ -62,6 +68,26 @@ class Setup:
         (xx, xy, yy), (uuu, uuv, uvv, vvv) = self.bow, self.cubic
         uu, vv = u * u, v * v
         return np.asarray(uu * (xx + uuu * u + uuv * v) + xy * u * v + vv * (yy + uvv * u + vvv * v))
+
+
+def left(outside: Array, radius: float, length: float) -> Array:
+    """Return what remains of a step of one that comes as the force falls while a cutter leaves the block.
+
+    A part of the rim at the angle θ from the direction aside leaves when the axis is R sin θ before the edge:
+    of the force, what is left is the share of the cutter's width that is still cut, 1 − sin θ with
+    R (1 − cos θ) the way since the front left. Each part of the step decays over ``length`` (m) to 1/e.
+
+    Parameters
+    ----------
+    outside : distance of the axis past the edge, m.
+    """
+    way = np.linspace(0.0, max(float(outside.max(initial=0.0)) + radius, radius), LEFT)
+    end = np.arccos(1.0 - np.minimum(way / radius, 1.0))[:, None]
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    theta = 0.5 * end * (1.0 + nodes)
+    since = way[:, None] - radius * (1.0 - np.cos(theta))
+    remains = (np.cos(theta) * np.exp(-since / length)) @ weights * 0.5 * end[:, 0]
+    return np.asarray(np.interp(outside + radius, way, remains, left=0.0))
 
 
 def swung(vibration: Vibration, phase: float, passages: Passages, pace: Pace) -> Array:
