@@ -20,6 +20,7 @@ from metro.units import JSON
 TEMPLATE = "report.typ"
 # The space between a number and its unit, at which no line may end.
 UNIT = re.compile(r"(?<=\d) (?=(?:%|[mµ]?m|[km]?N|k?Hz|rpm|m?s|kg|N/\w+)(?![^\W\d]))")
+HEIGHT = re.compile(rb"""<svg\b[^>]*?\bheight=['"]([\d.]+)pt""")
 HEADER = 90  # characters of a title that fit beside the subtitle at the head of a page
 # Sets each of some characters alone, as the report would.
 PROBE = """#set document(title: "probe")
@@ -52,6 +53,7 @@ def compile_pdf(cover: Cover, sections: Sequence[Section], links: Mapping[str, s
             "cover": asdict(cover),
             "header": _cut(cover.title),
             "links": dict(links),
+            "floats": True,
             "sections": [_section(s, i, folder) for i, s in enumerate(sections)],
         }
         text = UNIT.sub("\u00a0", json.dumps(content, ensure_ascii=False))
@@ -61,9 +63,15 @@ def compile_pdf(cover: Cover, sections: Sequence[Section], links: Mapping[str, s
             return _compiled(folder, text)
         except typst.TypstError:
             fonts, missing = found_for(frozenset(text))
-            if not fonts and not missing:
-                raise
-            return _compiled(folder, glyphs.without(text, missing), fonts)
+            if fonts or missing:
+                return _compiled(folder, glyphs.without(text, missing), fonts)
+            # Typst cannot tag every float that falls into a list or a table: figures stay in their places
+            return _compiled(folder, _still(text))
+
+
+def _still(content: str) -> str:
+    """Return the content of a report whose figures do not float."""
+    return json.dumps({**json.loads(content), "floats": False}, ensure_ascii=False)
 
 
 def _compiled(folder: Path, content: str, fonts: Sequence[Path] = ()) -> bytes:
@@ -131,6 +139,20 @@ def _cut(title: str) -> str:
     return title if len(title) <= HEADER else f"{title[:HEADER]} …"
 
 
+def svg_height(svg: bytes) -> float:
+    """Return the height of a figure, points.
+
+    Raises
+    ------
+    ValueError
+        The figure does not state it in points.
+    """
+    found = HEIGHT.search(svg)
+    if found is None:
+        raise ValueError("found an SVG without a height in points; expected a figure of matplotlib")
+    return float(found[1])
+
+
 def _section(section: Section, place: int, folder: Path) -> JSON:
     items = [_item(item, f"figure-{place}-{i}.svg", folder) for i, item in enumerate(section.items)]
     return {"title": section.title, "page": section.page, "items": items}
@@ -143,5 +165,6 @@ def _item(item: Item, name: str, folder: Path) -> JSON:
         return {"kind": kind, "items": parts}
     if isinstance(item, Picture):
         (folder / name).write_bytes(item.svg)
-        return {"kind": kind, "file": name, "caption": item.caption, "alt": item.alt}
+        told = {"caption": item.caption, "alt": item.alt}
+        return {"kind": kind, "file": name, "height": svg_height(item.svg), **told}
     return {"kind": kind, **asdict(item)}
