@@ -83,6 +83,8 @@ def test_a_cut_is_not_tried_where_its_force_cannot_be_computed():
     results = results_with_feeds()
     assert trial_cut(results) is not None
     assert trial_cut(replace(results, identified={})) is None
+    wide = results.batch.runs.assign(operation="side", direction="up", radial_depth_mm=40.0)
+    assert trial_cut(replace(results, batch=replace(results.batch, runs=wide))) is None
     tool = {**results.batch.manifest["tool"], "end": "ball"}
     ball = replace(results.batch, manifest={**results.batch.manifest, "tool": tool})
     assert trial_cut(replace(results, batch=ball)) is None

@@ -38,6 +38,8 @@ def trial_cut(results: Results) -> JSON | None:
         return None
     radius = 0.5 * float(tool["diameter_mm"])
     arc = _arc(row, radius)
+    if arc is None:
+        return None
     runout_um, runout_deg = _runout(results)
     return {
         "kind": "trial",
@@ -81,11 +83,14 @@ def _row(results: Results) -> Mapping[str, Any] | None:
     return None if known.empty else dict(known.iloc[0])
 
 
-def _arc(row: Mapping[str, Any], radius: float) -> Engagement:
-    """Return the arc of a run; a blank radial depth is the whole diameter."""
+def _arc(row: Mapping[str, Any], radius: float) -> Engagement | None:
+    """Return the arc of a run; a blank radial depth is the whole diameter, one beyond it has no arc."""
     radial = float(row.get("radial_depth_mm", math.nan))
     radial = 2.0 * radius if math.isnan(radial) else radial
-    return engagement(str(row["operation"]), str(row.get("direction") or ""), radial * MM, radius * MM)
+    try:
+        return engagement(str(row["operation"]), str(row.get("direction") or ""), radial * MM, radius * MM)
+    except ValueError:
+        return None
 
 
 def _teeth(tool: JSON) -> list[float]:
@@ -136,7 +141,11 @@ def _bounds(results: Results, arc: Engagement, radius: float) -> bool:
     if table is None or table.empty or "operation" not in table:
         return False
     own = _arc(dict(table.iloc[0]), radius)
-    return math.isclose(own.entry, arc.entry, abs_tol=1e-6) and math.isclose(own.exit, arc.exit, abs_tol=1e-6)
+    return (
+        own is not None
+        and math.isclose(own.entry, arc.entry, abs_tol=1e-6)
+        and math.isclose(own.exit, arc.exit, abs_tol=1e-6)
+    )
 
 
 def _said(row: Mapping[str, Any]) -> str:
