@@ -64,6 +64,18 @@ def test_a_page_that_is_left_after_two_lines_counts_as_empty():
     assert min(empty_shares(pdf)) > 0.8
 
 
+def test_a_last_page_of_a_few_lines_is_saved_by_setting_all_a_little_closer():
+    def pages(count):
+        return len(empty_shares(compile_pdf(Cover("A title", "batch", "metro"), [section(count)])))
+
+    def section(count):
+        return Section("First", [Paragraph(WORDS * 2) for _ in range(count)])
+
+    two = next(count for count in range(10, 80) if pages(count) == 2)
+    *_, last = empty_shares(compile_pdf(Cover("A title", "batch", "metro"), [section(two)]))
+    assert last < 0.9  # what is beyond one page is not a few lines
+
+
 def test_the_letters_of_a_report_have_eight_points_at_least():
     results = synthetic.results()
     pdf = report_pdf(results, report_sections(results))

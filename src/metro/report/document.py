@@ -17,7 +17,8 @@ from metro.report import glyphs
 from metro.report.content import Abreast, Item, Picture, Section
 from metro.units import JSON
 
-TEMPLATE = "report.typ"
+TEMPLATE, CONTENT = "report.typ", "content.json"
+FEW_LINES = 250.0  # a last page that ends above is nearly empty, points
 # The space between a number and its unit, at which no line may end.
 UNIT = re.compile(r"(?<=\d) (?=(?:%|[mµ]?m|[km]?N|k?Hz|rpm|m?s|kg|N/\w+)(?![^\W\d]))")
 HEIGHT = re.compile(rb"""<svg\b[^>]*?\bheight=['"]([\d.]+)pt""")
@@ -54,11 +55,13 @@ def compile_pdf(cover: Cover, sections: Sequence[Section], links: Mapping[str, s
             "header": _cut(cover.title),
             "links": dict(links),
             "floats": True,
+            "tight": False,
             "sections": [_section(s, i, folder) for i, s in enumerate(sections)],
         }
         text = UNIT.sub("\u00a0", json.dumps(content, ensure_ascii=False))
         (folder / "title.txt").write_text(cover.title, encoding="utf-8")
         (folder / TEMPLATE).write_bytes((files("metro.report") / "templates" / TEMPLATE).read_bytes())
+        text = _filled(folder, text)
         try:
             return _compiled(folder, text)
         except typst.TypstError:
@@ -66,12 +69,36 @@ def compile_pdf(cover: Cover, sections: Sequence[Section], links: Mapping[str, s
             if fonts or missing:
                 return _compiled(folder, glyphs.without(text, missing), fonts)
             # Typst cannot tag every float that falls into a list or a table: figures stay in their places
-            return _compiled(folder, _still(text))
+            return _compiled(folder, _with(text, floats=False))
 
 
-def _still(content: str) -> str:
-    """Return the content of a report whose figures do not float."""
-    return json.dumps({**json.loads(content), "floats": False}, ensure_ascii=False)
+def _with(content: str, **settings: bool) -> str:
+    """Return the content of a report with other settings of its template."""
+    return json.dumps({**json.loads(content), **settings}, ensure_ascii=False)
+
+
+def _filled(folder: Path, content: str) -> str:
+    """Set all a little closer where the last page holds a few lines and can be saved by that."""
+    tight = _with(content, tight=True)
+    pages, end = _end(folder, content)
+    return tight if end < FEW_LINES and _end(folder, tight)[0] < pages else content
+
+
+def _end(folder: Path, content: str) -> tuple[int, float]:
+    """Return on which page a report ends, and how far below its upper edge, points."""
+    import typst
+
+    (folder / CONTENT).write_text(content, encoding="utf-8")
+    found = typst.query(
+        str(folder / TEMPLATE),
+        "<end>",
+        field="value",
+        one=True,
+        root=str(folder),
+        ignore_system_fonts=True,
+    )
+    page, end = json.loads(found)
+    return int(page), float(end)
 
 
 def _compiled(folder: Path, content: str, fonts: Sequence[Path] = ()) -> bytes:
@@ -84,7 +111,7 @@ def _compiled(folder: Path, content: str, fonts: Sequence[Path] = ()) -> bytes:
     """
     import typst
 
-    (folder / "content.json").write_text(content, encoding="utf-8")
+    (folder / CONTENT).write_text(content, encoding="utf-8")
     further = folder / "fonts"
     further.mkdir(exist_ok=True)
     for place, font in enumerate(fonts):
