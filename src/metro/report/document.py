@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from metro.batch.writing import writing
 from metro.report import glyphs
-from metro.report.content import Abreast, Item, Picture, Section
+from metro.report.content import Abreast, Bullets, Item, Paragraph, Picture, Section
 from metro.units import JSON
 
 TEMPLATE, CONTENT = "report.typ", "content.json"
@@ -194,4 +194,13 @@ def _item(item: Item, name: str, folder: Path) -> JSON:
         (folder / name).write_bytes(item.svg)
         told = {"caption": item.caption, "alt": item.alt}
         return {"kind": kind, "file": name, "height": svg_height(item.svg), **told}
+    if isinstance(item, Paragraph):
+        return {"kind": kind, "text": _whole(item.text), "look": item.look}
+    if isinstance(item, Bullets):
+        return {"kind": kind, "items": [_whole(text) for text in item.items], "small": item.small}
     return {"kind": kind, **asdict(item)}
+
+
+def _whole(text: str) -> str:
+    """Keep a value on one line with its interval; a narrow cell of a table has no room for that."""
+    return text.replace(" ± ", "\u00a0±\u00a0")
