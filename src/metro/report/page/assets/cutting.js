@@ -23,17 +23,19 @@ function cutForce(tool, cut, runout) {
   const perDepth = Math.tan(tool.helix) / tool.radius;
   const slices = Math.max(4, Math.ceil((SLICES * Math.abs(perDepth) * cut.depth * 360) / TURN));
   const high = cut.depth / slices, force = { x: [], y: [], z: [] };
-  const levels = Array.from({ length: slices }, (_, i) => teethAt(tool, cut.feed, perDepth * (i + 0.5) * high, runout));
+  const levels = Array.from({ length: slices }, (_, i) => perDepth * (i + 0.5) * high);
+  const edges = levels.flatMap((lag) => teethAt(tool, cut.feed, lag, runout));
   let around = 0;
   for (let degree = 0; degree < 360; degree += 1) {
     let [x, y, z] = [0, 0, 0];
-    for (const { angle, passes } of levels.flat()) {
+    for (const { angle, passes } of edges) {
       const phi = (((angle + (degree * TURN) / 360) % TURN) + TURN) % TURN;
       if (phi < tool.entry || phi > tool.exit) continue;
-      const [sine, cosine] = [Math.sin(phi), Math.cos(phi)];
-      const chip = Math.min(...passes.map(({ travel, gap }) => travel * sine + gap));
+      const sine = Math.sin(phi), cosine = Math.cos(phi);
+      let chip = Infinity;
+      for (const { travel, gap } of passes) chip = Math.min(chip, travel * sine + gap);
       if (chip <= 0) continue;
-      const [t, r, a] = [ktc * chip + kte, krc * chip + kre, kac * chip + kae].map((each) => each * high);
+      const t = (ktc * chip + kte) * high, r = (krc * chip + kre) * high, a = (kac * chip + kae) * high;
       x -= t * cosine + r * sine;
       y += t * sine - r * cosine;
       z += a;
