@@ -41,7 +41,7 @@ ROOMS = {
     "wording": set(),
     "decisions": {"cutting", "signals"},
     "memory": set(),
-    "report": {"batch", "observables"},
+    "report": {"batch", "observables", "cutting"},
     "stages": {
         "batch",
         "codehash",

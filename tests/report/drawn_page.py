@@ -18,9 +18,11 @@ RUNS = pd.DataFrame(
         "role": "validate",
         "spindle_rpm": [1000.0, 1000.0, 1000.0, 1200.0],
         "axial_depth_mm": [1.0, 1.0, 1.0, 3.0],
+        "feed_per_tooth_mm": 0.05,
         "pose": ["1"] * 4,
     }
 )
+TOOL = {"diameter_mm": 12.0, "teeth": 3, "helix_deg": 30.0}
 BLANK = dict.fromkeys(("t_s", "angle_deg", "s_mm", "x_mm", "y_mm"), np.nan)
 
 
@@ -78,7 +80,8 @@ def _lobes(depth):
     rpm = np.arange(1000.0, 2001.0, 50.0)
     depth = np.where(rpm == 1800.0, 10.0 * depth, depth)
     table = pd.DataFrame({"position": 1, "rpm": rpm, "depth_mm": depth, "kind": "hopf", "chatter_hz": 88.0})
-    return table.assign(depth_lo_mm=0.9 * depth, depth_hi_mm=1.1 * depth, interpolated=False)
+    table = table.assign(depth_lo_mm=0.9 * depth, depth_hi_mm=1.1 * depth, interpolated=False)
+    return table.assign(operation="slot", direction="slot", radial_depth_mm=12.0)
 
 
 def _face():
@@ -89,6 +92,20 @@ def _face():
 
 def _error(rms):
     return {"rms": rms, "nrmse": rms / 100, "ci95": [0.9 * rms, 1.1 * rms]}
+
+
+def _identified(name, ktc):
+    """Return coefficients of which one differs between batches by more than its interval."""
+    known = {"ktc": ktc, "krc": 300.0, "kac": 150.0, "kte": 14.0, "kre": 18.0, "kae": 4.0}
+    waveform = {
+        key: {
+            "value": value,
+            "ci95": [value - 5.0, value + 5.0],
+            "unit": "N/mm2" if key[-1] == "c" else "N/mm",
+        }
+        for key, value in known.items()
+    }
+    return {"format": 1, "batch": name, "force": {"waveform": waveform}}
 
 
 def _entry(unit, status="explained"):
@@ -117,7 +134,7 @@ def written_page(root):
     }
     for name, (title, frames, observables) in titles.items():
         processed, reports = root / "processed" / name, root / "reports" / name
-        batch = Batch(name, {"title": title, "cell": "c", "source": "measured"}, {"cell": "c"},
+        batch = Batch(name, {"title": title, "cell": "c", "source": "measured", "tool": TOOL}, {"cell": "c"},
                       RUNS.set_index("run"), {})  # fmt: skip
         write_batch(processed, batch, {})
         (processed / "loop.json").write_text(json.dumps({"observables": {}}))
@@ -127,7 +144,7 @@ def written_page(root):
         if "waviness" in verdicts:
             verdicts["waviness"] = _entry("um", "unexplained")
         write_json(reports / "verdict.json", {"format": 1, "batch": name, "observables": verdicts})
-        write_json(reports / "identified.json", {"format": 1, "batch": name})
+        write_json(reports / "identified.json", _identified(name, 850.0 if name == "early" else 900.0))
         write_json(reports / "provenance.json", {"format": 1})
         (reports / "report.pdf").write_bytes(b"%PDF-1.7")
     folders = [root / "reports" / name for name in titles]

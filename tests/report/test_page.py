@@ -83,7 +83,7 @@ def test_what_a_batch_says_of_itself_is_text_and_never_markup(page):
     assert EVIL in "".join(parsed.texts["h3"])
     assert EVIL not in page
     scripts = [a for name, a in parsed.elements if name == "script"]
-    assert len(scripts) == 3  # data of two batches, and the page's own
+    assert len(scripts) == 4  # what is compared, data of two batches, and the page's own
     assert Parsed(tag("p", EVIL, title='"><b>')).elements == [("p", {"title": '"><b>'})]
     assert json.loads(embedded({"run": "</script><!--"})) == {"run": "</script><!--"}
     assert "<" not in embedded({"run": "</script><!--"})

@@ -58,7 +58,7 @@ def test_the_policy_lets_the_pages_own_script_run_and_no_other(browser, address)
     said = []
     own.on("console", lambda message: said.append(message.text))
     own.goto(f"{address}#batch-late")
-    assert own.locator("#batch-late .plot").count() == 5
+    assert own.locator("#batch-late .plot").count() == 6
     assert said == []
     assert own.title() == "Campaign summary"
     assert EVIL in own.locator("#batch-early summary").first.inner_text()
@@ -72,7 +72,7 @@ def test_the_policy_lets_the_pages_own_script_run_and_no_other(browser, address)
 
 def test_every_plot_is_drawn(page):
     charts = page.locator("svg.chart").all()
-    assert len(charts) == 3
+    assert len(charts) == 4
     for chart in charts:
         paths = [p.get_attribute("d") for p in chart.locator("path.line").all()]
         assert all(len(d) > 100 and "NaN" not in d for d in paths)
@@ -291,7 +291,7 @@ def test_paper_gets_every_plot_and_the_page_is_folded_again_after_it(page):
     assert page.locator("#batch-early .plot").count() == 0
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.locator("details.batch[open]").count() == 2
-    assert page.locator("#batch-early .plot").count() == 3
+    assert page.locator("#batch-early .plot").count() == 4
     page.emulate_media(media="print")
     assert not page.get_by_role("button", name="Larger").first.is_visible()
     assert plot(page, "Faces, all runs").locator("h4 small").inner_text() == "r1, measured, less its plane"
@@ -342,8 +342,71 @@ def test_text_of_plots_is_readable_on_a_telephone(page):
 @pytest.mark.skipif(
     not AXE.is_file(), reason="axe-core is not installed (npm install axe-core, or METRO_AXE)"
 )
-def test_no_rule_of_axe_is_broken(page):
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_rule_of_axe_is_broken(page, scheme):
+    page.emulate_media(color_scheme=scheme)
     page.get_by_role("button", name="Unfold all").click()
     page.evaluate(AXE.read_text(encoding="utf-8"))
     found = page.evaluate("axe.run()")["violations"]
     assert [(rule["id"], [n["html"] for n in rule["nodes"]][:3]) for rule in found] == []
+
+
+def test_what_does_not_hold_the_words_searched_for_is_hidden(page):
+    page.get_by_label("Search").fill("waviness early")
+    assert not page.locator("#batch-late").is_visible()
+    assert page.locator("#batch-early").is_visible()
+    assert page.get_by_text("1 of 2 batches").is_visible()
+    page.get_by_label("Search").fill("")
+    assert page.locator("#batch-late").is_visible()
+
+
+def test_errors_are_sorted_among_those_of_their_unit(page):
+    table = page.locator("table[data-verdicts]").first
+    for _ in ("rising", "falling"):
+        table.get_by_role("button", name="after").click()
+        units = [cell.inner_text() for cell in table.locator("tbody td:nth-child(6)").all()]
+        assert units == ["N", "N", "µm", "mm", "1"]
+
+
+def test_a_verdict_is_seen_on_a_telephone(browser, address):
+    small = browser.new_page(viewport={"width": 420, "height": 900})
+    small.goto(address)
+    badges = small.locator("table[data-verdicts] .badge").all()
+    assert len(badges) == 5
+    assert all(box["x"] + box["width"] <= 420 for box in (badge.bounding_box() for badge in badges))
+    assert small.evaluate("document.documentElement.scrollWidth") == 420
+    small.close()
+
+
+def test_two_batches_are_compared_by_what_both_identified(page):
+    section = page.locator(".compare")
+    assert section.get_by_label("first batch").input_value() == "early"
+    assert section.get_by_text("1 of 7 shared quantities differ").is_visible()
+    row = section.get_by_role("row", name=re.compile("^K_tc"))
+    assert [cell.inner_text() for cell in row.locator("td").all()] == [
+        *("K_tc", "850.0\u00a0±\u00a05.0 N/mm²", "900.0\u00a0±\u00a05.0 N/mm²", "1.06", "differs"),
+    ]
+    section.get_by_label("first batch").select_option("late")
+    assert section.get_by_text("0 of").is_visible()
+
+
+def test_a_cut_is_tried_with_sliders_and_marked_on_the_boundary(page):
+    here = plot(page, "Try a cut")
+    said = here.locator("p.tried")
+    before = float(re.search(r"axis ([\d.]+) N", said.inner_text())[1])
+    assert "predicted to be stable" in said.inner_text()
+    here.get_by_label("axial depth").fill("3")
+    after = float(re.search(r"axis ([\d.]+) N", said.inner_text())[1])
+    assert after > 2 * before
+    assert "predicted to chatter" in said.inner_text()
+    assert plot(page, "Stability boundary").locator("g .mark.tried").count() == 1
+    here.get_by_label("spindle speed").fill("1800")
+    assert "predicted to be stable" in said.inner_text()
+
+
+def test_the_page_is_dark_where_the_reader_asks_for_it(browser, address):
+    dark = browser.new_page(color_scheme="dark")
+    dark.goto(address)
+    ground = dark.evaluate("getComputedStyle(document.documentElement).backgroundColor")
+    assert max(int(part) for part in re.findall(r"\d+", ground)) < 50
+    dark.close()

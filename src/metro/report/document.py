@@ -14,12 +14,14 @@ from types import MappingProxyType
 
 from metro.batch.writing import writing
 from metro.report import glyphs
-from metro.report.content import Abreast, Item, Picture, Section
+from metro.report.content import Abreast, Bullets, Item, Paragraph, Picture, Section
 from metro.units import JSON
 
-TEMPLATE = "report.typ"
+TEMPLATE, CONTENT = "report.typ", "content.json"
+FEW_LINES = 250.0  # a last page that ends above is nearly empty, points
 # The space between a number and its unit, at which no line may end.
 UNIT = re.compile(r"(?<=\d) (?=(?:%|[mµ]?m|[km]?N|k?Hz|rpm|m?s|kg|N/\w+)(?![^\W\d]))")
+HEIGHT = re.compile(rb"""<svg\b[^>]*?\bheight=['"]([\d.]+)pt""")
 HEADER = 90  # characters of a title that fit beside the subtitle at the head of a page
 # Sets each of some characters alone, as the report would.
 PROBE = """#set document(title: "probe")
@@ -52,18 +54,51 @@ def compile_pdf(cover: Cover, sections: Sequence[Section], links: Mapping[str, s
             "cover": asdict(cover),
             "header": _cut(cover.title),
             "links": dict(links),
+            "floats": True,
+            "tight": False,
             "sections": [_section(s, i, folder) for i, s in enumerate(sections)],
         }
         text = UNIT.sub("\u00a0", json.dumps(content, ensure_ascii=False))
         (folder / "title.txt").write_text(cover.title, encoding="utf-8")
         (folder / TEMPLATE).write_bytes((files("metro.report") / "templates" / TEMPLATE).read_bytes())
+        text = _filled(folder, text)
         try:
             return _compiled(folder, text)
         except typst.TypstError:
             fonts, missing = found_for(frozenset(text))
-            if not fonts and not missing:
-                raise
-            return _compiled(folder, glyphs.without(text, missing), fonts)
+            if fonts or missing:
+                return _compiled(folder, glyphs.without(text, missing), fonts)
+            # Typst cannot tag every float that falls into a list or a table: figures stay in their places
+            return _compiled(folder, _with(text, floats=False))
+
+
+def _with(content: str, **settings: bool) -> str:
+    """Return the content of a report with other settings of its template."""
+    return json.dumps({**json.loads(content), **settings}, ensure_ascii=False)
+
+
+def _filled(folder: Path, content: str) -> str:
+    """Set all a little closer where the last page holds a few lines and can be saved by that."""
+    tight = _with(content, tight=True)
+    pages, end = _end(folder, content)
+    return tight if end < FEW_LINES and _end(folder, tight)[0] < pages else content
+
+
+def _end(folder: Path, content: str) -> tuple[int, float]:
+    """Return on which page a report ends, and how far below its upper edge, points."""
+    import typst
+
+    (folder / CONTENT).write_text(content, encoding="utf-8")
+    found = typst.query(
+        str(folder / TEMPLATE),
+        "<end>",
+        field="value",
+        one=True,
+        root=str(folder),
+        ignore_system_fonts=True,
+    )
+    page, end = json.loads(found)
+    return int(page), float(end)
 
 
 def _compiled(folder: Path, content: str, fonts: Sequence[Path] = ()) -> bytes:
@@ -76,7 +111,7 @@ def _compiled(folder: Path, content: str, fonts: Sequence[Path] = ()) -> bytes:
     """
     import typst
 
-    (folder / "content.json").write_text(content, encoding="utf-8")
+    (folder / CONTENT).write_text(content, encoding="utf-8")
     further = folder / "fonts"
     further.mkdir(exist_ok=True)
     for place, font in enumerate(fonts):
@@ -131,6 +166,20 @@ def _cut(title: str) -> str:
     return title if len(title) <= HEADER else f"{title[:HEADER]} …"
 
 
+def svg_height(svg: bytes) -> float:
+    """Return the height of a figure, points.
+
+    Raises
+    ------
+    ValueError
+        The figure does not state it in points.
+    """
+    found = HEIGHT.search(svg)
+    if found is None:
+        raise ValueError("found an SVG without a height in points; expected a figure of matplotlib")
+    return float(found[1])
+
+
 def _section(section: Section, place: int, folder: Path) -> JSON:
     items = [_item(item, f"figure-{place}-{i}.svg", folder) for i, item in enumerate(section.items)]
     return {"title": section.title, "page": section.page, "items": items}
@@ -143,5 +192,15 @@ def _item(item: Item, name: str, folder: Path) -> JSON:
         return {"kind": kind, "items": parts}
     if isinstance(item, Picture):
         (folder / name).write_bytes(item.svg)
-        return {"kind": kind, "file": name, "caption": item.caption, "alt": item.alt}
+        told = {"caption": item.caption, "alt": item.alt}
+        return {"kind": kind, "file": name, "height": svg_height(item.svg), **told}
+    if isinstance(item, Paragraph):
+        return {"kind": kind, "text": _whole(item.text), "look": item.look}
+    if isinstance(item, Bullets):
+        return {"kind": kind, "items": [_whole(text) for text in item.items], "small": item.small}
     return {"kind": kind, **asdict(item)}
+
+
+def _whole(text: str) -> str:
+    """Keep a value on one line with its interval; a narrow cell of a table has no room for that."""
+    return text.replace(" ± ", "\u00a0±\u00a0")

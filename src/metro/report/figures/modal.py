@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 DIAGRAMS = 4
 MOST_SHAPES = 16
+MODE_ROW = 0.16  # inches that the label of a mode takes
 
 
 def responses(frf: pd.DataFrame) -> Figure:
@@ -106,7 +107,8 @@ def shapes(residues: pd.DataFrame, alike: pd.DataFrame) -> Figure:
     points = list(residues["point"].unique())
     at = np.arange(len(points))
     with style.style():
-        canvas = Canvas(figsize=(style.WIDTH, 0.7 + 0.62 * -(-len(panels) // 4)), layout="constrained")
+        height = max(0.62 * -(-len(panels) // 4), MODE_ROW * alike["first_hz"].nunique())
+        canvas = Canvas(figsize=(style.WIDTH, 0.7 + height), layout="constrained")
         halves: Any = canvas.subfigures(1, 2, width_ratios=[1.9, 1])
         left, right = halves
         grid = left.subplots(-(-len(panels) // 4), 4, squeeze=False, sharex=True, sharey=True)
@@ -138,8 +140,8 @@ def _alike(part: SubFigure, alike: pd.DataFrame) -> None:
     image = axes.imshow(matrix, vmin=0, vmax=1, cmap=style.SEQUENTIAL, origin="lower")
     place = np.arange(len(matrix))
     names = [number(float(frequency), 4) for frequency in matrix.index]
-    axes.set_xticks(place, names, rotation=90, fontsize=8)
+    axes.set_xticks([])  # the order is that of the other axis
     axes.set_yticks(place, names, fontsize=8)
     axes.grid(visible=False)
-    axes.set_xlabel("mode (Hz)")
-    part.colorbar(image, ax=axes, location="top", label="MAC", shrink=0.8)
+    axes.set(ylabel="mode (Hz)", xlabel="the same modes")
+    part.colorbar(image, ax=axes, location="right", label="MAC")

@@ -14,6 +14,7 @@ from metro.report.page.faces import face_maps, point_maps
 from metro.report.page.markup import Html, badge, embedded, items_of, joined, tag
 from metro.report.page.path_errors import path_errors
 from metro.report.page.responses import response_curves
+from metro.report.page.trial import trial_cut
 from metro.report.parameters import parameter_words
 from metro.report.results import Results
 from metro.report.sections.causes import with_causes
@@ -112,6 +113,7 @@ def _plots(results: Results, budget: int) -> list[JSON]:
         lambda share: face_maps(results, share),
         *(lambda share, name=name: run_curves(results, name, share) for name in results.verdicts()),
         lambda share: path_errors(results, share),
+        lambda _: trial_cut(results),
     ]
     plots: list[JSON] = []
     for waiting, make in zip(range(len(makers), 0, -1), makers, strict=True):

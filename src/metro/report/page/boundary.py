@@ -13,6 +13,8 @@ from metro.report.results import Results
 from metro.report.sections.lobes import placed
 from metro.units import JSON, Array
 
+TITLE = "Stability boundary"
+
 
 def boundary_curves(results: Results, budget: int) -> JSON | None:
     """Return the stability boundary of every position before and after, with its test cuts and islands."""
@@ -32,7 +34,7 @@ def boundary_curves(results: Results, budget: int) -> JSON | None:
     shown = fitting(curves, budget, [-float(i) for i in range(len(curves))])
     return {
         "kind": "chart",
-        "title": "Stability boundary",
+        "title": TITLE,
         "x": "spindle speed (rpm)",
         "y": "depth of cut (mm)",
         "unit": "mm",

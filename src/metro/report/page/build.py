@@ -9,11 +9,16 @@ from metro import __version__
 from metro.report.campaign import TITLE
 from metro.report.content import Section
 from metro.report.page.batch import anchor, batch_section
+from metro.report.page.compare import TITLE as COMPARE
+from metro.report.page.compare import compare_section, quantities
 from metro.report.page.frame import contents, document, named, section
 from metro.report.page.markup import items_of, tag
 from metro.report.results import Results
 
-SCRIPTS = ("kit.js", "panel.js", "chart.js", "face.js", "tables.js", "page.js")
+SCRIPTS = (
+    *("kit.js", "panel.js", "chart.js", "face.js", "cutting.js", "trial.js"),
+    *("tables.js", "compare.js", "search.js", "page.js"),
+)
 BATCHES = "Batches"
 WHOLE, PER_BATCH = 4_000_000, 400_000  # bytes that the data of all plots, and those of one batch, may take
 
@@ -30,20 +35,24 @@ def campaign_page(sections: Sequence[Section], batches: Iterable[Results], links
     budget = min(PER_BATCH, WHOLE // max(1, len(links)))
     anchors = {name: f"#{quote(anchor(name))}" for name in links}
     summary = [section(s.title, items_of(s.items, anchors)) for s in sections]
-    unfolding = [batch_section(results, links[results.batch.name], budget) for results in batches]
+    unfolding, compared = [], []
+    for results in batches:
+        unfolding.append(batch_section(results, links[results.batch.name], budget))
+        compared.append((results.batch.name, quantities(results)))
+    comparing = compare_section(compared)
     buttons = [
         tag("button", "Unfold all", type="button", data_fold="open"),
         tag("button", "Fold all", type="button", data_fold="close"),
     ]
     without = tag("noscript", tag("p", "The plots need JavaScript; all else is here without it."))
     head = tag("p", *buttons, class_="tools")
-    parts = [*summary, section(BATCHES, head, without, *unfolding)]
+    parts = [*summary, *comparing, section(BATCHES, head, without, *unfolding)]
     below = f"{len(links)} batches · metro {__version__} · "
     header = tag(
         "header",
         tag("h1", TITLE),
         tag("p", below, tag("a", "the same as PDF", href="summary.pdf")),
-        contents([*(s.title for s in sections), BATCHES]),
+        contents([*(s.title for s in sections), *([COMPARE] if comparing else []), BATCHES]),
     )
     skips = {"verdicts": "main", "batches": named(BATCHES)}
     return document(TITLE, header, parts, skips, SCRIPTS)

@@ -11,7 +11,7 @@ function chart(host, plot) {
   const drawing = svg("svg", { class: "chart" }, svg("clipPath", { id: clip }, opening), ground, picked, cursor);
   const [, across, unit = ""] = /^(.*?)(?: \((.*)\))?$/.exec(plot.x);
   const above = html("li", {}, "▲ goes on above: zoom in to see it");
-  let curve, panels = [], from, to, at = 0, mark = null;
+  let curve, panels = [], from, to, at = 0, mark = null, tried = null;
   const around = frame(host, plot, drawing, resize);
 
   const inside = () => around.width() - BOX.left - BOX.right;
@@ -27,7 +27,7 @@ function chart(host, plot) {
 
   function choose(next) {
     const before = curve && { ends: whole(), x: curve.x[at] };
-    curve = { ...next, x: unpack(next.x), marks: next.marks || [], gaps: new Set(next.gaps || []) };
+    curve = { ...next, x: unpack(next.x), marks: [...(next.marks || []), ...(tried ? [tried] : [])], gaps: new Set(next.gaps || []) };
     curve.lines = next.lines.map((line) => ({ ...line, y: unpack(line.y),
       low: line.low && unpack(line.low), high: line.high && unpack(line.high) }));
     const main = { ...next, lines: curve.lines, marks: curve.marks, label: plot.y, top: BOX.top, tall: BOX.main };
@@ -80,12 +80,13 @@ function chart(host, plot) {
 
   function name() {
     const swatch = (look) => svg("svg", { viewBox: "0 0 26 10", class: "swatch", "aria-hidden": "true" },
-      look === "stable" || look === "chatter" || (curve.rows && look !== "band") ? symbol(look, 13, 5)
+      ["stable", "chatter", "tried"].includes(look) || (curve.rows && look !== "band") ? symbol(look, 13, 5)
         : svg("path", { class: `line ${look}`, d: "M0 5H26" }));
     const entries = curve.lines.map((line) => [line.look, line.name]);
     if (curve.lines.some((line) => line.low)) entries.push(["band", "95 % interval"]);
     if (curve.marks.some((m) => m.look === "stable")) entries.push(["stable", "stable cut"]);
     if (curve.marks.some((m) => m.look === "chatter")) entries.push(["chatter", "chatter"]);
+    if (tried) entries.push(["tried", "the cut that is tried"]);
     if ((curve.spans || []).length) entries.push(["span", "stable island"]);
     around.legend.replaceChildren(
       ...entries.map(([look, text]) => html("li", {}, swatch(look), ` ${text}`)), above);
@@ -236,4 +237,20 @@ function chart(host, plot) {
 
   around.tools.append(chooser(plot, choose), button("Larger", () => zoom(0.5)),
     button("Smaller", () => zoom(2)), button("All", all));
+
+  // Puts a mark that can be moved, and says what the first line is there.
+  function put(x, y, words) {
+    tried = { x, y, look: "tried", told: words };
+    curve.marks = [...curve.marks.filter((one) => one.look !== "tried"), tried];
+    panels[0].marks = curve.marks;
+    mark = null;
+    if (x < from || x > to) [from, to] = whole();
+    name();
+    redraw();
+    const near = nearest(curve.x, x), { y: depth, low, high } = curve.lines[0];
+    return { value: depth[near], low: low ? low[near] : depth[near], high: high ? high[near] : depth[near],
+      told: curve.told[near], said: curve.said };
+  }
+
+  return { show: choose, put };
 }

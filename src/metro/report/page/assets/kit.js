@@ -20,6 +20,7 @@ function svg(name, attributes = {}, ...children) {
 
 // Numbers come as 16-bit steps between low and high, in base64; the last code says that there is none.
 function unpack(packed) {
+  if (!packed.data) return packed; // computed in the page
   const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
   const view = new DataView(bytes.buffer);
   return Float64Array.from({ length: bytes.length / 2 }, (_, i) => {

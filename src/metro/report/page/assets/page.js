@@ -6,7 +6,12 @@ function unfold(batch) {
   const data = batch.querySelector("script.data");
   if (!data) return;
   const host = batch.querySelector(".plots");
-  for (const plot of JSON.parse(data.textContent)) (plot.kind === "map" ? face : chart)(host, plot);
+  const plots = JSON.parse(data.textContent), made = {};
+  for (const plot of plots.filter((each) => each.kind !== "trial")) {
+    made[plot.title] = (plot.kind === "map" ? face : chart)(host, plot);
+  }
+  // A trial is drawn above the boundary, on which it puts its mark
+  for (const plot of plots.filter((each) => each.kind === "trial")) trial(host, plot, made[plot.boundary]);
   data.remove();
 }
 
@@ -42,4 +47,8 @@ addEventListener("beforeprint", () => {
 addEventListener("afterprint", () => {
   for (const batch of folded) batch.open = false;
 });
+document.querySelector("header").append(
+  search(batches, [...document.querySelectorAll("table[data-verdicts]")]));
+const known = document.querySelector("script.compared");
+if (known) comparison(document.querySelector(".compare"), JSON.parse(known.textContent));
 follow(location.hash);

@@ -18,14 +18,20 @@ function compared(a, b) {
 
 function sortable(table) {
   const body = table.tBodies[0], heads = [...table.tHead.rows[0].cells];
+  const units = heads.findIndex((head) => head.textContent === "unit");
+  const first = [...body.rows];
   heads.forEach((head, column) => {
     const sort = button(head.textContent, () => {
       const falls = head.getAttribute("aria-sort") === "ascending";
       heads.forEach((other) => other.removeAttribute("aria-sort"));
       head.setAttribute("aria-sort", falls ? "descending" : "ascending");
-      const text = (row) => row.cells[column].textContent.trim();
-      const rows = [...body.rows].sort((a, b) => compared(text(a), text(b)));
-      body.append(...(falls ? rows.reverse() : rows));
+      const text = (row, at = column) => row.cells[at].textContent.trim();
+      // Millimetres and newtons have no order: numbers are sorted among those of their unit
+      const measured = units >= 0 && first.some((row) => Number.isFinite(leading(text(row))));
+      const group = (row) => first.findIndex((other) => text(other, units) === text(row, units));
+      const sign = falls ? -1 : 1;
+      body.append(...[...body.rows].sort(
+        (a, b) => (measured ? group(a) - group(b) : 0) || sign * compared(text(a), text(b))));
     });
     head.replaceChildren(sort);
   });
