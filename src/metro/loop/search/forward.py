@@ -25,7 +25,9 @@ MOST_EFFECTS = 4  # of a model
 def forward(space: SearchSpace) -> Choice:
     """Add the best effect that passes every gate until none does, and weigh what was added.
 
-    Where a rival takes the place of an effect, others may explain what it leaves: they are tried again.
+    Where a rival takes the place of an effect, others may explain what it leaves: they are tried again. No
+    set of effects is looked at twice, whether it was weighed or came out of a contest: gates that contradict
+    each other would lead around for ever.
     """
     current, steps = space.base, list[Fit]()
     trials: dict[tuple[str, str], Trial] = {}
@@ -43,6 +45,7 @@ def forward(space: SearchSpace) -> Choice:
         better = contest.final
         if frozenset(better.candidate.effects) in weighed:
             break
+        weighed.add(frozenset(better.candidate.effects))
         current, dropped = _pruned(better, space)
         contest = None if dropped else contest
     chosen = set(contest.final.candidate.effects)
