@@ -59,6 +59,10 @@ class Made:
     def point_tooth_hz(self):
         return 3 * self.point_rpm / 60.0
 
+    @property
+    def point_cut(self):
+        return np.zeros(len(self.point_rpm), dtype=int)
+
     def boundaries(self, change):
         model = change(Line(shift=self.moved))
         return model.boundary(self.point_rpm), np.full(len(self.point_rpm), model.hz)

@@ -6,15 +6,14 @@ from label_toy import GATES, SHIFT, SLOPE, Line, problem
 from scipy.special import logsumexp
 
 from metro.loop.labels import hypotheses
-from metro.loop.labels.evidence import log_likelihood
+from metro.loop.labels.evidence import Errors, log_likelihood
 from metro.loop.labels.hypotheses import LabelEvidence, changed, hypothesis, quantile
 from metro.loop.labels.problem import tests_of as told_by
 
 TASK = problem(Line(slope=0.8, shift=-0.4), 5)
 TESTS, _ = told_by(TASK, "identify")
-EVIDENCE = LabelEvidence(
-    TASK.boundaries, TASK.estimates, TESTS, np.zeros((1, len(TASK.point_rpm))), GATES.seed
-)
+NONE = Errors(np.zeros((1, len(TASK.point_rpm))), np.array([TESTS.model_sd]))
+EVIDENCE = LabelEvidence(TASK.boundaries, TASK.estimates, TESTS, NONE, GATES.seed)
 
 
 def grid(effects, count):
@@ -24,7 +23,7 @@ def grid(effects, count):
     theta = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
     models = [Line(**{e.name: v for e, v in zip(effects, row, strict=True)}) for row in theta]
     depth = np.stack([model.boundary(TASK.point_rpm) for model in models])
-    found = log_likelihood(TESTS, depth, np.full_like(depth, 300.0), EVIDENCE.deviations)
+    found = log_likelihood(TESTS, depth, np.full_like(depth, 300.0), EVIDENCE.errors)
     return theta, found.sum(axis=2)[:, 0]
 
 
@@ -74,11 +73,11 @@ def test_where_the_boundary_jumps_it_is_solved_until_the_interval_is_that_of_a_f
         jump = 0.8 * np.tanh((model.slope - step) / 0.02)
         return model.boundary(TASK.point_rpm) + jump, np.full(len(TASK.point_rpm), 300.0)
 
-    evidence = LabelEvidence(solved, TASK.estimates, TESTS, np.zeros((1, len(TASK.point_rpm))), GATES.seed)
+    evidence = LabelEvidence(solved, TASK.estimates, TESTS, NONE, GATES.seed)
     found = hypothesis((SLOPE,), evidence)
     theta = quantile(SLOPE.parameters[0], (np.arange(2000) + 0.5) / 2000)
     depth = np.stack([solved(lambda _, v=v: Line(slope=v))[0] for v in theta])
-    log = log_likelihood(TESTS, depth, np.full_like(depth, 300.0), evidence.deviations).sum(axis=2)[:, 0]
+    log = log_likelihood(TESTS, depth, np.full_like(depth, 300.0), evidence.errors).sum(axis=2)[:, 0]
     below = np.cumsum(np.exp(log - logsumexp(log)))
     told = found.parameters("slope")["size"]["ci95"]
     assert told == pytest.approx(np.interp([0.025, 0.975], below, theta), abs=0.12)

@@ -7,7 +7,15 @@ import pytest
 from scipy.stats import norm
 
 from metro.loop.labels import evidence as room
-from metro.loop.labels.evidence import Labels, left_out, log_evidence, log_likelihood, posterior
+from metro.loop.labels.evidence import (
+    Errors,
+    Labels,
+    drawn_errors,
+    left_out,
+    log_evidence,
+    log_likelihood,
+    posterior,
+)
 
 RPM = np.array([2000.0, 3000.0])
 TOOTH_HZ = np.array([80.0, 110.0])
@@ -17,13 +25,24 @@ NONE = np.full(3, np.nan)
 def labelled(point, depth, unstable, chatter_hz=None, error=1e-9):
     depth = np.asarray(depth)
     chatter = np.full(len(depth), np.nan) if chatter_hz is None else np.asarray(chatter_hz)
-    return Labels(np.asarray(point), depth, np.asarray(unstable, float), chatter, RPM, TOOTH_HZ, 0.15, error)
+    return Labels(
+        np.asarray(point),
+        depth,
+        np.asarray(unstable, float),
+        chatter,
+        RPM,
+        TOOTH_HZ,
+        0.15,
+        error,
+        np.zeros(2),
+    )
 
 
 def at(tests, boundary, chatter=300.0):
     """Log-likelihood (j,) of one boundary, the same at both points."""
     depth = np.full((1, 2), boundary)
-    return log_likelihood(tests, depth, np.full((1, 2), chatter), np.zeros((1, 2)))[0, 0]
+    errors = Errors(np.zeros((1, 2)), np.array([0.15]))
+    return log_likelihood(tests, depth, np.full((1, 2), chatter), errors)[0, 0]
 
 
 @pytest.mark.parametrize("unstable", [0.0, 1.0])
@@ -90,3 +109,25 @@ def test_speeds_left_out_are_whole():
     same = replace(tests, rpm=np.array([2500.0, 2500.0]))  # two cuts at one speed
     assert at(same, 0.0).shape == (1,)
     assert at(same, 0.0).sum() == pytest.approx(at(tests, 0.0).sum())
+
+
+def test_errors_have_the_variances_that_are_stated_and_sizes_that_are_all_alike():
+    tests = replace(labelled([0, 1], [0.0, 0.0], [1, 1]), cut=np.array([0, 1]))
+    errors = drawn_errors(tests, np.zeros((70_000, 2)), 5)
+    relative = errors.deviations / errors.sd[:, None]
+    covariance = np.cov(relative.T)
+    np.testing.assert_allclose(np.diag(covariance), room.SHARED + room.OF_CUT, rtol=0.03)
+    assert covariance[0, 1] == pytest.approx(room.SHARED, rel=0.05)
+    assert np.unique(errors.sd, return_counts=True)[1].std() < 1.0
+
+
+def test_labels_far_from_the_boundary_say_that_the_errors_are_large():
+    near, far = (labelled([0, 0, 1, 1], [by - 0.1, by + 0.1] * 2, [0, 1, 0, 1]) for by in (0.0, 0.8))
+    weights = []
+    for tests in (near, far):
+        errors = drawn_errors(tests, np.zeros((700, 2)), 5)
+        flat = np.zeros((1, 2))
+        likelihood = log_likelihood(tests, flat, np.full((1, 2), np.nan), errors)
+        weights.append(room.of_errors(likelihood, np.ones(1), errors) @ errors.sd)
+    assert weights[0] < 0.25
+    assert weights[1] > 0.35

@@ -6,28 +6,27 @@ import numpy as np
 from label_toy import GATES, Line, problem
 from scipy import stats
 
-from metro.loop.labels.evidence import SHARED
+from metro.loop.labels.evidence import drawn_errors
 from metro.loop.labels.hypotheses import LabelEvidence, hypothesis
 from metro.loop.labels.problem import every_test
 from metro.loop.labels.surprise import drawn, surprise
 
-SD = 0.15
-
 
 def surprised(task, seed=1):
     tests = every_test(task)
-    shared = np.random.default_rng(seed).normal(size=(128, 1)) * SD * SHARED**0.5
-    evidence = LabelEvidence(
-        task.boundaries, task.estimates, tests, np.tile(shared, len(tests.rpm)), GATES.seed
-    )
-    return surprise(tests, hypothesis((), evidence), evidence.deviations, seed)
+    errors = drawn_errors(tests, np.zeros((128, len(tests.rpm))), seed)
+    evidence = LabelEvidence(task.boundaries, task.estimates, tests, errors, GATES.seed)
+    return surprise(tests, hypothesis((), evidence), errors, seed)
 
 
 def labelled(true, seed):
     """Tests of the toy with labels in error as the model says: all alike, each speed, and each test."""
     task, rng = problem(Line(), 1), np.random.default_rng(seed)
-    boundary = true.boundary(task.point_rpm) + SD * SHARED**0.5 * rng.standard_normal()
-    return replace(task, unstable=drawn(every_test(task), boundary, rng) > 0.5)
+    tests = every_test(task)
+    errors = drawn_errors(tests, np.zeros((7, len(tests.rpm))), seed + 1000).of_size(tests.model_sd)
+    one = rng.integers(len(errors.sd))
+    boundary = true.boundary(task.point_rpm) + errors.deviations[one]
+    return replace(task, unstable=drawn(tests, boundary, float(errors.sd[one]), rng) > 0.5)
 
 
 def test_where_the_model_is_right_it_is_small_as_often_as_it_says():

@@ -8,6 +8,7 @@ import pytest
 from label_toy import GATES, RPM, SHIFT, SLOPE, Line, problem
 from worded import in_words
 
+from metro.loop.labels.evidence import Errors
 from metro.loop.labels.hypotheses import LabelEvidence, hypothesis
 from metro.loop.labels.problem import tests_of as told_by
 from metro.loop.labels.search import search_labels
@@ -76,7 +77,7 @@ def test_nothing_is_as_likely_as_a_curve_that_is_flat():
 def test_the_curve_that_is_found_is_the_one_that_acts():
     task = problem(Arch(rise=0.5), 4)
     tests, _ = told_by(task, "identify")
-    flat = np.zeros((1, len(RPM)))
+    flat = Errors(np.zeros((1, len(RPM))), np.array([0.15]))
     evidence = LabelEvidence(task.boundaries, task.estimates, tests, flat, GATES.seed)
     found = unknown(hypothesis((), evidence), evidence)
     at = np.array([2400.0, 3800.0, 5200.0])
@@ -104,7 +105,7 @@ def test_what_moves_deep_boundaries_most_is_found_as_such():
         lambda _: (boundary, np.full(len(boundary), 300.0)),
         lambda changes: (np.tile(boundary, (len(changes), 1)), np.full((len(changes), len(boundary)), 300.0)),
         tests,
-        np.zeros((1, len(boundary))),
+        Errors(np.zeros((1, len(boundary))), np.array([0.15])),
         GATES.seed,
     )
     found = unknown(hypothesis((), evidence), evidence)

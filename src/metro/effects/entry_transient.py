@@ -62,8 +62,8 @@ EFFECT = Effect(
     adapt=adapt,
     signature=(
         "The same decay behind the entry of every pass, whatever the depth of cut and the pose, and often "
-        "the opposite where the cutter leaves the block. The ringing of the arm's modes is at the same place, "
-        "but swings, and goes with the force."
+        "the opposite where the cutter leaves the block. The ringing of the arm's modes is at the same "
+        "place, but swings, and goes with the force."
     ),
     literature="Altintas et al., CIRP Ann. 60 (2011) 779: feed drives under load",
     experiment="the same pass at two feeds and at two depths: a drive that droops does so with the force",

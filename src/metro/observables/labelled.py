@@ -71,6 +71,11 @@ class Labelled(Protocol):
         ...
 
     @property
+    def point_cut(self) -> np.ndarray:
+        """(p,) which cut each point is of, by a number: those that differ in what the teeth go through."""
+        ...
+
+    @property
     def model_sd(self) -> float:
         """Standard deviation of the log of the depth for what the models leave out."""
         ...

@@ -1,9 +1,13 @@
 """What labels say of the boundary: stable below it, unstable above, give or take what the model leaves out.
 
-The error of the model, in the logarithm of the depth, has three parts: one that all tests share, one of each
-speed (the boundary is wrong there for every depth), one of each test (where the operator draws the line). So
-the tests at one speed speak of one unknown depth, and their likelihood as a function of it is a table; tests
-at the same speed are never counted as if each were evidence of its own.
+The error of the model, in the logarithm of the depth, has four parts: one that all tests share, one of each
+cut (modes that are off x and y move the boundary of up and of down milling differently), one of each speed of
+a cut (the boundary is wrong there for every depth), one of each test (where the operator draws the line). So
+the tests of a cut at one speed speak of one unknown depth, and their likelihood as a function of it is a
+table; tests at the same speed are never counted as if each were evidence of its own.
+
+How large the error is differs from machine to machine. Every draw of it has a size of its own, and the tests
+say which sizes are likely.
 """
 
 from __future__ import annotations
@@ -15,9 +19,11 @@ import numpy as np
 from metro.units import Array
 
 # Shares of the variance of the model's error.
-SHARED, OF_SPEED, OF_TEST = 0.45, 0.45, 0.1
-_ERRORS = np.linspace(-4.0, 4.0, 33)  # of a speed, in standard deviations
-_GRID, _BEYOND = 300, 4.0  # depths of the table, to so many standard deviations beyond the tests
+SHARED, OF_CUT, OF_SPEED, OF_TEST = 0.37, 0.23, 0.35, 0.05
+# Sizes that the error may have, relative to what is usual: each as likely as any other before the tests.
+SIZES = (0.5, 1.0, 2.0, 4.0)
+_ERRORS = np.linspace(-6.0, 6.0, 61)  # of a speed, in standard deviations
+_GRID, _BEYOND = 200, 4.0  # depths of the table, to so many standard deviations beyond the tests
 # Chatter frequencies: standard deviation of the logarithm, share of those that follow no model (another mode,
 # once chatter is full grown), and the width over which these spread.
 FREQUENCY_SD, STRAY, STRAY_WIDTH = 0.07, 0.2, 3.0
@@ -36,7 +42,8 @@ class Labels:
     point, depth, unstable, chatter_hz : (n,) place among the points; log of the depth in m; label 1 or 0;
         frequency, Hz, or NaN.
     rpm, tooth_hz : (p,) speed of each point, and frequency of its teeth, Hz.
-    model_sd, label_error : of the model, in the log of the depth; probability of a wrong label.
+    model_sd, label_error : usual error of the model, in the log of the depth; probability of a wrong label.
+    cut : (p,) which cut each point is of, by a number.
     """
 
     point: np.ndarray
@@ -47,6 +54,7 @@ class Labels:
     tooth_hz: Array
     model_sd: float
     label_error: float
+    cut: np.ndarray
 
     @property
     def speeds(self) -> Array:
@@ -65,7 +73,41 @@ class Labels:
         )
 
 
-def unstable_probability(tests: Labels, boundary: Array, sd: float) -> Array:
+@dataclass(frozen=True)
+class Errors:
+    """Draws of what the models get wrong.
+
+    Attributes
+    ----------
+    deviations : (s, p) of the log depth: what the base model is uncertain of, what all tests share and what
+        those of a cut share. sd : (s,) size of the model's error in each draw, all four parts together.
+    """
+
+    deviations: Array
+    sd: Array
+
+    @property
+    def own_sd(self) -> Array:
+        """(s,) sizes of the part of the error that is not shared by the tests of a cut."""
+        return np.asarray(self.sd * np.sqrt(OF_SPEED + OF_TEST))
+
+    def of_size(self, sd: float) -> Errors:
+        """Return the draws of one size."""
+        kept = self.sd == sd
+        return Errors(self.deviations[kept], self.sd[kept])
+
+
+def drawn_errors(tests: Labels, base: Array, seed: int) -> Errors:
+    """Draw the errors that tests share, beside deviations ``base`` (s, p) by what the model has in doubt."""
+    rng = np.random.default_rng(seed)
+    sd = tests.model_sd * np.resize(SIZES, len(base))
+    cuts, cut = np.unique(tests.cut, return_inverse=True)
+    shared = rng.normal(size=(len(base), 1)) * SHARED**0.5
+    of_cut = rng.normal(size=(len(base), len(cuts)))[:, cut] * OF_CUT**0.5
+    return Errors(base + sd[:, None] * (shared + of_cut), sd)
+
+
+def unstable_probability(tests: Labels, boundary: Array, sd: Array | float) -> Array:
     """Probability that tests are unstable, at log depths of the boundary (..., n), in error by ``sd``."""
     from scipy.special import ndtr
 
@@ -73,47 +115,41 @@ def unstable_probability(tests: Labels, boundary: Array, sd: float) -> Array:
     return tests.label_error + (1.0 - 2.0 * tests.label_error) * chance
 
 
-def own_sd(tests: Labels) -> float:
-    """Return the part of the model's error that is not shared by all tests."""
-    return tests.model_sd * float(np.sqrt(OF_SPEED + OF_TEST))
-
-
 def log_likelihood(
-    tests: Labels, depth: Array, chatter: Array, deviations: Array, unsure: Array | None = None
+    tests: Labels, depth: Array, chatter: Array, errors: Errors, unsure: Array | None = None
 ) -> Array:
     """Log-likelihood (t, s, j) of the tests at each of j speeds.
 
     Parameters
     ----------
     depth, chatter : (t, p) log depth and chatter frequency (Hz) of t boundaries at all points.
-    deviations : (s, p) deviations of the log depth, what all tests share included.
     unsure : (t, p) standard deviations of ``depth``, where it is not known exactly.
     """
+    deviations = errors.deviations
     own = np.random.default_rng(0).standard_normal(deviations.shape)  # the same for all boundaries
     total = np.zeros((len(depth), len(deviations), len(tests.speeds)))
     for point in np.unique(tests.point):
         here = tests.take(tests.point == point)
-        grid, log_chance = _table(here)
         at = depth[:, None, point] + deviations[None, :, point]
         if unsure is not None:
             at = at + unsure[:, None, point] * own[None, :, point]
         speed = np.searchsorted(tests.speeds, tests.rpm[point])
-        total[:, :, speed] += (
-            np.interp(at, grid, log_chance)
-            + _frequency(here, chatter[:, point], tests.tooth_hz[point])[:, None]
-        )
+        for sd in np.unique(errors.sd):
+            alike = errors.sd == sd
+            total[:, alike, speed] += np.interp(at[:, alike], *_table(here, float(sd)))
+        total[:, :, speed] += _frequency(here, chatter[:, point], tests.tooth_hz[point])[:, None]
     return total
 
 
-def _table(here: Labels) -> tuple[Array, Array]:
-    """Log depths of the boundary at one point, and the log-likelihood of the labels there."""
+def _table(here: Labels, sd: float) -> tuple[Array, Array]:
+    """Log depths of the boundary at one point, and the log-likelihood of the labels for an error ``sd``."""
     from scipy.special import logsumexp
 
-    margin = _BEYOND * here.model_sd
+    margin = _BEYOND * sd
     grid = np.linspace(here.depth.min() - margin, here.depth.max() + margin, _GRID)
     weights = np.exp(-0.5 * _ERRORS**2)
-    moved = grid[:, None] + _ERRORS * here.model_sd * np.sqrt(OF_SPEED)
-    chance = unstable_probability(here, moved[..., None], here.model_sd * np.sqrt(OF_TEST))
+    moved = grid[:, None] + _ERRORS * sd * np.sqrt(OF_SPEED)
+    chance = unstable_probability(here, moved[..., None], sd * np.sqrt(OF_TEST))
     each = np.log(np.where(here.unstable > 0.5, chance, 1.0 - chance)).sum(axis=-1)
     return grid, np.asarray(logsumexp(each, b=weights / weights.sum(), axis=1))
 
@@ -146,6 +182,19 @@ def left_out(likelihood: Array, prior: Array) -> Array:
     every = log_evidence(likelihood, prior)
     speeds = range(likelihood.shape[2])
     return np.array([every - log_evidence(np.delete(likelihood, j, axis=2), prior) for j in speeds])
+
+
+def of_errors(likelihood: Array, prior: Array, errors: Errors) -> Array:
+    """(s,) weights of draws of the errors: of those of one size together, by how likely the tests make it."""
+    from scipy.special import logsumexp
+
+    each = logsumexp(likelihood.sum(axis=2), b=prior[:, None], axis=0)
+    weights = np.zeros(len(each))
+    for sd in np.unique(errors.sd):
+        alike = errors.sd == sd
+        weights[alike] = logsumexp(each[alike]) - np.log(alike.sum())
+    weights = np.exp(weights - weights.max())
+    return np.asarray(weights / weights.sum())
 
 
 def posterior(likelihood: Array, prior: Array) -> Array:

@@ -21,7 +21,7 @@ import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, by_name
 from metro.kriging import krige
-from metro.loop.labels.evidence import Labels, log_evidence, log_likelihood, posterior
+from metro.loop.labels.evidence import Errors, Labels, log_evidence, log_likelihood, of_errors, posterior
 from metro.units import JSON, Array
 
 _MOST, _MOST_EACH = 256, 64  # points of a set, and of each parameter
@@ -43,14 +43,14 @@ class LabelEvidence:
     predict : ``predict(change)`` is the log depth (p,) and the chatter frequency (p,) at the boundary at all
         points, once ``change`` has been made to the models.
     estimate : the same (t, p), roughly and quickly, for t changes.
-    tests : with their labels. deviations : (s, p) of the log depth, by what the base model is uncertain.
+    tests : with their labels. errors : of the models.
     seed : of the draws.
     """
 
     predict: Callable[[Change], tuple[Array, Array]]
     estimate: Callable[[Sequence[Change]], tuple[Array, Array]]
     tests: Labels
-    deviations: Array
+    errors: Errors
     seed: int
 
     def testable(self, log_depth: Array) -> Array:
@@ -70,7 +70,7 @@ class Hypothesis:
     prior : (t,) weights.
     depth, chatter : (t, p) log depth (m) and chatter frequency (Hz) at the boundary, at all points.
     unsure : (t, p) standard deviation of ``depth``, as far as it is not solved but learnt.
-    likelihood : (t, s, j) log-likelihood of the tests at each speed, for s deviations of the base.
+    likelihood : (t, s, j) log-likelihood of the tests at each speed, for s draws of the errors.
     """
 
     effects: tuple[Effect, ...]
@@ -96,6 +96,10 @@ class Hypothesis:
     def weights(self) -> Array:
         """(t,) posterior weights of the parameters."""
         return posterior(self.likelihood, self.prior)
+
+    def of_errors(self, errors: Errors) -> Array:
+        """(s,) weights of the draws of the errors, by their sizes."""
+        return of_errors(self.likelihood, self.prior, errors)
 
     @property
     def in_doubt(self) -> Array:
@@ -129,7 +133,7 @@ def hypothesis(
     if not size:
         depth, chatter = (part[None] for part in evidence.predict(_change((), np.zeros(0))))
         sure = np.zeros_like(depth)
-        likelihood = log_likelihood(evidence.tests, depth, chatter, evidence.deviations)
+        likelihood = log_likelihood(evidence.tests, depth, chatter, evidence.errors)
         none = np.zeros((1, 0))
         return Hypothesis((), none, none, np.ones(1), depth, chatter, sure, likelihood)
     rng = np.random.default_rng(evidence.seed)
@@ -212,8 +216,7 @@ class _Drawn:
         correction, unsure = learnt(cube)
         depth = rough + correction
         chatter = hz * (solved_hz / hz[self.at])[learnt.nearest(cube)]
-        tests, deviations = self.evidence.tests, self.evidence.deviations
-        likelihood = log_likelihood(tests, depth, chatter, deviations, unsure)
+        likelihood = log_likelihood(self.evidence.tests, depth, chatter, self.evidence.errors, unsure)
         density = np.ones(len(cube))  # that of the first set; all sets have equally many points
         for cloud in self.clouds:
             density += cloud.density(cube)

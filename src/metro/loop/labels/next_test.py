@@ -78,7 +78,9 @@ def _chance(problem: Labelled, one: Weighed, rpm: Array, depth: Array, outcome: 
         boundary = base + curves(mine, outcome.base_boundary, (rpm, outcome.evidence.testable(base)))[heavy]
     else:
         boundary = np.stack([problem.boundary_at(changed(mine, which), rpm) for which in heavy])
-    chance: Array = ndtr((np.log(depth) - boundary[:, :, None]) / tests.model_sd).mean(axis=0)
+    errors = outcome.evidence.errors
+    sd = float(np.sqrt(mine.of_errors(errors) @ errors.sd**2))
+    chance: Array = ndtr((np.log(depth) - boundary[:, :, None]) / sd).mean(axis=0)
     return tests.label_error + (1.0 - 2.0 * tests.label_error) * chance
 
 

@@ -29,4 +29,5 @@ def _labels(problem: Labelled) -> Labels:
         problem.point_tooth_hz,
         problem.model_sd,
         problem.label_error,
+        problem.point_cut,
     )

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from metro.effects.effect import Effect, fitted_to
-from metro.loop.labels.evidence import SHARED, Labels, left_out, own_sd, unstable_probability
+from metro.loop.labels.evidence import Errors, Labels, drawn_errors, left_out, unstable_probability
 from metro.loop.labels.hypotheses import Hypothesis, LabelEvidence, hypothesis
 from metro.loop.labels.problem import tests_of
 from metro.loop.labels.unknown import unknown
@@ -135,9 +135,8 @@ def search_labels(problem: Labelled, library: Sequence[Effect], gates: Gates) ->
     """Weigh nothing, each effect, and pairs, by the identification tests."""
     effects, unable = fitted_to(tuple(library), problem)
     tests, _ = tests_of(problem, "identify")
-    base = problem.deviations(DEVIATIONS, gates.seed)
-    shared = np.random.default_rng(gates.seed).normal(size=(DEVIATIONS, 1)) * tests.model_sd * SHARED**0.5
-    evidence = LabelEvidence(problem.boundaries, problem.estimates, tests, base + shared, gates.seed)
+    errors = drawn_errors(tests, problem.deviations(DEVIATIONS, gates.seed), gates.seed)
+    evidence = LabelEvidence(problem.boundaries, problem.estimates, tests, errors, gates.seed)
     nothing = hypothesis((), evidence)
     singles = [hypothesis((effect,), evidence) for effect in effects if not effect.resembled]
     lacking = [hypothesis((effect,), evidence) for effect in effects if effect.resembled]
@@ -185,20 +184,21 @@ def _probabilities(
     return [Weighed(one, float(w)) for one, w in zip(every, weight / weight.sum(), strict=True)]
 
 
-def predicted(chosen: Hypothesis, tests: Labels, deviations: Array) -> Array:
+def predicted(chosen: Hypothesis, tests: Labels, errors: Errors) -> Array:
     """Probability (n,) that tests are unstable, over the parameters that the hypothesis is left with."""
-    return np.asarray(chosen.weights @ _by_parameters(chosen, tests, deviations))
+    return np.asarray(chosen.weights @ _by_parameters(chosen, tests, errors))
 
 
-def _by_parameters(chosen: Hypothesis, tests: Labels, deviations: Array) -> Array:
-    boundary = chosen.depth[:, None, tests.point] + deviations[None, :, tests.point]
-    return np.asarray(unstable_probability(tests, boundary, own_sd(tests)).mean(axis=1))
+def _by_parameters(chosen: Hypothesis, tests: Labels, errors: Errors) -> Array:
+    boundary = chosen.depth[:, None, tests.point] + errors.deviations[None, :, tests.point]
+    chance = unstable_probability(tests, boundary, errors.own_sd[:, None])
+    return np.asarray(np.einsum("tsn,s->tn", chance, chosen.of_errors(errors)))
 
 
 def _largest(single: Hypothesis, nothing: Hypothesis, evidence: LabelEvidence) -> float:
     """Largest change of the probability of a test, which nine in ten of the parameters do not exceed."""
-    tests, deviations = evidence.tests, evidence.deviations
-    change = _by_parameters(single, tests, deviations) - _by_parameters(nothing, tests, deviations)
+    tests, errors = evidence.tests, evidence.errors
+    change = _by_parameters(single, tests, errors) - _by_parameters(nothing, tests, errors)
     return float(np.quantile(np.abs(change).max(axis=1), 0.9))
 
 
@@ -208,7 +208,7 @@ def _judged(one: Weighed, nothing: Hypothesis, evidence: LabelEvidence, gates: G
         return one
     mine, tests = one.hypothesis, evidence.tests
     gain = left_out(mine.likelihood, mine.prior) - left_out(nothing.likelihood, nothing.prior)
-    change = predicted(mine, tests, evidence.deviations) - predicted(nothing, tests, evidence.deviations)
+    change = predicted(mine, tests, evidence.errors) - predicted(nothing, tests, evidence.errors)
     size = float(np.sqrt(np.mean(change**2)))
     odds = (1.0 - PRIOR_NOTHING) / PRIOR_NOTHING * np.exp(mine.log_evidence - nothing.log_evidence)
     against = odds / (1.0 + odds)

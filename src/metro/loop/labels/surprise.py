@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from metro.loop.labels.evidence import OF_SPEED, OF_TEST, Labels, log_evidence, log_likelihood
+from metro.loop.labels.evidence import OF_SPEED, OF_TEST, Errors, Labels, log_evidence, log_likelihood
 from metro.loop.labels.hypotheses import Hypothesis
 from metro.units import Array
 
@@ -19,26 +19,25 @@ DRAWS = 400  # sets of labels: a p-value of 0.01 is known to 0.005
 _BOUNDARIES = 12  # of a hypothesis, by their weights
 
 
-def drawn(tests: Labels, boundary: Array, rng: np.random.Generator) -> Array:
-    """Labels (n,) of tests, drawn with the errors of speeds and tests; ``boundary`` (p,) log depth."""
-    speeds = np.searchsorted(tests.speeds, tests.rpm[tests.point])
-    at = boundary[tests.point]
-    at = at + tests.model_sd * OF_SPEED**0.5 * rng.standard_normal(len(tests.speeds))[speeds]
-    at = at + tests.model_sd * OF_TEST**0.5 * rng.standard_normal(len(speeds))
-    wrong = rng.random(len(speeds)) < tests.label_error
+def drawn(tests: Labels, boundary: Array, sd: float, rng: np.random.Generator) -> Array:
+    """Labels (n,) of tests about a ``boundary`` (p,) in log depth, with errors of speeds and of tests.
+
+    ``sd``: of all four parts of the error.
+    """
+    at = boundary + sd * OF_SPEED**0.5 * rng.standard_normal(len(boundary))
+    at = at[tests.point] + sd * OF_TEST**0.5 * rng.standard_normal(len(tests.point))
+    wrong = rng.random(len(at)) < tests.label_error
     return np.asarray((tests.depth > at) ^ wrong, dtype=float)
 
 
-def surprise(tests: Labels, mine: Hypothesis, deviations: Array, seed: int) -> float:
+def surprise(tests: Labels, mine: Hypothesis, errors: Errors, seed: int) -> float:
     """Probability that labels drawn from a hypothesis are at least as unlikely as those measured.
 
-    Parameters
-    ----------
-    deviations : (s, p) of the log depth by what the base model is uncertain of and what all tests share.
+    The model's errors are as large as is usual: where they are larger, something is missing.
     """
     if not len(tests.depth):
         return 1.0
-    rng = np.random.default_rng([seed, 3])
+    rng, errors = np.random.default_rng([seed, 3]), errors.of_size(tests.model_sd)
     chosen = rng.choice(len(mine.prior), size=min(_BOUNDARIES, len(mine.prior)), p=mine.weights)
     depth = mine.depth[chosen]
     silent = replace(tests, chatter_hz=np.full(len(tests.depth), np.nan))
@@ -51,7 +50,7 @@ def surprise(tests: Labels, mine: Hypothesis, deviations: Array, seed: int) -> f
             if key not in known:
                 place = silent.take(places[key[0]])
                 known[key] = log_likelihood(
-                    replace(place, unstable=labels[places[key[0]]]), depth, depth, deviations
+                    replace(place, unstable=labels[places[key[0]]]), depth, depth, errors
                 )
         total = np.sum([known[key] for key in here], axis=0)
         return log_evidence(total, np.full(len(depth), 1.0 / len(depth)))
@@ -59,6 +58,7 @@ def surprise(tests: Labels, mine: Hypothesis, deviations: Array, seed: int) -> f
     measured = evidence(tests.unstable)
     below = 0
     for _ in range(DRAWS):
-        boundary = depth[rng.integers(len(depth))] + deviations[rng.integers(len(deviations))]
-        below += evidence(drawn(tests, boundary, rng)) <= measured + 1e-9
+        one = rng.integers(len(errors.sd))
+        boundary = depth[rng.integers(len(depth))] + errors.deviations[one]
+        below += evidence(drawn(tests, boundary, float(errors.sd[one]), rng)) <= measured + 1e-9
     return (1 + below) / (1 + DRAWS)

@@ -88,7 +88,7 @@ class _Judged:
             return parts
         if self.status == "unexplained":
             leading = self.outcome.lead or self.outcome.weighed[0]
-            probability = predicted(leading.hypothesis, self.tests, self.outcome.evidence.deviations)
+            probability = predicted(leading.hypothesis, self.tests, self.outcome.evidence.errors)
             wrong = np.flatnonzero(np.abs(self.tests.unstable - probability) > 0.5)
             parts.append(
                 Statement("wrong_labels", {"runs": [self.runs[i] for i in wrong], "tests": len(self.runs)})
@@ -160,7 +160,7 @@ def _judged(
     if outcome is None:
         return _Judged(rows, None, tests, runs, 1.0, False, [])
     leading = outcome.lead or outcome.weighed[0]
-    contradiction = surprise(tests, leading.hypothesis, outcome.evidence.deviations, gates.seed)
+    contradiction = surprise(tests, leading.hypothesis, outcome.evidence.errors, gates.seed)
     upstream = first is not None and contradiction >= SIGNIFICANT > _without_upstream(first, gates)
     suggested = next_tests(task, outcome) if outcome.lead or len(rows) < LEAST_TESTS else []
     judged = _Judged(rows, outcome, tests, runs, contradiction, upstream and not outcome.lead, suggested)
@@ -171,7 +171,7 @@ def _without_upstream(first: Labelled, gates: Gates) -> float:
     """Return how surprising the tests are under the base model with the coefficients as they were."""
     tests, _ = tests_of(first, "identify")
     outcome = search_labels(first, (), gates)
-    return surprise(tests, outcome.weighed[0].hypothesis, outcome.evidence.deviations, gates.seed)
+    return surprise(tests, outcome.weighed[0].hypothesis, outcome.evidence.errors, gates.seed)
 
 
 def _verified(task: Labelled, judged: _Judged, gates: Gates) -> JSON:
@@ -186,7 +186,7 @@ def _with_effects(task: Labelled, rows: pd.DataFrame, outcome: LabelOutcome) -> 
     """Put into ``after`` what the lead predicts for the held-out tests whose boundary it changes."""
     assert outcome.lead is not None
     tests, runs = tests_of(task, "validate")
-    probability = predicted(outcome.lead.hypothesis, tests, outcome.evidence.deviations)
+    probability = predicted(outcome.lead.hypothesis, tests, outcome.evidence.errors)
     changed = pd.Series(probability, index=list(runs), dtype=float).reindex(rows["run"]).to_numpy()
     return rows.assign(after=np.where(np.isfinite(changed), changed, rows["after"]))
 

@@ -65,7 +65,7 @@ def of_hypotheses(
     """Return how surprising the held-out tests are under nothing, and under the lead (None: nothing)."""
     tests, _ = tests_of(task, "validate")
     first, second = (
-        surprise(tests, one.hypothesis, outcome.evidence.deviations, gates.seed)
+        surprise(tests, one.hypothesis, outcome.evidence.errors, gates.seed)
         for one in (outcome.weighed[0], lead or outcome.weighed[0])
     )
     return first, second

@@ -61,6 +61,11 @@ class LabelProblem:
         frequencies: Array = np.concatenate([np.zeros(0), *teeth_hz])
         return frequencies
 
+    @property
+    def point_cut(self) -> np.ndarray:
+        """(p,) case of each point: a cut at a place."""
+        return np.repeat(np.arange(len(self.cases)), [len(case.rpm) for case in self.cases])
+
     def boundaries(self, change: Change) -> tuple[Array, Array]:
         """Log depth (p,) and chatter frequency (p,), Hz, of the boundary once the models are changed."""
         return boundaries(self.cases, change)
@@ -71,8 +76,7 @@ class LabelProblem:
 
     def case_at(self, position: str | None = None) -> Case | None:
         """Return the case with most of the tests, of all or of those at a position."""
-        owner = np.repeat(np.arange(len(self.cases)), [len(case.rpm) for case in self.cases])
-        tests = np.bincount(owner[self.point[self.point >= 0]], minlength=len(self.cases))
+        tests = np.bincount(self.point_cut[self.point[self.point >= 0]], minlength=len(self.cases))
         there = [i for i, case in enumerate(self.cases) if position in (None, case.position)]
         return self.cases[max(there, key=lambda i: int(tests[i]))] if there else None
 
