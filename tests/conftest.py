@@ -13,12 +13,19 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 SHARED = ("module", "package", "session")
 
 
-@pytest.hookimpl(tryfirst=True)  # xdist reads the groups in the same hook
-def pytest_collection_modifyitems(items):
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config, items):
+    """Put the group of a test behind its name, where the scheduler of xdist looks for it.
+
+    xdist 3.8 means to do so itself for what is marked, but does it where pytest 9 no longer reads the name.
+    """
+    if not getattr(config.option, "loadgroup", False):  # xdist sets it in its workers
+        return
     for item in items:
-        group = shared_by(item)
-        if group and not item.get_closest_marker("xdist_group"):
-            item.add_marker(pytest.mark.xdist_group(group))
+        marked = item.get_closest_marker("xdist_group")
+        group = marked.args[0] if marked else shared_by(item)
+        if group and not item.nodeid.endswith(f"@{group}"):
+            item._id = type(item._id).parse(f"{item.nodeid}@{group}")
 
 
 def shared_by(item):
