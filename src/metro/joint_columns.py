@@ -162,7 +162,10 @@ def axes_in(names: Sequence[str]) -> Axes:
 
 def stated(table: pd.DataFrame) -> list[str]:
     """Return the columns of positions in which a table has any number."""
-    return [name for name in POSITIONS if name in table and table[name].notna().any()]
+    there = [name for name in POSITIONS if name in table]
+    if table.empty:  # as where a batch has no such table
+        return []
+    return list(table[there].columns[table[there].notna().any()])
 
 
 def axes_of(table: pd.DataFrame) -> Axes:

@@ -21,7 +21,7 @@ GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, 
 
 @cache
 def clean(seed):
-    """Close the loop on a batch that hides nothing; once for all tests of a process."""
+    """Close the loop on a batch that hides nothing; once for the tests of the group "blind-clean"."""
     with TemporaryDirectory() as folder:
         return closed(Path(folder), {}, seed)
 

@@ -80,6 +80,7 @@ def test_a_chipped_tooth_is_taken_for_nothing_of_the_library(tmp_path):
     assert values["chipped_tooth"]["length_um"] == pytest.approx(40.0, rel=0.05)
 
 
+@pytest.mark.xdist_group("blind-clean")
 def test_no_chipped_tooth_is_seen_in_a_batch_without_it():
     outcome, verdict, _ = clean(3)
     assert outcome.likeness is None

@@ -68,6 +68,7 @@ def test_a_hidden_effect_is_found_with_its_size_and_improves_runs_that_no_fit_ha
             assert low - margin < true < high + margin, (key, found, true)
 
 
+@pytest.mark.xdist_group("blind-clean")
 def test_in_a_batch_that_hides_nothing_nothing_is_found_and_the_sensors_turn_cannot_be_seen():
     outcome, verdict, _ = clean(3)
     assert outcome.names == ()
@@ -75,6 +76,7 @@ def test_in_a_batch_that_hides_nothing_nothing_is_found_and_the_sensors_turn_can
     assert "dynamometer_rotation" in outcome.not_visible
 
 
+@pytest.mark.xdist_group("blind-clean")
 def test_a_turned_sensor_changes_the_coefficients_and_nothing_else(tmp_path):
     outcome, verdict, _ = closed(tmp_path, {"dynamometer_rotation": {"angle_deg": 5.0}}, 3)
     straight, _, _ = clean(3)

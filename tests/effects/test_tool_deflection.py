@@ -62,6 +62,7 @@ def test_the_stiffness_of_a_tool_that_yields_beside_its_runout_is_found(tmp_path
     assert compare(rigid, fitted).p_value < 1e-5
 
 
+@pytest.mark.xdist_group("blind-clean")
 def test_in_a_batch_without_it_no_deflection_is_found():
     outcome, _, _ = clean(3)
     assert "tool_deflection" not in outcome.names

@@ -28,6 +28,7 @@ def test_hidden_runout_is_found_with_its_radius_and_angle(tmp_path, seed):
     assert verdict["after"]["rms"] < 0.3 * verdict["before"]["rms"]
 
 
+@pytest.mark.xdist_group("blind-clean")
 def test_no_runout_is_found_in_a_batch_without_it():
     outcome, verdict, _ = clean(3)
     assert "tool_runout" not in outcome.names

@@ -5,7 +5,7 @@ Each observable states its own needs with these names; :mod:`metro.observables.c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ import pandas as pd
 
 from metro.batch.entries import FILE, entry
 from metro.batch.findings import Finding
+from metro.batch.tables import records
 from metro.units import JSON
 
 TOOL = ("tool.diameter_mm", "tool.teeth", "tool.helix_deg")
@@ -118,7 +119,7 @@ def missing_files(runs: pd.DataFrame, column: str) -> list[str]:
     return [] if len(runs) else [f"{column} files in runs.csv"]
 
 
-def blank_settings(row: Mapping[Hashable, Any]) -> list[str]:
+def blank_settings(row: Mapping[str, Any]) -> list[str]:
     """Return which settings of a cut a row of the run table leaves blank.
 
     A slot and a hole need neither a radial depth nor a direction: they are cut from the solid. Of a row that
@@ -130,7 +131,7 @@ def blank_settings(row: Mapping[Hashable, Any]) -> list[str]:
 
 def described(runs: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
     """Return the runs whose settings are all given, and what is blank in how many of the others."""
-    blank = [blank_settings(row) for row in runs.to_dict("records")]
+    blank = [blank_settings(row) for row in records(runs)]
     names = [name for one in blank for name in one]
     lacking = [f"{name} in {names.count(name)} of {len(runs)} of these runs" for name in dict.fromkeys(names)]
     return runs.loc[[not one for one in blank]], lacking

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from metro.batch.findings import Finding, shown
 from metro.batch.sources import Files, files_of, parted, source
-
-if TYPE_CHECKING:
-    from metro.batch.tables import Table
+from metro.batch.tables import Table, records
 
 # Column of runs.csv → what kind of file it names, in the words of metro.formats.registry.
 RUN_FILES = {
@@ -50,7 +48,7 @@ def file_findings(folder: Path, runs: Table, impacts: Table, files: Files) -> It
     yield from _shared(runs)
 
 
-def in_the_air(row: Mapping[Hashable, Any]) -> str:
+def in_the_air(row: Mapping[str, Any]) -> str:
     """Return the column whose log is of an arm that moved and cut nothing; "" where the row has none.
 
     It is ``joint_log``; or the only robot log of a row that describes no cut.
@@ -64,7 +62,7 @@ def in_the_air(row: Mapping[Hashable, Any]) -> str:
 
 def _named(runs: Table, impacts: Table) -> Iterator[tuple[Table, int, str, str, str]]:
     """Yield every file that is named: table, position of the row, column, path and kind."""
-    rows = runs.frame.to_dict("records")
+    rows = records(runs.frame)
     for column, kind in RUN_FILES.items():
         for position, row in enumerate(rows):
             if row[column]:

@@ -12,7 +12,8 @@ import pandas as pd
 from metro.batch.columns import RUNS
 from metro.batch.files import RUN_FILES
 from metro.batch.findings import ContractError, Finding
-from metro.batch.runs import settings_name
+from metro.batch.runs import SETTINGS, settings_name
+from metro.batch.tables import records
 
 DIGITS = 4  # of a setting that is computed
 ROLE = "identify"
@@ -48,7 +49,7 @@ def rounded(value: float) -> float:
 def _condition(runs: pd.DataFrame, row: Row) -> str:
     """Return the condition of the batch that has the settings of a row, else a new one named by them."""
     name = settings_name(row)
-    names = pd.Series([settings_name(each) for each in runs.to_dict("records")], runs.index, dtype=str)
+    names = pd.Series([settings_name(each) for each in records(runs[[*SETTINGS]])], runs.index, dtype=str)
     same = runs["condition"][names == name]
     return str(same.iloc[0]) if len(same) else name
 

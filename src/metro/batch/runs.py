@@ -10,7 +10,7 @@ import pandas as pd
 
 from metro.batch.files import RUN_FILES, in_the_air
 from metro.batch.findings import Finding
-from metro.batch.tables import Table
+from metro.batch.tables import Table, records
 from metro.units import JSON, MM
 
 HOLE = "hole_diameter_mm"  # key of batch.yaml
@@ -72,7 +72,7 @@ def filled(frame: pd.DataFrame, manifest: JSON) -> pd.DataFrame:
         full = (runs["operation"] == "slot") & runs["radial_depth_mm"].isna()
         runs["radial_depth_mm"] = runs["radial_depth_mm"].mask(full, float(diameter))
     runs["feed_direction_deg"] = runs["feed_direction_deg"].fillna(0.0)
-    names = pd.Series([settings_name(row) for row in runs.to_dict("records")], runs.index, dtype=str)
+    names = pd.Series([settings_name(row) for row in records(runs[[*SETTINGS]])], runs.index, dtype=str)
     runs["condition"] = runs["condition"].mask(runs["condition"] == "", names)
     place = runs.groupby("condition").cumcount() + 1
     runs["replicate"] = runs["replicate"].fillna(place).astype(int)
@@ -84,7 +84,7 @@ def filled(frame: pd.DataFrame, manifest: JSON) -> pd.DataFrame:
 def _with_joint_logs(frame: pd.DataFrame) -> pd.DataFrame:
     """Return a copy of the run table in which logs of an arm that cut nothing are joint logs, too."""
     runs = frame.copy()
-    for at, row in zip(runs.index, frame.to_dict("records"), strict=True):
+    for at, row in zip(runs.index, records(frame), strict=True):
         column = in_the_air(row)
         if column not in ("", "joint_log"):
             runs.loc[at, "joint_log"] = row[column]
@@ -131,7 +131,7 @@ def design_findings(runs: pd.DataFrame, file: str) -> Iterator[Finding]:
 
 def _conditions(runs: pd.DataFrame, file: str) -> Iterator[Finding]:
     """Warn where conditions are not what they are said to be: the same settings, and no other ones."""
-    settings = pd.Series([settings_name(row) for row in runs.to_dict("records")], runs.index, dtype=str)
+    settings = pd.Series([settings_name(row) for row in records(runs[[*SETTINGS]])], runs.index, dtype=str)
     for name, group in settings.groupby(runs["condition"]):
         if group.nunique() > 1:
             message = f'condition "{name!s}" has runs of different settings: {"; ".join(sorted(set(group)))}'

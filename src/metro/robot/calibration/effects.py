@@ -188,8 +188,8 @@ def _splines(place: Array, count: int, *, closed: bool) -> Array:
     if closed:
         from_knot = (from_knot + count / 2) % count - count / 2
     u = np.abs(from_knot)
-    near, far = 2 / 3 - u**2 + u**3 / 2, np.clip(2 - u, 0.0, None) ** 3 / 6
-    return np.asarray(np.where(u < 1, near, far))
+    beyond = np.maximum(2.0 - u, 0.0)  # products, as a power takes ten times as long
+    return np.asarray(np.where(u < 1.0, 2 / 3 + u * u * (u / 2 - 1.0), beyond * beyond * beyond / 6))
 
 
 def _drift(by: Callable[[Poses], Array]) -> Basis:
