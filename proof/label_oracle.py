@@ -2,7 +2,7 @@
 
 As everywhere the oracle knows which effects act, and learns their parameters from the identification tests.
 How large the effects are is judged with their true parameters: boundaries are predicted with the batch's own
-modes and coefficients, and labels are drawn from them with the errors that the loop itself allows for.
+modes and coefficients, and labels are drawn from them with the errors that are usual in the loop.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ from metro.effects.effect import Effect, fitted_to
 from metro.loop.labels.evidence import (
     FREQUENCY_SD,
     LINES,
-    SHARED,
+    SIZES,
     STRAY,
     STRAY_WIDTH,
+    Errors,
     Labels,
+    drawn_errors,
     log_evidence,
     log_likelihood,
-    own_sd,
     unstable_probability,
 )
 from metro.loop.labels.hypotheses import LabelEvidence, hypothesis
@@ -78,7 +79,7 @@ def label_oracle(
     known = {effect.name: effect for effect in able}
     mine, _ = tests_of(task, "identify")
     held, _ = tests_of(task, "validate")
-    deviations = drawn_deviations(task, SEED)
+    errors = usual_errors(task, SEED)
     base = _boundary_of(task, known, {})
     counts = (len(mine.depth), len(held.depth))
     result: JSON = {"enough": min(counts) >= LEAST_TESTS and len(mine.speeds) >= LEAST_SPEEDS}
@@ -86,42 +87,42 @@ def label_oracle(
         return result | dict.fromkeys(("before", "after", "floor")) | {"sizes": dict.fromkeys(hidden, 0.0)}
     if set(hidden) - set(known):
         every = every_test(task)
-        drawn = [_evidence(one, base, deviations) for one in _drawn(task, every, base, LONG)]
+        drawn = [_evidence(one, base, errors) for one in _drawn(task, every, base, LONG)]
         usual, chance = float(np.mean(drawn)), float(np.quantile(drawn, ALARM))
-        size = (usual - _evidence(every, base, deviations)) / (usual - chance)
-        before, floor = _errors(held, base, deviations)
+        size = (usual - _evidence(every, base, errors)) / (usual - chance)
+        before, floor = _errors(held, base, errors)
         sizes = dict.fromkeys(hidden, max(0.0, size))
         return result | {"before": before, "after": None, "floor": floor, "sizes": sizes}
     # A boundary has no joints: what is always there has one form.
     always = {name: forms(values)[0] for name, values in (also or {}).items() if name in known}
     truth = _boundary_of(task, known, {**hidden, **always})
     drawn_labels = _drawn(task, mine, truth, DRAWS)
-    full = np.array([_evidence(one, truth, deviations) for one in drawn_labels])
+    full = np.array([_evidence(one, truth, errors) for one in drawn_labels])
     sizes = {}
     for name in hidden:
         others = {other: values for other, values in hidden.items() if other != name}
         without = _boundary_of(task, known, {**others, **always})
-        ratio = full - [_evidence(one, without, deviations) for one in drawn_labels]
+        ratio = full - [_evidence(one, without, errors) for one in drawn_labels]
         sizes[name] = max(0.0, float(np.quantile(ratio, ASSURED))) / gain
-    before, _ = _errors(held, base, deviations)
-    exact, floor = _errors(held, truth, deviations)
-    after = _rms(held, _learnt(task, [known[name] for name in (*hidden, *always)], held, deviations))
+    before, _ = _errors(held, base, errors)
+    exact, floor = _errors(held, truth, errors)
+    after = _rms(held, _learnt(task, [known[name] for name in (*hidden, *always)], held, errors))
     return result | {"before": before, "after": after, "exact": exact, "floor": floor, "sizes": sizes}
 
 
-def _learnt(task: LabelProblem, effects: Sequence[Effect], held: Labels, deviations: Array) -> Array:
+def _learnt(task: LabelProblem, effects: Sequence[Effect], held: Labels, errors: Errors) -> Array:
     """Probability that held-out tests are unstable, with parameters learnt from the identification tests."""
-    evidence = LabelEvidence(task.boundaries, task.estimates, tests_of(task, "identify")[0], deviations, SEED)
+    evidence = LabelEvidence(task.boundaries, task.estimates, tests_of(task, "identify")[0], errors, SEED)
     learnt = hypothesis((effects[0],), evidence)
     for count in range(2, len(effects) + 1):
         learnt = hypothesis(tuple(effects[:count]), evidence, learnt)
-    return predicted(learnt, held, deviations)
+    return predicted(learnt, held, errors)
 
 
-def drawn_deviations(task: Labelled, seed: int) -> Array:
-    """(s, p) of the log depth: what modes and coefficients are uncertain of, and what all tests share."""
-    shared = np.random.default_rng(seed).normal(size=(DEVIATIONS, 1)) * task.model_sd * SHARED**0.5
-    return np.asarray(task.deviations(DEVIATIONS, seed) + shared)
+def usual_errors(task: Labelled, seed: int) -> Errors:
+    """Draw errors of the models, of the usual size."""
+    every = task.deviations(DEVIATIONS * len(SIZES), seed)
+    return drawn_errors(every_test(task), every, seed).of_size(task.model_sd)
 
 
 def _boundary_of(task: LabelProblem, known: Mapping[str, Effect], hidden: Mapping[str, JSON]) -> _Boundary:
@@ -141,8 +142,8 @@ def _change(effect: Effect, values: JSON) -> Callable[[StabilityModel], Stabilit
     return lambda model: effect.apply(model, numbers)
 
 
-def _evidence(tests: Labels, boundary: _Boundary, deviations: Array) -> float:
-    likelihood = log_likelihood(tests, boundary.depth[None], boundary.chatter[None], deviations)
+def _evidence(tests: Labels, boundary: _Boundary, errors: Errors) -> float:
+    likelihood = log_likelihood(tests, boundary.depth[None], boundary.chatter[None], errors)
     return log_evidence(likelihood, np.ones(1))
 
 
@@ -151,10 +152,11 @@ def _drawn(task: LabelProblem, tests: Labels, truth: _Boundary, draws: int) -> l
     rng = np.random.default_rng([SEED, 2])
     heard = bool(np.isfinite(task.chatter_hz).any())
     size = len(tests.depth)
-    deviations = drawn_deviations(task, SEED + 1)
+    errors = usual_errors(task, SEED + 1)
     drawn = []
     for _ in range(draws):
-        unstable = labels_drawn(tests, truth.depth + deviations[rng.integers(DEVIATIONS)], rng) > 0.5
+        boundary = truth.depth + errors.deviations[rng.integers(DEVIATIONS)]
+        unstable = labels_drawn(tests, boundary, task.model_sd, rng) > 0.5
         stray = rng.random(size) < STRAY
         spread = np.where(
             stray,
@@ -168,12 +170,12 @@ def _drawn(task: LabelProblem, tests: Labels, truth: _Boundary, draws: int) -> l
     return drawn
 
 
-def _errors(held: Labels, boundary: _Boundary, deviations: Array) -> tuple[float | None, float | None]:
+def _errors(held: Labels, boundary: _Boundary, errors: Errors) -> tuple[float | None, float | None]:
     """Rms error of the predicted probability of held-out labels, and what it would be of drawn ones."""
     if not len(held.depth):
         return None, None
-    depth = boundary.depth[held.point] + deviations[:, held.point]
-    chance = unstable_probability(held, depth, own_sd(held)).mean(axis=0)
+    depth = boundary.depth[held.point] + errors.deviations[:, held.point]
+    chance = unstable_probability(held, depth, errors.own_sd[:, None]).mean(axis=0)
     return _rms(held, chance), float(np.sqrt(np.mean(chance * (1.0 - chance))))
 
 

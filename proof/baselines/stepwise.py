@@ -27,7 +27,7 @@ from metro.observables.labelled import Labelled
 from metro.observables.problem import Problem, Refusal
 from metro.units import JSON, Array
 from proof.baselines.program import TOO_FEW, Given, held_out_rows, said
-from proof.label_oracle import drawn_deviations
+from proof.label_oracle import usual_errors
 
 MOST = 4  # effects
 Model = TypeVar("Model")
@@ -107,7 +107,7 @@ class Stepwise:
         held, runs = tests_of(problem, "validate")
         if not len(tests.depth):
             return TOO_FEW
-        errors = drawn_deviations(problem, self.given.seed)
+        errors = usual_errors(problem, self.given.seed)
         evidence = LabelEvidence(problem.boundaries, problem.estimates, tests, errors, self.given.seed)
 
         def added(model: Hypothesis, effect: Effect) -> Hypothesis:
