@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -24,6 +25,7 @@ from proof.progress import tracked
 
 STAGES = ("ingest", "identify", "predict", "loop", "verdict")
 CHECKOUT = Path(__file__).parents[1]
+FAILED = 3  # exit code of a process whose batch failed, with the reason in its folder
 
 
 @dataclass(frozen=True)
@@ -97,9 +99,30 @@ def forgotten(out: Layout) -> None:
 
 def _each(done: Callable[[Job], str | None], waiting: list[Job], jobs: int, doing: str) -> list[str | None]:
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    with ProcessPoolExecutor(jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
-        futures = [pool.submit(done, job) for job in waiting]
+    with ThreadPoolExecutor(jobs) as pool:
+        futures = [pool.submit(alone, done, job) for job in waiting]
         return [future.result() for future in tracked(futures, doing)]
+
+
+def alone(done: Callable[[Job], str | None], job: Job) -> str | None:
+    """Run a job in a process of its own; return the name of a batch that failed.
+
+    Compiled code that is interrupted when the time is used up may take its process along. That is a batch
+    that failed; the others go on.
+    """
+    process = get_context("spawn").Process(target=_ended, args=(done, job))
+    process.start()
+    process.join()
+    if process.exitcode not in (0, FAILED):
+        _tidied(job)
+        job.reports.mkdir(parents=True, exist_ok=True)
+        (job.reports / "failed.txt").write_text(f"its process ended with exit code {process.exitcode}\n")
+    return job.folder.name if process.exitcode else None
+
+
+def _ended(done: Callable[[Job], str | None], job: Job) -> None:
+    """Run a job, and say by the exit code whether it failed."""
+    sys.exit(0 if done(job) is None else FAILED)
 
 
 def _through(observable: str) -> tuple[str, ...]:
