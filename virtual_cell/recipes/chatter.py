@@ -44,8 +44,12 @@ _TRACE_MM = 8.0
 # The theory of the lobes takes the edge forces to drop out. They do not quite: a vibration moves where a
 # tooth enters and leaves the cut. These are a hundredth of the published ones.
 _LAW = Coefficients(
-    *(TITANIUM.ktc, TITANIUM.krc, TITANIUM.kac),
-    *(0.01 * edge for edge in (TITANIUM.kte, TITANIUM.kre, TITANIUM.kae)),
+    TITANIUM.ktc,
+    TITANIUM.krc,
+    TITANIUM.kac,
+    0.01 * TITANIUM.kte,
+    0.01 * TITANIUM.kre,
+    0.01 * TITANIUM.kae,
 )
 _MODES = {name: replace(modes, stiffness=_STIFFER * modes.stiffness) for name, modes in MODES.items()}
 

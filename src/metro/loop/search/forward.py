@@ -20,6 +20,8 @@ from metro.loop.search.trial import Trial, parted, small_beside_residual, tried,
 from metro.loop.statement import Statement
 
 MOST_EFFECTS = 4  # of a model
+# Trials by what a model has, in whatever order it was added, and what was tried on top of that.
+Known = dict[tuple[frozenset[Effect], tuple[tuple[str, str], ...]], list[Trial]]
 
 
 def forward(space: SearchSpace) -> Choice:
@@ -33,8 +35,9 @@ def forward(space: SearchSpace) -> Choice:
     trials: dict[tuple[str, str], Trial] = {}
     contest: Contest | None = None
     weighed: set[frozenset[Effect]] = set()
+    known: Known = {}
     while True:
-        grown, further, latest = _added(current, space)
+        grown, further, latest = _added(current, space, known)
         steps, trials = steps + further, trials | latest
         if contest is not None and grown is current:
             break
@@ -53,13 +56,22 @@ def forward(space: SearchSpace) -> Choice:
     return Choice(contest.final, tuple(steps), tuple(trials.values()), contest.weight, contest.rivals)
 
 
-def _added(current: Fit, space: SearchSpace) -> tuple[Fit, list[Fit], dict[tuple[str, str], Trial]]:
-    """Add effects to a fit one by one; return the last fit, that after each addition, and the last trials."""
+def _added(
+    current: Fit, space: SearchSpace, known: Known
+) -> tuple[Fit, list[Fit], dict[tuple[str, str], Trial]]:
+    """Add effects to a fit one by one; return the last fit, that after each addition, and the last trials.
+
+    ``known``: trials that were made, to which those made here are added.
+    """
     steps: list[Fit] = []
     trials: dict[tuple[str, str], Trial] = {}
     barred: set[str] = set()
     while len(current.candidate.effects) < MOST_EFFECTS:
-        round_trials = tried(current, _open(current, barred, space), space.prior, space.gates, space.least)
+        effects = _open(current, barred, space)
+        asked = frozenset(current.candidate.effects), tuple(effect.key for effect in effects)
+        if asked not in known:
+            known[asked] = tried(current, effects, space.prior, space.gates, space.least)
+        round_trials = known[asked]
         trials |= {trial.effect.key: trial for trial in round_trials}
         open_to = [trial for trial in round_trials if not trial.why_not]
         passed = [trial for trial in open_to if not trial.beside] or open_to
