@@ -20,12 +20,11 @@ def test_others_are_tried_on_the_model_that_won(monkeypatch):
     space = SearchSpace(base, (BEND, RIPPLE, GAIN), prior, GATES, GATES.materiality)
     started, added = [], room._added
 
-    def first_alone(current, space):
+    def first_alone(current, space, known):
         """Add one effect at first, as if the other had not passed beside it."""
         started.append({effect.name for effect in current.candidate.effects})
-        return added(
-            current, SearchSpace(base, (BEND,), *(prior, GATES, space.least)) if len(started) == 1 else space
-        )
+        alone = SearchSpace(base, (BEND,), *(prior, GATES, space.least))
+        return added(current, alone if len(started) == 1 else space, known)
 
     def swapped(base, current, *_):
         """Put the ripple in the place of the bend at first, as if it explained the runs better."""
