@@ -11,7 +11,8 @@ from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import fit
 from metro.loop.fitting.noise import first_noise
 from metro.loop.planning.decide import Pair, decided, plan
-from metro.loop.search.rivals import HOPELESS, RIVAL_WEIGHT
+from metro.loop.search.rivals import RIVAL_WEIGHT
+from metro.loop.search.trial import HOPELESS
 from metro.observables.problem import Made, Proposal
 
 

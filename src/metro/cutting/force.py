@@ -35,7 +35,9 @@ ANGLES = 720
 
 
 @lru_cache(maxsize=512)
-def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False) -> Array:
+def force_basis(
+    cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False, angles: int = ANGLES
+) -> Array:
     """Force on the tool per unit of each coefficient over one revolution, feed frame.
 
     The edge is integrated to 1e-9 of the largest force (laws that are not linear: 1e-7), runout and true
@@ -45,41 +47,41 @@ def force_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool = False)
 
     Returns
     -------
-    (ANGLES, 3, 6) array: angle of tooth 0's tip from +y, evenly from 0 to 2π; axis; coefficient in the order
+    (angles, 3, 6) array: angle of tooth 0's tip from +y, evenly from 0 to 2π; axis; coefficient in the order
     of ``COEFFICIENTS`` (shear in N per N/m², edge in N per N/m of axial depth). Read-only: it is cached.
     """
-    angle = TURN * np.arange(ANGLES) / ANGLES
+    angle = TURN * np.arange(angles) / angles
     cutter = placed(cutter, cut, true_path)
     if not cutter.cylindrical:
-        return _general_table(cutter, law, cut, true_path)
+        return _general_table(cutter, law, cut, true_path, angles)
     before = passes(cutter, cut, true_path, angle)
-    if len(before.rows) == 1 and before.rows.shape[1] == 1 and ANGLES % cutter.teeth == 0:
-        angle = angle[: ANGLES // cutter.teeth]  # all teeth are alike: one pitch of angles
-    along = edges(cutter, cut, angle, step=TURN / ANGLES)
+    if len(before.rows) == 1 and before.rows.shape[1] == 1 and angles % cutter.teeth == 0:
+        angle = angle[: angles // cutter.teeth]  # all teeth are alike: one pitch of angles
+    along = edges(cutter, cut, angle, step=TURN / angles)
     raw = raw_edges(cut.engagement, cutter.radius, true_path)
     pitch = assembled(pieces(before, raw, along), law, len(angle))
-    basis = np.tile(pitch, (ANGLES // len(angle), 1, 1))
+    basis = np.tile(pitch, (angles // len(angle), 1, 1))
     basis.flags.writeable = False
     return basis
 
 
-def _general_table(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool) -> Array:
+def _general_table(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool, angles: int) -> Array:
     """Table of :func:`force_basis` of a cutter that is no cylinder, with its teeth where they are."""
     even = bool(np.ptp(cutter.pitch(1)) < ALIKE and not cutter.runout_radius and not any(cutter.reach))
-    count = ANGLES // cutter.teeth if even and ANGLES % cutter.teeth == 0 else ANGLES
-    along = edges(cutter, cut, TURN * np.arange(count) / ANGLES, step=TURN / ANGLES)
+    count = angles // cutter.teeth if even and angles % cutter.teeth == 0 else angles
+    along = edges(cutter, cut, TURN * np.arange(count) / angles, step=TURN / angles)
     pitch = general_basis(cutter, law, cut, along, true_path=true_path)
-    basis = np.tile(pitch, (ANGLES // count, 1, 1))
+    basis = np.tile(pitch, (angles // count, 1, 1))
     if cut.pitch:
-        basis += _lost_at_the_floor(cutter, law, cut, true_path)
+        basis += _lost_at_the_floor(cutter, law, cut, true_path, angles)
     basis.flags.writeable = False
     return basis
 
 
-def _lost_at_the_floor(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool) -> Array:
+def _lost_at_the_floor(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool, angles: int) -> Array:
     """Return what the floor of a helix takes from the table of a cylinder: rounded ends are far below it."""
     cylinder, level = replace(cutter, corner=0.0, taper=0.0), replace(cut, pitch=0.0)
-    with_floor, without = (force_basis(cylinder, law, each, true_path) for each in (cut, level))
+    with_floor, without = (force_basis(cylinder, law, each, true_path, angles) for each in (cut, level))
     return np.asarray(with_floor - without)
 
 

@@ -87,6 +87,7 @@ def searched(problem: Problem, base: Fit, found: list[JSON], gates: Gates) -> Se
         prior,
         gates,
         least,
+        behind=np.inf,
     )
     fitted = [
         Tried(effects[trial.effect.name].entry, trial, _share(current, trial, prior)) for trial in trials

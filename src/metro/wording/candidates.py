@@ -100,6 +100,13 @@ def _misses_half(values: JSON) -> str:
     )
 
 
+def _far_behind(values: JSON) -> str:
+    return (
+        f"another effect fits the same runs far better ({values['behind']:.0f} in log-likelihood): "
+        "this one was not tested further"
+    )
+
+
 SENTENCES: Mapping[str, Sentence] = {
     "undetermined": "these runs do not determine its parameters",
     "unlike": "not an effect of the library, and it does not explain the remaining error",
@@ -107,6 +114,7 @@ SENTENCES: Mapping[str, Sentence] = {
     "misses_half": _misses_half,
     "resembled": "not an effect of the library: it only describes the remaining error",
     "beaten": "passed every test, but the effects that were added explain the runs better",
+    "far_behind": _far_behind,
     "untested": "not tested: every run was used in the fit, so none is available to judge it",
     "not_converged": _not_converged,
     "implausible": _implausible,

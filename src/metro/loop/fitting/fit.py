@@ -16,14 +16,7 @@ import numpy as np
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate, started
 from metro.loop.fitting.covariance import between_runs
-from metro.loop.fitting.descent import (
-    ENOUGH,
-    ITERATIONS,
-    descend,
-    farthest,
-    free,
-    polish,
-)
+from metro.loop.fitting.descent import ITERATIONS, descend, farthest, free, polish
 from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.system import (
@@ -40,6 +33,7 @@ from metro.units import Array
 FOLLOWED = 4  # starts of new effect parameters that are followed to the end
 FIRST_STEPS, KEPT = 3, 2  # where little is left to explain, after so many steps so many are kept
 HOPELESS = 1.0  # and none, where twice the log-likelihood has not gained that much per parameter: chance does
+SAME = 0.05  # difference of the costs of two descents that ended in one place: each stops before its very end
 ALIKE = 1e-9  # relative difference of the sums of squares of starts that are the same
 UNDECIDED = 0.1  # differences in twice the log-likelihood that the noise, once known better, may turn round
 ROUNDS, SETTLED = 12, 0.2  # of noise estimation and descent; gain in twice the log-likelihood that ends them
@@ -134,7 +128,7 @@ def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fi
         best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
     if start and fresh:
         first = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS)
-        best = _distinct(first, ENOUGH)
+        best = _distinct(first, SAME)
         if all(missed < noise.budget for missed in noise.misfit.values()):
             best = best[:KEPT]
             here = State(start.theta, start.beta, dict(start.nuisance))
@@ -142,7 +136,7 @@ def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fi
             if without - first[0][0] < HOPELESS * len(fresh):
                 return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
     reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS)
-    near = _distinct([one for one in reached if one[0] < reached[0][0] + UNDECIDED], ENOUGH)
+    near = _distinct([one for one in reached if one[0] < reached[0][0] + UNDECIDED], SAME)
     refined = [_refined(candidate, blocks, prior, noise, state, rounds=ROUNDS) for state in near]
     return max(refined, key=lambda fitted: fitted.total)
 

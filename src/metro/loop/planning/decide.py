@@ -20,7 +20,8 @@ from metro.loop.checks.evidence import leave_out
 from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.planning.experiment import ENOUGH, MOST_REPEATS, expected
-from metro.loop.search.rivals import HOPELESS, RIVAL_WEIGHT
+from metro.loop.search.rivals import RIVAL_WEIGHT
+from metro.loop.search.trial import HOPELESS
 from metro.observables.problem import Proposal
 from metro.units import Array
 

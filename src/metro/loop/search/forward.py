@@ -16,7 +16,7 @@ from metro.loop.checks.evidence import compare, hold_out, leave_out
 from metro.loop.fitting.fit import Fit
 from metro.loop.search.rivals import Contest, believed, contested
 from metro.loop.search.strategy import Choice, SearchSpace
-from metro.loop.search.trial import Trial, parted, small_beside_residual, tried, without
+from metro.loop.search.trial import HOPELESS, Trial, parted, small_beside_residual, tried, without
 from metro.loop.statement import Statement
 
 MOST_EFFECTS = 4  # of a model
@@ -109,12 +109,20 @@ def _open(current: Fit, barred: set[str], space: SearchSpace) -> list[Effect]:
 
 
 def _pruned(current: Fit, space: SearchSpace) -> tuple[Fit, set[str]]:
-    """Drop effects that the latest addition made idle."""
+    """Drop effects that the latest addition made idle.
+
+    On conditions left out, an effect gains what it gains on the runs of the fit less one for each of its
+    parameters (Stone 1977, J. R. Stat. Soc. B 39, 44). Where that is far above what it must gain, no
+    condition is left out here: the contest with its rivals does that in the end.
+    """
     dropped: set[str] = set()
     for effect in current.candidate.effects[:-1]:
         smaller, current = parted(space.base, current, effect, space.prior)
         evidence = compare(smaller, current)
+        expected = current.total - smaller.total - len(effect.parameters)
         if evidence.size >= space.least:
+            if expected > space.gates.held_out_gain + HOPELESS:
+                continue
             evidence = hold_out(evidence, leave_out(smaller, space.prior), current, space.prior)
         if evidence.gain < space.gates.held_out_gain:
             current, dropped = smaller, dropped | {effect.name}

@@ -14,10 +14,9 @@ from metro.loop.checks.evidence import leave_out, weights
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, fit
 from metro.loop.fitting.noise import Noise
-from metro.loop.search.trial import Gates, beyond_left_out, parted, unlike
+from metro.loop.search.trial import HOPELESS, Gates, beyond_left_out, parted, unlike
 
 RIVAL_WEIGHT = 0.05  # above it, another effect in the place of one that was chosen leaves it undecided
-HOPELESS = 12.0  # log-likelihood on the runs of the fit by which a rival may be behind and still be weighed
 
 
 @dataclass(frozen=True)

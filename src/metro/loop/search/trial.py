@@ -20,6 +20,7 @@ from metro.units import Array
 
 LEAST_BETTER = 0.4  # share of the left-out conditions that an effect must predict better
 HALF_INTERVAL = 2.0  # standard deviations: half a 95 % interval
+HOPELESS = 12.0  # log-likelihood on the runs of the fit by which an effect may be behind and still be weighed
 OF_THE_RESIDUAL = 0.5  # an effect smaller than this share of what stays unexplained may be part of that
 
 
@@ -59,10 +60,20 @@ class Trial:
     beside: Statement | None = None
 
 
-def tried(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, least: float) -> list[Trial]:
+def tried(
+    current: Fit,
+    effects: Sequence[Effect],
+    prior: Noise,
+    gates: Gates,
+    least: float,
+    *,
+    behind: float = HOPELESS,
+) -> list[Trial]:
     """Fit each effect jointly with what is there, compare, and apply the gates.
 
-    Conditions are left out only for effects that pass the gates before.
+    Conditions are left out only for effects that pass the gates before and are not further ``behind`` the
+    foremost of them in log-likelihood: those are tried again once it is added. Where none of these passes,
+    conditions are left out for the others as well.
     """
     trials = []
     for effect in effects:
@@ -82,7 +93,30 @@ def tried(current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, l
         )
         for trial, q in zip(trials, q_values, strict=True)
     ]
-    return _held_out(current, trials, prior, gates)
+    far = _far_behind(trials, behind)
+    judged = _held_out(current, [far.get(trial.effect.key, trial) for trial in trials], prior, gates)
+    if far and all(trial.why_not for trial in judged):
+        return _held_out(current, trials, prior, gates)
+    return judged
+
+
+def _far_behind(trials: Sequence[Trial], behind: float) -> dict[tuple[str, str], Trial]:
+    """Return the trials that are too far behind the foremost one that may be added, saying so of each.
+
+    The foremost is one that may be added at once, where there is any.
+    """
+    open_to = [trial for trial in trials if not trial.why_not]
+    foremost = max(
+        (trial.fit.total for trial in open_to if not trial.beside),
+        default=max((trial.fit.total for trial in open_to), default=-np.inf),
+    )
+    return {
+        trial.effect.key: replace(
+            trial, why_not=Statement("far_behind", {"behind": foremost - trial.fit.total})
+        )
+        for trial in open_to
+        if trial.fit.total < foremost - behind
+    }
 
 
 def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> list[Trial]:

@@ -7,18 +7,20 @@ with the orbit and the sensor does not, so the sensor's matrix is averaged over 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from metro.cutting.helical import turn
+from metro.observables.force.reading import responses
 from metro.units import Array, ComplexArray
 
 ORBIT_POINTS = 5  # within a time block, over which the turning frame is averaged
 Triple = tuple[float, float, float]
 Rows = tuple[tuple[float, ...], ...]
 NO_CROSSTALK: Rows = ((0.0, 0.0, 0.0),) * 3
+Mixing = tuple[Rows, float, Rows]  # axes, rotation and crosstalk of a sensor
 WORK_AXES: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -59,10 +61,9 @@ class Dynamometer:
         return not self.resonances and not mixed and not any(self.discharge)
 
     @property
-    def rows(self) -> tuple[Array, Array]:
-        """Return the declared channels (3, 3), and those that the sensor has."""
-        declared = np.array(self.axes)
-        return declared, (np.eye(3) + self.crosstalk) @ declared @ turn(np.array(-self.rotation))
+    def mixing(self) -> Mixing:
+        """What the shares of the channels depend on."""
+        return self.axes, self.rotation, self.crosstalk
 
     @property
     def drift(self) -> Array:
@@ -97,54 +98,53 @@ class Recording:
 @lru_cache(maxsize=1024)
 def transfer(sensor: Dynamometer, recording: Recording, orders: int) -> ComplexArray:
     """Map of the force to the reading at the orders 0…, in the comparison's frame: (blocks, orders, 3, 3)."""
-    still = replace(sensor, resonances=(), slope=(0.0, 0.0, 0.0))  # what the maps below depend on
-    by_channel = _by_channel(replace(still, discharge=(0.0, 0.0, 0.0)), recording)
-    gain = _gain(sensor, recording.speed, orders)
-    seen = (gain @ by_channel.reshape(len(by_channel), 3, 9)).reshape(-1, orders, 3, 3)
-    seen[:, 0] = _steady(still, recording)
+    if sensor.ideal:
+        return np.broadcast_to(np.eye(3, dtype=complex), (len(recording.middles), orders, 3, 3))
+    modes = np.array([(one.frequency, one.damping) for one in sensor.resonances]).reshape(-1, 2, 3)
+    seen = responses(_by_channel(sensor.mixing, recording), recording.speed, modes, orders)
+    seen[:, 0] = _steady(sensor.mixing, sensor.discharge, recording)
     seen.flags.writeable = False
-    return np.asarray(seen)
+    return seen
+
+
+@lru_cache(maxsize=64)
+def _channels(mixing: Mixing) -> tuple[Array, Array]:
+    """Return the inverse of the declared channels (3, 3), and the channels that the sensor has."""
+    axes, rotation, crosstalk = mixing
+    declared = np.array(axes)
+    return np.linalg.inv(declared), (np.eye(3) + crosstalk) @ declared @ turn(np.array(-rotation))
 
 
 @lru_cache(maxsize=512)
-def _by_channel(sensor: Dynamometer, recording: Recording) -> Array:
+def _by_channel(mixing: Mixing, recording: Recording) -> Array:
     """Share of each channel in that map, (blocks, channels, 3, 3), averaged over the turn within a block."""
-    declared, true = sensor.rows
+    inverse, true = _channels(mixing)
     points = ORBIT_POINTS if recording.orbit else 1
     shares = (np.arange(points) + 0.5) / points - 0.5
     times = np.array(recording.middles)[:, None] + shares * recording.span
     frame = turn(recording.orbit * times)
-    back = np.swapaxes(frame, -1, -2) @ np.linalg.inv(declared)
+    back = np.swapaxes(frame, -1, -2) @ inverse
     by_channel = np.einsum("bpic,bpcj->bcij", back, true @ frame) / points
     by_channel.flags.writeable = False
     return np.asarray(by_channel)
 
 
-def _gain(sensor: Dynamometer, speed: float, orders: int) -> ComplexArray:
-    """Response of each channel at the orders 0…, (orders, 3): the product of those of its resonances."""
-    gain = np.ones((orders, 3), complex)
-    for one in sensor.resonances:
-        ratio = speed * np.arange(orders)[:, None] / np.array(one.frequency)
-        gain = gain * (1.0 / (1.0 - ratio**2 + 2j * np.array(one.damping) * ratio))
-    return gain
-
-
 @lru_cache(maxsize=512)
-def _steady(sensor: Dynamometer, recording: Recording) -> Array:
+def _steady(mixing: Mixing, discharge: Triple, recording: Recording) -> Array:
     """Map (blocks, 3, 3) of the mean force to its reading while the charge leaks away.
 
     A channel with discharge rate 1/τ reads y' = F' − y/τ, y = 0 before the contact. A force that turns with
     the orbit is the real part of a complex one times e^{iωt}.
     """
-    declared, true = sensor.rows
+    inverse, true = _channels(mixing)
     orbit, middles = recording.orbit, np.array(recording.middles)
-    rate, since = np.array(sensor.discharge), middles[:, None] - recording.contact
+    rate, since = np.array(discharge), middles[:, None] - recording.contact
     plane = (true[:, 0] - 1j * true[:, 1]) * np.exp(1j * orbit * recording.contact)
     turning = plane * _leaked(rate, orbit, since)
     rows = np.stack(
         [turning.real, -turning.imag, true[:, 2] * _leaked(rate, 0.0, since).real], axis=-1
     )  # (blocks, channels, 3)
-    steady = np.swapaxes(turn(orbit * middles), -1, -2) @ np.linalg.inv(declared) @ rows
+    steady = np.swapaxes(turn(orbit * middles), -1, -2) @ inverse @ rows
     steady.flags.writeable = False
     return np.asarray(steady)
 

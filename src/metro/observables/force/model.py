@@ -12,7 +12,7 @@ from metro.cutting.chipped import Chipped
 from metro.cutting.cutter import Cutter
 from metro.cutting.engagement import with_wall_proud
 from metro.cutting.force import COEFFICIENTS, Cut
-from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped, turn
+from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped
 from metro.cutting.law import EdgeLaw
 from metro.observables.force import terms as added
 from metro.observables.force.dynamometer import Dynamometer, Recording, transfer
@@ -24,8 +24,9 @@ from metro.observables.force.order_basis import (
     shares_of_feeds,
     yielding_orders,
 )
+from metro.observables.force.reading import read_orders
 from metro.observables.problem import Block, Parameter
-from metro.signals.orders import amplitudes, from_amplitudes
+from metro.signals.orders import amplitudes
 from metro.units import N_MM, N_MM2, Array, ComplexArray
 
 PHASES_PER_PITCH = 12
@@ -100,8 +101,8 @@ class ForceModel:
     origin: ForceModel | None = None
 
     def moved_from(self, origin: ForceModel) -> ForceModel:
-        """Return the model as a small change of another."""
-        return replace(self, origin=origin)
+        """Return the model as a small change of another; as it is where its tool does not yield."""
+        return replace(self, origin=origin) if any(self.structure.compliance) else self
 
     def with_term(self, term: added.Term) -> ForceModel:
         """Return the model with one more term."""
@@ -203,18 +204,14 @@ class ForceModel:
             force = np.einsum(
                 "kbf,fchap->kbhap" if force.shape[1] == 1 else "kbf,fbhap->kbhap", shares, force
             )
-        elif self.sensor.ideal:
-            force = np.broadcast_to(force, (1, len(recording.middles), *force.shape[2:]))
-        turned = turn(direction)[:, None, None] @ force
-        turned *= np.exp(1j * phase[:, None] * np.arange(orders))[:, None, :, None, None]
-        seen = turned if self.sensor.ideal else transfer(self.sensor, recording, orders) @ turned
-        seen = added.read(self.terms, seen, self, setting)
+        response = added.seen(self.terms, transfer(self.sensor, recording, orders), self, setting)[None]
         if setting.helix is not None and self.structure.orbit_amplitude:
             feed = direction[:, None] + recording.orbit * np.array(recording.middles)
             wave = recording.attenuation * np.cos(feed - self.structure.orbit_phase)
-            seen[..., 2, :] *= (1.0 + self.structure.orbit_amplitude * wave)[:, :, None, None]
-        rows = from_amplitudes(seen.transpose(2, 0, 1, 3, 4)).transpose(1, 2, 3, 0, 4)
-        return rows.reshape(len(nuisances), -1, p)
+            axial = np.ones((*feed.shape, 3))
+            axial[..., 2] += self.structure.orbit_amplitude * wave
+            response = response * axial[:, :, None, :, None]
+        return read_orders(force, direction, phase, response).reshape(len(nuisances), -1, p)
 
     def _cutting(self, setting: ForceSetting) -> ForceSetting:
         """Return the setting that an arm of this stiffness cuts: a softer arm cuts less of the wall."""

@@ -271,12 +271,12 @@ def acted(terms: tuple[Term, ...], force: ComplexArray, model: Any, setting: Any
     return changed
 
 
-def read(terms: tuple[Term, ...], seen: ComplexArray, model: Any, setting: Any) -> ComplexArray:
-    """Return a reading (k, blocks, orders, 3, p) with the responses of all terms."""
+def seen(terms: tuple[Term, ...], response: ComplexArray, model: Any, setting: Any) -> ComplexArray:
+    """Return a sensor's response (blocks, orders, 3, 3) with those of all terms."""
     for term in terms:
-        gain = term.gain(model, setting, seen.shape[2])
-        seen = seen if gain is None else seen * gain[:, :, None]
-    return seen
+        gain = term.gain(model, setting, response.shape[1])
+        response = response if gain is None else response * gain[:, :, None]
+    return response
 
 
 def pushed(terms: tuple[Term, ...], model: Any, block: Block) -> Array | float:
