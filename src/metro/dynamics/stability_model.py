@@ -43,8 +43,10 @@ class StabilityModel:
     softening: float = 0.0
     yielding: float = 0.0
 
-    def boundary(self, rpm: Array) -> tuple[Array, Array]:
+    def boundary(self, rpm: Array, *, scan: bool = True) -> tuple[Array, Array]:
         """Lowest depths (k,), m, and chatter frequencies there (k,), Hz, at speeds (k,), rev/min.
+
+        ``scan``: see :func:`metro.dynamics.lobes.stability_boundary`.
 
         Raises
         ------
@@ -54,15 +56,15 @@ class StabilityModel:
         factor = self._factor(rpm)
         if self.yielding:
             softer = (factor / COMPLIANCES[:, None]).ravel()
-            depth, hz = self._at(np.tile(rpm, len(COMPLIANCES)), softer)
+            depth, hz = self._at(np.tile(rpm, len(COMPLIANCES)), softer, scan=scan)
             shape = (len(COMPLIANCES), len(rpm))
             return _agreed(depth.reshape(shape), hz.reshape(shape), self.yielding)
-        return self._at(rpm, factor)
+        return self._at(rpm, factor, scan=scan)
 
-    def _at(self, rpm: Array, factor: Array) -> tuple[Array, Array]:
+    def _at(self, rpm: Array, factor: Array, *, scan: bool) -> tuple[Array, Array]:
         """Return the boundary (k,) at speeds (k,) with ``factor`` (k,) times the stiffness."""
         slowed = rpm / np.sqrt(factor)
-        boundaries = [boundary_of_edge(self.structure, cut, slowed, factor) for cut in self.cuts]
+        boundaries = [boundary_of_edge(self.structure, cut, slowed, factor, scan=scan) for cut in self.cuts]
         depth = np.stack([one.depth for one in boundaries])
         least = (depth.argmin(axis=0), np.arange(depth.shape[1]))
         chatter = np.stack([one.chatter_hz for one in boundaries])[least]

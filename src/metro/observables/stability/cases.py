@@ -57,9 +57,12 @@ class Case:
         return np.log(np.where(known, sampled, 1.0) / np.where(known, lowest, 1.0))
 
 
-def boundaries(cases: Sequence[Case], change: Change) -> tuple[Array, Array]:
-    """Log depth and chatter frequency (Hz) at the speeds of all cases, one after another, after a change."""
-    solved = [change(case.model).boundary(case.rpm) for case in cases]
+def boundaries(cases: Sequence[Case], change: Change, *, scan: bool = True) -> tuple[Array, Array]:
+    """Log depth and chatter frequency (Hz) at the speeds of all cases, one after another, after a change.
+
+    ``scan``: see :func:`metro.dynamics.lobes.stability_boundary`.
+    """
+    solved = [change(case.model).boundary(case.rpm, scan=scan) for case in cases]
     depth, chatter = (np.concatenate(part) for part in zip(*solved, strict=True))
     return np.log(depth), chatter
 
