@@ -19,6 +19,7 @@ from metro.loop.fitting.covariance import between_runs
 from metro.loop.fitting.descent import ITERATIONS, descend, farthest, free, polish
 from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.nuisances import costs, search_nuisance
 from metro.loop.fitting.system import (
     State,
     condition,
@@ -27,7 +28,7 @@ from metro.loop.fitting.system import (
     normal_equations,
     solution,
 )
-from metro.observables.problem import Block, Model, predictions
+from metro.observables.problem import Block
 from metro.units import Array
 
 FOLLOWED = 4  # starts of new effect parameters that are followed to the end
@@ -105,14 +106,40 @@ class _End(NamedTuple):
     condition: float
 
 
-@lru_cache(maxsize=256)
-def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fit | None = None) -> Fit:
+def fit(
+    candidate: Candidate,
+    blocks: tuple[Block, ...],
+    prior: Noise,
+    start: Fit | None = None,
+    bound: float = np.inf,
+) -> Fit:
     """Fit a candidate to blocks: base parameters, effect parameters and nuisances jointly.
 
     ``start``, a fit of the same or of a simpler candidate, gives the base parameters and the noise to begin
     with; effect parameters that it lacks are started from all combinations of their starting values, group
-    after group, and the best few are followed.
+    after group, and the best few are followed. A fit whose cost would stay above ``bound``, under the noise
+    to begin with, is given up where that is seen. Fits are kept; one without a bound is as good as any.
     """
+    kept = _kept(candidate, blocks, prior, start)
+    known = np.inf if np.inf in kept else bound
+    if known not in kept:
+        kept[known] = _fitted(candidate, blocks, prior, start, bound)
+    return kept[known]
+
+
+@lru_cache(maxsize=256)
+def _kept(
+    candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fit | None
+) -> dict[float, Fit]:
+    """Return the place where fits are kept, by their bounds."""
+    del candidate, blocks, prior, start
+    return {}
+
+
+def _fitted(
+    candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fit | None, bound: float
+) -> Fit:
+    """Fit as :func:`fit` says."""
     noise = start.noise if start else prior
     known = start.theta if start else np.zeros(0)
     fresh = candidate.parameters[len(known) :]
@@ -124,18 +151,18 @@ def fit(candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fi
         trials: list[tuple[float, State]] = []
         for given in started(candidate, best[0].theta, places):
             state = State(given, beta.copy(), {})
-            trials.append((_search_nuisance(candidate, blocks, noise, state, around), state))
+            trials.append((search_nuisance(candidate, blocks, noise, state, around), state))
         best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
     if start and fresh:
-        first = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS)
+        first = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS, bound=bound)
         best = _distinct(first, SAME)
         if all(missed < noise.budget for missed in noise.misfit.values()):
             best = best[:KEPT]
-            here = State(start.theta, start.beta, dict(start.nuisance))
-            without = linearised(start.candidate, blocks, noise, here, derivatives="none").cost
-            if without - first[0][0] < HOPELESS * len(fresh):
+            if cost_under(start, noise) - first[0][0] < HOPELESS * len(fresh):
                 return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
-    reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS)
+    reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS, bound=bound)
+    if reached[0][0] > bound:
+        return _refined(candidate, blocks, prior, noise, reached[0][1], rounds=0)
     near = _distinct([one for one in reached if one[0] < reached[0][0] + UNDECIDED], SAME)
     refined = [_refined(candidate, blocks, prior, noise, state, rounds=ROUNDS) for state in near]
     return max(refined, key=lambda fitted: fitted.total)
@@ -151,18 +178,32 @@ def _distinct(reached: Sequence[tuple[float, State]], apart: float) -> list[Stat
 
 
 def _lowest_first(
-    candidate: Candidate, blocks: Sequence[Block], noise: Noise, states: Sequence[State], *, steps: int
+    candidate: Candidate,
+    blocks: Sequence[Block],
+    noise: Noise,
+    states: Sequence[State],
+    *,
+    steps: int,
+    bound: float = np.inf,
 ) -> list[tuple[float, State]]:
     """Follow each state some steps down; return where they lead, with the cost there.
 
-    Once one has been followed to its end, others are given up when they cannot come as low.
+    Once one has been followed to its end, others are given up when they cannot come as low; so is each that
+    cannot come below the ``bound``.
     """
     reached: list[tuple[float, State]] = []
     for state in states:
         lowest = min((cost for cost, _ in reached), default=np.inf) if steps == ITERATIONS else np.inf
+        lowest = min(lowest, bound)
         end, cost = descend(candidate, blocks, noise, state, steps, rival=lowest + UNDECIDED)
         reached.append((cost, end))
     return sorted(reached, key=lambda pair: pair[0])
+
+
+def cost_under(fitted: Fit, noise: Noise) -> float:
+    """Return the cost of a fit under another noise: twice the negative logarithm of likelihood and prior."""
+    state = State(fitted.theta, fitted.beta, dict(fitted.nuisance))
+    return linearised(fitted.candidate, fitted.blocks, noise, state, derivatives="none").cost
 
 
 def refit(start: Fit, blocks: Sequence[Block], prior: Noise) -> Fit:
@@ -188,8 +229,8 @@ def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
     for block in blocks:
         starts = model.nuisance_starts(block)
         states = [State(state.theta, state.beta, {block.run: start}) for start in starts]
-        costs = _costs(model, block, noise, state.beta, starts).tolist()
-        near = _distinct(sorted(zip(costs, states, strict=True), key=lambda one: one[0]), ALIKE * min(costs))
+        left = costs(model, block, noise, state.beta, starts).tolist()
+        near = _distinct(sorted(zip(left, states, strict=True), key=lambda one: one[0]), ALIKE * min(left))
         reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
         state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
     return _finished(candidate, blocks, noise, state, _End(fitted.covariance, fitted.step, fitted.condition))
@@ -214,45 +255,6 @@ def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> 
             rows.append(kept[0])
             right.append(kept[1])
     return least_squares(np.vstack(rows), np.concatenate(right))
-
-
-def _search_nuisance(
-    candidate: Candidate,
-    blocks: Sequence[Block],
-    noise: Noise,
-    state: State,
-    around: Mapping[str, Array] | None = None,
-) -> float:
-    """Put each block's nuisance at the best of its starts for the state's parameters; return the cost.
-
-    The starts are those of the model, or only the symmetric images of ``around``; an unknown that ``around``
-    lacks, since it is of a simpler candidate, takes all of its starts.
-    """
-    model = candidate.model(state.theta)
-    total = 0.0
-    for block in blocks:
-        starts = model.nuisance_starts(block)
-        starts = _images(block, around[block.run], starts) if around else starts
-        costs = _costs(model, block, noise, state.beta, starts)
-        best = int(np.argmin(costs))
-        state.nuisance[block.run] = np.asarray(starts[best], dtype=float)
-        total += float(costs[best])
-    return total
-
-
-def _costs(model: Model, block: Block, noise: Noise, beta: Array, starts: Array) -> Array:
-    """Weighted sum of squares that each of a block's nuisances leaves, (starts,)."""
-    weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
-    left = (block.measured - predictions(model, block, starts, beta)) * weight
-    return np.asarray(np.sum(left**2, axis=1))
-
-
-def _images(block: Block, nuisance: Array, starts: Array) -> Array:
-    images = nuisance[None] if block.symmetries is None else nuisance + block.symmetries
-    lacking = np.unique(starts[:, len(nuisance) :], axis=0)
-    if not lacking.size:
-        return images
-    return np.hstack([np.repeat(images, len(lacking), axis=0), np.tile(lacking, (len(images), 1))])
 
 
 def _refined(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from metro.effects.effect import Effect
 from metro.loop.checks.evidence import leave_out, weights
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import Fit, fit
+from metro.loop.fitting.fit import Fit, cost_under, fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.search.trial import HOPELESS, Gates, beyond_left_out, parted, unlike
 
@@ -101,14 +101,19 @@ def _round(
 
 
 def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Noise) -> list[Fit]:
-    """Fit every other effect in place of the one that ``smaller`` lacks; those not far behind."""
+    """Fit every other effect in place of the one that ``smaller`` lacks; those not far behind.
+
+    One that is far behind under the noise of ``smaller``, which hides the most, is so under any that comes
+    after: it is not followed to its end.
+    """
+    bound = cost_under(current, smaller.noise) + 2.0 * HOPELESS
     others = {effect.name for effect in smaller.candidate.effects}
     present = set(_keys(current))
     fits = []
     for effect in effects:
         if effect.name not in others and effect.key not in present:
             candidate = Candidate(current.candidate.base, (*smaller.candidate.effects, effect))
-            fitted = fit(candidate, current.blocks, prior, smaller)
+            fitted = fit(candidate, current.blocks, prior, smaller, bound)
             near = fitted.total > current.total - HOPELESS and not unlike(effect, fitted)
             if near and not beyond_left_out(fitted, prior):
                 fits.append(fitted)
