@@ -1,0 +1,92 @@
+"""Effects that are far behind are not followed: neither when they are tried, nor as rivals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, problem
+
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import cost_under, fit
+from metro.loop.fitting.noise import first_noise
+from metro.loop.search import rivals as rivals_room
+from metro.loop.search import trial as room
+from metro.loop.search.trial import HOPELESS, tried
+
+
+@pytest.fixture
+def base():
+    task = problem(2, truth=Wave(bend=0.2, ripple=0.15), phased=False)
+    blocks = task.role("identify")
+    return fit(Candidate(task.base), blocks, first_noise(GATES.model_form_budget, task.scatter, blocks))
+
+
+@pytest.fixture
+def left_out(monkeypatch):
+    """Names of the effects of the models for which conditions were left out."""
+    asked, leave_out = [], room.hold_out
+
+    def counted(evidence, out, larger, prior):
+        asked.append(larger.candidate.effects[-1].name)
+        return leave_out(evidence, out, larger, prior)
+
+    monkeypatch.setattr(room, "hold_out", counted)
+    return asked
+
+
+def trials(base, effects, prior_of, **options):
+    prior = first_noise(GATES.model_form_budget, prior_of, base.blocks)
+    return {one.effect.name: one for one in tried(base, effects, prior, GATES, 0.001, **options)}
+
+
+def test_no_condition_is_left_out_for_an_effect_that_is_far_behind(base, left_out):
+    found = trials(base, (BEND, TWIN, RIPPLE), np.full(2, 0.01))
+    assert set(left_out) == {"bend", "twin"}
+    assert found["bend"].why_not is None
+    behind = found["bend"].fit.total - found["ripple"].fit.total
+    assert behind > HOPELESS
+    assert found["ripple"].why_not.code == "far_behind"
+    assert found["ripple"].why_not.values["behind"] == pytest.approx(behind, rel=0.01)
+
+
+def test_all_are_weighed_where_that_is_asked_for(base, left_out):
+    found = trials(base, (BEND, RIPPLE), np.full(2, 0.01), behind=np.inf)
+    assert set(left_out) == {"bend", "ripple"}
+    assert getattr(found["ripple"].why_not, "code", "") != "far_behind"
+
+
+def test_those_behind_are_weighed_after_all_where_the_foremost_does_not_pass(base, left_out, monkeypatch):
+    monkeypatch.setattr(
+        room, "_not_held_out", lambda evidence, _: "no gain" if evidence.statistic > 30.0 else None
+    )
+    found = trials(base, (BEND, RIPPLE), np.full(2, 0.01))
+    assert found["bend"].why_not == "no gain"
+    assert found["ripple"].why_not is None
+    assert set(left_out) == {"bend", "ripple"}
+
+
+def test_a_fit_is_given_up_above_its_bound_and_followed_to_its_end_below(base):
+    prior = first_noise(GATES.model_form_budget, np.full(2, 0.01), base.blocks)
+    start = replace(base, noise=base.noise.sound)  # it hides nothing of what is missed
+    whole = fit(Candidate(base.candidate.base, (BEND,)), base.blocks, prior, start)
+    bound = cost_under(whole, start.noise) + 2.0 * HOPELESS
+    hopeless, near = (
+        fit(Candidate(base.candidate.base, (one,)), base.blocks, prior, start, bound)
+        for one in (RIPPLE, TWIN)
+    )
+    assert hopeless.noise is start.noise  # it was not estimated anew
+    assert hopeless.total < whole.total - HOPELESS
+    assert near.noise is not start.noise
+    assert near.total == pytest.approx(whole.total, abs=0.01)
+
+
+def test_rivals_are_the_same_as_without_a_bound(base, monkeypatch):
+    prior = first_noise(GATES.model_form_budget, np.full(2, 0.01), base.blocks)
+    current = fit(Candidate(base.candidate.base, (BEND,)), base.blocks, prior, base)
+    library = (BEND, TWIN, RIPPLE, GAIN)
+    bounded = rivals_room._replaced(current, base, library, prior)
+    monkeypatch.setattr(rivals_room, "cost_under", lambda *_: np.inf)
+    unbounded = rivals_room._replaced(current, base, library, prior)
+    assert [one.candidate.effects for one in bounded] == [one.candidate.effects for one in unbounded]
+    assert [one.total for one in bounded] == pytest.approx([one.total for one in unbounded], abs=0.02)
+    assert bounded
