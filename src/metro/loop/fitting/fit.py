@@ -189,7 +189,7 @@ def _lowest_first(
     """Follow each state some steps down; return where they lead, with the cost there.
 
     Once one has been followed to its end, others are given up when they cannot come as low; so is each that
-    cannot come below the ``bound``.
+    cannot come below the ``bound``, and all after one whose first step already promises too little for that.
     """
     reached: list[tuple[float, State]] = []
     for state in states:
@@ -197,6 +197,8 @@ def _lowest_first(
         lowest = min(lowest, bound)
         end, cost = descend(candidate, blocks, noise, state, steps, rival=lowest + UNDECIDED)
         reached.append((cost, end))
+        if cost > bound and end is state:
+            break
     return sorted(reached, key=lambda pair: pair[0])
 
 

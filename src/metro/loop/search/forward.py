@@ -9,6 +9,7 @@ made idle is dropped for good. Then each is weighed against its rivals.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from metro.effects.effect import Effect
@@ -19,7 +20,7 @@ from metro.loop.search.strategy import Choice, SearchSpace
 from metro.loop.search.trial import HOPELESS, Trial, parted, small_beside_residual, tried, without
 from metro.loop.statement import Statement
 
-MOST_EFFECTS = 4  # of a model
+MOST_EFFECTS = 6  # of a model: four that every machine has (runout, end, resonance, crosstalk), and two
 # Trials by what a model has, in whatever order it was added, and what was tried on top of that.
 Known = dict[tuple[frozenset[Effect], tuple[tuple[str, str], ...]], list[Trial]]
 
@@ -61,6 +62,7 @@ def _added(
 ) -> tuple[Fit, list[Fit], dict[tuple[str, str], Trial]]:
     """Add effects to a fit one by one; return the last fit, that after each addition, and the last trials.
 
+    Effects that gained no more than chance does in the round before wait until no other may be added at once.
     ``known``: trials that were made, to which those made here are added.
     """
     steps: list[Fit] = []
@@ -68,13 +70,18 @@ def _added(
     barred: set[str] = set()
     while len(current.candidate.effects) < MOST_EFFECTS:
         effects = _open(current, barred, space)
-        asked = frozenset(current.candidate.effects), tuple(effect.key for effect in effects)
-        if asked not in known:
-            known[asked] = tried(current, effects, space.prior, space.gates, space.least)
-        round_trials = known[asked]
+        passed: list[Trial] = []
+        for several in (_promising(effects, trials), effects):
+            asked = frozenset(current.candidate.effects), tuple(effect.key for effect in several)
+            if asked not in known:
+                known[asked] = tried(current, several, space.prior, space.gates, space.least)
+            round_trials = known[asked]
+            open_to = [trial for trial in round_trials if not trial.why_not]
+            passed = [trial for trial in open_to if not trial.beside]
+            if passed:
+                break
         trials |= {trial.effect.key: trial for trial in round_trials}
-        open_to = [trial for trial in round_trials if not trial.why_not]
-        passed = [trial for trial in open_to if not trial.beside] or open_to
+        passed = passed or open_to
         if not passed:
             break
         first = max(passed, key=lambda trial: believed(trial.effect, trial.weight))
@@ -82,6 +89,18 @@ def _added(
         barred |= dropped
         steps.append(current)
     return current, steps, trials
+
+
+def _promising(effects: list[Effect], trials: Mapping[tuple[str, str], Trial]) -> list[Effect]:
+    """Return the effects that gained more than chance does, where they were tried last, or were not tried.
+
+    By chance, twice the log-likelihood gains one for each parameter: the mean of chi-squared.
+    """
+    return [
+        effect
+        for effect in effects
+        if effect.key not in trials or trials[effect.key].evidence.statistic > len(effect.parameters)
+    ]
 
 
 def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str, str], Statement]]:
