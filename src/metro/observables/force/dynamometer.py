@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from metro.cutting.helical import turn
-from metro.observables.force.reading import responses
+from metro.cutting.reading import responses
 from metro.units import Array, ComplexArray
 
 ORBIT_POINTS = 5  # within a time block, over which the turning frame is averaged

@@ -14,6 +14,7 @@ from metro.cutting.engagement import with_wall_proud
 from metro.cutting.force import COEFFICIENTS, Cut
 from metro.cutting.helical import BOTTOM_EDGES, Helix, bottom_thrust, ramped
 from metro.cutting.law import EdgeLaw
+from metro.cutting.reading import read_orders
 from metro.observables.force import terms as added
 from metro.observables.force.dynamometer import Dynamometer, Recording, transfer
 from metro.observables.force.order_basis import (
@@ -24,7 +25,6 @@ from metro.observables.force.order_basis import (
     shares_of_feeds,
     yielding_orders,
 )
-from metro.observables.force.reading import read_orders
 from metro.observables.problem import Block, Parameter
 from metro.signals.orders import amplitudes
 from metro.units import N_MM, N_MM2, Array, ComplexArray
