@@ -9,8 +9,10 @@ from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, problem
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import cost_under, fit
 from metro.loop.fitting.noise import first_noise
+from metro.loop.search import forward as forward_room
 from metro.loop.search import rivals as rivals_room
 from metro.loop.search import trial as room
+from metro.loop.search.strategy import SearchSpace
 from metro.loop.search.trial import HOPELESS, tried
 
 
@@ -90,3 +92,18 @@ def test_rivals_are_the_same_as_without_a_bound(base, monkeypatch):
     assert [one.candidate.effects for one in bounded] == [one.candidate.effects for one in unbounded]
     assert [one.total for one in bounded] == pytest.approx([one.total for one in unbounded], abs=0.02)
     assert bounded
+
+
+def test_what_gained_no_more_than_chance_waits_until_no_other_may_be_added_at_once(base, monkeypatch):
+    prior = first_noise(GATES.model_form_budget, np.full(2, 0.01), base.blocks)
+    asked, ask = [], forward_room.tried
+
+    def counted(current, effects, *options):
+        asked.append({effect.name for effect in effects})
+        return ask(current, effects, *options)
+
+    monkeypatch.setattr(forward_room, "tried", counted)
+    space = SearchSpace(base, (BEND, RIPPLE, GAIN), prior, GATES, 0.001)
+    current, _, _ = forward_room._added(base, space, {})
+    assert {effect.name for effect in current.candidate.effects} == {"bend", "ripple"}
+    assert [names for names in asked if names][:3] == [{"bend", "ripple", "gain"}, {"ripple"}, {"gain"}]
