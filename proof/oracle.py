@@ -11,9 +11,9 @@ import pandas as pd
 
 from metro.effects.effect import Effect, fitted_to
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import Fit, fit
+from metro.loop.fitting.fit import Fit, fit, score
 from metro.loop.fitting.held_out import comparison, held_out
-from metro.loop.fitting.noise import first_noise
+from metro.loop.fitting.noise import diagonal, first_noise, shared, whitener
 from metro.observables.problem import Problem
 from metro.units import JSON
 from proof.score import forms, joint
@@ -79,16 +79,35 @@ def oracle(
         full = fitted(acting)
     rows = _rows(task, base, full)
     floor = _rms(_rows(_all_identified(task), base, full)["sigma"])
-    sizes = {}
-    for effect in acting:
-        lacking = _rows(task, fitted([other for other in acting if other is not effect]), full)
-        sizes[effect.name] = _rms(lacking["after"] - lacking["before"]) / floor
+    sizes = {
+        effect.name: _size(task, fitted([other for other in acting if other is not effect]), full)
+        for effect in acting
+    }
     return {
         "before": _rms(rows["measured"] - rows["before"]),
         "after": _rms(rows["measured"] - rows["after"]),
         "floor": floor,
         "sizes": sizes,
     }
+
+
+def _size(task: Problem, lacking: Fit, full: Fit) -> float:
+    """Rms change of the held-out elements by an effect, each in deviations of its noise.
+
+    What a whole run shares (its height and tilt on an unknown place, its zeros, its scatter of coefficients)
+    is noise in those directions alone: a form of 10 µm is seen on a face whose height is known to 90 µm.
+    """
+    blocks = _all_identified(task).role("validate")
+    total, count = 0.0, 0
+    one, other = (score(fitted, blocks) for fitted in (lacking, full))
+    for block in blocks:
+        matrix, _ = full.candidate.model(full.theta).design(block, other.nuisance[block.run], full.beta)
+        whiten = whitener(
+            diagonal(block, full.noise.alone(block)), shared(block, full.noise, matrix, full.beta)
+        )
+        change = whiten(other.predict(block) - one.predict(block))
+        total, count = total + float(change @ change), count + len(change)
+    return float(np.sqrt(total / count))
 
 
 def _kept(effect: Effect) -> Effect:

@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 from toy import BEND, GATES, SIGMA, Wave, problem
 
+from metro.loop.checks.evidence import missed
 from metro.loop.checks.floor import ABOVE, AgainstFloor, against_floor
 from metro.loop.checks.left_out import left_out, parameter_errors, unseen
 from metro.loop.fitting.candidate import Candidate
@@ -57,7 +58,7 @@ def test_what_a_model_misses_does_not_excuse_its_errors():
     """A model that misses much is fitted with a misfit: its parameters are no less certain for that."""
     task = problem(4, truth=Wave(spike=0.5), phased=False)
     whole, prior = fitted(task)
-    assert whole.noise.misfit["x"] > 0.1
+    assert missed(whole) > 0.1
     for one in unseen(whole, prior):
         assert np.all(np.diag(one.covariance)[:2] <= np.diag(whole.covariance)[:2] * 2.0)
         assert one.nuisance.keys() == {block.run for block in one.blocks}

@@ -9,7 +9,16 @@ from hypothesis import strategies as st
 from toy import BETA, POINTS, SIGMA, Wave, block
 
 from metro.loop.fitting import noise as noise_room
-from metro.loop.fitting.noise import Noise, block_sigma, diagonal, first_noise, shared, updated, whitener
+from metro.loop.fitting.noise import (
+    Noise,
+    block_sigma,
+    diagonal,
+    first_noise,
+    missed,
+    shared,
+    updated,
+    whitener,
+)
 
 
 @settings(max_examples=30, deadline=None)
@@ -87,6 +96,28 @@ def test_what_the_model_misses_is_measured_relative_to_the_signal():
     )
 
 
+@pytest.mark.parametrize(("share", "level"), [(0.2, 0.0), (0.0, 2.0), (0.15, 2.0)])
+def test_what_is_missed_whatever_the_signal_is_told_from_what_grows_with_it(share, level):
+    """Else runs with a small signal would make those with a large one count for nothing."""
+    rng, parts = np.random.default_rng(8), []
+    for one, matrix, _ in runs(300, 0.0):
+        rms = np.sqrt(np.mean(one.measured**2))
+        waves = rng.normal(0.0, np.hypot(share * rms, level), POINTS)
+        parts.append((one, matrix, waves + rng.normal(0.0, SIGMA, POINTS)))
+    found = estimated(parts, first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts]))
+    assert found.misfit["x"] == pytest.approx(share, rel=0.15, abs=0.03)
+    assert found.level["x"] == pytest.approx(level, rel=0.2, abs=0.3)
+
+
+def test_signals_of_one_size_leave_all_that_is_missed_relative():
+    rng = np.random.default_rng(8)
+    parts = [part for part in runs(60, 0.0) if part[0].setting.feed == 3.0]
+    parts = [(one, matrix, rng.normal(0.0, 0.3, POINTS)) for one, matrix, _ in parts]
+    found = estimated(parts, first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts]))
+    assert found.level["x"] == pytest.approx(0.0, abs=1e-9)
+    assert found.misfit["x"] > 0.0
+
+
 def test_a_load_test_tells_nothing_of_the_scatter_of_cuts():
     (one, matrix, rest), *_ = runs(1, 0.05)
     load = replace(one, role="calibrate")
@@ -148,9 +179,8 @@ def test_a_misfit_stays_where_it_is_found_wherever_it_is_sought_from(start, bad,
         for one, matrix, _ in runs(3, 0.0)
     ]
     prior = first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts])
-    near, still = (
-        estimated(parts, replace(prior, misfit={"x": start}), steps).misfit["x"] for steps in (80, 81)
-    )
+    found = (estimated(parts, replace(prior, misfit={"x": start}), steps) for steps in (80, 81))
+    near, still = (np.sqrt(np.mean([missed(part[0], one) for part in parts])) for one in found)
     assert near == pytest.approx(still, rel=0.02)
     assert still > 0.0
 
@@ -213,7 +243,8 @@ def test_a_zero_that_hardly_shows_is_not_blown_up_to_explain_what_a_model_misses
     ]
     found = estimated(parts, first_noise(0.0, np.full(2, 0.01), [part[0] for part in parts]))
     assert found.zero_factor <= 4.0
-    assert found.misfit["x"] > 0.2
+    one = parts[0][0]
+    assert np.mean(missed(one, found)) > 0.04 * np.mean(one.measured**2)
 
 
 def test_what_calibrates_shares_what_it_does_not_identify_and_no_scatter():

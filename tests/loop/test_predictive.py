@@ -9,6 +9,8 @@ from scipy.special import logsumexp
 from toy import BEND, GATES, RIPPLE, Wave, block, problem
 
 from metro.loop.checks.evidence import leave_out
+from metro.loop.checks.evidence import missed as missed_by
+from metro.loop.checks.left_out import most_missed
 from metro.loop.checks.predictive import estimated, predictive
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
@@ -87,8 +89,8 @@ def test_what_a_model_misses_in_the_condition_left_out_alone_is_known_there_too(
     noise = first_noise(GATES.model_form_budget, task.scatter, blocks)
     found = fit(Candidate(task.base), blocks, noise)
     others = refit(found, [one for one in blocks if one not in missed], noise)
-    assert found.noise.misfit["x"] > 2.0 * others.noise.misfit["x"]
-    known = replace(others, noise=replace(others.noise, misfit=found.noise.misfit))
+    known = most_missed(others, found.noise)
+    assert missed_by(known) > 2.0 * missed_by(others)
     (name,) = {one.condition for one in missed}
     assert leave_out(found, noise)[name] == pytest.approx(predictive(known, missed))
     assert leave_out(found, noise)[name] > predictive(others, missed) + 10.0

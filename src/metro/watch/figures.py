@@ -86,7 +86,7 @@ def compared(force: ForceModel, block: Block) -> Compared:
             parameter_errors(scored, block),
         ]
     )
-    alone = replace(scored.noise, repeats={block.condition: 1.0 / block.repeats}, misfit={})
+    alone = scored.noise.alone(block)
     variance = noise_room.diagonal(block, replace(alone, budget=0.0))
     budget = noise_room.diagonal(block, alone) - variance
     rows = block.coordinates["axis"].astype(str), block.to_rows(residual), block.to_rows(block.measured)

@@ -59,7 +59,7 @@ LARGEST = {
 def likenesses(compared: Compared) -> tuple[Likeness, ...]:
     """Return the causes whose shape the residual has, the best one first; none where no cause explains it."""
     block = compared.block
-    alone = replace(compared.scored.noise, repeats={block.condition: 1.0 / block.repeats}, misfit={})
+    alone = compared.scored.noise.alone(block)
     weight = 1.0 / np.sqrt(noise_room.diagonal(block, alone))
     causes, own = _causes(compared)
     basis = np.linalg.qr(own * weight[:, None])[0]

@@ -14,6 +14,7 @@ import numpy as np
 
 from metro.loop.checks.left_out import LeftOut, left_out, most_missed
 from metro.loop.checks.predictive import predictive
+from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.noise import PRIOR_RUNS, Noise
@@ -114,9 +115,8 @@ def missed(fitted: Fit) -> float:
     lost, signal = 0.0, 0.0
     for block in fitted.blocks:
         if block.role != "calibrate":
-            share = np.array([fitted.noise.misfit.get(str(axis), 0.0) for axis in np.unique(block.axis)])
-            power = [float(np.sum(block.measured[block.axis == axis] ** 2)) for axis in np.unique(block.axis)]
-            lost, signal = lost + float(share**2 @ power), signal + sum(power)
+            lost += float(noise_room.missed(block, fitted.noise).sum())
+            signal += float(np.sum(block.measured**2))
     return math.sqrt(lost / signal)
 
 

@@ -123,7 +123,7 @@ def _unshared(block: Block, fitted: Fit) -> tuple[Array, list[float]]:
 
     What a model gets wrong is a smooth shape: it is taken as one direction of each axis.
     """
-    alone = replace(fitted.noise, repeats={block.condition: 1.0 / block.repeats}, misfit={})
+    alone = fitted.noise.alone(block)
     variance = noise_room.diagonal(block, replace(alone, budget=0.0))
     budget = noise_room.diagonal(block, alone) - variance
     return variance, [float(budget[block.axis == axis].sum()) for axis in np.unique(block.axis)]

@@ -86,8 +86,11 @@ def most_missed(others: Fit, whole: Noise) -> Fit:
 
     What a model misses may show in the condition that is left out only (where a gap closes).
     """
-    misfit = {axis: max(rms, whole.misfit.get(axis, 0.0)) for axis, rms in others.noise.misfit.items()}
-    return replace(others, noise=replace(others.noise, misfit=misfit))
+    misfit, level = (
+        {axis: max(rms, known.get(axis, 0.0)) for axis, rms in own.items()}
+        for own, known in ((others.noise.misfit, whole.misfit), (others.noise.level, whole.level))
+    )
+    return replace(others, noise=replace(others.noise, misfit=misfit, level=level))
 
 
 @lru_cache(maxsize=64)

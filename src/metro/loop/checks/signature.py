@@ -91,7 +91,7 @@ def unseen_signature(scored: Sequence[Fit], least: float) -> list[Line]:
 
 def _left(fitted: Fit, block: Block, further: Array | None = None) -> _Left:
     """Return what a fit leaves of a block; ``further`` (n, k): directions of errors beside those of a run."""
-    strict = replace(fitted.noise, misfit={})
+    strict = fitted.noise.sound
     model = fitted.candidate.model(fitted.theta)
     matrix, offset = model.design(block, fitted.nuisance[block.run], fitted.beta)
     directions = noise_room.shared(block, strict, matrix, fitted.beta)

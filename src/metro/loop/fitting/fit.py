@@ -7,7 +7,7 @@ combinations of their starting values; the noise is re-estimated from the residu
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -156,7 +156,7 @@ def _fitted(
     if start and fresh:
         first = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS, bound=bound)
         best = _distinct(first, SAME)
-        if all(missed < noise.budget for missed in noise.misfit.values()):
+        if noise_room.within_budget(blocks, noise):
             best = best[:KEPT]
             if cost_under(start, noise) - first[0][0] < HOPELESS * len(fresh):
                 return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
@@ -305,7 +305,7 @@ def _reestimated(
 
     A misfit hides from what whole runs share what that would explain, and may then never come down.
     """
-    starts = [noise, replace(noise, misfit={})] if any(noise.misfit.values()) else [noise]
+    starts = [noise, noise.sound] if noise_room.misses(noise) else [noise]
     reached = [_expected(candidate, blocks, prior, start, state) for start in starts]
     if len(reached) == 1:
         return reached[0]

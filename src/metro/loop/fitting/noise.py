@@ -25,6 +25,9 @@ MISFIT_CORRELATION = 12.0  # neighbouring elements of a misfit that count as one
 # Of the way to the misfit estimated: a larger one lets the elements that are measured best weigh less, and is
 # then estimated smaller, so that whole steps would go to and fro about the point where it stays.
 MISFIT_STEP = 0.5
+# One less the squared cosine of signals² and of one size for all: from there on they are told from one size,
+# and what is missed whatever the signal from what grows with it. Signals that scatter by a tenth reach it.
+ONE_SIZE = 0.03
 LARGEST_ZERO = 4.0  # of its deviation: a zero that is farther off is something else that is taken for it
 
 
@@ -46,6 +49,8 @@ class Noise:
         estimated with each fit, so that a model that misses much does not bend its parameters to please the
         elements that are measured best. What is missed is a smooth shape, the same in every run: about twelve
         neighbouring elements count as one piece of evidence.
+    level : by axis, rms (SI) of what it misses whatever the size of the signal: the waves that gears leave on
+        a wall are as high after a light cut as after a heavy one. Runs with other signals tell it apart.
     """
 
     budget: float
@@ -55,6 +60,7 @@ class Noise:
     everywhere: float = 1.0
     alike: float = 1.0
     misfit: dict[str, float] = field(default_factory=dict)
+    level: dict[str, float] = field(default_factory=dict)
 
     @cached_property
     def scattering(self) -> np.ndarray:
@@ -64,7 +70,11 @@ class Noise:
     @cached_property
     def sound(self) -> Noise:
         """The noise of a model that misses nothing."""
-        return replace(self, misfit={})
+        return replace(self, misfit={}, level={})
+
+    def alone(self, block: Block) -> Noise:
+        """Return the noise of one waveform of a block by itself, of a model that misses nothing."""
+        return replace(self.sound, repeats={block.condition: 1.0 / block.repeats})
 
 
 @dataclass(frozen=True)
@@ -107,15 +117,36 @@ def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION
     What all repeats share counts as many times as there are repeats. The misfit counts ``correlation``
     times, so that that many elements weigh as one.
     """
-    names, number, rms = _axes(block)
-    scale = rms if block.scale is None else block.scale
-    missed = np.array([noise.misfit.get(name, 0.0) for name in names])[number] * rms
+    scale = _axes(block)[2] if block.scale is None else block.scale
     repeats = noise.repeats.get(block.condition, 1) * block.repeats
     alike = 0.0 if block.alike is None else block.alike**2 * (1.0 + noise.alike * (repeats - 1.0))
-    wrong = (noise.budget * scale) ** 2 + correlation * missed**2
+    wrong = (noise.budget * scale) ** 2 + correlation * missed(block, noise)
     variance = np.asarray(block.sigma**2 + alike + repeats * noise.everywhere * wrong)
     variance.flags.writeable = False
     return variance
+
+
+def missed(block: Block, noise: Noise) -> Array:
+    """Mean square of what the model misses, by element (n,), SI²."""
+    names, number, rms = _axes(block)
+    share, level = (
+        np.array([part.get(name, 0.0) for name in names])[number] for part in (noise.misfit, noise.level)
+    )
+    return np.asarray((share * rms) ** 2 + level**2)
+
+
+def misses(noise: Noise) -> bool:
+    """Whether the model is known to miss anything."""
+    return any(noise.misfit.values()) or any(noise.level.values())
+
+
+def within_budget(blocks: Sequence[Block], noise: Noise) -> bool:
+    """Whether the model misses less in every block than it is allowed to get wrong."""
+    return all(
+        bool((missed(block, noise) < (noise.budget * _axes(block)[2]) ** 2).all())
+        for block in blocks
+        if block.role != "calibrate"
+    )
 
 
 def all_alike(noise: Noise) -> Noise:
@@ -135,7 +166,7 @@ def log_determinant(block: Block, noise: Noise, directions: Array, whiten: White
     that misses a little is likelier than one that misses nothing.
     """
     known = diagonal(block, noise.sound)
-    if not any(noise.misfit.values()):
+    if not misses(noise):
         return whiten.log_shared - len(known)
     once, counted = diagonal(block, noise, correlation=1.0), diagonal(block, noise)
     scaled = directions / np.sqrt(known)[:, None]
@@ -167,8 +198,7 @@ def whitener(variance: Array, directions: Array) -> Whitener:
 
 def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
     """Return the standard deviation of measured less predicted, per row of the comparison table, (m,)."""
-    alone = replace(noise, repeats={block.condition: 1.0 / block.repeats}, misfit={})
-    unshared, directions = diagonal(block, alone), shared(block, noise, design, beta)
+    unshared, directions = diagonal(block, noise.alone(block)), shared(block, noise, design, beta)
     if block.synthesis is None:
         return np.asarray(np.sqrt(unshared + (directions**2).sum(axis=1)))
     spread = block.synthesis**2 @ unshared + ((block.synthesis @ directions) ** 2).sum(axis=1)
@@ -189,8 +219,7 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
     p = len(at)
     amplitudes = {"scatter": [1.0] * PRIOR_RUNS, "zero": [1.0] * PRIOR_RUNS}
     size = float(np.mean(noise.scatter[at] / prior.scatter[at])) if p else 1.0
-    pull: dict[str, float] = {}
-    weight: dict[str, float] = {}
+    moments: dict[str, Array] = {}
     residuals: list[tuple[Block, Array, Array]] = []
     for block, residual, directions in parts:
         if block.role == "calibrate":
@@ -208,24 +237,51 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         spread = left**2 + ((directions @ uncertain) * directions).sum(axis=1)
         excess = spread - diagonal(block, noise.sound)
         names, number, rms = _axes(block)
-        pulls = np.bincount(number, rms**2 * excess / variance**2)
-        weights = np.bincount(number, (rms**2 / variance) ** 2)
-        for name, one, other in zip(names, pulls, weights, strict=True):
-            pull[name] = pull.get(name, 0.0) + float(one)
-            weight[name] = weight.get(name, 0.0) + float(other)
+        kinds = np.stack([rms**2, np.ones_like(rms)]) / variance
+        products = np.einsum("in,jn->nij", kinds, np.vstack([kinds, excess / variance]))
+        for place, name in enumerate(names):
+            moments[name] = moments.get(name, 0.0) + products[number == place].sum(axis=0)
     factor = {key: float(np.sqrt(np.mean(values))) for key, values in amplitudes.items()}
     misfit: dict[str, float] = {}
-    for name, pulled in pull.items():
-        square = max(0.0, pulled) / weight[name] if weight[name] else 0.0
-        before = noise.misfit.get(name, 0.0) ** 2
-        misfit[name] = math.sqrt(MISFIT_STEP * square + (1.0 - MISFIT_STEP) * before)
+    level: dict[str, float] = {}
+    for name, moment in moments.items():
+        share, flat = _squares(moment)
+        misfit[name] = _towards(share, noise.misfit.get(name, 0.0))
+        level[name] = _towards(flat, noise.level.get(name, 0.0))
     return replace(
         noise,
         scatter=prior.scatter * factor["scatter"],
         zero_factor=min(factor["zero"], LARGEST_ZERO),
         misfit=misfit,
+        level=level,
         alike=_alike(residuals),
     )
+
+
+def _towards(square: float, known: float) -> float:
+    return math.sqrt(MISFIT_STEP * square + (1.0 - MISFIT_STEP) * known**2)
+
+
+def _squares(moment: Array) -> tuple[float, float]:
+    """Least squares for relative misfit² and level², neither of them negative.
+
+    Where all runs have signals of one size nothing tells the two apart: then all is relative.
+
+    Parameters
+    ----------
+    moment : (2, 3) normal equations with their right side.
+    """
+    (a, b, x), (_, c, y) = moment.tolist()
+    determinant = a * c - b * b
+    if a == 0.0:
+        return 0.0, max(0.0, y) / c if c else 0.0
+    if determinant > ONE_SIZE * a * c:
+        share, level = (c * x - b * y) / determinant, (a * y - b * x) / determinant
+        if share >= 0.0 and level >= 0.0:
+            return share, level
+        if share < 0.0:
+            return 0.0, max(0.0, y) / c
+    return max(0.0, x) / a, 0.0
 
 
 def _alike(residuals: Sequence[tuple[Block, Array, Array]]) -> float:
