@@ -13,7 +13,17 @@ from metro.batch.batch import Batch
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness.doubt import damping_doubt
 from metro.observables.flatness.dynamics import TipDynamics, tip_dynamics
-from metro.observables.flatness.model import ACROSS, AHEAD, PHASES, FaceSetting, LoadSetting, PoseField
+from metro.observables.flatness.model import (
+    ACROSS,
+    AHEAD,
+    PHASES,
+    PLACE,
+    BelievedSetting,
+    FaceSetting,
+    FlatnessModel,
+    LoadSetting,
+    PoseField,
+)
 from metro.observables.flatness.noise import bin_sigma
 from metro.observables.flatness.path import (
     Path,
@@ -36,7 +46,10 @@ from metro.surface.tip_stiffness import (
 )
 from metro.units import DEG, MM, UM, Array
 
-REGISTERED_SD = 10 * UM
+REGISTERED_SD = 10 * UM  # of the place of one scan about that of all
+# Of the tip's frequencies: the reduced mass is declared, and known to some 5 % (drawings, or a hammer).
+FREQUENCY_SD = 0.025
+PLACE_SD = 100 * UM  # of the declared place, in which all scans share an error: height, tilts at the edges
 GAUGE_SD = 0.1 * UM
 MOST_POINTS = 1200
 LEAST_COVERAGE, SECTORS = 0.75, 8
@@ -119,6 +132,17 @@ def _linearity(pose: str, loads: pd.DataFrame) -> list[str]:
         f"Pose {pose}: the compliance along the load changes by {100 * change:+.1f} % from {low:.0f} to "
         f"{high:.0f} N (mean of {len(changes)} tests); the model takes the line through both."
     ]
+
+
+def believed_block(model: FlatnessModel) -> Block:
+    """Return what is believed of the scanner's place and of the tip's frequencies, before any face."""
+    sigma = np.array([PLACE_SD if one.name in PLACE else FREQUENCY_SD for one in model.believed])
+    names, zeros, none = [one.name for one in model.believed], np.zeros((len(sigma), 0)), np.zeros(0)
+    return Block(
+        *("believed", "believed", "calibrate", 0, np.zeros(len(sigma)), sigma, BelievedSetting()),
+        *(np.array(names), zeros, none, {}),
+        belief=True,
+    )
 
 
 def face_block(

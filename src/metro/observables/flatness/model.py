@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from metro.observables.flatness.path import Pace, Passages
-from metro.observables.flatness.ringing import Ringing
+from metro.observables.flatness.ringing import SHARPER, Ringing
 from metro.observables.flatness.setup import Setup, swung
 from metro.observables.problem import Block, Parameter
 from metro.observables.waviness.model import Vibration
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 ENTRIES = ("zx", "zy", "zz")
+PLACE = ("place_height", "place_tilt_x", "place_tilt_y")  # tilts as the height at the edges of the work
 # Places across and along the feed, in radii of a disc, whose mean equals that over the disc: exactly for a
 # cubic, and to 0.2 % for a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
@@ -95,6 +96,16 @@ class FaceSetting:
         """Average the values of points, (n,) or (n, p), over the bins."""
         return np.asarray((np.add.reduceat(values, self.first, axis=0).T / self._count).T)
 
+    @cached_property
+    def plane(self) -> Array:
+        """Heights of an offset and two tilts, (bins, 3), each tilt ±1 at the edges of the work."""
+        across = []
+        for values, size in zip((self.x, self.y), self.size, strict=True):
+            at = self.mean(values)
+            low, high = (0.0, size) if math.isfinite(size) else (float(at.min()), float(at.max()))
+            across.append((2.0 * at - low - high) / ((high - low) or 1.0))
+        return np.column_stack([np.ones_like(across[0]), *across])
+
     @property
     def _count(self) -> np.ndarray:
         """Points in each bin."""
@@ -108,6 +119,11 @@ class FaceSetting:
         weight = np.repeat(1.0 / self._count, self._count * len(ACROSS)) / len(ACROSS)
         begins = np.append(len(ACROSS) * self.first, len(weight))
         return csr_array((weight, np.arange(len(weight)), begins))
+
+
+@dataclass(frozen=True)
+class BelievedSetting:
+    """What is believed of the scanner's place and of the ringing beforehand: evidence on these alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,26 +145,36 @@ class FlatnessModel:
     Attributes
     ----------
     fields : the compliance over (x, y) at each pose, known from load tests.
+    placed : whether the place of the scanner is declared. All scans share its error: height and two tilts.
+    ringing : poses at which the tip rings; the mass declared there leaves its frequencies a bit off.
     structure : stiffness of the arm in the cut, relative to these tests.
     setup : deviations of spindle, tool and work from the programmed setup.
     vibration : of the tip, from the start of the first pass; each face has its own phase of each wave.
     """
 
     fields: tuple[PoseField, ...]
+    placed: bool = False
+    ringing: tuple[str, ...] = ()
     structure: Structure = field(default_factory=Structure)
     setup: Setup = field(default_factory=Setup)
     vibration: tuple[Vibration, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Coefficients of C_zx, C_zy, C_zz in the terms of each pose's basis, um/N."""
-        return tuple(
+        """What is believed of beforehand, and C_zx, C_zy, C_zz in the terms of each pose's basis, um/N."""
+        return self.believed + tuple(
             Parameter(f"c_{entry}_u{i}v{j}_{part.pose}", "um/N", UM)
             for part in self.fields
             for entry, seen in zip(ENTRIES, part.entries, strict=True)
             if seen
             for i, j in POWERS[: part.basis.terms]
         )
+
+    @property
+    def believed(self) -> tuple[Parameter, ...]:
+        """Place of the scanner, and by how much the frequencies of the tip are off at each pose."""
+        place = [Parameter(name, "um", UM) for name in PLACE if self.placed]
+        return (*place, *(Parameter(f"ringing_off_{pose}", "%", 0.01) for pose in self.ringing))
 
     def nuisance_starts(self, block: Block) -> Array:
         """Return starts of a face's nuisance, (k, m): the phase of each wave, and at least one."""
@@ -159,12 +185,19 @@ class FlatnessModel:
 
     def design(self, block: Block, nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
         """Matrix (n, p) in m per (m/N), and the offset of ringing, vibration and setup (n,) m."""
-        setting = block.setting
+        setting, count = block.setting, len(block.measured)
+        if isinstance(setting, BelievedSetting):
+            return np.eye(count, len(self.parameters)), np.zeros(count)
         if isinstance(setting, LoadSetting):
-            return _loaded(self.fields, setting), np.zeros(len(block.measured))
+            loaded = _loaded(self.fields, setting)
+            return np.hstack([np.zeros((count, len(self.believed))), loaded]), np.zeros(count)
         terms, offset = _shaped(self, setting, self._phases(nuisance))
         columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
-        parts = [_own(part, setting.pose, columns) for part in self.fields]
+        parts = [setting.plane] if self.placed else []
+        if self.ringing:
+            sharper = _sharper(self, setting, self._phases(nuisance))
+            parts.append(np.outer(sharper, np.array(self.ringing) == setting.pose))
+        parts += [_own(part, setting.pose, columns) for part in self.fields]
         return setting.shape(np.hstack(parts)), setting.shape(offset.copy())
 
     def finished(self, setting: FaceSetting, nuisance: Array) -> tuple[tuple[np.ndarray, np.ndarray], Array]:
@@ -203,6 +236,16 @@ class FlatnessModel:
 
     def _basis(self, setting: FaceSetting) -> Basis:
         return next(part.basis for part in self.fields if part.pose == setting.pose)
+
+
+@lru_cache(maxsize=512)
+def _sharper(model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...]) -> Array:
+    """Return the heights, (bins,) m, that faces gain per relative rise of the tip's frequencies."""
+    if setting.ringing is None:
+        return np.zeros(len(setting.first))
+    chosen, _ = model.finished(setting, np.array(phases))
+    low, high = (_ringing(setting, one, model.structure)[chosen] for one in setting.ringing.sharper)
+    return setting.mean(high - low) / (2.0 * SHARPER)
 
 
 def _own(part: PoseField, pose: str, columns: Array) -> Array:

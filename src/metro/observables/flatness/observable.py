@@ -16,7 +16,7 @@ from metro.batch.writing import writing
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness import NAME, TABLES
 from metro.observables.flatness.advice import advice, after_loop, planned_points, studied
-from metro.observables.flatness.blocks import LOADS, Pose, face_block, pose_of_loads
+from metro.observables.flatness.blocks import LOADS, Pose, believed_block, face_block, pose_of_loads
 from metro.observables.flatness.dynamics import tip_block
 from metro.observables.flatness.model import FlatnessModel
 from metro.observables.flatness.pairing import paired
@@ -118,9 +118,12 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
     remarks = observed["face_placed"][["run", "remark"]].to_numpy(dtype=object).tolist()
     notes += [f"Run {run}: {remark}." for run, remark in remarks if remark]
     notes += [note for pose in known for note in pose.notes] + _limits(batch)
-    model = FlatnessModel(tuple(pose.field for pose in known))
-    scatter = np.full(len(model.parameters), SCATTER)
-    evidence = (*(pose.block for pose in known), *blocks)
+    placed = "to_work" in batch.instrument("scanner")
+    rung = tuple(pose.field.pose for pose in known if pose.dynamics is not None)
+    model = FlatnessModel(tuple(pose.field for pose in known), placed=placed, ringing=rung)
+    scatter = np.array([0.0 if one in model.believed else SCATTER for one in model.parameters])
+    believed = [believed_block(model)] if model.believed else []
+    evidence = (*believed, *(pose.block for pose in known), *blocks)
     return Problem(NAME, "mm", MM, model, evidence, scatter, SYSTEMATIC, notes=tuple(dict.fromkeys(notes)))
 
 
@@ -163,7 +166,8 @@ def _limits(batch: Batch) -> list[str]:
         "The face is compared where the cutter is fully engaged (one radius from entry and exit); the "
         "spindle is square to it. Where no impact test at the pose gives the damping of the arm, its modes "
         "share one ratio of 5 %, known to a factor of two.",
-        "Scans are placed by the declared scanner-to-work transform (offset and tilts known to 10 µm)."
+        "Scans are placed by the declared scanner-to-work transform. Its height, and its tilts as the height "
+        "at the edges, may be off by 0.1 mm in all scans alike, and by another 10 µm in each scan."
         if placed
         else "No scanner-to-work transform is declared: an offset and two tilts are left out of the measured "
         "and of the predicted heights alike, so that only the shape is compared, and what moves or tilts a "

@@ -26,6 +26,7 @@ from metro.surface.tip_response import TipModes, disc_weights, respond, tip_mode
 from metro.units import MM, Array
 
 SEGMENT = 4 * MM  # M, C, K are constant over it
+SHARPER = 0.01  # relative difference of a frequency over which a derivative by it is taken
 PER_CYCLE = 4  # samples in a period of the fastest mode, and in the time that the footprint's radius takes
 
 
@@ -76,6 +77,16 @@ class Ringing:
         """Height of the tip over the static one under the full force, (points, k) m, mean over discs."""
         return self.at(self.moved(structure), passages) + self.of_teeth(structure, passages)
 
+    @cached_property
+    def sharper(self) -> tuple[Ringing, Ringing]:
+        """The ringing of a tip whose modes are lower and higher by ``SHARPER``, as of more and less mass."""
+        low, high = (self._tuned(1.0 + share) for share in (-SHARPER, SHARPER))
+        return low, high
+
+    def _tuned(self, factor: float) -> Ringing:
+        teeth = self.teeth and replace(self.teeth, modes=_tuned(self.teeth.modes, factor))
+        return replace(self, modes=_tuned(self.modes, factor), teeth=teeth)
+
     def moved(self, structure: Structure) -> Array:
         """Height of the tip over the static one under the full force, (passes, n) m, see :meth:`heights`."""
         softer = structure.in_cut(np.ones(1))
@@ -120,6 +131,11 @@ class Ringing:
         share = place - before
         low, high = heights[passages.number, before], heights[passages.number, before + 1]
         return np.asarray(low + share * (high - low))
+
+
+def _tuned(modes: TipModes, factor: float) -> TipModes:
+    """Return the modes of a tip of the same stiffness whose frequencies are another by a factor."""
+    return TipModes(modes.frequency * factor, modes.shape * factor, modes.inverse / factor)
 
 
 def make_ringing(
