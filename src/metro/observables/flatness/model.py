@@ -191,11 +191,10 @@ class FlatnessModel:
         if isinstance(setting, LoadSetting):
             loaded = _loaded(self.fields, setting)
             return np.hstack([np.zeros((count, len(self.believed))), loaded]), np.zeros(count)
-        terms, offset = _shaped(self, setting, self._phases(nuisance))
+        terms, offset, sharper = _shaped(self, setting, self._phases(nuisance))
         columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
         parts = [setting.plane] if self.placed else []
         if self.ringing:
-            sharper = _sharper(self, setting, self._phases(nuisance))
             parts.append(np.outer(sharper, np.array(self.ringing) == setting.pose))
         parts += [_own(part, setting.pose, columns) for part in self.fields]
         return setting.shape(np.hstack(parts)), setting.shape(offset.copy())
@@ -238,16 +237,6 @@ class FlatnessModel:
         return next(part.basis for part in self.fields if part.pose == setting.pose)
 
 
-@lru_cache(maxsize=512)
-def _sharper(model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...]) -> Array:
-    """Return the heights, (bins,) m, that faces gain per relative rise of the tip's frequencies."""
-    if setting.ringing is None:
-        return np.zeros(len(setting.first))
-    chosen, _ = model.finished(setting, np.array(phases))
-    low, high = (_ringing(setting, one, model.structure)[chosen] for one in setting.ringing.sharper)
-    return setting.mean(high - low) / (2.0 * SHARPER)
-
-
 def _own(part: PoseField, pose: str, columns: Array) -> Array:
     """Return those ``columns``, (n, 3 · terms) of a face at ``pose``, that are parameters; else zeros."""
     count = int(part.used.sum())
@@ -263,15 +252,30 @@ def _loaded(fields: tuple[PoseField, ...], setting: LoadSetting) -> Array:
 
 
 @lru_cache(maxsize=512)
-def _shaped(model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...]) -> tuple[Array, Array]:
-    """Return the mean of the basis' terms over each bin, (bins, terms), and of the offset, (bins,) m.
+def _shaped(
+    model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...]
+) -> tuple[Array, Array, Array]:
+    """Return means over each bin: of the basis' terms, (bins, terms), of the offset, and of :func:`_sharper`.
 
     The result is cached because noise and parameters are estimated in turn, many times over.
     """
     chosen, above_static = model.finished(setting, np.array(phases))
     bowed = model.setup.bowed(setting.x, setting.y, setting.size)
     finished_by = chosen[1].astype(np.int8).tobytes()
-    return _terms(model._basis(setting), setting, finished_by), setting.mean(above_static[chosen] + bowed)
+    sharper = _sharper(setting, model.structure, finished_by) if model.ringing else np.zeros(0)
+    terms = _terms(model._basis(setting), setting, finished_by)
+    return terms, setting.mean(above_static[chosen] + bowed), sharper
+
+
+@lru_cache(maxsize=512)
+def _sharper(setting: FaceSetting, structure: Structure, finished_by: bytes) -> Array:
+    """Return the heights, (bins,) m, that faces gain per relative rise of the tip's frequencies."""
+    if setting.ringing is None:
+        return np.zeros(len(setting.first))
+    lowest = np.frombuffer(finished_by, dtype=np.int8).astype(np.intp)
+    chosen = np.arange(len(lowest)), lowest
+    low, high = (_ringing(setting, one, structure)[chosen] for one in setting.ringing.sharper)
+    return setting.mean(high - low) / (2.0 * SHARPER)
 
 
 @lru_cache(maxsize=512)
@@ -293,7 +297,7 @@ def _static(basis: Basis, setting: FaceSetting) -> Array:
     return np.asarray((rows @ setting.loaded).reshape(at.x.shape))
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=256)
 def _ringing(setting: FaceSetting, ringing: Ringing, structure: Structure) -> Array:
     """Return the ringing at each passage, (n, k) m; other effects on the face do not change it.
 
@@ -303,7 +307,7 @@ def _ringing(setting: FaceSetting, ringing: Ringing, structure: Structure) -> Ar
     return rung + ringing.of_teeth(structure, setting.passages)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _rung(ringing: Ringing, structure: Structure) -> Array:
     """Return the height over the static one along the passes, (passes, n) m.
 
@@ -325,7 +329,7 @@ def _cubic(place: float) -> list[tuple[int, float]]:
     return [(first + i, math.prod((share - j) / (i - j) for j in range(4) if j != i)) for i in range(4)]
 
 
-@lru_cache(maxsize=512)
+@lru_cache(maxsize=1024)
 def _rung_at(ringing: Ringing, structure: Structure) -> Array:
     """Ringing at one stiffness, cached: it takes long, and other effects on the face do not change it."""
     return ringing.moved(structure)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -81,13 +82,20 @@ def left(outside: Array, radius: float, length: float) -> Array:
     ----------
     outside : distance of the axis past the edge, m.
     """
-    way = np.linspace(0.0, max(float(outside.max(initial=0.0)) + radius, radius), LEFT)
+    way, since, share = _leaving(radius, max(float(outside.max(initial=0.0)) + radius, radius))
+    remains = (share * np.exp(-since / length)).sum(axis=1)
+    return np.asarray(np.interp(outside + radius, way, remains, left=0.0))
+
+
+@lru_cache(maxsize=64)
+def _leaving(radius: float, most: float) -> tuple[Array, Array, Array]:
+    """Return ways (n,) of the front up to ``most``; for each, ways since parts left, and their shares."""
+    way = np.linspace(0.0, most, LEFT)
     end = np.arccos(1.0 - np.minimum(way / radius, 1.0))[:, None]
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     theta = 0.5 * end * (1.0 + nodes)
     since = way[:, None] - radius * (1.0 - np.cos(theta))
-    remains = (np.cos(theta) * np.exp(-since / length)) @ weights * 0.5 * end[:, 0]
-    return np.asarray(np.interp(outside + radius, way, remains, left=0.0))
+    return way, since, np.cos(theta) * weights * 0.5 * end
 
 
 def swung(vibration: Vibration, phase: float, passages: Passages, pace: Pace) -> Array:
