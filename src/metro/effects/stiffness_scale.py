@@ -18,10 +18,13 @@ def apply(model: WithStructure, values: Mapping[str, float]) -> WithStructure:
     return replace(model, structure=scaled)
 
 
+# The frequency at which a tip rings goes with the root of its stiffness: waves are found from beside only.
+BESIDE = (0.45, 0.6, 0.75, 0.88, 0.96, 1.04, 1.14, 1.35, 1.65, 2.1)
+
 OF_MACHINE = Effect(
     name="stiffness_scale",
     observables=("flatness",),
-    parameters=(EffectParameter("factor", "1", 0.2, 5.0, 0.05, starts=(0.8, 1.2)),),
+    parameters=(EffectParameter("factor", "1", 0.2, 5.0, 0.05, starts=BESIDE),),
     apply=apply,
     signature=(
         "Deformation or deviation in proportion to the predicted one, over all runs and places. "
@@ -41,9 +44,11 @@ def _gives_way(effect: Effect, problem: Any) -> Effect | Refusal:
     return effect
 
 
+AWAY = (EffectParameter("factor", "1", 0.2, 5.0, 0.05, starts=(0.8, 1.2)),)
 OF_SIDE_CUTS = replace(
     OF_MACHINE,
     observables=("force",),
+    parameters=AWAY,
     form="side cuts",
     signature=(
         "Side cuts by an arm, which gives way, that are deeper or shallower than the load tests let expect. "
@@ -51,7 +56,9 @@ OF_SIDE_CUTS = replace(
     ),
     adapt=_gives_way,
 )
-OF_ARM = replace(OF_MACHINE, observables=("deformation",), form="all joints", where={"joint": "all"})
+OF_ARM = replace(
+    OF_MACHINE, observables=("deformation",), parameters=AWAY, form="all joints", where={"joint": "all"}
+)
 
 
 def _of(joint: int) -> Effect:
@@ -61,6 +68,7 @@ def _of(joint: int) -> Effect:
     return replace(
         OF_MACHINE,
         observables=("deformation",),
+        parameters=AWAY,
         apply=of_joint,
         signature=(
             "Deformation in proportion to the contribution of one joint. In cuts that load the arm in the "

@@ -31,7 +31,7 @@ from metro.loop.fitting.system import (
 from metro.observables.problem import Block
 from metro.units import Array
 
-FOLLOWED = 4  # starts of new effect parameters that are followed to the end
+FOLLOWED = 4  # starts of new effect parameters that are followed to the end; of a single one, all are
 FIRST_STEPS, KEPT = 3, 2  # where little is left to explain, after so many steps so many are kept
 HOPELESS = 1.0  # and none, where twice the log-likelihood has not gained that much per parameter: chance does
 SAME = 0.05  # difference of the costs of two descents that ended in one place: each stops before its very end
@@ -154,7 +154,8 @@ def _fitted(
             trials.append((search_nuisance(candidate, blocks, noise, state, around), state))
         best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
     if start and fresh:
-        first = _lowest_first(candidate, blocks, noise, best[:FOLLOWED], steps=FIRST_STEPS, bound=bound)
+        followed = best if len(fresh) == 1 else best[:FOLLOWED]
+        first = _lowest_first(candidate, blocks, noise, followed, steps=FIRST_STEPS, bound=bound)
         best = _distinct(first, SAME)
         if noise_room.within_budget(blocks, noise):
             best = best[:KEPT]

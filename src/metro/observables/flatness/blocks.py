@@ -16,6 +16,7 @@ from metro.observables.flatness.dynamics import TipDynamics, tip_dynamics
 from metro.observables.flatness.model import (
     ACROSS,
     AHEAD,
+    FORCE,
     PHASES,
     PLACE,
     BelievedSetting,
@@ -49,6 +50,7 @@ from metro.units import DEG, MM, UM, Array
 REGISTERED_SD = 10 * UM  # of the place of one scan about that of all
 # Of the tip's frequencies: the reduced mass is declared, and known to some 5 % (drawings, or a hammer).
 FREQUENCY_SD = 0.025
+FORCE_SD = 0.04  # of the force by the coefficients: those of another bar, and corners that are not sharp
 PLACE_SD = 100 * UM  # of the declared place, in which all scans share an error: height, tilts at the edges
 GAUGE_SD = 0.1 * UM
 MOST_POINTS = 1200
@@ -135,8 +137,9 @@ def _linearity(pose: str, loads: pd.DataFrame) -> list[str]:
 
 
 def believed_block(model: FlatnessModel) -> Block:
-    """Return what is believed of the scanner's place and of the tip's frequencies, before any face."""
-    sigma = np.array([PLACE_SD if one.name in PLACE else FREQUENCY_SD for one in model.believed])
+    """Return what is believed of the scanner's place, the force and the tip's frequencies beforehand."""
+    known = dict.fromkeys(PLACE, PLACE_SD) | {FORCE: FORCE_SD}
+    sigma = np.array([known.get(one.name, FREQUENCY_SD) for one in model.believed])
     names, zeros, none = [one.name for one in model.believed], np.zeros((len(sigma), 0)), np.zeros(0)
     return Block(
         *("believed", "believed", "calibrate", 0, np.zeros(len(sigma)), sigma, BelievedSetting()),

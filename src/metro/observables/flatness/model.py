@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from metro.observables.flatness.path import Pace, Passages
-from metro.observables.flatness.ringing import SHARPER, Ringing
+from metro.observables.flatness.ringing import Ringing
+from metro.observables.flatness.rung import rung, sharper
 from metro.observables.flatness.setup import Setup, swung
 from metro.observables.problem import Block, Parameter
 from metro.observables.waviness.model import Vibration
@@ -24,13 +25,12 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 ENTRIES = ("zx", "zy", "zz")
+FORCE = "force_off"
 PLACE = ("place_height", "place_tilt_x", "place_tilt_y")  # tilts as the height at the edges of the work
 # Places across and along the feed, in radii of a disc, whose mean equals that over the disc: exactly for a
 # cubic, and to 0.2 % for a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
-STIFF_NODES = (
-    0.02  # spacing of nodes in the logarithm of the stiffness, between which ringing is interpolated
-)
+FINE = 0.002  # grid of relative frequencies about which the ringing is linearised
 PHASES = tuple(2 * math.pi * third / 3 for third in range(3))
 
 
@@ -172,9 +172,10 @@ class FlatnessModel:
 
     @property
     def believed(self) -> tuple[Parameter, ...]:
-        """Place of the scanner, and by how much the frequencies of the tip are off at each pose."""
+        """Place of the scanner; by how much the force is off, and the tip's frequencies at each pose."""
         place = [Parameter(name, "um", UM) for name in PLACE if self.placed]
-        return (*place, *(Parameter(f"ringing_off_{pose}", "%", 0.01) for pose in self.ringing))
+        ringing = [Parameter(f"ringing_off_{pose}", "%", 0.01) for pose in self.ringing]
+        return (*place, Parameter(FORCE, "%", 0.01), *ringing)
 
     def nuisance_starts(self, block: Block) -> Array:
         """Return starts of a face's nuisance, (k, m): the phase of each wave, and at least one."""
@@ -183,7 +184,7 @@ class FlatnessModel:
         each = [PHASES if swing.amplitude else PHASES[:1] for swing in self.vibration]
         return np.array(list(itertools.product(*(each or [PHASES[:1]]))))
 
-    def design(self, block: Block, nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
+    def design(self, block: Block, nuisance: Array, beta: Array | None = None) -> tuple[Array, Array]:
         """Matrix (n, p) in m per (m/N), and the offset of ringing, vibration and setup (n,) m."""
         setting, count = block.setting, len(block.measured)
         if isinstance(setting, BelievedSetting):
@@ -191,20 +192,34 @@ class FlatnessModel:
         if isinstance(setting, LoadSetting):
             loaded = _loaded(self.fields, setting)
             return np.hstack([np.zeros((count, len(self.believed))), loaded]), np.zeros(count)
-        terms, offset, sharper = _shaped(self, setting, self._phases(nuisance))
+        off = self._off(setting, beta)
+        terms, offset, harder, rising = _shaped(self, setting, self._phases(nuisance), off)
         columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
         parts = [setting.plane] if self.placed else []
-        if self.ringing:
-            parts.append(np.outer(sharper, np.array(self.ringing) == setting.pose))
+        parts += [harder[:, None], np.outer(rising, np.array(self.ringing) == setting.pose)]
         parts += [_own(part, setting.pose, columns) for part in self.fields]
-        return setting.shape(np.hstack(parts)), setting.shape(offset.copy())
+        return setting.shape(np.hstack(parts)), setting.shape(offset - off * rising)
 
-    def finished(self, setting: FaceSetting, nuisance: Array) -> tuple[tuple[np.ndarray, np.ndarray], Array]:
+    def _off(self, setting: FaceSetting, beta: Array | None) -> float:
+        """Return by how much the frequencies of the tip are off, relative, to the grid."""
+        if beta is None or setting.pose not in self.ringing:
+            return 0.0
+        place = len(self.believed) - len(self.ringing) + self.ringing.index(setting.pose)
+        return FINE * round(float(beta[place]) / FINE)
+
+    def tuning(self, off: float) -> float:
+        """Return the tip's frequencies in the cut over those of the load tests with the declared mass."""
+        return (1.0 + off) / math.sqrt(float(self.structure.in_cut(np.ones(1))[0]))
+
+    def finished(
+        self, setting: FaceSetting, nuisance: Array, off: float = 0.0
+    ) -> tuple[tuple[np.ndarray, np.ndarray], Array]:
         """Index of the passage that finished each point, and heights over the static one, (n, k) m.
 
-        The passage with the lowest cut finishes a point. For ``nuisance`` see :meth:`nuisance_starts`.
+        The passage with the lowest cut finishes a point. For ``nuisance`` see :meth:`nuisance_starts`;
+        ``off`` is the relative error of the tip's frequencies.
         """
-        height, above_static = self._heights(setting, nuisance)
+        height, above_static = self._heights(setting, nuisance, off)
         lowest = height.argmin(axis=1)
         return (np.arange(len(lowest)), lowest), above_static
 
@@ -212,13 +227,13 @@ class FlatnessModel:
         """Height of the cut at each passage by the load tests, (n, k) m; infinite if there is no passage."""
         return self._heights(setting, nuisance)[0]
 
-    def _heights(self, setting: FaceSetting, nuisance: Array) -> tuple[Array, Array]:
+    def _heights(self, setting: FaceSetting, nuisance: Array, off: float = 0.0) -> tuple[Array, Array]:
         passages = setting.passages
         above_static = self.setup.cuts(setting.x, setting.y, passages, setting.pace)
         for swing, phase in zip(self.vibration, self._phases(nuisance), strict=True):
             above_static = above_static + swung(swing, phase, passages, setting.pace)
         if setting.ringing is not None:
-            above_static = above_static + _ringing(setting, setting.ringing, self.structure)
+            above_static = above_static + self.structure.in_cut(rung(setting, self.tuning(off)))
         static = self.structure.in_cut(self._static(setting))
         return np.where(passages.valid, static + above_static, np.inf), above_static
 
@@ -253,29 +268,30 @@ def _loaded(fields: tuple[PoseField, ...], setting: LoadSetting) -> Array:
 
 @lru_cache(maxsize=512)
 def _shaped(
-    model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...]
-) -> tuple[Array, Array, Array]:
-    """Return means over each bin: of the basis' terms, (bins, terms), of the offset, and of :func:`_sharper`.
+    model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], off: float
+) -> tuple[Array, Array, Array, Array]:
+    """Return means over each bin: terms of the basis, (bins, terms); heights, (bins,) m, whatever these are.
 
-    The result is cached because noise and parameters are estimated in turn, many times over.
+    The heights are the offset, and what is gained per relative rise of the force and of the frequencies. The
+    result is cached because noise and parameters are estimated in turn, many times over.
     """
-    chosen, above_static = model.finished(setting, np.array(phases))
+    chosen, above_static = model.finished(setting, np.array(phases), off)
     bowed = model.setup.bowed(setting.x, setting.y, setting.size)
-    finished_by = chosen[1].astype(np.int8).tobytes()
-    sharper = _sharper(setting, model.structure, finished_by) if model.ringing else np.zeros(0)
-    terms = _terms(model._basis(setting), setting, finished_by)
-    return terms, setting.mean(above_static[chosen] + bowed), sharper
+    basis, finished_by = model._basis(setting), chosen[1].astype(np.int8).tobytes()
+    harder, rising = _believed(basis, setting, model.tuning(off), finished_by)
+    terms, heights = _terms(basis, setting, finished_by), setting.mean(above_static[chosen] + bowed)
+    return terms, heights, model.structure.in_cut(harder), model.structure.in_cut(rising)
 
 
 @lru_cache(maxsize=512)
-def _sharper(setting: FaceSetting, structure: Structure, finished_by: bytes) -> Array:
-    """Return the heights, (bins,) m, that faces gain per relative rise of the tip's frequencies."""
-    if setting.ringing is None:
-        return np.zeros(len(setting.first))
-    lowest = np.frombuffer(finished_by, dtype=np.int8).astype(np.intp)
-    chosen = np.arange(len(lowest)), lowest
-    low, high = (_ringing(setting, one, structure)[chosen] for one in setting.ringing.sharper)
-    return setting.mean(high - low) / (2.0 * SHARPER)
+def _believed(basis: Basis, setting: FaceSetting, tuning: float, finished_by: bytes) -> tuple[Array, Array]:
+    """Return what faces gain, (bins,) m, per relative rise of the force, and of the frequencies.
+
+    Both are of the load tests: that of the force need not be better known than their compliance is.
+    """
+    chosen = _places(finished_by)
+    height = _static(basis, setting)[chosen] + rung(setting, tuning)[chosen]
+    return setting.mean(height), setting.mean(sharper(setting, tuning)[chosen])
 
 
 @lru_cache(maxsize=512)
@@ -284,9 +300,14 @@ def _terms(basis: Basis, setting: FaceSetting, finished_by: bytes) -> Array:
 
     The result is cached because a small change of an effect rarely changes which passage is the lowest.
     """
+    chosen = _places(finished_by)
+    return setting.mean(basis(setting.passages.x[chosen], setting.passages.y[chosen]))
+
+
+def _places(finished_by: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Return the index of each point, and of the passage that finished it."""
     lowest = np.frombuffer(finished_by, dtype=np.int8).astype(np.intp)
-    rows = np.arange(len(lowest))
-    return setting.mean(basis(setting.passages.x[rows, lowest], setting.passages.y[rows, lowest]))
+    return np.arange(len(lowest)), lowest
 
 
 @lru_cache(maxsize=64)
@@ -295,41 +316,3 @@ def _static(basis: Basis, setting: FaceSetting) -> Array:
     at = setting.passages
     rows = heights_design(basis, at.x.ravel(), at.y.ravel(), setting.force)
     return np.asarray((rows @ setting.loaded).reshape(at.x.shape))
-
-
-@lru_cache(maxsize=256)
-def _ringing(setting: FaceSetting, ringing: Ringing, structure: Structure) -> Array:
-    """Return the ringing at each passage, (n, k) m; other effects on the face do not change it.
-
-    It is already a mean along the feed, because its waves may be shorter than a disc.
-    """
-    rung = ringing.at(_rung(ringing, structure), setting.middle)
-    return rung + ringing.of_teeth(structure, setting.passages)
-
-
-@lru_cache(maxsize=256)
-def _rung(ringing: Ringing, structure: Structure) -> Array:
-    """Return the height over the static one along the passes, (passes, n) m.
-
-    It is interpolated over the logarithm of the stiffness with a cubic, to 1e-3 of the ringing.
-    """
-    if structure.stiffness_factor == 1.0:
-        return _rung_at(ringing, structure)
-    place = math.log(structure.stiffness_factor) / STIFF_NODES
-    parts = [
-        weight * _rung_at(ringing, Structure(math.exp(node * STIFF_NODES))) for node, weight in _cubic(place)
-    ]
-    return np.asarray(sum(parts))
-
-
-def _cubic(place: float) -> list[tuple[int, float]]:
-    """Return the four integers about a place, each with its weight in Lagrange's cubic interpolation."""
-    first = math.floor(place) - 1
-    share = place - first
-    return [(first + i, math.prod((share - j) / (i - j) for j in range(4) if j != i)) for i in range(4)]
-
-
-@lru_cache(maxsize=1024)
-def _rung_at(ringing: Ringing, structure: Structure) -> Array:
-    """Ringing at one stiffness, cached: it takes long, and other effects on the face do not change it."""
-    return ringing.moved(structure)

@@ -122,8 +122,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
     rung = tuple(pose.field.pose for pose in known if pose.dynamics is not None)
     model = FlatnessModel(tuple(pose.field for pose in known), placed=placed, ringing=rung)
     scatter = np.array([0.0 if one in model.believed else SCATTER for one in model.parameters])
-    believed = [believed_block(model)] if model.believed else []
-    evidence = (*believed, *(pose.block for pose in known), *blocks)
+    evidence = (believed_block(model), *(pose.block for pose in known), *blocks)
     return Problem(NAME, "mm", MM, model, evidence, scatter, SYSTEMATIC, notes=tuple(dict.fromkeys(notes)))
 
 

@@ -26,7 +26,6 @@ from metro.surface.tip_response import TipModes, disc_weights, respond, tip_mode
 from metro.units import MM, Array
 
 SEGMENT = 4 * MM  # M, C, K are constant over it
-SHARPER = 0.01  # relative difference of a frequency over which a derivative by it is taken
 PER_CYCLE = 4  # samples in a period of the fastest mode, and in the time that the footprint's radius takes
 
 
@@ -75,31 +74,27 @@ class Ringing:
 
     def heights(self, structure: Structure, passages: Passages) -> Array:
         """Height of the tip over the static one under the full force, (points, k) m, mean over discs."""
-        return self.at(self.moved(structure), passages) + self.of_teeth(structure, passages)
+        (softer,) = structure.in_cut(np.ones(1)).tolist()
+        tuned = self.tuned(1.0 / math.sqrt(softer))
+        return np.asarray(softer * (tuned.at(tuned.moved(), passages) + tuned.of_teeth(passages)))
 
-    @cached_property
-    def sharper(self) -> tuple[Ringing, Ringing]:
-        """The ringing of a tip whose modes are lower and higher by ``SHARPER``, as of more and less mass."""
-        low, high = (self._tuned(1.0 + share) for share in (-SHARPER, SHARPER))
-        return low, high
-
-    def _tuned(self, factor: float) -> Ringing:
+    def tuned(self, factor: float) -> Ringing:
+        """Return the ringing of a tip of the same stiffness, whose frequencies are another by a factor."""
         teeth = self.teeth and replace(self.teeth, modes=_tuned(self.teeth.modes, factor))
         return replace(self, modes=_tuned(self.modes, factor), teeth=teeth)
 
-    def moved(self, structure: Structure) -> Array:
+    def moved(self) -> Array:
         """Height of the tip over the static one under the full force, (passes, n) m, see :meth:`heights`."""
-        softer = structure.in_cut(np.ones(1))
-        modes, ratio = self._in_cut(self.modes, softer)
-        moved = respond(modes, ratio, self.force, self.step) - (softer * self.static)[:, None]
+        ratio = self.damping.ratio(self.modes.frequency)
+        moved = respond(self.modes, ratio, self.force, self.step) - self.static[:, None]
         return np.convolve(moved.ravel(), self.weights, mode="same").reshape(self.passes, -1)
 
-    def of_teeth(self, structure: Structure, passages: Passages) -> Array | float:
+    def of_teeth(self, passages: Passages) -> Array | float:
         """Height of the tip about its mean over a turn at each passage, (points, k) m; zero without teeth."""
         if self.teeth is None:
             return 0.0
-        modes, ratio = self._in_cut(self.teeth.modes, structure.in_cut(np.ones(1)))
-        heights = tooth_heights(modes, ratio, self.teeth.force, self.teeth.rate)
+        ratio = self.damping.ratio(self.teeth.modes.frequency)
+        heights = tooth_heights(self.teeth.modes, ratio, self.teeth.force, self.teeth.rate)
         return at_rim(heights, passages.number, passages.rim, self.teeth.angles)
 
     @cached_property
@@ -118,11 +113,6 @@ class Ringing:
     @cached_property
     def _hash(self) -> int:
         return hash(self._said)
-
-    def _in_cut(self, modes: TipModes, softer: Array) -> tuple[TipModes, Array]:
-        """Return the modes of load tests with the stiffness of the cut, and their damping ratios."""
-        modes = replace(modes, frequency=modes.frequency / np.sqrt(softer))
-        return modes, self.damping.ratio(modes.frequency)
 
     def at(self, heights: Array, passages: Passages) -> Array:
         """Interpolate ``heights`` (passes, n) at passages, (points, k)."""
