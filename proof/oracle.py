@@ -46,7 +46,8 @@ def oracle(
     -------
     ``before`` and ``after`` (rms error on the held-out runs without and with the effects), ``floor`` (rms of
     the noise there, without the uncertainty of base parameters) and ``sizes``: of each effect, how much the
-    prediction changes when it is left out and all else is refitted, over the floor. Where the library lacks
+    prediction changes when it is left out and all else is refitted, over the floor, or over the noise beside
+    what whole runs share, whichever is larger. Where the library lacks
     one of them: ``after`` is None, the floor that of the declared noise (the fitted one has swallowed some of
     the effect), and the size the error beyond noise and uncertainty of base parameters, over the floor.
     """
@@ -79,10 +80,12 @@ def oracle(
         full = fitted(acting)
     rows = _rows(task, base, full)
     floor = _rms(_rows(_all_identified(task), base, full)["sigma"])
-    sizes = {
-        effect.name: _size(task, fitted([other for other in acting if other is not effect]), full)
-        for effect in acting
-    }
+    sizes = {}
+    for effect in acting:
+        without = fitted([other for other in acting if other is not effect])
+        lacking = _rows(task, without, full)
+        change = _rms(lacking["after"] - lacking["before"]) / floor
+        sizes[effect.name] = max(change, _change_of_form(task, without, full))
     return {
         "before": _rms(rows["measured"] - rows["before"]),
         "after": _rms(rows["measured"] - rows["after"]),
@@ -91,11 +94,11 @@ def oracle(
     }
 
 
-def _size(task: Problem, lacking: Fit, full: Fit) -> float:
-    """Rms change of the held-out elements by an effect, each in deviations of its noise.
+def _change_of_form(task: Problem, lacking: Fit, full: Fit) -> float:
+    """Rms change of the held-out elements by an effect over their noise, beside what a whole run shares.
 
-    What a whole run shares (its height and tilt on an unknown place, its zeros, its scatter of coefficients)
-    is noise in those directions alone: a form of 10 µm is seen on a face whose height is known to 90 µm.
+    The height and tilt of a face on an unknown place, zeros and scatter of coefficients are noise in those
+    directions alone: a form of 10 µm is seen on a face whose height is known to 90 µm.
     """
     blocks = _all_identified(task).role("validate")
     total, count = 0.0, 0

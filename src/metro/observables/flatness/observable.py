@@ -166,7 +166,7 @@ def _limits(batch: Batch) -> list[str]:
         "spindle is square to it. Where no impact test at the pose gives the damping of the arm, its modes "
         "share one ratio of 5 %, known to a factor of two.",
         "Scans are placed by the declared scanner-to-work transform. Its height, and its tilts as the height "
-        "at the edges, may be off by 0.1 mm in all scans alike, and by another 10 µm in each scan."
+        "at the edges, may have an error of 0.1 mm that all scans share, and another of 10 µm in each scan."
         if placed
         else "No scanner-to-work transform is declared: an offset and two tilts are left out of the measured "
         "and of the predicted heights alike, so that only the shape is compared, and what moves or tilts a "

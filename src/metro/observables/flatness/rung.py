@@ -1,0 +1,58 @@
+"""The ringing of a face at every passage, for modes that are tuned higher or lower than the load tests say.
+
+A tip whose stiffness is ``s`` times that of the load tests and whose mass is ``m`` times the declared one
+rings like theirs, tuned by √(s/m), over s. So one interpolation over the tuning serves stiffness and mass
+alike. Other effects on a face do not change its ringing: it is kept.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from metro.units import Array
+
+if TYPE_CHECKING:
+    from metro.observables.flatness.model import FaceSetting
+    from metro.observables.flatness.ringing import Ringing
+
+NODES = 0.01  # spacing of nodes in the logarithm of the tuning, between which ringing is interpolated
+
+
+@lru_cache(maxsize=256)
+def rung(setting: FaceSetting, tuning: float) -> Array:
+    """Height over the static one at each passage, (n, k) m, of a tip as stiff as in the load tests.
+
+    It is already a mean along the feed, because its waves may be shorter than a disc.
+    """
+    ringing = setting.ringing
+    if ringing is None:
+        return np.zeros(setting.passages.along.shape)
+    place = math.log(tuning) / NODES
+    moved = sum(weight * _moved(ringing, node) for node, weight in _cubic(place))
+    of_teeth = ringing.tuned(tuning).of_teeth(setting.passages)
+    return np.asarray(ringing.at(np.asarray(moved), setting.middle) + of_teeth)
+
+
+def sharper(setting: FaceSetting, tuning: float) -> Array:
+    """Return what the heights of :func:`rung` gain per relative rise of the tip's frequencies, (n, k) m."""
+    high, low = (rung(setting, tuning * math.exp(step)) for step in (NODES, -NODES))
+    return np.asarray((high - low) / (2.0 * NODES))
+
+
+def _cubic(place: float) -> list[tuple[int, float]]:
+    """Return the integers about a place, each with its weight in Lagrange's cubic interpolation."""
+    if place == round(place):
+        return [(round(place), 1.0)]
+    first = math.floor(place) - 1
+    share = place - first
+    return [(first + i, math.prod((share - j) / (i - j) for j in range(4) if j != i)) for i in range(4)]
+
+
+@lru_cache(maxsize=1024)
+def _moved(ringing: Ringing, node: int) -> Array:
+    """Ringing at one node, kept: it takes long."""
+    return ringing.tuned(math.exp(node * NODES)).moved()
