@@ -118,6 +118,13 @@ def test_signals_of_one_size_leave_all_that_is_missed_relative():
     assert found.misfit["x"] > 0.0
 
 
+def test_what_cuts_miss_is_no_error_of_a_load_test_or_an_instrument():
+    """Their axes may have the same names, and quite another unit."""
+    one = replace(runs(1, 0.0)[0][0], role="calibrate")
+    noise = Noise(0.0, np.full(2, 0.01), {}, misfit={"x": 0.2}, level={"x": 3.0})
+    assert diagonal(one, noise) == pytest.approx(diagonal(one, noise.sound))
+
+
 def test_a_load_test_tells_nothing_of_the_scatter_of_cuts():
     (one, matrix, rest), *_ = runs(1, 0.05)
     load = replace(one, role="calibrate")

@@ -19,7 +19,7 @@ def apply(model: WithStructure, values: Mapping[str, float]) -> WithStructure:
 
 
 # The frequency at which a tip rings goes with the root of its stiffness: waves are found from beside only.
-BESIDE = (0.45, 0.6, 0.75, 0.88, 0.96, 1.04, 1.14, 1.35, 1.65, 2.1)
+BESIDE = (0.45, 0.6, 0.75, 0.88, 0.96, 1.04, 1.14, 1.37, 1.67, 2.1)
 
 OF_MACHINE = Effect(
     name="stiffness_scale",

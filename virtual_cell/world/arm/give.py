@@ -24,7 +24,7 @@ _MDEG = 1e-3 * DEG
 
 def _other_tool(rng: np.random.Generator, _: Robot) -> Parameters:
     """Draw the row of another tool: another length along the flange's x, in a holder that is turned."""
-    length = drawn_signed(rng, 8.0, 150.0)
+    length = drawn_signed(rng, 45.0, 260.0)
     lateral = rng.uniform(-0.45, 0.45, 2) * length
     d = (length, lateral[0], lateral[1])
     return {name: float(round(v, 2)) for name, v in zip(("dx_mm", "dy_mm", "dz_mm"), d, strict=True)}
@@ -36,7 +36,7 @@ def _elsewhere(robot: Robot, p: Parameters) -> Robot:
 
 def _gap(rng: np.random.Generator, robot: Robot) -> Parameters:
     joint = drawn_joint(rng, robot.moves.swaying or (0,))
-    return {"joint": joint, "angle_mdeg": drawn_size(rng, 0.8, 12.0)}
+    return {"joint": joint, "angle_mdeg": drawn_size(rng, 3.0, 33.0)}
 
 
 def _worn(robot: Robot, p: Parameters) -> Robot:
@@ -47,7 +47,7 @@ def _worn(robot: Robot, p: Parameters) -> Robot:
 def _preload(rng: np.random.Generator, _: Robot) -> Parameters:
     """Draw a loss (or a gain) of preload, of every joint or of one that gives way along the walls."""
     every = rng.uniform() < 0.6
-    size = drawn_signed(rng, 0.03, 0.5) if every else drawn_signed(rng, 0.08, 0.8)
+    size = drawn_signed(rng, 0.135, 0.7) if every else drawn_signed(rng, 0.3, 1.15)
     return {
         "factor": float(round(math.exp(size), 3)),
         "joint": "all" if every else drawn_joint(rng, (0, 1, 2, 4, 5)),
@@ -93,7 +93,7 @@ def _hard(rng: np.random.Generator, robot: Robot) -> Parameters:
     joint = drawn_joint(rng, (0, 1, 2, 4, 5))
     torque = 600.0 * robot.moves.lever[joint - 1]
     k = float(robot.springs.stiffness[joint - 1])
-    return {"joint": joint, "cubic": drawn_size(rng, 0.4, 8.0) * k**3 / torque**2}
+    return {"joint": joint, "cubic": drawn_size(rng, 2.0, 17.5) * k**3 / torque**2}
 
 
 def _hardened(robot: Robot, p: Parameters) -> Robot:
