@@ -16,6 +16,9 @@ from load_rows import load_table
 from metro.batch.batch import Batch
 from metro.batch.findings import ContractError
 from metro.batch.processed import COLUMNS, Processed, read_batch
+from metro.effects.library import library
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness import observable as flatness
 from metro.observables.flatness.model import FaceSetting, LoadSetting
@@ -404,6 +407,11 @@ def test_the_simulated_plate_shows_how_stiff_the_arm_was_in_the_cut(tmp_path: Pa
         for factor in (0.7, 0.8, 0.9, 1)
     }
     assert min(misfit, key=misfit.__getitem__) == 0.8
+    # The force of the base model can stand in for it, and so can masses: far beyond what is believed of them.
+    outcome = search(task, library("flatness"), Gates(0.007, 0.004, 0.05, 3.0, 1))
+    assert sum(outcome.base.chi2[b.run] for b in task.blocks if b.belief) > 30.0
+    assert [effect.name for effect in outcome.final.candidate.effects] == ["stiffness_scale"]
+    assert outcome.final.theta[0] == pytest.approx(0.8, abs=0.05)
 
 
 def _misfit(task: Problem, factor: float, run: str) -> float:

@@ -73,7 +73,8 @@ def compare(smaller: Fit, larger: Fit) -> Evidence:
     parameters = len(larger.theta) - len(smaller.theta) + runs * (_own(larger) - _own(smaller))
     sought = _sought(larger) / _sought(smaller)
     p_value = -math.expm1(sought * math.log1p(-min(tail(statistic, parameters, runs), 1.0 - 1e-16)))
-    return Evidence(statistic, p_value, {}, change(smaller, larger), missed(larger), sought)
+    size = math.hypot(change(smaller, larger), _taken(smaller, larger))
+    return Evidence(statistic, p_value, {}, size, missed(larger), sought)
 
 
 def hold_out(evidence: Evidence, smaller_out: Mapping[str, float], larger: Fit, prior: Noise) -> Evidence:
@@ -98,6 +99,29 @@ def tail(statistic: float, parameters: int, runs: int) -> float:
     from scipy.stats import f
 
     return float(f.sf(max(statistic, 0.0) / parameters, parameters, runs + PRIOR_RUNS))
+
+
+def _taken(smaller: Fit, larger: Fit) -> float:
+    """Rms change by base parameters of which something is believed, over the rms measured, over the runs.
+
+    An effect that they stand in for changes no prediction, but spares them a strain: it is as large as that.
+    """
+    model, believed = smaller.candidate.model(smaller.theta), np.zeros(len(smaller.beta), dtype=bool)
+    for block in smaller.blocks:
+        if block.belief:
+            believed |= model.design(block, smaller.nuisance[block.run], smaller.beta)[0].any(axis=0)
+    if not believed.any():
+        return 0.0
+    moved = np.where(believed, smaller.beta - larger.beta, 0.0)
+    taken, signal = 0.0, 0.0
+    for block in smaller.blocks:
+        if block.role != "calibrate":
+            design, _ = model.design(block, smaller.nuisance[block.run], smaller.beta)
+            taken, signal = (
+                taken + float(np.sum((design @ moved) ** 2)),
+                signal + float(np.sum(block.measured**2)),
+            )
+    return math.sqrt(taken / signal)
 
 
 def change(smaller: Fit, larger: Fit) -> float:
