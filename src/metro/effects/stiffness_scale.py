@@ -44,6 +44,7 @@ def _gives_way(effect: Effect, problem: Any) -> Effect | Refusal:
     return effect
 
 
+# Without waves, one start on each side of the neutral factor is enough.
 AWAY = (EffectParameter("factor", "1", 0.2, 5.0, 0.05, starts=(0.8, 1.2)),)
 OF_SIDE_CUTS = replace(
     OF_MACHINE,

@@ -117,10 +117,8 @@ def _taken(smaller: Fit, larger: Fit) -> float:
     for block in smaller.blocks:
         if block.role != "calibrate":
             design, _ = model.design(block, smaller.nuisance[block.run], smaller.beta)
-            taken, signal = (
-                taken + float(np.sum((design @ moved) ** 2)),
-                signal + float(np.sum(block.measured**2)),
-            )
+            taken += float(np.sum((design @ moved) ** 2))
+            signal += float(np.sum(block.measured**2))
     return math.sqrt(taken / signal)
 
 

@@ -127,7 +127,7 @@ def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION
 
 
 def missed(block: Block, noise: Noise) -> Array:
-    """Mean square of what the model misses, by element (n,), SI²; in cuts, which alone tell it."""
+    """Mean square of what the model misses, by element (n,), SI². It is zero in a load test."""
     names, number, rms = _axes(block)
     if block.role == "calibrate":
         return np.zeros(len(rms))

@@ -26,9 +26,7 @@ from metro.observables.problem import Problem
 
 STRATEGY: Strategy = forward  # the one in use
 NOT_VISIBLE = 0.02  # share of a signature that the base parameters leave, below which it is not tried
-STRAINED = (
-    0.01  # p-value of what the base fit makes of what is believed beforehand, below which all are tried
-)
+STRAINED = 0.01  # p-value of what is believed beforehand in the base fit, below which all are tried
 DIM = 0.1  # share that the zeros of the runs leave, below which an effect is listed as hidden by them
 EVEN = 0.5  # least share explained by effects that are claimed
 SESSION = 0.005  # p-value of a step along the session that counts

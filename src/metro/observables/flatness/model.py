@@ -287,7 +287,7 @@ def _shaped(
 def _believed(basis: Basis, setting: FaceSetting, tuning: float, finished_by: bytes) -> tuple[Array, Array]:
     """Return what faces gain, (bins,) m, per relative rise of the force, and of the frequencies.
 
-    Both are of the load tests: that of the force need not be better known than their compliance is.
+    Both hold for the compliance of the load tests alone, so that they are linear in the base parameters.
     """
     chosen = _places(finished_by)
     height = _static(basis, setting)[chosen] + rung(setting, tuning)[chosen]
