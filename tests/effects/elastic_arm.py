@@ -4,6 +4,7 @@ Nothing of the statics or of the torsion of the models is used: where joints tak
 differences of the forward kinematics, torques from virtual work, twists from a root finder.
 """
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -93,8 +94,9 @@ def cut(order, role, place, size, *, truth, rng):
     z = [deflection(arm, one, force, truth, cutting=True, rate=v) for one, v in zip(q, rate, strict=True)]
     z = np.array(z) @ normal
     kept = np.arange(4, POINTS - 4, 4)
-    setting = CutWall(q, q, rate, np.tile(known, (POINTS, 1)), normal, SPACING, CUTOFF, kept)
+    setting = CutWall(q, q, rate, np.tile(known, (POINTS, 1)), normal, SPACING, CUTOFF, kept, "dynamometer")
     softness = DeformationModel(ARM).per_newton(setting, 1 / STIFFNESS)
+    setting = replace(setting, harder=np.linalg.norm(known) * softness)
     return Block(
         run=f"r{order:02d}",
         condition=f"{role} {pose} {degrees} {way} {size}",

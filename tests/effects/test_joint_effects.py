@@ -1,7 +1,6 @@
 """What one joint does: found where it is hidden, of the right joint; absent where not; confusions named."""
 
 from dataclasses import replace
-from functools import partial
 from types import SimpleNamespace
 
 import elastic_arm
@@ -21,7 +20,7 @@ from metro.effects.library import library, with_declared
 from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
 from metro.loop.verdict.verdict import parameters
-from metro.observables.deformation.blocks import wall_error
+from metro.observables.deformation.blocks import WallErrors
 from metro.observables.deformation.model import CutWall, DeformationModel
 from metro.observables.deformation.proposals import feasible
 from metro.observables.problem import Refusal
@@ -84,7 +83,7 @@ def test_proposed_walls_part_joints_that_the_cuts_do_not():
         return DeformationModel(ARM).per_newton(setting, softness)
 
     walls = [block for block in task.blocks if isinstance(block.setting, CutWall)]
-    error = partial(wall_error, per_newton=per_newton, lack_of_fit=0.0)
+    error = WallErrors(per_newton, lack_of_fit=0.0)
     proposals = feasible(walls, task.role("calibrate"), ARM, error)
     outcome = search(task, joint_backlash.EFFECT, GATES)
     best = prospects(outcome.final, outcome.rivals[0].fit, proposals)[0]

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from metro.observables.arm.lack_of_fit import directions, lack_of_fit
-from metro.observables.deformation.blocks import wall_error
+from metro.observables.deformation.blocks import WallErrors
 
 POSES, LOADS, JOINTS = 30, 24, 6
 NOISE, SHARE = 10e-6, 0.05
@@ -89,7 +89,6 @@ def test_directions_are_those_of_a_compliance_matrix():
 
 def test_the_lack_of_fit_is_an_error_of_a_wall_beside_that_of_its_force():
     force = np.array([[0.0, 30.0, 40.0], [0.0, 0.0, 20.0]])  # 50 N at most
-    made = wall_error(
-        SimpleNamespace(force=force), 0.03, lambda _: np.full((2, 3), 1e-6), lack_of_fit=0.04 * np.sqrt(3.0)
-    )
+    errors = WallErrors(lambda _: np.full((2, 3), 1e-6), lack_of_fit=0.04 * np.sqrt(3.0))
+    made = errors.own(SimpleNamespace(force=force), 0.03)
     assert made == pytest.approx(np.full((2, 3), 0.05 * 50.0 * 1e-6))

@@ -14,6 +14,7 @@ from metro.slips.waveform import Coefficients, Record, design, fit
 
 EVERY = list(signed_permutations())
 OTHERS = [matrix for matrix in EVERY if not np.array_equal(matrix, np.eye(3))]
+UPSIDE_DOWN = np.diag([1.0, 1.0, -1.0])
 FEW = OTHERS[::9]
 
 
@@ -32,6 +33,8 @@ def true_axes(matrix):
     back = matrix.T
     right = np.linalg.det(back) > 0
     axes = axes_text(back if right else -back)
+    if np.array_equal(matrix, UPSIDE_DOWN):
+        return f"then write reads: tool, axes: {axes}"
     if right:
         return f"Likely: axes: {axes}"
     return "Likely: reads: tool" + ("" if np.array_equal(back, -np.eye(3)) else f", axes: {axes}")
@@ -51,6 +54,15 @@ def test_a_wrong_orientation_is_found_with_the_line_to_write(matrix):
 @pytest.mark.parametrize("matrix", OTHERS, ids=axes_text)
 def test_each_of_the_wrong_orientations_is_found(matrix):
     assert true_axes(matrix) in found_orientation(matrix)
+
+
+def test_an_axial_force_that_points_the_other_way_alone_is_to_be_checked_and_spoils_nothing():
+    """Tables of coefficients do not agree on it: a right-hand helix pulls the tool out of its holder."""
+    (doubt,) = contradictions([record.mapped(UPSIDE_DOWN) for record in records()], CUTTER, SENSOR)
+    assert doubt.observables == ()
+    assert "push the dynamometer by hand along its axis" in doubt.text
+    (sure,) = contradictions([record.mapped(-UPSIDE_DOWN) for record in records()], CUTTER, SENSOR)
+    assert "force" in sure.observables
 
 
 def test_the_declared_axes_and_rotation_are_where_the_proposal_starts():
@@ -156,5 +168,5 @@ def test_an_end_that_nobody_declared_is_no_slip_of_the_axes():
 def test_wrong_axes_of_a_ball_end_that_nobody_declared_are_found_with_the_end(matrix):
     given = [record.mapped(matrix) for record in depth_sweep(BALL, SLIDING)]
     (slip,) = contradictions(given, CUTTER, SENSOR, (BALL,))
-    assert true_axes(matrix).removeprefix("Likely: ") in slip.text
+    assert true_axes(matrix).removeprefix("Likely: ").removeprefix("then write ") in slip.text
     assert "with a ball end of the tool" in slip.text

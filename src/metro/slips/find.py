@@ -40,8 +40,8 @@ def find(
     identified : content of identified.json.
     """
     slips = speed_slips(batch, read) or _of(tasks, "force", lambda task: force_slips(batch, task))
-    if not slips:
-        slips = _of(tasks, "joint_force", joint_slips)
+    if not any(slip.observables for slip in slips):
+        slips = (*slips, *_of(tasks, "joint_force", joint_slips))
     return (*slips, *_of_the_machine(batch, read, observed, identified))
 
 

@@ -18,7 +18,7 @@ from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem
 from metro.slips import channels, chip_geometry, orientation, run_table
 from metro.slips.hypothesis import Hypothesis
-from metro.slips.physical import coefficients_text, impossible, mean_chip
+from metro.slips.physical import against_helix, coefficients_text, impossible, mean_chip
 from metro.slips.slip import Slip
 from metro.slips.speed import period, repeats_per_revolution, turns_as_declared
 from metro.slips.waveform import Design, Record, WaveFit, design, fit, record_of
@@ -47,8 +47,9 @@ def force_slips(batch: Batch, problem: Problem) -> tuple[Slip, ...]:
     """Fit the straight cuts under the declared bookkeeping and under every slip of the list.
 
     A slip is stated where the declared coefficients are impossible, or where another bookkeeping, with
-    possible ones, explains the waveforms decisively better. Helical cuts alone give none: where on the orbit
-    they begin is not known.
+    possible ones, explains the waveforms decisively better; one that spoils nothing, where all that speaks
+    against the declaration is which way the axial force points. Helical cuts alone give none: where on the
+    orbit they begin is not known.
     """
     records = [record_of(block) for block in problem.blocks if block.setting.helix is None]
     base = cast("ForceModel", problem.base)
@@ -79,21 +80,39 @@ def contradictions(
     sensor : its entry of the manifest. ends : the cutter with the ends that it may have instead.
     """
     designs = [design(cutter, record.setting) for record in records]
-    declared, chip = fit(records, designs), mean_chip(records)
-    faults = impossible(declared, chip, _deciding(cutter))
+    declared, chip, helix = fit(records, designs), mean_chip(records), _deciding(cutter)
+    faults = impossible(declared, chip, helix)
     tried = [Tried(one, one.fitted()) for one in _hypotheses(records, designs, cutter, sensor, declared)]
-    possible = [one for one in tried if not impossible(one.fitted, chip, _deciding(cutter))]
+    possible = [
+        one
+        for one in tried
+        if not (impossible(one.fitted, chip, helix) or against_helix(one.fitted, chip, helix))
+    ]
     others = [Tried(one, one.fitted()) for one in _with_ends(records, ends, sensor)]
     possible += [one for one in others if not impossible(one.fitted, chip, 0.0)]
     limit = declared.misfit * (ALIKE if faults else BETTER)
     better = sorted((one for one in possible if one.fitted.misfit < limit), key=lambda one: one.fitted.misfit)
     if not faults and not better:
-        return ()
+        return _upside_down(declared, possible, chip, helix)
     least = better[0].fitted.misfit if better else math.nan
     named = [one for one in better if one.fitted.misfit <= ALIKE * least]
     if any(one.hypothesis.kind == END for one in named):
         return ()
     return (_slip(declared, faults, named[:MOST_NAMED], chip),)
+
+
+def _upside_down(declared: WaveFit, possible: list[Tried], chip: float, helix: float) -> tuple[Slip, ...]:
+    """Return what is to be checked where an axial force is not as the helix; alone it spoils no result."""
+    found = against_helix(declared, chip, helix)
+    alike = [one for one in possible if one.fitted.misfit < ALIKE * declared.misfit]
+    if not found or not alike:
+        return ()
+    best = min(alike, key=lambda one: one.fitted.misfit).hypothesis
+    remedy = (
+        f"Either fz has the other sign, then write {best.remedy}; or the tool is pulled the other way than "
+        "most tables of coefficients have it. To decide, push the dynamometer by hand along its axis"
+    )
+    return (Slip((), f"with the force as declared {found}", remedy, best.file, best.column),)
 
 
 def _deciding(cutter: Cutter) -> float:

@@ -18,6 +18,7 @@ RADIAL = (
 )
 AXIAL_MARGIN = 1.5  # on K_ac <= K_tc tan(helix), which is for an edge without corner
 LIKE_THE_MODEL = 0.5  # misfit up to which waveforms say what the coefficients are; noise decides beyond it
+WAYS = (1.0, -1.0)
 SPECIFIC = (20.0, 1e5)  # N/mm2: from plastics to ten times hardened steel, for the thinnest chips
 
 
@@ -37,8 +38,8 @@ def impossible(fitted: WaveFit, chip: float, helix: float) -> tuple[str, ...]:
 
     Judged is the force per width of cut at the mean chip, K h + K_e, of which shear and edge term are parts.
     Along the cutting speed it takes power from the spindle (> 0), and the chip presses the edge away from the
-    work (> 0) by no more than friction and rake allow. In oblique cutting the axial force has the sign of the
-    helix, and its shear term is at most K_tc tan(helix) (docs/slips.md).
+    work (> 0) by no more than friction and rake allow. In oblique cutting the shear term of the axial force
+    is at most K_tc tan(helix), whichever way it points (docs/slips.md).
 
     Parameters
     ----------
@@ -48,6 +49,22 @@ def impossible(fitted: WaveFit, chip: float, helix: float) -> tuple[str, ...]:
     if by_mean or fitted.misfit > LIKE_THE_MODEL:
         return by_mean
     return tuple(f"{text}, by waveform" for text in _impossible(fitted.wave, chip, helix))
+
+
+def against_helix(fitted: WaveFit, chip: float, helix: float) -> str:
+    """Say that the axial force has not the sign that the helix has; "" where it may have it.
+
+    A right-hand helix has a positive K_ac in the tables of coefficients. Which way a sensor counts as upwards
+    is not the same in all of them, so that this alone proves no mistake.
+    """
+    if abs(helix) <= LEAST_HELIX:
+        return ""
+    axial, side = _total(2, chip), math.copysign(1.0, helix)
+    wrong = "is negative" if side > 0 else "is positive, with a left-hand helix"
+    by_mean = _beyond(fitted.mean, -side * axial, "K_ac h + K_ae", axial, wrong)
+    if by_mean or fitted.misfit > LIKE_THE_MODEL:
+        return by_mean
+    return _beyond(fitted.wave, -side * axial, "K_ac h + K_ae", axial, wrong)
 
 
 def _impossible(coefficients: Coefficients, chip: float, helix: float) -> tuple[str, ...]:
@@ -60,13 +77,12 @@ def _impossible(coefficients: Coefficients, chip: float, helix: float) -> tuple[
     if not any(texts):
         over = f"exceeds {RADIAL} (K_tc h + K_te)"
         texts.append(_beyond(coefficients, radial - RADIAL * along, "K_rc h + K_re", radial, over))
-    if abs(helix) > LEAST_HELIX:
-        side, most = math.copysign(1.0, helix), AXIAL_MARGIN * math.tan(abs(helix))
-        wrong = "is negative" if side > 0 else "is positive, with a left-hand helix"
-        texts.append(_beyond(coefficients, -side * axial, "K_ac h + K_ae", axial, wrong))
-        if not any(texts):
-            over = f"exceeds {most:.2g} (K_tc h + K_te)"
-            texts.append(_beyond(coefficients, side * axial - most * along, "K_ac h + K_ae", axial, over))
+    if abs(helix) > LEAST_HELIX and not any(texts):
+        most = AXIAL_MARGIN * math.tan(abs(helix))
+        over = f"exceeds {most:.2g} (K_tc h + K_te)"
+        texts += [
+            _beyond(coefficients, way * axial - most * along, "K_ac h + K_ae", axial, over) for way in WAYS
+        ]
     value, sd = coefficients.of(ktc)
     low, high = (limit * N_MM2 for limit in SPECIFIC)
     if value - DEVIATIONS * _known(sd, value) > high or 0.0 < value + DEVIATIONS * _known(sd, value) < low:

@@ -13,7 +13,8 @@ class Slip:
 
     Attributes
     ----------
-    observables : those whose results it spoils: nothing is attributed in them.
+    observables : those whose results it spoils: nothing is attributed in them. None where it may be a slip,
+        and is to be checked.
     found : what contradicts, with its numbers; a sentence without its full stop.
     remedy : which mistake explains it and which line or cell to change; "" where none of the list does.
     file, column, run : where the line to change is, as far as it is one.

@@ -2,14 +2,38 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from metro.units import JSON
+
+# Base parameters of which something is believed beforehand, by the pattern of their names.
+BELIEFS = {
+    r"softer_joint_(\d)": "compliance of joint {} in the cut, against the load tests",
+    r"wall_zero": "zero of all walls",
+    r"force_off": "force",
+    r"force_off_(\w+)_([xyz])": "force by the {}, along {} and relative to its size",
+    r"place_height": "height of the scanner",
+    r"place_tilt_([xy])": "tilt of the scanner along {}, at the edges of the work",
+    r"ringing_off_(\w+)": "frequencies of the tip at pose {}",
+    r"torque_gain": "gain of all torques",
+    r"gain_of_joint_(\d)": "gain of the torque of joint {}",
+    r"gain_of_(.)": "gain of the dynamometer along {}",
+    r"crosstalk_of_(.)_in_(.)": "crosstalk of the dynamometer from {} to {}",
+}
 
 
 def plain(name: str) -> str:
     """Write the name of an effect or observable as words."""
     return name.replace("_", " ")
+
+
+def belief(name: str) -> str:
+    """Write the name of a base parameter that says by how much an instrument, or what is declared, is off."""
+    for pattern, words in BELIEFS.items():
+        if found := re.fullmatch(pattern, name):
+            return words.format(*found.groups())
+    return plain(name)
 
 
 def listed(names: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from metro.units import JSON, printed, printed_name
 from metro.wording.candidates import Sentence
-from metro.wording.names import listed, plain
+from metro.wording.names import belief, listed, plain
 
 MOST_PLACES = 4  # that are named
 LEAST_CHANCE = 1e-4  # below it, tails of the distribution are no figure to quote
@@ -140,6 +140,33 @@ def _noise(values: JSON) -> str:
     return words
 
 
+def _in_percent(one: JSON) -> JSON:
+    """Return what is believed of a plain ratio in percent."""
+    numbers = {name: 100.0 * one[name] for name in ("sd", "before", "after")}
+    return {**one, **numbers, "unit": "%"} if one["unit"] == "1" else one
+
+
+def _strained(values: JSON) -> str:
+    """Say what the instruments would have to be off, without and with the effects."""
+    effects, without, left = values["effects"], [], []
+    for one in map(_in_percent, values["far"]):
+        known = f"known within ±{2.0 * one['sd']:.2g} {printed(one['unit'])}"
+        if abs(one["before"]) > values["limit"] * one["sd"]:
+            then = f", with {'them' if len(effects) > 1 else 'it'} {one['after']:.2g}" if effects else ""
+            without.append(
+                f"{belief(one['name'])} {one['before']:.2g} {printed(one['unit'])} ({known}{then})"
+            )
+        else:
+            left.append(f"{belief(one['name'])} {one['after']:.2g} {printed(one['unit'])} ({known})")
+    words = []
+    if without:
+        lacking = f"Without {listed(effects)}" if effects else "By these runs"
+        words.append(f"{lacking}, errors of the instruments would have to be: {'; '.join(without)}.")
+    if left:
+        words.append(f"With {listed(effects)} they would have to be: {'; '.join(left)}.")
+    return " ".join(words)
+
+
 PARTS = {
     "same": "is the same in every run",
     "feed": "grows with the feed",
@@ -210,5 +237,6 @@ SENTENCES: Mapping[str, Sentence] = {
     "above_floor": _above_floor,
     "verification": _verification,
     "noise": _noise,
+    "strained": _strained,
     "contradiction": "not judged, because the data contradict the declaration of the batch",
 }

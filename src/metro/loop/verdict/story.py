@@ -10,6 +10,7 @@ from metro.loop.search.outcome import Outcome
 from metro.loop.search.trial import Gates, Trial
 from metro.loop.statement import Statement
 from metro.loop.verdict.advice import ranked
+from metro.loop.verdict.beliefs import beliefs, strained
 from metro.loop.verdict.verdict import error, estimates, gain, held_out_rms, parameters, why_not
 from metro.observables.problem import Block, Problem
 from metro.units import JSON, Array
@@ -19,10 +20,13 @@ MOST_PROPOSALS = 5  # that are listed
 
 def story(problem: Problem, outcome: Outcome, verdict: JSON, gates: Gates) -> JSON:
     """Return the observable's entry of loop.json, all that was tried: statements where that has sentences."""
+    believed = beliefs(outcome)
     return {
         "unit": problem.unit,
         "notes": list(problem.notes),
         "noise": _noise(problem, outcome, verdict, gates),
+        "believed": believed,
+        "strained": strained(believed, outcome),
         "candidates": [_tried(problem, trial, outcome) for trial in outcome.trials],
         "path": _path(problem, outcome),
         "signature_unit": problem.basis_unit or problem.unit,

@@ -11,7 +11,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.joint_columns import Axes
 from metro.observables.arm.lack_of_fit import LackOfFit, directions, lack_of_fit
-from metro.observables.deformation.model import DeformationModel, KnownJoints, LoadTest
+from metro.observables.deformation.model import DeformationModel, KnownParameters, LoadTest
 from metro.observables.problem import Block, Refusal
 from metro.robot import identifiability
 from metro.robot.identifiability import Identifiability, NextLoad
@@ -89,7 +89,7 @@ def best_compliance(batch: Batch, model: DeformationModel, loads: pd.DataFrame) 
     if not isinstance(tests, Refusal):
         return tests.value
     known = batch.cell.get("joint_stiffness_nm_rad")
-    return np.zeros(len(model.parameters)) if known is None else 1.0 / np.asarray(known, dtype=float)
+    return np.zeros(len(model.arm.dh)) if known is None else 1.0 / np.asarray(known, dtype=float)
 
 
 def fitted_loads(model: DeformationModel, loads: pd.DataFrame) -> Compliances | Refusal:
@@ -198,11 +198,11 @@ def _load_block(pose: str, loads: pd.DataFrame, sigma: Array, arm: Arm, per_newt
 
 def _known_block(joints: np.ndarray, value: Array, sd: Array) -> Block:
     axis = np.array([f"joint {i + 1}" for i in joints])
-    return _evidence("known joints", value, sd, KnownJoints(joints), axis)
+    return _evidence("known joints", value, sd, KnownParameters(joints), axis)
 
 
 def _evidence(
-    name: str, measured: Array, sigma: Array, setting: LoadTest | KnownJoints, axis: np.ndarray
+    name: str, measured: Array, sigma: Array, setting: LoadTest | KnownParameters, axis: np.ndarray
 ) -> Block:
     """Return a block that calibrates: it belongs to no cut, has no zeros, and is never compared."""
     zeros = np.zeros((len(measured), 0))

@@ -1,10 +1,10 @@
-"""Walls as blocks: the deformation of one run from its trace, and the uncertainty of its force."""
+"""Walls as blocks: the deformation of one run from its trace, and the errors that it has alone or shares."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,17 +17,46 @@ from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import wall
 from metro.observables.arm.wall_profile import SPACING
 from metro.observables.cut.conditions import feed
-from metro.observables.deformation.model import CutWall
+from metro.observables.deformation.model import AXES, WALL_ZERO, CutWall, DeformationModel, KnownParameters
 from metro.observables.problem import Block
 from metro.units import MM, UM, Array
 
-# Relative error of the force of a run, and of the error that all runs share, by the source of the force. The
-# force from a repeat with a dynamometer is as accurate as that, and as repeats agree (2 %).
-SYSTEMATIC = {**tip_force.SYSTEMATIC, "repeat": math.hypot(tip_force.SYSTEMATIC["dynamometer"], 0.02)}
+AS_REPEATS = 0.02  # relative, how well the forces of repeats agree
+# Relative error of the force of a run by its source; all runs share it, but for that between repeats.
+SYSTEMATIC = {**tip_force.SYSTEMATIC, "repeat": math.hypot(tip_force.SYSTEMATIC["dynamometer"], AS_REPEATS)}
+LOADED = 0.01  # load cell and gauge of the load tests, which all walls share
+# Of a joint's compliance at the twist of a cut about that at the twist of the load tests: gears are some 5 to
+# 10 % softer where they are twisted least.
+SOFTER = 0.05
+TOUCHED = 10 * UM  # of the zero that all walls share: the touch on the work, and the tool's radius
 ZERO = 5 * UM  # standard error of a profile's zero against the programmed wall, before repeats show theirs
 DECLARED = 4  # walls for which that counts
-PerNewton = Callable[[CutWall], Array]
-WallError = Callable[[CutWall, float], Array]  # :func:`wall_error` of an arm
+
+
+@dataclass(frozen=True)
+class WallErrors:
+    """What an error of the force does to a wall of one arm.
+
+    Attributes
+    ----------
+    per_newton : see :meth:`metro.observables.deformation.model.DeformationModel.per_newton`.
+    lack_of_fit : relative rms, over all directions of force (:mod:`metro.observables.arm.lack_of_fit`).
+    """
+
+    per_newton: Callable[[CutWall], Array]
+    lack_of_fit: float
+
+    def harder(self, setting: CutWall) -> Array:
+        """Return what a wall gains, (n, 3) m, if the force is wrong along x, y or z by its whole size."""
+        return float(np.linalg.norm(setting.force, axis=1).max()) * self.per_newton(setting)
+
+    def own(self, setting: CutWall, relative: float = 0.0) -> Array:
+        """Return the error of a wall in which it is alone, (n, 3) m, for one of its force that it alone has.
+
+        The arm gives way in each direction by another share than its joints say, which is an error as that of
+        a force in that direction.
+        """
+        return math.hypot(relative, self.lack_of_fit / math.sqrt(3.0)) * self.harder(setting)
 
 
 def cutoff(batch: Batch) -> float:
@@ -36,11 +65,11 @@ def cutoff(batch: Batch) -> float:
 
 
 def wall_blocks(
-    batch: Batch, observed: Mapping[str, pd.DataFrame], error: WallError
+    batch: Batch, observed: Mapping[str, pd.DataFrame], errors: WallErrors
 ) -> tuple[list[Block], tuple[str, ...]]:
     """Return a block per wall that was traced, and sentences on the runs that have none.
 
-    ``error``: of a wall for a relative error of its force, see :func:`wall_error`.
+    ``errors``: of a wall that those of its force make.
     """
     refused = observed["deformation_refused"].groupby(["what", "reason"], sort=False)["run"]
     notes = [f"No {what} of {', '.join(runs)}: {reason}." for (what, reason), runs in refused]
@@ -50,7 +79,7 @@ def wall_blocks(
     for name, table in points.groupby("run", sort=False):
         run = str(name)
         if run in forces and batch.runs.loc[run, "role"] in {"identify", "validate"}:
-            block = _wall_block(batch, run, table, forces[run], error)
+            block = _wall_block(batch, run, table, forces[run], errors)
             if block is None:
                 notes.append(f"Run {run}: the wall is too short for the filter.")
             else:
@@ -84,12 +113,11 @@ def _wall_block(
     run: str,
     points: pd.DataFrame,
     force: pd.DataFrame,
-    error: WallError,
+    errors: WallErrors,
 ) -> Block | None:
     """Wall points away from the filter's and the wall's ends; half a cut-off apart their noise is white.
 
-    The force of a run has about the same error as the force of all runs, in each direction. Neither that
-    error nor the zero of the trace is estimated from the residual, because a displaced wall is no wrong zero.
+    The zero of the trace is not estimated from the residual, because a displaced wall is no wrong zero.
     """
     face, longest = wall(batch, run), cutoff(batch)
     row: Any = batch.runs.loc[run]
@@ -107,8 +135,10 @@ def _wall_block(
     count = len(kept)
     # Without a feed in the run table the rate is zero, and no effect that depends on it is predicted.
     rate = np.gradient(commanded, SPACING, axis=0) * np.nan_to_num(feed(batch, run))
-    setting = CutWall(commanded, actual, rate, at_points, face.normal, SPACING, longest, kept)
-    off = SYSTEMATIC[str(force["source"].iloc[0])]
+    read = str(force["source"].iloc[0])
+    own, source = (AS_REPEATS, "dynamometer") if read == "repeat" else (0.0, read)
+    setting = CutWall(commanded, actual, rate, at_points, face.normal, SPACING, longest, kept, source)
+    setting = replace(setting, harder=errors.harder(setting))
     return Block(
         run=run,
         condition=str(row["condition"]),
@@ -120,21 +150,26 @@ def _wall_block(
         axis=np.full(count, "z"),
         zeros=np.zeros((count, 0)),
         zero_sd=np.zeros(0),
-        unidentified=error(setting, off),
+        unidentified=errors.own(setting, own),
         coordinates={"axis": np.full(count, "z"), "s_mm": x[kept] / MM, "x_mm": x[kept] / MM},
     )
 
 
-def wall_error(setting: CutWall, relative: float, per_newton: PerNewton, lack_of_fit: float) -> Array:
-    """Return the error of a wall for an error in x, y or z by a share of the whole force, (n, 3) m.
+def believed_block(model: DeformationModel) -> Block:
+    """Return what is believed beforehand of the joints in the cut, the walls' zero, and the force.
 
-    The arm gives way in each direction by another share than its joints say, too, which is an error as that
-    of a force in that direction.
-
-    Parameters
-    ----------
-    per_newton : see :meth:`metro.observables.deformation.model.DeformationModel.per_newton`.
-    lack_of_fit : relative rms, over all directions of force (:mod:`metro.observables.arm.lack_of_fit`).
+    A load cell that reads wrong makes all joints stiffer or softer, which is the same as a wrong force on the
+    walls.
     """
-    each = math.hypot(relative, lack_of_fit / math.sqrt(3.0))
-    return each * float(np.linalg.norm(setting.force, axis=1).max()) * per_newton(setting)
+    off = {source: math.hypot(SYSTEMATIC[source], LOADED) for source in model.forces}
+    force = {f"force_off_{source}_{axis}": off[source] for source in model.forces for axis in AXES}
+    known = force | {WALL_ZERO: TOUCHED}
+    sigma = [known.get(one.name, SOFTER) for one in model.believed]
+    count = len(sigma)
+    places = len(model.parameters) - count + np.arange(count)
+    names, zeros, none = np.array([one.name for one in model.believed]), np.zeros((count, 0)), np.zeros(0)
+    return Block(
+        *("believed", "believed", "calibrate", 0, np.zeros(count), np.array(sigma)),
+        *(KnownParameters(places), names, zeros, none, {}),
+        belief=True,
+    )

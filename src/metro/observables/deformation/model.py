@@ -8,8 +8,9 @@ in their compliances; with other joints the model is linear about given complian
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -22,7 +23,10 @@ from metro.robot.statics import joint_torque, moving_jacobian, tip_jacobian
 from metro.robot.torsion import Torsion
 from metro.structure import Structure
 from metro.surface.profile import gaussian_filter
-from metro.units import Array
+from metro.units import UM, Array
+
+WALL_ZERO = "wall_zero"
+AXES = "xyz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +38,9 @@ class CutWall:
     commanded, actual : (m, n) joint angles of the log of the cut, rad. rate : (m, n) their speeds, rad/s.
     force : (m, 3) on the tool, work frame, N. normal : (3,) of the wall, out of the material.
     spacing, cutoff : of the points and of the profile's filter, m. kept : (n,) points that are compared.
+    source : of the force.
+    harder : (n, 3) height that the compared points gain, m, if the force is wrong along work x, y or z by its
+        whole size; None where the force is taken as right.
     """
 
     commanded: Array
@@ -44,6 +51,8 @@ class CutWall:
     spacing: float
     cutoff: float
     kept: np.ndarray
+    source: str = ""
+    harder: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +65,10 @@ class LoadTest:
 
 
 @dataclass(frozen=True, eq=False)
-class KnownJoints:
-    """Joints whose compliances are known beforehand: their indices."""
+class KnownParameters:
+    """Base parameters of which something is known beforehand: their indices."""
 
-    joints: np.ndarray
+    places: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +85,10 @@ class DeformationModel:
     drives : friction that the idle run does not have, on the far side of the springs.
     drift : displacement of the tip from one run to the next, work frame x and y, m.
     give : compliance between flange and edge in the cut: m of the wall per newton along its normal.
+    touched : whether all walls share an error of their zero: the touch on the work, and the tool's radius.
+    forces : sources of the force on the walls. Walls of one source share its errors, along each work axis.
+    springs : compliances of the joints by the load tests alone. Those in the cut may deviate from them, since
+        a gear is softer where it is twisted less. Empty where they do not.
     """
 
     arm: Arm
@@ -85,12 +98,40 @@ class DeformationModel:
     drives: DriveTorques = field(default_factory=DriveTorques)
     drift: tuple[float, float] = (0.0, 0.0)
     give: float = 0.0
+    touched: bool = False
+    forces: tuple[str, ...] = ()
+    springs: tuple[float, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Compliances of the joints, from the base up."""
+        """Compliances of the joints, from the base up, and what is believed of beforehand."""
         units = ["m/N" if linear else "rad/(N m)" for linear in self.arm.axes.linear]
-        return tuple(Parameter(f"joint_compliance_{i + 1}", unit) for i, unit in enumerate(units))
+        joints = (Parameter(f"joint_compliance_{i + 1}", unit) for i, unit in enumerate(units))
+        return (*joints, *self.believed)
+
+    @property
+    def believed(self) -> tuple[Parameter, ...]:
+        """By how much each joint is softer in the cut, the zero of all walls, and errors of the force.
+
+        Those are relative to the size of the force, for each of its sources along the work axes.
+        """
+        softer = [Parameter(f"softer_joint_{i + 1}", "%", 0.01) for i in range(len(self.springs))]
+        zero = [Parameter(WALL_ZERO, "um", UM)] if self.touched else []
+        force = itertools.product(self.forces, AXES)
+        return (
+            *softer,
+            *zero,
+            *(Parameter(f"force_off_{source}_{axis}", "%", 0.01) for source, axis in force),
+        )
+
+    def compliance(self, beta: Array) -> Array:
+        """Return the compliances of the joints in load tests, (n,), among the base parameters."""
+        return beta[: len(self.arm.dh)]
+
+    def in_cut(self, beta: Array) -> Array:
+        """Return the compliances of the joints in the cut, (n,), by the base parameters."""
+        count = len(self.springs)
+        return self.compliance(beta) + (np.array(self.springs) * beta[count : 2 * count] if count else 0.0)
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -102,16 +143,37 @@ class DeformationModel:
         return np.zeros((1, 0))
 
     def design(self, block: Block, _nuisance: Array, beta: Array | None = None) -> tuple[Array, Array]:
-        """Design matrix (n, 6), m per rad/(N m), and offset (n,), m, of a cut, load test or known joints."""
+        """Design matrix (n, p), m per base parameter, and offset (n,), m, of a cut, load test or belief."""
         setting: Any = block.setting
-        about = np.zeros(len(self.arm.dh)) if beta is None else beta
+        about = np.zeros(len(self.parameters)) if beta is None else beta
         if isinstance(setting, CutWall):
-            matrix, offset = self._cut(setting, about)
-            return matrix, offset + block.order * float(setting.normal[:2] @ np.array(self.drift))
+            matrix, offset = self._cut(setting, self.in_cut(about))
+            offset = offset + block.order * float(setting.normal[:2] @ np.array(self.drift))
+            softer = [matrix * np.array(self.springs)] if self.springs else []
+            return np.hstack([matrix, *softer, self._off(setting)]), offset
         if isinstance(setting, LoadTest):
-            return self._loaded(setting, about)
-        rows = np.eye(len(self.arm.dh))[setting.joints]
+            matrix, offset = self._loaded(setting, self.compliance(about))
+            return np.hstack([matrix, np.zeros((len(matrix), len(self.believed)))]), offset
+        rows = np.eye(len(self.parameters))[setting.places]
         return rows, np.zeros(len(rows))
+
+    def _off(self, setting: CutWall) -> Array:
+        """Return what a wall gains per unit of its zero, and of what the force is off, (n, k).
+
+        That holds for the compliances of the load tests alone, so that it is linear in the base parameters.
+        """
+        zero = np.ones((len(setting.kept), int(self.touched)))
+        harder = np.zeros((len(zero), len(AXES))) if setting.harder is None else setting.harder
+        return np.hstack([zero, *(harder * (source == setting.source) for source in self.forces)])
+
+    def believed_force(self, setting: CutWall, beta: Array) -> CutWall:
+        """Return the wall with the force that the base parameters say, instead of the one that was read."""
+        if setting.source not in self.forces:
+            return setting
+        before = len(self.arm.dh) + len(self.springs) + int(self.touched)
+        first = before + len(AXES) * self.forces.index(setting.source)
+        size = np.linalg.norm(setting.force, axis=1)
+        return replace(setting, force=setting.force + np.outer(size, beta[first : first + len(AXES)]))
 
     def torques(self, joints: Array, force: Array) -> Array:
         """Torque on the link of each joint that a force on the tip makes, (m, n), N m."""
@@ -151,7 +213,10 @@ class DeformationModel:
         Linear springs are fitted to the evidence on the joints alone. A joint without evidence is taken to
         have at least a hundredth of the largest compliance.
         """
-        rows = [self.design(block, np.zeros(0))[0] / block.sigma[:, None] for block in _calibrating(blocks)]
+        rows = [
+            self.compliance(self.design(block, np.zeros(0))[0].T).T / block.sigma[:, None]
+            for block in _calibrating(blocks)
+        ]
         right = [block.measured / block.sigma for block in _calibrating(blocks)]
         size = np.linalg.norm(matrix := np.vstack(rows), axis=0)
         scale = np.where(size > 0.0, size, 1.0)
@@ -186,7 +251,7 @@ class DeformationModel:
 
 
 def _calibrating(blocks: Sequence[Block]) -> list[Block]:
-    return [block for block in blocks if block.role == "calibrate"]
+    return [block for block in blocks if block.role == "calibrate" and not block.belief]
 
 
 @lru_cache(maxsize=1024)

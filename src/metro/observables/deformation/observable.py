@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -19,7 +20,7 @@ from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall, wall
 from metro.observables.arm.wall_profile import wall_points
 from metro.observables.deformation import NAME, TABLES
-from metro.observables.deformation.blocks import SYSTEMATIC, cutoff, wall_blocks, wall_error
+from metro.observables.deformation.blocks import SYSTEMATIC, WallErrors, believed_block, cutoff, wall_blocks
 from metro.observables.deformation.model import DeformationModel
 from metro.observables.deformation.proposals import feasible
 from metro.observables.deformation.report import arm_block, tip_forces
@@ -28,7 +29,6 @@ from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.robot.kinematics import Arm, arm_of_cell
 from metro.units import JSON, MM
 
-LOADED = 0.01  # load cell and gauge of the load tests, which all walls share
 SCATTER = 0.005  # of a joint from run to run: what scatters is the force, which each wall allows for
 
 
@@ -121,8 +121,8 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     model = DeformationModel(arm)
     softness = best_compliance(batch, model, observed["arm_loads"])
     missed = lacking(model, observed["arm_loads"]).share
-    error = partial(wall_error, per_newton=partial(model.per_newton, compliance=softness), lack_of_fit=missed)
-    walls, notes = wall_blocks(batch, observed, error)
+    errors = WallErrors(partial(model.per_newton, compliance=softness), missed)
+    walls, notes = wall_blocks(batch, observed, errors)
     if not walls:
         return Refusal("; ".join(notes) or "no run has a profile")
     evidence = calibration(batch, model, observed["arm_loads"])
@@ -139,11 +139,12 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         *said,
         *notes,
     )
-    systematic = math.hypot(max(SYSTEMATIC[source] for source in used), LOADED, missed / math.sqrt(3.0))
-    scatter = np.full(len(model.parameters), SCATTER)
+    forces = tuple(dict.fromkeys(block.setting.source for block in walls))
+    base = replace(model, touched=True, forces=forces, springs=tuple(np.maximum(softness, 0.0).tolist()))
+    scatter = np.array([0.0 if one in base.believed else SCATTER for one in base.parameters])
     return Problem(
-        NAME, "mm", MM, model, (*calibrate, *walls), scatter, systematic, tuple(notes),
-        feasible(walls, calibrate, model.arm, error),
+        NAME, "mm", MM, base, (believed_block(base), *calibrate, *walls), scatter, missed / math.sqrt(3.0),
+        tuple(notes), feasible(walls, calibrate, model.arm, errors),
     )  # fmt: skip
 
 

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from metro.observables.cut.conditions import turn_about_z
-from metro.observables.deformation.blocks import ZERO, WallError
+from metro.observables.deformation.blocks import SYSTEMATIC, ZERO, WallErrors
 from metro.observables.deformation.model import CutWall, LoadTest
 from metro.observables.problem import Block, Made, Proposal
 from metro.robot.kinematics import Arm
 from metro.units import DEG, Array
 
-MEASURED = 0.01  # relative error of a force that a dynamometer reads
+MEASURED = "dynamometer"  # the source of the force on walls that are made next
 SHALLOW, DEEP = 0.5, 2.0  # depths of walls, relative to the run that they vary
 HEAVIER = 2.0  # force of load tests, relative to the largest force so far
 LOADED = "load tests "  # the name of such a block begins with it; the pose follows
@@ -23,7 +23,7 @@ TURNS = (0.0, 90.0 * DEG)  # of the feed; half a turn only reverses the load on 
 
 
 def feasible(
-    walls: Sequence[Block], tests: Sequence[Block], arm: Arm, error: WallError
+    walls: Sequence[Block], tests: Sequence[Block], arm: Arm, errors: WallErrors
 ) -> tuple[Proposal, ...]:
     """Return walls and load tests that could be made after those of a batch.
 
@@ -33,15 +33,16 @@ def feasible(
     Parameters
     ----------
     walls, tests : blocks of the batch; ``tests`` those of load tests and of joints known beforehand.
-    error : of a wall for a relative error of its force, see
-        :func:`metro.observables.deformation.blocks.wall_error`.
+    errors : of a wall that those of its force make.
     """
     loaded = [block for block in tests if isinstance(block.setting, LoadTest)]
     made = [block for block in walls if block.role == "identify"]
-    return (*_walls(made, loaded, arm, error), *map(_heavier, loaded))
+    return (*_walls(made, loaded, arm, errors), *map(_heavier, loaded))
 
 
-def _walls(made: Sequence[Block], loaded: Sequence[Block], arm: Arm, error: WallError) -> Iterator[Proposal]:
+def _walls(
+    made: Sequence[Block], loaded: Sequence[Block], arm: Arm, errors: WallErrors
+) -> Iterator[Proposal]:
     """Propose walls at two depths.
 
     The depth distinguishes a gap from a spring; pose and direction distinguish the joints.
@@ -63,7 +64,7 @@ def _walls(made: Sequence[Block], loaded: Sequence[Block], arm: Arm, error: Wall
                     f"a wall as that of {like.condition} at half and at twice the depth, in {place}, "
                     f"feed at {feed}°, with a dynamometer"
                 )
-                blocks = (_block(like, here, depth, words, error) for depth in (SHALLOW, DEEP))
+                blocks = (_block(like, here, depth, words, errors) for depth in (SHALLOW, DEEP))
                 given: dict[str, float | str] = {"feed_direction_deg": feed}
                 given |= {"pose": pose} if pose else {}
                 rows = (Made(like.run, {"axial_depth_mm": depth}, given) for depth in (SHALLOW, DEEP))
@@ -106,11 +107,13 @@ def _turned(setting: CutWall, joints: Array, turn: float) -> CutWall:
     )
 
 
-def _block(like: Block, setting: CutWall, depth: float, words: str, error: WallError) -> Block:
+def _block(like: Block, setting: CutWall, depth: float, words: str, errors: WallErrors) -> Block:
     """Return the wall at a relative depth; the mean force is proportional to it."""
     setting = replace(setting, force=depth * setting.force)
+    own = 0.0 if setting.source == MEASURED else SYSTEMATIC[MEASURED]
+    setting = replace(setting, harder=errors.harder(setting), source=MEASURED)
     name = f"proposed: {words}, {depth:g}"
-    unidentified = np.column_stack([np.full(len(like.axis), ZERO), error(setting, MEASURED)])
+    unidentified = np.column_stack([np.full(len(like.axis), ZERO), errors.own(setting, own)])
     return replace(like, run=name, condition=name, setting=setting, unidentified=unidentified)
 
 

@@ -98,7 +98,7 @@ def wall_figures(model: DeformationModel, block: Block, fit: BaseFit) -> JSON:
         frame; displacement of the tip from the wall with and without that rotation, mm ([K] eq. 16 to 18);
         the ``curve`` of cut-in and steady cut, mm, not filtered.
     """
-    setting: CutWall = block.setting
+    setting, compliance = model.believed_force(block.setting, fit.beta), model.in_cut(fit.beta)
     matrix, offset = model.design(block, np.zeros(0), fit.beta)
     row = matrix.mean(axis=0)
     zero, *force = np.array([ZERO]) if block.unidentified is None else block.unidentified.mean(axis=0)
@@ -106,11 +106,11 @@ def wall_figures(model: DeformationModel, block: Block, fit: BaseFit) -> JSON:
     sd = math.sqrt(float(row @ fit.covariance @ row) + float(np.sum(np.square(force))))
     measured = float(block.measured.mean())
     read = math.hypot(float(np.sqrt(np.mean(block.sigma**2) / len(block.sigma))), zero)
-    twist = model.twists(setting, fit.beta)
+    twist = model.twists(setting, compliance)
     flange, turned, tip = (
         part[setting.kept].mean(axis=0) for part in deflections(model.arm, setting.commanded, twist)
     )
-    proud = model.deflection(setting, fit.beta) @ setting.normal
+    proud = model.deflection(setting, compliance) @ setting.normal
     along = setting.spacing * np.arange(len(proud)) / MM + block.coordinates["x_mm"][0]
     along -= setting.spacing * setting.kept[0] / MM
     return {
@@ -136,7 +136,8 @@ def _stiffness(
     if arm is None:
         return Refusal("no arm.dh")
     if fit is not None:
-        value, sd, dof = fit.beta, np.sqrt(np.diag(fit.covariance)), fit.dof
+        count = len(arm.dh)  # what follows is believed of the walls
+        value, sd, dof = fit.beta[:count], np.sqrt(np.diag(fit.covariance))[:count], fit.dof
     else:
         tests = fitted_loads(DeformationModel(arm), observed["arm_loads"])
         if isinstance(tests, Refusal):
@@ -177,10 +178,20 @@ def _mean_force(face: Wall, rows: pd.DataFrame, relative: float) -> JSON:
     return block
 
 
-def _deformation(model: DeformationModel, setting: CutWall, fit: BaseFit) -> JSON:
+def _deformation(model: DeformationModel, wall: CutWall, fit: BaseFit) -> JSON:
     """Mean deflection of the tip at the compared points of the wall, work frame, by the fitted base model."""
-    each = model.contributions(setting.commanded, setting.force)[setting.kept].mean(axis=0)
-    mean = model.deflection(setting, fit.beta)[setting.kept].mean(axis=0)
+    count = len(model.arm.dh)
+
+    def deflected(beta: Array) -> Array:
+        cut = model.believed_force(wall, beta)
+        return np.asarray(model.deflection(cut, model.in_cut(beta))[wall.kept].mean(axis=0))
+
+    mean = deflected(fit.beta)
+    cut = model.believed_force(wall, fit.beta)
+    each = model.contributions(cut.commanded, cut.force)[wall.kept].mean(axis=0)
+    # It is linear in what is believed of the force, so that a step of any size tells the slope.
+    steps = np.eye(len(fit.beta))[count:]
+    each = np.hstack([each, *((deflected(fit.beta + step) - mean)[:, None] for step in steps)])
     sd = np.sqrt(np.einsum("ai,ij,aj->a", each, fit.covariance, each))
     return {
         axis: quantity(value / MM, error / MM, "mm", fit.dof)

@@ -21,16 +21,17 @@ USUAL = {
 def with_contradictions(first: Section, results: Results) -> Section:
     """Return the first page with what makes its results doubtful in front of everything else."""
     slips = results.verdict.get("contradictions") or []
-    texts = [str(slip["words"]) for slip in slips]
+    texts = [str(slip["words"]) for slip in slips if slip["observables"]]
+    doubts = [Paragraph(f"To be checked: {slip['words']}") for slip in slips if not slip["observables"]]
     spoiled = {name for slip in slips for name in slip["observables"]}
     for name, entry in results.verdicts().items():
         if name not in spoiled and entry.get("misses"):
             texts.append(_misses_half(name, entry["misses"]))
     if not texts:
-        return first
+        return replace(first, items=[*first.items, *doubts]) if doubts else first
     head = "Correct this first. No cause is given where the data contradict what the batch declares."
     items: list[Item] = [Paragraph(head, "warning"), *(Paragraph(text, "warning") for text in texts)]
-    return replace(first, items=[*items, *first.items])
+    return replace(first, items=[*items, *doubts, *first.items])
 
 
 def _misses_half(name: str, missed: float) -> str:

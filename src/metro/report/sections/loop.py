@@ -40,6 +40,8 @@ def _observable(observable: str, entry: JSON, record: JSON, left: str) -> list[I
     items: list[Item] = [Paragraph(story or verdict_words(observable, entry, left))]
     if noise:
         items.append(Paragraph(_noise_words(noise, shown)))
+    if record.get("strained"):
+        items.append(Paragraph(str(record["strained"])))
     if "held_out" in entry:
         items.append(Paragraph("Effects with their values, and what was tried: “The arm by measured poses”."))
     else:

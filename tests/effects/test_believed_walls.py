@@ -1,0 +1,88 @@
+"""What all walls share: springs that are softer in the cut, a zero, and a force that is off."""
+
+from dataclasses import replace
+
+import elastic_arm
+import numpy as np
+import pytest
+
+from metro.effects import joint_backlash, stiffness_scale
+from metro.loop.search.search import search
+from metro.loop.search.trial import Gates
+from metro.loop.statement import to_json
+from metro.loop.verdict.beliefs import beliefs, strained
+from metro.observables.deformation.blocks import believed_block
+from metro.observables.deformation.model import CutWall, DeformationModel
+from metro.wording.statements import worded
+
+BASE = DeformationModel(elastic_arm.ARM)
+COMPLIANCE = 1 / elastic_arm.STIFFNESS
+SHARING = replace(BASE, touched=True, forces=("dynamometer",), springs=tuple(COMPLIANCE))
+NAMES = [one.name for one in SHARING.parameters]
+GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
+
+
+def problem(truth, seed):
+    task = elastic_arm.problem(truth, seed, base=SHARING)
+    scatter = np.where(np.arange(len(NAMES)) < 6, 0.005, 0.0)
+    return replace(task, blocks=(believed_block(SHARING), *task.blocks), scatter=scatter, systematic=0.0)
+
+
+@pytest.fixture(scope="module")
+def wall():
+    return next(block for block in problem({}, 0).blocks if isinstance(block.setting, CutWall))
+
+
+def height(block, **beliefs):
+    """Predicted wall with all springs as in the load tests, but for what is given."""
+    beta = np.concatenate([COMPLIANCE, np.zeros(len(SHARING.believed))])
+    for name, value in beliefs.items():
+        beta[NAMES.index(name)] = value
+    matrix, offset = SHARING.design(block, np.zeros(0), beta)
+    return matrix @ beta + offset
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_force_that_is_off_moves_the_wall_as_the_force_that_it_then_is(wall, axis):
+    told = height(wall, **{f"force_off_dynamometer_{'xyz'[axis]}": 0.03})
+    size = np.linalg.norm(wall.setting.force, axis=1)
+    truly = replace(
+        wall, setting=replace(wall.setting, force=wall.setting.force + np.outer(size, 0.03 * np.eye(3)[axis]))
+    )
+    matrix, offset = BASE.design(truly, np.zeros(0), COMPLIANCE)
+    np.testing.assert_allclose(told, matrix @ COMPLIANCE + offset, rtol=1e-9)
+    beta = np.zeros(len(NAMES))
+    beta[NAMES.index(f"force_off_dynamometer_{'xyz'[axis]}")] = 0.03
+    np.testing.assert_allclose(SHARING.believed_force(wall.setting, beta).force, truly.setting.force)
+
+
+def test_a_joint_that_is_softer_in_the_cut_moves_the_wall_and_no_load_test(wall):
+    softer = COMPLIANCE * np.array([1, 1, 1.04, 1, 1, 1])
+    matrix, offset = BASE.design(wall, np.zeros(0), softer)
+    np.testing.assert_allclose(height(wall, softer_joint_3=0.04), matrix @ softer + offset, rtol=1e-9)
+    test = problem({}, 0).role("calibrate")[1]
+    np.testing.assert_array_equal(height(test, softer_joint_3=0.04), height(test))
+
+
+def test_the_zero_of_all_walls_moves_each_as_a_whole(wall):
+    np.testing.assert_allclose(height(wall, wall_zero=5e-6) - height(wall), 5e-6)
+
+
+def test_gears_that_are_a_little_softer_in_the_cut_are_no_effect():
+    task = problem({"factor": dict(zip(range(1, 7), (0.95, 0.97, 0.94, 0.96, 0.98, 0.93), strict=True))}, 2)
+    outcome = search(task, (*stiffness_scale.EFFECT, *joint_backlash.EFFECT), GATES)
+    assert outcome.names == ()
+    assert strained(beliefs(outcome), outcome) == ""
+
+
+def test_an_arm_that_is_much_softer_is_one_and_it_is_said_what_it_would_take_without():
+    task = problem({"factor": dict.fromkeys(range(1, 7), 0.6)}, 3)
+    outcome = search(task, (*stiffness_scale.EFFECT, *joint_backlash.EFFECT), GATES)
+    assert outcome.names == ("stiffness_scale",)
+    told = beliefs(outcome)
+    assert {one["name"] for one in told} == {one.name for one in SHARING.believed}
+    assert max(abs(one["before"]) / one["sd"] for one in told) > 3.0
+    assert max(abs(one["after"]) / one["sd"] for one in told) < 3.0
+    words = worded(to_json(strained(told, outcome)))
+    assert words.startswith("Without stiffness scale, errors of the instruments would have to be: ")
+    assert "known within ±10 %, with it" in words
