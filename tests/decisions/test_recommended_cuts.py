@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from metro.decisions.cuts import Milling, recommended_cuts
+from metro.decisions.cuts import Milling, Reach, recommended_cuts
 from virtual_cell.chips import Engagement, Tool
 from virtual_cell.milling import Cut, in_millimetres, power
 from virtual_cell.motion import Straight
@@ -34,9 +34,9 @@ def table_of(depths=(), unstable=(), rpm=3000.0, ends=True, **changed):
     return every.assign(position="1", own_modes=True, **{**CUT, **changed})
 
 
-def cuts(low=None, tested=None, status="clean", limits=None):
+def cuts(low=None, tested=None, status="clean", limits=None, **reach):
     tested = table_of() if tested is None else tested
-    return recommended_cuts(boundary(low), tested, status, MILLING, limits or {})
+    return recommended_cuts(boundary(low), tested, status, MILLING, Reach(limits or {}, **reach))
 
 
 def test_the_pocket_is_found_at_the_depth_of_its_worst_neighbour():
@@ -58,6 +58,30 @@ def test_limits_of_the_machine_hold():
     assert all(cut["spindle_rpm"] <= 2500.0 for cut in found)
     assert {cut["axial_depth_mm"] for cut in found} == {0.15}
     assert cuts(limits={"axial_depth_mm": [2.0, 3.0]}) == []
+
+
+def test_no_cut_is_deeper_than_the_runs_and_the_work_tell():
+    runs, none = (
+        pd.DataFrame({"axial_depth_mm": [0.5, 2.0]}),
+        pd.DataFrame({"position": [], "frequency_hz": []}),
+    )
+    known = Reach.of({"work": {"size_mm": [100, 60, 3.0]}}, runs, none)
+    assert (known.deepest_mm, known.highest_hz) == (3.0, {})
+    assert Reach.of({}, runs, none).deepest_mm == 4.0
+    found = cuts(low=np.full(len(RPM), 60.0), deepest_mm=4.0)
+    assert {(cut["axial_depth_mm"], cut["at_reach"]) for cut in found} == {(4.0, True)}
+    (stated,) = {
+        cut["at_reach"] for cut in cuts(low=np.full(len(RPM), 60.0), limits={"axial_depth_mm": [1, 9]})
+    }
+    assert not stated
+
+
+def test_no_cut_is_named_where_the_teeth_pass_faster_than_the_hammer_reached():
+    frf = pd.DataFrame({"position": ["1", "1", "2"], "frequency_hz": [20.0, 130.0, 900.0]})
+    highest = Reach.of({}, pd.DataFrame({"axial_depth_mm": [1.0]}), frf).highest_hz
+    assert highest == {"1": 130.0, "2": 900.0}
+    assert all(cut["spindle_rpm"] * 3 / 60.0 <= 130.0 for cut in cuts(highest_hz=highest))
+    assert cuts(highest_hz={"1": 40.0}) == []
 
 
 @pytest.mark.parametrize(("direction", "side"), [("down", "down"), ("up", "up")])

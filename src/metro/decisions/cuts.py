@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from metro.cutting.engagement import engagement
 from metro.units import JSON, MM, N_MM, N_MM2, RPM, Array
 
 MOST = 3  # pockets of a position
+DEEPER = 2.0  # than the deepest cut made: beyond, other modes, forces and the work itself are not known
 PROBABILITY = 0.975  # of a stable cut, at the lower end of the band
 CONTRADICTED = 0.05  # chance of as many chattering tests below the band: under it the band is not believed
 # Columns of the run table that say which boundary a cut has.
@@ -77,8 +78,35 @@ def _per_arc(declared: JSON) -> bool:
     return "kte_n_mm" in declared and declared.get("edge_length", "axial") != "axial"
 
 
+@dataclass(frozen=True)
+class Reach:
+    """How far the evidence of a batch reaches, beyond which no cut is recommended.
+
+    Attributes
+    ----------
+    limits : of ``batch.yaml``: least and greatest, by column of ``runs.csv``.
+    deepest_mm : of the cuts made, times :data:`DEEPER`, and of the work; NaN where neither is known.
+    highest_hz : highest frequency that a hammer excited, by position; none where modes are declared.
+    """
+
+    limits: Mapping[str, Any]
+    deepest_mm: float = math.nan
+    highest_hz: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, manifest: JSON, runs: pd.DataFrame, frf: pd.DataFrame) -> Reach:
+        """Return the reach of a batch. ``frf``: table ``frf_used``."""
+        made = pd.to_numeric(runs["axial_depth_mm"], errors="coerce").max()
+        size = (manifest.get("work") or {}).get("size_mm") or [math.nan] * 3
+        bounds = [one for one in (DEEPER * float(made), float(size[2])) if math.isfinite(one)]
+        highest = {
+            str(position): float(rows.max()) for position, rows in frf.groupby("position")["frequency_hz"]
+        }
+        return cls(manifest.get("limits") or {}, min(bounds, default=math.nan), highest)
+
+
 def recommended_cuts(
-    lobes: pd.DataFrame, tests: pd.DataFrame, status: str | None, milling: Milling, limits: Mapping[str, Any]
+    lobes: pd.DataFrame, tests: pd.DataFrame, status: str | None, milling: Milling, reach: Reach
 ) -> list[JSON]:
     """Return the cuts to use at each position, the largest removal rate first, or why there are none.
 
@@ -86,15 +114,16 @@ def recommended_cuts(
     ----------
     lobes : table ``lobes_final``. tests : table ``lobe_runs`` with the columns :data:`CUT` of the run table.
     status : of the verdict on stability; None: no cut was tested.
-    limits : of ``batch.yaml``: least and greatest, by column of ``runs.csv``.
+    reach : of the evidence. No cut is deeper, and none has its teeth pass at a frequency that no hammer
+        reached: which modes would chatter there is not known.
 
     Returns
     -------
     list of JSON
-        ``position``, ``spindle_rpm``, ``axial_depth_mm``, the other settings, ``probability_stable`` (at
-        least), ``removal_cm3_min``, ``torque_nm``, ``power_kw``, ``chatter_hz`` (at the boundary there),
-        ``advice``: ``use``, ``try`` (begin at half the depth and listen: no test confirms it) or ``do_not``;
-        ``why`` as a code.
+        ``position``, ``spindle_rpm``, ``axial_depth_mm``, whether that is the reach of the evidence
+        (``at_reach``), the other settings, ``probability_stable`` (at least), ``removal_cm3_min``,
+        ``torque_nm``, ``power_kw``, ``chatter_hz`` (at the boundary there), ``advice``: ``use``, ``try``
+        (begin at half the depth and listen: no test confirms it) or ``do_not``; ``why`` as a code.
     """
     found = []
     for position, rows in lobes.groupby("position", sort=False):
@@ -103,7 +132,8 @@ def recommended_cuts(
             continue
         known = _tested(line, tests[tests["position"] == position])
         below, chattered = _below(line, known)
-        pockets = sorted(_pockets(line, milling, limits), key=lambda cut: -cut["removal_cm3_min"])
+        highest = reach.highest_hz.get(str(position), math.inf)
+        pockets = sorted(_pockets(line, milling, reach, highest), key=lambda cut: -cut["removal_cm3_min"])
         for cut in pockets[:MOST]:
             near = known["rpm"].min() <= cut["spindle_rpm"] <= known["rpm"].max()
             advice, why = _advice(status, below, chattered, within=bool(near))
@@ -111,18 +141,21 @@ def recommended_cuts(
     return found
 
 
-def _pockets(line: pd.DataFrame, milling: Milling, limits: Mapping[str, Any]) -> Iterator[JSON]:
+def _pockets(line: pd.DataFrame, milling: Milling, reach: Reach, highest_hz: float) -> Iterator[JSON]:
     """Yield the surely stable cut of each speed at which removal has a local maximum."""
     rpm, low = line["rpm"].to_numpy(float), line["depth_lo_mm"].to_numpy(float)
-    least, most = limits.get("spindle_rpm") or (-math.inf, math.inf)
-    shallow, deepest = limits.get("axial_depth_mm") or (0.0, math.inf)
+    least, most = reach.limits.get("spindle_rpm") or (-math.inf, math.inf)
+    most = min(most, 60.0 * highest_hz / milling.teeth)
+    known = math.inf if math.isnan(reach.deepest_mm) else reach.deepest_mm
+    shallow, deepest = reach.limits.get("axial_depth_mm") or (0.0, known)
     depth = np.minimum(_worst_about(low), deepest)
     removal = np.where((rpm >= least) & (rpm <= most) & (depth >= shallow), rpm * depth, -math.inf)
     higher = np.concatenate([[-math.inf], removal, [-math.inf]])
     peaks = np.flatnonzero((removal > higher[:-2]) & (removal >= higher[2:]) & np.isfinite(removal))
     for at in peaks:
         row = line.iloc[int(at)]
-        yield _cut(row, float(depth[at]), milling)
+        cut = _cut(row, float(depth[at]), milling)
+        yield {**cut, "at_reach": bool(depth[at] == known and "axial_depth_mm" not in reach.limits)}
 
 
 def _worst_about(values: Array) -> Array:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from metro.batch.processed import read_batch, read_json, write_json
 from metro.batch.provenance import write_made
-from metro.decisions.cuts import CUT, Milling, recommended_cuts
+from metro.decisions.cuts import CUT, Milling, Reach, recommended_cuts
 from metro.decisions.results import decisions
 from metro.units import JSON
 from metro.wording.batch import story_of, verdict_of
@@ -43,6 +43,6 @@ def _decided(processed: Path, reports: Path, verdict: JSON) -> JSON:
     if len(lobes) and milling:
         tests = pd.read_parquet(processed / "lobe_runs.parquet").join(batch.runs[list(CUT)], on="run")
         status = (verdict["observables"].get("lobes") or {}).get("status")
-        limits = batch.manifest.get("limits") or {}
-        decided["recommended_cuts"] = recommended_cuts(lobes, tests, status, milling, limits)
+        reach = Reach.of(batch.manifest, batch.runs, pd.read_parquet(processed / "frf_used.parquet"))
+        decided["recommended_cuts"] = recommended_cuts(lobes, tests, status, milling, reach)
     return decided

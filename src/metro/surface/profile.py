@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from metro.surface.dust import dust
 from metro.units import MM, Array
 
 ALPHA = math.sqrt(math.log(2.0) / math.pi)
@@ -77,7 +78,7 @@ def noise_gain(spacing: float, cutoff: float) -> float:
 
 
 def even(x: Array, z: Array) -> tuple[Array, Array]:
-    """Bring a trace to even spacing: sorted, points without a value left out, linear between neighbours.
+    """Bring a trace to even spacing: sorted, without dust or points that have no value, linear between them.
 
     Parameters
     ----------
@@ -91,6 +92,8 @@ def even(x: Array, z: Array) -> tuple[Array, Array]:
     known = np.isfinite(x) & np.isfinite(z)
     x, first = np.unique(x[known], return_index=True)
     z = z[known][first]
+    clean = ~dust(x, z)
+    x, z = x[clean], z[clean]
     if len(x) < 8:
         raise ValueError(f"a profile of {len(x)} points: at least 8 are needed")
     step = np.diff(x)

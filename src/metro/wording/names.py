@@ -16,6 +16,7 @@ BELIEFS = {
     r"place_height": "height of the scanner",
     r"place_tilt_([xy])": "tilt of the scanner along {}, at the edges of the work",
     r"ringing_off_(\w+)": "frequencies of the tip at pose {}",
+    r"drive_lag": "lag of all torques behind the force",
     r"torque_gain": "gain of all torques",
     r"gain_of_joint_(\d)": "gain of the torque of joint {}",
     r"gain_of_(.)": "gain of the dynamometer along {}",

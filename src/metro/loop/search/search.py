@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from metro.effects.effect import Effect, fitted_to
 from metro.loop.checks import signature as residual
 from metro.loop.checks.between import Between, between_conditions
@@ -79,10 +81,12 @@ def _visible(effects: Sequence[Effect], base: Fit) -> tuple[tuple[Effect, ...], 
 
 
 def _strained(base: Fit) -> bool:
-    from scipy.stats import chi2
+    from scipy.stats import norm
 
-    believed = [(base.chi2[block.run], len(block.measured)) for block in base.blocks if block.belief]
-    return any(float(chi2.sf(square, count)) < STRAINED for square, count in believed)
+    deviations = [
+        np.abs(block.measured - base.predict(block)) / block.sigma for block in base.blocks if block.belief
+    ]
+    return any(2.0 * len(far) * float(norm.sf(far.max())) < STRAINED for far in deviations if len(far))
 
 
 def _described(

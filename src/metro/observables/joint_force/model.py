@@ -1,9 +1,10 @@
 """The joint force model: motor torques of the cut less those of the idle run, given the force on the tool.
 
 Per joint and bin of the path: torque = gain × (−Jᵀ f) + drives + payload (virtual work), with f the
-dynamometer's force, averaged over a revolution of the spindle and over the bin. Each joint's torque and each
-axis of the dynamometer may have a small additional gain, and each axis may show a little of the force along
-the others (crosstalk, a mounting that is turned), to first order, within the accuracy of the instruments. The
+dynamometer's force, averaged over a revolution of the spindle and over the bin. Each joint's torque, whatever
+makes it, and each axis of the dynamometer may have a small additional gain, and each axis may show some of
+the force along the others (crosstalk, a turned mounting), to first order, within the accuracy of the
+instruments. The torques may follow the force late, by the filters of the drives and the clock of the log. The
 rows of the comparison are forces: that of the dynamometer, and the sensorless force, which is that of the
 dynamometer plus the force at the tip that belongs to the residual torques.
 """
@@ -23,9 +24,10 @@ from metro.robot.kinematics import Arm, Geometry
 from metro.robot.payload import Payload, gravity_torque
 from metro.robot.statics import Flange, flange_of, joint_torque, tip_jacobian_of
 from metro.signals.waves import waves
-from metro.units import Array
+from metro.units import MS, Array
 
 AXES = "xyz"
+LAG_STEP = 5 * MS  # over which the torques are differentiated
 CROSS = tuple(permutations(range(3), 2))  # axis that shows it, axis along which the force is
 
 
@@ -97,11 +99,11 @@ class JointForceModel:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """One gain error that all torques share, one for each joint that turns and each axis, crosstalk."""
+        """A gain that all torques share, one of each joint that turns and of each axis, crosstalk, lag."""
         names = ["torque_gain", *(f"gain_of_joint_{i + 1}" for i in self.joints)]
         names += [f"gain_of_{a}" for a in AXES]
         names += [f"crosstalk_of_{AXES[along]}_in_{AXES[seen]}" for seen, along in CROSS]
-        return tuple(Parameter(name, "1") for name in names)
+        return (*(Parameter(name, "1") for name in names), Parameter("drive_lag", "ms", MS))
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -113,9 +115,10 @@ class JointForceModel:
         return np.zeros((1, 0))
 
     def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
-        """Torque (k m, k + 10) per gain, and that without a force (k m,), N m, as waves along the path.
+        """Waves of the torque (k m, k + 11) per gain and lag, and those without a force (k m,), N m.
 
-        For :class:`Instruments` they are the gains (k + 9, k + 10) themselves; k joints turn.
+        For :class:`Instruments` they are the gains and the lag (k + 10, k + 11) themselves; k joints turn.
+        The torques of drives and payload are read with the gains of the joints, too.
         """
         run: Any = block.setting
         if isinstance(run, Instruments):
@@ -124,7 +127,12 @@ class JointForceModel:
         other = self.drives.at(run.q, run.rate, run.since, run.width)
         for mass in self.payload:
             other = other + gravity_torque(self.arm, along(Same(self.arm.dh), run), mass)
-        return carried(self.arm, run, self.offset), in_waves(other[:, list(self.joints)])
+        read = in_waves(other[:, list(self.joints)])
+        matrix = np.column_stack([carried(self.arm, run, self.offset), late(self.arm, run, self.offset)])
+        if read.any():
+            each = np.kron(np.eye(len(self.joints)), np.ones((len(other), 1)))
+            matrix[:, 1 : 1 + len(self.joints)] += each * read[:, None]
+        return matrix, read
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +172,13 @@ def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
     whole = np.sum(by_axis, axis=0)
     by_joint = np.kron(np.eye(jacobian.shape[-1]), np.ones((len(force), 1))) * whole[:, None]
     return np.column_stack([whole, by_joint, *by_axis, *across])
+
+
+@lru_cache(maxsize=256)
+def late(arm: Arm, run: TorqueRun, offset: float) -> Array:
+    """Waves (k m,), N m/s, of the torque that balances the force, per second by which it comes later."""
+    after, before = (carried(arm, run, offset + step)[:, 0] for step in (LAG_STEP, -LAG_STEP))
+    return np.asarray((after - before) / (2.0 * LAG_STEP))
 
 
 def in_waves(torque: Array) -> Array:

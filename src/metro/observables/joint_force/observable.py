@@ -26,6 +26,7 @@ from metro.observables.joint_force.model import (
     JointForceModel,
     TorqueRun,
     in_waves,
+    late,
     running,
 )
 from metro.observables.observable import Observable
@@ -41,7 +42,13 @@ from metro.signals.waves import variance, wandering, waves
 from metro.units import JSON, MM, MS, Array
 
 SCATTER = 0.01
-CALIBRATED = 0.01  # relative error of the torque of a joint and of an axis of the dynamometer, in all runs
+CALIBRATED = 0.01  # relative error of an axis of the dynamometer, in all runs
+DRIVEN = 0.03  # of the torque of a joint, in all runs: torque constants are stated to some 5 %
+LAG = 10 * MS  # of all torques behind the force: filters of the drives (20 to 60 Hz), clock of the log
+# After a start from rest the joints' friction first winds up, over 1e-4 to 1e-3 rad: some millimetres of the
+# path at a lever of a metre and more. Cut and idle run may have started elsewhere.
+SETTLED, OF_AIR = 5 * MM, 1.0 / 3.0
+SHIFT = 4 * MS  # of the log of one run: it is stamped in cycles of 4 to 12 ms
 # Of the force along one axis that another one shows: makers state up to 2 % of crosstalk, and a mounting is
 # square to 1° or so, as two standard deviations each.
 CROSSTALK = math.hypot(0.01, 0.5 * math.radians(1.0))
@@ -129,6 +136,7 @@ def _torque(
         pair = align.align(places[0], channels[0], places[1], channels[1], width, gaps=gaps)
     except ValueError as error:
         return Refusal(str(error))
+    pair = _settled(pair, pair.first[:, -1] - wall(batch, run).start)
     period = float(np.median(np.diff(cut.time)))
     samples = width / step
     white = [
@@ -151,6 +159,12 @@ def _torque(
     columns |= dict(zip(axes.driven(NOISE), np.sqrt(white[0] + white[1]), strict=True))
     columns |= dict(zip(axes.driven(WANDER), np.sqrt(2.0 * idling), strict=True))
     return pd.DataFrame(columns)
+
+
+def _settled(pair: align.Aligned, x: Array) -> align.Aligned:
+    """Leave out the first millimetres of a path, at most a third of what lies before the block (x < 0)."""
+    kept = x - x[0] >= min(SETTLED, OF_AIR * max(0.0, -float(x[0])))
+    return align.Aligned(pair.s[kept], pair.first[kept], pair.second[kept])
 
 
 def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSON) -> Problem | Refusal:
@@ -178,9 +192,10 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         "The torques of the cut less those of the idle run at the same place are what the dynamometer's "
         "force asks of the joints; friction and gravity are those of the idle run.",
         "The sensorless force is solved from all joints by weighted least squares.",
-        "All torques may have one common scale error. The torques of each joint and the force along each "
-        f"axis may have another of {CALIBRATED:.0%}, the same in all runs. Each axis of the dynamometer may "
-        f"show {CROSSTALK:.1%} of the force along the others.",
+        "All torques may have one common scale error. The torques of each joint may have another of "
+        f"{DRIVEN:.0%}, and the force along each axis one of {CALIBRATED:.0%}, the same in all runs. Each "
+        f"axis of the dynamometer may show {CROSSTALK:.1%} of the force along the others. All torques may "
+        f"follow the force {LAG / MS:.0f} ms late, and those of each run another {SHIFT / MS:.0f} ms.",
         *(
             f"Run {run}: the robot log is of another time than the dynamometer's record; it is taken to "
             "start with it."
@@ -199,10 +214,12 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
 def _instruments(batch: Batch, arm: Arm) -> Block:
     """Return what is known of gains and crosstalk; of joints, what the cell declares of each one."""
     joints, names = arm.axes.turning, arm.axes.driven("joint {}")
-    axis = np.array([*names, *WORK, *(WORK[seen] for seen, _ in CROSS)])
+    axis = np.array([*names, *WORK, *(WORK[seen] for seen, _ in CROSS), "time"])
     count = len(axis)
     zeros, known, sigma = np.zeros((count, 0)), np.zeros(count), np.full(count, CALIBRATED)
-    sigma[len(joints) + len(WORK) :] = CROSSTALK
+    sigma[: len(joints)] = DRIVEN
+    sigma[len(joints) + len(WORK) : -1] = CROSSTALK
+    sigma[-1] = LAG
     if declared(batch.cell):
         drives = drives_of_cell(batch.cell, len(arm.axes)).covariance
         own = np.diag(drives)[joints] - drives[0, 1]  # what joints share is the gain of all torques
@@ -235,6 +252,7 @@ def _block(row: Any, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander:
         axis=np.repeat(axes.driven("joint {}"), count),
         zeros=zeros,
         zero_sd=REPEATABLE * noise,
+        unidentified=SHIFT * late(arm, setting, 0.0)[:, None],
         labels=np.tile(_lengths(table["s_mm"].to_numpy()), len(axes.turning)),
         synthesis=-solve,
         anchor=known.T.ravel() + solve @ in_waves(torque),

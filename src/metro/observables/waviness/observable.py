@@ -107,12 +107,22 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         f"{np.sqrt((used[numbered(ENCODER, used)] ** 2).sum(axis=1)).median():.2g} µm at the tip, every "
         f"{used['log_step_mm'].median():.2g} mm: each wave of each joint counts by what of it may be more.",
         *_said_of_shifts(used),
+        *_said_of_dust(used),
         *([] if compliance.any() else ["No joint compliance is known: torques twist no joint here."]),
         *([] if forces else ["No force on the tip is known: no joint passes a gap here."]),
         *notes,
     )
     return Problem(
         NAME, "um", UM, WavinessModel(tuple(arm.axes.turning)), blocks, np.array([SCATTER]), SYSTEMATIC, said
+    )
+
+
+def _said_of_dust(facts: pd.DataFrame) -> list[str]:
+    """Say of how many points of a profile dust was removed."""
+    dusty = facts[facts["dust_points"] > 0]
+    listed = ", ".join(f"{run} {points}" for run, points in dusty["dust_points"].items())
+    return (
+        [f"Points of the profiles that lie on narrow spikes (dust) are left out: {listed}."] if listed else []
     )
 
 

@@ -15,6 +15,7 @@ from metro.observables.problem import Refusal
 from metro.robot.drive_torques import TURNING
 from metro.robot.kinematics import Arm
 from metro.robot.statics import tip_jacobian
+from metro.surface.dust import dust
 from metro.surface.profile import ROUGHNESS_CUTOFF, even, part
 from metro.surface.shift import Shift, shift_between
 from metro.surface.waves import white_noise
@@ -50,11 +51,12 @@ def wave_points(
     tuple
         Per point ``x_mm, t_s, waviness_um, kept``, joint angles, the tip's tracking error along the wall's
         normal by joint, and that of the idle run (NaN if there is none); and ``shift_mm, shift_sd_mm,
-        shifted, alike, shortest_mm, profile_step_mm, log_step_mm, idle_speed``, and the noise of each joint's
-        encoder at the tip, ``encoder1_um …``.
+        shifted, dust_points, alike, shortest_mm, profile_step_mm, log_step_mm, idle_speed``, and the noise of
+        each joint's encoder at the tip, ``encoder1_um …``.
     """
     try:
-        x, z = even(profile["x_mm"].to_numpy(dtype=float) * MM, profile["z_mm"].to_numpy(dtype=float) * MM)
+        traced = profile[["x_mm", "z_mm"]].to_numpy(dtype=float).T * MM
+        x, z = even(*traced)
     except ValueError as error:
         return Refusal(str(error))
     way = _way(cut, arm, wall)
@@ -80,6 +82,7 @@ def wave_points(
         "shift_mm": shift.value / MM,
         "shift_sd_mm": shift.sd / MM,
         "shifted": shift.detected,
+        "dust_points": int(dust(traced[0], traced[1]).sum()),
         "alike": shift.alike,
         "shortest_mm": shortest / MM,
         "profile_step_mm": (x[1] - x[0]) / MM,

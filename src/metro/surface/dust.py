@@ -1,0 +1,44 @@
+"""Dust on a stylus trace: spikes that are narrow, and stand out of what is beside them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from metro.units import MM, Array
+
+WINDOW = 1 * MM  # of the running median; waves that are longer pass it
+WIDEST = 0.4 * MM  # grains and fibres are 0.05 to 0.2 mm wide, and the stylus adds its radius
+STANDS_OUT = 8.0  # deviations from the median; the marks of a feed reach two to three
+BESIDE = 3.0  # deviations down to which the flanks belong to a spike
+FLANK = 0.1 * MM  # on either side, which belongs to a spike although it no longer stands out
+LEAST_POINTS = 9  # in the window
+
+
+def dust(x: Array, z: Array) -> np.ndarray:
+    """Mark the points of a trace that lie on a narrow spike, (n,).
+
+    A spike counts against the scatter of the whole trace about its running median (median absolute
+    deviation), so that a rough wall has none because it is rough. What is wider than 0.4 mm is no dust.
+
+    Parameters
+    ----------
+    x, z : (n,) position along the trace, m, in order, and height, m.
+    """
+    from scipy.ndimage import binary_dilation, label, median_filter
+
+    none = np.zeros(len(x), dtype=bool)
+    spacing = float(np.median(np.diff(x))) if len(x) > 1 else 0.0
+    points = 2 * round(WINDOW / spacing / 2) + 1 if spacing > 0.0 else 0
+    if points < LEAST_POINTS or len(x) < 2 * points:
+        return none
+    stands = z - median_filter(z, points, mode="nearest")
+    scatter = 1.4826 * float(np.median(np.abs(stands - np.median(stands))))
+    if scatter == 0.0:
+        return none
+    spikes, count = label(np.abs(stands) > BESIDE * scatter)
+    highest = np.zeros(count + 1)
+    np.maximum.at(highest, spikes, np.abs(stands))
+    wide = np.bincount(spikes, minlength=count + 1) * spacing > WIDEST
+    is_dust = (highest > STANDS_OUT * scatter) & ~wide
+    is_dust[0] = False
+    return np.asarray(binary_dilation(is_dust[spikes], iterations=max(round(FLANK / spacing), 1)))
