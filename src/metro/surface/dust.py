@@ -8,8 +8,10 @@ from metro.units import MM, Array
 
 WINDOW = 1 * MM  # of the running median; waves that are longer pass it
 WIDEST = 0.4 * MM  # grains and fibres are 0.05 to 0.2 mm wide, and the stylus adds its radius
-STANDS_OUT = 8.0  # deviations from the median; the marks of a feed reach two to three
-BESIDE = 3.0  # deviations down to which the flanks belong to a spike
+STANDS_OUT = (
+    5.0  # deviations from the median; marks of a feed reach two to three, noise five in a million points
+)
+BESIDE = 2.5  # deviations down to which the flanks belong to a spike
 FLANK = 0.1 * MM  # on either side, which belongs to a spike although it no longer stands out
 LEAST_POINTS = 9  # in the window
 

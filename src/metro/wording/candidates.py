@@ -113,7 +113,7 @@ SENTENCES: Mapping[str, Sentence] = {
     "unbelieved": "more of the error remains unexplained with it than it explains",
     "misses_half": _misses_half,
     "resembled": "not an effect of the library: it only describes the remaining error",
-    "beaten": "passed every test, but the effects that were added explain the runs better",
+    "beaten": "passed every test by itself, but the model that was chosen explains the runs better",
     "far_behind": _far_behind,
     "untested": "not tested: every run was used in the fit, so none is available to judge it",
     "not_converged": _not_converged,

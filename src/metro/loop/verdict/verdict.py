@@ -75,7 +75,7 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
             for trial in outcome.trials
             if trial.effect.name not in claimed
         ],
-        "indistinguishable": [list(rival.pair) for rival in outcome.rivals],
+        "indistinguishable": [list(pair) for pair in dict.fromkeys(rival.pair for rival in outcome.rivals)],
         "next_experiment": (next_experiment(problem, outcome, residual) if enough else more_runs(problem)),
         "unexplained": _unexplained(problem, outcome, rows, residual) if residual.parts else None,
     }
@@ -85,9 +85,9 @@ def why_not(outcome: Outcome, trial: Trial) -> Statement:
     """Return why an effect that was tried is not claimed."""
     if trial.effect.name in outcome.names:
         return Statement("untested")
-    chosen = [rival.effect for rival in outcome.rivals if rival.other == trial.effect.name]
+    chosen = dict.fromkeys(rival.effect for rival in outcome.rivals if rival.other == trial.effect.name)
     if chosen:
-        return Statement("confounded", {"effects": chosen})
+        return Statement("confounded", {"effects": list(chosen)})
     return trial.why_not or Statement("resembled" if trial.effect.resembled else "beaten")
 
 

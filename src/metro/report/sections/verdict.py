@@ -10,6 +10,7 @@ from metro.report.results import Results, heading
 from metro.report.sections.trust import HOLDS, SURE
 from metro.units import JSON, printed
 
+NOTHING_SEEN = 0.9  # error over signal, above which the model predicts next to nothing of it
 STATUS = {
     "clean": "clean",
     "explained": "explained",
@@ -30,7 +31,7 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
     # Of a probability the count of tests on the right side says more than the rms.
     tested = " ".join([verified, _fall(entry)] if _dimensionless(entry) else [_fall(entry), verified])
     says = {
-        "clean": f"{start}: the base model explains the identification runs; no effect is missing. {tested}",
+        "clean": f"{start}: {_clean(entry)} {tested}",
         "explained": f"{start}: {whole} {tested}{_within_floor(entry)}",
         "partly_explained": f"{start}: {part} {tested} A significant residual remains. "
         f"{_residual(entry, left)}",
@@ -46,6 +47,14 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
             f"{_fall(entry)}"
         )
     return says.get(status, f"{start}: {words(status)}.").strip()
+
+
+def _clean(entry: JSON) -> str:
+    """Say that nothing is missing; or that nothing was there which the model could have been tested by."""
+    share = (entry.get("before") or {}).get("nrmse")
+    if share is not None and share > NOTHING_SEEN and not _dimensionless(entry):
+        return "what was measured is no larger than the noise, so that it does not test the base model."
+    return "the base model explains the identification runs; no effect is missing."
 
 
 def _attribution(entry: JSON, what: str) -> str:
