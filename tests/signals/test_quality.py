@@ -125,6 +125,17 @@ def test_a_record_of_the_cut_alone_tells_nothing_of_its_zero():
     assert air_offset(("Fx", "Fy"), cut(np.array([40.0, 0.0]), (0.0, 0.0))) == []
 
 
+@pytest.mark.parametrize("entry", [0.0, 0.3], ids=["in the cut from the start", "entering"])
+def test_a_cut_that_is_calm_before_it_chatters_is_no_air(entry):
+    """Chatter of ten times the force; before, the teeth alone."""
+    random = np.random.default_rng(5)
+    engaged = np.clip(TIME / entry, 0.0, 1.0) if entry else np.ones(len(TIME))
+    teeth = engaged * (30.0 + 15.0 * np.sin(2.0 * np.pi * 50.0 * TIME))
+    chatter = 300.0 * np.clip((TIME - 0.4) / 0.1, 0.0, 1.0) * np.sin(2.0 * np.pi * 331.0 * TIME)
+    force = teeth + chatter + random.normal(size=len(TIME))
+    assert air_offset(("Fx", "Fy"), np.column_stack([force, -1.4 * force])) == []
+
+
 def test_a_record_too_short_for_blocks_tells_nothing_of_its_zero():
     assert air_offset(("Fx",), np.ones((60, 1))) == []
 

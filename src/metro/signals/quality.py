@@ -14,6 +14,7 @@ RATE_TOLERANCE = 0.01
 JITTER_LIMIT = 0.1
 GAP = 1.5
 AIR_BLOCKS = 50
+TEETH = 0.25  # scatter over mean, above which it is the force of teeth: a wrong zero does not scatter
 AIR_ACTIVITY = 0.1
 OFFSET_LIMIT = 0.02
 
@@ -188,8 +189,9 @@ def blocks_of(values: Array) -> tuple[Array, Array]:
 def zero_in_air(names: tuple[str, ...], activity: Array, mean: Array, largest: float) -> list[Finding]:
     """Check the zero of force channels where the tool cuts air at the record's start or end.
 
-    Air is the run of blocks at either end whose scatter is below a tenth of the cut's. A record that has no
-    such part does not show its zero, and gives no finding.
+    Air is the run of blocks at either end whose scatter is below a tenth of the cut's. A cut that is calm
+    before it chatters is no air: there the mean hardly changes where the scatter begins, or it is a force of
+    teeth, which scatters as much. A record that has no air does not show its zero, and gives no finding.
 
     Parameters
     ----------
@@ -202,7 +204,11 @@ def zero_in_air(names: tuple[str, ...], activity: Array, mean: Array, largest: f
     if not air.any() or air.all():
         return []
     zero = mean[air].mean(axis=0)
-    limit = OFFSET_LIMIT * largest
+    scatter, limit = float(np.median(activity[air])), OFFSET_LIMIT * largest
+    calm = np.linalg.norm(mean[~quiet].mean(axis=0) - zero) < scatter
+    teeth = np.abs(zero).max() > limit and scatter > TEETH * np.linalg.norm(zero)
+    if calm or teeth:
+        return []
     return [_offset(name, float(value), limit) for name, value in zip(names, zero, strict=True)]
 
 

@@ -26,6 +26,9 @@ LEAST = 0.6  # of the shortest wavelength: the filter passes less than a seventh
 NYQUIST = 2.0  # samples of the log per shortest wave that it can resolve
 MARK = 0.1  # waves whose length is within this share of a feed mark are omitted
 OCTAVES = (2.0, 4.0)  # mm, limits of the bands in which the residual is tested
+# Of the straightness of the profiler's traverse, rms over the waves that are compared: makers state 0.2 to
+# 0.5 µm over 100 mm, most of it long.
+DATUM = 0.2 * UM
 LOOSEST = 0.1 * MM  # largest standard error of a profile's place along the log, if they do not determine it
 
 
@@ -79,7 +82,7 @@ def wave_block(
         role="validate" if row["role"] == "validate" else "identify",
         order=int(row["order"]),
         measured=waves @ profile,
-        sigma=passes * np.sqrt(traced + passed),
+        sigma=passes * np.sqrt(traced + passed + _datum(length, int(kept.sum()))),
         alike=passes * np.sqrt(missed),
         setting=WavyCut(
             by_joint=by_joint,
@@ -97,6 +100,11 @@ def wave_block(
         synthesis=waves.T,
         labels=_band(length),
     )
+
+
+def _datum(length: Array, count: int) -> Array:
+    """Variance of each wave of ``length`` (k,) by the profiler's traverse, of ``count`` points in all."""
+    return np.asarray(DATUM**2 * count * length / length.sum())
 
 
 def _known(waves: Array) -> Array | None:
