@@ -27,9 +27,11 @@ from metro.observables.flatness.model import (
 )
 from metro.observables.flatness.noise import bin_sigma
 from metro.observables.flatness.path import (
+    NARROW,
     Path,
     make_pace,
     make_path,
+    narrow_passes,
     passages,
     turn_from_declared,
     work_size,
@@ -164,7 +166,8 @@ def face_block(
     if isinstance(tool, Refusal):
         return tool
     bin_number = _bins(table["pass"].to_numpy())
-    compared = _compared(table, path, tool.radius)
+    narrow = narrow_passes(batch, run, path, tool.radius)
+    compared = _compared(table, path, tool.radius) & ~_reached(table, path, narrow, tool.radius)
     table, bin_number = table[compared], bin_number[compared]
     if len(table) < 4:
         return Refusal(
@@ -189,7 +192,7 @@ def face_block(
     block = _block(batch, run, table, setting, path)
     doubt = damping_doubt(pose.field, setting)
     doubt = None if doubt is None else block.setting.shape(doubt)
-    return replace(block, unidentified=doubt), _said(run, turn, ringing)
+    return replace(block, unidentified=doubt), [*_said(run, turn, ringing), *_said_of_narrow(run, narrow)]
 
 
 def _places(table: pd.DataFrame, path: Path) -> tuple[Array, Array]:
@@ -265,6 +268,23 @@ def _compared(table: pd.DataFrame, path: Path, radius: float) -> np.ndarray:
     seen &= count >= LEAST_COVERAGE * np.median(count[seen])
     along = path.along(table["x_mm"].to_numpy() * MM, table["y_mm"].to_numpy() * MM)
     return np.asarray(seen & (along >= along[seen].min() + radius) & (along <= along[seen].max() - radius))
+
+
+def _reached(table: pd.DataFrame, path: Path, passes: np.ndarray, radius: float) -> np.ndarray:
+    """Mask of the points that the cutter reaches in one of some ``passes``."""
+    across = path.aside(table["x_mm"].to_numpy() * MM, table["y_mm"].to_numpy() * MM)
+    away = np.abs(across[:, None] - path.aside(*path.start[passes].T))
+    return np.asarray((away < radius).any(axis=1))
+
+
+def _said_of_narrow(run: str, narrow: np.ndarray) -> list[str]:
+    if not narrow.any():
+        return []
+    passes = ", ".join(str(i + 1) for i in np.flatnonzero(narrow))
+    return [
+        f"Run {run}: pass {passes} finds less than {NARROW:.0%} of the declared width left to cut, so that "
+        "its force is another one; what the cutter reaches there is not compared."
+    ]
 
 
 def _bins(number: np.ndarray) -> np.ndarray:

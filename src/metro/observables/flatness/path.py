@@ -20,6 +20,8 @@ from metro.units import DEG, MM, Array
 
 RETURN_SPEED, RETURN_PAUSE = 0.2, 0.6  # m/s, s: values of the contract if return_s is blank
 RAMP_POINTS = 17
+NARROW = 0.8  # of the declared width of cut, below which the force of a pass is another one
+ASIDE_POINTS = 2001  # over the work, by which widths are measured
 STEP = 0.01  # s, of the force along a pass
 
 
@@ -165,6 +167,26 @@ def turn_from_declared(batch: Batch, run: str, path: Path) -> float:
     return math.remainder(cmath.phase(path.direction) - declared * DEG, 2 * math.pi)
 
 
+def narrow_passes(batch: Batch, run: str, path: Path, radius: float) -> np.ndarray:
+    """Mark the passes that find less of the declared width of cut left than :data:`NARROW` of it, (passes,).
+
+    Earlier passes have taken what their cutter went over, and beside the work there is none. Where the size
+    of the work is not known, no pass is narrow.
+    """
+    corners = _corners(batch, path, aside=True)
+    declared = float(batch.runs["radial_depth_mm"].astype(float)[run]) * MM
+    if not (np.isfinite(corners).all() and declared > 0.0):
+        return np.zeros(len(path.length), dtype=bool)
+    place = np.linspace(corners.min(), corners.max(), ASIDE_POINTS)
+    left, width = np.ones(len(place), dtype=bool), np.ptp(corners) / (len(place) - 1)
+    narrow = []
+    for aside in path.aside(*path.start.T):
+        taken = left & (np.abs(place - aside) <= radius)
+        narrow.append(taken.sum() * width < NARROW * declared)
+        left &= ~taken
+    return np.array(narrow)
+
+
 def make_pace(batch: Batch, run: str, path: Path, tool: Cutter) -> Pace:
     """Return the pace of the axis: passes at the feed of the run table, then returns."""
     rate = float(batch.runs["spindle_rpm"].astype(float)[run]) / 60
@@ -182,10 +204,14 @@ def work_size(batch: Batch) -> tuple[float, float]:
     return float(size[0]) * MM, float(size[1]) * MM
 
 
-def _corners(batch: Batch, path: Path) -> Array:
-    """Position along the direction of travel of the work's corners, (4,) m; one is the origin."""
+def _corners(batch: Batch, path: Path, *, aside: bool = False) -> Array:
+    """Position along the direction of travel of the work's corners, (4,) m, or ``aside`` of it.
+
+    One corner is the origin.
+    """
     x, y = work_size(batch)
-    return path.along(*np.array([[0, 0], [x, 0], [0, y], [x, y]]).T)
+    across = path.aside if aside else path.along
+    return across(*np.array([[0, 0], [x, 0], [0, y], [x, y]]).T)
 
 
 def force_over_period(

@@ -21,6 +21,7 @@ from metro.units import DEG, JSON, Array
 Read = Callable[..., pd.DataFrame]
 UNITS = {"coulomb": "N m", "viscous": "N m s/rad"}
 LINEAR = "a linear axis, whose drive is not evaluated"
+FALLING = "friction falls with the speed here, as it does just above rest: no viscous friction is seen"
 BINS = 12  # of speed, per direction, in the figure
 LEAST_SAMPLES = 100
 
@@ -72,11 +73,13 @@ def _table(friction: Friction, log: Motion, relative: Array, axes: Axes) -> pd.D
         # Friction whose error exceeds the whole range of the motor's torque is not identified.
         swing = float(np.ptp(log.torque[:, j]))
         value[:2][half[j, :2] * (1.0, fastest[j]) > swing] = np.nan
+        falling = bool(interval[j, 1, 1] < 0.0)  # no viscous friction does: it is the fall from that at rest
+        value[1] = np.nan if falling else value[1]
         row = {"joint": j + 1, "fastest_deg_s": fastest[j] / DEG, "noise_nm": friction.noise[j]}
         for i, name in enumerate(UNITS):
             low, high = interval[j, i] if np.isfinite(value[i]) else (np.nan, np.nan)
             row |= {name: value[i], f"{name}_low": low, f"{name}_high": high}
-        remark = LINEAR if axes.linear[j] else _remark(friction, j, value)
+        remark = LINEAR if axes.linear[j] else FALLING if falling else _remark(friction, j, value)
         rows.append(row | {"remark": remark})
     return pd.DataFrame(rows)
 

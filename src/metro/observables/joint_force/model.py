@@ -28,6 +28,7 @@ from metro.units import MS, Array
 
 AXES = "xyz"
 LAG_STEP = 5 * MS  # over which the torques are differentiated
+LAG_GRID = 1 * MS
 CROSS = tuple(permutations(range(3), 2))  # axis that shows it, axis along which the force is
 
 
@@ -114,11 +115,12 @@ class JointForceModel:
         """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
         return np.zeros((1, 0))
 
-    def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
+    def design(self, block: Block, _nuisance: Array, beta: Array | None = None) -> tuple[Array, Array]:
         """Waves of the torque (k m, k + 11) per gain and lag, and those without a force (k m,), N m.
 
         For :class:`Instruments` they are the gains and the lag (k + 10, k + 11) themselves; k joints turn.
-        The torques of drives and payload are read with the gains of the joints, too.
+        The torques of drives and payload are read with the gains of the joints, too. The lag is linear about
+        that of ``beta``, to a grid.
         """
         run: Any = block.setting
         if isinstance(run, Instruments):
@@ -128,11 +130,13 @@ class JointForceModel:
         for mass in self.payload:
             other = other + gravity_torque(self.arm, along(Same(self.arm.dh), run), mass)
         read = in_waves(other[:, list(self.joints)])
-        matrix = np.column_stack([carried(self.arm, run, self.offset), late(self.arm, run, self.offset)])
+        lag = 0.0 if beta is None else LAG_GRID * round(float(beta[-1]) / LAG_GRID)
+        later = late(self.arm, run, self.offset + lag)
+        matrix = np.column_stack([carried(self.arm, run, self.offset + lag), later])
         if read.any():
             each = np.kron(np.eye(len(self.joints)), np.ones((len(other), 1)))
             matrix[:, 1 : 1 + len(self.joints)] += each * read[:, None]
-        return matrix, read
+        return matrix, read - lag * later
 
 
 @dataclass(frozen=True, eq=False)
