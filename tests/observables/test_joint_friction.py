@@ -72,6 +72,19 @@ def test_friction_is_found_of_joints_that_turn_round(found):
     assert (table["remark"] == "").all()
 
 
+def test_friction_that_falls_with_the_speed_is_not_called_viscous():
+    """Just above rest it falls (Stribeck): what a straight line through it shows is no viscous friction."""
+    rng = np.random.default_rng(6)
+    runs = [run(rng, f"r{i}", swing(700 + 90 * i, 0.1)) for i in range(4)]
+    for one in runs:
+        rate = np.radians(np.gradient(one["q1_deg"], one["t_s"]))
+        one["tau1_nm"] -= 4.0 * VISCOUS[0] * rate
+    row = observed(*runs)["joint_friction"].set_index("joint").loc[1]
+    assert np.isfinite(row["coulomb"])
+    assert np.isnan(row["viscous"])
+    assert "falls with the speed" in row["remark"]
+
+
 def test_of_the_others_it_is_said_why_not(found):
     table = found["joint_friction"].set_index("joint")
     assert np.isnan(table.loc[5, "coulomb"])

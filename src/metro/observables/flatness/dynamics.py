@@ -102,7 +102,7 @@ def _interpolated(pose: str, mass: MatrixField, points: int) -> list[str]:
 def _damping(
     pose: str, frequency: Array, error: float, modes: pd.DataFrame
 ) -> tuple[Rayleigh | None, list[str]]:
-    """Return a0, a1 of the measured modes of the arm, and notes on modes that contradict M and K.
+    """Return a0, a1 of the measured modes of the arm, and notes on modes that M and K do not have.
 
     ``frequency`` (n, 3) rad/s: that of M and K at the load points, with the relative error ``error``.
     """
@@ -112,7 +112,7 @@ def _damping(
     measured = 2 * np.pi * table["frequency_hz"].to_numpy(dtype=float)
     arm = measured <= OF_THE_ARM * frequency.max()
     table, measured = table[arm], measured[arm]
-    notes = list(_contradictions(pose, frequency, error, table))
+    notes = list(_others(pose, frequency, error, table))
     try:
         rayleigh = fit_rayleigh(measured, *table[["damping", "damping_sd"]].to_numpy(dtype=float).T)
     except ValueError:
@@ -145,20 +145,30 @@ def _of_the_pose(pose: str, modes: pd.DataFrame) -> pd.DataFrame:
     return modes[((place == pose) | place.str.startswith(f"{pose}/")) & known]
 
 
-def _contradictions(pose: str, frequency: Array, error: float, table: pd.DataFrame) -> Iterator[str]:
-    """Name each measured mode that differs from every mode of M and K by more than the errors of both."""
+def _others(pose: str, frequency: Array, error: float, table: pd.DataFrame) -> Iterator[str]:
+    """Name the measured modes that differ from every mode of M and K by more than the errors of both.
+
+    That some do is no contradiction: M and K of the tip hold three modes, an arm has more. The lowest of them
+    should be among the three.
+    """
     low, high = frequency.min(axis=0) / (2 * np.pi), frequency.max(axis=0) / (2 * np.pi)
-    columns = (table[name].to_numpy(dtype=float) for name in ("frequency_hz", "frequency_sd_hz"))
-    for measured, sd, direction in zip(*columns, table["direction"], strict=True):
+    modes = table.sort_values("frequency_hz")
+    columns = (modes[name].to_numpy(dtype=float) for name in ("frequency_hz", "frequency_sd_hz"))
+    others = []
+    for measured, sd in zip(*columns, strict=True):
         off = np.maximum(np.maximum(low - measured, measured - high), 0.0)
-        nearest = int(np.argmin(off))
-        allowed = SURE * math.hypot(np.nan_to_num(sd), error * measured)
-        if off[nearest] > allowed:
-            yield (
-                f"Pose {pose}: the impacts show a mode at {measured:.4g} Hz along {direction}, M and K "
-                f"(mass.csv, loads.csv) none nearer than {low[nearest]:.4g} to {high[nearest]:.4g} Hz over "
-                f"the face, known to {allowed:.2g} Hz: they contradict each other."
-            )
+        others.append(bool(off.min() > SURE * math.hypot(np.nan_to_num(sd), error * measured)))
+    if not any(others):
+        return
+    along = zip(modes["frequency_hz"], modes["direction"], others, strict=True)
+    listed = ", ".join(f"{hz:.4g} Hz along {direction}" for hz, direction, other in along if other)
+    three = ", ".join(f"{a:.4g} to {b:.4g} Hz" for a, b in zip(low, high, strict=True))
+    why = (
+        "The lowest of the arm's modes is among them: check mass.csv and loads.csv."
+        if others[0]
+        else "An arm has more modes than these three."
+    )
+    yield f"Pose {pose}: M and K (mass.csv, loads.csv: {three} over the face) do not have {listed}. {why}"
 
 
 def tip_block(damping: Mapping[str, Rayleigh]) -> JSON:
