@@ -67,7 +67,7 @@ def best_cut(verdict: JSON) -> list[str]:
         return []
     best = max(cuts, key=lambda cut: cut["removal_cm3_min"])
     sure = probability(best["probability_stable"])
-    reach = ", as deep as these runs can tell" if best.get("at_reach") else ""
+    reach = ", as deep as these runs let one judge" if best.get("at_reach") else ""
     return [
         f"Recommended cut: {number(best['spindle_rpm'], 4)} rpm, {number(best['axial_depth_mm'], 2)} mm deep"
         f"{reach} (position {best['position']}): stable with probability {sure} or more, "
