@@ -152,6 +152,13 @@ def test_a_cut_that_chatters_among_measurements_of_the_force_is_flagged_on_the_f
     assert any("b: chatters at 68" in getattr(item, "text", "") for item in first.items)
 
 
+def test_a_cut_that_may_chatter_is_not_said_to(forces):
+    doubtful = RUNS.assign(labelled=-1)
+    doubtful.loc[doubtful["run"] == "b", "probability"] = 0.51
+    (flag,) = [flag for flag in chatter_flags(forces(doubtful)) if flag.startswith("b:")]
+    assert flag.startswith("b: may chatter at 68")
+
+
 def test_tests_of_the_lobes_that_chatter_are_no_flaw():
     tables = {**synthetic.tables(), "chatter_runs": RUNS, "lobe_runs": LOBES}
     assert "lobes_final" in tables

@@ -35,6 +35,8 @@ class Observable(Generic[Posed]):
     observed_with_coefficients : whether the observed tables depend on the cutting coefficients, so that they
         are made anew where an effect changed these.
     reported_without_fit : whether ``report`` has something to say where nothing was fitted.
+    retold : whether ``report`` is written again with the model and the fit of proven effects: what the base
+        model identified without them is wrong by what they are.
     after_loop : ``after_loop(batch, observed, identified, problem, fit)`` writes the blocks that follow from
         the model with the effects found, which ``problem`` has as its base. None: nothing follows.
     """
@@ -48,4 +50,5 @@ class Observable(Generic[Posed]):
     gives_coefficients: bool = False
     observed_with_coefficients: bool = False
     reported_without_fit: bool = False
+    retold: bool = False
     after_loop: Callable[[Batch, Observed, JSON, Problem, BaseFit], JSON] | None = None

@@ -45,6 +45,8 @@ from metro.stages.problem_file import Posed, read_problems
 from metro.stages.problems import merged, pose
 from metro.units import JSON
 
+SETTLED = ("explained", "partly_explained")  # statuses whose effects are proven
+
 
 @dataclass
 class Closing:
@@ -216,7 +218,7 @@ def _close(state: Closing, observable: Observable[Any], posed: Posed, *, anew: b
     if (state.upstream or closure.redrawn) and tells:
         blocks = observable.report(state.batch, state.observed, state.identified, posed.task, fitted)
         state.identified = merged(state.identified, blocks)
-    if observable.after_loop and closure.outcome and fitted:
+    if closure.outcome and fitted:
         _follow(state, observable, state.closed[observable.name], fitted)
 
 
@@ -235,9 +237,13 @@ def _posed_anew(state: Closing, observable: Observable[Any], posed: Posed) -> Po
 def _follow(state: Closing, observable: Observable[Any], closed: Closed, fitted: BaseFit) -> None:
     """Write what follows from the model with the effects found, where there are any."""
     final = closed.outcome.final
-    if observable.after_loop and final.candidate.effects:
-        with_effects = replace(closed.problem, base=final.candidate.model(final.theta))
-        blocks = observable.after_loop(state.batch, state.observed, state.identified, with_effects, fitted)
+    if not final.candidate.effects:
+        return
+    with_effects = replace(closed.problem, base=final.candidate.model(final.theta))
+    settled = state.verdicts[observable.name]["status"] in SETTLED
+    writers = [observable.report] if observable.retold and settled else []
+    for write in [*writers, *filter(None, [observable.after_loop])]:
+        blocks = write(state.batch, state.observed, state.identified, with_effects, fitted)
         state.identified = merged(state.identified, blocks)
 
 

@@ -159,4 +159,4 @@ def report(
     return {"arm": arm_block(batch, observed, task, fit) | tip_forces(batch, observed, identified)}
 
 
-OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, observed_with_coefficients=True)
+OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, observed_with_coefficients=True, retold=True)

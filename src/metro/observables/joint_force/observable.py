@@ -337,4 +337,4 @@ def beside(batch: Batch, read: Tables, identified: JSON) -> tuple[dict[str, pd.D
     return ({} if isinstance(tables, Refusal) else tables) | free, {**({"arm": arm} if arm else {}), **blocks}
 
 
-OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, beside=beside)
+OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, beside=beside, retold=True)

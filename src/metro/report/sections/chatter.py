@@ -13,6 +13,7 @@ from metro.units import JSON
 
 LONGEST = 30
 UNDECIDED = 0.5  # probability of a record that does not decide
+SURELY = 0.9  # probability from which a cut is said to chatter
 KINDS = {
     "hopf": "Hopf",
     "flip": "flip",
@@ -45,11 +46,15 @@ def chatter_flags(results: Results) -> list[str]:
     if tests is None:
         return []
     loud = tests[tests["unstable"] > 0].sort_values("probability", ascending=False)
-    return [
-        f"{row['run']}: chatters at {number(row['chatter_hz'])} Hz (probability "
-        f"{probability(row['probability'])}), and no model of the force holds there"
-        for _, row in loud.iterrows()
-    ]
+    return [_flag(row) for _, row in loud.iterrows()]
+
+
+def _flag(row: pd.Series) -> str:
+    """Say that a cut chatters; below a probability that counts as certain, that it may."""
+    how = f"at {number(row['chatter_hz'])} Hz (probability {probability(row['probability'])})"
+    if row["probability"] < SURELY:
+        return f"{row['run']}: may chatter {how}; a resonance of the dynamometer can look like it"
+    return f"{row['run']}: chatters {how}, and no model of the force holds there"
 
 
 def _tests(results: Results) -> pd.DataFrame | None:
