@@ -110,7 +110,9 @@ def test_edited_code_re_runs_the_stages_that_use_it(checkout):
 
 
 def test_an_edited_sentence_of_a_verdict_re_runs_no_fit(checkout):
-    checkout.edit("src/metro/wording/candidates.py", "passed every test, but", "passed all tests, but")
+    checkout.edit(
+        "src/metro/wording/candidates.py", "passed every test by itself", "passed all tests by itself"
+    )
     assert checkout.planned() == from_stage("verdict", BOTH)
 
 

@@ -14,7 +14,7 @@ RATE_TOLERANCE = 0.01
 JITTER_LIMIT = 0.1
 GAP = 1.5
 AIR_BLOCKS = 50
-TEETH = 0.25  # scatter over mean, above which it is the force of teeth: a wrong zero does not scatter
+TEETH = 0.4  # scatter over mean, above which it is the force of teeth: a wrong zero does not scatter
 AIR_ACTIVITY = 0.1
 OFFSET_LIMIT = 0.02
 
@@ -190,8 +190,8 @@ def zero_in_air(names: tuple[str, ...], activity: Array, mean: Array, largest: f
     """Check the zero of force channels where the tool cuts air at the record's start or end.
 
     Air is the run of blocks at either end whose scatter is below a tenth of the cut's. A cut that is calm
-    before it chatters is no air: there the mean hardly changes where the scatter begins, or it is a force of
-    teeth, which scatters as much. A record that has no air does not show its zero, and gives no finding.
+    before it chatters is no air: that is a force of teeth, which scatters, and no wrong zero. A record that
+    has no air does not show its zero, and gives no finding.
 
     Parameters
     ----------
@@ -205,9 +205,7 @@ def zero_in_air(names: tuple[str, ...], activity: Array, mean: Array, largest: f
         return []
     zero = mean[air].mean(axis=0)
     scatter, limit = float(np.median(activity[air])), OFFSET_LIMIT * largest
-    calm = np.linalg.norm(mean[~quiet].mean(axis=0) - zero) < scatter
-    teeth = np.abs(zero).max() > limit and scatter > TEETH * np.linalg.norm(zero)
-    if calm or teeth:
+    if np.abs(zero).max() > limit and scatter > TEETH * np.linalg.norm(zero):
         return []
     return [_offset(name, float(value), limit) for name, value in zip(names, zero, strict=True)]
 

@@ -26,8 +26,8 @@ AS_REPEATS = 0.02  # relative, how well the forces of repeats agree
 SYSTEMATIC = {**tip_force.SYSTEMATIC, "repeat": math.hypot(tip_force.SYSTEMATIC["dynamometer"], AS_REPEATS)}
 LOADED = 0.01  # load cell and gauge of the load tests, which all walls share
 # Of a joint's compliance at the twist of a cut about that at the twist of the load tests: gears are some 5 to
-# 10 % softer where they are twisted least.
-SOFTER = 0.05
+# 10 % softer where they are twisted least, and the two differ by a part of that.
+SOFTER = 0.03
 TOUCHED = 10 * UM  # of the zero that all walls share: the touch on the work, and the tool's radius
 ZERO = 5 * UM  # standard error of a profile's zero against the programmed wall, before repeats show theirs
 DECLARED = 4  # walls for which that counts
