@@ -102,7 +102,7 @@ def test_a_constant_channel_is_dead_and_not_clipped():
 
 
 def air_offset(names, values):
-    return quality.zero_in_air(names, *quality.blocks_of(values), float(np.abs(values).max()))
+    return quality.zero_in_air(names, quality.blocks_of(values), float(np.abs(values).max()))
 
 
 def cut(offset, air):

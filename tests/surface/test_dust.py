@@ -48,6 +48,13 @@ def test_dust_changes_the_waviness_by_little_once_it_is_left_out():
     assert np.abs(without - clean).max() < 0.2 * spoilt
 
 
+def test_dust_is_no_gap_in_the_trace():
+    """A grain may be wider than the ten points that a trace may lack."""
+    wide = WALL + 60e-6 * (np.abs(X - 0.031) < 1.9e-4)
+    assert dust(X, wide).sum() > 10
+    assert len(even(X, wide)[0]) == len(X)
+
+
 def test_a_trace_of_few_points_is_left_as_it_is():
     assert not dust(X[::20], WALL[::20] + grain(0.031, 70e-6)[::20]).any()
     assert not dust(X[:1], WALL[:1]).any()

@@ -14,7 +14,8 @@ RATE_TOLERANCE = 0.01
 JITTER_LIMIT = 0.1
 GAP = 1.5
 AIR_BLOCKS = 50
-TEETH = 0.4  # scatter over mean, above which it is the force of teeth: a wrong zero does not scatter
+TEETH = 0.2  # scatter over mean, above which it may be the force of teeth: a wrong zero does not scatter
+SMOOTH = 0.5  # scatter of the steps over that of the values, below which it is no white noise
 AIR_ACTIVITY = 0.1
 OFFSET_LIMIT = 0.02
 
@@ -178,25 +179,32 @@ def motion(set_deg: Array) -> Finding:
     return Finding("motion", travel, 0.0, travel > 0.0, message)
 
 
-def blocks_of(values: Array) -> tuple[Array, Array]:
-    """Return scatter, all channels together (b,), and means (b, k) of the blocks that channels part into."""
+def blocks_of(values: Array) -> tuple[Array, Array, Array]:
+    """Return scatter (b,), means (b, k) and scatter of the steps (b,) of the blocks that channels part into.
+
+    The scatter is that of all channels together; that of white noise equals that of its steps, by which a
+    force of teeth moves less from sample to sample.
+    """
     blocks = values[: len(values) // AIR_BLOCKS * AIR_BLOCKS].reshape(AIR_BLOCKS, -1, values.shape[1])
     if blocks.shape[1] < 2:
-        return np.zeros(0), np.zeros((0, values.shape[1]))
-    return np.sqrt(np.sum(np.var(blocks, axis=1), axis=1)), blocks.mean(axis=1)
+        return np.zeros(0), np.zeros((0, values.shape[1])), np.zeros(0)
+    scatter = np.sqrt(np.sum(np.var(blocks, axis=1), axis=1))
+    steps = np.sqrt(0.5 * np.sum(np.mean(np.diff(blocks, axis=1) ** 2, axis=1), axis=1))
+    return scatter, blocks.mean(axis=1), steps
 
 
-def zero_in_air(names: tuple[str, ...], activity: Array, mean: Array, largest: float) -> list[Finding]:
+def zero_in_air(names: tuple[str, ...], blocks: tuple[Array, Array, Array], largest: float) -> list[Finding]:
     """Check the zero of force channels where the tool cuts air at the record's start or end.
 
     Air is the run of blocks at either end whose scatter is below a tenth of the cut's. A cut that is calm
-    before it chatters is no air: that is a force of teeth, which scatters, and no wrong zero. A record that
-    has no air does not show its zero, and gives no finding.
+    before it chatters is no air: the force of its teeth scatters, and does so smoothly. A record that has no
+    air does not show its zero, and gives no finding.
 
     Parameters
     ----------
-    activity, mean : of the blocks, as of :func:`blocks_of`. largest : of the values, without their sign.
+    blocks : of the channels, as of :func:`blocks_of`. largest : of the values, without their sign.
     """
+    activity, mean, steps = blocks
     if not len(activity):
         return []
     quiet = activity < AIR_ACTIVITY * float(np.quantile(activity, 0.9))
@@ -205,7 +213,8 @@ def zero_in_air(names: tuple[str, ...], activity: Array, mean: Array, largest: f
         return []
     zero = mean[air].mean(axis=0)
     scatter, limit = float(np.median(activity[air])), OFFSET_LIMIT * largest
-    if np.abs(zero).max() > limit and scatter > TEETH * np.linalg.norm(zero):
+    smooth = float(np.median(steps[air])) < SMOOTH * scatter
+    if np.abs(zero).max() > limit and smooth and scatter > TEETH * np.linalg.norm(zero):
         return []
     return [_offset(name, float(value), limit) for name, value in zip(names, zero, strict=True)]
 

@@ -36,7 +36,7 @@ class RecordQuality:
     _near: Array | None = None  # the last piece, with the samples before it
     _begins: bool = True  # whether that piece begins the record
     _flat: list[Finding] = field(default_factory=list)  # of the pieces before it
-    _blocks: list[tuple[Array, Array]] = field(default_factory=list)
+    _blocks: list[tuple[Array, Array, Array]] = field(default_factory=list)
 
     def add(self, time: Array, values: Array) -> None:
         """Take the next piece: stamps (n,), s, and channels (n, k)."""
@@ -87,9 +87,9 @@ class RecordQuality:
 
     def air_offset(self) -> list[Finding]:
         """Check the zero of the channels where the tool cuts air at the start or the end."""
-        activity, mean = (np.concatenate(parts) for parts in zip(*self._blocks, strict=True))
+        scatter, mean, steps = (np.concatenate(parts) for parts in zip(*self._blocks, strict=True))
         largest = float(np.max(np.maximum(np.abs(self._low), np.abs(self._high))))
-        return quality.zero_in_air(self.names, activity, mean, largest)
+        return quality.zero_in_air(self.names, (scatter, mean, steps), largest)
 
     def channels(self) -> list[Finding]:
         """Check each channel: it moves, is not clipped, and no two are the same."""

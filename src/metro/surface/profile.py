@@ -92,8 +92,6 @@ def even(x: Array, z: Array) -> tuple[Array, Array]:
     known = np.isfinite(x) & np.isfinite(z)
     x, first = np.unique(x[known], return_index=True)
     z = z[known][first]
-    clean = ~dust(x, z)
-    x, z = x[clean], z[clean]
     if len(x) < 8:
         raise ValueError(f"a profile of {len(x)} points: at least 8 are needed")
     step = np.diff(x)
@@ -104,5 +102,6 @@ def even(x: Array, z: Array) -> tuple[Array, Array]:
             f"the profile has a gap of {step[place]:.3g} after x = {x[place]:.6g}, "
             f"where its points are {spacing:.3g} apart"
         )
+    clean = ~dust(x, z)
     grid = np.linspace(x[0], x[-1], round((x[-1] - x[0]) / spacing) + 1)
-    return grid, np.interp(grid, x, z)
+    return grid, np.interp(grid, x[clean], z[clean])
