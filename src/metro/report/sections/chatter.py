@@ -53,7 +53,7 @@ def _flag(row: pd.Series) -> str:
     """Say that a cut chatters; below a probability that counts as certain, that it may."""
     how = f"at {number(row['chatter_hz'])} Hz (probability {probability(row['probability'])})"
     if row["probability"] < SURELY:
-        return f"{row['run']}: may chatter {how}; a resonance of the dynamometer can look like it"
+        return f"{row['run']}: may chatter {how}; it may also be a resonance of the dynamometer"
     return f"{row['run']}: chatters {how}, and no model of the force holds there"
 
 
