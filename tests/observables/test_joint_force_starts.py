@@ -1,0 +1,39 @@
+"""A path without its start from rest, and torques that follow the force late."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from metro.observables.joint_force.model import JointForceModel, TorqueRun, running
+from metro.observables.joint_force.observable import _settled
+from metro.robot.kinematics import arm_of_cell
+from metro.signals.align import Aligned
+
+DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
+
+
+@pytest.mark.parametrize(("first", "left_out"), [(-0.030, 5), (-0.006, 2), (0.002, 0)])
+def test_the_start_of_a_path_is_left_out_but_for_most_of_the_air(first, left_out):
+    x = first + 1e-3 * np.arange(60)
+    pair = Aligned(np.arange(60.0), np.column_stack([x, x]), np.column_stack([x, x]))
+    kept = _settled(pair, x)
+    assert len(kept.s) == len(kept.first) == len(kept.second) == 60 - left_out
+    assert kept.s[0] == left_out
+
+
+def test_a_lag_of_the_drives_is_a_clock_that_is_late_by_as_much():
+    model = JointForceModel(arm_of_cell({"arm": {"dh": DH}}, {}))
+    t = np.linspace(0.0, 4.0, 81)
+    force = np.column_stack([np.sin(3 * t), np.cos(2 * t), t]) * 50.0
+    still = np.tile([0.1, -0.4, 0.2, 0.3, 0.8, 0.2], (81, 1))
+    run = TorqueRun(still, np.zeros_like(still), t, t, np.full(81, 0.05), running(t, force))
+    block = SimpleNamespace(setting=run)
+    names = [one.name for one in model.parameters]
+    beta = np.where(np.array(names) == "torque_gain", 1.0, 0.0)
+    late = beta + np.where(np.array(names) == "drive_lag", 0.012, 0.0)
+    matrix, offset = model.design(block, np.zeros(0), late)
+    other, none = JointForceModel(model.arm, offset=0.012).design(block, np.zeros(0), beta)
+    np.testing.assert_allclose(matrix @ late + offset, other @ beta + none, atol=1e-9)
+    without, zero = model.design(block, np.zeros(0), beta)
+    assert np.abs(matrix @ late + offset - without @ beta - zero).max() > 0.1
