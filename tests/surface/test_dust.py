@@ -5,6 +5,7 @@ import pytest
 
 from metro.surface.dust import dust
 from metro.surface.profile import even, part
+from metro.units import MM, UM
 
 X = np.arange(0.0, 0.1, 5e-5)
 RNG = np.random.default_rng(3)
@@ -58,3 +59,13 @@ def test_dust_is_no_gap_in_the_trace():
 def test_a_trace_of_few_points_is_left_as_it_is():
     assert not dust(X[::20], WALL[::20] + grain(0.031, 70e-6)[::20]).any()
     assert not dust(X[:1], WALL[:1]).any()
+
+
+@pytest.mark.parametrize("starts_mm", [2.0, 4.0, 6.0])
+def test_sharp_marks_of_chatter_that_start_half_way_are_no_dust(starts_mm):
+    x = np.arange(0.0, 8 * MM, 10 * UM)
+    grown = 1.0 - np.exp(-np.maximum(x - starts_mm * MM, 0.0) / (1 * MM))
+    cusps = (np.abs(np.cos(np.pi * x / (0.9 * MM))) ** 3 - 0.4) * 5 * UM * grown
+    ripple = 0.2 * UM * np.sin(2 * np.pi * x / (0.22 * MM))
+    z = cusps + ripple + np.random.default_rng(5).normal(0.0, 0.02 * UM, len(x))
+    assert not dust(x, z).any()
