@@ -8,6 +8,7 @@ from toy import BEND, GATES, RIPPLE, SCATTER, Wave, problem
 from metro.loop.checks.between import Between
 from metro.loop.checks.restless import Restless
 from metro.loop.checks.signature import Line
+from metro.loop.search.forward import forward
 from metro.loop.search.outcome import withdrawn
 from metro.loop.search.search import _unsteady, search
 from metro.loop.statement import Statement
@@ -57,3 +58,14 @@ def test_a_scatter_that_changes_the_prediction_too_little_is_no_finding():
     found = search(problem(3, phased=False, scatter=10 * SCATTER), (), GATES)
     assert found.base_restless.relative == pytest.approx(0.1, rel=0.5)
     assert _unsteady(found.base, found.prior, 0.5) is None
+
+
+@pytest.mark.parametrize(("weight", "claimed"), [(0.6, ("bend",)), (0.45, ())])
+def test_effects_none_of_which_is_likelier_than_not_are_not_claimed(weight, claimed):
+    def unsure(space):
+        choice = forward(space)
+        return replace(choice, weight=dict.fromkeys(choice.weight, weight))
+
+    found = search(problem(9, truth=Wave(bend=0.2), phased=False), (BEND, RIPPLE), GATES, unsure)
+    assert found.names == claimed
+    assert (found.trials[0].why_not == Statement("unbelieved")) is (not claimed)

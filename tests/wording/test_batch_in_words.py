@@ -55,7 +55,7 @@ def test_the_verdict_holds_sentences_and_of_a_cause_what_is_brief():
     entry = content["observables"]["force"]
     assert (
         entry["unexplained"]["signature"]
-        == "more of the error remains unexplained with it than it explains; b"
+        == "with what stays unexplained beside it, it is not likelier than not to be the cause; b"
     )
     assert entry["candidates"][0]["why_not"].startswith("passed every test")
     assert entry["next_experiment"].startswith("tests with a stable or unstable label")
@@ -78,11 +78,15 @@ def test_the_story_ends_with_the_verdict_in_a_sentence():
 
 
 @pytest.mark.parametrize(
-    ("names", "words"),
-    [(["a_b"], "by a b."), (["a", "b"], "by a and b."), (["a", "b", "c_d"], "by a, b and c d.")],
+    ("chances", "words"),
+    [
+        ({"a_b": 0.99}, "by a b."),
+        ({"a": 0.99, "b": 0.94}, "by a and b (possible)."),
+        ({"a": 1.0, "b": 0.96, "c_d": 0.95}, "by a, b and c d."),
+    ],
 )
-def test_effects_are_named_in_a_row(names, words):
-    effects = [{"effect": name} for name in names]
+def test_effects_are_named_in_a_row_with_those_that_are_only_possible(chances, words):
+    effects = [{"effect": name, "probability": chance} for name, chance in chances.items()]
     entry = {**VERDICT, "status": "explained", "effects": effects, "unexplained": None, "before": None}
     assert verdict_in_words(entry) == f"The residual is explained {words}"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from metro.units import JSON, printed
 from metro.wording.causes import cause_in_words, split_in_words
-from metro.wording.names import listed, plain
+from metro.wording.names import SURE, listed, plain
 from metro.wording.statements import worded
 
 BRIEF = (
@@ -18,7 +18,7 @@ BRIEF = (
 STATUSES = {
     "clean": "The identification runs show no effect beyond the base model; nothing was added.",
     "explained": "The residual is explained by {effects}.",
-    "partly_explained": "Part of the residual is explained by {effects}, as left-out conditions confirm. "
+    "partly_explained": "Part of the residual is explained by {effects}. "
     "A significant residual remains that no effect of the library explains.",
     "undetermined": "Several effects explain the residual equally well with these data: {rivals}.",
     "unexplained": "There is a significant residual that no effect of the library explains; nothing was "
@@ -66,6 +66,11 @@ def story_of(findings: JSON) -> JSON:
     return {**head, "observables": observables, "effects": effects, "causes": causes, "chain": chain}
 
 
+def _named(effect: JSON) -> str:
+    """Name an effect, as a possible one where it is not proven."""
+    return str(effect["effect"]) if effect["probability"] >= SURE else f"{effect['effect']} (possible)"
+
+
 def verdict_in_words(verdict: JSON) -> str:
     """Say the verdict on an observable as an engineer would, without what remains unexplained.
 
@@ -75,7 +80,7 @@ def verdict_in_words(verdict: JSON) -> str:
     """
     if verdict.get("words"):
         return str(verdict["words"])
-    effects = listed([entry["effect"] for entry in verdict["effects"]] or [""])
+    effects = listed([_named(entry) for entry in verdict["effects"]] or [""])
     rivals = "; ".join(plain(" or ".join(pair)) for pair in verdict["indistinguishable"])
     status = "contradicted" if verdict.get("contradicted") else verdict["status"]
     sentence = STATUSES[status].format(effects=effects, rivals=rivals)

@@ -110,7 +110,7 @@ def _far_behind(values: JSON) -> str:
 SENTENCES: Mapping[str, Sentence] = {
     "undetermined": "these runs do not determine its parameters",
     "unlike": "not an effect of the library, and it does not explain the remaining error",
-    "unbelieved": "more of the error remains unexplained with it than it explains",
+    "unbelieved": "with what stays unexplained beside it, it is not likelier than not to be the cause",
     "misses_half": _misses_half,
     "resembled": "not an effect of the library: it only describes the remaining error",
     "beaten": "passed every test by itself, but the model that was chosen explains the runs better",

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from metro.units import JSON
 
+SURE = 0.95  # probability from which on a cause counts as identified
 # Base parameters of which something is believed beforehand, by the pattern of their names.
 BELIEFS = {
     r"softer_joint_(\d)": "compliance of joint {} in the cut, against the load tests",

@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 
 from metro.units import JSON
 from metro.wording.candidates import Sentence
-from metro.wording.names import chance, listed, pair, plain
+from metro.wording.names import SURE, chance, listed, pair, plain
 
 BY = {"random": "at random", "region": "by region", "time": "by time"}
-SURE = 0.95  # probability from which on a cause counts as identified
 LEAST_PART = 0.05  # of what is left, that is told
 KINDS = {
     "pose": "a cause that changes with the pose and not with one joint alone, such as a link, a bearing or "

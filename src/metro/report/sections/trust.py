@@ -10,8 +10,8 @@ from metro.report.cuts import NAMES, NUMBERS
 from metro.report.numbers import listing, number, percent, probability, words
 from metro.report.results import Results, heading
 from metro.units import JSON, printed
+from metro.wording.names import SURE
 
-SURE = 0.95  # probability from which on a cause counts as identified
 HOLDS = ("clean", "explained")
 UNTESTED = "No prediction was tested here."
 IDENTIFIED = (
