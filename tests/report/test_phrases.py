@@ -73,3 +73,13 @@ def test_a_note_becomes_a_sentence_and_symbols_stay(text, told):
 def test_units_are_set_as_in_print():
     assert plain("it can be detected from 12 um/min on") == "it can be detected from 12 µm/min on"
     assert plain("a column thrust_um") == "a column thrust_um"
+
+
+def test_of_many_kinds_only_the_largest_are_named():
+    entries = [place("z", f"wave {k} over the face", 1.0 / (k + 1)) for k in range(30)]
+    told = residual_words(entries, 3)
+    assert told.startswith("wave 0 over the face (z ")
+    assert told.endswith(", and smaller parts of 26 other kinds")
+    assert told.count(";") == 3
+    assert residual_words(entries[:5], 3).endswith(", and smaller parts of 1 other kind")
+    assert "smaller" not in residual_words(entries[:4], 3)

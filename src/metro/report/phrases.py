@@ -9,6 +9,7 @@ from metro.report.numbers import listing, percent
 from metro.units import JSON
 
 MOST_ORDERS = 6
+MOST_KINDS = 4  # of places that are named in a sentence
 
 
 def residual_words(entries: Sequence[JSON], teeth: int) -> str:
@@ -24,7 +25,10 @@ def residual_words(entries: Sequence[JSON], teeth: int) -> str:
         if entry.get("significant"):
             kinds.setdefault(_kind(str(entry["label"]), teeth), []).append(entry)
     ranked = sorted(kinds.items(), key=lambda item: -max(_size(entry) for entry in item[1]))
-    return "; ".join(_kind_words(kind, same_kind) for kind, same_kind in ranked)
+    named = [_kind_words(kind, same_kind) for kind, same_kind in ranked[:MOST_KINDS]]
+    smaller = len(ranked) - len(named)
+    more = f", and smaller parts of {smaller} other kind{'s' if smaller > 1 else ''}" if smaller > 0 else ""
+    return "; ".join(named) + more
 
 
 def sentence(text: str) -> str:

@@ -63,7 +63,7 @@ class Lobes:
     boundary : at k speeds.
     which : (k,) index of the least stable cut.
     samples : (s, k) m, lowest depths under the uncertainty of modes and coefficients.
-    anew : (r, j) ratio of some of the samples, at some speeds, to their exact solutions.
+    anew : (r, j) ratio of some of the samples, at some speeds, to their exact solutions; NaN without a limit.
     """
 
     tip: Tip
@@ -220,7 +220,9 @@ def solve(tip: Tip, cutting: Cutting, first: pd.Series, rpm: Array, *, check: bo
         return lobes
     some = slice(ANEW_EVERY // 2, None, ANEW_EVERY)
     solved = [depths_anew(tip.structure, cut, rpm[some], deviations[:ANEW]) for cut in cuts]
-    return replace(lobes, anew=lobes.samples[:ANEW, some] / np.min(solved, axis=0))
+    exact, near = np.min(solved, axis=0), lobes.samples[:ANEW, some]
+    limited = np.isfinite(exact) & np.isfinite(near) & (exact > 0.0) & (near > 0.0)
+    return replace(lobes, anew=np.divide(near, exact, out=np.full(near.shape, np.nan), where=limited))
 
 
 def _lowest(boundaries: list[Boundary], which: np.ndarray) -> Boundary:

@@ -168,7 +168,7 @@ def _residual(entry: JSON, left: str) -> str:
     unexplained = entry.get("unexplained") or {}
     if not unexplained.get("signature"):
         return ""
-    return f"The remaining error appears {left or plain(str(unexplained['signature']))}."
+    return f"Remaining error: {left or plain(str(unexplained['signature']))}."
 
 
 def left_words(results: Results, observable: str) -> str:
