@@ -12,6 +12,7 @@ from worded import in_words
 
 from metro.loop.labels.verdict import judge_labels
 from metro.loop.labels.verification import log_likelihood, surprise_alone
+from metro.wording.statements import worded
 
 RNG = np.random.default_rng(1)
 PROBABILITY = RNG.uniform(0.02, 0.98, 40)
@@ -159,6 +160,8 @@ def test_twins_are_undetermined_and_a_next_test_is_named():
     assert verdict["status"] == "undetermined"
     assert {"shift", "twin"} <= {name for pair in verdict["indistinguishable"] for name in pair}
     assert "rev/min" in verdict["next_experiment"]
+    for effect in (SHIFT, TWIN):
+        assert f"What shows {effect.name} directly: {effect.experiment}" in verdict["next_experiment"]
     assert story["experiments"][0]["probability"] <= 1.0
 
 
@@ -181,3 +184,12 @@ def test_too_few_tests_are_insufficient_for_effects():
     _, verdict, story, _ = closed(Line(), (SHIFT, SLOPE), seed=3, rpm=np.array([4000.0, 5000.0]))
     assert verdict["candidates"] == []
     assert "speeds, not held out, are needed" in story["noise"]["words"]
+
+
+def test_a_mode_that_may_be_missing_is_to_be_sought_at_its_frequency():
+    mode = {"effect": "missing_mode", "experiment": "an impact test", "near_hz": 567.3, "ci95_hz": [560, 575]}
+    promise = {"information": 0.5, "leading": 0.9, "leading_now": 0.6}
+    test = {"code": "test", "values": {"rpm": 3000.0, "depth_mm": 1.0}}
+    values = {"test": test, "names": ["missing_mode"], **promise, "directly": [mode]}
+    words = worded({"code": "next_test", "values": values})
+    assert words.endswith("What shows missing mode at about 567 Hz directly: an impact test")

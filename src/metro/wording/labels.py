@@ -38,8 +38,14 @@ def _next_test(values: JSON) -> str:
     return (
         f"{values['test']}: its result best distinguishes {names} ({values['information']:.2f} bit). The "
         f"probability of the most probable cause is expected to rise from {values['leading_now']:.2f} to "
-        f"{values['leading']:.2f}"
+        f"{values['leading']:.2f}{''.join(map(_directly, values.get('directly', [])))}"
     )
+
+
+def _directly(values: JSON) -> str:
+    """Say what shows an effect without a further cut."""
+    at = f" at about {values['near_hz']:.3g} Hz" if "near_hz" in values else ""
+    return f". What shows {plain(values['effect'])}{at} directly: {values['experiment']}"
 
 
 def _test_beside(values: JSON) -> str:

@@ -13,7 +13,7 @@ from metro.loop.labels.search import NOTHING, LabelOutcome, Weighed
 from metro.loop.labels.unknown import UNKNOWN, curves
 from metro.loop.statement import Statement
 from metro.observables.labelled import Labelled
-from metro.units import MM, Array
+from metro.units import JSON, MM, Array
 
 _DEPTHS = 9  # tried, from the least to the greatest that was tested
 _DRAWS = 12  # parameters of each hypothesis, by their posterior
@@ -95,7 +95,27 @@ def advice(tests: Sequence[NextTest], outcome: LabelOutcome) -> Statement:
     lead = outcome.lead.names if outcome.lead else ()
     names = [*lead, *outcome.rivals] or [NOTHING]
     promise = {"information": best.information, "leading": best.leading, "leading_now": best.leading_now}
-    return Statement("next_test", {"test": best.statement, "names": names, **promise})
+    values = {"test": best.statement, "names": names, **promise, "directly": _directly(names, outcome)}
+    return Statement("next_test", values)
+
+
+def _directly(names: Sequence[str], outcome: LabelOutcome) -> list[JSON]:
+    """Say of each effect in question what shows it without a further cut, and at which frequency to look."""
+    told: list[JSON] = []
+    for name in names:
+        first = next((one for one in outcome.weighed if name in one.names), None)
+        effect = next((e for e in first.hypothesis.effects if e.name == name), None) if first else None
+        if first is None or effect is None or effect.resembled:
+            continue
+        sought = first.hypothesis.parameters(name).get("frequency_hz")
+        told.append(
+            {
+                "effect": name,
+                "experiment": effect.experiment,
+                **({"near_hz": sought["value"], "ci95_hz": sought["ci95"]} if sought else {}),
+            }
+        )
+    return told
 
 
 def beside(rows: pd.DataFrame) -> Statement:
