@@ -360,14 +360,16 @@ def test_a_tool_that_yields_is_given_the_depth_that_it_really_cuts(cell):
     np.testing.assert_allclose(found, rigid, rtol=1e-5)
 
 
-def test_a_dynamometer_gives_the_mean_of_the_steady_cut_about_its_air(cell):
+@pytest.mark.parametrize(("starts", "drift"), [(1.0, 0.0), (1.0, 2.0), (0.0, 0.0)])
+def test_a_dynamometer_gives_the_mean_of_the_steady_cut_about_its_air(cell, starts, drift):
+    """The air after the cut is three times as long as that before, if there is any: the zero is a line."""
     rate, turn = 2000.0, 60 / 4000
-    t = np.arange(0, 6, 1 / rate)
-    cutting = (t > 1) & (t < 5)
+    t = np.arange(0, 8, 1 / rate)
+    cutting = (t >= starts) & (t < 5)
     ripple = 1 + 0.5 * np.sin(2 * np.pi * 3 / turn * t)
     record = pd.DataFrame({"t_s": t, "spindle_deg": np.nan})
     for name, mean, zero in (("fx_n", 90.0, 3.0), ("fy_n", -150.0, -2.0), ("fz_n", 40.0, 1.0)):
-        record[name] = mean * ripple * cutting + zero
+        record[name] = mean * ripple * cutting + zero + drift * t
     found = tip_force.from_dynamometer(
         cell.batch, "r1", FakeTables(lambda *_: record), wall(cell.batch, "r1")
     )

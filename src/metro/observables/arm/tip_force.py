@@ -14,7 +14,7 @@ from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm.wall import Wall
 from metro.observables.cut import conditions as cutting_force
-from metro.observables.cut.long_record import LongRecord
+from metro.observables.cut.long_record import LongRecord, Stretch
 from metro.observables.problem import Refusal
 from metro.robot.drive_torques import TURNING
 from metro.robot.joint_dynamics import low_passed
@@ -254,7 +254,7 @@ def from_dynamometer(batch: Batch, run: str, read: Tables, wall: Wall) -> pd.Dat
         return about
     count, total, square = 0, np.zeros(3), np.zeros(3)
     for part in about.record.stretches(about.steady):
-        signal = part.signal - about.zero
+        signal = about.of(part)
         total, square = total + signal.sum(axis=0), square + (signal**2).sum(axis=0)
         count += len(signal)
     mean = total / count
@@ -265,11 +265,21 @@ def from_dynamometer(batch: Batch, run: str, read: Tables, wall: Wall) -> pd.Dat
 
 @dataclass(frozen=True, eq=False)
 class AboutAir:
-    """A dynamometer record, its ``zero`` (3,) N in the air, and the slice of the steady cut."""
+    """A dynamometer record, its zero in the air, and the slice of the steady cut.
+
+    ``zero`` (3,) N at the start of the record, ``drift`` (3,) N/s of it: none where there is air on one side
+    of the cut alone.
+    """
 
     record: LongRecord
     zero: Array
+    drift: Array
     steady: slice
+
+    def of(self, part: Stretch) -> Array:
+        """Return the force (n, 3), N, of a stretch of the record."""
+        since = part.time - self.record.start
+        return np.asarray(part.signal - self.zero - since[:, None] * self.drift)
 
 
 def about_air(batch: Batch, run: str, read: Tables, wall: Wall) -> AboutAir | Refusal:
@@ -285,8 +295,26 @@ def about_air(batch: Batch, run: str, read: Tables, wall: Wall) -> AboutAir | Re
         segments = steady.segments(turns, round(record.rate * wall.leaving / cutting_force.feed(batch, run)))
     except ValueError as error:
         return Refusal(str(error))
-    zero = turns.mean[segments.quiet].mean(axis=0) if segments.quiet.any() else np.zeros(3)
-    return AboutAir(record, zero, segments.steady)
+    zero, drift = _zero_line(segments, turns.length / record.rate)
+    return AboutAir(record, zero, drift, segments.steady)
+
+
+def _zero_line(segments: steady.Segments, turn: float) -> tuple[Array, Array]:
+    """Return the zero at the start of a record, N, and its drift, N/s, by what is read in the air.
+
+    ``turn``: time of a revolution, s. An amplifier that drifts by a tenth of a newton a second is wrong by
+    more than the noise after a path of ten seconds.
+    """
+    mean, middle = segments.turns.mean, turn * (np.arange(len(segments.quiet)) + 0.5)
+    if not segments.quiet.any():
+        return np.zeros(3), np.zeros(3)
+    cut = 0.5 * turn * (segments.steady.start + segments.steady.stop) / segments.turns.length
+    sides = [segments.quiet & (middle < cut), segments.quiet & (middle > cut)]
+    if not all(side.any() for side in sides):
+        return mean[segments.quiet].mean(axis=0), np.zeros(3)
+    (before, after), (first, last) = ([of[side].mean(axis=0) for side in sides] for of in (mean, middle))
+    drift = (after - before) / (last - first)
+    return before - first * drift, drift
 
 
 def from_coefficients(

@@ -103,7 +103,7 @@ def _integral(measured: tip_force.AboutAir, places: Array) -> ForceRecord:
     """Return the running integral of a measured about its zero at rising times (k,), s, from its start."""
     integral, before, last = np.zeros((len(places), 3)), np.zeros(3), (np.zeros(0), np.zeros((0, 3)))
     for part in measured.record.stretches():
-        here = part.time - measured.record.start, part.signal - measured.zero
+        here = part.time - measured.record.start, measured.of(part)
         time, force = (np.concatenate(ends) for ends in zip(last, here, strict=True))
         whole = running(time, force).integral
         inside = (places >= time[0]) & (places <= time[-1])
