@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -10,12 +11,11 @@ import numpy as np
 from metro.cutting.cutter import Cutter
 from metro.cutting.floor import floor_at, floor_of
 from metro.cutting.force import Cut
-from metro.units import ComplexArray
+from metro.units import Array, ComplexArray
 
 NODES = 64  # of a Gauss rule over the arc, beside two for each order: the floor of a helix bends most
 
 
-@lru_cache(maxsize=512)
 def arc_force(cutter: Cutter, cut: Cut, multiple: int, highest: int) -> ComplexArray:
     """Return the orders of a force cos(mφ) per unit of edge on every tooth in the cut, φ its immersion angle.
 
@@ -32,9 +32,16 @@ def arc_force(cutter: Cutter, cut: Cut, multiple: int, highest: int) -> ComplexA
     (H+1, 3, 2) m: amplitudes (:func:`metro.signals.orders.amplitudes`) of the force on the tool in the feed
     frame, of a tangential and of a radial force of 1 N/m. Read-only: it is kept.
     """
+    true = replace(cutter, runout_radius=0.0, runout_angle=0.0, reach=())
+    return _arc_force(true, replace(cut, feed_per_tooth=0.0), multiple, highest)
+
+
+@lru_cache(maxsize=512)
+def _arc_force(cutter: Cutter, cut: Cut, multiple: int, highest: int) -> ComplexArray:
+    """Return :func:`arc_force`, of what it depends on alone: neither runout nor feed."""
     orders = np.arange(highest + 1)[:, None]
     entry, leave = cut.engagement.entry, cut.engagement.exit
-    nodes, weights = np.polynomial.legendre.leggauss(NODES + 2 * highest)
+    nodes, weights = _nodes(NODES + 2 * highest)
     phi, weights = entry + 0.5 * (leave - entry) * (1.0 + nodes), 0.5 * (leave - entry) * weights
     cosine, sine = np.cos(phi), np.sin(phi)
     floor, height = floor_of(cutter, cut), np.full(len(phi), cut.axial_depth)
@@ -50,3 +57,10 @@ def arc_force(cutter: Cutter, cut: Cut, multiple: int, highest: int) -> ComplexA
     result = np.einsum("hn,acn->hac", wave, axes)
     result.flags.writeable = False
     return np.asarray(result)
+
+
+@lru_cache(maxsize=16)
+def _nodes(count: int) -> tuple[Array, Array]:
+    """Nodes and weights of a Gauss rule; finding them takes longer than all that is done with them."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return nodes, weights

@@ -167,12 +167,13 @@ def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
     The log stamps it ``offset`` s later than the dynamometer.
     """
     force = run.force.mean(run.t - offset, run.width)
-    jacobian = tip_jacobian_of(arm, along(Same(arm.dh), run))[..., arm.axes.turning]
-    unit = np.eye(3)
-    by_axis = [in_waves(joint_torque(jacobian, force * axis)) for axis in unit]
-    across = [
-        in_waves(joint_torque(jacobian, np.outer(force[:, along], unit[seen]))) for seen, along in CROSS
-    ]
+    jacobian = _driven_jacobian(arm, run)
+    # Of a force along each axis as each axis shows it: (m, seen, along, k), all in one transform.
+    torque = -jacobian[:, :, None, :] * force[:, None, :, None]
+    each = np.moveaxis(waves(torque.reshape(len(force), -1)).reshape(torque.shape), 0, -1)
+    each = each.reshape(3, 3, -1)
+    by_axis = [each[i, i] for i in range(3)]
+    across = [each[seen, along] for seen, along in CROSS]
     whole = np.sum(by_axis, axis=0)
     by_joint = np.kron(np.eye(jacobian.shape[-1]), np.ones((len(force), 1))) * whole[:, None]
     return np.column_stack([whole, by_joint, *by_axis, *across])
@@ -181,8 +182,14 @@ def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
 @lru_cache(maxsize=256)
 def late(arm: Arm, run: TorqueRun, offset: float) -> Array:
     """Waves (k m,), N m/s, of the torque that balances the force, per second by which it comes later."""
-    after, before = (carried(arm, run, offset + step)[:, 0] for step in (LAG_STEP, -LAG_STEP))
-    return np.asarray((after - before) / (2.0 * LAG_STEP))
+    after, before = (run.force.mean(run.t - offset - step, run.width) for step in (LAG_STEP, -LAG_STEP))
+    return in_waves(joint_torque(_driven_jacobian(arm, run), (after - before) / (2.0 * LAG_STEP)))
+
+
+@lru_cache(maxsize=256)
+def _driven_jacobian(arm: Arm, run: TorqueRun) -> Array:
+    """Tip velocity per rate of each joint that turns, along a run, (m, 3, k)."""
+    return np.asarray(tip_jacobian_of(arm, along(Same(arm.dh), run))[..., arm.axes.turning])
 
 
 def in_waves(torque: Array) -> Array:
