@@ -84,7 +84,7 @@ def _added(
         passed = passed or open_to
         if not passed:
             break
-        first = max(passed, key=lambda trial: believed(trial.effect, trial.weight))
+        first = max(passed, key=lambda trial: believed(trial.effect, trial.weight, trial.fit))
         current, dropped = _pruned(first.fit, space)
         barred |= dropped
         steps.append(current)

@@ -14,7 +14,7 @@ from metro.loop.checks.evidence import leave_out, weights
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, cost_under, fit
 from metro.loop.fitting.noise import Noise
-from metro.loop.search.trial import HOPELESS, Gates, beyond_left_out, parted, unlike
+from metro.loop.search.trial import HOPELESS, Gates, beyond_left_out, parted, unlike, unsettled
 
 RIVAL_WEIGHT = 0.05  # above it, another effect in the place of one that was chosen leaves it undecided
 
@@ -46,9 +46,14 @@ class Contest:
     rivals: tuple[Rival, ...] = ()
 
 
-def believed(effect: Effect, weight: float) -> tuple[bool, float]:
-    """Order of belief: what is not of the library comes after all that is and has a weight that counts."""
-    return not effect.resembled and weight > RIVAL_WEIGHT, weight
+def believed(effect: Effect, weight: float, fitted: Fit) -> tuple[bool, bool, float]:
+    """Order of belief: what is not of the library comes after all that is and has a weight that counts.
+
+    Of the latter, an effect whose fit is a result comes before one whose parameters would have to be larger
+    than they may be, or are not determined.
+    """
+    counts = not effect.resembled and weight > RIVAL_WEIGHT
+    return counts and unsettled(fitted) is None, counts, weight
 
 
 def contested(base: Fit, current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> Contest:
@@ -93,7 +98,10 @@ def _round(
         for fitted, other in zip(others, share[1:], strict=True):
             if other > RIVAL_WEIGHT:
                 rivals.append(Rival(*_titles(effect, fitted.candidate.effects[-1]), float(other), fitted))
-        belief = [believed(one, float(part)) for one, part in zip(in_place, share, strict=True)]
+        fits = [current, *others]
+        belief = [
+            believed(one, float(w), fitted) for one, w, fitted in zip(in_place, share, fits, strict=True)
+        ]
         first = belief.index(max(belief))
         if better is None and first > 0:
             better = others[first - 1]
