@@ -141,6 +141,11 @@ class Effect:
         return self.name, self.form
 
     @property
+    def title(self) -> str:
+        """Its name, with its form if it has one: ``friction_reversal (joint 3)``."""
+        return f"{self.name} ({self.form})" if self.form else self.name
+
+    @property
     def reported(self) -> tuple[EffectParameter, ...]:
         """The parameter that each value of the contract belongs to."""
         return self.parameters[:1] * len(self.mixing) if self.mixing else self.parameters

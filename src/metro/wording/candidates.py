@@ -107,11 +107,19 @@ def _far_behind(values: JSON) -> str:
     )
 
 
+def _holds_nothing(values: JSON) -> str:
+    return (
+        "its interval holds no effect at all, once what the model gets wrong may be the same in all "
+        f"conditions (p = {values['p_value']:.2g})"
+    )
+
+
 SENTENCES: Mapping[str, Sentence] = {
     "undetermined": "these runs do not determine its parameters",
     "unlike": "not an effect of the library, and it does not explain the remaining error",
     "unbelieved": "with what stays unexplained beside it, it is not likelier than not to be the cause",
     "misses_half": _misses_half,
+    "holds_nothing": _holds_nothing,
     "resembled": "not an effect of the library: it only describes the remaining error",
     "beaten": "passed every test by itself, but the model that was chosen explains the runs better",
     "far_behind": _far_behind,

@@ -17,9 +17,11 @@ from metro.loop.checks.evidence import compare, hold_out, leave_out
 from metro.loop.fitting.fit import Fit
 from metro.loop.search.rivals import Contest, believed, contested
 from metro.loop.search.strategy import Choice, SearchSpace
+from metro.loop.search.told import least_told
 from metro.loop.search.trial import HOPELESS, Trial, parted, small_beside_residual, tried, without
 from metro.loop.statement import Statement
 
+TOLD = 0.05  # p-value of an effect by its own interval, above which that holds none: the 95 % of intervals
 MOST_EFFECTS = 6  # of a model: four that every machine has (runout, end, resonance, crosstalk), and two
 # Trials by what a model has, in whatever order it was added, and what was tried on top of that.
 Known = dict[tuple[frozenset[Effect], tuple[tuple[str, str], ...]], list[Trial]]
@@ -104,15 +106,21 @@ def _promising(effects: list[Effect], trials: Mapping[tuple[str, str], Trial]) -
 
 
 def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str, str], Statement]]:
-    """Drop, the smallest first, effects that are small beside what stays unexplained; say why of each."""
+    """Drop effects that are not told from none, or small beside what stays unexplained; say why of each.
+
+    The least told goes first, then the smallest.
+    """
     dropped: dict[tuple[str, str], Statement] = {}
     while current.candidate.effects:
         evidences = {
             effect: compare(*parted(space.base, current, effect, space.prior))
             for effect in current.candidate.effects
         }
-        least = min(evidences, key=lambda effect: evidences[effect].size)
-        why = small_beside_residual(evidences[least])
+        least, p_value = least_told(current)
+        why: Statement | None = Statement("holds_nothing", {"p_value": p_value})
+        if p_value <= TOLD:
+            least = min(evidences, key=lambda effect: evidences[effect].size)
+            why = small_beside_residual(evidences[least])
         if why is None:
             break
         dropped[least.key] = why

@@ -79,6 +79,12 @@ class Outcome:
         """
         return self.weight[name] * self.explained
 
+    def some(self, name: str) -> float:
+        """Return the probability that a chosen effect or one of its rivals is the cause."""
+        titles = {effect.title for effect in self.final.candidate.effects if effect.name == name} | {name}
+        others = sum(rival.weight for rival in self.rivals if rival.effect in titles)
+        return min(1.0, self.weight[name] + others) * self.explained
+
 
 def withdrawn(outcome: Outcome, why: Statement) -> Outcome:
     """Return an outcome without effects: a correction that is less likely than not is not applied."""

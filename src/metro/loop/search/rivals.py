@@ -72,9 +72,7 @@ def contested(base: Fit, current: Fit, effects: Sequence[Effect], prior: Noise, 
 
 def _titles(chosen: Effect, other: Effect) -> tuple[str, str]:
     """Names of two effects, with their forms where the name is the same."""
-    if chosen.name != other.name:
-        return chosen.name, other.name
-    return f"{chosen.name} ({chosen.form})", f"{other.name} ({other.form})"
+    return (chosen.name, other.name) if chosen.name != other.name else (chosen.title, other.title)
 
 
 def _keys(fitted: Fit) -> list[tuple[str, str]]:

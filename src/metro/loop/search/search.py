@@ -30,7 +30,7 @@ STRATEGY: Strategy = forward  # the one in use
 NOT_VISIBLE = 0.02  # share of a signature that the base parameters leave, below which it is not tried
 STRAINED = 0.01  # p-value of what is believed beforehand in the base fit, below which all are tried
 DIM = 0.1  # share that the zeros of the runs leave, below which an effect is listed as hidden by them
-EVEN = 0.5  # probability that one of the effects must exceed for any to be claimed
+EVEN = 0.5  # probability that one of the effects, or a rival of it, must exceed for any to be claimed
 SESSION = 0.005  # p-value of a step along the session that counts
 SESSION_SIZE = 0.01  # and its least size, relative to the parameter
 CONDITIONS = 0.001  # p-value of differences between conditions that count
@@ -117,8 +117,8 @@ def _described(
         dim=_dim(base, space.effects),
         likeness=likeness if likeness is not final else None,
     )
-    likeliest = max(map(outcome.probability, outcome.names), default=outcome.explained)
-    return outcome if outcome.rivals or likeliest > EVEN else withdrawn(outcome, Statement("unbelieved"))
+    likeliest = max(map(outcome.some, outcome.names), default=outcome.explained)
+    return outcome if likeliest > EVEN else withdrawn(outcome, Statement("unbelieved"))
 
 
 def _of_the_library(base: Fit, fitted: Fit, prior: Noise) -> Fit:

@@ -1,0 +1,41 @@
+"""Whether the intervals of an effect's parameters hold none of it: then it is not claimed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from metro.effects.effect import Effect
+from metro.loop.fitting.fit import Fit
+from metro.loop.fitting.held_out import run_dof
+
+
+def least_told(fitted: Fit) -> tuple[Effect, float]:
+    """Return the effect of a fit that is told from none the least, and its p-value by its own intervals.
+
+    Likelihoods take what a model gets wrong for independent from condition to condition; intervals, that it
+    may be the same in all. An effect that only the former see is one that the report itself says may be none.
+    """
+    p_values = [_p_value(fitted, effect, place) for effect, place in fitted.candidate.parts(fitted.theta)]
+    least = int(np.argmax(p_values))
+    return fitted.candidate.effects[least], p_values[least]
+
+
+def _p_value(fitted: Fit, effect: Effect, place: slice) -> float:
+    """Test of all sizes together (Wald), by F on the degrees of freedom of intervals.
+
+    An angle is no size, nor what has no value at which it changes nothing, as a frequency.
+    """
+    from scipy.stats import f
+
+    p = len(fitted.beta)
+    covariance = fitted.covariance[p:, p:][place, place] * fitted.dispersion
+    away = fitted.theta[place] - np.array([one.neutral for one in effect.parameters])
+    sized = np.array(
+        [one.period is None and one.lower <= one.neutral <= one.upper for one in effect.parameters]
+    )
+    told = sized & np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0)
+    if not told.any():
+        return 0.0 if not sized.any() else 1.0
+    covariance, away = covariance[np.ix_(told, told)], away[told]
+    wald = float(away @ np.linalg.pinv(covariance, hermitian=True) @ away)
+    return float(f.sf(wald / len(away), len(away), run_dof(fitted)))
