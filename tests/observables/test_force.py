@@ -31,7 +31,7 @@ from metro.observables.force.coefficients import correlation
 from metro.observables.force.dynamometer import Recording
 from metro.observables.force.mean_forces import mean_forces
 from metro.observables.force.model import ForceModel, ForceSetting
-from metro.observables.problem import BaseFit, Block, Problem
+from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.signals.orders import order_matrix
 from metro.stages.ingest import ingest
@@ -303,6 +303,19 @@ def test_shear_and_edge_terms_that_the_data_cannot_part_carry_a_warning():
     (warning,) = told(-0.99)["warnings"]
     assert warning.startswith("ktc and kte")
     assert np.array(told(-0.99)["correlation"]["matrix"])[0, 3] == pytest.approx(-0.99)
+
+
+def test_runs_that_chattered_are_no_evidence_of_a_steady_cut(clean):
+    runs = clean.batch.runs
+    labelled = runs.assign(stable=np.where(np.arange(len(runs)) == 0, "no", "yes"))
+    task = force.problem(replace(clean.batch, runs=labelled), clean.observed, {})
+    first = str(runs.index[0])
+    assert {block.run for block in task.blocks} == {block.run for block in clean.task.blocks} - {first}
+    assert f"Left out: {first}, which chattered (column stable): the model is of a steady cut." in task.notes
+    assert not any("chattered" in note for note in clean.task.notes)
+    none = force.problem(replace(clean.batch, runs=runs.assign(stable="no")), clean.observed, {})
+    assert isinstance(none, Refusal)
+    assert "every run with a record chattered" in none.reason
 
 
 def test_a_batch_without_records_says_so(clean):

@@ -40,6 +40,7 @@ SCATTER = 0.01
 UNIDENTIFIED_KFAC = (
     140.0 * N_MM2
 )  # rms of what it may be: anything up to the 243 N/mm² that [T] table 4 found
+CHATTERED = "no"  # in the column ``stable``
 LEAST_FEED_RATIO = 1.1  # between axial feeds at which the thrust of an unknown K_Fac differs
 
 
@@ -50,9 +51,11 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         return tool if isinstance(tool, Refusal) else Refusal("no order averages")
     by_run = dict(tuple(observed["orders"].groupby("run", sort=False)))
     spindle = with_predicted_give(batch, observed["spindle"], tool).set_index("run")
-    blocks = tuple(
-        block_of(batch, run, by_run[run], tool, spindle) for run in recorded(batch) if run in by_run
-    )
+    runs = [run for run in recorded(batch) if run in by_run]
+    chattered = [run for run in runs if str(batch.runs.loc[run, "stable"]) == CHATTERED]
+    if len(chattered) == len(runs):
+        return Refusal("every run with a record chattered (column stable); the model is of a steady cut")
+    blocks = tuple(block_of(batch, run, by_run[run], tool, spindle) for run in runs if run not in chattered)
     helical = any(block.setting.helix is not None for block in blocks)
     bottom = _bottom_edges(blocks)
     if bottom == ("kfae",):
@@ -68,6 +71,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         "in the work frame"
         + (" (helical runs: in the frame that turns with the orbit)." if helical else "."),
         *(f"Left out: {reason}." for reason in observed["force_refused"]["reason"]),
+        *_chatter_note(chattered),
     ]
     scatter = np.full(len(model.parameters), SCATTER)
     next_runs = feasible(blocks, tool, batch.manifest.get("limits"))
@@ -83,6 +87,12 @@ def _base(batch: Batch, tool: Cutter, bottom: tuple[str, ...]) -> ForceModel:
         sensor=Dynamometer(axes=cutting_force.channels(batch)),
         end_declared=cutting_force.end_declared(batch),
     )
+
+
+def _chatter_note(runs: list[str]) -> tuple[str, ...]:
+    """Say which runs are left out because they chattered."""
+    told = f"Left out: {', '.join(runs)}, which chattered (column stable): the model is of a steady cut."
+    return (told,) if runs else ()
 
 
 def _path_note(tool: Cutter, blocks: tuple[Block, ...]) -> str:
