@@ -19,6 +19,7 @@ MM = 1e-3
 UM = 1e-6
 MS = 1e-3
 DEG = math.pi / 180.0
+ARCSEC = DEG / 3600.0
 MRAD = 1e-3
 URAD = 1e-6
 RPM = 2.0 * math.pi / 60.0

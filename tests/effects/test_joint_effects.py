@@ -83,7 +83,7 @@ def test_proposed_walls_part_joints_that_the_cuts_do_not():
         return DeformationModel(ARM).per_newton(setting, softness)
 
     walls = [block for block in task.blocks if isinstance(block.setting, CutWall)]
-    error = WallErrors(per_newton, lack_of_fit=0.0)
+    error = WallErrors(per_newton, DeformationModel(ARM).per_radian, lack_of_fit=0.0)
     proposals = feasible(walls, task.role("calibrate"), ARM, error)
     outcome = search(task, joint_backlash.EFFECT, GATES)
     best = prospects(outcome.final, outcome.rivals[0].fit, proposals)[0]

@@ -89,6 +89,17 @@ def test_directions_are_those_of_a_compliance_matrix():
 
 def test_the_lack_of_fit_is_an_error_of_a_wall_beside_that_of_its_force():
     force = np.array([[0.0, 30.0, 40.0], [0.0, 0.0, 20.0]])  # 50 N at most
-    errors = WallErrors(lambda _: np.full((2, 3), 1e-6), lack_of_fit=0.04 * np.sqrt(3.0))
-    made = errors.own(SimpleNamespace(force=force), 0.03)
-    assert made == pytest.approx(np.full((2, 3), 0.05 * 50.0 * 1e-6))
+    newton, radian = (lambda _: np.full((2, 3), 1e-6)), (lambda _: np.full(2, 2.0))
+    errors = WallErrors(newton, radian, lack_of_fit=0.04 * np.sqrt(3.0))
+    made = errors.own(SimpleNamespace(force=force, kept=np.array([3, 9])), 0.03)
+    assert made[:, :3] == pytest.approx(np.full((2, 3), 0.05 * 50.0 * 1e-6))
+
+
+def test_gears_leave_a_level_and_waves_on_every_wall():
+    """Independent of the force: an arcsecond at a reach of two metres is 9.7 µm."""
+    setting = SimpleNamespace(force=np.full((40, 3), 1e-9), kept=np.arange(40))
+    errors = WallErrors(lambda _: np.zeros((40, 3)), lambda _: np.full(40, 2.0), lack_of_fit=0.0)
+    made = errors.own(setting)[:, 3:]
+    assert made[:, 0] == pytest.approx(9.7e-6, rel=1e-3)
+    assert np.sqrt((made[:, 1:] ** 2).sum(axis=1).mean()) == pytest.approx(4.85e-6, rel=1e-3)
+    assert (np.abs(made[:, 1:]).max(axis=0)[:-1] > np.abs(made[:, 1:]).max(axis=0)[1:]).all()

@@ -22,7 +22,7 @@ from virtual_cell.units import DEG, MM, RPM, UM, Array
 from virtual_cell.wall import feed_marks, settled, trace
 from virtual_cell.write import RUN_COLUMNS, Row, fresh_folder, write_csv, write_signal, write_yaml
 
-FACTOR = 0.85
+FACTOR = 0.5
 RUNOUT_UM, RUNOUT_DEG = 7.35, 40.0
 DH = (
     *((0, 90, 500, 250), (90, 0, 0, 610), (-180, -90, 0, 70)),

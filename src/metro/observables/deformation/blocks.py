@@ -19,18 +19,25 @@ from metro.observables.arm.wall_profile import SPACING
 from metro.observables.cut.conditions import feed
 from metro.observables.deformation.model import AXES, WALL_ZERO, CutWall, DeformationModel, KnownParameters
 from metro.observables.problem import Block
-from metro.units import MM, UM, Array
+from metro.units import ARCSEC, MM, UM, Array
 
 AS_REPEATS = 0.02  # relative, how well the forces of repeats agree
 # Relative error of the force of a run by its source; all runs share it, but for that between repeats.
 SYSTEMATIC = {**tip_force.SYSTEMATIC, "repeat": math.hypot(tip_force.SYSTEMATIC["dynamometer"], AS_REPEATS)}
 LOADED = 0.01  # load cell and gauge of the load tests, which all walls share
-# Of a joint's compliance at the twist of a cut about that at the twist of the load tests: gears are some 5 to
-# 10 % softer where they are twisted least, and the two differ by a part of that.
-SOFTER = 0.03
+# Of a joint's compliance at the twist of a cut about that at the twist of the load tests: up to an eighth of
+# the rated torque a gear is 10 to 35 % softer (makers), of which its share of the joint's twist leaves 10 %,
+# and load tests that go beyond differ from a cut by about half of that.
+SOFTER = 0.05
 TOUCHED = 10 * UM  # of the zero that all walls share: the touch on the work, and the tool's radius
 ZERO = 5 * UM  # standard error of a profile's zero against the programmed wall, before repeats show theirs
 DECLARED = 4  # walls for which that counts
+# Where gears come to rest, by joint: half of a lost motion of 2 arcsec (makers: 0.4 to 60), the same in cuts
+# alike, so that repeats do not show it; and the waves that they leave along a wall, of 2 to 30 arcsec most of
+# which are longer than the wall or shorter than the cut-off.
+LOST = 1.0 * ARCSEC
+WAVES = 0.5 * ARCSEC
+HALF_WAVES = 4  # along a wall, the longer the higher
 
 
 @dataclass(frozen=True)
@@ -39,11 +46,12 @@ class WallErrors:
 
     Attributes
     ----------
-    per_newton : see :meth:`metro.observables.deformation.model.DeformationModel.per_newton`.
+    per_newton, per_radian : see :class:`metro.observables.deformation.model.DeformationModel`.
     lack_of_fit : relative rms, over all directions of force (:mod:`metro.observables.arm.lack_of_fit`).
     """
 
     per_newton: Callable[[CutWall], Array]
+    per_radian: Callable[[CutWall], Array]
     lack_of_fit: float
 
     def harder(self, setting: CutWall) -> Array:
@@ -51,12 +59,21 @@ class WallErrors:
         return float(np.linalg.norm(setting.force, axis=1).max()) * self.per_newton(setting)
 
     def own(self, setting: CutWall, relative: float = 0.0) -> Array:
-        """Return the error of a wall in which it is alone, (n, 3) m, for one of its force that it alone has.
+        """Return the errors of a wall in which it is alone, (n, 8) m, for one of its force that it alone has.
 
         The arm gives way in each direction by another share than its joints say, which is an error as that of
-        a force in that direction.
+        a force in that direction. Beside it are those of the gears.
         """
-        return math.hypot(relative, self.lack_of_fit / math.sqrt(3.0)) * self.harder(setting)
+        of_force = math.hypot(relative, self.lack_of_fit / math.sqrt(3.0)) * self.harder(setting)
+        return np.hstack([of_force, self._gears(setting)])
+
+    def _gears(self, setting: CutWall) -> Array:
+        """Return what gears leave on a wall whatever the force, (n, 5) m: a level, and waves along it."""
+        place, number = setting.kept - setting.kept[0], np.arange(1, HALF_WAVES + 1)
+        waves = np.cos(math.pi * place[:, None] / max(int(place[-1]), 1) * number) / number
+        waves *= WAVES / math.sqrt(float((waves**2).mean(axis=0).sum()))
+        level = np.full((len(place), 1), LOST)
+        return np.hstack([level, waves]) * self.per_radian(setting)[:, None]
 
 
 def cutoff(batch: Batch) -> float:

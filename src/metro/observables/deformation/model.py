@@ -207,6 +207,12 @@ class DeformationModel:
         columns = np.einsum("m,a,mai,i,mbi->mb", share, setting.normal, moved, compliance, at_tip)
         return np.asarray(_filter(len(size), setting.spacing, setting.cutoff)[setting.kept] @ columns)
 
+    def per_radian(self, setting: CutWall) -> Array:
+        """Height of the wall, (n,) m/rad, that turns of all joints make, each by itself: root of squares."""
+        outwards, _ = _outwards(self.arm, self.flange_rotation, setting)
+        height = np.linalg.norm(outwards[:, self.arm.axes.turning], axis=1)
+        return np.asarray(_filter(len(height), setting.spacing, setting.cutoff)[setting.kept] @ height)
+
     def largest_twists(self, blocks: Sequence[Block]) -> tuple[Array, Array]:
         """Approximate compliance of each joint, (n,) rad/(N m), and its largest torsion in a batch, (n,) rad.
 

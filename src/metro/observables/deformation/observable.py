@@ -121,7 +121,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     model = DeformationModel(arm)
     softness = best_compliance(batch, model, observed["arm_loads"])
     missed = lacking(model, observed["arm_loads"]).share
-    errors = WallErrors(partial(model.per_newton, compliance=softness), missed)
+    errors = WallErrors(partial(model.per_newton, compliance=softness), model.per_radian, missed)
     walls, notes = wall_blocks(batch, observed, errors)
     if not walls:
         return Refusal("; ".join(notes) or "no run has a profile")

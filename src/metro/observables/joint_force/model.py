@@ -170,8 +170,8 @@ def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
     jacobian = _driven_jacobian(arm, run)
     # Of a force along each axis as each axis shows it: (m, seen, along, k), all in one transform.
     torque = -jacobian[:, :, None, :] * force[:, None, :, None]
-    each = np.moveaxis(waves(torque.reshape(len(force), -1)).reshape(torque.shape), 0, -1)
-    each = each.reshape(3, 3, -1)
+    moved = np.moveaxis(waves(torque.reshape(len(force), -1)).reshape(torque.shape), 0, -1)
+    each = moved.reshape(3, 3, -1)
     by_axis = [each[i, i] for i in range(3)]
     across = [each[seen, along] for seen, along in CROSS]
     whole = np.sum(by_axis, axis=0)
