@@ -10,9 +10,9 @@ from metro.report.cuts import NAMES, NUMBERS
 from metro.report.numbers import listing, number, percent, probability, words
 from metro.report.results import Results, heading
 from metro.units import JSON, printed
-from metro.wording.names import SURE
 
 HOLDS = ("clean", "explained")
+SURE = 0.95  # probability from which on a cause counts as identified
 UNTESTED = "No prediction was tested here."
 IDENTIFIED = (
     f"{UNTESTED} The identified values are valid within their intervals for the declared set-up. How well "

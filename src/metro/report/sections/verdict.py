@@ -7,9 +7,8 @@ from metro.report.numbers import listing, percent, with_interval, words
 from metro.report.parameters import effect_words
 from metro.report.phrases import plain, residual_words
 from metro.report.results import Results, heading
-from metro.report.sections.trust import HOLDS
+from metro.report.sections.trust import HOLDS, SURE
 from metro.units import JSON, printed
-from metro.wording.names import SURE
 
 NOTHING_SEEN = 0.9  # error over signal, above which the model predicts next to nothing of it
 STATUS = {
