@@ -91,6 +91,17 @@ def test_effects_are_named_in_a_row_with_those_that_are_only_possible(chances, w
     assert verdict_in_words(entry) == f"The residual is explained {words}"
 
 
+def test_where_a_further_cause_is_undetermined_the_proven_one_is_said_first():
+    effects = [
+        {"effect": "stiffness_scale", "probability": 0.99},
+        {"effect": "joint_backlash", "probability": 0.4},
+    ]
+    pairs = [["joint_backlash", "tip_give"]]
+    told = {"status": "undetermined", "effects": effects, "indistinguishable": pairs, "before": None}
+    words = verdict_in_words({**VERDICT, **told, "unexplained": None})
+    assert words.startswith("Part of the residual is explained by stiffness scale. Several effects explain ")
+
+
 def test_a_contradiction_says_how_probable_such_differences_are():
     size = {"value": 1.0, "ci95": [0.5, 1.5], "unit": "um"}
     witness = {"observable": "force", "says": "found it", "parameters": {"radius_um": size, "joint": 3}}

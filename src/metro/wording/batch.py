@@ -84,6 +84,9 @@ def verdict_in_words(verdict: JSON) -> str:
     rivals = "; ".join(plain(" or ".join(pair)) for pair in verdict["indistinguishable"])
     status = "contradicted" if verdict.get("contradicted") else verdict["status"]
     sentence = STATUSES[status].format(effects=effects, rivals=rivals)
+    proven = [str(one["effect"]) for one in verdict["effects"] if one["probability"] >= SURE]
+    if status == "undetermined" and proven:
+        sentence = f"Part of the residual is explained by {listed(proven)}. {sentence}"
     sentence += "".join(f" {one['lowered']}." for one in verdict["effects"] if one.get("lowered"))
     before, after = verdict["before"], verdict["after"]
     if before and after:

@@ -35,8 +35,7 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
         "explained": f"{start}: {whole} {tested}{_within_floor(entry)}",
         "partly_explained": f"{start}: {part} {tested} A significant residual remains. "
         f"{_residual(entry, left)}",
-        "undetermined": f"{start}: the base model lacks an effect, but these runs do not determine which "
-        f"one. {_rivals(entry)}{tested}",
+        "undetermined": f"{start}: {_undetermined(entry)} {_rivals(entry)}{tested}",
         "unexplained": f"{start}: the base model has a significant error that no effect of the library "
         f"explains. {tested} {_residual(entry, left)}",
         "insufficient": f"{start}: there are too few runs to decide whether an effect is missing. {tested}",
@@ -55,6 +54,15 @@ def _clean(entry: JSON) -> str:
     if share is not None and share > NOTHING_SEEN and not _dimensionless(entry):
         return "what was measured is no larger than the noise, so that it does not test the base model."
     return "the base model explains the identification runs; no effect is missing."
+
+
+def _undetermined(entry: JSON) -> str:
+    """Say what is identified all the same, and that the rest is not."""
+    proven = [one for one in entry.get("effects") or [] if (one.get("probability") or 0.0) >= SURE]
+    if not proven:
+        return "the base model lacks an effect, but these runs do not determine which one."
+    known = _attribution({**entry, "effects": proven}, "part of the difference")
+    return f"{known} The base model lacks a further effect, but these runs do not determine which one."
 
 
 def _attribution(entry: JSON, what: str) -> str:
