@@ -109,7 +109,8 @@ def _gaps(record: Steps) -> Finding:
     if record.gaps == 0:
         return Finding("gaps", 0.0, 0.0, True, "no samples are missing")
     missing = f"{record.lost / record.typical:.0f} samples missing in all"
-    message = f"{record.gaps} gap{'s' if record.gaps > 1 else ''}, the longest {record.longest / MS:.3g} ms, {missing}"
+    gaps = f"{record.gaps} gap{'s' if record.gaps > 1 else ''}"
+    message = f"{gaps}, the longest {record.longest / MS:.3g} ms, {missing}"
     return Finding("gaps", float(record.gaps), 0.0, False, f"{message}: the logger lost data")
 
 
