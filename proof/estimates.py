@@ -16,7 +16,6 @@ ANGLES = {
     ("orbit_stiffness", "phase_deg"): "turn",
     ("mode_coupling", "angle_deg"): "half",
     ("gear_ripple", "phase_deg"): "turn",
-    ("path_vibration", "phase_deg"): "turn",
 }
 # Effects whose parameters are the entries of one vector: an entry's error is relative to the largest of them.
 VECTORS = ("spindle_tilt", "fixture_bow")

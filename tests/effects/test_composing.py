@@ -234,9 +234,9 @@ COMPOSED = {
         added,
     ),
     "path_vibration": (
-        {"frequency_hz": 6.0, "amplitude_um": 4.0, "phase_deg": 20.0},
-        {"frequency_hz": 6.0, "amplitude_um": 3.0, "phase_deg": 100.0},
-        phasor("amplitude_um", "phase_deg"),
+        {"frequency_hz": 6.0, "amplitude_um": 4.0},
+        {"frequency_hz": 6.0, "amplitude_um": 3.0},
+        only("amplitude_um"),
     ),
     "path_vibration faces": (
         {"frequency_hz": 1.7, "amplitude_um": 4.0},

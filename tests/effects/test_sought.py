@@ -21,6 +21,11 @@ class Setting:
     t: np.ndarray
 
     @property
+    def filtered(self):
+        """No filter."""
+        return np.eye(len(self.t))
+
+    @property
     def q(self):
         """Angles of the joints: the second turns steadily."""
         return np.outer(TURN_RATE * self.t, np.eye(6)[1])
@@ -40,7 +45,7 @@ class Wall:
     def design(self, block, _nuisance, _beta=None):
         setting = block.setting
         torque = self.drives.at(setting.q, 0.0 * setting.q, setting.t)[:, 1]
-        swings = sum(swing.at(setting.t) for swing in self.vibration)
+        swings = sum(swing.at(setting.t, 0.0) for swing in self.vibration)
         return np.ones((len(setting.t), 1)), swings + MICROMETRE_PER_NM * torque
 
 
@@ -63,7 +68,8 @@ def task():
 
 def test_a_vibration_is_one_of_as_many_lines_as_the_longest_run_resolves(task):
     found = path_vibration.adapt(path_vibration.ON_WALLS, task)
-    frequency, amplitude, _ = found.parameters
+    frequency, amplitude = found.parameters
+    assert found.own == 1
     assert frequency.starts[0] == pytest.approx(FREQUENCY, abs=0.5 / max(SECONDS))
     assert amplitude.starts[0] > 0.0
     # from two cycles of the shortest run to four points a cycle, each line as wide as 1 / (8 s)

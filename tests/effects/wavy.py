@@ -6,7 +6,7 @@ import numpy as np
 
 from metro.loop.search.trial import Gates
 from metro.observables.problem import Block, Problem
-from metro.observables.waviness.model import WavinessModel, WavyCut
+from metro.observables.waviness.model import PHASES, WavinessModel, WavyCut
 from metro.surface.profile import part
 from metro.surface.waves import wave_basis
 
@@ -69,9 +69,11 @@ def problem(truth=None, *, seed=0, transfer=1.0):
             zeros=np.zeros((count, 0)), zero_sd=np.zeros(0),
             coordinates={"axis": np.full(len(X[KEPT]), "z"), "x_mm": X[KEPT] * 1e3},
             synthesis=np.linalg.pinv(wave_basis(len(X[KEPT]), SPACING, 0.6e-3, CUTOFF)[0]),
+            symmetries=np.array(PHASES)[:, None],
             labels=np.where(length > 2e-3, "waves above 2 mm", "waves below 2 mm"),
         )  # fmt: skip
-        matrix, offset = truth.design(blank, np.zeros(0))
+        phases = np.random.default_rng([seed, order]).uniform(0.0, 2.0 * np.pi, len(truth.vibration))
+        matrix, offset = truth.design(blank, phases)
         made = matrix[:, 0] * transfer * (1 + 0.01 * rng.normal()) + offset + SIGMA * rng.normal(size=count)
         blocks.append(replace(blank, measured=made))
     return Problem("waviness", "um", 1e-6, WavinessModel(tuple(range(6))), tuple(blocks), np.array([0.02]))

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, Values
-from metro.effects.periodogram import TimeShares, middle_start, own_peaks, peaks
+from metro.effects.periodogram import TimeShares, middle_start, own_peaks
 from metro.observables.flatness.model import FlatnessModel
 from metro.observables.problem import Block, Problem, Refusal
 from metro.observables.waviness.model import Vibration, WavinessModel
-from metro.units import DEG, MM, UM, Array
+from metro.units import MM, UM, Array
 
 LEAST_CYCLES, LEAST_POINTS = (
     2.0,
@@ -25,24 +24,27 @@ OF_THE_STRONGEST = 0.4  # least power of a line that is followed, too
 STEPS = 3.0  # per width of a line: the longest run's reciprocal
 MOST = 4  # lines that are followed
 
+Model = TypeVar("Model", WavinessModel, FlatnessModel)
 
-def apply(model: WavinessModel, values: Values) -> WavinessModel:
-    """Let the tip swing along the wall's normal, too; time starts with the log of each cut."""
-    swing = Vibration(values["frequency_hz"], values["amplitude_um"] * UM, values["phase_deg"] * DEG)
+
+def apply(model: Model, values: Values) -> Model:
+    """Let the tip swing along a wall's normal, or along z, too; each run has a phase of its own."""
+    swing = Vibration(values["frequency_hz"], values["amplitude_um"] * UM)
     return replace(model, vibration=(*model.vibration, swing))
 
 
 def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
-    """Start from the strongest lines in time of the base model's residual."""
-    times = [block.setting.t for block in problem.role("identify")]
-    if not times:
+    """Start from the strongest lines in time of the base model's residual, each run with its own phase."""
+    walls = [block.setting for block in problem.role("identify")]
+    if not walls:
         return Refusal("no run is there to find its frequency in")
-    frequencies = _resolved(times)
+    frequencies = _resolved([wall.t for wall in walls])
     if not len(frequencies):
         return Refusal("the cuts are too short to hold two cycles of anything")
-    lines, size = peaks(problem, _unit, frequencies, MOST)
-    frequency, amplitude, phase = effect.parameters
+    frequency, amplitude = effect.parameters
     step = float(frequencies[1] - frequencies[0]) if len(frequencies) > 1 else frequency.scale
+    grid = frequencies if len(frequencies) > 1 else frequencies[0] + step * np.arange(2)
+    lines, size = own_peaks(problem, list(map(_along_wall, walls)), grid, MOST, least=OF_THE_STRONGEST)
     start = max(float(np.median(size)) / UM, amplitude.scale)
     return replace(
         effect,
@@ -55,10 +57,16 @@ def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
                 starts=tuple(lines.tolist()),
             ),
             replace(amplitude, starts=(start,)),
-            phase,
         ),
         sought=max(1.0, len(frequencies) / STEPS),
+        own=1,
     )
+
+
+def _along_wall(setting: Any) -> TimeShares:
+    """Every place of a wall is cut once, and filtered as the profile is."""
+    time = setting.t[:, None]
+    return TimeShares(time, np.ones_like(time), lambda heights: setting.filtered @ heights)
 
 
 def _resolved(times: list[Array]) -> Array:
@@ -67,16 +75,6 @@ def _resolved(times: list[Array]) -> Array:
     low = LEAST_CYCLES / spans.min()
     high = max(len(t) / LEAST_POINTS / span for t, span in zip(times, spans, strict=True))
     return np.asarray(np.arange(low, high, 1.0 / (STEPS * spans.max())))
-
-
-def _unit(model: Any, frequency: float, quarter: float) -> Any:
-    return replace(model, vibration=(*model.vibration, Vibration(frequency, 1.0, quarter * math.pi / 2)))
-
-
-def on_faces(model: FlatnessModel, values: Values) -> FlatnessModel:
-    """Let the tip swing along z, too; time starts with the first pass, the phase is each face's own."""
-    swing = Vibration(values["frequency_hz"], values["amplitude_um"] * UM)
-    return replace(model, vibration=(*model.vibration, swing))
 
 
 def adapt_to_faces(effect: Effect, problem: Problem) -> Effect | Refusal:
@@ -144,17 +142,6 @@ ON_WALLS = Effect(
     parameters=(
         EffectParameter("frequency_hz", "Hz", 0.1, 500.0, 0.05, starts=(5.0,)),
         EffectParameter("amplitude_um", "um", 0.0, 500.0, 0.5, starts=(2.0,), local=True),
-        EffectParameter(
-            "phase_deg",
-            "deg",
-            -180.0,
-            180.0,
-            20.0,
-            (-120.0, 0.0, 120.0),
-            period=360.0,
-            length="amplitude_um",
-            local=True,
-        ),
     ),
     apply=apply,
     part="vibration",
@@ -173,7 +160,6 @@ ON_FACES = replace(
         EffectParameter("frequency_hz", "Hz", 0.01, 500.0, 0.003, starts=(2.0,)),
         EffectParameter("amplitude_um", "um", 0.0, 500.0, 0.5, starts=(2.0,), local=True),
     ),
-    apply=on_faces,
     adapt=adapt_to_faces,
     signature=(
         "Waves along every pass of one frequency in time, that go on from pass to pass and from where they "

@@ -75,12 +75,12 @@ def own_peaks(
     blocks = problem.role("identify")
     power, square = np.zeros(len(frequencies)), np.zeros(len(frequencies))
     for block, left, way in zip(blocks, _residuals(problem.base, blocks)[0], ways, strict=True):
-        zeros = np.linalg.qr(block.zeros / block.sigma[:, None])[0]
+        zeros = np.linalg.qr(block.zeros / block.error[:, None])[0]
         residual = left - zeros @ (zeros.T @ left)
         wave = way.share * np.exp(2j * np.pi * frequencies[0] * way.time)
         on = np.exp(2j * np.pi * (frequencies[1] - frequencies[0]) * way.time)
         for i in range(len(frequencies)):
-            seen = way.mean(wave.sum(axis=1)) / block.sigma
+            seen = way.mean(wave.sum(axis=1)) / block.error
             waves = np.stack([seen.imag, seen.real], axis=1)
             waves -= zeros @ (zeros.T @ waves)
             right = waves.T @ residual

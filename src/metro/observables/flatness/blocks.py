@@ -17,7 +17,6 @@ from metro.observables.flatness.model import (
     ACROSS,
     AHEAD,
     FORCE,
-    PHASES,
     PLACE,
     BelievedSetting,
     FaceSetting,
@@ -39,6 +38,7 @@ from metro.observables.flatness.path import (
 from metro.observables.flatness.patterns import patterns
 from metro.observables.flatness.ringing import Ringing, make_ringing
 from metro.observables.problem import Block, Refusal
+from metro.observables.waviness.model import PHASES
 from metro.surface.footprint import RADIUS
 from metro.surface.tip_stiffness import (
     choose_basis,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
@@ -15,7 +14,7 @@ from metro.observables.flatness.ringing import Ringing
 from metro.observables.flatness.rung import rung, sharper
 from metro.observables.flatness.setup import Setup, swung
 from metro.observables.problem import Block, Parameter
-from metro.observables.waviness.model import Vibration
+from metro.observables.waviness.model import Vibration, phase_starts, phases_of
 from metro.structure import Structure
 from metro.surface.footprint import RADIUS
 from metro.surface.tip_stiffness import POWERS, Basis, Rows, heights_design
@@ -31,7 +30,6 @@ PLACE = ("place_height", "place_tilt_x", "place_tilt_y")  # tilts as the height 
 # cubic, and to 0.2 % for a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
 FINE = 0.002  # grid of relative frequencies about which the ringing is linearised
-PHASES = tuple(2 * math.pi * third / 3 for third in range(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +179,7 @@ class FlatnessModel:
         """Return starts of a face's nuisance, (k, m): the phase of each wave, and at least one."""
         if not isinstance(block.setting, FaceSetting):
             return np.zeros((1, 0))
-        each = [PHASES if swing.amplitude else PHASES[:1] for swing in self.vibration]
-        return np.array(list(itertools.product(*(each or [PHASES[:1]]))))
+        return phase_starts(self.vibration)
 
     def design(self, block: Block, nuisance: Array, beta: Array | None = None) -> tuple[Array, Array]:
         """Matrix (n, p) in m per (m/N), and the offset of ringing, vibration and setup (n,) m."""
@@ -193,7 +190,7 @@ class FlatnessModel:
             loaded = _loaded(self.fields, setting)
             return np.hstack([np.zeros((count, len(self.believed))), loaded]), np.zeros(count)
         off = self._off(setting, beta)
-        terms, offset, harder, rising = _shaped(self, setting, self._phases(nuisance), off)
+        terms, offset, harder, rising = _shaped(self, setting, phases_of(self.vibration, nuisance), off)
         columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
         parts = [setting.plane] if self.placed else []
         parts += [harder[:, None], np.outer(rising, np.array(self.ringing) == setting.pose)]
@@ -230,20 +227,12 @@ class FlatnessModel:
     def _heights(self, setting: FaceSetting, nuisance: Array, off: float = 0.0) -> tuple[Array, Array]:
         passages = setting.passages
         above_static = self.setup.cuts(setting.x, setting.y, passages, setting.pace)
-        for swing, phase in zip(self.vibration, self._phases(nuisance), strict=True):
+        for swing, phase in zip(self.vibration, phases_of(self.vibration, nuisance), strict=True):
             above_static = above_static + swung(swing, phase, passages, setting.pace)
         if setting.ringing is not None:
             above_static = above_static + self.structure.in_cut(rung(setting, self.tuning(off)))
         static = self.structure.in_cut(self._static(setting))
         return np.where(passages.valid, static + above_static, np.inf), above_static
-
-    def _phases(self, nuisance: Array) -> tuple[float, ...]:
-        """Return the phase of each wave: zero where its amplitude is, and where no phase is given."""
-        known = itertools.chain(nuisance, itertools.repeat(0.0))
-        return tuple(
-            float(phase) if swing.amplitude else 0.0
-            for swing, phase in zip(self.vibration, known, strict=False)
-        )
 
     def _static(self, setting: FaceSetting) -> Array:
         return _static(self._basis(setting), setting)

@@ -14,7 +14,7 @@ from metro.joint_columns import numbered
 from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import wall
 from metro.observables.problem import Block
-from metro.observables.waviness.model import WavyCut
+from metro.observables.waviness.model import PHASES, WavyCut
 from metro.observables.waviness.points import ENCODER, GRID, IDLE, STRAYED
 from metro.robot.kinematics import Arm
 from metro.robot.statics import joint_torque, tip_jacobian
@@ -99,6 +99,7 @@ def wave_block(
         coordinates={"axis": axis, "s_mm": place, "x_mm": place, "t_s": points.loc[kept, "t_s"].to_numpy()},
         synthesis=waves.T,
         labels=_band(length),
+        symmetries=np.array(PHASES)[:, None],
     )
 
 

@@ -8,7 +8,9 @@ the friction and ripple of the gears. When T_i changes its sign, the joint passe
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,6 +21,8 @@ from metro.robot.by_joint import of_joints
 from metro.robot.drive_torques import DriveTorques
 from metro.robot.torsion import Torsion, passed
 from metro.units import Array
+
+PHASES = tuple(2 * math.pi * third / 3 for third in range(3))  # of a vibration, from which a run's is sought
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,15 +63,28 @@ class WavyCut:
 
 @dataclass(frozen=True)
 class Vibration:
-    """A vibration of the tip along the wall's normal: amplitude sin(2π frequency t + phase); m, Hz, rad."""
+    """A vibration of the tip along the wall's normal: amplitude sin(2π frequency t + phase); m, Hz."""
 
     frequency: float = 0.0
     amplitude: float = 0.0
-    phase: float = 0.0
 
-    def at(self, t: Array) -> Array:
-        """Displacement (m,) at times ``t`` (m,), s."""
-        return np.asarray(self.amplitude * np.sin(2.0 * math.pi * self.frequency * t + self.phase))
+    def at(self, t: Array, phase: float) -> Array:
+        """Displacement (m,) at times ``t`` (m,), s; a run has a ``phase`` of its own, rad."""
+        return np.asarray(self.amplitude * np.sin(2.0 * math.pi * self.frequency * t + phase))
+
+
+def phase_starts(vibration: Sequence[Vibration]) -> Array:
+    """Return starts (k, m) of the phases of a run, rad: three of each wave; at least one."""
+    each = [PHASES if swing.amplitude else PHASES[:1] for swing in vibration]
+    return np.array(list(itertools.product(*(each or [PHASES[:1]]))))
+
+
+def phases_of(vibration: Sequence[Vibration], nuisance: Array) -> tuple[float, ...]:
+    """Return the phase of each wave: zero where its amplitude is, and where no phase is given."""
+    known = itertools.chain(nuisance, itertools.repeat(0.0))
+    return tuple(
+        float(phase) if swing.amplitude else 0.0 for swing, phase in zip(vibration, known, strict=False)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +96,8 @@ class WavinessModel:
     joints : that effects of one joint may belong to, from 0.
     drives : torques of friction and gears that the idle run does not have.
     torsion : of the joints; only its gaps make waves.
-    vibration : waves that are functions of time alone, not of the place.
+    vibration : waves that are functions of time alone, not of the place; each run has its own phase of each,
+        since nothing starts a vibration with the log.
     """
 
     joints: tuple[int, ...]
@@ -93,15 +111,15 @@ class WavinessModel:
         return (Parameter("transfer", "1"),)
 
     def nuisance_starts(self, _block: Block) -> Array:
-        """Return the one empty set of nonlinear unknowns, shape (1, 0)."""
-        return np.zeros((1, 0))
+        """Return starts of the phases of a run."""
+        return phase_starts(self.vibration)
 
-    def design(self, block: Block, _nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
+    def design(self, block: Block, nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
         """Waves (n, 1), m per unit of transfer, and the waves that no encoder sees (n,), m."""
         run: Any = block.setting
         torque = run.load - self.drives.at(run.q, run.rate, run.t)
         twist = run.compliance * torque + passed(run.load, of_joints(self.torsion.gap, len(run.compliance)))
         unseen = (run.moves * twist).sum(axis=1)
-        for swing in self.vibration:
-            unseen = unseen + swing.at(run.t)
+        for swing, phase in zip(self.vibration, phases_of(self.vibration, nuisance), strict=True):
+            unseen = unseen + swing.at(run.t, phase)
         return run.tracking[:, None], run.filtered @ unseen
