@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from toy import BEND, GAIN, GATES, TWIN, Wave, problem
+from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, problem
 from worded import in_words
 
 from metro.loop.checks.left_out import left_out
@@ -64,7 +64,19 @@ def test_an_effect_at_its_bound_has_converged_and_is_no_result():
     assert found.theta == pytest.approx([0.05])
     assert found.converged
     (name,) = [parameter.name for parameter in low.parameters]
-    assert unsettled(found) == Statement("implausible", {"parameter": name, "bound": 0.05})
+    why = Statement("implausible", {"parameter": name, "bound": 0.05})
+    assert unsettled(found) == why
+    both = replace(
+        found,
+        candidate=Candidate(found.candidate.base, (low, RIPPLE)),
+        theta=np.append(found.theta, 0.0),
+        covariance=np.pad(found.covariance, (0, 1), constant_values=1e-9),
+    )
+    beside = unsettled(both)  # of the one tried last, the fault is that another is at its bound with it
+    assert beside == Statement("beside", {"effect": "bend", "why": why})
+    assert (
+        in_words(beside) == f"with it, bend is no result: its {name} would exceed the plausible limit of 0.05"
+    )
 
 
 def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):

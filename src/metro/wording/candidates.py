@@ -22,6 +22,10 @@ def _implausible(values: JSON) -> str:
     return f"its {values['parameter']} would exceed the plausible limit of {values['bound']:g}"
 
 
+def _beside(values: JSON) -> str:
+    return f"with it, {plain(values['effect'])} is no result: {values['why']}"
+
+
 def _no_prediction(values: JSON) -> str:
     return f"in {values['run']} {values['why']}"
 
@@ -126,6 +130,7 @@ SENTENCES: Mapping[str, Sentence] = {
     "untested": "not tested: every run was used in the fit, so none is available to judge it",
     "not_converged": _not_converged,
     "implausible": _implausible,
+    "beside": _beside,
     "no_prediction": _no_prediction,
     "no_evidence": _no_evidence,
     "immaterial": _immaterial,

@@ -156,8 +156,12 @@ def unsettled(fitted: Fit) -> Statement | None:
     variance = np.diag(fitted.covariance)[len(fitted.beta) :] * fitted.dispersion
     half = HALF_INTERVAL * np.sqrt(np.maximum(variance, 0.0))
     parts = fitted.candidate.parts(fitted.theta)
-    reasons = (_undetermined(effect, fitted.theta[place], half[place]) for effect, place in parts)
-    return next(filter(None, reasons), None) or beyond(fitted, fitted.blocks)
+    for effect, place in parts:
+        why = _undetermined(effect, fitted.theta[place], half[place])
+        if why is not None:  # of the one that was tried last, or of one that was there already
+            tried_last = effect is fitted.candidate.effects[-1]
+            return why if tried_last else Statement("beside", {"effect": effect.name, "why": why})
+    return beyond(fitted, fitted.blocks)
 
 
 def _undetermined(effect: Effect, value: Array, half: Array) -> Statement | None:
