@@ -193,3 +193,6 @@ def test_a_mode_that_may_be_missing_is_to_be_sought_at_its_frequency():
     values = {"test": test, "names": ["missing_mode"], **promise, "directly": [mode]}
     words = worded({"code": "next_test", "values": values})
     assert words.endswith("What shows missing mode at about 567 Hz directly: an impact test")
+    assert "expected to rise from 0.60 to 0.90" in words
+    still = worded({"code": "next_test", "values": {**values, "leading": 0.602}})
+    assert "One test changes little: the most probable cause has a probability of 0.60" in still

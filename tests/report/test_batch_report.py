@@ -136,6 +136,22 @@ def test_every_status_has_its_sentence(status, words):
     assert words in verdict_words("force", entry)
 
 
+def test_what_is_no_rival_is_named_beside_those_that_are():
+    """The cause that was proven comes first, one that is only possible last; a rival is not said twice."""
+    pairs = [["tool_wear", "charge_drift"]]
+    proven = synthetic.observable("undetermined", effects=[synthetic.RUNOUT], indistinguishable=pairs)
+    assert "traced to tool runout (radius 9.83 ± 0.31 µm" in verdict_words("force", proven)
+    assert "Beside these" not in verdict_words("force", proven)
+    lead = [
+        {**synthetic.RUNOUT, "probability": 0.6},
+        {**synthetic.RUNOUT, "effect": "tool_wear", "probability": 0.6},
+    ]
+    said = verdict_words("force", {**proven, "effects": lead})
+    assert "Beside these, a possible cause is tool runout (radius 9.83 ± 0.31 µm, angle 41.2 ± 2.4°)." in said
+    assert "these runs do not determine which one" in said
+    assert said.count("tool wear") == 1
+
+
 def test_a_cause_that_is_not_certain_is_a_lead_and_nothing_is_traced_to_it():
     doubtful = {**synthetic.RUNOUT, "probability": 0.63}
     alone = verdict_words("force", synthetic.observable("explained", effects=[doubtful]))

@@ -35,11 +35,14 @@ def _test(values: JSON) -> str:
 
 def _next_test(values: JSON) -> str:
     names = " or ".join(map(plain, values["names"]))
-    return (
-        f"{values['test']}: its result best distinguishes {names} ({values['information']:.2f} bit). The "
-        f"probability of the most probable cause is expected to rise from {values['leading_now']:.2f} to "
-        f"{values['leading']:.2f}{''.join(map(_directly, values.get('directly', [])))}"
+    now, then = f"{values['leading_now']:.2f}", f"{values['leading']:.2f}"
+    promise = (
+        f"The probability of the most probable cause is expected to rise from {now} to {then}"
+        if now != then
+        else f"One test changes little: the most probable cause has a probability of {now}, now and after it"
     )
+    directly = "".join(map(_directly, values.get("directly", [])))
+    return f"{values['test']}: its result best distinguishes {names}. {promise}{directly}"
 
 
 def _directly(values: JSON) -> str:

@@ -188,7 +188,16 @@ def _rivals(entry: JSON) -> str:
     groups = [
         " or ".join(words(str(name)) for name in group) for group in entry.get("indistinguishable") or []
     ]
-    return f"Possible causes: {'; or '.join(groups)}. " if groups else ""
+    paired = {
+        str(name).partition(" (")[0] for group in entry.get("indistinguishable") or [] for name in group
+    }
+    alone = [
+        effect_words(one)
+        for one in entry.get("effects") or []
+        if str(one["effect"]) not in paired and (one.get("probability") or 0.0) < SURE
+    ]
+    further = f"Beside these, a possible cause is {listing(alone)}. " if alone and groups else ""
+    return f"Possible causes: {'; or '.join(groups)}. {further}" if groups else ""
 
 
 def next_words(entry: JSON) -> str:
