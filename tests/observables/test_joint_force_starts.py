@@ -3,10 +3,11 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from metro.observables.joint_force.model import JointForceModel, TorqueRun, running
-from metro.observables.joint_force.observable import _settled
+from metro.observables.joint_force.tables import _covered, _settled
 from metro.robot.kinematics import arm_of_cell
 from metro.signals.align import Aligned
 
@@ -37,3 +38,18 @@ def test_a_lag_of_the_drives_is_a_clock_that_is_late_by_as_much():
     np.testing.assert_allclose(matrix @ late + offset, other @ beta + none, atol=1e-9)
     without, zero = model.design(block, np.zeros(0), beta)
     assert np.abs(matrix @ late + offset - without @ beta - zero).max() > 0.1
+
+
+@pytest.mark.parametrize(("ends", "kept"), [((True, True), 60), ((True, False), 50), ((False, False), 39)])
+def test_a_record_that_ends_in_the_cut_says_nothing_of_the_force_beyond(ends, kept):
+    """Bins of 0.1 s from 1 s before a record of 4.05 s; with air at an end the force beyond is none."""
+    time = -1.0 + 0.1 * np.arange(60)
+    at = 0.005 * np.arange(811)
+    known = (ends[0] | (at >= 0.05)) & (ends[1] | (at <= 4.0 - 0.05))
+    pair = Aligned(np.arange(60.0), time[:, None], time[:, None])
+    found = _covered(pair, time, pd.DataFrame({"t_s": at, "known": known}))
+    assert len(found.s) == kept
+    if not ends[1]:
+        assert found.first.max() <= 3.95 < found.first.max() + 0.1
+    if not ends[0]:
+        assert found.first.min() >= 0.05 > found.first.min() - 0.1
