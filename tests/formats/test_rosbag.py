@@ -166,7 +166,7 @@ def test_dropped_late_and_repeated_messages(tmp_path):
     found = {note.check: note.value for note in table.attrs["notes"]}
     assert found == {"late packets": 1, "repeated packets": 1}
     gaps = next(finding for finding in sampling(table["t_s"].to_numpy(), 250.0) if finding.check == "gaps")
-    assert gaps.message.startswith("1 gaps, the longest 12 ms, 2 samples missing")
+    assert gaps.message.startswith("1 gap, the longest 12 ms, 2 samples missing")
 
 
 def test_a_bag_without_set_points_says_which_topics_it_has_and_which_were_looked_for(tmp_path):
