@@ -35,13 +35,14 @@ SIDE = ("r01", "r02")  # down, up
 
 @pytest.fixture(scope="module")
 def cell(tmp_path_factory):
-    """Side cuts of a robot that is as stiff in the cut as in its load tests, and how its tables are read."""
+    """Side cuts of a robot a little softer in the cut than in its load tests, and how to read them."""
     root = tmp_path_factory.mktemp("kr160")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(kr160, "SOFT", kr160.ARM)  # the bundled batch has a softer one
-        kr160.make(root / "kr160-stiff")
+        slightly = replace(kr160.ARM, stiffness=0.85 * kr160.ARM.stiffness)
+        patch.setattr(kr160, "SOFT", slightly)  # the bundled batch has a much softer one
+        kr160.make(root / "kr160-side")
     out = root / "out"
-    ingest(root / "kr160-stiff", ROOT / "config" / "cells", out, {}, "test")
+    ingest(root / "kr160-side", ROOT / "config" / "cells", out, {}, "test")
     return read_batch(out), Processed(out)
 
 
@@ -116,7 +117,7 @@ def test_the_forces_of_an_arm_that_gives_way_leave_no_misfit(cell):
     assert spindle["give_mm"].max() < 0.3
     with_give, without = misfit(spindle), misfit(spindle.assign(give_mm=0.0))
     assert with_give < 0.0005
-    assert without > max(0.001, 3.0 * with_give)
+    assert without > 0.002
 
 
 def test_an_arm_of_unknown_stiffness_is_said_to_be_one(cell):

@@ -101,21 +101,21 @@ def advice(tests: Sequence[NextTest], outcome: LabelOutcome) -> Statement:
 
 def _directly(names: Sequence[str], outcome: LabelOutcome) -> list[JSON]:
     """Say of each effect in question what shows it without a further cut, and at which frequency to look."""
-    told: list[JSON] = []
+    shown: list[JSON] = []
     for name in names:
         first = next((one for one in outcome.weighed if name in one.names), None)
         effect = next((e for e in first.hypothesis.effects if e.name == name), None) if first else None
         if first is None or effect is None or effect.resembled:
             continue
         sought = first.hypothesis.parameters(name).get("frequency_hz")
-        told.append(
+        shown.append(
             {
                 "effect": name,
                 "experiment": effect.experiment,
                 **({"near_hz": sought["value"], "ci95_hz": sought["ci95"]} if sought else {}),
             }
         )
-    return told
+    return shown
 
 
 def beside(rows: pd.DataFrame) -> Statement:

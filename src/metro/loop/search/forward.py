@@ -16,12 +16,14 @@ from metro.effects.effect import Effect
 from metro.loop.checks.evidence import compare, hold_out, leave_out
 from metro.loop.fitting.fit import Fit
 from metro.loop.search.rivals import Contest, believed, contested
+from metro.loop.search.significance import least_significant
 from metro.loop.search.strategy import Choice, SearchSpace
-from metro.loop.search.told import least_told
 from metro.loop.search.trial import HOPELESS, Trial, parted, small_beside_residual, tried, without
 from metro.loop.statement import Statement
 
-TOLD = 0.05  # p-value of an effect by its own interval, above which that holds none: the 95 % of intervals
+SIGNIFICANT = (
+    0.05  # p-value of an effect by its own interval, above which that holds none: the 95 % of intervals
+)
 MOST_EFFECTS = 6  # of a model: four that every machine has (runout, end, resonance, crosstalk), and two
 # Trials by what a model has, in whatever order it was added, and what was tried on top of that.
 Known = dict[tuple[frozenset[Effect], tuple[tuple[str, str], ...]], list[Trial]]
@@ -106,9 +108,9 @@ def _promising(effects: list[Effect], trials: Mapping[tuple[str, str], Trial]) -
 
 
 def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str, str], Statement]]:
-    """Drop effects that are not told from none, or small beside what stays unexplained; say why of each.
+    """Drop effects that are not significant by their own intervals, or small beside what stays unexplained.
 
-    The least told goes first, then the smallest.
+    The least significant goes first, then the smallest; it is said why of each.
     """
     dropped: dict[tuple[str, str], Statement] = {}
     while current.candidate.effects:
@@ -116,9 +118,9 @@ def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str
             effect: compare(*parted(space.base, current, effect, space.prior))
             for effect in current.candidate.effects
         }
-        least, p_value = least_told(current)
+        least, p_value = least_significant(current)
         why: Statement | None = Statement("holds_nothing", {"p_value": p_value})
-        if p_value <= TOLD:
+        if p_value <= SIGNIFICANT:
             least = min(evidences, key=lambda effect: evidences[effect].size)
             why = small_beside_residual(evidences[least])
         if why is None:

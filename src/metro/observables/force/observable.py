@@ -91,8 +91,8 @@ def _base(batch: Batch, tool: Cutter, bottom: tuple[str, ...]) -> ForceModel:
 
 def _chatter_note(runs: list[str]) -> tuple[str, ...]:
     """Say which runs are left out because they chattered."""
-    told = f"Left out: {', '.join(runs)}, which chattered (column stable): the model is of a steady cut."
-    return (told,) if runs else ()
+    note = f"Left out: {', '.join(runs)}, which chattered (column stable): the model is of a steady cut."
+    return (note,) if runs else ()
 
 
 def _path_note(tool: Cutter, blocks: tuple[Block, ...]) -> str:

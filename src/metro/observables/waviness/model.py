@@ -22,7 +22,7 @@ from metro.robot.drive_torques import DriveTorques
 from metro.robot.torsion import Torsion, passed
 from metro.units import Array
 
-PHASES = tuple(2 * math.pi * third / 3 for third in range(3))  # of a vibration, from which a run's is sought
+PHASES = tuple(2 * math.pi * third / 3 for third in range(3))  # of a vibration: starts of the fit to a run
 
 
 @dataclass(frozen=True, eq=False)

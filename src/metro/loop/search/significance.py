@@ -1,4 +1,4 @@
-"""Whether the intervals of an effect's parameters hold none of it: then it is not claimed."""
+"""Significance of an effect by its own intervals: what these do not show is not claimed."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.held_out import run_dof
 
 
-def least_told(fitted: Fit) -> tuple[Effect, float]:
-    """Return the effect of a fit that is told from none the least, and its p-value by its own intervals.
+def least_significant(fitted: Fit) -> tuple[Effect, float]:
+    """Return the least significant effect of a fit, and its p-value by its own intervals.
 
     Likelihoods take what a model gets wrong for independent from condition to condition; intervals, that it
     may be the same in all. An effect that only the former see is one that the report itself says may be none.
@@ -33,9 +33,9 @@ def _p_value(fitted: Fit, effect: Effect, place: slice) -> float:
     sized = np.array(
         [one.period is None and one.lower <= one.neutral <= one.upper for one in effect.parameters]
     )
-    told = sized & np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0)
-    if not told.any():
+    known = sized & np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0)
+    if not known.any():
         return 0.0 if not sized.any() else 1.0
-    covariance, away = covariance[np.ix_(told, told)], away[told]
+    covariance, away = covariance[np.ix_(known, known)], away[known]
     wald = float(away @ np.linalg.pinv(covariance, hermitian=True) @ away)
     return float(f.sf(wald / len(away), len(away), run_dof(fitted)))

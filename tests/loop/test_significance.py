@@ -11,7 +11,7 @@ from metro.loop.fitting.fit import fit
 from metro.loop.fitting.noise import first_noise
 from metro.loop.search import forward
 from metro.loop.search.search import search
-from metro.loop.search.told import least_told
+from metro.loop.search.significance import least_significant
 
 
 @pytest.fixture(scope="module")
@@ -22,12 +22,12 @@ def bent():
     return fit(Candidate(task.base, (BEND, RIPPLE)), blocks, prior)
 
 
-def test_of_what_is_there_and_what_is_not_the_latter_is_told_least(bent):
-    effect, p_value = least_told(bent)
+def test_of_what_is_there_and_what_is_not_the_latter_is_least_significant(bent):
+    effect, p_value = least_significant(bent)
     assert effect is RIPPLE
     assert p_value > 0.05
     alone = fit(Candidate(bent.candidate.base, (BEND,)), bent.blocks, bent.noise)
-    assert least_told(alone)[1] < 1e-4
+    assert least_significant(alone)[1] < 1e-4
 
 
 def test_the_p_value_is_that_of_the_interval(bent):
@@ -37,13 +37,13 @@ def test_the_p_value_is_that_of_the_interval(bent):
     alone = fit(Candidate(bent.candidate.base, (BEND,)), bent.blocks, bent.noise)
     half = t.ppf(0.975, len(alone.blocks) - 1) * np.sqrt(alone.covariance[-1, -1] * alone.dispersion)
     at_the_end = replace(alone, theta=np.array([BEND.parameters[0].neutral + half]))
-    assert least_told(at_the_end)[1] == pytest.approx(0.05)
+    assert least_significant(at_the_end)[1] == pytest.approx(0.05)
 
 
-def test_what_is_told_from_nothing_stays_and_what_is_not_goes(monkeypatch):
+def test_what_is_significant_stays_and_what_is_not_goes(monkeypatch):
     task = problem(9, truth=Wave(bend=0.2), phased=False)
     assert search(task, (BEND, RIPPLE), GATES).names == ("bend",)
-    monkeypatch.setattr(forward, "TOLD", 0.0)
+    monkeypatch.setattr(forward, "SIGNIFICANT", 0.0)
     found = search(task, (BEND, RIPPLE), GATES)
     assert found.names == ()
     assert {one.effect.name: one.why_not and one.why_not.code for one in found.trials}[
