@@ -53,7 +53,8 @@ def twisted(torque, stiffness, cubic):
 def deflection(arm, q, force, truth, *, cutting, rate=(0.0,) * 6):
     """Where the tip goes under a force on it; ``truth``: gap (mdeg), cubic, factor by joint 1 … 6.
 
-    Also friction (N m) on the link side of the springs, against which the joints turn at ``rate``.
+    Also friction (N m) on the link side of the springs, against which the joints turn at ``rate``; drag (N m)
+    that has to be overcome before a gap is passed; ``springs``: twists (6,) of torques (6,).
     """
     by_joint = moves(arm, q)
     torque = by_joint.T @ force
@@ -64,7 +65,12 @@ def deflection(arm, q, force, truth, *, cutting, rate=(0.0,) * 6):
         if cutting:
             held = truth.get("friction", {}).get(i + 1, 0.0) * np.sign(rate[i])
             twist[i] -= held / factor / STIFFNESS[i]
-            twist[i] += np.sign(torque[i]) * np.radians(truth.get("gap", {}).get(i + 1, 0.0) * 1e-3) / 2
+            passed = abs(torque[i]) > truth.get("drag", {}).get(i + 1, 0.0)
+            twist[i] += (
+                passed * np.sign(torque[i]) * np.radians(truth.get("gap", {}).get(i + 1, 0.0) * 1e-3) / 2
+            )
+    if "springs" in truth:
+        twist += truth["springs"](torque) - torque / STIFFNESS
     return by_joint @ twist
 
 

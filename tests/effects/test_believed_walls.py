@@ -6,7 +6,7 @@ import elastic_arm
 import numpy as np
 import pytest
 
-from metro.effects import joint_backlash, stiffness_scale
+from metro.effects import joint_backlash, stiffness_hardening, stiffness_scale
 from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
 from metro.loop.statement import to_json
@@ -14,8 +14,10 @@ from metro.loop.verdict.beliefs import beliefs, strained
 from metro.observables.deformation.blocks import believed_block
 from metro.observables.deformation.model import CutWall, DeformationModel
 from metro.wording.statements import worded
+from virtual_cell.world.arm.gears import springs
 
-BASE = DeformationModel(elastic_arm.ARM)
+ARM = elastic_arm.ARM
+BASE = DeformationModel(ARM)
 COMPLIANCE = 1 / elastic_arm.STIFFNESS
 SHARING = replace(BASE, touched=True, forces=("dynamometer",), springs=tuple(COMPLIANCE))
 NAMES = [one.name for one in SHARING.parameters]
@@ -66,6 +68,45 @@ def test_a_joint_that_is_softer_in_the_cut_moves_the_wall_and_no_load_test(wall)
 
 def test_the_zero_of_all_walls_moves_each_as_a_whole(wall):
     np.testing.assert_allclose(height(wall, wall_zero=5e-6) - height(wall), 5e-6)
+
+
+def of_gears(seed):
+    """Walls and load tests of an arm with gears of the virtual world, and what both models say of them."""
+    rng = np.random.default_rng(seed)
+    rated = np.array([2600.0, 3400.0, 1900.0, 700.0, 600.0, 380.0])
+    task = problem({"springs": springs(rng, elastic_arm.STIFFNESS, rated).elastic}, seed)
+    tests = [block.setting for block in task.role("calibrate") if not block.belief]
+    torque = np.vstack([np.abs(BASE.torques(test.joints, test.force)) for test in tests])
+    base = replace(SHARING, loaded=tuple(torque.max(axis=0)))
+    scatter = np.where(np.arange(len(base.parameters)) < 6, 0.005, 0.0)
+    blocks = (believed_block(base), *task.blocks[1:])
+    return task, replace(task, base=base, blocks=blocks, scatter=scatter)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_gears_in_three_pieces_harden_no_joint(seed):
+    """Springs that are a fifth softer below a tenth of the rated torque are what gears are."""
+    without, with_lost_motion = of_gears(seed)
+    effects = (*stiffness_hardening.EFFECT, *stiffness_scale.EFFECT, *joint_backlash.EFFECT)
+    assert search(with_lost_motion, effects, GATES).names == ()
+    if seed == 1:
+        assert search(without, effects, GATES).names != ()
+
+
+def test_lost_motion_is_one_way_beyond_a_fraction_of_the_load(wall):
+    _, task = of_gears(1)
+    base, place = task.base, [one.name for one in task.base.parameters].index("lost_motion_joint_2")
+    beta = np.concatenate([COMPLIANCE, np.zeros(len(base.believed))])
+    largest = base.loaded[1]
+    for share, passed in ((0.02, 0.1), (0.5, 1.0), (-1.0, -1.0)):
+        way = base._lost(np.full((1, 6), share * largest))[0, 1]
+        assert way == pytest.approx(passed * COMPLIANCE[1] * largest, rel=0.02)
+    matrix, _ = base.design(wall, np.zeros(0), beta)
+    moved = elastic_arm.moves(ARM, wall.setting.commanded[20])[:, 1] @ wall.setting.normal
+    torque = elastic_arm.moves(ARM, wall.setting.commanded[20])[:, 1] @ wall.setting.force[20]
+    middle = list(wall.setting.kept).index(20)
+    expected = moved * COMPLIANCE[1] * largest * np.tanh(5.0 * torque / largest)
+    assert matrix[middle, place] == pytest.approx(expected, rel=1e-3)
 
 
 def test_gears_that_are_a_little_softer_in_the_cut_are_no_effect():

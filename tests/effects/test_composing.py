@@ -209,14 +209,22 @@ COMPOSED = {
     ),
     "flange_rotation": ({"share": 0.2}, {"share": 0.3}, added),
     "friction_by_speed": ({"torque_nm_s": 200.0}, {"torque_nm_s": -500.0}, added),
-    "friction_reversal": ({"torque_nm": 10.0}, {"torque_nm": -25.0}, added),
+    "friction_reversal": (
+        {"torque_nm": 10.0, "presliding_mrad": 0.3},
+        {"torque_nm": -25.0, "presliding_mrad": 0.3},
+        only("torque_nm"),
+    ),
     "friction_warmup": ({"slope_nm_s": 0.5}, {"slope_nm_s": 0.9}, added),
     "gear_ripple": (
         {"torque_nm": 8.0, "order": 60.0, "phase_deg": 20.0},
         {"torque_nm": 5.0, "order": 60.0, "phase_deg": 130.0},
         phasor("torque_nm", "phase_deg"),
     ),
-    "joint_backlash": ({"angle_mdeg": 5.0}, {"angle_mdeg": 12.0}, added),
+    "joint_backlash": (
+        {"angle_mdeg": 5.0, "drag_nm": 4.0},
+        {"angle_mdeg": 12.0, "drag_nm": 4.0},
+        only("angle_mdeg"),
+    ),
     "missing_mode": (
         {"frequency_hz": 250.0, "damping": 0.03, "stiffness_n_um": 9.0, "axis": 1.0},
         {"frequency_hz": 250.0, "damping": 0.03, "stiffness_n_um": 6.0, "axis": 1.0},

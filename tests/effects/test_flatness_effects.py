@@ -43,7 +43,7 @@ def swung_in_short_waves(time, phase, **_cut):
 
 def bowed(x, y):
     u, v = x / 60.0 - 1.0, y / 30.0 - 1.0
-    return 12e-3 * u**2 - 5e-3 * u * v + 8e-3 * v**2
+    return 40e-3 * u**2 - 25e-3 * u * v + 30e-3 * v**2
 
 
 def spot(x, y):
@@ -55,9 +55,14 @@ HIDDEN = [
     ("thermal_growth", {"hidden": grown}, {"um_per_min": 25.0}),
     ("entry_transient", {"hidden": entered}, {"amplitude_um": 40.0, "length_mm": 15.0}),
     ("path_vibration", {"hidden": swung}, {"frequency_hz": 1.7, "amplitude_um": 8.0}),
-    ("fixture_bow", {"work": bowed}, {"xx_um": 12.0, "xy_um": -5.0, "yy_um": 8.0}),
-    ("stiffness_scale", {"factor": 0.75}, {"factor": 0.75}),
+    ("fixture_bow", {"work": bowed}, {"xx_um": 40.0, "xy_um": -25.0, "yy_um": 30.0}),
+    ("stiffness_scale", {"factor": 0.65}, {"factor": 0.65}),
 ]
+
+
+def bowed_as_a_scanner(x, y):
+    return bowed(x, y) / 8.0
+
 
 SHORT = ("path_vibration", {"hidden": swung_in_short_waves}, {"frequency_hz": 4.9, "amplitude_um": 15.0})
 
@@ -230,3 +235,8 @@ def test_what_is_outside_the_library_is_described(made, words):
     lines = signature(base, 0.04)
     assert any(line.significant for line in lines)
     assert words in in_words(places(lines))
+
+
+def test_a_bow_that_a_scanner_has_is_not_one_of_the_fixture():
+    task = problem(work=bowed_as_a_scanner)
+    assert search(task, library("flatness"), GATES).names == ()

@@ -59,6 +59,17 @@ def test_what_a_joint_hides_is_found_in_cuts_that_part_the_joints(truth, name, j
     assert told[parameter]["value"] == pytest.approx(value, rel=0.15)
 
 
+def test_a_gap_that_small_torques_do_not_pass_is_one_and_no_soft_spring():
+    truth = {"gap": {5: 12.0}, "drag": {5: 12.0}}
+    effects = (*joint_backlash.EFFECT, *stiffness_scale.EFFECT)
+    outcome = found(truth, effects=effects, ways=elastic_arm.EVERY_WAY, sizes=(0.2, 0.5, 1.3))
+    assert outcome.names == ("joint_backlash",)
+    told = parameters(outcome.final, "joint_backlash")
+    assert told["joint"] == 5
+    assert told["angle_mdeg"]["ci95"][0] < 12.0 < told["angle_mdeg"]["ci95"][1]
+    assert 4.0 < told["drag_nm"]["value"] < 25.0
+
+
 def test_nothing_is_found_where_the_joints_are_linear_springs():
     assert found({}).names == ()
 

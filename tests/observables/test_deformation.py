@@ -19,7 +19,7 @@ from metro.loop.fitting.held_out import identified_fit
 from metro.observables.arm import tip_force
 from metro.observables.arm.wall import wall
 from metro.observables.deformation import observable as deformation
-from metro.observables.deformation.blocks import LOADED, SOFTER, TOUCHED, ZERO, with_zeros
+from metro.observables.deformation.blocks import LOADED, SOFTER, TOUCHED, TWISTED, ZERO, with_zeros
 from metro.observables.deformation.model import CutWall
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.robot.kinematics import arm_of_cell
@@ -316,6 +316,7 @@ def test_without_an_idle_run_the_force_comes_from_the_coefficients_and_the_notes
     off = np.hypot(tip_force.SYSTEMATIC["coefficients"], LOADED)
     assert dict(zip(believed.axis, believed.sigma, strict=True)) == {
         **{f"softer_joint_{joint}": SOFTER for joint in range(1, 7)},
+        **{f"lost_motion_joint_{joint}": TWISTED for joint in range(1, 7)},
         "wall_zero": TOUCHED,
         **{f"force_off_coefficients_{axis}": pytest.approx(off) for axis in "xyz"},
     }

@@ -2,16 +2,47 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from metro.robot.drive_torques import TURNING, DriveTorques
+from metro.robot.drive_torques import TURNING, DriveTorques, slid
 
-Q, RATE, T = np.zeros((3, 6)), np.array([[0.2], [-0.1], [0.3]]) * np.ones(6), np.array([0.0, 1.0, 4.0])
+RATE, T = np.array([[0.2], [-0.1], [0.3]]) * np.ones(6), np.array([0.0, 1.0, 4.0])
+Q = np.array([[0.0], [-0.05], [0.25]]) * np.ones(6)
 
 
 @pytest.mark.parametrize("part", ["reversal", "warmup", "viscous"])
 def test_each_part_of_friction_is_there_alone(part):
-    side = np.tanh(RATE[:, 2] / TURNING)
+    side = np.array([-1.0, -1.0, 1.0])  # the way that it goes, from the start on
     expected = {"reversal": 3.0 * side, "warmup": 3.0 * T * side, "viscous": 3.0 * RATE[:, 2]}[part]
     torque = DriveTorques().with_friction(2, **{part: 3.0}).at(Q, RATE, T)
     assert torque[:, 2] == pytest.approx(expected)
     assert not np.delete(torque, 2, axis=1).any()
+
+
+def test_friction_follows_the_way_on_which_a_joint_turns_round():
+    """Dahl's differential equation, integrated by another package in small steps."""
+    t = np.linspace(0.0, 4.0, 401)
+    q, rate = 2e-3 * np.sin(1.3 * t), 2.6e-3 * np.cos(1.3 * t)
+    turn = 4e-4
+
+    def slope(at, state):
+        speed = 2.6e-3 * np.cos(1.3 * at)
+        return (np.sign(speed) - state) * abs(speed) / turn
+
+    whole = solve_ivp(slope, (0.0, 4.0), [1.0], t_eval=t, max_step=1e-3, rtol=1e-8)
+    np.testing.assert_allclose(slid(q, rate, turn), whole.y[0], atol=5e-3)
+
+
+def test_friction_without_presliding_follows_the_speed_and_there_is_none_where_that_is_unknown():
+    q, rate = np.linspace(0.0, 1e-2, 5), np.array([1e-4, 2e-4, -2e-4, 1e-3, 0.0])
+    np.testing.assert_allclose(slid(q, rate, 0.0), np.tanh(rate / TURNING))
+    assert not slid(q, np.zeros(5), 3e-4).any()
+
+
+def test_a_joint_of_which_something_else_is_believed_keeps_it():
+    told = DriveTorques().with_friction(3, reversal=1.0).with_presliding(3, 1e-3)
+    t = np.linspace(0.0, 1.0, 50)
+    q = np.zeros((50, 6))
+    q[:, 3] = 2e-3 * np.cos(2 * np.pi * t)
+    rate = np.gradient(q, t, axis=0)
+    np.testing.assert_allclose(told.at(q, rate, t)[:, 3], slid(q[:, 3], rate[:, 3], 1e-3))

@@ -52,10 +52,20 @@ def test_weak_hardening_leaves_no_rounding_and_strong_leaves_the_cube_root():
 
 def test_a_gap_is_passed_by_half_to_the_side_of_the_torque_whatever_its_size():
     torque = np.array([[40.0, -8.0], [400.0, -80.0], [-400.0, 0.0]])
-    found = passed(torque, np.array([2e-4, 6e-4]))
+    found = passed(torque, np.array([2e-4, 6e-4]), np.zeros(2))
     np.testing.assert_allclose(found, [[1e-4, -3e-4], [1e-4, -3e-4], [-1e-4, 0.0]], rtol=0.02)
-    assert (passed(np.zeros((3, 2)), np.array([2e-4, 6e-4])) == 0).all()
-    assert (passed(torque, np.zeros(2)) == 0).all()
+    assert (passed(np.zeros((3, 2)), np.array([2e-4, 6e-4]), np.zeros(2)) == 0).all()
+    assert (passed(torque, np.zeros(2), np.zeros(2)) == 0).all()
+
+
+def test_a_gap_is_passed_where_the_torque_overcomes_the_drag_and_hardly_where_it_does_not():
+    torque = np.array([[3.0], [20.0], [120.0], [-120.0]])
+    share = passed(torque, np.array([2.0]), np.array([20.0]))[:, 0]
+    assert share[0] < 0.2
+    assert 0.5 < share[1] < 0.9
+    np.testing.assert_allclose(share[2:], [1.0, -1.0], rtol=1e-3)
+    twist, _ = Torsion().with_joint(0, gap=2.0, drag=20.0).in_cut(torque, np.zeros(1))
+    np.testing.assert_allclose(twist[:, 0], share)
 
 
 def test_gap_and_factor_act_in_the_cut_alone_and_hardening_in_both():
@@ -73,6 +83,7 @@ def test_gap_and_factor_act_in_the_cut_alone_and_hardening_in_both():
 
 def test_what_is_told_twice_of_a_joint_adds_up():
     twice = Torsion().with_joint(2, gap=1e-4, factor=0.8).with_joint(2, gap=2e-4, factor=0.5)
+    assert twice.with_joint(1, gap=1e-4, drag=5.0).drag[1] == 5.0
     assert twice.gap[2] == pytest.approx(3e-4)
     assert twice.factor[2] == pytest.approx(0.4)
     assert twice.gap[:2] == (0.0, 0.0)

@@ -7,23 +7,40 @@ from dataclasses import replace
 
 from metro.effects.effect import Effect, EffectParameter, per_joint
 from metro.effects.parts import WithDrives
+from metro.robot.drive_torques import PRESLIDING
+
+MOST = 2.0  # mrad: twice what is found of joints with gears
 
 
 def _of(joint: int) -> Effect:
     def apply(model: WithDrives, values: Mapping[str, float]) -> WithDrives:
-        return replace(model, drives=model.drives.with_friction(joint, reversal=values["torque_nm"]))
+        drives = model.drives.with_friction(joint, reversal=values["torque_nm"])
+        return replace(model, drives=drives.with_presliding(joint, values["presliding_mrad"] * 1e-3))
 
     return Effect(
         name="friction_reversal",
         observables=("joint_force", "deformation", "waviness"),
-        parameters=(EffectParameter("torque_nm", "N m", -300.0, 300.0, 3.0, starts=(-10.0, 10.0)),),
+        parameters=(
+            EffectParameter("torque_nm", "N m", -300.0, 300.0, 3.0, starts=(-10.0, 10.0)),
+            EffectParameter(
+                "presliding_mrad",
+                "mrad",
+                0.0,
+                MOST,
+                0.05,
+                starts=(PRESLIDING / 1e-3, 0.0),
+                neutral=PRESLIDING / 1e-3,
+                optional=True,
+                all_there_is=True,
+            ),
+        ),
         apply=apply,
         part="drives",
         signature=(
-            "The torque of one joint has a constant error that changes sign where the joint reverses, and "
-            "the "
-            "wall has the deviation by which that torque twists the joint. A joint that turns one way in "
-            "every run shows a force that does not depend on the cut."
+            "The torque of one joint has a constant error that changes sign where the joint reverses, over "
+            "the turn that friction needs to follow, and the wall has the deviation by which that torque "
+            "twists the joint. A joint that turns one way in every run shows a force that does not depend on "
+            "the cut."
         ),
         literature="[K] section 4: waviness and force error at the reversal of joint 6",
         experiment="a path on which the joint turns round in the middle of the cut, cut and idle, both ways",

@@ -97,7 +97,7 @@ def _matches(effect: Effect, values: Mapping[str, Any]) -> bool:
         and all(
             len(values[name]) == _entries(effect, name)
             for name in effect.names
-            if isinstance(values[name], list)
+            if isinstance(values.get(name), list)
         )
     )
 

@@ -24,7 +24,7 @@ EFFECT = Effect(
     name="tool_offset_error",
     observables=("joint_force", "deformation"),
     parameters=tuple(
-        EffectParameter(name, "mm", -200.0, 200.0, 1.0, starts=(0.0,), plausible=20.0) for name in AXES
+        EffectParameter(name, "mm", -200.0, 200.0, 1.0, starts=(0.0,), plausible=60.0) for name in AXES
     ),
     apply=apply,
     part="arm",

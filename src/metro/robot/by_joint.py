@@ -21,6 +21,13 @@ def raised(values: Sequence[float], joint: int, by: float) -> tuple[float, ...]:
     return tuple(whole.tolist())
 
 
+def put(values: Sequence[float], joint: int, value: float, none: float = 0.0) -> tuple[float, ...]:
+    """Return values with another one at one joint, from 0; those of joints that had none are ``none``."""
+    whole = of_joints(values, max(len(values), joint + 1), none)
+    whole[joint] = value
+    return tuple(whole.tolist())
+
+
 def scaled(values: Sequence[float], joint: int, by: float) -> tuple[float, ...]:
     """Return factors of joints with that of one joint, from 0, times ``by``."""
     whole = of_joints(values, max(len(values), joint + 1), 1.0)

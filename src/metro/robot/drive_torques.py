@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from metro.robot.by_joint import of_joints, raised
+from metro.robot.by_joint import of_joints, put, raised
 from metro.units import Array
 
 TURNING = 2e-4  # rad/s: below it a joint is turning round, and its friction is between its two levels
+PRESLIDING = 3e-4  # rad: asperities and grease give way by 0.1 to 1 mrad before a joint slides
+STARTED = 0.1  # of that turn: from which on a path has a direction
 
 
 @dataclass(frozen=True)
@@ -33,12 +35,14 @@ class DriveTorques:
     ----------
     reversal : Coulomb level of the cut less that of the idle run, N m.
     warmup : slope of the Coulomb level from the start of the cut's log, N m/s.
+    presliding : turn over which the friction of a joint follows when it turns round, rad (or m).
     viscous : friction in proportion to the joint's speed, the cut's less the idle run's, N m s/rad.
     ripple : of the gears, in the cut alone (what both runs have at the same place cancels).
     """
 
     reversal: tuple[float, ...] = ()
     warmup: tuple[float, ...] = ()
+    presliding: tuple[float, ...] = ()
     viscous: tuple[float, ...] = ()
     ripple: tuple[Ripple, ...] = ()
 
@@ -53,6 +57,10 @@ class DriveTorques:
             viscous=raised(self.viscous, joint, viscous),
         )
 
+    def with_presliding(self, joint: int, turn: float) -> DriveTorques:
+        """Return these with the friction of one joint, from 0, following over another ``turn``, rad."""
+        return replace(self, presliding=put(self.presliding, joint, turn, PRESLIDING))
+
     def at(self, q: Array, rate: Array, t: Array, width: Array | float = 0.0) -> Array:
         """Torque (m, n), N m, on top of that of the idle run, each the mean over ``width`` s.
 
@@ -64,11 +72,37 @@ class DriveTorques:
             of_joints(each, rate.shape[1]) for each in (self.reversal, self.warmup, self.viscous)
         )
         torque: Array = rate * viscous
-        if reversal.any() or warmup.any():
-            torque += np.tanh(rate / TURNING) * (reversal + np.outer(t, warmup))
+        presliding = of_joints(self.presliding, rate.shape[1], PRESLIDING)
+        for joint in np.flatnonzero((reversal != 0.0) | (warmup != 0.0)):
+            level = reversal[joint] + t * warmup[joint]
+            torque[:, joint] += level * slid(q[:, joint], rate[:, joint], float(presliding[joint]))
         for one in self.ripple:
             angle = one.order * q[:, one.joint]
             cycles = one.order * rate[:, one.joint] * width / (2.0 * np.pi)
             mean = one.sine * np.sin(angle) + one.cosine * np.cos(angle)
             torque[:, one.joint] += np.sinc(cycles) * mean
         return torque
+
+
+def slid(q: Array, rate: Array, presliding: float) -> Array:
+    """Friction along a path over its level, (m,), −1 … 1.
+
+    It follows the way, whatever the speed: once a joint turns round, it tends to the other level over the
+    turn of ``presliding`` (Dahl, AIAA J. 14 (1976) 1675, exactly for each step). Without presliding it
+    follows the speed, and is between its levels where that is near none. Before the path begins, the joint
+    was moving as at its start.
+
+    Parameters
+    ----------
+    q, rate : (m,) rad and rad/s along the path; no friction where no speed is known. presliding : rad.
+    """
+    if presliding <= 0.0 or not rate.any():
+        return np.tanh(rate / TURNING)
+    away = np.flatnonzero(np.abs(q - q[0]) > STARTED * presliding)
+    state = float(np.sign(q[away[0]] - q[0])) if len(away) else 0.0
+    steps = np.diff(q)
+    kept = np.exp(-np.abs(steps) / presliding)
+    along = [state]
+    for share, more in zip(kept.tolist(), (np.sign(steps) * (1.0 - kept)).tolist(), strict=True):
+        along.append(share * along[-1] + more)
+    return np.array(along)

@@ -1,7 +1,8 @@
 """How far the joints of an arm twist under a torque: springs that may harden, and a gap between gear teeth.
 
 A joint's spring obeys T = k x + cubic x³ (stiffer the further it is twisted, as flexsplines and preloaded
-bearings are); on top of it the joint passes half of its gap towards the side that the torque pushes it to.
+bearings are); on top of it the joint passes half of its gap towards the side that the torque pushes it to,
+where that overcomes the drag beyond the gap.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from metro.robot.by_joint import of_joints, raised, scaled
+from metro.robot.by_joint import of_joints, put, raised, scaled
 from metro.units import Array
 
 TURNING = 0.02  # of the largest torque: below it a joint is between the two ends of its gap
@@ -25,19 +26,27 @@ class Torsion:
     Attributes
     ----------
     gap : whole gap, rad, in the cut alone (a static load has passed it before anything is read).
+    drag : torque, N m, that holds a link within its gap.
     cubic : hardening, N m/rad³, in the cut and under static loads.
     factor : stiffness in the cut relative to static loads.
     """
 
     gap: tuple[float, ...] = ()
+    drag: tuple[float, ...] = ()
     cubic: tuple[float, ...] = ()
     factor: tuple[float, ...] = ()
 
-    def with_joint(self, joint: int, *, gap: float = 0.0, cubic: float = 0.0, factor: float = 1.0) -> Torsion:
-        """Return this with more gap and hardening of one joint, from 0, its stiffness times ``factor``."""
+    def with_joint(
+        self, joint: int, *, gap: float = 0.0, drag: float = 0.0, cubic: float = 0.0, factor: float = 1.0
+    ) -> Torsion:
+        """Return this with more gap and hardening of one joint, from 0, its stiffness times ``factor``.
+
+        ``drag`` is that of the whole gap.
+        """
         return replace(
             self,
             gap=raised(self.gap, joint, gap),
+            drag=put(self.drag, joint, drag) if gap else self.drag,
             cubic=raised(self.cubic, joint, cubic),
             factor=scaled(self.factor, joint, factor),
         )
@@ -50,7 +59,12 @@ class Torsion:
         torque : (m, n) on the links, N m, along one cut. compliance : (n,) of static loads, rad/(N m).
         """
         twist, slope = self.at_rest(torque / self.factors(torque.shape[-1]), compliance)
-        return twist + passed(torque, of_joints(self.gap, torque.shape[-1])), slope
+        return twist + self.passed(torque), slope
+
+    def passed(self, torque: Array) -> Array:
+        """How much of its gap each joint has passed under torques (m, n), N m, along one cut: (m, n) rad."""
+        count = torque.shape[-1]
+        return passed(torque, of_joints(self.gap, count), of_joints(self.drag, count))
 
     def factors(self, count: int) -> Array:
         """Stiffness in the cut relative to static loads, of ``count`` joints, (n,)."""
@@ -88,14 +102,18 @@ def spring_slope(torque: Array, twist: Array, compliance: Array, cubic: Array) -
     return np.asarray((torque - held * twist**3) / (1.0 + 3.0 * compliance * held * twist**2))
 
 
-def passed(torque: Array, gap: Array) -> Array:
+def passed(torque: Array, gap: Array, drag: Array) -> Array:
     """How much of its gap each joint has passed, (m, n), rad: half of it, to the side that the torque pushes.
+
+    A torque below the drag leaves the link somewhere within the gap, the nearer to its middle the smaller it
+    is: where, depends on what was before.
 
     Parameters
     ----------
-    torque : (m, n) N m along one cut. gap : (n,) rad.
+    torque : (m, n) N m along one cut. gap : (n,) rad. drag : (n,) N m.
     """
     if not gap.any():
         return np.zeros_like(torque)
     largest = np.abs(torque).max(axis=0, initial=0.0)
-    return np.asarray(0.5 * gap * np.tanh(torque / np.where(largest > 0.0, TURNING * largest, 1.0)))
+    turning = np.hypot(np.where(largest > 0.0, TURNING * largest, 1.0), drag)
+    return np.asarray(0.5 * gap * np.tanh((torque / turning) ** 3))

@@ -11,14 +11,17 @@ SURE = 0.95  # probability from which on a cause counts as identified
 # Base parameters of which something is believed beforehand, by the pattern of their names.
 BELIEFS = {
     r"softer_joint_(\d)": "compliance of joint {} in the cut, against the load tests",
+    r"lost_motion_joint_(\d)": "lost motion of joint {} in the load tests, of its twist there",
     r"wall_zero": "zero of all walls",
     r"force_off": "force",
     r"force_off_(\w+)_([xyz])": "force by the {}, along {} and relative to its size",
     r"place_height": "height of the scanner",
     r"place_tilt_([xy])": "tilt of the scanner along {}, at the edges of the work",
+    r"form_(xx|xy|yy)": "curvature {} of the scanner's field, at the edges of the work",
     r"ringing_off_(\w+)": "frequencies of the tip at pose {}",
     r"drive_lag": "lag of all torques behind the force",
     r"torque_gain": "gain of all torques",
+    r"friction_under_load_joint_(\d)": "friction of joint {} under the load of the cut",
     r"gain_of_joint_(\d)": "gain of the torque of joint {}",
     r"gain_of_(.)": "gain of the dynamometer along {}",
     r"crosstalk_of_(.)_in_(.)": "crosstalk of the dynamometer from {} to {}",

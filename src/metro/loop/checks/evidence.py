@@ -26,6 +26,7 @@ from metro.loop.fitting.system import (
 )
 from metro.units import Array
 
+FAULTY = 0.01  # share of conditions that are another than their files say
 TOUCHED = 0.01  # of the largest gain or loss at a left-out condition: below it, the condition is not touched
 
 
@@ -160,6 +161,21 @@ def leave_out(fitted: Fit, prior: Noise, moved: Callable[[Fit], Fit] | None = No
     }
 
 
+def by_condition(fitted: Fit) -> dict[str, float]:
+    """Log-likelihood of each condition on the runs of the fit, less what its parameters gain by chance.
+
+    That is one for each parameter (Stone 1977, J. R. Stat. Soc. B 39, 44) and each unknown of a run itself.
+    """
+    likelihood: dict[str, float] = {}
+    for block in fitted.blocks:
+        own = 0 if block.role == "calibrate" else _own(fitted)
+        likelihood[block.condition] = (
+            likelihood.get(block.condition, 0.0) + fitted.log_likelihood[block.run] - own
+        )
+    each = len(fitted.theta) / len(likelihood)
+    return {name: value - each for name, value in likelihood.items()}
+
+
 def _log_likelihood(part: LeftOut, moved: Callable[[Fit], Fit] | None, known: Noise) -> float:
     """Log-likelihood of what was left out; ``known``: the noise by all runs."""
     others = moved(part.others) if moved else part.others
@@ -171,6 +187,9 @@ def weights(
 ) -> Array:
     """Pseudo-BMA weights of candidates by Bayesian bootstrap over conditions, (candidates,).
 
+    Any condition may be another than its files say, in a way that no candidate knows: then it is as likely
+    under each. So no single condition decides.
+
     Parameters
     ----------
     held_out : for each candidate, its held-out log-likelihood (or gain over a common reference) by condition.
@@ -178,7 +197,11 @@ def weights(
     """
     names = list(held_out[0])
     table = np.array([[candidate[name] for name in names] for candidate in held_out])
-    known = table[np.isfinite(table)]
+    finite = np.where(np.isfinite(table), table, -np.inf)
+    faulty = np.logaddexp(finite, finite.max(axis=0) + math.log(FAULTY))
+    known = faulty[np.isfinite(table)]
+    # What has no prediction of a condition is no better for that it may be another one.
+    table = np.where(np.isfinite(table), faulty, table)
     table = np.clip(table, known.min() - 100.0, known.max() + 100.0) if known.size else np.zeros_like(table)
     share = np.random.default_rng(seed).dirichlet(np.ones(len(names)), size=draws) * len(names)
     total = share @ table.T + np.log(np.ones(len(table)) if prior is None else prior)

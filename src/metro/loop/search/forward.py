@@ -24,6 +24,7 @@ from metro.loop.statement import Statement
 SIGNIFICANT = (
     0.05  # p-value of an effect by its own interval, above which that holds none: the 95 % of intervals
 )
+MUCH = 0.1  # of the signal, by which an effect moves the prediction whatever its interval holds
 MOST_EFFECTS = 6  # of a model: four that every machine has (runout, end, resonance, crosstalk), and two
 # Trials by what a model has, in whatever order it was added, and what was tried on top of that.
 Known = dict[tuple[frozenset[Effect], tuple[tuple[str, str], ...]], list[Trial]]
@@ -110,7 +111,9 @@ def _promising(effects: list[Effect], trials: Mapping[tuple[str, str], Trial]) -
 def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str, str], Statement]]:
     """Drop effects that are not significant by their own intervals, or small beside what stays unexplained.
 
-    The least significant goes first, then the smallest; it is said why of each.
+    The least significant goes first, then the smallest; it is said why of each. The intervals of few runs
+    that a model misses by a fifth hold almost anything: an effect stays that moves the prediction by much,
+    and by more than all that is missed.
     """
     dropped: dict[tuple[str, str], Statement] = {}
     while current.candidate.effects:
@@ -120,7 +123,7 @@ def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str
         }
         least, p_value = least_significant(current)
         why: Statement | None = Statement("holds_nothing", {"p_value": p_value})
-        if p_value <= SIGNIFICANT:
+        if p_value <= SIGNIFICANT or evidences[least].size > max(MUCH, evidences[least].missed):
             least = min(evidences, key=lambda effect: evidences[effect].size)
             why = small_beside_residual(evidences[least])
         if why is None:

@@ -6,11 +6,14 @@ explains the runs as well, on conditions left out, is named beside it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from metro.effects.effect import Effect
-from metro.loop.checks.evidence import leave_out, weights
+from metro.loop.checks.evidence import by_condition, leave_out, weights
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, cost_under, fit
 from metro.loop.fitting.noise import Noise
@@ -91,7 +94,9 @@ def _round(
         others = _replaced(current, smaller, effects, prior)
         in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
         left_out = [leave_out(fitted, prior) for fitted in (smaller, current, *others)]
-        share = weights(left_out, gates.seed, prior=[1.0, *(one.odds for one in in_place)])[1:]
+        within = [by_condition(fitted) for fitted in (smaller, current, *others)]
+        odds = [1.0, *_odds(in_place, [current, *others])]
+        share = np.mean([weights(table, gates.seed, prior=odds) for table in (left_out, within)], axis=0)[1:]
         weight[effect.name] = float(share[0])
         for fitted, other in zip(others, share[1:], strict=True):
             if other > RIVAL_WEIGHT:
@@ -104,6 +109,27 @@ def _round(
         if better is None and first > 0:
             better = others[first - 1]
     return Contest(current, weight, tuple(rivals)), better
+
+
+def _odds(effects: Sequence[Effect], fits: Sequence[Fit]) -> list[float]:
+    """Return the odds of effects before the runs are seen, each at the size that its fit gives it.
+
+    Of the forms of one effect, that with the more plausible size has the better ones: a gap of a joint's gear
+    that is as wide as a worn one has, before one that is wider than any. Sizes of different effects are not
+    compared.
+    """
+    strain = [_strain(effect, fitted) for effect, fitted in zip(effects, fits, strict=True)]
+    least: dict[str, float] = {}
+    for effect, far in zip(effects, strain, strict=True):
+        least[effect.name] = min(far, least.get(effect.name, far))
+    return [one.odds * math.exp(least[one.name] - far) for one, far in zip(effects, strain, strict=True)]
+
+
+def _strain(effect: Effect, fitted: Fit) -> float:
+    """Return minus the logarithm of how plausible the size of an effect is, but for a constant."""
+    place = dict(fitted.candidate.parts(fitted.theta))[effect]
+    sizes = zip(effect.parameters, fitted.theta[place].tolist(), strict=True)
+    return 0.5 * math.fsum((size / one.plausible) ** 2 for one, size in sizes if one.plausible is not None)
 
 
 def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Noise) -> list[Fit]:

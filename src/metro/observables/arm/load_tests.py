@@ -92,6 +92,14 @@ def best_compliance(batch: Batch, model: DeformationModel, loads: pd.DataFrame) 
     return np.zeros(len(model.arm.dh)) if known is None else 1.0 / np.asarray(known, dtype=float)
 
 
+def largest_loads(model: DeformationModel, loads: pd.DataFrame) -> Array:
+    """Return the largest torque of the load tests on each joint, N m, (n,); (0,) where there is no test."""
+    if loads.empty:
+        return np.zeros(0)
+    joints, force, _ = _load_arrays(loads, model.arm)
+    return np.asarray(np.abs(model.torques(joints, force)).max(axis=0))
+
+
 def fitted_loads(model: DeformationModel, loads: pd.DataFrame) -> Compliances | Refusal:
     """Joint compliances from the load tests alone."""
     if loads.empty:

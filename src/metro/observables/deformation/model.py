@@ -26,6 +26,8 @@ from metro.surface.profile import gaussian_filter
 from metro.units import UM, Array
 
 WALL_ZERO = "wall_zero"
+LOST_MOTION = "lost_motion_joint_"
+PASSED = 0.2  # of a joint's largest load: where its lost motion is passed
 AXES = "xyz"
 
 
@@ -89,6 +91,7 @@ class DeformationModel:
     forces : sources of the force on the walls. Walls of one source share its errors, along each work axis.
     springs : compliances of the joints by the load tests alone. Those in the cut may deviate from them, since
         a gear is softer where it is twisted less. Empty where they do not.
+    loaded : largest torque of the load tests on each joint, N m. Empty where no lost motion is believed.
     """
 
     arm: Arm
@@ -101,6 +104,7 @@ class DeformationModel:
     touched: bool = False
     forces: tuple[str, ...] = ()
     springs: tuple[float, ...] = ()
+    loaded: tuple[float, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -111,15 +115,18 @@ class DeformationModel:
 
     @property
     def believed(self) -> tuple[Parameter, ...]:
-        """By how much each joint is softer in the cut, the zero of all walls, and errors of the force.
+        """By how much each joint is softer in the cut, its lost motion, and common errors.
 
-        Those are relative to the size of the force, for each of its sources along the work axes.
+        The lost motion is relative to the joint's twist under the largest load. Common are the zero of all
+        walls, and errors of the force relative to its size, for each of its sources along the work axes.
         """
         softer = [Parameter(f"softer_joint_{i + 1}", "%", 0.01) for i in range(len(self.springs))]
+        lost = [Parameter(f"{LOST_MOTION}{i + 1}", "%", 0.01) for i in range(len(self.loaded))]
         zero = [Parameter(WALL_ZERO, "um", UM)] if self.touched else []
         force = itertools.product(self.forces, AXES)
         return (
             *softer,
+            *lost,
             *zero,
             *(Parameter(f"force_off_{source}_{axis}", "%", 0.01) for source, axis in force),
         )
@@ -150,12 +157,39 @@ class DeformationModel:
             matrix, offset = self._cut(setting, self.in_cut(about))
             offset = offset + block.order * float(setting.normal[:2] @ np.array(self.drift))
             softer = [matrix * np.array(self.springs)] if self.springs else []
-            return np.hstack([matrix, *softer, self._off(setting)]), offset
+            return np.hstack([matrix, *softer, self._lost_in_cut(setting), self._off(setting)]), offset
         if isinstance(setting, LoadTest):
             matrix, offset = self._loaded(setting, self.compliance(about))
-            return np.hstack([matrix, np.zeros((len(matrix), len(self.believed)))]), offset
+            softer = [np.zeros((len(matrix), len(self.springs))), self._lost_in_test(setting)]
+            common = len(self.parameters) - sum(part.shape[1] for part in (matrix, *softer))
+            return np.hstack([matrix, *softer, np.zeros((len(matrix), common))]), offset
         rows = np.eye(len(self.parameters))[setting.places]
         return rows, np.zeros(len(rows))
+
+    def _lost(self, torque: Array) -> Array:
+        """Return the way of each joint, (m, n) rad, if its lost motion is its twist under its largest load.
+
+        A gear is softer up to some fraction of its load; beyond that, it has only passed a way that the
+        others have not.
+        """
+        if not self.loaded:
+            return np.zeros((len(torque), 0))
+        largest = np.array(self.loaded)
+        share = np.tanh(torque / np.where(largest > 0.0, PASSED * largest, 1.0))
+        return np.asarray(np.array(self.springs) * largest * share)
+
+    def _lost_in_test(self, setting: LoadTest) -> Array:
+        """Return what load tests gain by that way, (n, k) m."""
+        moved, torque = _static(self.arm, self.flange_rotation, setting)
+        lost = self._lost(torque)
+        return np.asarray((moved[..., : lost.shape[1]] * lost[:, None, :])[setting.measured])
+
+    def _lost_in_cut(self, setting: CutWall) -> Array:
+        """Return what a wall gains by that way, (n, k) m."""
+        out, torque = _outwards(self.arm, self.flange_rotation, setting)
+        lost = self._lost(self.structure.in_cut(torque) / self.torsion.factors(torque.shape[1]))
+        smooth = _filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
+        return np.asarray(smooth @ (out[:, : lost.shape[1]] * lost))
 
     def _off(self, setting: CutWall) -> Array:
         """Return what a wall gains per unit of its zero, and of what the force is off, (n, k).
@@ -170,7 +204,7 @@ class DeformationModel:
         """Return the wall with the force that the base parameters say, instead of the one that was read."""
         if setting.source not in self.forces:
             return setting
-        before = len(self.arm.dh) + len(self.springs) + int(self.touched)
+        before = len(self.arm.dh) + len(self.springs) + len(self.loaded) + int(self.touched)
         first = before + len(AXES) * self.forces.index(setting.source)
         size = np.linalg.norm(setting.force, axis=1)
         return replace(setting, force=setting.force + np.outer(size, beta[first : first + len(AXES)]))
@@ -232,6 +266,13 @@ class DeformationModel:
         forced = [one for one in settings if isinstance(one, CutWall | LoadTest)]
         torque = np.vstack([_static(self.arm, self.flange_rotation, one)[1] for one in forced])
         return compliance, np.abs(torque).max(axis=0) * compliance
+
+    def largest_in_cut(self, blocks: Sequence[Block]) -> Array:
+        """Largest torque of the cuts on the link of each joint, (n,) N m."""
+        settings: list[Any] = [block.setting for block in blocks]
+        walls = [one for one in settings if isinstance(one, CutWall)]
+        torques = [_static(self.arm, self.flange_rotation, wall)[1] for wall in walls]
+        return np.asarray(np.abs(np.vstack(torques)).max(axis=0, initial=0.0))
 
     def _cut(self, setting: CutWall, compliance: Array) -> tuple[Array, Array]:
         out, torque = _outwards(self.arm, self.flange_rotation, setting)

@@ -14,7 +14,7 @@ from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
 from metro.observables.arm.give import GivingArm, giving_arm
-from metro.observables.arm.load_tests import best_compliance, calibration, lacking
+from metro.observables.arm.load_tests import best_compliance, calibration, lacking, largest_loads
 from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall, wall
@@ -140,7 +140,13 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         *notes,
     )
     forces = tuple(dict.fromkeys(block.setting.source for block in walls))
-    base = replace(model, touched=True, forces=forces, springs=tuple(np.maximum(softness, 0.0).tolist()))
+    base = replace(
+        model,
+        touched=True,
+        forces=forces,
+        springs=tuple(np.maximum(softness, 0.0).tolist()),
+        loaded=tuple(largest_loads(model, observed["arm_loads"]).tolist()),
+    )
     scatter = np.array([0.0 if one in base.believed else SCATTER for one in base.parameters])
     return Problem(
         NAME, "mm", MM, base, (believed_block(base), *calibrate, *walls), scatter, missed / math.sqrt(3.0),

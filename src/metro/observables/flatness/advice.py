@@ -15,6 +15,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness.blocks import Pose, face_block, plane_directions
+from metro.observables.flatness.model import FORM
 from metro.observables.flatness.path import beside, work_size
 from metro.observables.flatness.scan import POINT_COLUMNS
 from metro.observables.flatness.study import configuration, factors_of, levels_of, study
@@ -223,9 +224,11 @@ def _drawn(task: Problem, fit: BaseFit, choice: Choice, unknown: Unknown) -> Arr
     places = np.array(own) if own else starts
     taken = (unknown.place * len(places)).astype(int)
     result = np.empty((len(unknown.beta), len(choice.block.measured)))
+    of_the_face = _of_the_face(task)
     for number in np.unique(taken):
         rows = taken == number
         design, offset = task.base.design(choice.block, places[number], fit.beta)
+        design = design * of_the_face
         base = offset + design @ fit.beta
         off = [_at(task, fit, block, places[number]) - base for block in choice.forces]
         off = off or [unknown.scale * base]
@@ -237,7 +240,12 @@ def _drawn(task: Problem, fit: BaseFit, choice: Choice, unknown: Unknown) -> Arr
 
 def _at(task: Problem, fit: BaseFit, block: Block, nuisance: Array) -> Array:
     design, offset = task.base.design(block, nuisance, fit.beta)
-    return np.asarray(offset + design @ fit.beta)
+    return np.asarray(offset + design @ (fit.beta * _of_the_face(task)))
+
+
+def _of_the_face(task: Problem) -> np.ndarray:
+    """Return which base parameters shape a face, (p,): not the form of the scanner."""
+    return np.array([one.name not in FORM for one in task.base.parameters])
 
 
 def ranges(block: Block, heights: Array) -> Array:

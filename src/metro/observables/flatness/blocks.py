@@ -17,6 +17,7 @@ from metro.observables.flatness.model import (
     ACROSS,
     AHEAD,
     FORCE,
+    FORM,
     PLACE,
     BelievedSetting,
     FaceSetting,
@@ -54,6 +55,7 @@ REGISTERED_SD = 10 * UM  # of the place of one scan about that of all
 FREQUENCY_SD = 0.025
 FORCE_SD = 0.04  # of the force by the coefficients: those of another bar, and corners that are not sharp
 PLACE_SD = 100 * UM  # of the declared place, in which all scans share an error: height, tilts at the edges
+FORM_SD = 5 * UM  # of the scanner's form over the work: how straight its axes are, and its field is flat
 GAUGE_SD = 0.1 * UM
 MOST_POINTS = 1200
 LEAST_COVERAGE, SECTORS = 0.75, 8
@@ -139,8 +141,8 @@ def _linearity(pose: str, loads: pd.DataFrame) -> list[str]:
 
 
 def believed_block(model: FlatnessModel) -> Block:
-    """Return what is believed of the scanner's place, the force and the tip's frequencies beforehand."""
-    known = dict.fromkeys(PLACE, PLACE_SD) | {FORCE: FORCE_SD}
+    """Return what is believed of the scanner, the force and the tip's frequencies beforehand."""
+    known = dict.fromkeys(PLACE, PLACE_SD) | dict.fromkeys(FORM, FORM_SD) | {FORCE: FORCE_SD}
     sigma = np.array([known.get(one.name, FREQUENCY_SD) for one in model.believed])
     names, zeros, none = [one.name for one in model.believed], np.zeros((len(sigma), 0)), np.zeros(0)
     return Block(

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 ENTRIES = ("zx", "zy", "zz")
 FORCE = "force_off"
 PLACE = ("place_height", "place_tilt_x", "place_tilt_y")  # tilts as the height at the edges of the work
+FARTHEST = 0.7  # of what the tip's frequencies are off, as a logarithm: half or twice as high
+FORM = ("form_xx", "form_xy", "form_yy")  # of the scanner: curvatures, as the height at the edges of the work
 # Places across and along the feed, in radii of a disc, whose mean equals that over the disc: exactly for a
 # cubic, and to 0.2 % for a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
@@ -105,6 +107,12 @@ class FaceSetting:
         return np.column_stack([np.ones_like(across[0]), *across])
 
     @property
+    def form(self) -> Array:
+        """Heights of three curvatures, (bins, 3), each 1 at the edges or corners of the work."""
+        _, across, along = self.plane.T
+        return np.column_stack([across**2, across * along, along**2])
+
+    @property
     def _count(self) -> np.ndarray:
         """Points in each bin."""
         return np.diff(np.append(self.first, len(self.x) // len(ACROSS)))
@@ -170,8 +178,8 @@ class FlatnessModel:
 
     @property
     def believed(self) -> tuple[Parameter, ...]:
-        """Place of the scanner; by how much the force is off, and the tip's frequencies at each pose."""
-        place = [Parameter(name, "um", UM) for name in PLACE if self.placed]
+        """Place and form of the scanner; by how much the force is off, and the tip's frequencies by pose."""
+        place = [Parameter(name, "um", UM) for name in (*(PLACE if self.placed else ()), *FORM)]
         ringing = [Parameter(f"ringing_off_{pose}", "%", 0.01) for pose in self.ringing]
         return (*place, Parameter(FORCE, "%", 0.01), *ringing)
 
@@ -192,7 +200,7 @@ class FlatnessModel:
         off = self._off(setting, beta)
         terms, offset, harder, rising = _shaped(self, setting, phases_of(self.vibration, nuisance), off)
         columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
-        parts = [setting.plane] if self.placed else []
+        parts = [*([setting.plane] if self.placed else []), setting.form]
         parts += [harder[:, None], np.outer(rising, np.array(self.ringing) == setting.pose)]
         parts += [_own(part, setting.pose, columns) for part in self.fields]
         return setting.shape(np.hstack(parts)), setting.shape(offset - off * rising)
@@ -205,8 +213,13 @@ class FlatnessModel:
         return FINE * round(float(beta[place]) / FINE)
 
     def tuning(self, off: float) -> float:
-        """Return the tip's frequencies in the cut over those of the load tests with the declared mass."""
-        return (1.0 + off) / math.sqrt(float(self.structure.in_cut(np.ones(1))[0]))
+        """Return the tip's frequencies in the cut over those of the load tests with the declared mass.
+
+        A step of a fit may go beyond what a frequency can be off by.
+        """
+        return math.exp(min(max(off, -FARTHEST), FARTHEST)) / math.sqrt(
+            float(self.structure.in_cut(np.ones(1))[0])
+        )
 
     def finished(
         self, setting: FaceSetting, nuisance: Array, off: float = 0.0

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from metro.observables.problem import Block, Parameter
-from metro.robot.drive_torques import DriveTorques
+from metro.robot.drive_torques import PRESLIDING, DriveTorques, slid
 from metro.robot.kinematics import Arm, Geometry
 from metro.robot.payload import Payload, gravity_torque
 from metro.robot.statics import Flange, flange_of, joint_torque, tip_jacobian_of
@@ -27,6 +27,7 @@ from metro.signals.waves import waves
 from metro.units import MS, Array
 
 AXES = "xyz"
+UNDER_LOAD = "friction_under_load_joint_"
 LAG_STEP = 5 * MS  # over which the torques are differentiated
 LAG_GRID = 1 * MS
 CROSS = tuple(permutations(range(3), 2))  # axis that shows it, axis along which the force is
@@ -100,11 +101,12 @@ class JointForceModel:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """A gain that all torques share, one of each joint that turns and of each axis, crosstalk, lag."""
+        """A gain that all torques share, one of each joint and axis, crosstalk, friction under load, lag."""
         names = ["torque_gain", *(f"gain_of_joint_{i + 1}" for i in self.joints)]
         names += [f"gain_of_{a}" for a in AXES]
         names += [f"crosstalk_of_{AXES[along]}_in_{AXES[seen]}" for seen, along in CROSS]
-        return (*(Parameter(name, "1") for name in names), Parameter("drive_lag", "ms", MS))
+        friction = [Parameter(f"{UNDER_LOAD}{i + 1}", "N m") for i in self.joints]
+        return (*(Parameter(name, "1") for name in names), *friction, Parameter("drive_lag", "ms", MS))
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -116,9 +118,9 @@ class JointForceModel:
         return np.zeros((1, 0))
 
     def design(self, block: Block, _nuisance: Array, beta: Array | None = None) -> tuple[Array, Array]:
-        """Waves of the torque (k m, k + 11) per gain and lag, and those without a force (k m,), N m.
+        """Waves of the torque (k m, 2 k + 11) per base parameter, and those without a force (k m,), N m.
 
-        For :class:`Instruments` they are the gains and the lag (k + 10, k + 11) themselves; k joints turn.
+        For :class:`Instruments` they are all but the first (2 k + 10, 2 k + 11) themselves; k joints turn.
         The torques of drives and payload are read with the gains of the joints, too. The lag is linear about
         that of ``beta``, to a grid.
         """
@@ -132,7 +134,8 @@ class JointForceModel:
         read = in_waves(other[:, list(self.joints)])
         lag = 0.0 if beta is None else LAG_GRID * round(float(beta[-1]) / LAG_GRID)
         later = late(self.arm, run, self.offset + lag)
-        matrix = np.column_stack([carried(self.arm, run, self.offset + lag), later])
+        whole = carried(self.arm, run, self.offset + lag)
+        matrix = np.column_stack([whole, rubbing(run, self.joints), later])
         if read.any():
             each = np.kron(np.eye(len(self.joints)), np.ones((len(other), 1)))
             matrix[:, 1 : 1 + len(self.joints)] += each * read[:, None]
@@ -177,6 +180,13 @@ def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
     whole = np.sum(by_axis, axis=0)
     by_joint = np.kron(np.eye(jacobian.shape[-1]), np.ones((len(force), 1))) * whole[:, None]
     return np.column_stack([whole, by_joint, *by_axis, *across])
+
+
+@lru_cache(maxsize=256)
+def rubbing(run: TorqueRun, joints: tuple[int, ...]) -> Array:
+    """Waves (k m, k) of the friction of each joint that turns, over its level."""
+    states = np.stack([slid(run.q[:, joint], run.rate[:, joint], PRESLIDING) for joint in joints], axis=1)
+    return np.stack([in_waves(states * joint) for joint in np.eye(len(joints))], axis=1)
 
 
 @lru_cache(maxsize=256)

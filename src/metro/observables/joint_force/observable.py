@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,15 +23,16 @@ from metro.observables.joint_force.model import (
     Instruments,
     JointForceModel,
     TorqueRun,
+    carried,
     in_waves,
     late,
+    rubbing,
     running,
 )
 from metro.observables.joint_force.tables import NOISE, WANDER, observe
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
-from metro.robot.drive_torques import TURNING
 from metro.robot.drives import declared, drives_of_cell
 from metro.robot.kinematics import Arm, arm_of_cell
 from metro.robot.statics import driven_jacobian
@@ -41,6 +42,8 @@ from metro.units import JSON, MS, Array
 SCATTER = 0.01
 CALIBRATED = 0.01  # relative error of an axis of the dynamometer, in all runs
 DRIVEN = 0.03  # of the torque of a joint, in all runs: torque constants are stated to some 5 %
+BY_LOAD = 0.015  # of the torque of the cut: what the friction of a joint has more, under load (0.3 to 2 %)
+LEAST_FRICTION = 0.1  # N m, of a joint that no cut loads
 LAG = 10 * MS  # of all torques behind the force: filters of the drives (20 to 60 Hz), clock of the log
 SHIFT = 4 * MS  # of the log of one run: it is stamped in cycles of 4 to 12 ms
 # Of the force along one axis that another one shows: makers state up to 2 % of crosstalk, and a mounting is
@@ -91,18 +94,26 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     scatter = np.zeros(len(model.parameters))
     scatter[0] = SCATTER
     return Problem(
-        NAME, "N", 1.0, model, (_instruments(batch, arm), *blocks), scatter, notes=notes, basis_unit="N m"
+        NAME,
+        "N",
+        1.0,
+        model,
+        (_instruments(batch, arm, blocks), *blocks),
+        scatter,
+        notes=notes,
+        basis_unit="N m",
     )
 
 
-def _instruments(batch: Batch, arm: Arm) -> Block:
-    """Return what is known of gains and crosstalk; of joints, what the cell declares of each one."""
+def _instruments(batch: Batch, arm: Arm, blocks: Sequence[Block]) -> Block:
+    """Return what is known of gains, crosstalk and friction; of joints, what the cell declares of each."""
     joints, names = arm.axes.turning, arm.axes.driven("joint {}")
-    axis = np.array([*names, *WORK, *(WORK[seen] for seen, _ in CROSS), "time"])
+    axis = np.array([*names, *WORK, *(WORK[seen] for seen, _ in CROSS), *names, "time"])
     count = len(axis)
     zeros, known, sigma = np.zeros((count, 0)), np.zeros(count), np.full(count, CALIBRATED)
     sigma[: len(joints)] = DRIVEN
     sigma[len(joints) + len(WORK) : -1] = CROSSTALK
+    sigma[-1 - len(joints) : -1] = np.maximum(BY_LOAD * _largest(arm, blocks), LEAST_FRICTION)
     sigma[-1] = LAG
     if declared(batch.cell):
         drives = drives_of_cell(batch.cell, len(arm.axes)).covariance
@@ -115,13 +126,17 @@ def _instruments(batch: Batch, arm: Arm) -> Block:
     )
 
 
+def _largest(arm: Arm, blocks: Sequence[Block]) -> Array:
+    """Return the largest torque of the cuts on each joint that turns, (k,) N m: rms over a run."""
+    loads = [carried(arm, block.setting, 0.0)[:, 0].reshape(len(arm.axes.turning), -1) for block in blocks]
+    return np.asarray(np.max([np.sqrt(np.mean(load**2, axis=1)) for load in loads], axis=0))
+
+
 def _block(row: Any, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander: Array) -> Block:
     """Torques of the run whose row of the run table is ``row``, in waves along its path."""
     setting, count, axes = torque_run(table, force), len(table), arm.axes
     noise = table[axes.driven(NOISE)].to_numpy()[0]
     white = noise**2 / table["samples"].iloc[0]
-    turning = np.tanh(setting.rate[:, axes.turning] / TURNING)
-    zeros = np.stack([in_waves(turning * joint) for joint in np.eye(len(axes.turning))], axis=1)
     solve = _least_squares(arm, setting, np.sqrt(white))
     torque = table[axes.torques].to_numpy()
     known = setting.force.mean(setting.t, setting.width)
@@ -134,7 +149,7 @@ def _block(row: Any, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander:
         sigma=np.sqrt(variance(count, white, wander**2)).T.ravel(),
         setting=setting,
         axis=np.repeat(axes.driven("joint {}"), count),
-        zeros=zeros,
+        zeros=rubbing(setting, tuple(axes.turning)),
         zero_sd=REPEATABLE * noise,
         unidentified=SHIFT * late(arm, setting, 0.0)[:, None],
         labels=np.tile(_lengths(table["s_mm"].to_numpy()), len(axes.turning)),

@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 
 from metro.observables.problem import Block, Parameter
-from metro.robot.by_joint import of_joints
 from metro.robot.drive_torques import DriveTorques
-from metro.robot.torsion import Torsion, passed
+from metro.robot.torsion import Torsion
 from metro.units import Array
 
 PHASES = tuple(2 * math.pi * third / 3 for third in range(3))  # of a vibration: starts of the fit to a run
@@ -110,6 +109,11 @@ class WavinessModel:
         """Share of the tracking error that the wall shows; ideally it is 1."""
         return (Parameter("transfer", "1"),)
 
+    def largest_in_cut(self, blocks: Sequence[Block]) -> Array:
+        """Largest torque of the cuts on the link of each joint, (n,) N m."""
+        settings: list[Any] = [block.setting for block in blocks]
+        return np.asarray(np.abs(np.vstack([run.load for run in settings])).max(axis=0, initial=0.0))
+
     def nuisance_starts(self, _block: Block) -> Array:
         """Return starts of the phases of a run."""
         return phase_starts(self.vibration)
@@ -118,7 +122,7 @@ class WavinessModel:
         """Waves (n, 1), m per unit of transfer, and the waves that no encoder sees (n,), m."""
         run: Any = block.setting
         torque = run.load - self.drives.at(run.q, run.rate, run.t)
-        twist = run.compliance * torque + passed(run.load, of_joints(self.torsion.gap, len(run.compliance)))
+        twist = run.compliance * torque + self.torsion.passed(run.load)
         unseen = (run.moves * twist).sum(axis=1)
         for swing, phase in zip(self.vibration, phases_of(self.vibration, nuisance), strict=True):
             unseen = unseen + swing.at(run.t, phase)
