@@ -44,6 +44,8 @@ def test_what_is_significant_stays_and_what_is_not_goes(monkeypatch):
     task = problem(9, truth=Wave(bend=0.2), phased=False)
     assert search(task, (BEND, RIPPLE), GATES).names == ("bend",)
     monkeypatch.setattr(forward, "SIGNIFICANT", 0.0)
+    assert search(task, (BEND, RIPPLE), GATES).names == ("bend",)  # it moves the prediction by much
+    monkeypatch.setattr(forward, "MUCH", np.inf)
     found = search(task, (BEND, RIPPLE), GATES)
     assert found.names == ()
     assert {one.effect.name: one.why_not and one.why_not.code for one in found.trials}[

@@ -300,7 +300,7 @@ def test_what_is_told_are_parameters_of_a_form_of_the_library(about, world):
     for name, some in told.items():
         for one in some:
             effect = known[name, one.parameters.get("joint")]
-            assert set(one.parameters) == {*effect.names, *effect.where}
+            assert {*one.parameters, *effect.left_out} == {*effect.names, *effect.where}
 
 
 # -- tests on either side of the boundary

@@ -187,8 +187,8 @@ def weights(
 ) -> Array:
     """Pseudo-BMA weights of candidates by Bayesian bootstrap over conditions, (candidates,).
 
-    Any condition may be another than its files say, in a way that no candidate knows: then it is as likely
-    under each. So no single condition decides.
+    Any condition may be another than its files say, in a way that no effect knows: then it is as likely under
+    each effect. So no single condition decides between effects. The first candidate has none of them.
 
     Parameters
     ----------
@@ -197,11 +197,13 @@ def weights(
     """
     names = list(held_out[0])
     table = np.array([[candidate[name] for name in names] for candidate in held_out])
-    finite = np.where(np.isfinite(table), table, -np.inf)
-    faulty = np.logaddexp(finite, finite.max(axis=0) + math.log(FAULTY))
-    known = faulty[np.isfinite(table)]
+    effects = table[1:]
+    finite = np.where(np.isfinite(effects), effects, -np.inf)
+    best = finite.max(axis=0, initial=-np.inf)
+    faulty = np.logaddexp(finite + math.log1p(-FAULTY), best + math.log(FAULTY))
     # What has no prediction of a condition is no better for that it may be another one.
-    table = np.where(np.isfinite(table), faulty, table)
+    table = np.vstack([table[:1], np.where(np.isfinite(effects), faulty, effects)])
+    known = table[np.isfinite(table)]
     table = np.clip(table, known.min() - 100.0, known.max() + 100.0) if known.size else np.zeros_like(table)
     share = np.random.default_rng(seed).dirichlet(np.ones(len(names)), size=draws) * len(names)
     total = share @ table.T + np.log(np.ones(len(table)) if prior is None else prior)
