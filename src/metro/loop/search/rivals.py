@@ -1,7 +1,7 @@
 """Rivals: other effects in the place of one that was chosen, refitted with all the others.
 
 An effect that was added first may have stood for one that fits better once the others are known; and what
-explains the runs as well, on conditions left out, is named beside it.
+explains the runs as well, those of the fit and conditions left out, is named beside it.
 """
 
 from __future__ import annotations

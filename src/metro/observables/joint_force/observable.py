@@ -128,8 +128,11 @@ def _instruments(batch: Batch, arm: Arm, blocks: Sequence[Block]) -> Block:
 
 def _largest(arm: Arm, blocks: Sequence[Block]) -> Array:
     """Return the largest torque of the cuts on each joint that turns, (k,) N m: rms over a run."""
-    loads = [carried(arm, block.setting, 0.0)[:, 0].reshape(len(arm.axes.turning), -1) for block in blocks]
-    return np.asarray(np.max([np.sqrt(np.mean(load**2, axis=1)) for load in loads], axis=0))
+    count = len(arm.axes.turning)
+    loads = [carried(arm, block.setting, 0.0)[:, 0].reshape(count, -1) for block in blocks]
+    return np.asarray(
+        np.max([np.zeros(count), *(np.sqrt(np.mean(load**2, axis=1)) for load in loads)], axis=0)
+    )
 
 
 def _block(row: Any, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander: Array) -> Block:
