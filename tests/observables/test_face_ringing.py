@@ -186,12 +186,12 @@ def test_a_damping_that_nothing_tells_is_in_doubt_by_as_much_as_faces_of_arms_di
     field = PoseField("A", basis, (True, True, True))
     columns = damping_doubt(field, setting)
     assert columns is not None
-    lowest, _ = FlatnessModel((field,)).finished(setting, np.zeros(1))
+    share, _ = FlatnessModel((field,)).finished(setting, np.zeros(1))
     rng = np.random.default_rng(3)
 
     def height(ratio: float) -> np.ndarray:
         moved = replace(rung, damping=SharedRatio(ratio)).heights(Structure(), setting.middle)
-        return setting.mean(moved[lowest])
+        return setting.mean((share * moved).sum(axis=1))
 
     drawn = [height(0.05 * 2.0 ** rng.standard_normal()) - height(0.05) for _ in range(300)]
     expected = np.sqrt(np.mean(np.square(drawn), axis=0))

@@ -14,9 +14,10 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.observables.cut import conditions as cutting_force
-from metro.observables.flatness.blocks import Pose, face_block, plane_directions
+from metro.observables.flatness.blocks import Pose, face_block
 from metro.observables.flatness.model import FORM
 from metro.observables.flatness.path import beside, work_size
+from metro.observables.flatness.placing import plane_directions
 from metro.observables.flatness.scan import POINT_COLUMNS
 from metro.observables.flatness.study import configuration, factors_of, levels_of, study
 from metro.observables.problem import BaseFit, Block, Problem, Refusal

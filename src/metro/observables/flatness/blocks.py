@@ -37,6 +37,7 @@ from metro.observables.flatness.path import (
     work_size,
 )
 from metro.observables.flatness.patterns import patterns
+from metro.observables.flatness.placing import plane_directions
 from metro.observables.flatness.ringing import Ringing, make_ringing
 from metro.observables.problem import Block, Refusal
 from metro.observables.waviness.model import PHASES
@@ -295,9 +296,3 @@ def _bins(number: np.ndarray) -> np.ndarray:
     begins = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
     within = np.arange(len(number)) - np.repeat(begins, np.diff(np.append(begins, len(number))))
     return np.cumsum(within % width == 0)
-
-
-def plane_directions(x: Array, y: Array) -> Array:
-    """Directions of an offset and two tilts, (n, 3); each tilt is ±1 at the edges."""
-    across = [(c - (c.min() + c.max()) / 2) / (np.ptp(c) / 2 or 1.0) for c in (x, y)]
-    return np.column_stack([np.ones(len(x)), *across])

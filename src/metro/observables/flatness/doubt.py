@@ -20,10 +20,10 @@ def damping_doubt(field: PoseField, setting: FaceSetting) -> Array | None:
     if ringing is None:
         return None
     model = FlatnessModel((field,))
-    chosen, _ = model.finished(setting, np.zeros(1))
-    known = ringing.heights(model.structure, setting.middle)[chosen]
+    share, _ = model.finished(setting, np.zeros(1))
+    known = ringing.heights(model.structure, setting.middle)
     columns = []
     for weight, damping in ringing.damping.doubts():
-        other = replace(ringing, damping=damping).heights(model.structure, setting.middle)[chosen]
-        columns.append(weight * setting.mean(other - known))
+        other = replace(ringing, damping=damping).heights(model.structure, setting.middle)
+        columns.append(weight * setting.mean((share * (other - known)).sum(axis=1)))
     return np.column_stack(columns)

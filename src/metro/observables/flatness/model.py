@@ -32,6 +32,7 @@ FORM = ("form_xx", "form_xy", "form_yy")  # of the scanner: curvatures, as the h
 # cubic, and to 0.2 % for a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
 FINE = 0.002  # grid of relative frequencies about which the ringing is linearised
+KINK = 1 * UM  # passages whose cuts differ by less finish a place together: teeth are less even than that
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,17 +222,16 @@ class FlatnessModel:
             float(self.structure.in_cut(np.ones(1))[0])
         )
 
-    def finished(
-        self, setting: FaceSetting, nuisance: Array, off: float = 0.0
-    ) -> tuple[tuple[np.ndarray, np.ndarray], Array]:
-        """Index of the passage that finished each point, and heights over the static one, (n, k) m.
+    def finished(self, setting: FaceSetting, nuisance: Array, off: float = 0.0) -> tuple[Array, Array]:
+        """Share of each passage in finishing each place, and heights over the static one, (n, k) m.
 
-        The passage with the lowest cut finishes a point. For ``nuisance`` see :meth:`nuisance_starts`;
-        ``off`` is the relative error of the tip's frequencies.
+        The passage with the lowest cut finishes a place. Where two are nearly as low both do, so that a face
+        changes smoothly with every parameter. For ``nuisance`` see :meth:`nuisance_starts`; ``off`` is the
+        relative error of the tip's frequencies.
         """
         height, above_static = self._heights(setting, nuisance, off)
-        lowest = height.argmin(axis=1)
-        return (np.arange(len(lowest)), lowest), above_static
+        share = np.exp((height.min(axis=1, keepdims=True) - height) / KINK)
+        return share / share.sum(axis=1, keepdims=True), above_static
 
     def heights(self, setting: FaceSetting, nuisance: Array) -> Array:
         """Height of the cut at each passage by the load tests, (n, k) m; infinite if there is no passage."""
@@ -274,42 +274,25 @@ def _shaped(
 ) -> tuple[Array, Array, Array, Array]:
     """Return means over each bin: terms of the basis, (bins, terms); heights, (bins,) m, whatever these are.
 
-    The heights are the offset, and what is gained per relative rise of the force and of the frequencies. The
+    The heights are the offset, and what is gained per relative rise of the force and of the frequencies. Both
+    gains hold for the compliance of the load tests alone, so that they are linear in the base parameters. The
     result is cached because noise and parameters are estimated in turn, many times over.
     """
-    chosen, above_static = model.finished(setting, np.array(phases), off)
+    share, above_static = model.finished(setting, np.array(phases), off)
     bowed = model.setup.bowed(setting.x, setting.y, setting.size)
-    basis, finished_by = model._basis(setting), chosen[1].astype(np.int8).tobytes()
-    harder, rising = _believed(basis, setting, model.tuning(off), finished_by)
-    terms, heights = _terms(basis, setting, finished_by), setting.mean(above_static[chosen] + bowed)
-    return terms, heights, model.structure.in_cut(harder), model.structure.in_cut(rising)
+    basis, tuning = model._basis(setting), model.tuning(off)
+    terms = np.einsum("nk,nkt->nt", share, _terms(basis, setting))
+    harder = _static(basis, setting) + rung(setting, tuning)
+    heights = [above_static, *(model.structure.in_cut(one) for one in (harder, sharper(setting, tuning)))]
+    offset, forced, rising = setting.mean(np.stack([(share * one).sum(axis=1) for one in heights], axis=1)).T
+    return setting.mean(terms), offset + setting.mean(bowed), forced, rising
 
 
-@lru_cache(maxsize=512)
-def _believed(basis: Basis, setting: FaceSetting, tuning: float, finished_by: bytes) -> tuple[Array, Array]:
-    """Return what faces gain, (bins,) m, per relative rise of the force, and of the frequencies.
-
-    Both hold for the compliance of the load tests alone, so that they are linear in the base parameters.
-    """
-    chosen = _places(finished_by)
-    height = _static(basis, setting)[chosen] + rung(setting, tuning)[chosen]
-    return setting.mean(height), setting.mean(sharper(setting, tuning)[chosen])
-
-
-@lru_cache(maxsize=512)
-def _terms(basis: Basis, setting: FaceSetting, finished_by: bytes) -> Array:
-    """Mean of the basis' terms where the tool was, (bins, terms); ``finished_by``: index of each passage.
-
-    The result is cached because a small change of an effect rarely changes which passage is the lowest.
-    """
-    chosen = _places(finished_by)
-    return setting.mean(basis(setting.passages.x[chosen], setting.passages.y[chosen]))
-
-
-def _places(finished_by: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Return the index of each point, and of the passage that finished it."""
-    lowest = np.frombuffer(finished_by, dtype=np.int8).astype(np.intp)
-    return np.arange(len(lowest)), lowest
+@lru_cache(maxsize=64)
+def _terms(basis: Basis, setting: FaceSetting) -> Array:
+    """Return the basis' terms where the tool was at each passage, (n, k, terms)."""
+    at = setting.passages
+    return np.asarray(basis(at.x.ravel(), at.y.ravel()).reshape(*at.x.shape, -1))
 
 
 @lru_cache(maxsize=64)

@@ -19,6 +19,7 @@ from metro.observables.flatness.advice import advice, after_loop, planned_points
 from metro.observables.flatness.blocks import LOADS, Pose, believed_block, face_block, pose_of_loads
 from metro.observables.flatness.dynamics import tip_block
 from metro.observables.flatness.model import FlatnessModel
+from metro.observables.flatness.noise import without_what_repeats
 from metro.observables.flatness.pairing import paired
 from metro.observables.flatness.repeats import cloud_of, noise_by_repeats, scanned_again
 from metro.observables.flatness.scan import FACE_TABLES, measured_run
@@ -122,7 +123,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
     rung = tuple(pose.field.pose for pose in known if pose.dynamics is not None)
     model = FlatnessModel(tuple(pose.field for pose in known), placed=placed, ringing=rung)
     scatter = np.array([0.0 if one in model.believed else SCATTER for one in model.parameters])
-    evidence = (believed_block(model), *(pose.block for pose in known), *blocks)
+    evidence = (believed_block(model), *(pose.block for pose in known), *without_what_repeats(blocks))
     return Problem(NAME, "mm", MM, model, evidence, scatter, SYSTEMATIC, notes=tuple(dict.fromkeys(notes)))
 
 

@@ -87,3 +87,9 @@ def _as_it_lies(cloud: Points, path: Array | None, size: list[float] | None, why
     off = misses.max() / MM
     remark = f"its scan is taken as it lies: its outline is that of the work within {off:.2g} mm"
     return Placed(cloud, "outline", unknown, remark)
+
+
+def plane_directions(x: Array, y: Array) -> Array:
+    """Directions of an offset and two tilts, (n, 3); each tilt is ±1 at the edges."""
+    across = [(c - (c.min() + c.max()) / 2) / (np.ptp(c) / 2 or 1.0) for c in (x, y)]
+    return np.column_stack([np.ones(len(x)), *across])
