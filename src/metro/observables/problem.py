@@ -9,6 +9,7 @@ nonlinear quantities are either parameters of an effect, which changes the model
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -245,6 +246,8 @@ class Problem:
     notes : sentences for the report on what this problem had to omit or assume.
     feasible : runs that could be made next, among which the loop searches for the most informative one.
     basis_unit : unit of the blocks, if it differs from that of the comparison (torques, compared as forces).
+    unresolved : rms (SI) of what the form of an instrument alone leaves over a run: less is no finding,
+        however small the signal is.
     """
 
     observable: str
@@ -257,10 +260,20 @@ class Problem:
     notes: tuple[str, ...] = field(default=())
     feasible: tuple[Proposal, ...] = ()
     basis_unit: str | None = None
+    unresolved: float = 0.0
 
     def role(self, *roles: Role) -> tuple[Block, ...]:
         """Return the blocks that have one of ``roles``."""
         return tuple(block for block in self.blocks if block.role in roles)
+
+    def least_residual(self, relative: float) -> float:
+        """Return the least residual that counts, relative to the signal: ``relative`` or more.
+
+        What the inputs of the model may cause in all runs, and what an instrument does not resolve, is none.
+        """
+        cut = np.concatenate([block.measured for block in self.role("identify")] or [np.zeros(0)])
+        signal = math.sqrt(float(np.mean(cut**2))) if np.any(cut) else math.inf
+        return max(relative, 2.0 * self.systematic, self.unresolved / signal)
 
     def handled_by(self, handler: Handler[Result]) -> Result:
         """Let a handler do with the problem what it does with those whose measurements are samples."""

@@ -54,7 +54,8 @@ def search(
     base = base or fit(Candidate(problem.base), blocks, prior)
     visible, absorbed = _visible(effects, base)
     space = SearchSpace(base, visible, prior, gates, max(gates.materiality, 2.0 * problem.systematic))
-    return _described(space, strategy(space), tuple(library), unable | absorbed)
+    floor = problem.least_residual(max(gates.materiality, gates.model_form_budget))
+    return _described(space, strategy(space), tuple(library), unable | absorbed, floor)
 
 
 def _visible(effects: Sequence[Effect], base: Fit) -> tuple[tuple[Effect, ...], dict[str, Statement]]:
@@ -90,12 +91,18 @@ def _strained(base: Fit) -> bool:
 
 
 def _described(
-    space: SearchSpace, choice: Choice, library: tuple[Effect, ...], not_visible: dict[str, Statement | str]
+    space: SearchSpace,
+    choice: Choice,
+    library: tuple[Effect, ...],
+    not_visible: dict[str, Statement | str],
+    floor: float,
 ) -> Outcome:
-    """Describe what a strategy chose: the fits without what is not of the library, and the residual."""
+    """Describe what a strategy chose: the fits without what is not of the library, and the residual.
+
+    ``floor``: the least residual that counts, relative to the signal.
+    """
     base, prior, likeness = space.base, space.prior, choice.fit
     final = _of_the_library(base, likeness, prior)
-    floor = max(space.least, space.gates.model_form_budget)
     outcome = Outcome(
         base=base,
         final=final,

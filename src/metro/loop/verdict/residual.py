@@ -52,7 +52,7 @@ def residual_of(problem: Problem, outcome: Outcome, gates: Gates) -> Residual:
     if parts or not enough_runs(problem):
         return Residual(parts, outcome.final, outcome.lines)
     scored = unseen(outcome.final, outcome.prior)
-    least = max(gates.materiality, 2.0 * problem.systematic, gates.model_form_budget)
+    least = problem.least_residual(max(gates.materiality, gates.model_form_budget))
     lines = tuple(line for line in unseen_signature(scored, least) if line.significant)
     if seen := places(lines):
         return Residual((Statement("unseen", {"places": seen}),), outcome.final, lines)

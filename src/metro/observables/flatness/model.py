@@ -11,7 +11,7 @@ import numpy as np
 
 from metro.observables.flatness.path import Pace, Passages
 from metro.observables.flatness.ringing import Ringing
-from metro.observables.flatness.rung import rung, sharper
+from metro.observables.flatness.rung import FINE, rung, sharper
 from metro.observables.flatness.setup import Setup, swung
 from metro.observables.problem import Block, Parameter
 from metro.observables.waviness.model import Vibration, phase_starts, phases_of
@@ -31,7 +31,6 @@ FORM = ("form_xx", "form_xy", "form_yy")  # of the scanner: curvatures, as the h
 # Places across and along the feed, in radii of a disc, whose mean equals that over the disc: exactly for a
 # cubic, and to 0.2 % for a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
-FINE = 0.002  # grid of relative frequencies about which the ringing is linearised
 KINK = 1 * UM  # passages whose cuts differ by less finish a place together: teeth are less even than that
 
 
@@ -225,13 +224,16 @@ class FlatnessModel:
     def finished(self, setting: FaceSetting, nuisance: Array, off: float = 0.0) -> tuple[Array, Array]:
         """Share of each passage in finishing each place, and heights over the static one, (n, k) m.
 
-        The passage with the lowest cut finishes a place. Where two are nearly as low both do, so that a face
-        changes smoothly with every parameter. For ``nuisance`` see :meth:`nuisance_starts`; ``off`` is the
-        relative error of the tip's frequencies.
+        The passage with the lowest cut finishes a place. Where two are nearly as low both do, and the place
+        is a little lower than the mean of both, −KINK log Σ exp(−height / KINK): so a face changes smoothly,
+        and by the shares of the passages, with every parameter. For ``nuisance`` see :meth:`nuisance_starts`;
+        ``off`` is the relative error of the tip's frequencies.
         """
         height, above_static = self._heights(setting, nuisance, off)
         share = np.exp((height.min(axis=1, keepdims=True) - height) / KINK)
-        return share / share.sum(axis=1, keepdims=True), above_static
+        share /= share.sum(axis=1, keepdims=True)
+        together = KINK * np.log(np.maximum(share, np.finfo(float).tiny))
+        return share, above_static + together
 
     def heights(self, setting: FaceSetting, nuisance: Array) -> Array:
         """Height of the cut at each passage by the load tests, (n, k) m; infinite if there is no passage."""

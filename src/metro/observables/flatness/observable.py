@@ -16,7 +16,7 @@ from metro.batch.writing import writing
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness import NAME, TABLES
 from metro.observables.flatness.advice import advice, after_loop, planned_points, studied
-from metro.observables.flatness.blocks import LOADS, Pose, believed_block, face_block, pose_of_loads
+from metro.observables.flatness.blocks import FORM_SD, LOADS, Pose, believed_block, face_block, pose_of_loads
 from metro.observables.flatness.dynamics import tip_block
 from metro.observables.flatness.model import FlatnessModel
 from metro.observables.flatness.noise import without_what_repeats
@@ -32,6 +32,8 @@ from metro.surface.tip_damping import Rayleigh
 from metro.units import JSON, MM
 
 SCATTER = 0.02
+# rms over a face of three curvatures that are each off by the scanner's form: that of u² and of u v is 0.3.
+UNRESOLVED = FORM_SD * math.sqrt(2.0 * 4.0 / 45.0 + 1.0 / 9.0)
 SYSTEMATIC = 0.02  # of the mean force, which the coefficients and the load cells share among all runs
 
 
@@ -124,7 +126,8 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
     model = FlatnessModel(tuple(pose.field for pose in known), placed=placed, ringing=rung)
     scatter = np.array([0.0 if one in model.believed else SCATTER for one in model.parameters])
     evidence = (believed_block(model), *(pose.block for pose in known), *without_what_repeats(blocks))
-    return Problem(NAME, "mm", MM, model, evidence, scatter, SYSTEMATIC, notes=tuple(dict.fromkeys(notes)))
+    said = tuple(dict.fromkeys(notes))
+    return Problem(NAME, "mm", MM, model, evidence, scatter, SYSTEMATIC, said, unresolved=UNRESOLVED)
 
 
 def _what_it_needs(

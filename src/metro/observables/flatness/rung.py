@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from metro.observables.flatness.model import FaceSetting
     from metro.observables.flatness.ringing import Ringing
 
+# Grid of relative frequencies about which the ringing is linearised, and the step of its slope: then the next
+# place of the grid goes on where the line about this one ends.
+FINE = 0.002
 NODES = 0.01  # spacing of nodes in the logarithm of the tuning, between which ringing is interpolated
 
 
@@ -39,8 +42,8 @@ def rung(setting: FaceSetting, tuning: float) -> Array:
 
 def sharper(setting: FaceSetting, tuning: float) -> Array:
     """Return what the heights of :func:`rung` gain per relative rise of the tip's frequencies, (n, k) m."""
-    high, low = (rung(setting, tuning * math.exp(step)) for step in (NODES, -NODES))
-    return np.asarray((high - low) / (2.0 * NODES))
+    high, low = (rung(setting, tuning * math.exp(step)) for step in (FINE, -FINE))
+    return np.asarray((high - low) / (2.0 * FINE))
 
 
 def _cubic(place: float) -> list[tuple[int, float]]:
