@@ -31,7 +31,7 @@ FORM = ("form_xx", "form_xy", "form_yy")  # of the scanner: curvatures, as the h
 # Places across and along the feed, in radii of a disc, whose mean equals that over the disc: exactly for a
 # cubic, and to 0.2 % for a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
-KINK = 1 * UM  # passages whose cuts differ by less finish a place together: teeth are less even than that
+KINK = 0.1 * UM  # passages whose cuts differ by less finish a place together: teeth are less even than that
 
 
 @dataclass(frozen=True, eq=False)
