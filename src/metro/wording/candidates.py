@@ -26,6 +26,13 @@ def _beside(values: JSON) -> str:
     return f"with it, {plain(values['effect'])} is no result: {values['why']}"
 
 
+def _tied(values: JSON) -> str:
+    return (
+        f"{plain(values['effect'])} would begin in every repeat at the same time (mean cosine of the phases' "
+        f"difference {values['cosine']:.2f}, {values['pairs']} pairs of runs), which no free vibration does"
+    )
+
+
 def _no_prediction(values: JSON) -> str:
     return f"in {values['run']} {values['why']}"
 
@@ -131,6 +138,7 @@ SENTENCES: Mapping[str, Sentence] = {
     "not_converged": _not_converged,
     "implausible": _implausible,
     "beside": _beside,
+    "tied": _tied,
     "no_prediction": _no_prediction,
     "no_evidence": _no_evidence,
     "immaterial": _immaterial,

@@ -11,6 +11,7 @@ from metro.effects.effect import Effect
 from metro.loop.checks import signature as residual
 from metro.loop.checks.evidence import Evidence, compare, hold_out, leave_out, missed, weights
 from metro.loop.checks.left_out import left_out
+from metro.loop.checks.phases import tied
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, fit
 from metro.loop.fitting.noise import Noise
@@ -149,7 +150,8 @@ def unsettled(fitted: Fit) -> Statement | None:
     """Return why a fit is no result; None where it is one.
 
     It did not converge, or determines no parameter of an effect, or these would have to be larger than they
-    may be, or its model does not hold there.
+    may be, or what should begin at any time begins at the same one in every repeat, or its model does not
+    hold there.
     """
     if not fitted.converged:
         return Statement("not_converged", {"step": fitted.step})
@@ -161,6 +163,8 @@ def unsettled(fitted: Fit) -> Statement | None:
         if why is not None:  # of the one that was tried last, or of one that was there already
             tried_last = effect is fitted.candidate.effects[-1]
             return why if tried_last else Statement("beside", {"effect": effect.name, "why": why})
+    if repeated := tied(fitted):
+        return Statement("tied", vars(repeated))
     return beyond(fitted, fitted.blocks)
 
 
