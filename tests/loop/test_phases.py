@@ -44,7 +44,7 @@ def test_phases_that_repeat_are_tied_whatever_they_are(found: Fit) -> None:
     assert said is not None
     assert (said.effect, said.pairs) == ("path_vibration", CONDITIONS)
     assert said.cosine > 0.8
-    assert "begin in every repeat at the same time" in in_words(unsettled(repeated))
+    assert "begin at the same time in every repeat" in in_words(unsettled(repeated))
 
 
 def test_free_phases_are_refused_as_rarely_as_the_level_says(found: Fit) -> None:

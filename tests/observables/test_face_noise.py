@@ -1,11 +1,13 @@
 """Standard errors of faces: what comes again in every repeat is no noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from metro.observables.flatness.model import BelievedSetting
 from metro.observables.flatness.noise import without_what_repeats
-from metro.observables.problem import Block
+from metro.observables.problem import Block, Problem
 from metro.units import UM
 
 X, Y = (c.ravel() for c in np.meshgrid(np.arange(10.0, 90.0, 4.0), np.arange(10.0, 70.0, 4.0)))
@@ -52,3 +54,19 @@ def test_faces_of_other_places_are_not_compared() -> None:
     here, there = face("r1", RINGING), face("r2", RINGING)
     there.coordinates["x_mm"] = X + 2000.0
     assert all((block.sigma == 10 * UM).all() for block in without_what_repeats([here, there]))
+
+
+def test_one_scan_in_two_runs_is_no_repeat() -> None:
+    """A file that was given twice would leave no noise at all."""
+    once = face("r1", RINGING)
+    for block in without_what_repeats([once, replace(once, run="r2")]):
+        assert (block.sigma == once.sigma).all()
+
+
+def test_what_an_instrument_does_not_resolve_is_a_larger_share_of_a_smaller_signal() -> None:
+    faces = (face("r1", 40 * UM * np.sin(X / 9.0)), face("r2", 40 * UM * np.sin(X / 9.0)))
+    signal = np.sqrt(np.mean(np.concatenate([block.measured for block in faces]) ** 2))
+    task = Problem("flatness", "mm", 1e-3, None, faces, np.zeros(0), unresolved=0.1 * signal)
+    assert task.least_residual(0.04) == pytest.approx(0.1)
+    assert task.least_residual(0.2) == 0.2
+    assert replace(task, systematic=0.15).least_residual(0.04) == pytest.approx(0.3)

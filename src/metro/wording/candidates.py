@@ -28,7 +28,7 @@ def _beside(values: JSON) -> str:
 
 def _tied(values: JSON) -> str:
     return (
-        f"{plain(values['effect'])} would begin in every repeat at the same time (mean cosine of the phases' "
+        f"{plain(values['effect'])} would begin at the same time in every repeat (mean cosine of the phases' "
         f"difference {values['cosine']:.2f}, {values['pairs']} pairs of runs), which no free vibration does"
     )
 

@@ -17,6 +17,7 @@ from metro.units import MM, Array
 
 LAG = 2  # bins: discs and noise of neighbouring bins overlap, those of the next but one do not
 LEAST = 20  # differences from which the noise can be estimated
+SAME = 1e-12  # m: heights that differ by less are of one file
 MEDIAN = 1.4826  # standard deviation over median absolute deviation of a normal distribution
 
 
@@ -69,7 +70,8 @@ def without_what_repeats(blocks: Sequence[Block]) -> list[Block]:
 def _differing(one: Block, other: Block) -> list[float]:
     """Return the variance of the difference of two faces over what their errors say, robust; or nothing.
 
-    Each face has a place of its own: height and tilts of the difference do not count.
+    Each face has a place of its own: height and tilts of the difference do not count. One scan in two runs is
+    no repeat, and says nothing.
     """
     from scipy.spatial import cKDTree
 
@@ -79,6 +81,8 @@ def _differing(one: Block, other: Block) -> list[float]:
     if both.sum() < LEAST:
         return []
     nearest = nearest[both]
+    if np.median(np.abs(one.measured[both] - other.measured[nearest])) < SAME:
+        return []
     error = np.hypot(one.sigma[both], other.sigma[nearest])
     apart = (one.measured[both] - other.measured[nearest]) / error
     plane = plane_directions(*here[both].T) / error[:, None]
