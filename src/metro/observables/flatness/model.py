@@ -230,7 +230,9 @@ class FlatnessModel:
         ``off`` is the relative error of the tip's frequencies.
         """
         height, above_static = self._heights(setting, nuisance, off)
-        share = np.exp((height.min(axis=1, keepdims=True) - height) / KINK)
+        lowest = height.min(axis=1, keepdims=True)
+        height = np.where(np.isfinite(lowest), height, 0.0)  # passes too far apart leave places uncut
+        share = np.exp((np.where(np.isfinite(lowest), lowest, 0.0) - height) / KINK)
         share /= share.sum(axis=1, keepdims=True)
         together = KINK * np.log(np.maximum(share, np.finfo(float).tiny))
         return share, above_static + together
