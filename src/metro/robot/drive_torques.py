@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from metro.robot.by_joint import of_joints, put, raised
+from metro.same import Same
 from metro.units import Array
 
 TURNING = 2e-4  # rad/s: below it a joint is turning round, and its friction is between its two levels
@@ -71,17 +73,23 @@ class DriveTorques:
         reversal, warmup, viscous = (
             of_joints(each, rate.shape[1]) for each in (self.reversal, self.warmup, self.viscous)
         )
-        torque: Array = rate * viscous
+        torque = rate * viscous if viscous.any() else np.zeros_like(rate)
         presliding = of_joints(self.presliding, rate.shape[1], PRESLIDING)
         for joint in np.flatnonzero((reversal != 0.0) | (warmup != 0.0)):
             level = reversal[joint] + t * warmup[joint]
-            torque[:, joint] += level * slid(q[:, joint], rate[:, joint], float(presliding[joint]))
+            torque[:, joint] += level * _slid(Same(q), Same(rate), int(joint), float(presliding[joint]))
         for one in self.ripple:
             angle = one.order * q[:, one.joint]
             cycles = one.order * rate[:, one.joint] * width / (2.0 * np.pi)
             mean = one.sine * np.sin(angle) + one.cosine * np.cos(angle)
             torque[:, one.joint] += np.sinc(cycles) * mean
         return torque
+
+
+# A search asks for the friction of one joint along one run again and again, and only its level differs.
+@lru_cache(maxsize=256)
+def _slid(q: Same[Array], rate: Same[Array], joint: int, presliding: float) -> Array:
+    return slid(q.value[:, joint], rate.value[:, joint], presliding)
 
 
 def slid(q: Array, rate: Array, presliding: float) -> Array:

@@ -7,11 +7,13 @@ conventions, linear axes and URDF are a :class:`metro.robot.chain.Chain` in thei
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from metro.joint_columns import Axes
 from metro.robot.chain import Chain, chain_of_arm
+from metro.same import Same
 from metro.units import DEG, JSON, MM, Array
 
 Geometry = Array | Chain
@@ -88,7 +90,12 @@ def prismatic(dh: Geometry) -> np.ndarray:
 
 def axes(dh: Geometry) -> Axes:
     """Return the columns of the joints of an arm."""
-    return Axes(tuple(bool(shifts) for shifts in prismatic(dh)))
+    return _axes(Same(dh))
+
+
+@lru_cache(maxsize=64)  # asked for each prediction of a fit
+def _axes(dh: Same[Geometry]) -> Axes:
+    return Axes(tuple(bool(shifts) for shifts in prismatic(dh.value)))
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:

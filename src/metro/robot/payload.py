@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from metro.robot.kinematics import Arm
-from metro.robot.statics import Flange, joint_torque, tip_jacobian_of
+from metro.robot.statics import Flange
 from metro.units import Array
 
 GRAVITY = 9.81  # m/s², along −z of the base
@@ -20,12 +19,19 @@ class Payload:
     mass: float = 0.0
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
+    @property
+    def moments(self) -> Array:
+        """Mass, kg, and mass times each coordinate of its centre, kg m, (4,)."""
+        return self.mass * np.array([1.0, *self.centre])
 
-def gravity_torque(arm: Arm, flange: Flange, payload: Payload) -> Array:
-    """Torque of the motors (m, n), N m, that holds a payload: that of its weight at its centre.
 
+def gravity_torque(flange: Flange) -> Array:
+    """Torque of the motors that holds a mass on the flange, (m, n, 4): per kg, and per kg m along each axis.
+
+    It is linear in the mass and in the mass times its centre: those in the flange frame multiply the columns.
     ``flange`` along m points. The base stands upright.
     """
-    at_centre = tip_jacobian_of(replace(arm, tool=np.array(payload.centre)), flange)
-    weight = arm.work[:3, :3].T @ np.array([0.0, 0.0, -payload.mass * GRAVITY])
-    return joint_torque(at_centre, np.broadcast_to(weight, (len(at_centre), 3)))
+    vertical, (about_x, about_y) = flange.jacobian[:, 2], np.moveaxis(flange.jacobian[:, 3:5], 1, 0)
+    x, y = flange.axes[:, 0, None, :], flange.axes[:, 1, None, :]
+    raised = about_x[..., None] * y - about_y[..., None] * x
+    return GRAVITY * np.concatenate([vertical[..., None], raised], axis=-1)

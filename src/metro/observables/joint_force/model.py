@@ -13,16 +13,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import permutations
+from itertools import pairwise, permutations
 from typing import Any
 
 import numpy as np
 
 from metro.observables.problem import Block, Parameter
 from metro.robot.drive_torques import PRESLIDING, DriveTorques, slid
-from metro.robot.kinematics import Arm, Geometry
+from metro.robot.kinematics import Arm, Geometry, axes
 from metro.robot.payload import Payload, gravity_torque
 from metro.robot.statics import Flange, flange_of, joint_torque, tip_jacobian_of
+from metro.same import Same
 from metro.signals.waves import waves
 from metro.units import MS, Array
 
@@ -128,39 +129,71 @@ class JointForceModel:
         if isinstance(run, Instruments):
             gains = len(self.parameters)
             return np.eye(gains)[1:], np.zeros(gains - 1)
-        other = self.drives.at(run.q, run.rate, run.since, run.width)
-        for mass in self.payload:
-            other = other + gravity_torque(self.arm, along(Same(self.arm.dh), run), mass)
-        read = in_waves(other[:, list(self.joints)])
-        lag = 0.0 if beta is None else LAG_GRID * round(float(beta[-1]) / LAG_GRID)
-        later = late(self.arm, run, self.offset + lag)
-        whole = carried(self.arm, run, self.offset + lag)
-        matrix = np.column_stack([whole, rubbing(run, self.joints), later])
+        at, lag = self._lagged(beta)
+        matrix, later = basis(self.arm, run, at), late(self.arm, run, at)
+        read = self._beside(run)
         if read.any():
-            each = np.kron(np.eye(len(self.joints)), np.ones((len(other), 1)))
-            matrix[:, 1 : 1 + len(self.joints)] += each * read[:, None]
+            matrix, ends = matrix.copy(), np.arange(len(self.joints) + 1) * len(run.t)
+            for i, (first, end) in enumerate(pairwise(ends)):
+                matrix[first:end, 1 + i] += read[first:end]
         return matrix, read - lag * later
 
+    def predictions(self, block: Block, nuisances: Array, beta: Array) -> Array:
+        """Prediction (k, n) of a block, k times the same: no run has unknowns of its own.
 
-@dataclass(frozen=True, eq=False)
-class Same:
-    """Stands for a geometry in the key of a cache: the same object, of whatever values."""
+        It is ``offset + matrix @ beta`` of :meth:`design`, without a matrix of its own.
+        """
+        run: Any = block.setting
+        if isinstance(run, Instruments):
+            predicted = beta[1:]
+        else:
+            at, lag = self._lagged(beta)
+            read, each = self._beside(run), np.repeat(beta[1 : 1 + len(self.joints)], len(run.t))
+            predicted = basis(self.arm, run, at) @ beta + (1.0 + each) * read - lag * late(self.arm, run, at)
+        return np.broadcast_to(predicted, (len(nuisances), len(predicted)))
 
-    geometry: Geometry
+    def _lagged(self, beta: Array | None) -> tuple[float, float]:
+        """By how much the log is late and the lag on the grid about which that is linear, both s."""
+        lag = 0.0 if beta is None else LAG_GRID * round(float(beta[-1]) / LAG_GRID)
+        return self.offset + lag, lag
 
-    def __hash__(self) -> int:
-        """Return that of the object."""
-        return id(self.geometry)
-
-    def __eq__(self, other: object) -> bool:
-        """Whether it is the same object."""
-        return isinstance(other, Same) and other.geometry is self.geometry
+    def _beside(self, run: TorqueRun) -> Array:
+        """Waves (k m,), N m, of the torques of drives and payload."""
+        dh = Same(self.arm.dh)
+        read = driven(self.drives, dh, run)
+        if self.payload:
+            read = read + held(dh, run) @ sum(mass.moments for mass in self.payload)
+        return read
 
 
 @lru_cache(maxsize=256)
-def along(arm: Same, run: TorqueRun) -> Flange:
+def along(dh: Same[Geometry], run: TorqueRun) -> Flange:
     """Return the flange along a run: no effect moves it, whatever else an effect changes of the arm."""
-    return flange_of(arm.geometry, run.q)
+    return flange_of(dh.value, run.q)
+
+
+@lru_cache(maxsize=256)
+def driven(drives: DriveTorques, dh: Same[Geometry], run: TorqueRun) -> Array:
+    """Waves (k m,), N m, of the torques of the drives; not to be changed."""
+    torque = drives.at(run.q, run.rate, run.since, run.width)[:, axes(dh.value).turning]
+    return in_waves(torque) if torque.any() else np.zeros(torque.size)
+
+
+@lru_cache(maxsize=256)
+def held(dh: Same[Geometry], run: TorqueRun) -> Array:
+    """Waves (k m, 4), N m, of the torques that hold a mass on the flange, per moment of it."""
+    torques = gravity_torque(along(dh, run))[:, axes(dh.value).turning]
+    return np.stack([in_waves(one) for one in np.moveaxis(torques, -1, 0)], axis=1)
+
+
+@lru_cache(maxsize=256)
+def basis(arm: Arm, run: TorqueRun, offset: float) -> Array:
+    """Waves (k m, 2 k + 11) per base parameter without the torques of drives and payload; not to be changed.
+
+    The log stamps the force ``offset`` s later than the dynamometer.
+    """
+    rubbed = rubbing(run, tuple(arm.axes.turning))
+    return np.column_stack([carried(arm, run, offset), rubbed, late(arm, run, offset)])
 
 
 @lru_cache(maxsize=256)

@@ -1,0 +1,71 @@
+"""What the joint force model predicts in one step, against its design, and the weight it carries."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from metro.observables.joint_force.model import Instruments, JointForceModel, TorqueRun, running
+from metro.robot.drive_torques import DriveTorques, Ripple, slid
+from metro.robot.kinematics import arm_of_cell, forward
+from metro.robot.payload import GRAVITY, Payload, gravity_torque
+from metro.robot.statics import flange_of
+
+DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
+ARM = arm_of_cell({"arm": {"dh": DH}}, {"tool_in_flange_mm": [210, 0, 280]})
+T = np.linspace(0.0, 4.0, 81)
+Q = np.array([0.1, -0.4, 0.2, 0.3, 0.8, 0.2]) + 0.2 * np.sin(np.outer(T, [0.5, 0.4, 0.9, 0.3, 1.1, 0.7]))
+RUN = TorqueRun(
+    Q,
+    np.gradient(Q, T, axis=0),
+    T,
+    T,
+    np.full(81, 0.05),
+    running(T, 50.0 * np.column_stack([np.sin(3 * T), np.cos(2 * T), T])),
+)
+DRIVES = DriveTorques(
+    reversal=(0.0, 3.0), warmup=(0.0, 0.0, 0.5), viscous=(4.0,), ripple=(Ripple(4, 60.0, 2.0, 1.0),)
+)
+LADEN = (Payload(5.0, (0.1, 0.05, -0.2)), Payload(-2.0))
+
+
+@pytest.mark.parametrize("setting", [RUN, Instruments()])
+@pytest.mark.parametrize(
+    "parts", [{}, {"drives": DRIVES}, {"payload": LADEN}, {"drives": DRIVES, "offset": 0.02}]
+)
+def test_the_prediction_is_that_of_the_design(setting, parts):
+    model = JointForceModel(ARM, **parts)
+    beta = np.random.default_rng(1).normal(0.0, 0.05, len(model.parameters))
+    block = SimpleNamespace(setting=setting)
+    matrix, offset = model.design(block, np.zeros(0), beta)
+    found = model.predictions(block, np.zeros((2, 0)), beta)
+    np.testing.assert_allclose(found, np.tile(offset + matrix @ beta, (2, 1)), rtol=1e-12, atol=1e-10)
+
+
+def test_a_design_changes_nothing_that_others_are_given():
+    block, beta = SimpleNamespace(setting=RUN), np.full(23, 0.1)
+    before = JointForceModel(ARM).predictions(block, np.zeros((1, 0)), beta).copy()
+    JointForceModel(ARM, drives=DRIVES, payload=LADEN).design(block, np.zeros(0), beta)
+    np.testing.assert_array_equal(JointForceModel(ARM).predictions(block, np.zeros((1, 0)), beta), before)
+
+
+def test_what_holds_a_mass_is_the_slope_of_its_height():
+    """Virtual work: the torque of each motor is the rise of the potential energy with its angle."""
+    centre, mass, step = np.array([0.1, 0.05, -0.2]), 7.0, 1e-6
+    q = Q[::20]
+
+    def energy(angles):
+        flange = forward(ARM.dh, angles)
+        return mass * GRAVITY * (flange[..., :3, :3] @ centre + flange[..., :3, 3])[..., 2]
+
+    slopes = [(energy(q + step * unit) - energy(q - step * unit)) / (2 * step) for unit in np.eye(6)]
+    torque = gravity_torque(flange_of(ARM.dh, q)) @ Payload(mass, tuple(centre)).moments
+    np.testing.assert_allclose(torque, np.transpose(slopes), atol=1e-5)
+
+
+def test_friction_is_that_of_the_joint_along_its_path():
+    torque = DRIVES.at(Q, RUN.rate, T)
+    np.testing.assert_allclose(torque[:, 1], 3.0 * slid(Q[:, 1], RUN.rate[:, 1], 3e-4), atol=1e-12)
+    faster = DriveTorques(reversal=(0.0, 3.0), presliding=(0.0, 0.05)).at(Q, RUN.rate, T)
+    np.testing.assert_allclose(faster[:, 1], 3.0 * slid(Q[:, 1], RUN.rate[:, 1], 0.05), atol=1e-12)
+    assert np.abs(faster - torque).max() > 0.1
