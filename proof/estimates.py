@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -26,7 +27,8 @@ class Estimate:
     """One true value and what was found for it.
 
     ``error`` is relative (in a list or a vector: to its largest value), of an angle that has a period in
-    degrees; ``covered``: whether the 95 % interval holds the truth, None where none is stated.
+    degrees; ``covered``: whether the 95 % interval holds the truth, as well as that can be said in these
+    parameters; None where none is stated.
     """
 
     effect: str
@@ -35,7 +37,13 @@ class Estimate:
     covered: bool | None
 
 
-def estimates(effect: str, truth: Mapping[str, Any], estimated: JSON, teeth: int) -> list[Estimate]:
+def estimates(
+    effect: str,
+    truth: Mapping[str, Any],
+    estimated: JSON,
+    teeth: int,
+    doubt: Mapping[str, float] | float = 0.0,
+) -> list[Estimate]:
     """Compare the parameters that truth and finding both have.
 
     Which tooth is the first one cannot be observed: the angle of runout is compared modulo the pitch, and a
@@ -46,6 +54,8 @@ def estimates(effect: str, truth: Mapping[str, Any], estimated: JSON, teeth: int
     ----------
     truth, estimated : as in the contract's table of effects and in verdict.json: a value or a list of values
         by name.
+    doubt : error of the truth in these parameters, where what was built has another form: by name in the unit
+        of each, or relative (in a list or a vector: to its largest value).
     """
     largest = max(abs(value) for value in truth.values()) if effect in VECTORS else None
     return [
@@ -60,6 +70,7 @@ def estimates(effect: str, truth: Mapping[str, Any], estimated: JSON, teeth: int
             _list(estimated[name]),
             teeth=teeth,
             largest=largest,
+            doubt=doubt,
         )
     ]
 
@@ -73,7 +84,14 @@ def _list(value: Any) -> list[Any]:
 
 
 def _compared(
-    effect: str, name: str, true: np.ndarray, estimated: list[JSON], *, teeth: int, largest: float | None
+    effect: str,
+    name: str,
+    true: np.ndarray,
+    estimated: list[JSON],
+    *,
+    teeth: int,
+    largest: float | None,
+    doubt: Mapping[str, float] | float,
 ) -> Iterator[Estimate]:
     value = np.array([entry["value"] for entry in estimated], dtype=float)
     period = _period(effect, name, teeth)
@@ -83,10 +101,17 @@ def _compared(
         turned = [np.roll(true, shift) for shift in range(len(true))]
         true = min(turned, key=lambda order: float(np.sum((order - value) ** 2)))
     scale = 1.0 if period is not None else largest or float(np.abs(true).max())
+    unsure = doubt.get(name, 0.0) if isinstance(doubt, Mapping) else doubt * scale
     for right, error, entry in zip(true.tolist(), ((value - true) / scale).tolist(), estimated, strict=True):
         low, high = entry.get("ci95") or (None, None)
-        covered = None if low is None or high is None else bool(low <= right <= high)
+        covered = None if low is None or high is None else _holds(low, entry["value"], high, right, unsure)
         yield Estimate(effect, name, error, covered)
+
+
+def _holds(low: float, value: float, high: float, truth: float, unsure: float) -> bool:
+    """Whether an interval holds a truth that is itself known to ``unsure``: two independent errors add."""
+    reach = value - low if truth < value else high - value
+    return abs(truth - value) <= math.hypot(reach, unsure)
 
 
 def _period(effect: str, name: str, teeth: int) -> float | None:

@@ -209,7 +209,13 @@ def score(truth: JSON, oracle: JSON | None, said: JSON | None, *, teeth: int, ob
             one
             for effect in effects
             if effect["effect"] in hidden
-            for one in estimates(effect["effect"], hidden[effect["effect"]], effect["parameters"], teeth)
+            for one in estimates(
+                effect["effect"],
+                hidden[effect["effect"]],
+                effect["parameters"],
+                teeth,
+                truth.get("translation_error", {}).get(effect["effect"], 0.0),
+            )
         ),
         stated=_stated(effects, {*hidden, *also}, oracle["sizes"]),
         rejected=_rejected(said["candidates"], hidden, beside, oracle["sizes"], observable),

@@ -22,7 +22,8 @@ class Moves:
 
     ``travel`` (6,) rad per m of the path, mean; ``turning``: joints (0 … 5) that turn round within a cut;
     ``swaying``: joints on which the torque of the cut changes its sign within one; ``speed``: lowest and
-    highest feed, m/s; ``lever`` (6,) of the joints on the tip, m; ``seconds`` of a cut.
+    highest feed, m/s; ``lever`` (6,) of the joints on the tip, m; ``seconds`` of a cut; ``give`` (6,) of the
+    joints, by how much each lets the tip go out of the walls in the cuts, m.
     """
 
     travel: tuple[float, ...]
@@ -31,6 +32,7 @@ class Moves:
     speed: tuple[float, float]
     lever: tuple[float, ...]
     seconds: float
+    give: tuple[float, ...]
 
 
 @dataclass(frozen=True)

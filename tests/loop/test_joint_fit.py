@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 from toy import BEND, BETA, GATES, RIPPLE, Wave, problem
+from toy import block as toy_block
 
 from metro.loop.checks.evidence import compare, hold_out, leave_out, missed, surviving_share, weights
 from metro.loop.checks.left_out import most_missed
@@ -137,6 +138,28 @@ def test_covariance_is_the_spread_of_repeated_batches():
     # A little misfit is always estimated, and weighs on what the noise within a run decides.
     assert spread[2] < 1.15 * told[2] < 2.1 * spread[2]
     assert np.all(np.abs(np.mean(values, axis=0) - [*BETA, 0.2]) < 4 * spread / np.sqrt(40))
+
+
+def test_an_interval_holds_what_an_effect_differs_by_from_run_to_run():
+    """An effect of another size in each of six runs, in noise that is believed to be ten times what it is.
+
+    Then no misfit is seen, and the inverse of the normal matrix says a third of how far the effect is off.
+    """
+    held, sds = [], []
+    for seed in range(40):
+        rng = np.random.default_rng(300 + seed)
+        runs = [
+            toy_block(f"r{i}", 3.0, "identify", rng, truth=Wave(bend=rng.normal(0.2, 0.03)), order=i)
+            for i in range(6)
+        ]
+        blocks = tuple(replace(run, sigma=10.0 * run.sigma) for run in runs)
+        prior = first_noise(0.0, np.full(2, 0.01), blocks)
+        found = fit(Candidate(Wave(), (BEND,)), blocks, prior, fit(Candidate(Wave()), blocks, prior))
+        sd = float(np.sqrt(found.covariance[2, 2]))
+        held.append(abs(found.theta[0] - 0.2) < stats.t.ppf(0.975, len(blocks) - 1) * sd)
+        sds.append(sd)
+    assert np.mean(held) >= 0.9
+    assert np.median(sds) < 2.0 * 0.03 / np.sqrt(6)
 
 
 def test_a_fit_starts_phases_over_the_whole_revolution():

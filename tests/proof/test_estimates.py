@@ -21,6 +21,17 @@ def test_the_error_is_relative_and_the_interval_covers_or_does_not():
     assert not far.covered
 
 
+@pytest.mark.parametrize(
+    ("doubt", "holds"), [(0.0, False), ({"edge_growth_per_m": 0.019}, True), (0.19, True), (0.15, False)]
+)
+def test_a_truth_that_has_another_form_is_known_to_its_own_error(doubt, holds):
+    """0.02 off with an interval of 0.01: the errors add as independent ones do, √(0.01² + 0.0173²)."""
+    truth, found = {"edge_growth_per_m": 0.1}, {"edge_growth_per_m": quantity(0.12, 0.01)}
+    one = estimates("tool_wear", truth, found, 3, doubt)[0]
+    assert one.covered is holds
+    assert one.error == pytest.approx(0.2)
+
+
 @given(teeth=st.integers(2, 6), turns=st.integers(-5, 5))
 def test_the_angle_of_runout_is_known_up_to_the_pitch(teeth, turns):
     found = {"angle_deg": quantity(291.5 + turns * 360.0 / teeth, 1.0)}

@@ -103,10 +103,11 @@ def drawn(rng: np.random.Generator, style: str) -> tuple[ArmCell, Bench]:
         if attempt > _TRIES or (turning if wanted else not (by_role["identify"] | by_role["validate"])):
             break
     swaying = _swaying(arm, bench, plans, lines, turn)
-    moves = moves_of(arm, bench, plans, lines, (tuple(sorted(turning)), swaying))
+    bench = replace(bench, lines=lines, plans=plans)
+    moves = moves_of(arm, bench, turn, (tuple(sorted(turning)), swaying))
     gains = rng.spawn(1)[0].normal(0.0, _CALIBRATION, 6) if style == "b" else np.zeros(6)
     cell = ArmCell(arm, drives, origin, turn, moves, torque_gain=tuple(gains.tolist()))
-    return cell, replace(bench, lines=lines, plans=plans)
+    return cell, bench
 
 
 def _bench(rng: np.random.Generator, style: str) -> Bench:
@@ -314,15 +315,29 @@ def _swaying(
 def moves_of(
     arm: Arm,
     bench: Bench,
-    plans: Sequence[Plan],
-    lines: Mapping[Way, Line],
+    turn: Array,
     special: tuple[tuple[int, ...], tuple[int, ...]],
 ) -> Moves:
     """How the joints move in the cuts; ``special``: those that turn round, those whose torque sways."""
+    plans, lines = bench.plans, bench.lines
+    gives = []
+    for plan in plans:
+        wall, along = side(bench, way(plan)), lines[way(plan)]
+        feed = np.stack([wall.along, wall.across, [0.0, 0.0, 1.0]])
+        force = full_cut(side_cut(bench, plan, bench.metal)) @ feed @ turn.T
+        linear = arm.jacobian(along.q[len(along.q) // 2])[:3]
+        gives.append(np.abs((turn @ wall.normal) @ linear * (linear.T @ force) / arm.stiffness))
     travel = np.mean(
         [np.abs(np.diff(one.q, axis=0)).sum(axis=0) / one.length for one in lines.values()], axis=0
     )
     lever = np.mean([np.linalg.norm(arm.jacobian(one.q[0])[:3], axis=0) for one in lines.values()], axis=0)
     speeds = [speed(bench, plan) for plan in plans]
     seconds = float(np.mean([lines[way(p)].length / v for p, v in zip(plans, speeds, strict=True)]))
-    return Moves(tuple(travel.tolist()), *special, (min(speeds), max(speeds)), tuple(lever.tolist()), seconds)
+    return Moves(
+        tuple(travel.tolist()),
+        *special,
+        (min(speeds), max(speeds)),
+        tuple(lever.tolist()),
+        seconds,
+        tuple(np.mean(gives, axis=0).tolist()),
+    )

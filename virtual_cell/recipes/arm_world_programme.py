@@ -140,7 +140,7 @@ def drawn(rng: np.random.Generator, style: str) -> tuple[Robot, Bench, Session]:
             break
     bench = replace(bench, lines=lines, plans=plans)
     special = tuple(sorted(turning)), _swaying(arm, bench, turn)
-    moves = moves_of(arm, bench, plans, lines, special)
+    moves = moves_of(arm, bench, turn, special)
     near = next(iter(lines.values())).q[0]
     robot = _robot(rng, arm, moves, habits, place=(origin, turn), near=near)
     return (

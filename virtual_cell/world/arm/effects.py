@@ -18,19 +18,29 @@ from virtual_cell.hidden import JOINT, Parameters, drawn_angle, drawn_signed, dr
 from virtual_cell.units import DEG, MM, MS, UM, Array
 from virtual_cell.world.arm.cause import Cause, During, on_joint
 from virtual_cell.world.arm.give import GIVE
-from virtual_cell.world.arm.made import Made, Translated, drawn_joint, moving
+from virtual_cell.world.arm.made import Made, Translated, drawn_joint, leading, moving
 from virtual_cell.world.arm.robot import Robot
 from virtual_cell.world.draws import digits
 
 
 def _likely(rng: np.random.Generator, robot: Robot) -> int:
-    """Draw a joint that moves, mostly one that turns round in the cuts, where there is any."""
+    """Draw a joint that moves, mostly one that turns round in the cuts, where there is any.
+
+    Of these it is one whose friction is much at the tip: that of a small one is lost in the noise of others.
+    """
     turning = robot.moves.turning
-    return drawn_joint(rng, turning if turning and rng.uniform() < 0.9 else moving(robot))
+    some = turning if turning and rng.uniform() < 0.9 else moving(robot)
+    return drawn_joint(rng, leading(robot.joints.coulomb / np.array(robot.moves.lever), some))
+
+
+def _more_or_less(rng: np.random.Generator, low: float, high: float) -> float:
+    """Draw by how much a friction changes, over its level: it may grow beyond, but not fall below none."""
+    more = rng.uniform() < 0.6
+    return float(f"{drawn_size(rng, low, high) if more else -rng.uniform(low, 0.94):.3g}")
 
 
 def _clock(rng: np.random.Generator, _: Robot) -> Parameters:
-    return {"offset_ms": drawn_signed(rng, 25.0, 300.0)}
+    return {"offset_ms": drawn_signed(rng, 90.0, 1700.0)}
 
 
 def _late(robot: Robot, p: Parameters) -> Robot:
@@ -44,7 +54,7 @@ def _clock_read(robot: Robot, _: Sequence[During], p: Parameters) -> Translated:
 def _seal(rng: np.random.Generator, robot: Robot) -> Parameters:
     joint = _likely(rng, robot)
     level = float(robot.joints.coulomb[joint - 1])
-    return {"joint": joint, "torque_nm": drawn_signed(rng, 0.3 * level, 1.4 * level)}
+    return {"joint": joint, "torque_nm": digits(level * _more_or_less(rng, 0.74, 3.2))}
 
 
 def _sealed(robot: Robot, p: Parameters) -> Robot:
@@ -73,7 +83,7 @@ def _grease(rng: np.random.Generator, robot: Robot) -> Parameters:
     joint = _likely(rng, robot)
     level = float(robot.joints.coulomb[joint - 1]) / robot.moves.seconds
     settles = drawn_size(rng, 0.8, 6.0) * robot.moves.seconds
-    slope = drawn_signed(rng, 0.08 * level, 0.8 * level)
+    slope = digits(level * _more_or_less(rng, 0.66, 3.4))
     return {"joint": joint, "slope_nm_s": slope, "settles_s": digits(settles)}
 
 
@@ -106,7 +116,7 @@ def _wheel(rng: np.random.Generator, robot: Robot) -> Parameters:
     return {
         "joint": joint,
         "order": float(round(2.0 * math.pi / wave)),
-        "torque_nm": drawn_size(rng, 0.05 * level, 0.5 * level),
+        "torque_nm": drawn_size(rng, 0.26 * level, 0.85 * level),
         "phase_deg": drawn_angle(rng),
         "squeezed": round(float(rng.uniform(0.15, 0.6)), 2),
     }
@@ -174,17 +184,20 @@ def _pumped(robot: Robot, p: Parameters) -> Robot:
 
     Its speed and its stroke wander by a few per cent about their means, and it starts a little late.
     """
-    unsteady = p.get("unsteady", 0.1)
 
     def tip(during: During) -> Array:
-        own = during.own()
-        wander = np.stack([_slow(own, during.t, unsteady) for _ in range(2)])
-        start = own.normal(0.0, 2.0 * unsteady)
-        turned = 2.0 * math.pi * p["frequency_hz"] * during.t + p.get("phase_deg", 0.0) * DEG + start
-        moved = p["amplitude_um"] * UM * (1.0 + wander[0]) * np.sin(turned + 2.0 * wander[1])
-        return np.outer(moved * during.cutting, during.normal)
+        return np.outer(_stroke(during, p) * during.cutting, during.normal)
 
     return robot.with_cause(Cause(tip=tip))
+
+
+def _stroke(during: During, p: Parameters) -> Array:
+    """Motion (n,), m, that a pump makes of itself in a run."""
+    own, unsteady = during.own(), p.get("unsteady", 0.1)
+    wander = np.stack([_slow(own, during.t, unsteady) for _ in range(2)])
+    start = own.normal(0.0, 2.0 * unsteady)
+    turned = 2.0 * math.pi * p["frequency_hz"] * during.t + p.get("phase_deg", 0.0) * DEG + start
+    return np.asarray(p["amplitude_um"] * UM * (1.0 + wander[0]) * np.sin(turned + 2.0 * wander[1]))
 
 
 def _slow(rng: np.random.Generator, t: Array, size: float) -> Array:
@@ -194,11 +207,36 @@ def _slow(rng: np.random.Generator, t: Array, size: float) -> Array:
     return np.asarray(size * math.sqrt(2.0 / 3.0) * waves.sum(axis=1))
 
 
-def _pump_read(_: Robot, __: Sequence[During], p: Parameters) -> Translated:
+def _pump_read(_: Robot, cuts: Sequence[During], p: Parameters) -> Translated:
+    """Sine of one frequency and amplitude, and of a phase for each run, closest to what the pump did.
+
+    Its errors are those of a mean over the runs, by how much single runs have another one; that of the phase
+    is how far it wanders in a run.
+    """
+    from scipy.optimize import minimize_scalar
+
     unsteady = p.get("unsteady", 0.1)
-    return p, {
-        "frequency_hz": digits(unsteady / 3.0 / math.pi),
-        "amplitude_um": digits(unsteady * p["amplitude_um"]),
+    on = [(during.t[during.engaged > 0.5], _stroke(during, p)[during.engaged > 0.5]) for during in cuts]
+    span = max(float(np.ptp(t)) for t, _ in on)
+
+    def amplitudes(hz: float) -> Array:
+        return np.array([2.0 * abs(np.mean(z * np.exp(-2j * math.pi * hz * t))) for t, z in on])
+
+    def best(runs: slice) -> float:
+        near, apart = p["frequency_hz"], 0.5 / span
+        return float(
+            minimize_scalar(
+                lambda hz: -float((amplitudes(hz)[runs] ** 2).sum()),
+                bounds=(near - apart, near + apart),
+                method="bounded",
+            ).x
+        )
+
+    hz, alone = best(slice(None)), [best(slice(i, i + 1)) for i in range(len(on))]
+    found, runs = amplitudes(hz) / UM, math.sqrt(len(on))
+    return {**p, "frequency_hz": float(f"{hz:.6g}"), "amplitude_um": digits(float(found.mean()))}, {
+        "frequency_hz": digits(float(np.std(alone)) / runs),
+        "amplitude_um": digits(float(np.std(found)) / runs),
         "phase_deg": digits(2.0 * unsteady / DEG),
     }
 

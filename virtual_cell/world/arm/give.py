@@ -13,9 +13,9 @@ from itertools import pairwise
 import numpy as np
 
 from virtual_cell.hidden import JOINT, Parameters, drawn_signed, drawn_size
-from virtual_cell.units import DEG, MM
+from virtual_cell.units import DEG, MM, Array
 from virtual_cell.world.arm.cause import During
-from virtual_cell.world.arm.made import Made, Translated, drawn_joint, put
+from virtual_cell.world.arm.made import Made, Translated, drawn_joint, leading, put
 from virtual_cell.world.arm.robot import Robot
 from virtual_cell.world.draws import digits
 
@@ -24,7 +24,7 @@ _MDEG = 1e-3 * DEG
 
 def _other_tool(rng: np.random.Generator, _: Robot) -> Parameters:
     """Draw the row of another tool: another length along the flange's x, in a holder that is turned."""
-    length = drawn_signed(rng, 45.0, 260.0)
+    length = drawn_signed(rng, 155.0, 390.0)
     lateral = rng.uniform(-0.45, 0.45, 2) * length
     d = (length, lateral[0], lateral[1])
     return {name: float(round(v, 2)) for name, v in zip(("dx_mm", "dy_mm", "dz_mm"), d, strict=True)}
@@ -36,7 +36,7 @@ def _elsewhere(robot: Robot, p: Parameters) -> Robot:
 
 def _gap(rng: np.random.Generator, robot: Robot) -> Parameters:
     joint = drawn_joint(rng, robot.moves.swaying or (0,))
-    return {"joint": joint, "angle_mdeg": drawn_size(rng, 3.0, 33.0)}
+    return {"joint": joint, "angle_mdeg": drawn_size(rng, 9.5, 33.0)}
 
 
 def _worn(robot: Robot, p: Parameters) -> Robot:
@@ -44,15 +44,20 @@ def _worn(robot: Robot, p: Parameters) -> Robot:
     return replace(robot, springs=replace(robot.springs, gap=gap))
 
 
-def _preload(rng: np.random.Generator, _: Robot) -> Parameters:
+def _preload(rng: np.random.Generator, robot: Robot) -> Parameters:
     """Draw a loss (or a gain) of preload, of every joint or of one that gives way along the walls."""
     every = rng.uniform() < 0.6
-    size = drawn_signed(rng, 0.135, 0.7) if every else drawn_signed(rng, 0.3, 1.15)
+    size = drawn_signed(rng, 0.235, 0.7) if every else drawn_signed(rng, 0.55, 1.15)
     return {
         "factor": float(round(math.exp(size), 3)),
-        "joint": "all" if every else drawn_joint(rng, (0, 1, 2, 4, 5)),
+        "joint": "all" if every else drawn_joint(rng, leading(_gives(robot))),
         "uneven": round(float(rng.uniform(-0.15, 0.15)), 3),
     }
+
+
+def _gives(robot: Robot) -> Array:
+    """How far each joint lets the tip go out of the walls under the cuts, (6,) m."""
+    return np.array(robot.moves.give)
 
 
 def _eased(robot: Robot, p: Parameters) -> Robot:
@@ -90,10 +95,10 @@ def _ease_read(robot: Robot, cuts: Sequence[During], p: Parameters) -> Translate
 
 def _hard(rng: np.random.Generator, robot: Robot) -> Parameters:
     """Draw how much stiffer a spring is in its last pieces, by the cubic that lies closest to it."""
-    joint = drawn_joint(rng, (0, 1, 2, 4, 5))
+    joint = drawn_joint(rng, leading(_gives(robot)))
     torque = 600.0 * robot.moves.lever[joint - 1]
     k = float(robot.springs.stiffness[joint - 1])
-    return {"joint": joint, "cubic": drawn_size(rng, 2.0, 17.5) * k**3 / torque**2}
+    return {"joint": joint, "cubic": drawn_size(rng, 18.5, 65.0) * k**3 / torque**2}
 
 
 def _hardened(robot: Robot, p: Parameters) -> Robot:

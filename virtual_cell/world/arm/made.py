@@ -37,6 +37,12 @@ def moving(robot: Robot) -> list[int]:
     return [joint for joint in range(6) if travel[joint] > 0.33 * max(travel)]
 
 
+def leading(sizes: Array, among: Sequence[int] = range(6)) -> list[int]:
+    """Joints among indices 0 … 5 in which a size is at least half of the largest of these."""
+    largest = max(float(sizes[joint]) for joint in among)
+    return [joint for joint in among if sizes[joint] >= 0.5 * largest]
+
+
 def put(values: Array, joint: int, value: float | Array) -> Array:
     """Put a value at a joint, 1 … 6."""
     changed = np.array(values)

@@ -98,15 +98,15 @@ def _tilt(rng: np.random.Generator, cell: Workshop) -> Parameters:
 
 def _growth(rng: np.random.Generator, cell: Workshop) -> Parameters:
     # Without a declared place the tilt of the whole face, which is most of a growth, is not compared.
-    return {"um_per_min": sized(rng, cell, 0.06 if _unplaced(cell) else 0.9, 150.0)}
+    return {"um_per_min": sized(rng, cell, 0.06 if _unplaced(cell) else 0.45, 230.0)}
 
 
 def _vibration(rng: np.random.Generator, cell: Workshop) -> Parameters:
-    return {"frequency_hz": wave(rng, cell, 8.0, 70.0), "amplitude_um": sized(rng, cell, 0.4, 100.0)}
+    return {"frequency_hz": wave(rng, cell, 8.0, 70.0), "amplitude_um": sized(rng, cell, 0.22, 145.0)}
 
 
 def _droop(rng: np.random.Generator, cell: Workshop) -> Parameters:
-    amplitude = either_sign(rng) * sized(rng, cell, 0.12, 350.0)
+    amplitude = either_sign(rng) * sized(rng, cell, 0.09, 350.0)
     return {"amplitude_um": amplitude, "length_mm": drawn_size(rng, 8.0, 40.0)}
 
 
@@ -120,7 +120,7 @@ LIBRARY: Mapping[str, Hideable] = {
     "thermal_growth": Hideable("um_per_min", _growth, _warming),
     "fixture_bow": Hideable(
         "xx_um xy_um yy_um",
-        lambda r, c: towards(r, "xx_um xy_um yy_um", sized(r, c, 0.33, 300.0)),
+        lambda r, c: towards(r, "xx_um xy_um yy_um", sized(r, c, 0.131, 410.0)),
         _bowed,
     ),
     "path_vibration": Hideable("frequency_hz amplitude_um", _vibration, _swinging),

@@ -277,9 +277,9 @@ def _refined(
 def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> _End:
     """Covariance of base and effect parameters, (p + q, p + q), and how well the end was reached.
 
-    The base parameters scatter from run to run, and the runs tell how far that leaves them off. What the
-    model gets wrong where an effect shows may be the same in all runs: the variances of the effect parameters
-    allow for that.
+    The parameters scatter from run to run, and the runs say how far that leaves them off. What the model gets
+    wrong where an effect shows may also be the same in all runs, and then these do not differ by it: the
+    variance of an effect parameter is the larger one of the two.
     """
     system, wide = (
         linearised(candidate, blocks, kind, state) for kind in (noise, noise_room.all_alike(noise))
@@ -288,15 +288,21 @@ def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: 
     covariance, alike = inverse(normal), inverse(normal_equations(wide)[0])
     p = len(state.beta)
     factor = between_runs(system)
-    factor[p:] = 1.0
     covariance *= np.outer(factor, factor)
-    covariance[p:, p:] = alike[p:, p:]
+    covariance[p:, p:] = _wider(alike[p:, p:], np.diag(covariance)[p:])
     moving = free(candidate, state, right)
     still, downhill = normal[np.ix_(moving, moving)], right[moving]
     step = float((np.abs(solution(still, downhill)) / np.sqrt(np.diag(inverse(still)))).max(initial=0.0))
     if step > CONVERGED:
         step *= farthest(candidate, blocks, state, system)
     return _End(covariance, step, condition(normal))
+
+
+def _wider(covariance: Array, variance: Array) -> Array:
+    """Return a covariance (q, q) in which no variance is below another one, (q,); correlations stay."""
+    own = np.diag(covariance)
+    growth = np.sqrt(np.divide(variance, own, out=np.ones_like(own), where=(own > 0.0) & (variance > own)))
+    return np.asarray(covariance * np.outer(growth, growth))
 
 
 def _reestimated(
