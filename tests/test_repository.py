@@ -16,10 +16,11 @@ PYTHON = [*SOURCES, *sorted([*ROOT.glob("tests/**/*.py"), *ROOT.glob("benchmarks
 
 # Which rooms a room may import (docs/architecture.md). A module at the top of the package is its own room.
 PHYSICS = {"cutting", "dynamics", "robot", "surface"}
-BASE = {"spelling", "units", "joint_columns", "__init__"}
+BASE = {"spelling", "units", "joint_columns", "same", "__init__"}
 ROOMS = {
     "units": set(),
     "joint_columns": set(),
+    "same": set(),
     "__init__": {"loaded", "effects"},
     "syntax": set(),
     "codehash": {"syntax"},

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -271,3 +272,24 @@ def test_torques_carry_the_force_that_the_dynamometer_reads_give_or_take_their_c
         assert np.linalg.norm(force) > 20.0
         off = batch.torque(name, 0.4, 0.6) - carried
         assert np.abs(off).max() < 12.0 + 0.09 * np.abs(carried).max()
+
+
+def test_a_pump_is_translated_to_the_sine_that_it_is_closest_to():
+    """One that hardly wanders is what was drawn; the more it wanders, the less of it is one sine."""
+
+    def told(unsteady):
+        t = np.arange(0.0, 12.0, 0.01)
+        runs = [
+            SimpleNamespace(t=t, engaged=np.ones_like(t), own=lambda i=i: np.random.default_rng(i))
+            for i in range(8)
+        ]
+        drawn = {"frequency_hz": 4.31, "amplitude_um": 2.5, "phase_deg": 20.0, "unsteady": unsteady}
+        return LIBRARY["path_vibration"].translate(None, runs, drawn)
+
+    values, errors = told(0.002)
+    assert values["frequency_hz"] == pytest.approx(4.31, abs=5e-4)
+    assert values["amplitude_um"] == pytest.approx(2.5, rel=2e-3)
+    assert errors["amplitude_um"] < 5e-3
+    values, errors = told(0.2)
+    assert 2.0 < values["amplitude_um"] < 2.5
+    assert errors["amplitude_um"] > 0.02
