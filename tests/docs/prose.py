@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 LONGEST_PARAGRAPH = 90  # words
-# Pages that a program writes, and pages that are rewritten together with the part of it which they describe.
-ELSEWHERE = ("protocol", "world-", "verdict.md", "poses.md", "proof-tables.md")
+# Pages that a program writes.
+ELSEWHERE = ("protocol-board.md", "proof-tables.md")
 
 DIALECT = {
     "tell, told": r"\b(?:un)?told\b|\btell(?:s|ing)?\b",
