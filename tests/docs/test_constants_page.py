@@ -24,6 +24,19 @@ SINGLE = (
     "loop/ceiling.py",
     "loop/measured_poses.py",
     "signals/steady.py",
+    "observables/force/observable.py",
+    "observables/force/blocks.py",
+    "observables/joint_force/observable.py",
+    "observables/flatness/blocks.py",
+    "observables/flatness/observable.py",
+    "observables/deformation/blocks.py",
+    "observables/deformation/observable.py",
+    "observables/waviness/blocks.py",
+    "observables/waviness/observable.py",
+    "observables/arm/tip_force.py",
+    "effects/joint_backlash.py",
+    "observables/stability/boundary.py",
+    "robot/drive_torques.py",
 )
 KINDS = ("derived", "calibrated", "chosen", "numerical")
 ROW = re.compile(r"\| `([^`]+)`, `([^`]+)` \| `([^`]+)` \| (.+?) \| \*\*(\w+)\*\*(.*) \|")
