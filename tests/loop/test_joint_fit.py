@@ -155,7 +155,7 @@ def test_an_interval_holds_what_an_effect_differs_by_from_run_to_run():
         blocks = tuple(replace(run, sigma=10.0 * run.sigma) for run in runs)
         prior = first_noise(0.0, np.full(2, 0.01), blocks)
         found = fit(Candidate(Wave(), (BEND,)), blocks, prior, fit(Candidate(Wave()), blocks, prior))
-        sd = float(np.sqrt(found.covariance[2, 2]))
+        sd = float(np.sqrt(found.covariance[2, 2]) * found.wider[0])
         held.append(abs(found.theta[0] - 0.2) < stats.t.ppf(0.975, len(blocks) - 1) * sd)
         sds.append(sd)
     assert np.mean(held) >= 0.9

@@ -66,3 +66,10 @@ def test_effects_without_a_phase_of_their_own_are_not_asked(found: Fit) -> None:
     repeated = with_phases(found, np.zeros((CONDITIONS, REPEATS)))
     bend = replace(repeated.candidate, effects=(replace(FREE, own=0),))
     assert tied(replace(repeated, candidate=bend)) is None
+
+
+def test_what_runs_of_several_speeds_show_to_go_with_time_may_begin_alike(found: Fit) -> None:
+    repeated = with_phases(found, np.zeros((CONDITIONS, REPEATS)))
+    assert tied(repeated) is not None
+    timed = replace(repeated.candidate, effects=(replace(FREE, timed=True),))
+    assert tied(replace(repeated, candidate=timed)) is None

@@ -94,6 +94,7 @@ class Effect:
         shared by its forms.
     own : number of unknowns that it gives every run for itself (a phase): each is fitted to the run, and
         gains by chance.
+    timed : whether the runs have speeds apart, so that these unknowns belong to the time and not to the path.
     belongs_to : what its parameters are a property of. A campaign follows them over the batches of one cell
         and, where they are of the tool or the work, of one tool and one material.
     comparable : whether its parameters mean the same in every batch, so that a campaign may follow them.
@@ -118,6 +119,7 @@ class Effect:
     part: str = ""
     prior: float = 1.0
     own: int = 0
+    timed: bool = False
     sought: float = 1.0
     belongs_to: tuple[Owner, ...] = ("cell",)
     comparable: bool = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -23,6 +24,7 @@ SHORTEST = 5 * MM  # wave of which the discs of path points keep more than half
 OF_THE_STRONGEST = 0.4  # least power of a line that is followed, too
 STEPS = 3.0  # per width of a line: the longest run's reciprocal
 MOST = 4  # lines that are followed
+APART = 1.2  # ratio of speeds: ten waves on a path are two more or fewer then, and a run resolves one
 
 Model = TypeVar("Model", WavinessModel, FlatnessModel)
 
@@ -60,7 +62,13 @@ def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
         ),
         sought=max(1.0, len(frequencies) / STEPS),
         own=1,
+        timed=_apart([len(wall.t) / float(np.ptp(wall.t)) for wall in walls]),
     )
+
+
+def _apart(speeds: Sequence[float]) -> bool:
+    """Whether a wave that is tied to the path has other frequencies in time in some of the runs."""
+    return max(speeds) > APART * min(speeds)
 
 
 def _along_wall(setting: Any) -> TimeShares:
@@ -101,6 +109,7 @@ def adapt_to_faces(effect: Effect, problem: Problem) -> Effect | Refusal:
         ),
         sought=max(1.0, len(frequencies) / STEPS),
         own=1,
+        timed=_apart([block.setting.pace.speed for block in blocks]),
     )
 
 

@@ -112,7 +112,9 @@ class Witness:
     def errors(self, fitted: Fit) -> Array:
         """Covariance of the shared parameters by a fit, (s, s)."""
         places = len(fitted.beta) + self.places
-        return np.asarray(fitted.covariance[np.ix_(places, places)] * fitted.dispersion)
+        wider = fitted.wider[self.places]
+        covariance = fitted.covariance[np.ix_(places, places)] * np.outer(wider, wider)
+        return np.asarray(covariance * fitted.dispersion)
 
 
 @dataclass(frozen=True, eq=False)

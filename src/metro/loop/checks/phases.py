@@ -28,7 +28,8 @@ def tied(fitted: Fit) -> Tied | None:
     What is a function of time alone begins at any phase. What comes again in each pass, or stands at one
     place of the way, has the lines of a vibration too, but the same phase in every repeat. Of free phases the
     cosines of the n differences are uncorrelated, with mean zero and variance ½, so that their sum over
-    √(n/2) is nearly normal; of two pairs or fewer it never reaches the level.
+    √(n/2) is nearly normal; of two pairs or fewer it never reaches the level. An effect whose frequency runs
+    of other speeds share is one in time, whatever started it.
     """
     from scipy.stats import norm
 
@@ -40,6 +41,8 @@ def tied(fitted: Fit) -> Tied | None:
             phases.setdefault(block.condition, []).append(last)
     apart = [one - other for runs in phases.values() for one, other in combinations(runs, 2)]
     for place, effect in enumerate(free):
+        if effect.timed:
+            continue
         cosines = np.cos([difference[place] for difference in apart])
         if len(cosines) and norm.sf(cosines.sum() / math.sqrt(0.5 * len(cosines))) < TIED:
             return Tied(effect.name, len(cosines), float(cosines.mean()))

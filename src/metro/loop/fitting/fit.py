@@ -53,6 +53,8 @@ class Fit:
     theta, beta : effect parameters (units of the contract), base parameters (SI).
     nuisance : each block's nonlinear unknowns, by run.
     covariance : of ``[beta, theta]``, for a dispersion of one.
+    wider : by how much the interval of each effect parameter is wider than that covariance says, (q,) at
+        least one, since the runs differ by more.
     step : by how much another step of the descent would move a parameter, in its standard deviation, at most.
     condition : of the whitened, scaled columns of base and effects; infinite: a parameter is not determined.
     log_likelihood : marginal, by run; ``chi2`` and ``elements``: whitened sum of squares and count, by run.
@@ -64,6 +66,7 @@ class Fit:
     nuisance: Mapping[str, Array]
     noise: Noise
     covariance: Array
+    wider: Array
     step: float
     condition: float
     log_likelihood: Mapping[str, float]
@@ -102,6 +105,7 @@ class _End(NamedTuple):
     """What a linearisation at the end of a descent says of it; see :class:`Fit`."""
 
     covariance: Array
+    wider: Array
     step: float
     condition: float
 
@@ -236,7 +240,8 @@ def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
         near = _distinct(sorted(zip(left, states, strict=True), key=lambda one: one[0]), ALIKE * min(left))
         reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
         state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
-    return _finished(candidate, blocks, noise, state, _End(fitted.covariance, fitted.step, fitted.condition))
+    end = _End(fitted.covariance, fitted.wider, fitted.step, fitted.condition)
+    return _finished(candidate, blocks, noise, state, end)
 
 
 def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> Array:
@@ -277,9 +282,10 @@ def _refined(
 def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> _End:
     """Covariance of base and effect parameters, (p + q, p + q), and how well the end was reached.
 
-    The parameters scatter from run to run, and the runs say how far that leaves them off. What the model gets
-    wrong where an effect shows may also be the same in all runs, and then these do not differ by it: the
-    variance of an effect parameter is the larger one of the two.
+    The base parameters scatter from run to run, and the runs say how far that leaves them off. What the model
+    gets wrong where an effect shows may be the same in all runs: the variances of the effect parameters allow
+    for that, and their intervals are wider still where the runs differ by more. Whether an effect is there is
+    no question of how much of it there is in which run: conditions left out answer that.
     """
     system, wide = (
         linearised(candidate, blocks, kind, state) for kind in (noise, noise_room.all_alike(noise))
@@ -288,21 +294,22 @@ def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: 
     covariance, alike = inverse(normal), inverse(normal_equations(wide)[0])
     p = len(state.beta)
     factor = between_runs(system)
+    wider = _wider(np.diag(alike)[p:], np.diag(covariance)[p:] * factor[p:] ** 2)
+    factor[p:] = 1.0
     covariance *= np.outer(factor, factor)
-    covariance[p:, p:] = _wider(alike[p:, p:], np.diag(covariance)[p:])
+    covariance[p:, p:] = alike[p:, p:]
     moving = free(candidate, state, right)
     still, downhill = normal[np.ix_(moving, moving)], right[moving]
     step = float((np.abs(solution(still, downhill)) / np.sqrt(np.diag(inverse(still)))).max(initial=0.0))
     if step > CONVERGED:
         step *= farthest(candidate, blocks, state, system)
-    return _End(covariance, step, condition(normal))
+    return _End(covariance, wider, step, condition(normal))
 
 
-def _wider(covariance: Array, variance: Array) -> Array:
-    """Return a covariance (q, q) in which no variance is below another one, (q,); correlations stay."""
-    own = np.diag(covariance)
-    growth = np.sqrt(np.divide(variance, own, out=np.ones_like(own), where=(own > 0.0) & (variance > own)))
-    return np.asarray(covariance * np.outer(growth, growth))
+def _wider(alike: Array, differing: Array) -> Array:
+    """Return how much a deviation is larger (q,), at least one, by the larger one of two variances."""
+    known = (alike > 0.0) & np.isfinite(alike) & np.isfinite(differing)
+    return np.sqrt(np.maximum(np.divide(differing, alike, out=np.ones_like(alike), where=known), 1.0))
 
 
 def _reestimated(

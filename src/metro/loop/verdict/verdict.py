@@ -156,7 +156,7 @@ def _estimated(fitted: Fit, name: str) -> tuple[Effect, Array, Array]:
         if effect.name != name:
             continue
         values = effect.matrix @ fitted.theta[place]
-        covariance = fitted.covariance[p:, p:][place, place]
+        covariance = fitted.covariance[p:, p:][place, place] * np.outer(*[fitted.wider[place]] * 2)
         # An infinite variance stays one: a product with zeros would make it undefined.
         variance = [
             float(row[row != 0] @ covariance[np.ix_(row != 0, row != 0)] @ row[row != 0])
