@@ -79,3 +79,11 @@ def test_waves_of_the_same_length_at_every_feed_are_no_vibration():
     outcome = search(replace(task, blocks=blocks), LIBRARY, GATES)
     assert outcome.names == ()
     assert outcome.lines
+
+
+def test_a_vibration_belongs_to_the_time_where_runs_have_several_speeds():
+    task = problem(seed=3)
+    assert VIBRATION.adapt(VIBRATION, task).timed
+    first = task.role("identify")[0]
+    alike = replace(task, blocks=tuple(replace(first, run=f"r{i}") for i in range(3)))
+    assert not VIBRATION.adapt(VIBRATION, alike).timed
