@@ -44,6 +44,12 @@ def between_runs(system: System) -> Array:
     return factor
 
 
+def wider_than(alike: Array, differing: Array) -> Array:
+    """Return how much a deviation is larger (q,), at least one, by the larger one of two variances."""
+    known = (alike > 0.0) & np.isfinite(alike) & np.isfinite(differing)
+    return np.sqrt(np.maximum(np.divide(differing, alike, out=np.ones_like(alike), where=known), 1.0))
+
+
 def _part(system: System, run: int) -> tuple[Array, Array]:
     """One run's part in the normal matrix and its score, without the prior of the effects."""
     return normal_equations(replace(system, rows=[system.rows[run]], weight=np.zeros_like(system.weight)))

@@ -15,7 +15,7 @@ import numpy as np
 
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate, started
-from metro.loop.fitting.covariance import between_runs
+from metro.loop.fitting.covariance import between_runs, wider_than
 from metro.loop.fitting.descent import ITERATIONS, descend, farthest, free, polish
 from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
@@ -294,7 +294,7 @@ def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: 
     covariance, alike = inverse(normal), inverse(normal_equations(wide)[0])
     p = len(state.beta)
     factor = between_runs(system)
-    wider = _wider(np.diag(alike)[p:], np.diag(covariance)[p:] * factor[p:] ** 2)
+    wider = wider_than(np.diag(alike)[p:], np.diag(covariance)[p:] * factor[p:] ** 2)
     factor[p:] = 1.0
     covariance *= np.outer(factor, factor)
     covariance[p:, p:] = alike[p:, p:]
@@ -304,12 +304,6 @@ def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: 
     if step > CONVERGED:
         step *= farthest(candidate, blocks, state, system)
     return _End(covariance, wider, step, condition(normal))
-
-
-def _wider(alike: Array, differing: Array) -> Array:
-    """Return how much a deviation is larger (q,), at least one, by the larger one of two variances."""
-    known = (alike > 0.0) & np.isfinite(alike) & np.isfinite(differing)
-    return np.sqrt(np.maximum(np.divide(differing, alike, out=np.ones_like(alike), where=known), 1.0))
 
 
 def _reestimated(
