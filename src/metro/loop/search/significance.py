@@ -13,8 +13,8 @@ def least_significant(fitted: Fit) -> tuple[Effect, float]:
     """Return the least significant effect of a fit, and its p-value by its own intervals.
 
     Likelihoods take what a model gets wrong for independent from condition to condition; these intervals,
-    that it may be the same in all. An effect that only the former see is not shown. By how much an effect differs
-    from run to run (``Fit.wider``) is no doubt whether it is there, and widens only what is stated.
+    that it may be the same in all. An effect that only the former see is not shown. By how much an effect
+    differs from run to run (``Fit.wider``) is no doubt whether it is there, and widens only what is stated.
     """
     p_values = [_p_value(fitted, effect, place) for effect, place in fitted.candidate.parts(fitted.theta)]
     least = int(np.argmax(p_values))
