@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ SMALL_SHARES = (0.03, 0.01, 0.003)  # that say whether the derivatives hold
 FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e9  # of the normal matrix's diagonal
 HOPE = 30.0  # times what a step promises: more is not left to gain along a descent, except in a bent valley
 ACCEPTED = 1e-3  # share of what a step promised that it must keep
+MUCH = 0.5  # share of its promise that a step keeps where derivatives that were given are good enough
 
 
 def descend(
@@ -43,6 +45,7 @@ def descend(
     enough: float = ENOUGH,
     known: Known | None = None,
     rival: float = np.inf,
+    slopes: Sequence[Array] | None = None,
 ) -> tuple[State, float]:
     """Follow Levenberg's and Marquardt's steps to where none promises to gain anything that counts.
 
@@ -57,41 +60,41 @@ def descend(
     known : of the parameters beforehand; None: :func:`weakly_known`.
     rival : cost that another descent has reached. This one is given up where it would stay above that even
         if it gained ``HOPE`` times what its next step promises.
+    slopes : of each block, derivatives by the first effect parameters (n, k) near the start. They are used as
+        long as steps keep much of their promise, and not to end the descent. None: none are known.
 
     Returns
     -------
     state, cost : where at most so many ``steps`` lead.
     """
     free: Literal["all", "own"] = "own" if own else "all"
-    system = linearised(candidate, blocks, noise, state, derivatives=free, known=known)
-    damping = 0.0
+    at = partial(linearised, candidate, blocks, noise, known=known)
+    system, damping = at(state, derivatives=free, slopes=slopes), 0.0
     for step in range(1, steps + 1):
-        taken = _step(
-            candidate,
-            blocks,
-            state,
-            system,
-            damping,
-            own=own,
-            enough=max(enough, (system.cost - rival) / HOPE),
-        )
+        left = max(enough, (system.cost - rival) / HOPE)
+        taken = _step(candidate, blocks, state, system, damping, own=own, enough=left)
+        if taken is None and slopes and left == enough:
+            system, slopes = at(state, derivatives=free), None
+            taken = _step(candidate, blocks, state, system, damping, own=own, enough=left)
         if taken is None:
             break
-        state, gained, damping = taken
-        last = gained < enough or step == steps
-        system = linearised(
-            candidate, blocks, noise, state, derivatives="none" if last else free, known=known
-        )
-        if last:
-            break
+        state, damping = taken.state, taken.damping
+        if (taken.gained < enough and not slopes) or step == steps:
+            return state, at(state, derivatives="none").cost
+        slopes = slopes if taken.kept > MUCH else None
+        system = at(state, derivatives=free, slopes=slopes)
     return state, system.cost
 
 
 class _Taken(NamedTuple):
-    """A step that was taken: where it led, what it gained, and the damping to begin the next one with."""
+    """A step that was taken: where it led, what it gained, and the share of its promise that it kept.
+
+    ``damping``: to begin the next one with.
+    """
 
     state: State
     gained: float
+    kept: float
     damping: float
 
 
@@ -118,7 +121,7 @@ def _step(
             gained = here - _squares(candidate, blocks, trial, system)
             if gained > ACCEPTED * promised:
                 eased = max(1.0 / 3.0, 1.0 - (2.0 * gained / promised - 1.0) ** 3)
-                return _Taken(trial, gained, min(eased, 2.0) * damping)
+                return _Taken(trial, gained, gained / promised, min(eased, 2.0) * damping)
         damping, growth = max(growth * damping, FIRST_DAMPING), 2.0 * growth
     return None
 

@@ -20,9 +20,11 @@ from metro.loop.fitting.descent import ITERATIONS, descend, farthest, free, poli
 from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.nuisances import costs, search_nuisance
+from metro.loop.fitting.reestimate import reestimated
 from metro.loop.fitting.system import (
     State,
     condition,
+    effect_slopes,
     inverse,
     linearised,
     normal_equations,
@@ -38,7 +40,6 @@ SAME = 0.05  # difference of the costs of two descents that ended in one place: 
 ALIKE = 1e-9  # relative difference of the sums of squares of starts that are the same
 UNDECIDED = 0.1  # differences in twice the log-likelihood that the noise, once known better, may turn round
 ROUNDS, SETTLED = 12, 0.2  # of noise estimation and descent; gain in twice the log-likelihood that ends them
-EM_STEPS = 8  # of expectation and maximisation in each round
 # Where a prediction is rough (that of a tool too soft to be in balance) no step leads on down, although the
 # derivatives promise one. An interval that is off by half a deviation holds the truth in 92 cases of 100.
 CONVERGED = 0.5
@@ -159,13 +160,13 @@ def _fitted(
         best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
     if start and fresh:
         followed = best if len(fresh) == 1 else best[:FOLLOWED]
-        first = _lowest_first(candidate, blocks, noise, followed, steps=FIRST_STEPS, bound=bound)
+        first = _lowest_first(candidate, blocks, noise, followed, steps=FIRST_STEPS, bound=bound, known=start)
         best = _distinct(first, SAME)
         if noise_room.within_budget(blocks, noise):
             best = best[:KEPT]
             if cost_under(start, noise) - first[0][0] < HOPELESS * len(fresh):
                 return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
-    reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS, bound=bound)
+    reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS, bound=bound, known=start)
     if reached[0][0] > bound:
         return _refined(candidate, blocks, prior, noise, reached[0][1], rounds=0)
     near = _distinct([one for one in reached if one[0] < reached[0][0] + UNDECIDED], SAME)
@@ -190,21 +191,32 @@ def _lowest_first(
     *,
     steps: int,
     bound: float = np.inf,
+    known: Fit | None,
 ) -> list[tuple[float, State]]:
     """Follow each state some steps down; return where they lead, with the cost there.
 
-    Once one has been followed to its end, others are given up when they cannot come as low; so is each that
-    cannot come below the ``bound``, and all after one whose first step already promises too little for that.
+    ``known``: the fit of the smaller model, whose derivatives hold where each begins. Once one has been
+    followed to its end, others are given up when they cannot come as low; so is each that cannot come below
+    the ``bound``, and all after one whose first step already promises too little for that.
     """
     reached: list[tuple[float, State]] = []
     for state in states:
         lowest = min((cost for cost, _ in reached), default=np.inf) if steps == ITERATIONS else np.inf
         lowest = min(lowest, bound)
-        end, cost = descend(candidate, blocks, noise, state, steps, rival=lowest + UNDECIDED)
+        slopes = _slopes_of(known, blocks, state)
+        end, cost = descend(candidate, blocks, noise, state, steps, rival=lowest + UNDECIDED, slopes=slopes)
         reached.append((cost, end))
         if cost > bound and end is state:
             break
     return sorted(reached, key=lambda pair: pair[0])
+
+
+def _slopes_of(known: Fit | None, blocks: Sequence[Block], state: State) -> list[Array] | None:
+    """Return derivatives by the effects of a fit, at its parameters and the runs' unknowns of a state."""
+    if known is None or not known.theta.size:
+        return None
+    own = {run: values[: len(known.nuisance[run])] for run, values in state.nuisance.items()}
+    return effect_slopes(known.candidate, blocks, State(known.theta, known.beta, own))
 
 
 def cost_under(fitted: Fit, noise: Noise) -> float:
@@ -271,7 +283,7 @@ def _refined(
     """Re-estimate the noise from the residual and descend, in turn, until that gains next to nothing."""
     before = np.inf
     for _ in range(rounds):
-        noise = _reestimated(candidate, blocks, prior, noise, state)
+        noise = reestimated(candidate, blocks, prior, noise, state)
         state, cost = descend(candidate, blocks, noise, state)
         if before - cost < SETTLED:
             break
@@ -304,41 +316,6 @@ def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: 
     if step > CONVERGED:
         step *= farthest(candidate, blocks, state, system)
     return _End(covariance, wider, step, condition(normal))
-
-
-def _reestimated(
-    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State
-) -> Noise:
-    """Estimate the noise from the residual: from what it was, or from no misfit on, whichever is likelier.
-
-    A misfit hides from what whole runs share what that would explain, and may then never come down.
-    """
-    starts = [noise, noise.sound] if noise_room.misses(noise) else [noise]
-    reached = [_expected(candidate, blocks, prior, start, state) for start in starts]
-    if len(reached) == 1:
-        return reached[0]
-    return min(reached, key=lambda one: linearised(candidate, blocks, one, state, derivatives="none").cost)
-
-
-def _expected(
-    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State
-) -> Noise:
-    """Take some steps of expectation–maximisation for the noise."""
-    model = candidate.model(state.theta)
-    parts = []
-    for block in blocks:
-        matrix, offset = model.design(block, state.nuisance[block.run], state.beta)
-        parts.append((block, block.measured - offset - matrix @ state.beta, matrix))
-    for _ in range(EM_STEPS):
-        noise = noise_room.updated(
-            noise,
-            prior,
-            [
-                (block, residual, noise_room.shared(block, noise, matrix, state.beta))
-                for block, residual, matrix in parts
-            ],
-        )
-    return noise
 
 
 def _finished(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, end: _End) -> Fit:

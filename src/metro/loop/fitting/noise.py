@@ -28,6 +28,7 @@ MISFIT_STEP = 0.5
 # One less the squared cosine of signals² and of one size for all: from there on they are told from one size,
 # and what is missed whatever the signal from what grows with it. Signals that scatter by a tenth reach it.
 ONE_SIZE = 0.03
+SAME = 1e-3  # relative difference of all that a noise consists of, below which no weight changes that counts
 LARGEST_ZERO = 4.0  # of its deviation: a zero that is farther off is something else that is taken for it
 
 
@@ -258,6 +259,15 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         level=level,
         alike=_alike(residuals),
     )
+
+
+def alike(one: Noise, other: Noise) -> bool:
+    """Whether two noises, one estimated from the other, are the same but for what does not count."""
+    first, second = (
+        np.array([*each.scatter, each.zero_factor, each.alike, *each.misfit.values(), *each.level.values()])
+        for each in (one, other)
+    )
+    return len(first) == len(second) and bool(np.allclose(first, second, rtol=SAME, atol=0.0))
 
 
 def _towards(square: float, known: float) -> float:

@@ -99,16 +99,18 @@ def linearised(
     *,
     derivatives: Literal["all", "own", "none"] = "all",
     known: Known | None = None,
+    slopes: Sequence[Array] | None = None,
 ) -> System:
     """Whitened residual of every block, its likelihood, and its derivatives: all, or by its unknowns only.
 
-    ``known`` of the parameters beforehand; None: :func:`weakly_known`.
+    ``known`` of the parameters beforehand; None: :func:`weakly_known`. ``slopes``: of each block, derivatives
+    by the first effect parameters (n, k) that are taken to hold here, too; those by the others are computed.
     """
     point = _point(candidate, tuple(state.theta.tolist()), tuple(state.beta.tolist()))
     rows: list[Rows] = []
     whiteners: list[Whitener] = []
     log_likelihood, chi2 = {}, {}
-    for block in blocks:
+    for i, block in enumerate(blocks):
         nuisance = tuple(state.nuisance[block.run].tolist())
         matrix, offset = _design(point, block, nuisance)
         predicted = offset + matrix @ state.beta
@@ -120,7 +122,10 @@ def linearised(
         determinant = noise_room.log_determinant(block, noise, directions, whiten)
         log_likelihood[block.run] = -0.5 * (chi2[block.run] + determinant)
         if derivatives != "none":
-            effect, own = _slopes(point, block, nuisance, by_effects=derivatives == "all")
+            held = slopes[i] if slopes and derivatives == "all" else matrix[:, :0]
+            first = held.shape[1] if derivatives == "all" else len(state.theta)
+            effect, own = _slopes(point, block, nuisance, first)
+            effect = np.hstack([held, effect]) if first and derivatives == "all" else effect
             whitened = whiten(np.hstack([matrix, effect, own]))
             p, q = matrix.shape[1], matrix.shape[1] + effect.shape[1]
             rows.append((residual, whitened[:, :p], whitened[:, p:q], whitened[:, q:]))
@@ -155,11 +160,16 @@ def _design(point: _Point, block: Block, nuisance: tuple[float, ...]) -> tuple[A
 
 
 @lru_cache(maxsize=512)
-def _slopes(
-    point: _Point, block: Block, nuisance: tuple[float, ...], *, by_effects: bool
-) -> tuple[Array, Array]:
-    moved = point.moved if by_effects else []
+def _slopes(point: _Point, block: Block, nuisance: tuple[float, ...], first: int) -> tuple[Array, Array]:
+    """Return derivatives by effect parameters from ``first`` on, and by the block's own unknowns."""
+    moved = point.moved[first:] if first < len(point.theta) else []
     return _kept(*sensitivities(point.model, moved, block, np.array(nuisance), point.beta))
+
+
+def effect_slopes(candidate: Candidate, blocks: Sequence[Block], state: State) -> list[Array]:
+    """Return derivatives of each block by the effect parameters of a candidate, (n, q), not whitened."""
+    point = _point(candidate, tuple(state.theta.tolist()), tuple(state.beta.tolist()))
+    return [_slopes(point, block, tuple(state.nuisance[block.run].tolist()), 0)[0] for block in blocks]
 
 
 def _kept(first: Array, second: Array) -> tuple[Array, Array]:

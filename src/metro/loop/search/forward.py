@@ -99,12 +99,15 @@ def _added(
 def _promising(effects: list[Effect], trials: Mapping[tuple[str, str], Trial]) -> list[Effect]:
     """Return the effects that gained more than chance does, where they were tried last, or were not tried.
 
-    By chance, twice the log-likelihood gains one for each parameter: the mean of chi-squared.
+    Those that were not followed to their end, since another one was far ahead, may have gained as well. By
+    chance, twice the log-likelihood gains one for each parameter: the mean of chi-squared.
     """
     return [
         effect
         for effect in effects
-        if effect.key not in trials or trials[effect.key].evidence.statistic > len(effect.parameters)
+        if effect.key not in trials
+        or trials[effect.key].evidence.statistic > len(effect.parameters)
+        or getattr(trials[effect.key].why_not, "code", "") == "far_behind"
     ]
 
 

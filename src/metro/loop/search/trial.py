@@ -13,8 +13,10 @@ from metro.loop.checks.evidence import Evidence, compare, hold_out, leave_out, m
 from metro.loop.checks.left_out import left_out
 from metro.loop.checks.phases import tied
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import Fit, fit
+from metro.loop.fitting.fit import Fit, cost_under, fit
 from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.nuisances import search_nuisance
+from metro.loop.fitting.system import State, ahead, linearised, normal_equations
 from metro.loop.statement import Statement
 from metro.observables.problem import Block, Limited
 from metro.units import Array
@@ -72,51 +74,96 @@ def tried(
 ) -> list[Trial]:
     """Fit each effect jointly with what is there, compare, and apply the gates.
 
-    Conditions are left out only for effects that pass the gates before and are not further ``behind`` the
-    foremost of them in log-likelihood: those are tried again once it is added. Where none of these passes,
-    conditions are left out for the others as well.
+    Effects that are further ``behind`` the foremost one in log-likelihood are not followed to their end, and
+    no condition is left out for them: they are tried again once that one is added. Where none of the others
+    passes the gates, they are followed after all.
     """
-    trials = []
-    for effect in effects:
+    raced, bound = _raced(current, effects, prior, gates, least, behind=behind)
+    trials = _gated(raced, gates, least)
+    given_up = {trial.effect.key for trial in trials if cost_under(trial.fit, current.noise) > bound}
+    far = _far_behind(trials, given_up, behind)
+    judged = _held_out(current, [far.get(trial.effect.key, trial) for trial in trials], prior, gates)
+    if not far or not all(trial.why_not for trial in judged):
+        return judged
+    if given_up:
+        raced, _ = _raced(current, effects, prior, gates, least, behind=np.inf)
+    return _held_out(current, _gated(raced, gates, least), prior, gates)
+
+
+def _raced(
+    current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, least: float, *, behind: float
+) -> tuple[list[Trial], float]:
+    """Fit the effects, the most promising one first; return trials before any gate, and the bound.
+
+    The bound is the cost, under the noise to begin with, beyond which an effect is too far behind the
+    foremost one that may be added at once. That noise hides the most: what is far behind under it is so under
+    any that is known better.
+    """
+    trials: dict[Effect, Trial] = {}
+    bound = np.inf
+    for effect in sorted(effects, key=lambda each: _promised(current, each)):
         candidate = Candidate(current.candidate.base, (*current.candidate.effects, effect))
-        larger = fit(candidate, current.blocks, prior, current)
-        trials.append(Trial(effect, larger, compare(current, larger)))
-    p_values = [trial.evidence.p_value for trial in trials]
-    q_values = residual.q_values(p_values)
-    trials = [
+        larger = fit(candidate, current.blocks, prior, current, bound)
+        trials[effect] = Trial(effect, larger, compare(current, larger))
+        cautious = replace(trials[effect], q_value=len(effects) * trials[effect].evidence.p_value)
+        if not _refused(cautious, gates, least) and not small_beside_residual(cautious.evidence):
+            bound = min(bound, cost_under(larger, current.noise) + 2.0 * behind)
+    return [trials[effect] for effect in effects], bound
+
+
+def _promised(current: Fit, effect: Effect) -> float:
+    """Return the cost that one step from an effect's first start promises."""
+    candidate = Candidate(current.candidate.base, (*current.candidate.effects, effect))
+    theta = np.concatenate([current.theta, [one.starts[0] for one in effect.parameters]])
+    state = State(theta, current.beta, {})
+    search_nuisance(candidate, current.blocks, current.noise, state, current.nuisance)
+    system = linearised(candidate, current.blocks, current.noise, state)
+    return system.cost - ahead(*normal_equations(system))
+
+
+def _gated(trials: Sequence[Trial], gates: Gates, least: float) -> list[Trial]:
+    """Apply the gates that need no condition left out."""
+    q_values = residual.q_values([trial.evidence.p_value for trial in trials])
+    known = [replace(trial, q_value=float(q)) for trial, q in zip(trials, q_values, strict=True)]
+    return [
         replace(
             trial,
-            q_value=float(q),
-            why_not=unsettled(trial.fit)
-            or _why_not(trial.evidence, float(q), gates, least)
-            or (Statement("unlike") if unlike(trial.effect, trial.fit) else None),
+            why_not=_refused(trial, gates, least),
             beside=small_beside_residual(trial.evidence),
         )
-        for trial, q in zip(trials, q_values, strict=True)
+        for trial in known
     ]
-    far = _far_behind(trials, behind)
-    judged = _held_out(current, [far.get(trial.effect.key, trial) for trial in trials], prior, gates)
-    if far and all(trial.why_not for trial in judged):
-        return _held_out(current, trials, prior, gates)
-    return judged
 
 
-def _far_behind(trials: Sequence[Trial], behind: float) -> dict[tuple[str, str], Trial]:
+def _refused(trial: Trial, gates: Gates, least: float) -> Statement | None:
+    """Return why an effect may not be added, by its fit on all runs; None: it may."""
+    return (
+        unsettled(trial.fit)
+        or _why_not(trial.evidence, trial.q_value, gates, least)
+        or (Statement("unlike") if unlike(trial.effect, trial.fit) else None)
+    )
+
+
+def _far_behind(
+    trials: Sequence[Trial], given_up: set[tuple[str, str]], behind: float
+) -> dict[tuple[str, str], Trial]:
     """Return the trials that are too far behind the foremost one that may be added, saying so of each.
 
-    The foremost is one that may be added at once, where there is any.
+    The foremost is one that may be added at once, where there is any. ``given_up``: those of which that was
+    seen before they were followed to their end.
     """
-    open_to = [trial for trial in trials if not trial.why_not]
+    open_to = [trial for trial in trials if not trial.why_not and trial.effect.key not in given_up]
     foremost = max(
         (trial.fit.total for trial in open_to if not trial.beside),
         default=max((trial.fit.total for trial in open_to), default=-np.inf),
     )
+    last = given_up | {trial.effect.key for trial in open_to if trial.fit.total < foremost - behind}
     return {
         trial.effect.key: replace(
             trial, why_not=Statement("far_behind", {"behind": foremost - trial.fit.total})
         )
-        for trial in open_to
-        if trial.fit.total < foremost - behind
+        for trial in trials
+        if trial.effect.key in last
     }
 
 

@@ -21,6 +21,7 @@ from metro.observables.force.order_basis import (
     FEEDS,
     Orders,
     Soft,
+    lost,
     order_basis,
     shares_of_feeds,
     yielding_orders,
@@ -228,7 +229,8 @@ class ForceModel:
         """
         if self.chipped:
             sound = replace(self, chipped=())
-            return sound._orders(setting, beta) + self._lost(setting)
+            whole = (self.cutter, self.law, setting.cut)
+            return sound._orders(setting, beta) + lost(whole, self.chipped, setting.highest, self.true_path)
         tool, highest = (self.cutter, self.law, setting.cut), setting.highest
         if beta is None or not any(self.structure.compliance):
             return order_basis(*tool, highest, self.true_path)[None]
@@ -270,21 +272,6 @@ class ForceModel:
         ):
             return ""
         return "force and deflection find no balance: a tool this soft would not cut steadily"
-
-    def _lost(self, setting: ForceSetting) -> ComplexArray:
-        """Amplitudes of what chipped teeth change in the force, as if the tool did not yield.
-
-        The highest chip breaks the whole tool, the next one the tool that is left, up to its own height.
-        """
-        tool, changes = self.cutter, []
-        for chipped in sorted(self.chipped, key=lambda one: -one.height):
-            broken, low = chipped.change(tool, setting.cut)
-            with_it, without = (
-                order_basis(each, self.law, low, setting.highest, self.true_path) for each in (broken, tool)
-            )
-            changes.append(with_it - without)
-            tool = broken
-        return np.asarray(np.sum(changes, axis=0))
 
     def _bottom(self, setting: ForceSetting) -> list[float]:
         """Thrust of the bottom edges along z over the whole revolution: it is not inclined by the ramp."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from metro.cutting.chipped import Chipped
 from metro.cutting.cutter import Cutter
 from metro.cutting.force import Cut, force_basis
 from metro.cutting.law import EdgeLaw
@@ -45,6 +46,26 @@ def order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path:
     basis = amplitudes(to_orders(force_basis(cutter, law, cut, true_path, ANGLES), highest))
     basis.flags.writeable = False
     return basis
+
+
+@lru_cache(maxsize=4096)
+def lost(
+    whole: tuple[Cutter, EdgeLaw, Cut], chipped: tuple[Chipped, ...], highest: int, true_path: bool
+) -> ComplexArray:
+    """Amplitudes (orders, 3, 6) of what chipped teeth change in the force of a ``whole`` tool that is rigid.
+
+    The highest chip breaks the whole tool, the next one the tool that is left, up to its own height. It is
+    kept: read-only.
+    """
+    tool, law, cut = whole
+    changed = np.zeros((highest + 1, 3, 6), complex)
+    for one in sorted(chipped, key=lambda chip: -chip.height):
+        broken, low = one.change(tool, cut)
+        with_it, without = (order_basis(each, law, low, highest, true_path) for each in (broken, tool))
+        changed = changed + (with_it - without)
+        tool = broken
+    changed.flags.writeable = False
+    return changed
 
 
 class Soft(NamedTuple):

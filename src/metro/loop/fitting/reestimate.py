@@ -1,0 +1,47 @@
+"""The noise of a candidate, estimated from what its prediction leaves of the blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from metro.loop.fitting import noise as noise_room
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.system import State, linearised
+from metro.observables.problem import Block
+
+EM_STEPS = 8  # of expectation and maximisation, at most
+
+
+def reestimated(
+    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State
+) -> Noise:
+    """Estimate the noise from the residual: from what it was, or from no misfit on, whichever is likelier.
+
+    A misfit hides from what whole runs share what that would explain, and may then never come down.
+    """
+    starts = [noise, noise.sound] if noise_room.misses(noise) else [noise]
+    reached = [_expected(candidate, blocks, prior, start, state) for start in starts]
+    if len(reached) == 1:
+        return reached[0]
+    return min(reached, key=lambda one: linearised(candidate, blocks, one, state, derivatives="none").cost)
+
+
+def _expected(
+    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State
+) -> Noise:
+    """Take some steps of expectation–maximisation for the noise."""
+    model = candidate.model(state.theta)
+    parts = []
+    for block in blocks:
+        matrix, offset = model.design(block, state.nuisance[block.run], state.beta)
+        parts.append((block, block.measured - offset - matrix @ state.beta, matrix))
+    for _ in range(EM_STEPS):
+        directions = [
+            (block, residual, noise_room.shared(block, noise, matrix, state.beta))
+            for block, residual, matrix in parts
+        ]
+        before, noise = noise, noise_room.updated(noise, prior, directions)
+        if noise_room.alike(before, noise):
+            break
+    return noise
