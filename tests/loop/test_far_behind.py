@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, problem
 
+from metro.loop.fitting import fit as fit_room
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import cost_under, fit
 from metro.loop.fitting.noise import first_noise
@@ -107,3 +108,36 @@ def test_what_gained_no_more_than_chance_waits_until_no_other_may_be_added_at_on
     current, _, _ = forward_room._added(base, space, {})
     assert {effect.name for effect in current.candidate.effects} == {"bend", "ripple"}
     assert [names for names in asked if names][:3] == [{"bend", "ripple", "gain"}, {"ripple"}, {"gain"}]
+
+
+def test_what_is_given_up_is_said_to_be_far_behind_and_not_followed(base, monkeypatch):
+    prior = first_noise(GATES.model_form_budget, np.full(2, 0.01), base.blocks)
+    clear = replace(base, noise=base.noise.sound)  # it hides nothing of what is missed
+    followed, refine = [], fit_room._refined
+
+    def counted(candidate, *arguments, rounds):
+        followed.extend((effect.name, rounds) for effect in candidate.effects)
+        return refine(candidate, *arguments, rounds=rounds)
+
+    monkeypatch.setattr(fit_room, "_refined", counted)
+    found = {one.effect.name: one for one in tried(clear, (RIPPLE, BEND), prior, GATES, 0.001)}
+    assert found["bend"].why_not is None
+    assert found["ripple"].why_not.code == "far_behind"
+    assert ("ripple", 0) in followed  # it came after the more promising one, although it was named before
+    assert all(rounds == 0 for name, rounds in followed if name == "ripple")
+    space = [BEND, RIPPLE]
+    assert forward_room._promising(space, {found["ripple"].effect.key: found["ripple"]}) == space
+
+
+def test_what_was_given_up_is_followed_where_the_foremost_does_not_pass(base, monkeypatch):
+    prior = first_noise(GATES.model_form_budget, np.full(2, 0.01), base.blocks)
+    clear = replace(base, noise=base.noise.sound)
+    monkeypatch.setattr(room, "beyond_left_out", lambda fitted, _: refused(fitted))
+
+    def refused(fitted):
+        return "no prediction" if fitted.candidate.effects[-1] is BEND else None
+
+    found = {one.effect.name: one for one in tried(clear, (RIPPLE, BEND), prior, GATES, 0.001)}
+    assert found["bend"].why_not == "no prediction"
+    assert found["ripple"].fit.noise is not clear.noise
+    assert getattr(found["ripple"].why_not, "code", "") != "far_behind"
