@@ -20,6 +20,7 @@ FOLDERS = ("checks", "search", "verdict", "causes", "labels")
 SINGLE = (
     "loop/fitting/noise.py",
     "loop/fitting/fit.py",
+    "loop/fitting/reestimate.py",
     "loop/fitting/covariance.py",
     "loop/ceiling.py",
     "loop/measured_poses.py",
