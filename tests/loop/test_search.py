@@ -7,7 +7,7 @@ import pytest
 from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, effect, problem
 from worded import in_words
 
-from metro.loop.checks.evidence import Evidence
+from metro.loop.checks.evidence import Evidence, surviving_share
 from metro.loop.checks.signature import places, q_values
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import fit
@@ -15,7 +15,7 @@ from metro.loop.fitting.held_out import comparison, held_out
 from metro.loop.fitting.noise import first_noise
 from metro.loop.search import forward as forward_room
 from metro.loop.search import trial as trial_room
-from metro.loop.search.search import search
+from metro.loop.search.search import NOT_VISIBLE, search
 from metro.loop.search.strategy import SearchSpace
 from metro.loop.statement import Statement
 from metro.loop.verdict.verdict import judge, parameters, why_not
@@ -73,6 +73,35 @@ def test_an_effect_that_the_base_absorbs_is_said_to_be_invisible():
     assert set(outcome.not_visible) == {"gain"}
     assert verdict["status"] == "clean"
     assert "an experiment for gain" in verdict["next_experiment"]
+
+
+def nearly_absorbed(size):
+    """A gain with a little ripple of its own, of which the base parameters leave nothing but the ripple."""
+    return replace(
+        GAIN,
+        name="corner",
+        parameters=(replace(GAIN.parameters[0], starts=(-0.6, 0.6)),),
+        apply=lambda model, values: replace(
+            model, gain=model.gain + values["gain"], ripple=model.ripple + size * values["gain"]
+        ),
+    )
+
+
+def test_what_the_base_absorbs_but_for_what_is_far_above_the_noise_is_tried():
+    corner = nearly_absorbed(0.1)
+    task = problem(5, truth=Wave(gain=0.4, ripple=0.04), phased=False)
+    blocks = task.role("identify")
+    base = fit(Candidate(task.base), blocks, first_noise(0.002, task.scatter, blocks))
+    share = surviving_share(Candidate(task.base, (corner,)), base)
+    assert 1e-4 < share < NOT_VISIBLE
+    outcome = search(task, (corner,), GATES)
+    assert outcome.names == ("corner",)
+    assert outcome.final.theta[0] == pytest.approx(0.4, abs=0.1)
+
+
+def test_what_the_base_absorbs_but_for_what_is_lost_in_the_noise_is_not_tried():
+    outcome = search(problem(5, truth=Wave(gain=0.4, ripple=0.0004)), (nearly_absorbed(0.001),), GATES)
+    assert set(outcome.not_visible) == {"corner"}
 
 
 def test_two_effects_that_are_the_same_leave_the_cause_undetermined():

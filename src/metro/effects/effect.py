@@ -184,6 +184,12 @@ class Effect:
             for name, value in numbers.items()
         }
 
+    @property
+    def typical(self) -> float:
+        """Typical size of the first parameter: the farthest of its starts from none of the effect."""
+        first = self.parameters[0]
+        return max(abs(start - first.neutral) for start in first.starts)
+
     def values(self, theta: Array) -> dict[str, Any]:
         """Return the values by name, those of one name as a list; ``theta`` (parameters,)."""
         return by_name(self.reported, [float(value) for value in self.matrix @ theta])

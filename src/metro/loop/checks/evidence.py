@@ -220,6 +220,15 @@ def surviving_share(candidate: Candidate, base: Fit) -> float:
     return unabsorbed_share(sensitivity(candidate, base), len(base.beta) + len(base.theta))
 
 
+def seen_from(candidate: Candidate, base: Fit) -> float:
+    """Return three standard errors of an effect's first parameter, its size, beside the base parameters.
+
+    Of a strong signature, little may survive in them and yet be far above the noise.
+    """
+    left = surviving_share(candidate, base) * sensitivity(candidate, base).total
+    return 3.0 / math.sqrt(left) if left > 0 else math.inf
+
+
 @dataclass(frozen=True)
 class Dimmed:
     """What the base parameters and the zeros of the runs leave of an effect.

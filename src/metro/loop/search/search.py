@@ -13,7 +13,7 @@ import numpy as np
 from metro.effects.effect import Effect, fitted_to
 from metro.loop.checks import signature as residual
 from metro.loop.checks.between import Between, between_conditions
-from metro.loop.checks.evidence import dimmed, surviving_share
+from metro.loop.checks.evidence import dimmed, seen_from, surviving_share
 from metro.loop.checks.restless import Restless, restless
 from metro.loop.checks.session import Step, scan
 from metro.loop.fitting.candidate import Candidate
@@ -27,7 +27,9 @@ from metro.loop.statement import Statement
 from metro.observables.problem import Problem
 
 STRATEGY: Strategy = forward  # the one in use
-NOT_VISIBLE = 0.02  # share of a signature that the base parameters leave, below which it is not tried
+# Share of a signature that the base parameters leave, below which it is not tried unless one of typical size
+# would be seen in that.
+NOT_VISIBLE = 0.02
 STRAINED = 0.01  # p-value of what is believed beforehand in the base fit, below which all are tried
 DIM = 0.1  # share that the zeros of the runs leave, below which an effect is listed as hidden by them
 EVEN = 0.5  # probability that one of the effects, or a rival of it, must exceed for any to be claimed
@@ -61,6 +63,9 @@ def search(
 def _visible(effects: Sequence[Effect], base: Fit) -> tuple[tuple[Effect, ...], dict[str, Statement]]:
     """Return the effects whose signature the base parameters do not absorb, and why the others are hidden.
 
+    Those of which they leave little are hidden, unless one of typical size would be seen all the same: a
+    corner of a tool looks much like other coefficients, but not quite, and the rest is far above the noise.
+
     Where base parameters are strained far from what is believed of them, an effect that they absorb may be
     why: a force that is known to 4 % stands in for a tip that is softer by a quarter. Then all are tried.
     """
@@ -71,7 +76,12 @@ def _visible(effects: Sequence[Effect], base: Fit) -> tuple[tuple[Effect, ...], 
         for effect in effects
         if not effect.resembled
     }
-    visible = tuple(effect for effect in effects if shares.get(effect.key, 1.0) >= NOT_VISIBLE)
+    visible = tuple(
+        effect
+        for effect in effects
+        if shares.get(effect.key, 1.0) >= NOT_VISIBLE
+        or seen_from(Candidate(base.candidate.base, (effect,)), base) < effect.typical
+    )
     names = {effect.name for effect in visible}
     absorbed = {
         name: Statement("absorbed", {"share": share})
