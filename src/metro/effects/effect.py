@@ -186,7 +186,10 @@ class Effect:
 
     @property
     def typical(self) -> float:
-        """Typical size of the first parameter: the farthest of its starts from none of the effect."""
+        """Typical size of the first parameter: the farthest of its starts from none of the effect.
+
+        It is zero, and says nothing, where a model is linear in the parameter and starts from none.
+        """
         first = self.parameters[0]
         return max(abs(start - first.neutral) for start in first.starts)
 
