@@ -6,6 +6,7 @@ import numpy as np
 from corpus_case import Case
 from corpus_matlab import matlab73
 from corpus_tdms import lead_in, segment
+from corpus_text import SAMPLES
 
 # Kind → a channel of it, its column, an expected unit, and one that is of another quantity.
 CHANNELS = {
@@ -116,7 +117,11 @@ def _faults(kind, form):
             lambda found: {
                 name: (unit, np.where(np.arange(len(found[name][1])) == 9, np.nan, found[name][1]))
             },
-            says=["sample 10", column, "NaN", "expected"],
+            *(
+                ("flagged", ["sample 10", column, "lack a value"])
+                if kind in SAMPLES
+                else ("refused", ["sample 10", column, "NaN", "expected"])
+            ),
         ),
         case(
             "repeated time",

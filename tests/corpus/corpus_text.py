@@ -22,6 +22,7 @@ SIGNALS = {
 }
 REQUIRED = {"runs.csv": "run", "impacts.csv": "file", "published.csv": "unit"}
 FREE = ("runs.csv", "impacts.csv", "published.csv")  # their number may be blank where it does not apply
+SAMPLES = ("dynamometer", "robot_log")  # a row of these that lacks a value is a sample that was lost
 ROW = 2  # index of the row that is broken: line 3 of the file
 
 
@@ -101,6 +102,10 @@ def _faults(kind, form, column):
     def either(of_table, of_signal):
         return of_table if table else of_signal
 
+    def blank(fault, value):
+        how, found = ("flagged", "lack a value") if kind in SAMPLES else ("refused", "expected")
+        return case(fault, _cell(must, value), how, [row, must, found])
+
     return [
         case("columns parted by semicolons", lambda t: t.replace(",", ";"), says=["semicolons", "expected"]),
         case(
@@ -134,16 +139,20 @@ def _faults(kind, form, column):
         case("a required column is named otherwise", _header(must, f"my {must}"), says=[must, "expected"]),
         case("a column appears twice", _twice(column), says=[column]),
         case("columns in another order", _lines(lambda rows: [row[::-1] for row in rows]), "read"),
-        case("a blank cell", _cell(must, ""), says=[row, must, "expected"]),
+        blank("a blank cell", ""),
         case("text in a number", _cell(column, "high"), says=[*at, "high", "expected a"]),
-        case("not applicable", _cell(column, "n/a"), says=[*at, "expected"]),
-        case("NaN", _cell(must, "NaN"), says=[row, must, "expected"])
+        blank("not applicable", "n/a")
+        if kind in SAMPLES
+        else case("not applicable", _cell(column, "n/a"), says=[*at, "expected"]),
+        blank("NaN", "NaN")
         if must == column and kind not in FREE
         else case("a nought for nothing", _cell(column, "-"), says=[*at, "expected"]),
         case("inf", _cell(column, "inf"), says=[*at, "inf", "expected"]),
         case("an enormous number", _cell(column, "1e999"), says=[*at, "expected"]),
         case("a date where a spreadsheet saw one", _cell(column, "2-Jan"), says=[*at, "2-Jan", "expected"]),
-        case("a spreadsheet's error", _cell(column, "#DIV/0!"), says=[*at, "expected"]),
+        blank("a spreadsheet's error", "#DIV/0!")
+        if kind in SAMPLES
+        else case("a spreadsheet's error", _cell(column, "#DIV/0!"), says=[*at, "expected"]),
         case("a unit behind a number", _cell(column, "12 N"), says=[*at, "12 N", "expected"]),
         case("digits of another script", _cell(column, "१२"), says=[*at, "expected"]),
         case("an underscore in a number", _cell(column, "1_000"), says=[*at, "1_000", "expected"]),

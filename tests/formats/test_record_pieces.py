@@ -95,6 +95,22 @@ def test_a_force_that_is_not_finite_is_named_by_its_row_in_the_file(tmp_path, na
     assert pieces.value.message == whole.value.message
 
 
+def test_samples_that_lack_a_value_are_left_out_of_every_piece_and_the_last_one_is_needed(tmp_path, name):
+    force = FORCE.copy()
+    force[[49, 50, 777], 1] = np.nan
+    WRITERS[name](tmp_path / name, table(force=force))
+    pieces = list(read_pieces(tmp_path / name, "force", 50))
+    found, kept = pd.concat(pieces, ignore_index=True), np.delete(np.arange(COUNT), [49, 50, 777])
+    np.testing.assert_allclose(found[list(NAMES)], FORCE[kept], rtol=0, atol=1e-12)
+    notes = [note for piece in pieces for note in piece.attrs.get("notes", ())]
+    assert sum(note.value for note in notes) == 3.0
+    force[-1, 2] = np.nan
+    WRITERS[name](tmp_path / name, table(force=force))
+    for call in (lambda path: read(path, "force"), lambda path: list(read_pieces(path, "force", 50))):
+        with pytest.raises(FormatError, match="column fz_n: found nothing or NaN in the last row"):
+            call(tmp_path / name)
+
+
 def test_seven_samples_are_no_record(tmp_path, name):
     WRITERS[name](tmp_path / name, table(TIME[:7], FORCE[:7]))
     with pytest.raises(FormatError, match="found 7 rows, expected at least 8"):

@@ -194,8 +194,8 @@ def test_two_topics_of_measured_states_are_not_guessed_between(tmp_path):
             ["found the joints shoulder_pan", "names end in 1, 2, 3"],
         ),
         (
-            lambda k: state(k, angles(k) * (np.nan if k == 9 else 1)),
-            ["message 10 of /joint_states, column q1_deg", "found nothing or NaN"],
+            lambda k: state(k, angles(k) * (np.inf if k == 9 else 1)),
+            ["message 10 of /joint_states, column q1_deg", "found inf"],
         ),
         (
             lambda k: state(0 if k == 19 else 1000 * k),

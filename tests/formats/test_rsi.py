@@ -155,12 +155,12 @@ def without(text, tag):
             ["telegram 6 on line 6, column q3_deg", "'3o'", "a number"],
         ),
         (
-            lambda t: [*t[:5], t[5].replace('A3="30.005000"', ""), *t[6:]],
-            ["telegram 6 on line 6, column q3_deg", "nothing or NaN", "a finite number"],
+            lambda t: [*t[:-1], t[-1].replace('A3="', 'B3="')],
+            ["telegram 20 on line 20, column q3_deg", "nothing or NaN in the last row", "a finite number"],
         ),
         (
-            lambda t: [*t[:5], without(t[5], "AIPos"), *t[6:]],
-            ["telegram 6 on line 6, column q1_deg", "nothing"],
+            lambda t: [without(x, "AIPos") if k % 3 else x for k, x in enumerate(t)],
+            ["telegram 2 on line 2, column q1_deg", "nothing", "13 of 20 rows", "rate of the slowest"],
         ),
         (
             lambda t: [x.replace("<IPOC>4012", "<IPOC>soon") for x in t],
@@ -186,7 +186,11 @@ def test_what_is_wrong_with_a_recording_is_said_with_its_place(tmp_path, spoil, 
 def test_the_place_of_a_fault_is_that_in_the_file_also_where_telegrams_were_put_in_order(tmp_path):
     telegrams = [telegram(k) for k in (*range(10), 11, 10, *range(12, 20))]
     telegrams[11] = telegrams[11].replace("<AIPos", "<AIPos2")
-    assert "telegram 12 on line 12, column q1_deg" in failure(recorded(tmp_path, telegrams))
+    table = read(recorded(tmp_path, telegrams), "robot")
+    late, lost = table.attrs["notes"]
+    assert (late.check, lost.check, lost.value, lost.ok) == ("late packets", "missing values", 1.0, False)
+    assert "telegram 12 on line 12, column q1_deg" in lost.message
+    np.testing.assert_allclose(np.diff(table["t_s"])[[8, 9, 10]], [0.004, 0.008, 0.004])
 
 
 def test_another_xml_file_is_not_a_recording(tmp_path):

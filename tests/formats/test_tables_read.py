@@ -99,7 +99,11 @@ def test_a_blank_optional_column_is_as_none(tmp_path):
         (HEADER + "# x\n\n" + force(9) + "1,2,bad,4\n", ["line 13, column fy_n", "'bad'", "a number"]),
         (HEADER + "# x\n\n" + force(9) + "1,,3,4\n", ["line 13, column fx_n", "nothing or NaN"]),
         (HEADER + force(9) + "1,2,3,inf\n", ["line 11, column fz_n", "inf", "finite"]),
-        (HEADER + force(9) + "1,2,3\n", ["line 11, column fz_n", "nothing"]),
+        (HEADER + force(9) + "1,2,3\n", ["line 11, column fz_n", "nothing", "cut off"]),
+        (
+            HEADER + force(9) + "".join(f"{k},,3,4\n" for k in range(1, 11)),
+            ["line 11, column fx_n", "10 of 19"],
+        ),
         (HEADER + force(9) + "0.0008,2,3,4\n", ["line 11, column t_s", "0.0008 after 0.0008", "larger"]),
         ((HEADER + force()).encode("utf-16"), ["UTF-16", "UTF-8"]),
     ],
@@ -156,7 +160,7 @@ def test_a_cloud_is_not_a_force_record(tmp_path):
 
 def test_parquet_faults_name_row_and_column(tmp_path):
     path, table = tmp_path / "a.parquet", example("force")
-    table.loc[4, "fy_n"] = np.nan
+    table.loc[4, "fy_n"] = np.inf
     table.to_parquet(path)
     assert "row 5, column fy_n" in failure(path)
     table.assign(fy_n="x").to_parquet(path)
@@ -174,7 +178,41 @@ def test_parquet_integers_become_floats_and_nulls_are_found(tmp_path):
     assert read(path, "force")["fx_n"].dtype == np.float64
     table.loc[3, "fx_n"] = pd.NA
     table.to_parquet(path)
-    assert "row 4, column fx_n" in failure(path)
+    (note,) = read(path, "force").attrs["notes"]
+    assert "row 4, column fx_n" in note.message
+    table.loc[11, "fx_n"] = pd.NA
+    table.to_parquet(path)
+    assert "row 12, column fx_n: found nothing or NaN in the last row" in failure(path)
+
+
+@pytest.mark.parametrize("kind", ["force", "robot", "joints", "poses"])
+def test_a_row_that_lacks_a_value_is_a_lost_sample(tmp_path, kind):
+    table, path = whole(example(kind, 40)), tmp_path / "table.csv"
+    torn = table.copy()
+    torn.loc[[0, 1, 17], table.columns[-1]] = np.nan
+    torn.loc[18, table.columns[1]] = np.nan
+    torn.to_csv(path, index=False)
+    sniff(path, kind)
+    found = read(path, kind)
+    expected = table.drop(index=[0, 1, 17, 18]).reset_index(drop=True)
+    pd.testing.assert_frame_equal(found, expected, rtol=1e-14)
+    (note,) = found.attrs["notes"]
+    assert (note.check, note.value, note.ok) == ("missing values", 4.0, False)
+    assert f"4 of 40 rows lack a value (the first: line 2, column {table.columns[-1]})" in note.message
+
+
+def test_a_fault_behind_lost_samples_is_named_by_its_own_line(tmp_path):
+    path = written(
+        tmp_path, HEADER + force(4) + "0.0004,,1,2\n" + force(20)[len(force(5)) :] + "0.001,1,2,3\n"
+    )
+    assert "line 22, column t_s: found 0.001 after 0.0019" in failure(path)
+
+
+def test_a_record_may_begin_with_many_samples_that_lack_a_value(tmp_path):
+    filling = "".join(f"{k * 1e-4:.4f},{k},{k},\n" for k in range(-30, 0))
+    path = written(tmp_path, HEADER + filling + force(80))
+    sniff(path, "force")
+    assert len(read(path, "force")) == 80
 
 
 def test_npz_gives_real_and_imaginary_part(tmp_path):

@@ -154,7 +154,7 @@ def raw_counts():
             {"Time": None, "Fx": (TIME, WAVE)},
             ["Cut/Fy: found another start or step of time than channel Cut/Fx"],
         ),
-        ({"Fz": (np.where(TIME == 0.004, np.nan, 1), NEWTONS)}, ["sample 5, column fz_n", "NaN"]),
+        ({"Fz": (np.where(TIME == 0.004, np.inf, 1), NEWTONS)}, ["sample 5, column fz_n", "inf"]),
     ],
 )
 def test_what_is_wrong_with_a_channel_is_said_with_its_name(tmp_path, change, parts):

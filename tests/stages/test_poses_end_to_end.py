@@ -175,7 +175,7 @@ def test_the_check_names_what_poses_give_and_what_they_lack(tmp_path):
     [
         (lambda t: t.rename(columns={"Leica y": "other"}), 'found no "Leica y" in tracker.csv'),
         (
-            lambda t: t.assign(arm_joint_2=t["arm_joint_2"].where(t.index != 4)),
+            lambda t: t.assign(arm_joint_2=t["arm_joint_2"].where(t.index < 4)),
             "line 6, column q2_deg: found nothing",
         ),
         (lambda t: t * np.where(t.columns.str.startswith("arm"), np.pi / 180, 1), "seem to be in radians"),

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from metro.formats.errors import FormatError
+from metro.formats.packets import Note
 from metro.joint_columns import JOINT_COLUMNS, POSITIONS, fault_of, fault_of_cut, fault_of_poses
 from metro.spelling import resembling
 
@@ -25,6 +27,7 @@ class Kind:
     rising : the column that grows strictly from row to row, or "".
     whole : columns that hold whole numbers.
     least : the smallest number of rows.
+    samples : rows are samples, and one that lacks a value is left out as one that the logger lost.
     fault : says which of its columns are lacking beyond those that are required, by the names that are there.
     """
 
@@ -34,6 +37,7 @@ class Kind:
     rising: str = ""
     whole: tuple[str, ...] = ()
     least: int = 8
+    samples: bool = False
     fault: Callable[[Sequence[str]], str] = lambda _names: ""
 
     @property
@@ -45,9 +49,11 @@ class Kind:
 SIGMAS = ("sigma_x_mm", "sigma_y_mm", "sigma_z_mm")
 OF_A_POSE = ("t_s", "temperature_c", "sigma_mm", *SIGMAS, "target", "point")
 KINDS: dict[str, Kind] = {
-    "force": Kind("a force record", ("t_s", "fx_n", "fy_n", "fz_n"), ("spindle_deg",), rising="t_s"),
-    "robot": Kind("a robot log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of_cut),
-    "joints": Kind("a joint log", ("t_s",), JOINT_COLUMNS, rising="t_s", fault=fault_of),
+    "force": Kind(
+        "a force record", ("t_s", "fx_n", "fy_n", "fz_n"), ("spindle_deg",), rising="t_s", samples=True
+    ),
+    "robot": Kind("a robot log", ("t_s",), JOINT_COLUMNS, rising="t_s", samples=True, fault=fault_of_cut),
+    "joints": Kind("a joint log", ("t_s",), JOINT_COLUMNS, rising="t_s", samples=True, fault=fault_of),
     "path": Kind("a path", ("point", "pass", "x_mm", "y_mm", "z_mm"), whole=("point", "pass"), least=2),
     "profile": Kind("a profile", ("x_mm", "z_mm"), rising="x_mm"),
     "slopes": Kind(
@@ -62,6 +68,7 @@ KINDS: dict[str, Kind] = {
         ("x_mm", "y_mm", "z_mm"),
         (*POSITIONS, "rx_deg", "ry_deg", "rz_deg", "q1", "q2", "q3", "q4", *OF_A_POSE),
         whole=("target", "point"),
+        samples=True,
         fault=fault_of_poses,
     ),
     "targets": Kind("joint targets", (), POSITIONS, least=1, fault=fault_of_poses),
@@ -118,13 +125,18 @@ def _check_whole_kind(path: Path, kind: Kind, wanted: Sequence[str], names: Sequ
         raise FormatError(path, f"lacks of {kind.title}: {fault}; found the columns {present}")
 
 
-def checked(path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf) -> pd.DataFrame:
+def checked(
+    path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf, *, head: bool = False
+) -> pd.DataFrame:
     """Check a table and return it as the contract has it.
 
-    It is a whole one, or a piece that comes ``after`` a value of the column that rises.
+    It is a whole one, or a piece that comes ``after`` a value of the column that rises, or its ``head``: a
+    record may begin with samples that lack a value, as where a filter has to fill.
 
-    A cloud's rows without coordinates are dropped, their number is in ``attrs["dropped"]``. Everywhere else a
-    value that is not finite is an error, but for the 0 Hz line of an FRF, where integration divides by zero.
+    A cloud's rows without coordinates are dropped, their number is in ``attrs["dropped"]``; so are samples
+    that lack a value, which a note states (:class:`metro.formats.packets.Note`). Where the last row is such a
+    sample, ``attrs["torn"]`` says so. Everywhere else a value that is not finite is an error, but for the
+    0 Hz line of an FRF, where integration divides by zero.
 
     Raises
     ------
@@ -139,8 +151,10 @@ def checked(path: Path, kind: Kind, raw: Raw, least: int, after: float = -np.inf
         _check_whole_kind(path, kind, there, there)
     if kind.title == KINDS["cloud"].title:
         frame = _without_missing(frame)
-    else:
-        _check_finite(path, frame, raw.place)
+    elif kind.samples:
+        raw = _whole_samples(path, Raw(frame, raw.place), most=head)
+        frame, least = raw.frame, 0 if head and len(frame) else least
+    _check_finite(path, frame, raw.place)
     at_least(path, kind, len(frame), least)
     if kind.rising:
         _check_rising(path, frame, kind.rising, raw.place, after)
@@ -169,6 +183,53 @@ def _without_missing(frame: pd.DataFrame) -> pd.DataFrame:
     return kept
 
 
+def _whole_samples(path: Path, raw: Raw, *, most: bool) -> Raw:
+    """Leave out the rows that lack a value, as samples that the logger lost; ``most``: up to all but one.
+
+    Raises
+    ------
+    FormatError
+        Where most rows lack one: a column is recorded at another rate, or not at all.
+    """
+    lacks: npt.NDArray[np.bool_] = raw.frame.isna().to_numpy()
+    lost = np.asarray(lacks.any(axis=1))
+    count, rows = int(np.count_nonzero(lost)), len(lost)
+    if not count:
+        return raw
+
+    def place(row: int) -> str:
+        return f"{raw.place(row)}, column {', '.join(str(name) for name in raw.frame.columns[lacks[row]])}"
+
+    first = place(int(np.argmax(lost)))
+    if count == rows or (2 * count > rows and not most):
+        found = f"{first}: found nothing or NaN, and so in {count} of {rows} rows"
+        expected = "expected a finite number; export all columns at the rate of the slowest"
+        raise FormatError(path, f"{found}, {expected}")
+    kept = np.flatnonzero(~lost)
+    frame = raw.frame.iloc[kept].reset_index(drop=True)
+    message = (
+        f"{count} of {rows} rows lack a value (the first: {first}) and are left out; the logger lost data"
+    )
+    note = Note("missing values", float(count), 0.0, False, message)
+    frame.attrs["notes"] = [*raw.frame.attrs.get("notes", ()), note]
+    frame.attrs["torn"] = place(rows - 1) if lost[-1] else ""
+    return Raw(frame, lambda row: raw.place(int(kept[row])))
+
+
+def whole(path: Path, table: pd.DataFrame) -> pd.DataFrame:
+    """Return a checked table that is the end of a file; its last row must be there in full.
+
+    Raises
+    ------
+    FormatError
+        Where the last row lacks a value: then the file may have been cut off.
+    """
+    if torn := table.attrs.get("torn"):
+        message = f"{torn}: found nothing or NaN in the last row, expected a finite number"
+        raise FormatError(path, f"{message}; copy the file again if it was cut off, else delete that row")
+    return table
+
+
 def _check_finite(path: Path, frame: pd.DataFrame, place: Callable[[int], str]) -> None:
     for name in frame:
         wrong = ~np.isfinite(frame[name].to_numpy())
@@ -178,6 +239,8 @@ def _check_finite(path: Path, frame: pd.DataFrame, place: Callable[[int], str]) 
             row = int(np.argmax(wrong))
             value = frame[name].iloc[row]
             text = "nothing or NaN" if np.isnan(value) else f"{value}"
+            others = int(np.count_nonzero(wrong)) - 1
+            text += f", and {others} more" if others else ""
             raise FormatError(path, f"{place(row)}, column {name}: found {text}, expected a finite number")
 
 

@@ -18,7 +18,7 @@ from metro.formats.dynoware import dynoware_pieces
 from metro.formats.e57 import SIGNATURE, e57_pieces
 from metro.formats.errors import FormatError
 from metro.formats.gocator import read_gocator
-from metro.formats.kinds import KINDS, Kind, Raw, at_least, checked
+from metro.formats.kinds import KINDS, Kind, Raw, at_least, checked, whole
 from metro.formats.mapping import Source, mapped_pieces
 from metro.formats.pcd import pcd_pieces
 from metro.formats.ply import ply_pieces
@@ -145,7 +145,7 @@ def read(source: Path | Source, kind: str) -> pd.DataFrame:
         Naming file, place, column, what was found and what was expected.
     """
     path, raws = _opened(source, kind, None)
-    return checked(path, KINDS[kind], next(raws), KINDS[kind].least)
+    return whole(path, checked(path, KINDS[kind], next(raws), KINDS[kind].least))
 
 
 def read_pieces(source: Path | Source, kind: str, rows: int) -> Iterator[pd.DataFrame]:
@@ -155,19 +155,20 @@ def read_pieces(source: Path | Source, kind: str, rows: int) -> Iterator[pd.Data
     """
     asked, rows_read = KINDS[kind], 0
     path, raws = _opened(source, kind, rows)
-    last = -np.inf
+    last, table = -np.inf, pd.DataFrame()
     for raw in raws:
         table = checked(path, asked, raw, 0, after=last)
         rows_read += len(table)
         last = table[asked.rising].iloc[-1] if asked.rising and len(table) else last
         yield table
     at_least(path, asked, rows_read, asked.least)
+    whole(path, table)
 
 
 def sniff(source: Path | Source, kind: str) -> None:
     """Check header and first rows of a data file, quickly; raises FormatError as :func:`read` would."""
     path, raws = _opened(source, kind, _FIRST_ROWS, first=True)
-    checked(path, KINDS[kind], next(raws), 1)
+    checked(path, KINDS[kind], next(raws), 1, head=True)
 
 
 def stated_kinds(path: Path) -> tuple[str, ...]:

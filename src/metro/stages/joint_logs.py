@@ -26,7 +26,7 @@ def joint(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         if recordings.doubt(file, plausible.clock(time, rate) or joint_doubt(batch, table)):
             continue
         recordings.note(file, run, quality.sampling(time - time[0], rate))
-        recordings.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
+        recordings.note_read(file, run, table)
         drives = [name for name in table if str(name).startswith(("tau", "current"))]
         angles = table[positions([str(name) for name in table.columns])].to_numpy()
         checks = [quality.motion(angles), *(quality.dead(str(n), table[n].to_numpy()) for n in drives)]

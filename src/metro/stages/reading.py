@@ -95,6 +95,10 @@ class Recordings:
         """Add findings on a file to the quality table."""
         self.findings += [{"file": file, "run": run, **finding._asdict()} for finding in findings]
 
+    def note_read(self, file: str, run: str, table: pd.DataFrame) -> None:
+        """Add to the quality table what the reader of a file noted (:class:`metro.formats.packets.Note`)."""
+        self.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
+
     def doubt(self, file: str, message: str) -> bool:
         """Gather a problem of a file, where there is one (""); tell whether there is."""
         self.problems += [Problem("error", file, message)] if message else []

@@ -51,6 +51,7 @@ def force(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         for table in recordings.pieces(file, "force", PIECE):
             if len(table):
                 record.add(table["t_s"].to_numpy(), table[list(FORCES)].to_numpy())
+                recordings.note_read(file, run, table)
                 count += 1
         if len(recordings.problems) > faults or not _fit_force(batch, recordings, run, file, record):
             continue
@@ -124,6 +125,7 @@ def poses(batch: Batch, recordings: Recordings) -> Iterator[Part]:
             or plausible.positions(table[list(POINT)].to_numpy())
         )
         if not recordings.doubt(file, wrong):
+            recordings.note_read(file, run, table)
             yield {"run": run, **{str(name): table[name].astype(float) for name in table}}
 
 

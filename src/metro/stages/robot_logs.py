@@ -59,7 +59,7 @@ def robot(batch: Batch, recordings: Recordings) -> Iterator[Part]:
             places |= {run: goes} if log == "cut" else {}
             zero = recordings.zeros.get(run, own) if log == "cut" else own
             recordings.note(file, run, [starts_at(zero), *quality.sampling(time, rate)])
-            recordings.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
+            recordings.note_read(file, run, table)
             recordings.note(file, run, [] if followed else [NO_SET_POINTS])
             torques = table[axes.torques].to_numpy()
             checks = [quality.motion(goes), *channels(tuple(axes.torques), torques, None)]

@@ -55,7 +55,7 @@ def scan(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         for table in recordings.pieces(file, "cloud", PIECE):
             points = table[list(POINT)].to_numpy()
             points = points if to_work is None else moved(points, to_work)
-            recordings.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
+            recordings.note_read(file, run, table)
             kept, dropped = kept + len(points), dropped + table.attrs["dropped"]
             samples.append(_sample(points))
             if len(points):
