@@ -143,6 +143,17 @@ def only(name, how=added):
     return lambda a, b: {**a, **how({name: a[name]}, {name: b[name]})}
 
 
+def ripples(a, b):
+    """Vectors of torque at the order and at twice it; order and mode are the same in both."""
+    doubled = only("double_sine_nm")(only("double_cosine_nm")(a, b), b)
+    return phasor("torque_nm", "phase_deg")(a, b) | {
+        name: doubled[name] for name in doubled if "double" in name
+    }
+
+
+AMPLIFIED = {"order": 60.0, "mode_hz": 9.0, "mode_damping": 0.07}
+
+
 def masses(a, b):
     mass = a["mass_kg"] + b["mass_kg"]
     moment = sum(one["mass_kg"] * np.array(one["com_mm"]) for one in (a, b))
@@ -220,6 +231,16 @@ COMPOSED = {
         {"torque_nm": 5.0, "order": 60.0, "phase_deg": 130.0},
         phasor("torque_nm", "phase_deg"),
     ),
+    **{
+        f"gear_ripple joint {joint}, amplified": (
+            AMPLIFIED
+            | {"torque_nm": 8.0, "phase_deg": 20.0, "double_sine_nm": 2.0, "double_cosine_nm": -1.0},
+            AMPLIFIED
+            | {"torque_nm": 5.0, "phase_deg": 130.0, "double_sine_nm": 0.5, "double_cosine_nm": 3.0},
+            ripples,
+        )
+        for joint in range(1, 7)
+    },
     "joint_backlash": (
         {"angle_mdeg": 5.0, "drag_nm": 4.0},
         {"angle_mdeg": 12.0, "drag_nm": 4.0},

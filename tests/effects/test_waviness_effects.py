@@ -11,7 +11,8 @@ from metro.effects.path_vibration import ON_WALLS as VIBRATION
 from metro.loop.search.search import search
 from metro.loop.verdict.verdict import parameters
 from metro.observables.waviness.model import Vibration, WavinessModel
-from metro.robot.drive_torques import DriveTorques
+from metro.robot.amplified import AmplifiedRipple, Structure
+from metro.robot.drive_torques import DriveTorques, Ripple
 from metro.robot.torsion import Torsion
 
 MDEG = np.pi / 180e3
@@ -67,6 +68,34 @@ def test_a_vibration_is_found_by_its_frequency_in_time_whatever_its_phase_in_eac
     assert found["frequency_hz"]["value"] == pytest.approx(frequency, abs=0.03)
     assert found["amplitude_um"]["ci95"][0] < amplitude < found["amplitude_um"]["ci95"][1]
     assert found["amplitude_um"]["value"] == pytest.approx(amplitude, rel=0.2)
+
+
+RIPPLES = tuple(
+    e for e in library("waviness") if e.name == "gear_ripple" and e.form.startswith(("joint 1", "joint 2"))
+)
+
+
+def test_a_ripple_is_found_that_grows_with_the_feed_and_has_half_of_its_length_in_it():
+    """At three feeds its frequency is 4.8, 6.7 and 9.5 Hz on the first path, twice that in the last case."""
+    order, mode = 3000.0, Structure(11.0, 0.08)
+    made = AmplifiedRipple(0, order, (30.0, 20.0), (-6.0, 9.0), mode)
+    outcome = search(problem(WavinessModel(tuple(range(6)), amplified=(made,)), seed=6), RIPPLES, GATES)
+    assert [(e.name, e.form) for e in outcome.final.candidate.effects] == [
+        ("gear_ripple", "joint 1, amplified")
+    ]
+    found = parameters(outcome.final, "gear_ripple")
+    assert found["order"]["value"] == pytest.approx(order, abs=1.0)
+    assert found["torque_nm"]["value"] == pytest.approx(np.hypot(30.0, 20.0), rel=0.05)
+    assert found["mode_hz"]["value"] == pytest.approx(mode.frequency, rel=0.02)
+    assert found["mode_damping"]["value"] == pytest.approx(mode.damping, abs=0.02)
+    doubled = (found["double_sine_nm"]["value"], found["double_cosine_nm"]["value"])
+    assert doubled == pytest.approx((-6.0, 9.0), abs=1.5)
+
+
+def test_a_ripple_of_a_stiff_arm_is_one_without_a_mode():
+    truth = WavinessModel(tuple(range(6)), drives=DriveTorques(ripple=(Ripple(0, 2000.0, 25.0, 10.0),)))
+    outcome = search(problem(truth, seed=7), RIPPLES, GATES)
+    assert [(e.name, e.form) for e in outcome.final.candidate.effects] == [("gear_ripple", "joint 1")]
 
 
 def test_waves_of_the_same_length_at_every_feed_are_no_vibration():

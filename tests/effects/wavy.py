@@ -44,6 +44,7 @@ def cut(path, feed):
     return (
         WavyCut(
             by_joint=blank, idle=None, share=np.ones(blank.shape), q=q, rate=np.gradient(q, t, axis=0), t=t,
+            pace=np.gradient(q, t, axis=0),
             moves=np.tile(MOVES[path], (len(X), 1)), load=load, compliance=COMPLIANCE, filtered=filtered,
             longer=np.zeros((2, len(X[KEPT]))),
         ),

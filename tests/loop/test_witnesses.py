@@ -9,8 +9,9 @@ from scipy import optimize
 from toy import BEND, GATES, POINTS, RIPPLE, SIGMA, Wave, problem
 from worded import in_words
 
+from metro.effects.library import library
 from metro.loop.causes.causes import judged
-from metro.loop.causes.witnesses import Closed, Witness, agreement, ask, weighed
+from metro.loop.causes.witnesses import Closed, Witness, agreement, ask, key_of, shared, weighed
 from metro.loop.checks.evidence import change, leave_out
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.descent import descend
@@ -22,6 +23,17 @@ from metro.loop.verdict.batch_story import causes
 from metro.loop.verdict.verdict import judge
 from metro.wording.batch import BRIEF
 from metro.wording.causes import cause_in_words
+
+
+def test_the_forms_of_a_joints_cause_share_the_same_parameters():
+    """A ripple that the arm amplifies has a mode of its own, and the torque that motors see, too."""
+    shares = {}
+    for effect in library():
+        if effect.per == "joint" and not effect.resembled:
+            names = tuple(effect.parameters[place].name for place in shared(effect))
+            shares.setdefault(key_of(effect), set()).add(names)
+    assert shares
+    assert {key: names for key, names in shares.items() if len(names) > 1} == {}
 
 
 def noisy(task, sd, seed):

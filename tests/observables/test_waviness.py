@@ -25,11 +25,27 @@ def test_each_wall_is_a_block_of_waves_within_the_band(made):
     _, observed, task = made
     assert isinstance(task, Problem)
     assert observed["waviness_refused"].empty
-    assert {block.run for block in task.blocks} == {"r1", "r2", "r3"}
+    believed, *walls = task.blocks
+    assert {block.run for block in walls} == {"r1", "r2", "r3"}
     assert [block.run for block in task.role("validate")] == ["r3"]
-    for block in task.blocks:
+    assert (believed.belief, believed.role, believed.measured.tolist()) == (True, "calibrate", [1.0])
+    for block in walls:
         assert block.to_rows(block.measured).shape == block.coordinates["x_mm"].shape
         assert np.isfinite(block.sigma).all()
+
+
+def test_a_profile_that_lies_elsewhere_along_the_log_differs_by_the_direction_of_its_zero(made):
+    """What a shift of 2 µm does to the waves is 2 µm times that direction, whatever made the waves."""
+    _, observed, task = made
+    for block in task.role("identify", "validate"):
+        points = observed["waviness_points"].groupby("run").get_group(block.run)
+        x, height = points["x_mm"].to_numpy() * 1e-3, points["waviness_um"].to_numpy() * 1e-6
+        moved = np.interp(x + 2e-6, x, height) - np.interp(x - 2e-6, x, height)
+        seen = block.synthesis.T @ moved[points["kept"].to_numpy()] / 2
+        expected = block.zeros[:, 0] * 2e-6
+        assert np.linalg.norm(expected) > 0.0
+        assert np.linalg.norm(seen - expected) < 1e-6 * np.linalg.norm(expected)
+        assert 0.0 < block.zero_sd[0] < 0.2e-3
 
 
 def test_the_report_gives_wall_and_prediction_with_intervals(made):

@@ -31,7 +31,7 @@ def peaks(
         Frequencies and amplitudes (k,), the strongest first, k at most ``most``.
     """
     blocks = problem.role("identify")
-    residuals, known = _residuals(problem.base, blocks)
+    residuals, known = _residuals(problem)
     power, amplitude = np.empty(len(frequencies)), np.empty(len(frequencies))
     nothing = np.zeros(len(problem.base.parameters))
     for i, frequency in enumerate(frequencies):
@@ -77,7 +77,7 @@ def own_peaks(
     """
     blocks = problem.role("identify")
     power, square = np.zeros(len(frequencies)), np.zeros(len(frequencies))
-    for block, left, way in zip(blocks, _residuals(problem.base, blocks)[0], ways, strict=True):
+    for block, left, way in zip(blocks, _residuals(problem)[0], ways, strict=True):
         zeros = np.linalg.qr(block.zeros / block.error[:, None])[0]
         residual = left - zeros @ (zeros.T @ left)
         wave = way.share * np.exp(2j * np.pi * frequencies[0] * way.time)
@@ -115,8 +115,13 @@ def middle_start(base: Model, block: Block) -> Array:
     return np.asarray(starts[len(starts) // 2], dtype=float)
 
 
-def _residuals(base: Model, blocks: tuple[Block, ...]) -> tuple[list[Array], list[Array]]:
-    """Return the base model's residual of each block, in units of its error, and its offset there."""
+def _residuals(problem: Problem) -> tuple[list[Array], list[Array]]:
+    """Return the base model's residual of each run, in units of its error, and its offset there.
+
+    What is believed of the base parameters holds: else a wave would be taken for a larger one of these.
+    """
+    base, runs = problem.base, problem.role("identify")
+    blocks = (*runs, *(block for block in problem.blocks if block.belief))
     designs = [base.design(block, middle_start(base, block), None) for block in blocks]
     sigma = [block.error for block in blocks]
     scaled = np.vstack([matrix / s[:, None] for (matrix, _), s in zip(designs, sigma, strict=True)])
@@ -125,7 +130,8 @@ def _residuals(base: Model, blocks: tuple[Block, ...]) -> tuple[list[Array], lis
     )
     beta = np.linalg.lstsq(scaled, target, rcond=None)[0]
     ends = np.cumsum([len(block.measured) for block in blocks])[:-1]
-    return np.split(target - scaled @ beta, ends), [offset for _, offset in designs]
+    count = len(runs)
+    return np.split(target - scaled @ beta, ends)[:count], [offset for _, offset in designs[:count]]
 
 
 def _offset(model: Model, block: Block, beta: Array) -> Array:

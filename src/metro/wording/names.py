@@ -24,6 +24,7 @@ BELIEFS = {
     r"friction_under_load_joint_(\d)": "friction of joint {} under the load of the cut",
     r"gain_of_joint_(\d)": "gain of the torque of joint {}",
     r"gain_of_(.)": "gain of the dynamometer along {}",
+    r"transfer": "the wall's waves less the tip's, as a share",
     r"crosstalk_of_(.)_in_(.)": "crosstalk of the dynamometer from {} to {}",
 }
 

@@ -211,7 +211,8 @@ def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array
 def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Array]]) -> Noise:
     """One step of expectation–maximisation for scatter, zeros and misfit, and what repeats share.
 
-    Scatter and zeros are drawn towards the prior, as if it were ``PRIOR_RUNS`` runs.
+    Scatter and zeros are drawn towards the prior, as if it were ``PRIOR_RUNS`` runs. What is believed to be
+    of a size scatters by no more than it may be off.
 
     Parameters
     ----------
@@ -224,6 +225,7 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
     size = float(np.mean(noise.scatter[at] / prior.scatter[at])) if p else 1.0
     moments: dict[str, Array] = {}
     residuals: list[tuple[Block, Array, Array]] = []
+    largest = min((_may_be_off(block) for block, _, _ in parts if block.belief), default=np.inf)
     for block, residual, directions in parts:
         if block.role == "calibrate":
             continue
@@ -253,12 +255,18 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         level[name] = _towards(flat, noise.level.get(name, 0.0))
     return replace(
         noise,
-        scatter=prior.scatter * factor["scatter"],
+        scatter=np.minimum(prior.scatter * factor["scatter"], largest),
         zero_factor=min(factor["zero"], LARGEST_ZERO),
         misfit=misfit,
         level=level,
         alike=_alike(residuals),
     )
+
+
+def _may_be_off(block: Block) -> float:
+    """Least relative error of what a block believes to be of a size; infinite of what has none."""
+    sized = block.measured != 0.0
+    return float(np.min(block.sigma[sized] / np.abs(block.measured[sized]), initial=np.inf))
 
 
 def alike(one: Noise, other: Noise) -> bool:

@@ -32,13 +32,16 @@ def strained(entries: list[JSON], outcome: Outcome) -> Statement | str:
 
 
 def _estimates(fitted: Fit) -> dict[tuple[str, str, float], float]:
-    """Estimates of what is believed to be zero, in their units, by name, unit and standard deviation."""
+    """Estimates less what is believed, in their units, by name, unit and standard deviation."""
     model, found = fitted.candidate.model(fitted.theta), {}
     parameters = fitted.candidate.base.parameters
     for block in fitted.blocks:
         if block.belief:
             rows, _ = model.design(block, fitted.nuisance[block.run], fitted.beta)
-            for place, sd in zip(np.abs(rows).argmax(axis=1), block.sigma, strict=True):
+            for place, known, sd in zip(
+                np.abs(rows).argmax(axis=1), block.measured, block.sigma, strict=True
+            ):
                 one = parameters[place]
-                found[one.name, one.unit, float(sd) / one.si] = float(fitted.beta[place]) / one.si
+                off = float(fitted.beta[place]) - float(known)
+                found[one.name, one.unit, float(sd) / one.si] = off / one.si
     return found

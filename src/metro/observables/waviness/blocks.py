@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
@@ -14,13 +15,13 @@ from metro.joint_columns import numbered
 from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import wall
 from metro.observables.problem import Block
-from metro.observables.waviness.model import PHASES, WavyCut
+from metro.observables.waviness.model import PHASES, BelievedSetting, WavyCut
 from metro.observables.waviness.points import ENCODER, GRID, IDLE, STRAYED
 from metro.robot.kinematics import Arm
 from metro.robot.statics import joint_torque, tip_jacobian
 from metro.surface.profile import part, transmission
 from metro.surface.waves import signal_share, wave_basis
-from metro.units import MM, UM, Array
+from metro.units import MM, MS, UM, Array
 
 LEAST = 0.6  # of the shortest wavelength: the filter passes less than a seventh of shorter waves
 NYQUIST = 2.0  # samples of the log per shortest wave that it can resolve
@@ -29,6 +30,13 @@ OCTAVES = (2.0, 4.0)  # mm, limits of the bands in which the residual is tested
 # Of the straightness of the profiler's traverse, rms over the waves that are compared: makers state 0.2 to
 # 0.5 µm over 100 mm, most of it long.
 DATUM = 0.2 * UM
+# The first mode of an arm (6 to 25 Hz) makes a wave at half of its frequency a third larger, and a wave at
+# three halves of it a fifth smaller than it was: nothing that follows the joints is far from them.
+FOLLOWS = 0.5
+BENDS = 3  # degree of the angles over time: an arm's joints along a straight line turn no more than that
+# The tip follows its joints with a delay of 2 ζ / ω of the arm's first mode: 6 ms at 6.5 Hz and 12 %, 0.3 ms
+# at 25 Hz and 2 % (Schneider 2014). A profile's place along the log is known no better than half of that.
+DELAY = 3 * MS
 LOOSEST = 0.1 * MM  # largest standard error of a profile's place along the log, if they do not determine it
 
 
@@ -53,7 +61,8 @@ def wave_block(
     -----
     The tracking error below the noise of the encoders may be the same in all repeats; the noise that passes
     for tracking error differs from run to run. Each joint is weighed by the signal above the noise of its own
-    encoder. At the tip the noise of the first joints has a longer lever, and may exceed the tracking error of
+    encoder. A profile that lies elsewhere along the log differs by its own slope, whatever made its waves.
+    At the tip the noise of the first joints has a longer lever, and may exceed the tracking error of
     the wrist.
     """
     row: Any = batch.runs.loc[run]
@@ -74,6 +83,7 @@ def wave_block(
     profiler = float(batch.instrument("profiler").get("sigma_mm", 0.0005)) * MM
     traced = profiler**2 * facts["profile_step_mm"] * MM / GRID
     share, missed, passed = signal_share(by_joint / passes[:, None], coded, waves @ profile / passes, traced)
+    speed = float(np.ptp(points["x_mm"]) * MM / np.ptp(points["t_s"]))
     longer, _ = wave_basis(int(kept.sum()), GRID, cutoff, np.inf)
     place, axis = points.loc[kept, "x_mm"].to_numpy(), np.full(int(kept.sum()), "z")
     return Block(
@@ -94,12 +104,22 @@ def wave_block(
             **_joints(points, force, arm, wall(batch, run).normal),
         ),
         axis=np.full(len(length), "z"),
-        zeros=(share * (waves @ band @ np.gradient(strayed, GRID, axis=0))).sum(axis=1)[:, None],
-        zero_sd=np.array([min(facts["shift_sd_mm"] * MM, LOOSEST)]),
+        zeros=(waves @ np.gradient(points["waviness_um"].to_numpy() * UM, GRID)[kept])[:, None],
+        zero_sd=np.array([math.hypot(min(facts["shift_sd_mm"] * MM, LOOSEST), DELAY * speed)]),
         coordinates={"axis": axis, "s_mm": place, "x_mm": place, "t_s": points.loc[kept, "t_s"].to_numpy()},
         synthesis=waves.T,
         labels=_band(length),
         symmetries=np.array(PHASES)[:, None],
+    )
+
+
+def believed_block() -> Block:
+    """Return what is believed of the transfer: the wall follows the tip, and the tip its joints."""
+    zeros, none = np.zeros((1, 0)), np.zeros(0)
+    return Block(
+        *("believed", "believed", "calibrate", 0, np.ones(1), np.array([FOLLOWS]), BelievedSetting()),
+        *(np.array(["transfer"]), zeros, none, {}),
+        belief=True,
     )
 
 
@@ -122,7 +142,22 @@ def _joints(points: pd.DataFrame, force: pd.DataFrame | None, arm: Arm, normal: 
         steady = force[inside] if inside.any() else force
         load = -joint_torque(jacobian, np.tile(steady[FORCE].mean().to_numpy(), (len(q), 1)))
     moves = np.einsum("a,mai->mi", normal, jacobian)
-    return {"q": q, "t": t, "rate": np.gradient(q, t, axis=0), "moves": moves, "load": load}
+    return {
+        "q": q,
+        "t": t,
+        "rate": np.gradient(q, t, axis=0),
+        "pace": _pace(q, t),
+        "moves": moves,
+        "load": load,
+    }
+
+
+def _pace(q: Array, t: Array) -> Array:
+    """Smooth speeds (m, n) of the joints along a line at a steady feed; stamps (m,) may be late."""
+    from numpy.polynomial import Polynomial
+
+    fits = [Polynomial.fit(t, angle, BENDS) for angle in q.T]
+    return np.stack([fit.deriv()(t) for fit in fits], axis=1)
 
 
 def _free_of_marks(batch: Batch, run: str, length: Array) -> np.ndarray:

@@ -3,7 +3,8 @@
 waviness = transfer × (tracking error of the tip by the encoders) + F n · [Σ_i j_i x_i + vibration], with F
 the filter of the profile, n the wall's normal, j_i the columns of the tip's Jacobian. The encoders are on the
 motors, so they do not see the twist x_i = (T_i − τ_i) c_i of joint i. T_i is the torque of the cut, and τ_i
-the friction and ripple of the gears. When T_i changes its sign, the joint passes its gap.
+the friction and ripple of the gears. When T_i changes its sign, the joint passes its gap. A ripple that comes
+near the first mode of the arm's structure is amplified by it.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from metro.observables.problem import Block, Parameter
+from metro.robot.amplified import AmplifiedRipple
 from metro.robot.drive_torques import DriveTorques
 from metro.robot.torsion import Torsion
 from metro.units import Array
@@ -33,7 +35,8 @@ class WavyCut:
     by_joint : (k, n) tracking error of the tip along the wall's normal by the encoders, joint by joint,
         filtered as the profile is, m. idle : (k, n) that of the idle run; None if there is none.
     share : (k, n) share of each joint's waves that is not noise of its encoder.
-    q, rate : (m, n) joint angles, rad, and speeds, rad/s. t : (m,) from the start of the log of the cut, s.
+    q, rate, pace : (m, n) joint angles, rad, and speeds, rad/s: from point to point, and smooth.
+    t : (m,) from the start of the log of the cut, s.
     moves : (m, n) displacement of the tip along the wall's normal per turn of each joint, m/rad.
     load : (m, n) torque of the steady cut on the link of each joint, N m; zero if no force is known.
     compliance : (n,) of the joints, rad/(N m).
@@ -47,6 +50,7 @@ class WavyCut:
     share: Array
     q: Array
     rate: Array
+    pace: Array
     t: Array
     moves: Array
     load: Array
@@ -58,6 +62,11 @@ class WavyCut:
     def tracking(self) -> Array:
         """Tracking error (n,), m, without the share that is noise."""
         return np.asarray((self.share * self.by_joint).sum(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class BelievedSetting:
+    """Setting of what is believed of the transfer beforehand."""
 
 
 @dataclass(frozen=True)
@@ -97,12 +106,14 @@ class WavinessModel:
     torsion : of the joints; only its gaps make waves.
     vibration : waves that are functions of time alone, not of the place; each run has its own phase of each,
         since nothing starts a vibration with the log.
+    amplified : ripples of gears that the arm's structure amplifies.
     """
 
     joints: tuple[int, ...]
     drives: DriveTorques = field(default_factory=DriveTorques)
     torsion: Torsion = field(default_factory=Torsion)
     vibration: tuple[Vibration, ...] = ()
+    amplified: tuple[AmplifiedRipple, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -111,17 +122,24 @@ class WavinessModel:
 
     def largest_in_cut(self, blocks: Sequence[Block]) -> Array:
         """Largest torque of the cuts on the link of each joint, (n,) N m."""
-        settings: list[Any] = [block.setting for block in blocks]
+        settings: list[Any] = [block.setting for block in blocks if not block.belief]
         return np.asarray(np.abs(np.vstack([run.load for run in settings])).max(axis=0, initial=0.0))
 
-    def nuisance_starts(self, _block: Block) -> Array:
+    def nuisance_starts(self, block: Block) -> Array:
         """Return starts of the phases of a run."""
-        return phase_starts(self.vibration)
+        return np.zeros((1, 0)) if block.belief else phase_starts(self.vibration)
 
     def design(self, block: Block, nuisance: Array, _beta: Array | None = None) -> tuple[Array, Array]:
-        """Waves (n, 1), m per unit of transfer, and the waves that no encoder sees (n,), m."""
+        """Waves (n, 1), m per unit of transfer, and the waves that no encoder sees (n,), m.
+
+        For :class:`BelievedSetting` it is the transfer itself.
+        """
         run: Any = block.setting
+        if isinstance(run, BelievedSetting):
+            return np.ones((1, 1)), np.zeros(1)
         torque = run.load - self.drives.at(run.q, run.rate, run.t)
+        for ripple in self.amplified:
+            torque[:, ripple.joint] -= ripple.at(run.q, run.pace)
         twist = run.compliance * torque + self.torsion.passed(run.load)
         unseen = (run.moves * twist).sum(axis=1)
         for swing, phase in zip(self.vibration, phases_of(self.vibration, nuisance), strict=True):

@@ -18,7 +18,7 @@ from metro.observables.deformation.model import DeformationModel
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.observables.waviness import NAME, TABLES
-from metro.observables.waviness.blocks import wave_block
+from metro.observables.waviness.blocks import believed_block, wave_block
 from metro.observables.waviness.model import WavinessModel
 from metro.observables.waviness.points import ENCODER, wave_points
 from metro.observables.waviness.report import transfer, waviness_of
@@ -112,9 +112,8 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         *([] if forces else ["No force on the tip is known: no joint passes a gap here."]),
         *notes,
     )
-    return Problem(
-        NAME, "um", UM, WavinessModel(tuple(arm.axes.turning)), blocks, np.array([SCATTER]), SYSTEMATIC, said
-    )
+    base = WavinessModel(tuple(arm.axes.turning))
+    return Problem(NAME, "um", UM, base, (believed_block(), *blocks), np.array([SCATTER]), SYSTEMATIC, said)
 
 
 def _said_of_dust(facts: pd.DataFrame) -> list[str]:
@@ -155,11 +154,12 @@ def report(
         reason = task.reason if isinstance(task, Refusal) else "no run to fit"
         return {"arm": {"not_identified": {"waviness": reason}}}
     by_run, beside = {}, []
-    for block in task.blocks:
+    runs = [block for block in task.blocks if not block.belief]
+    for block in runs:
         matrix, offset = task.base.design(block, np.zeros(0), fit.beta)
         by_run[block.run] = waviness_of(block, offset + matrix @ fit.beta)
         beside.append(offset)
-    return {"arm": {"waviness": by_run, "waviness_transfer": transfer(task.blocks, beside)}}
+    return {"arm": {"waviness": by_run, "waviness_transfer": transfer(runs, beside)}}
 
 
 OBSERVABLE = Observable(NAME, TABLES, observe, problem, report, observed_with_coefficients=True)
