@@ -31,7 +31,7 @@ OCTAVES = (2.0, 4.0)  # mm, limits of the bands in which the residual is tested
 # 0.5 µm over 100 mm, most of it long.
 DATUM = 0.2 * UM
 # The first mode of an arm (6 to 25 Hz) makes a wave at half of its frequency a third larger, and a wave at
-# three halves of it a fifth smaller than it was: nothing that follows the joints is far from them.
+# three halves of it a fifth smaller. Nearer to the mode a wave grows by more: such a transfer is a strain.
 FOLLOWS = 0.5
 BENDS = 3  # degree of the angles over time: an arm's joints along a straight line turn no more than that
 # The tip follows its joints with a delay of 2 ζ / ω of the arm's first mode: 6 ms at 6.5 Hz and 12 %, 0.3 ms
