@@ -8,8 +8,12 @@ from wavy import GATES, problem
 
 from metro.effects.library import library
 from metro.effects.path_vibration import ON_WALLS as VIBRATION
+from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.fit import fit
+from metro.loop.fitting.noise import first_noise
 from metro.loop.search.search import search
 from metro.loop.verdict.verdict import parameters
+from metro.observables.waviness.blocks import FOLLOWS, believed_block
 from metro.observables.waviness.model import Vibration, WavinessModel
 from metro.robot.amplified import AmplifiedRipple, Structure
 from metro.robot.drive_torques import DriveTorques, Ripple
@@ -68,6 +72,17 @@ def test_a_vibration_is_found_by_its_frequency_in_time_whatever_its_phase_in_eac
     assert found["frequency_hz"]["value"] == pytest.approx(frequency, abs=0.03)
     assert found["amplitude_um"]["ci95"][0] < amplitude < found["amplitude_um"]["ci95"][1]
     assert found["amplitude_um"]["value"] == pytest.approx(amplitude, rel=0.2)
+
+
+def test_no_run_follows_the_tip_by_another_share_than_is_believed():
+    task = problem(seed=8)
+    blocks = tuple(
+        replace(block, measured=block.measured * (4.0 if number % 2 else -2.0))
+        for number, block in enumerate(task.role("identify"))
+    )
+    prior = first_noise(GATES.model_form_budget, task.scatter, blocks)
+    assert fit(Candidate(task.base), blocks, prior).noise.scatter[0] > FOLLOWS
+    assert fit(Candidate(task.base), (believed_block(), *blocks), prior).noise.scatter[0] <= FOLLOWS
 
 
 RIPPLES = tuple(
