@@ -37,7 +37,7 @@ ROOMS = {
     "observables": {"batch", "signals", "structure", "kriging", *PHYSICS},
     "effects": {"signals", "structure", "observables", *PHYSICS},
     "slips": {"batch", "signals", "cutting", "observables"},
-    "loop": {"observables", "effects", "kriging"},
+    "loop": {"observables", "effects", "kriging", "compiled"},
     "discovery": {"cutting", "observables", "effects", "loop"},
     "wording": set(),
     "decisions": {"cutting", "signals"},

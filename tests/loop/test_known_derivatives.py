@@ -71,13 +71,13 @@ def test_the_noise_is_estimated_until_it_stays(monkeypatch):
     blocks = task.role("identify")
     prior = first_noise(GATES.model_form_budget, task.scatter, blocks)
     fitted = fit(Candidate(task.base), blocks, prior)
-    steps, step = [], reestimate.noise_room.updated
+    steps, step = [], reestimate.updated
 
     def counted(*arguments):
         steps.append(step(*arguments))
         return steps[-1]
 
-    monkeypatch.setattr(reestimate.noise_room, "updated", counted)
+    monkeypatch.setattr(reestimate, "updated", counted)
     first = reestimate.reestimated(fitted.candidate, blocks, prior, prior, state_of(fitted))
     for _ in range(6):
         first = reestimate.reestimated(fitted.candidate, blocks, prior, first, state_of(fitted))

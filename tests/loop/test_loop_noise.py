@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from toy import BETA, POINTS, SIGMA, Wave, block
 
 from metro.loop.fitting import noise as noise_room
+from metro.loop.fitting.expectation import updated
 from metro.loop.fitting.noise import (
     Noise,
     block_sigma,
@@ -16,7 +17,6 @@ from metro.loop.fitting.noise import (
     first_noise,
     missed,
     shared,
-    updated,
     whitener,
 )
 

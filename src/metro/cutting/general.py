@@ -22,7 +22,7 @@ from metro.cutting.arcs import TURN
 from metro.cutting.chip import Cut, feed_per_radian
 from metro.cutting.cutter import Cutter
 from metro.cutting.edges import Edges
-from metro.cutting.envelope import meridian, place_at
+from metro.cutting.envelope import Meridian, meridian, place_at
 from metro.cutting.general_panels import RADIUS, Edge, Nodes, Scratch, panel_points
 from metro.cutting.general_teeth import Teeth, alone_from, reach, teeth_in
 from metro.cutting.law import EdgeLaw
@@ -68,13 +68,21 @@ def _nodes(bare: Cutter, depth: float, lag: float, feed: float, *, linear: bool)
     line = meridian(bare, depth, lag, feed)
     places, weights = rule(POINTS, linear)
     shares = np.sort(np.concatenate([[0.0, 0.5, 1.0], places]))
-    table = np.empty((len(line.length), len(shares), 8))
-    for panel, node in np.ndindex(table.shape[:2]):
-        place = place_at(line, panel, float(shares[node]))
-        angles = bare.lag_per_depth * place.height, lag * place.height
-        waves = [wave(angle) for angle in angles for wave in (math.sin, math.cos)]
-        table[panel, node] = [*place, *waves]
+    table = _places(line, lag, shares)
     return Nodes(line, lag, shares, np.isin(shares, places).nonzero()[0], weights, table)
+
+
+@compiled_with_arrays
+def _places(line: Meridian, lag: float, shares: Array) -> Array:
+    """Return the places at shares of each panel, with sine and cosine of either lag angle (``Nodes``)."""
+    table = np.empty((len(line.length), len(shares), 8))
+    for panel in range(len(line.length)):
+        for node in range(len(shares)):
+            place, row = place_at(line, panel, shares[node]), table[panel, node]
+            row[0], row[1], row[2], row[3] = place.height, place.radius, place.sine, place.cosine
+            for at, angle in ((4, line.lag_per_depth * place.height), (6, lag * place.height)):
+                row[at], row[at + 1] = math.sin(angle), math.cos(angle)
+    return table
 
 
 def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_path: bool) -> Array:

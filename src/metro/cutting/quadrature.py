@@ -91,6 +91,7 @@ def _summed(cut: Pieces, along: Points, shear: Array, angles: int) -> Array:
     return basis
 
 
+@lru_cache(maxsize=512)
 def is_linear(law: EdgeLaw, thickness: float) -> bool:
     """Whether the law's shear is the thickness itself: asked of it, for an effect may have replaced it."""
     some = np.linspace(0.0, thickness, 5)

@@ -8,28 +8,20 @@ samples make everything significant.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from itertools import combinations
 
 import numpy as np
 
+from metro.compiled import compiled_with_arrays
 from metro.observables.problem import Block
 from metro.units import Array
 
 PRIOR_RUNS = 4  # for which what is declared of scatter and zeros counts
 MISFIT_CORRELATION = 12.0  # neighbouring elements of a misfit that count as one piece of evidence
-# Of the way to the misfit estimated: a larger one lets the elements that are measured best weigh less, and is
-# then estimated smaller, so that whole steps would go to and fro about the point where it stays.
-MISFIT_STEP = 0.5
-# One less the squared cosine of signals² and of one size for all: from there on they are told from one size,
-# and what is missed whatever the signal from what grows with it. Signals that scatter by a tenth reach it.
-ONE_SIZE = 0.03
 SAME = 1e-3  # relative difference of all that a noise consists of, below which no weight changes that counts
-LARGEST_ZERO = 4.0  # of its deviation: a zero that is farther off is something else that is taken for it
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +95,7 @@ def first_noise(budget: float, scatter: Array, blocks: Sequence[Block]) -> Noise
 
 
 @lru_cache(maxsize=1024)
-def _axes(block: Block) -> tuple[tuple[str, ...], np.ndarray, Array]:
+def axes(block: Block) -> tuple[tuple[str, ...], np.ndarray, Array]:
     """Names of a block's axes, the number of each element's axis, and the rms of its axis's signal."""
     names, number = np.unique(block.axis.astype(str), return_inverse=True)
     signal = block.measured if block.scale is None else block.scale
@@ -118,18 +110,27 @@ def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION
     What all repeats share counts as many times as there are repeats. The misfit counts ``correlation``
     times, so that that many elements weigh as one.
     """
-    scale = _axes(block)[2] if block.scale is None else block.scale
+    variance = sound(block, noise) + correlation * apart(block, noise) * missed(block, noise)
+    variance.flags.writeable = False
+    return np.asarray(variance)
+
+
+def sound(block: Block, noise: Noise) -> Array:
+    """Variance of each element that nothing else shares where the model misses nothing, (n,)."""
+    scale = axes(block)[2] if block.scale is None else block.scale
     repeats = noise.repeats.get(block.condition, 1) * block.repeats
     alike = 0.0 if block.alike is None else block.alike**2 * (1.0 + noise.alike * (repeats - 1.0))
-    wrong = (noise.budget * scale) ** 2 + correlation * missed(block, noise)
-    variance = np.asarray(block.sigma**2 + alike + repeats * noise.everywhere * wrong)
-    variance.flags.writeable = False
-    return variance
+    return np.asarray(block.sigma**2 + alike + apart(block, noise) * (noise.budget * scale) ** 2)
+
+
+def apart(block: Block, noise: Noise) -> float:
+    """Return how many times what the model gets wrong counts in one of the runs that share it."""
+    return noise.repeats.get(block.condition, 1) * block.repeats * noise.everywhere
 
 
 def missed(block: Block, noise: Noise) -> Array:
     """Mean square of what the model misses, by element (n,), SI². It is zero in a load test."""
-    names, number, rms = _axes(block)
+    names, number, rms = axes(block)
     if block.role == "calibrate":
         return np.zeros(len(rms))
     share, level = (
@@ -146,7 +147,7 @@ def misses(noise: Noise) -> bool:
 def within_budget(blocks: Sequence[Block], noise: Noise) -> bool:
     """Whether the model misses less in every block than it is allowed to get wrong."""
     return all(
-        bool((missed(block, noise) < (noise.budget * _axes(block)[2]) ** 2).all())
+        bool((missed(block, noise) < (noise.budget * axes(block)[2]) ** 2).all())
         for block in blocks
         if block.role != "calibrate"
     )
@@ -208,67 +209,6 @@ def block_sigma(block: Block, noise: Noise, design: Array, beta: Array) -> Array
     return np.asarray(np.sqrt(spread))
 
 
-def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Array]]) -> Noise:
-    """One step of expectation–maximisation for scatter, zeros and misfit, and what repeats share.
-
-    Scatter and zeros are drawn towards the prior, as if it were ``PRIOR_RUNS`` runs. What is believed to be
-    of a size scatters by no more than it may be off.
-
-    Parameters
-    ----------
-    parts : for each run: block, residual (n,), and directions (n, k) under ``noise``. The first p directions
-        of a run are those of the base parameters that scatter, then come its zeros.
-    """
-    at = prior.scattering
-    p = len(at)
-    amplitudes = {"scatter": [1.0] * PRIOR_RUNS, "zero": [1.0] * PRIOR_RUNS}
-    size = float(np.mean(noise.scatter[at] / prior.scatter[at])) if p else 1.0
-    moments: dict[str, Array] = {}
-    residuals: list[tuple[Block, Array, Array]] = []
-    largest = min((_may_be_off(block) for block, _, _ in parts if block.belief), default=np.inf)
-    for block, residual, directions in parts:
-        if block.role == "calibrate":
-            continue
-        variance = diagonal(block, noise)
-        deviation, uncertain = amplitude(directions, residual, variance)
-        expected = deviation**2 + np.diag(uncertain)
-        amplitudes["scatter"] += [float(size**2 * expected[:p].mean())] if p else []
-        of_zeros = expected[p : p + block.zeros.shape[1]]
-        amplitudes["zero"] += [float(noise.zero_factor**2 * of_zeros.mean())] if len(of_zeros) else []
-        # The misfit as it is, not as it weighs: else it takes what the shared directions explain.
-        deviation, uncertain = amplitude(directions, residual, diagonal(block, noise, correlation=1.0))
-        left = residual - directions @ deviation
-        residuals.append((block, left, variance))
-        spread = left**2 + ((directions @ uncertain) * directions).sum(axis=1)
-        excess = spread - diagonal(block, noise.sound)
-        names, number, rms = _axes(block)
-        kinds = np.stack([rms**2, np.ones_like(rms)]) / variance
-        products = np.einsum("in,jn->nij", kinds, np.vstack([kinds, excess / variance]))
-        for place, name in enumerate(names):
-            moments[name] = moments.get(name, 0.0) + products[number == place].sum(axis=0)
-    factor = {key: float(np.sqrt(np.mean(values))) for key, values in amplitudes.items()}
-    misfit: dict[str, float] = {}
-    level: dict[str, float] = {}
-    for name, moment in moments.items():
-        share, flat = _squares(moment)
-        misfit[name] = _towards(share, noise.misfit.get(name, 0.0))
-        level[name] = _towards(flat, noise.level.get(name, 0.0))
-    return replace(
-        noise,
-        scatter=np.minimum(prior.scatter * factor["scatter"], largest),
-        zero_factor=min(factor["zero"], LARGEST_ZERO),
-        misfit=misfit,
-        level=level,
-        alike=_alike(residuals),
-    )
-
-
-def _may_be_off(block: Block) -> float:
-    """Least relative error of what a block believes to be of a size; infinite of what has none."""
-    sized = block.measured != 0.0
-    return float(np.min(block.sigma[sized] / np.abs(block.measured[sized]), initial=np.inf))
-
-
 def alike(one: Noise, other: Noise) -> bool:
     """Whether two noises, one estimated from the other, are the same but for what does not count."""
     first, second = (
@@ -278,52 +218,19 @@ def alike(one: Noise, other: Noise) -> bool:
     return len(first) == len(second) and bool(np.allclose(first, second, rtol=SAME, atol=0.0))
 
 
-def _towards(square: float, known: float) -> float:
-    return math.sqrt(MISFIT_STEP * square + (1.0 - MISFIT_STEP) * known**2)
-
-
-def _squares(moment: Array) -> tuple[float, float]:
-    """Least squares for relative misfit² and level², neither of them negative.
-
-    Where all runs have signals of one size nothing tells the two apart: then all is relative.
-
-    Parameters
-    ----------
-    moment : (2, 3) normal equations with their right side.
-    """
-    (a, b, x), (_, c, y) = moment.tolist()
-    determinant = a * c - b * b
-    if a == 0.0:
-        return 0.0, max(0.0, y) / c if c else 0.0
-    if determinant > ONE_SIZE * a * c:
-        share, level = (c * x - b * y) / determinant, (a * y - b * x) / determinant
-        if share >= 0.0 and level >= 0.0:
-            return share, level
-        if share < 0.0:
-            return 0.0, max(0.0, y) / c
-    return max(0.0, x) / a, 0.0
-
-
-def _alike(residuals: Sequence[tuple[Block, Array, Array]]) -> float:
-    """How much of ``Block.alike`` repeats share, by the products of their residuals, plus a standard error.
-
-    Parameters
-    ----------
-    residuals : for each run: block, what is left of it (n,), and its variance (n,).
-    """
-    shared, possible = 0.0, 0.0
-    for (one, left, variance), (other, right, its) in combinations(residuals, 2):
-        if one.condition != other.condition or one.alike is None or other.alike is None:
-            continue
-        if one.alike.shape == other.alike.shape:  # else they are not the same waves
-            each = one.alike * other.alike / (variance * its)
-            shared += float(each @ (left * right))
-            possible += float(each @ (one.alike * other.alike))
-    return min(1.0, max(0.0, shared / possible) + 1.0 / math.sqrt(possible)) if possible else 1.0
-
-
+@compiled_with_arrays
 def amplitude(directions: Array, residual: Array, variance: Array) -> tuple[Array, Array]:
     """Return the expected amplitude of each shared direction (k,), and the covariance of that."""
-    scaled = directions / np.sqrt(variance)[:, None]
-    covariance = np.asarray(np.linalg.inv(np.eye(scaled.shape[1]) + scaled.T @ scaled), dtype=float)
-    return covariance @ (scaled.T @ (residual / np.sqrt(variance))), covariance
+    count = directions.shape[1]
+    precision, right = np.eye(count), np.zeros(count)
+    for i in range(len(residual)):
+        for j in range(count):
+            weighted = directions[i, j] / variance[i]
+            right[j] += weighted * residual[i]
+            for k in range(j + 1):
+                precision[j, k] += weighted * directions[i, k]
+    for j in range(count):
+        for k in range(j):
+            precision[k, j] = precision[j, k]
+    covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
+    return np.asarray(covariance @ right), covariance

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.expectation import updated
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.system import State, linearised
 from metro.observables.problem import Block
@@ -41,7 +42,7 @@ def _expected(
             (block, residual, noise_room.shared(block, noise, matrix, state.beta))
             for block, residual, matrix in parts
         ]
-        before, noise = noise, noise_room.updated(noise, prior, directions)
+        before, noise = noise, updated(noise, prior, directions)
         if noise_room.alike(before, noise):
             break
     return noise

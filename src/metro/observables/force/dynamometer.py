@@ -95,13 +95,24 @@ class Recording:
         return float(np.sinc(self.orbit * self.span / (2.0 * math.pi)))
 
 
+STANDING = Recording((0.0,), 0.0, 0.0)  # whose frame does not turn
+
+
 @lru_cache(maxsize=1024)
 def transfer(sensor: Dynamometer, recording: Recording, orders: int) -> ComplexArray:
     """Map of the force to the reading at the orders 0…, in the comparison's frame: (blocks, orders, 3, 3)."""
     if sensor.ideal:
         return np.broadcast_to(np.eye(3, dtype=complex), (len(recording.middles), orders, 3, 3))
     modes = np.array([(one.frequency, one.damping) for one in sensor.resonances]).reshape(-1, 2, 3)
-    seen = responses(_by_channel(sensor.mixing, recording), recording.speed, modes, orders)
+    shape = len(recording.middles), orders, 3, 3
+    if not recording.orbit:  # then nothing turns, and all time blocks read alike but for what leaks away
+        shares = _by_channel(sensor.mixing, STANDING)
+        seen = np.broadcast_to(responses(shares, recording.speed, modes, orders), shape)
+        if not any(sensor.discharge):
+            return seen
+        seen = seen.copy()
+    else:
+        seen = responses(_by_channel(sensor.mixing, recording), recording.speed, modes, orders)
     seen[:, 0] = _steady(sensor.mixing, sensor.discharge, recording)
     seen.flags.writeable = False
     return seen
@@ -151,6 +162,8 @@ def _steady(mixing: Mixing, discharge: Triple, recording: Recording) -> Array:
 
 def _leaked(rate: Array, orbit: float, since: Array) -> ComplexArray:
     """Return the remaining part of e^{iωt}, applied from t = 0 on, after a discharge at ``rate`` (3,)."""
+    if not orbit:
+        return np.asarray(np.exp(-rate * since), complex)
     wave = np.exp(1j * orbit * since) + np.zeros_like(rate)
     with np.errstate(divide="ignore", invalid="ignore"):  # without discharge all of it is left
         left = (1j * orbit * wave + rate * np.exp(-rate * since)) / (1j * orbit + rate)

@@ -192,7 +192,8 @@ class ForceModel:
         ) * self._worn(setting)
 
     def _worn(self, setting: ForceSetting) -> Array:
-        return np.repeat([setting.feed_ratio, self.law.edge(setting.cut_length)], 3)
+        shear, edge = setting.feed_ratio, self.law.edge(setting.cut_length)
+        return np.array([shear, shear, shear, edge, edge, edge])
 
     def _rows(self, force: ComplexArray, setting: ForceSetting, nuisances: Array) -> Array:
         """Return what is read of a force (feeds, blocks or 1, H+1, 3, p) at nuisances (k, m): (k, n, p)."""
