@@ -19,6 +19,7 @@ SOURCE = ROOT / "src/metro"
 FOLDERS = ("checks", "search", "verdict", "causes", "labels")
 SINGLE = (
     "loop/fitting/noise.py",
+    "loop/fitting/expectation.py",
     "loop/fitting/fit.py",
     "loop/fitting/reestimate.py",
     "loop/fitting/covariance.py",
