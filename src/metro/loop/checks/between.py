@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.loop.fitting import noise as noise_room
+from metro.loop.fitting.expectation import amplitude
 from metro.loop.fitting.fit import Fit
 from metro.observables.problem import Block
 from metro.units import Array
@@ -81,9 +82,7 @@ def _deviations(fitted: Fit, block: Block) -> tuple[Array, Array, Array, Array]:
     matrix, offset = model.design(block, fitted.nuisance[block.run], fitted.beta)
     directions = noise_room.shared(block, fitted.noise, matrix, fitted.beta)
     residual = block.measured - offset - matrix @ fitted.beta
-    deviation, uncertain = noise_room.amplitude(
-        directions, residual, noise_room.diagonal(block, fitted.noise)
-    )
+    deviation, uncertain = amplitude(directions, residual, noise_room.diagonal(block, fitted.noise))
     p = len(fitted.noise.scattering)
     share = 1.0 - np.diag(uncertain)[:p]
     scaled = np.where(share > DETERMINED, deviation[:p] / np.sqrt(np.maximum(share, DETERMINED)), 0.0)

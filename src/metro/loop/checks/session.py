@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.loop.fitting import noise as noise_room
+from metro.loop.fitting.expectation import amplitude
 from metro.loop.fitting.fit import Fit
 from metro.observables.problem import Block
 from metro.units import Array
@@ -64,9 +65,9 @@ def _deviation(fitted: Fit, block: Block) -> Array:
     matrix, offset = model.design(block, fitted.nuisance[block.run], fitted.beta)
     directions = noise_room.shared(block, fitted.noise, matrix, fitted.beta)
     residual = block.measured - offset - matrix @ fitted.beta
-    amplitude, _ = noise_room.amplitude(directions, residual, noise_room.diagonal(block, fitted.noise))
+    deviation, _ = amplitude(directions, residual, noise_room.diagonal(block, fitted.noise))
     at = fitted.noise.scattering
-    return np.asarray(amplitude[: len(at)] * fitted.noise.scatter[at])
+    return np.asarray(deviation[: len(at)] * fitted.noise.scatter[at])
 
 
 def _cusum(series: Array) -> Array:

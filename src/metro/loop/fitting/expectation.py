@@ -15,7 +15,6 @@ from metro.loop.fitting.noise import (
     MISFIT_CORRELATION,
     PRIOR_RUNS,
     Noise,
-    amplitude,
     apart,
     axes,
     missed,
@@ -134,6 +133,24 @@ def _expected(
         at[1, 2] += second * excess
     moments[:, 1, 0] = moments[:, 0, 1]
     return expected, left, moments
+
+
+@compiled_with_arrays
+def amplitude(directions: Array, residual: Array, variance: Array) -> tuple[Array, Array]:
+    """Return the expected amplitude of each shared direction (k,), and the covariance of that."""
+    count = directions.shape[1]
+    precision, right = np.eye(count), np.zeros(count)
+    for i in range(len(residual)):
+        for j in range(count):
+            weighted = directions[i, j] / variance[i]
+            right[j] += weighted * residual[i]
+            for k in range(j + 1):
+                precision[j, k] += weighted * directions[i, k]
+    for j in range(count):
+        for k in range(j):
+            precision[k, j] = precision[j, k]
+    covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
+    return np.asarray(covariance @ right), covariance
 
 
 def _towards(square: float, known: float) -> float:

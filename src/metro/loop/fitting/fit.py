@@ -20,7 +20,6 @@ from metro.loop.fitting.descent import ITERATIONS, descend, farthest, free, poli
 from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.nuisances import costs, search_nuisance
-from metro.loop.fitting.reestimate import reestimated
 from metro.loop.fitting.system import (
     State,
     condition,
@@ -281,6 +280,9 @@ def _refined(
     candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State, *, rounds: int
 ) -> Fit:
     """Re-estimate the noise from the residual and descend, in turn, until that gains next to nothing."""
+    # It takes numba, which a prediction of a robot or a face by a known fit does without.
+    from metro.loop.fitting.reestimate import reestimated
+
     before = np.inf
     for _ in range(rounds):
         noise = reestimated(candidate, blocks, prior, noise, state)

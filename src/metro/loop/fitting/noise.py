@@ -15,7 +15,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from metro.compiled import compiled_with_arrays
 from metro.observables.problem import Block
 from metro.units import Array
 
@@ -216,21 +215,3 @@ def alike(one: Noise, other: Noise) -> bool:
         for each in (one, other)
     )
     return len(first) == len(second) and bool(np.allclose(first, second, rtol=SAME, atol=0.0))
-
-
-@compiled_with_arrays
-def amplitude(directions: Array, residual: Array, variance: Array) -> tuple[Array, Array]:
-    """Return the expected amplitude of each shared direction (k,), and the covariance of that."""
-    count = directions.shape[1]
-    precision, right = np.eye(count), np.zeros(count)
-    for i in range(len(residual)):
-        for j in range(count):
-            weighted = directions[i, j] / variance[i]
-            right[j] += weighted * residual[i]
-            for k in range(j + 1):
-                precision[j, k] += weighted * directions[i, k]
-    for j in range(count):
-        for k in range(j):
-            precision[k, j] = precision[j, k]
-    covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
-    return np.asarray(covariance @ right), covariance
