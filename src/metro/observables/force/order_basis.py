@@ -17,11 +17,10 @@ from metro.observables.force.dynamometer import Recording
 from metro.signals.orders import amplitudes, to_orders
 from metro.units import Array, ComplexArray
 
-# Angles of the table of a force whose orders are taken: 120 for each 16 orders, 7.5 in the period of the
-# highest, and no fewer than twice as many. The orders are then off by 2e-4 of the force (rms), 8e-4 where the
-# end of the tool is rounded, 2e-3 without a helix. A waveform that is drawn has 720, with which a fit takes
-# half as long again.
-ANGLES, ORDERS, LEAST = 120, 16, 2
+# Of the table of a force whose orders are taken: half of what a waveform that is drawn has. The orders up to
+# the 48th are then off by 2e-4 of the force (rms), 8e-4 where the end of the tool is rounded, 2e-3 without a
+# helix, and a fit takes half as long.
+ANGLES = 360
 FEEDS = (
     0.0,
     math.pi / 3.0,
@@ -41,14 +40,10 @@ def shares_of_feeds(recording: Recording, direction: Array) -> Array:
     return np.asarray((1.0 + 2.0 * wave) / len(FEEDS))
 
 
-def _angles(highest: int) -> int:
-    return ANGLES * max(LEAST, math.ceil(highest / ORDERS))
-
-
 @lru_cache(maxsize=4096)
 def order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path: bool) -> ComplexArray:
     """Amplitudes of the orders of the force on a rigid tool, (orders, 3, 6): read-only, it is kept."""
-    basis = amplitudes(to_orders(force_basis(cutter, law, cut, true_path, _angles(highest)), highest))
+    basis = amplitudes(to_orders(force_basis(cutter, law, cut, true_path, ANGLES), highest))
     basis.flags.writeable = False
     return basis
 
