@@ -105,7 +105,8 @@ def _identified(name, ktc):
         }
         for key, value in known.items()
     }
-    return {"format": 1, "batch": name, "force": {"waveform": waveform}}
+    correlation = {"coefficients": list(known), "matrix": np.eye(len(known)).tolist()}
+    return {"format": 1, "batch": name, "force": {"waveform": waveform, "correlation": correlation}}
 
 
 def _entry(unit, status="explained"):

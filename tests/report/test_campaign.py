@@ -13,7 +13,7 @@ from metro.batch.batch import Batch
 from metro.batch.processed import write_batch
 from metro.report.campaign import campaign_report, campaign_table
 from metro.report.sections.standings import largest_residuals, rankings
-from metro.stages.campaign import campaign, first_start
+from metro.stages.campaign import campaign
 
 EMPTY = {"format": 1, "batch": "modes-only", "metro": "0", "observables": {}}
 
@@ -119,8 +119,14 @@ def test_the_name_of_a_batch_leads_to_its_report(verdicts):
         assert {str(note.A.URI) for note in notes} == {"synthetic/report.pdf"}
 
 
-def test_a_batch_starts_with_the_first_of_its_runs_that_tells_when():
-    runs = pd.DataFrame({"started_at": ["2024-05-01T10:00:00+02:00", "", "2024-05-01T07:30:00Z"]})
-    assert first_start(runs) == pd.Timestamp("2024-05-01T07:30:00Z").timestamp()
-    assert first_start(pd.DataFrame({"started_at": ["", ""]})) is None
-    assert first_start(pd.DataFrame({"feed": [1.0]})) is None
+@pytest.mark.parametrize(
+    ("runs", "expected"),
+    [
+        ({"started_at": ["2024-05-01T10:00:00+02:00", "", "2024-05-01T07:30:00Z"]}, "2024-05-01T07:30:00Z"),
+        ({"started_at": ["", ""]}, None),
+        ({"feed": [1.0]}, None),
+    ],
+)
+def test_a_batch_starts_with_the_first_of_its_runs_that_tells_when(runs, expected):
+    batch = Batch("b", {}, {}, pd.DataFrame(runs), {})
+    assert batch.started == (None if expected is None else pd.Timestamp(expected).timestamp())

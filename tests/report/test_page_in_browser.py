@@ -1,12 +1,16 @@
 """The campaign's page in a browser: it draws, values are read with keys and mouse, nothing goes wrong."""
 
+import csv
+import io
 import os
 import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from drawn_page import EVIL, written_page
+from matplotlib import image
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 AXE = Path(os.environ.get("METRO_AXE", Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"))
@@ -71,7 +75,7 @@ def test_the_policy_lets_the_pages_own_script_run_and_no_other(browser, address)
 
 
 def test_every_plot_is_drawn(page):
-    charts = page.locator("svg.chart").all()
+    charts = page.locator("#batch-late svg.chart").all()
     assert len(charts) == 4
     for chart in charts:
         paths = [p.get_attribute("d") for p in chart.locator("path.line").all()]
@@ -100,13 +104,13 @@ def test_links_lead_to_sections_and_reports(page, address):
 def test_a_batch_is_unfolded_and_a_boundary_read_with_keys_alone(page, address):
     page.goto("about:blank")
     page.goto(address)
-    for _ in range(60):
+    for _ in range(80):
         page.keyboard.press("Tab")
         if page.evaluate("document.activeElement.closest('summary')?.parentElement.id") == "batch-late":
             break
     page.keyboard.press("Enter")
     page.wait_for_selector("#batch-late .plot")
-    for _ in range(20):
+    for _ in range(30):
         page.keyboard.press("Tab")
         if page.evaluate("document.activeElement.getAttribute('aria-label')") == "Stability boundary":
             break
@@ -203,7 +207,7 @@ def test_one_value_per_axis_is_a_mark_with_its_interval(page):
     assert chart.locator("path.line.measured").count() == 0
     assert [t.text_content() for t in chart.locator("text.middle").all()][:3] == ["x", "y", "z"]
     assert here.locator("output").inner_text() == (
-        "axis y: measured −176.0 ± 2.0 N; base model (nothing added) −156.0 N; left over: −20.0 N "
+        "axis y: measured −176.0 ± 2.0 N; base model (nothing added) −156.0 N; residual: −20.0 N "
         "(table 7, test 2)"
     )
 
@@ -231,7 +235,7 @@ def test_what_is_left_over_is_read_and_only_what_keys_lead_to_is_spoken(page):
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 60)
-    assert "left over: base model −12.0 N, with effects found −1.0 N" in read(page, name)
+    assert "residual: base model −12.0 N, with effects found −1.0 N" in read(page, name)
     assert spoken.text_content() == ""
     chart.focus()
     page.keyboard.press("End")
@@ -393,10 +397,10 @@ def test_two_batches_are_compared_by_what_both_identified(page):
 def test_a_cut_is_tried_with_sliders_and_marked_on_the_boundary(page):
     here = plot(page, "Try a cut")
     said = here.locator("p.tried")
-    before = float(re.search(r"axis ([\d.]+) N", said.inner_text())[1])
+    before = float(re.search(r"axis ([\d.]+) ±", said.inner_text())[1])
     assert "predicted to be stable" in said.inner_text()
     here.get_by_label("axial depth").fill("3")
-    after = float(re.search(r"axis ([\d.]+) N", said.inner_text())[1])
+    after = float(re.search(r"axis ([\d.]+) ±", said.inner_text())[1])
     assert after > 2 * before
     assert "predicted to chatter" in said.inner_text()
     assert plot(page, "Stability boundary").locator("g .mark.tried").count() == 1
@@ -410,3 +414,76 @@ def test_the_page_is_dark_where_the_reader_asks_for_it(browser, address):
     ground = dark.evaluate("getComputedStyle(document.documentElement).backgroundColor")
     assert max(int(part) for part in re.findall(r"\d+", ground)) < 50
     dark.close()
+
+
+def saved(page, title, what):
+    with page.expect_download() as waited:
+        plot(page, title).get_by_role("button", name=what).click()
+    return waited.value.suggested_filename, Path(waited.value.path()).read_bytes()
+
+
+def test_the_numbers_of_a_plot_are_saved_as_a_table(page):
+    name, content = saved(page, "Held-out runs: cutting force", "Save data")
+    assert name == "late-Held-out-runs-cutting-force-r1-along-x.csv"
+    head, *rows = list(csv.reader(content.decode().splitlines()))
+    assert head == [
+        *("spindle angle (°)", "measured", "measured, lower 95 %", "measured, upper 95 %"),
+        *("base model", "with effects found"),
+    ]
+    values = np.array(rows, dtype=float)
+    at = values[:, 0] == 90.0
+    assert values[at] == pytest.approx(np.array([[90.0, 100.0, 98.04, 101.96, 112.0, 101.0]]), abs=0.1)
+
+
+def test_the_heights_of_a_face_are_saved_as_a_table(page):
+    name, content = saved(page, "Faces, all runs", "Save data")
+    assert name == "late-Faces-all-runs-r1-measured-less-its-plane.csv"
+    head, *rows = list(csv.reader(content.decode().splitlines()))
+    assert head == ["x (mm)", "y (mm)", "height (µm)"]
+    assert len(rows) > 100
+
+
+@pytest.mark.parametrize("title", ["Stability boundary", "Faces, all runs"])
+def test_the_drawing_of_a_plot_is_saved_as_a_picture(page, title):
+    name, content = saved(page, title, "Save picture")
+    assert re.fullmatch(r"late-.*\.png", name)
+    picture = image.imread(io.BytesIO(content), format="png")
+    assert min(picture.shape[:2]) > 300
+    assert len(np.unique(picture.reshape(-1, picture.shape[2]), axis=0)) > 10  # more than one colour
+
+
+def test_a_run_is_compared_with_another(page):
+    unfolded(page, "early")
+    here = page.locator("#batch-early figure.plot").filter(
+        has=page.get_by_role("heading", name="Held-out runs: waviness of the wall")
+    )
+    before = here.locator("path.line.other").count()
+    choice = here.get_by_label("compared with")
+    choice.select_option(index=1)
+    run = choice.input_value()
+    assert before == 0
+    assert here.locator("svg.chart path.line.other").count() == 2  # the run, and less it
+    assert f"measured, {run}" in here.locator("output").inner_text()
+    assert f"; difference from {run}: " in here.locator("output").inner_text()
+    choice.select_option(index=0)
+    assert here.locator("svg.chart path.line.other").count() == 0
+
+
+def test_a_quantity_is_followed_over_batches(page):
+    here = page.locator(".trends figure.plot")
+    here.get_by_label("quantity").select_option("K_tc")
+    assert here.locator("svg.chart g > .mark.measured").count() == 2
+    assert [t.text_content() for t in here.locator("svg text.middle").all()][:2] == ["early", "late"]
+    chart = here.locator("svg.chart")
+    chart.focus()
+    page.keyboard.press("Home")
+    page.keyboard.press("End")
+    assert here.locator("output").inner_text().startswith("batch late: identified 900.0 ± 5.0 N/mm²")
+
+
+def test_a_cut_that_is_tried_has_intervals(page):
+    said = plot(page, "Try a cut").locator("p.tried").inner_text()
+    assert re.search(
+        r"axis [\d.]+ ± [\d.]+ N; mean torque [\d.]+ ± [\d.]+ N m; power [\d.]+ ± [\d.]+ W", said
+    )
+    assert plot(page, "Try a cut").locator("path.area").count() == 3

@@ -58,6 +58,31 @@ def test_the_force_in_the_page_is_that_of_the_model(name):
         assert found["torque"] == pytest.approx(expected, rel=0.002)
 
 
+@pytest.mark.skipif(NODE is None, reason="node is not installed")
+def test_the_interval_of_a_cut_is_that_of_drawn_coefficients_and_the_error_on_held_out_runs():
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(6, 6)) * np.array([20.0, 15.0, 10.0, 1.0, 1.0, 0.5])[:, None]
+    parts = [
+        {axis: rng.normal(size=5).tolist() for axis in "xyz"} | {"torque": rng.normal()} for _ in range(6)
+    ]
+    tool = {"coefficients": list(COEFFICIENTS), "covariance": (root @ root.T).tolist(), "error": 0.1}
+    scripts = "".join(SCRIPT.with_name(name).read_text() for name in ("cutting.js", "trial.js"))
+    call = f"{scripts}; console.log(JSON.stringify(composed(...{json.dumps([tool, parts])})))"
+    found = json.loads(subprocess.run([NODE, "-e", call], capture_output=True, text=True, check=True).stdout)
+    drawn = np.array(COEFFICIENTS) + rng.normal(size=(200_000, 6)) @ root.T
+    basis = np.array([[part[axis] for axis in "xyz"] for part in parts])
+    force = np.einsum("k,kai->ai", np.array(COEFFICIENTS), basis)
+    error = 0.1 * math.sqrt(float(np.mean(force**2)))
+    for i, axis in enumerate("xyz"):
+        assert found["force"][axis] == pytest.approx(force[i])
+        spread = np.hypot(np.std(drawn @ basis[:, i], axis=0), error)
+        assert found["halves"][axis] == pytest.approx(1.96 * spread, rel=0.01)
+    torques = np.array([part["torque"] for part in parts])
+    torque = float(np.array(COEFFICIENTS) @ torques)
+    spread = 1.96 * math.hypot(np.std(drawn @ torques), 0.1 * torque)
+    assert found["torque"] == pytest.approx([torque, spread], rel=0.01)
+
+
 def results_with_feeds():
     results = synthetic.results()
     runs = results.batch.runs.assign(feed_per_tooth_mm=0.05)

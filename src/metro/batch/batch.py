@@ -36,6 +36,14 @@ class Batch:
         entry: JSON = (self.manifest.get("instruments") or {}).get(name) or {}
         return entry
 
+    @property
+    def started(self) -> float | None:
+        """When the first run began, s since 1970; None where no run says. Without a zone it is UTC."""
+        if "started_at" not in self.runs:
+            return None
+        at = pd.to_datetime(self.runs["started_at"], format="ISO8601", utc=True, errors="coerce").min()
+        return None if pd.isna(at) else float(at.timestamp())
+
     def with_files(self, *columns: str, any_of: bool = False) -> list[str]:
         """List the runs, in the order of cutting, that name a file in all (or any) of ``columns``.
 

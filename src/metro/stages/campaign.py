@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-import pandas as pd
-
 from metro.batch.processed import read_batch, read_table, write_json, write_table
 from metro.batch.writing import write_atomically
 from metro.memory.history import Record
@@ -87,15 +85,7 @@ def _reason(log: Path) -> str:
 def _record(processed: Path, verdict: JSON, identified: JSON) -> Record:
     batch = read_batch(processed)
     loop = _json(processed / "loop.json")
-    return Record(batch.name, batch.manifest, first_start(batch.runs), verdict, loop, identified)
-
-
-def first_start(runs: pd.DataFrame) -> float | None:
-    """Return when the first run began, s since 1970; None where no run says. Without a zone it is UTC."""
-    if "started_at" not in runs:
-        return None
-    at = pd.to_datetime(runs["started_at"], format="ISO8601", utc=True, errors="coerce").min()
-    return None if pd.isna(at) else float(at.timestamp())
+    return Record(batch.name, batch.manifest, batch.started, verdict, loop, identified)
 
 
 def _json(path: Path) -> JSON:

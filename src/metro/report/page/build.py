@@ -9,15 +9,14 @@ from metro import __version__
 from metro.report.campaign import TITLE
 from metro.report.content import Section
 from metro.report.page.batch import anchor, batch_section
-from metro.report.page.compare import TITLE as COMPARE
 from metro.report.page.compare import compare_section, quantities
 from metro.report.page.frame import contents, document, named, section
 from metro.report.page.markup import items_of, tag
 from metro.report.results import Results
 
 SCRIPTS = (
-    *("kit.js", "panel.js", "chart.js", "face.js", "cutting.js", "trial.js"),
-    *("tables.js", "compare.js", "search.js", "page.js"),
+    *("kit.js", "saving.js", "panel.js", "beside.js", "chart.js", "face.js", "cutting.js", "trial.js"),
+    *("tables.js", "compare.js", "trends.js", "search.js", "page.js"),
 )
 BATCHES = "Batches"
 WHOLE, PER_BATCH = 4_000_000, 400_000  # bytes that the data of all plots, and those of one batch, may take
@@ -38,7 +37,7 @@ def campaign_page(sections: Sequence[Section], batches: Iterable[Results], links
     unfolding, compared = [], []
     for results in batches:
         unfolding.append(batch_section(results, links[results.batch.name], budget))
-        compared.append((results.batch.name, quantities(results)))
+        compared.append((results.batch, quantities(results)))
     comparing = compare_section(compared)
     buttons = [
         tag("button", "Unfold all", type="button", data_fold="open"),
@@ -46,13 +45,13 @@ def campaign_page(sections: Sequence[Section], batches: Iterable[Results], links
     ]
     without = tag("noscript", tag("p", "The plots need JavaScript; all else is here without it."))
     head = tag("p", *buttons, class_="tools")
-    parts = [*summary, *comparing, section(BATCHES, head, without, *unfolding)]
+    parts = [*summary, *(part for _, part in comparing), section(BATCHES, head, without, *unfolding)]
     below = f"{len(links)} batches · metro {__version__} · "
     header = tag(
         "header",
         tag("h1", TITLE),
         tag("p", below, tag("a", "the same as PDF", href="summary.pdf")),
-        contents([*(s.title for s in sections), *([COMPARE] if comparing else []), BATCHES]),
+        contents([*(s.title for s in sections), *(name for name, _ in comparing), BATCHES]),
     )
     skips = {"verdicts": "main", "batches": named(BATCHES)}
     return document(TITLE, header, parts, skips, SCRIPTS)

@@ -1,28 +1,48 @@
-"""What two batches can be compared by: the quantities that each identified, as data for the page."""
+"""What batches can be compared by: the quantities that each identified, as data for the page."""
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
+from metro.batch.batch import Batch
 from metro.observables.catalogue import title
 from metro.report.numbers import quantity
+from metro.report.page.curves import HELP
 from metro.report.page.frame import section
 from metro.report.page.markup import Html, embedded, tag
+from metro.report.page.packing import decimals
 from metro.report.results import Results
 from metro.report.sections.key_results import COEFFICIENTS, FORCE_SETS, receptance_peak
 from metro.units import JSON, printed
 
 TITLE = "Compare two batches"
+TRENDS = "Trends over batches"
+ORDER = "The batches are in the order in which their first runs began; those that do not say it come last."
 Quantity = tuple[str, JSON]
 
 
-def compare_section(batches: Sequence[tuple[str, list[JSON]]]) -> list[Html]:
-    """Write the section that compares two of the batches with quantities; nothing where there is one only."""
-    known = {name: rows for name, rows in batches if rows}
+def compare_section(batches: Sequence[tuple[Batch, list[JSON]]]) -> list[tuple[str, Html]]:
+    """Write the sections, with their titles, that compare batches: two of them, and all by each quantity.
+
+    Nothing where fewer than two have quantities, and no trend where no quantity is that of two.
+    """
+    dated = sorted(batches, key=lambda pair: (_began(pair[0]), pair[0].name))
+    known = {batch.name: rows for batch, rows in dated if rows}
     if len(known) < 2:
         return []
     data = tag("script", embedded(known), type="application/json", class_="compared")
-    return [section(TITLE, tag("div", class_="compare"), data)]
+    sections = [(TITLE, section(TITLE, tag("div", class_="compare"), data))]
+    if max(Counter(row["name"] for rows in known.values() for row in rows).values()) > 1:
+        trend = tag("div", class_="trends", data_help=HELP, data_note=ORDER)
+        sections.append((TRENDS, section(TRENDS, trend)))
+    return sections
+
+
+def _began(batch: Batch) -> float:
+    started = batch.started
+    return math.inf if started is None else started
 
 
 def quantities(results: Results) -> list[JSON]:
@@ -41,7 +61,11 @@ def quantities(results: Results) -> list[JSON]:
 def _entry(name: str, entry: JSON) -> JSON:
     low, high = entry.get("ci95") or (None, None)
     half = None if low is None or high is None else 0.5 * (float(high) - float(low))
-    return {"name": name, "text": quantity(entry), "value": float(entry["value"]), "half": half}
+    value = float(entry["value"])
+    unit, digits = printed(entry.get("unit")), decimals(half if half is not None else math.nan, abs(value))
+    return {
+        "name": name, "text": quantity(entry), "value": value, "half": half, "unit": unit, "decimals": digits
+    }  # fmt: skip
 
 
 def _coefficients(force: JSON) -> Iterator[Quantity]:

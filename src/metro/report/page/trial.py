@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from metro.cutting.engagement import Engagement, engagement
-from metro.report.numbers import percent
+from metro.report.numbers import listing, percent
 from metro.report.page.boundary import TITLE as BOUNDARY
 from metro.report.page.curves import HELP
 from metro.report.page.packing import decimals
@@ -24,13 +24,15 @@ TITLE = "Try a cut"
 NOTE = (
     "This page computes the force with the identified coefficients, a rigid machine and circular tooth paths."
 )
+COVERAGE = 1.96  # standard deviations from a value to an end of its 95 % interval
 LEAST_RUNOUT = 20.0  # end of the slider, µm
 
 
 def trial_cut(results: Results) -> JSON | None:
     """Return tool, coefficients and sliders of a cut; None where a cylinder's force cannot be computed."""
     tool = results.batch.manifest.get("tool") or {}
-    coefficients = _coefficients(results.identified.get("force") or {})
+    force = results.identified.get("force") or {}
+    coefficients = _coefficients(force)
     row = _row(results)
     if coefficients is None or row is None or not {"diameter_mm", "teeth"} <= set(tool):
         return None
@@ -55,6 +57,8 @@ def trial_cut(results: Results) -> JSON | None:
             "entry": arc.entry,
             "exit": arc.exit,
             "coefficients": coefficients,
+            "covariance": _covariance(force),
+            "error": _share(results),
             "runout": runout_deg * DEG,
         },
         "sliders": _sliders(results, row, runout_um),
@@ -71,6 +75,27 @@ def _coefficients(force: JSON) -> list[float] | None:
         block[name]["value"] for name in COEFFICIENTS if (block.get(name) or {}).get("value") is not None
     ]
     return [float(value) for value in known] if len(known) == len(COEFFICIENTS) else None
+
+
+def _covariance(force: JSON) -> list[list[float]] | None:
+    """Return the covariance (6, 6) of the errors of the coefficients of waveforms; None where not known."""
+    block, stated = force.get("waveform") or {}, force.get("correlation") or {}
+    names = list(stated.get("coefficients") or [])
+    if not set(COEFFICIENTS) <= set(names) or not set(COEFFICIENTS) <= set(block):
+        return None
+    ends = np.array([block[name]["ci95"] for name in COEFFICIENTS], dtype=float)
+    deviation = 0.5 * (ends[:, 1] - ends[:, 0]) / COVERAGE
+    if not np.isfinite(deviation).all():
+        return None
+    at = [names.index(name) for name in COEFFICIENTS]
+    correlation = np.array(stated["matrix"])[np.ix_(at, at)]
+    return [[float(f"{value:.6g}") for value in row] for row in np.outer(deviation, deviation) * correlation]
+
+
+def _share(results: Results) -> float | None:
+    """Return the error of the whole model on held-out runs over their signal; None without such runs."""
+    share = ((results.verdicts().get("force") or {}).get("after") or {}).get("nrmse")
+    return float(share) if share is not None and math.isfinite(share) else None
 
 
 def _row(results: Results) -> Mapping[str, Any] | None:
@@ -158,10 +183,11 @@ def _said(row: Mapping[str, Any]) -> str:
 
 
 def _error(results: Results) -> list[str]:
-    """Say how far the whole model is from held-out runs, where it was compared with some."""
-    error = (results.verdicts().get("force") or {}).get("after") or {}
-    share = error.get("nrmse")
-    known = share is not None and math.isfinite(share)
-    return (
-        [f"On held-out runs the whole model has an error of {percent(share)} of the signal."] if known else []
-    )
+    """Say how far the whole model is from held-out runs, where there are any, and what is drawn."""
+    share, said, sources = _share(results), [], ["the errors of the coefficients"]
+    if share is not None:
+        said = [f"On held-out runs the whole model has an error of {percent(share)} of the signal."]
+        sources.append("that error")
+    if _covariance(results.identified.get("force") or {}) is not None:
+        said.append(f"The bands are 95 % intervals; they contain {listing(sources)}.")
+    return said

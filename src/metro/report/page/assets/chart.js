@@ -11,7 +11,8 @@ function chart(host, plot) {
   const drawing = svg("svg", { class: "chart" }, svg("clipPath", { id: clip }, opening), ground, picked, cursor);
   const [, across, unit = ""] = /^(.*?)(?: \((.*)\))?$/.exec(plot.x);
   const above = html("li", {}, "▲ goes on above: zoom in to see it");
-  let curve, panels = [], from, to, at = 0, mark = null, tried = null;
+  let curve, panels = [], from, to, at = 0, mark = null, tried = null, other = NO_OTHER;
+  const partner = html("span", { class: "choices" });
   const around = frame(host, plot, drawing, resize);
 
   const inside = () => around.width() - BOX.left - BOX.right;
@@ -30,8 +31,10 @@ function chart(host, plot) {
     curve = { ...next, x: unpack(next.x), marks: [...(next.marks || []), ...(tried ? [tried] : [])], gaps: new Set(next.gaps || []) };
     curve.lines = next.lines.map((line) => ({ ...line, y: unpack(line.y),
       low: line.low && unpack(line.low), high: line.high && unpack(line.high) }));
-    const main = { ...next, lines: curve.lines, marks: curve.marks, label: plot.y, top: BOX.top, tall: BOX.main };
-    const strip = { lines: rest(), label: `left over${plot.unit ? ` (${plot.unit})` : ""}`,
+    offer(next);
+    const measure = curve.unit ?? plot.unit;
+    const main = { ...next, lines: curve.lines, marks: curve.marks, label: next.label || plot.y, top: BOX.top, tall: BOX.main };
+    const strip = { lines: rest(), label: `residual${measure ? ` (${measure})` : ""}`,
       top: BOX.top + BOX.main + BOX.between, tall: BOX.strip };
     panels = strip.lines.length ? [main, strip] : [main];
     mark = null;
@@ -45,10 +48,24 @@ function chart(host, plot) {
     resize();
   }
 
-  // Measured less predicted, over the interval of the measured value about zero.
+  // Another run may be drawn beside this one; the choice stays as long as there is such a curve of that run.
+  function offer(shown) {
+    const runs = alike(plot, shown);
+    partner.hidden = !runs.size;
+    const { select, label } = labelled("compared with", [NO_OTHER, ...runs.keys()], (run) => {
+      other = run;
+      choose(shown);
+      partner.querySelector("select").focus();
+    });
+    select.value = runs.has(other) ? other : NO_OTHER;
+    partner.replaceChildren(label);
+    if (runs.has(other)) curve.lines = [...curve.lines, besideLine(other, runs.get(other), curve)];
+  }
+
+  // Measured less predicted, over the interval of the measured value about zero; and less another run.
   function rest() {
     const [measured, ...predicted] = curve.lines;
-    if (measured.look !== "measured" || plot.log) return [];
+    if (measured.look !== "measured" || !predicted.length || plot.log) return [];
     const half = measured.low && measured.low.map((low, i) => (measured.high[i] - low) / 2);
     const zero = { look: "zero", y: measured.y.map(() => 0), low: half && half.map((h) => -h), high: half };
     return [zero, ...predicted.map((line) => ({ ...line, y: measured.y.map((y, i) => y - line.y[i]) }))];
@@ -109,7 +126,8 @@ function chart(host, plot) {
   }
 
   function scale() {
-    const along = curve.rows ? ticks(from, to, inside() / 30, 1) : ticks(from, to, Math.min(8, inside() / 55));
+    const longest = curve.rows ? Math.max(...curve.rows.map((row) => row.length)) : 0;
+    const along = curve.rows ? ticks(from, to, inside() / Math.max(30, 7 * longest), 1) : ticks(from, to, Math.min(8, inside() / 55));
     const told = (x) => (curve.rows ? curve.rows[Math.round(x) - 1] || "" : fixed(x, along.decimals));
     const lines = along.places.flatMap((x) => [
       ...panels.map((panel) => svg("path", { class: "grid", d: `M${px(x)} ${panel.top}v${panel.tall}` })),
@@ -138,17 +156,20 @@ function chart(host, plot) {
   function told() {
     if (mark !== null) return curve.marks[mark].told;
     if (curve.told) return curve.told[at];
-    const after = plot.unit ? ` ${plot.unit}` : "";
+    const measure = curve.unit ?? plot.unit, after = measure ? ` ${measure}` : "";
     const half = ({ low, high }) => {
       const size = low ? (high[at] - low[at]) / 2 : NaN;
       return Number.isFinite(size) ? ` ± ${fixed(size, curve.decimals)}` : "";
     };
     const lines = curve.lines.map((line) => `${line.name} ${value(line.y[at])}${half(line)}${after}`);
-    const left = (panels[1] ? panels[1].lines.slice(1) : []).map(
-      (line, i, { length }) => `${length > 1 ? `${line.name} ` : ""}${value(line.y[at])}${after}`);
+    const strip = panels[1] ? panels[1].lines.slice(1) : [];
+    const [residuals, others] = [false, true].map((is) => strip.filter((line) => (line.look === "other") === is));
+    const each = (line, named) => `${named ? `${line.name} ` : ""}${value(line.y[at])}${after}`;
+    const said = [...(residuals.length ? [`residual: ${residuals.map((line) => each(line, residuals.length > 1)).join(", ")}`] : []),
+      ...others.map((line) => `difference from ${other}: ${each(line, false)}`)];
     const step = ticks(from, to, 400).decimals;
     const where = curve.rows ? `${across} ${curve.rows[at]}` : `${across} ${fixed(curve.x[at], step)} ${unit}`;
-    return `${where}: ${lines.join("; ")}${left.length ? `; left over: ${left.join(", ")}` : ""}`;
+    return `${where}: ${[...lines, ...said].join("; ")}`;
   }
 
   function point() {
@@ -235,8 +256,18 @@ function chart(host, plot) {
   drawing.addEventListener("pointercancel", release);
   drawing.addEventListener("dblclick", all);
 
-  around.tools.append(chooser(plot, choose), button("Larger", () => zoom(0.5)),
-    button("Smaller", () => zoom(2)), button("All", all));
+  function table() {
+    const ends = (line) => (line.low ? [line.low, line.high] : []);
+    const columns = curve.lines.flatMap((line) => [line.y, ...ends(line)]);
+    const heads = curve.lines.flatMap((line) => [line.name, ...ends(line).map((_, i) => `${line.name}, ${i ? "upper" : "lower"} 95 %`)]);
+    const places = curve.rows || Array.from(curve.x);
+    saveTable(saved(), [plot.x, ...heads], places.map((x, i) => [x, ...columns.map((column) => column[i])]));
+  }
+  const saved = () => filed(host, plot.title, curve.said || "");
+  const titled = () => (curve.said ? `${plot.title}: ${curve.said}` : plot.title);
+  around.tools.append(chooser(plot, choose), partner, button("Larger", () => zoom(0.5)),
+    button("Smaller", () => zoom(2)), button("All", all), button("Save data", table),
+    button("Save picture", () => savePicture(saved(), titled(), drawing, around.legend)));
 
   // Puts a mark that can be moved, and says what the first line is there.
   function put(x, y, words) {

@@ -252,10 +252,16 @@ function face(host, plot) {
   });
   for (const end of ["pointerup", "pointercancel"]) drawing.addEventListener(end, () => { held = null; });
 
+  const saved = () => filed(host, plot.title, shown.said, shown.layers[layer].name);
+  function table() {
+    saveTable(saved(), ["x (mm)", "y (mm)", `height (${plot.unit})`], points.map(({ x, y, z }) => [x, y, z]));
+  }
+
   size();
   const toggle = fill(button("Scale to this face", scaled), { "aria-pressed": "false" });
   around.tools.append(chooser(plot, choose), choice, button("From above", above),
     button("Start view", back), button("Higher", () => change(0, 0, 1.25)),
-    button("Flatter", () => change(0, 0, 0.8)), toggle);
+    button("Flatter", () => change(0, 0, 0.8)), toggle, button("Save data", table),
+    button("Save picture", () => drawing.toBlob((blob) => save(`${saved()}.png`, blob))));
   back();
 }

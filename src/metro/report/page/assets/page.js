@@ -50,5 +50,9 @@ addEventListener("afterprint", () => {
 document.querySelector("header").append(
   search(batches, [...document.querySelectorAll("table[data-verdicts]")]));
 const known = document.querySelector("script.compared");
-if (known) comparison(document.querySelector(".compare"), JSON.parse(known.textContent));
+if (known) {
+  comparison(document.querySelector(".compare"), JSON.parse(known.textContent));
+  const trend = document.querySelector(".trends");
+  if (trend) trends(trend, JSON.parse(known.textContent));
+}
 follow(location.hash);

@@ -17,6 +17,7 @@ function symbol(look, x, y) {
   if (look === "stable") return svg("circle", { class: "mark stable", cx: x, cy: y, r: 4 });
   if (look === "measured") return svg("circle", { class: "mark measured", cx: x, cy: y, r: 3.5 });
   if (look === "tried") return svg("path", { class: "mark tried", d: `M${x} ${y - 7}l7 7l-7 7l-7 -7z` });
+  if (look === "other") return svg("path", { class: "mark other", d: `M${x} ${y - 5}l5 5l-5 5l-5 -5z` });
   if (look === "after") return svg("circle", { class: "mark after", cx: x, cy: y, r: 5 });
   return svg("path", { class: `mark ${look}`, d: `M${x - 4} ${y - 4}l8 8m0 -8l-8 8` });
 }
