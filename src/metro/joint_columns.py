@@ -14,6 +14,7 @@ MOST_AXES = 9  # an arm of seven joints on two external axes
 AXES = range(1, MOST_AXES + 1)
 TURNS, SHIFTS = tuple(f"q{i}_deg" for i in AXES), tuple(f"q{i}_mm" for i in AXES)
 POSITIONS = (*TURNS, *SHIFTS)
+PLACE, TURNED = ("x_mm", "y_mm", "z_mm"), ("rx_deg", "ry_deg", "rz_deg")
 TORQUES = tuple(f"tau{i}_nm" for i in AXES)
 JOINT_COLUMNS = (
     *POSITIONS,
@@ -72,6 +73,18 @@ def fault_of_poses(names: Sequence[str]) -> str:
         beyond = next(name for name in own if name not in positions(own))
         return f"one position of each axis, counted from 1 without a gap: there is {beyond}"
     return ""
+
+
+def fault_of_targets(names: Sequence[str]) -> str:
+    """Say what a table of targets lacks: joints, or places of the tip with all three angles or none."""
+    if any(name in names for name in POSITIONS):
+        return fault_of_poses(names)
+    lacking = [name for name in PLACE if name not in names]
+    if lacking:
+        return f"{POSITIONS[0]}, {POSITIONS[1]}, … of the joints, or {', '.join(PLACE)} of the tip"
+    turned = [name for name in TURNED if name in names]
+    lacking = [name for name in TURNED if name not in names]
+    return f"{', '.join(lacking)} beside {', '.join(turned)}" if turned and lacking else ""
 
 
 def fault_of_cut(names: Sequence[str]) -> str:

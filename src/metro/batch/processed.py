@@ -14,7 +14,7 @@ from metro import __version__
 from metro.batch.batch import Batch
 from metro.batch.columns import CROSS_STIFFNESS
 from metro.batch.writing import write_atomically
-from metro.joint_columns import JOINT_COLUMNS, MOVED, POSITIONS, TORQUES
+from metro.joint_columns import JOINT_COLUMNS, MOVED, PLACE, POSITIONS, TORQUES, TURNED
 from metro.units import JSON
 
 # Every table that ingest writes, always, with these columns (no rows where the batch has no such data).
@@ -35,7 +35,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("run", *POSITIONS, "x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg", "q1", "q2", "q3", "q4"),
         *("t_s", "temperature_c", "sigma_mm", "sigma_x_mm", "sigma_y_mm", "sigma_z_mm", "target", "point"),
     ),
-    "targets": ("run", *POSITIONS),
+    "targets": ("run", *POSITIONS, *PLACE, *TURNED),
     "hit": (
         "test",
         "position",

@@ -12,7 +12,16 @@ import pandas as pd
 
 from metro.formats.errors import FormatError
 from metro.formats.packets import Note
-from metro.joint_columns import JOINT_COLUMNS, POSITIONS, fault_of, fault_of_cut, fault_of_poses
+from metro.joint_columns import (
+    JOINT_COLUMNS,
+    PLACE,
+    POSITIONS,
+    TURNED,
+    fault_of,
+    fault_of_cut,
+    fault_of_poses,
+    fault_of_targets,
+)
 from metro.spelling import resembling
 
 
@@ -71,7 +80,7 @@ KINDS: dict[str, Kind] = {
         samples=True,
         fault=fault_of_poses,
     ),
-    "targets": Kind("joint targets", (), POSITIONS, least=1, fault=fault_of_poses),
+    "targets": Kind("targets", (), (*POSITIONS, *PLACE, *TURNED), least=1, fault=fault_of_targets),
     "cloud": Kind("a point cloud", ("x_mm", "y_mm", "z_mm"), least=3),
     "record": Kind("a hammer record", ("t_s", "force_n", "response"), rising="t_s"),
     "frf": Kind("an FRF", ("frequency_hz", "real", "imag"), ("coherence",), rising="frequency_hz"),

@@ -15,7 +15,7 @@ from metro.batch.batch import Batch
 from metro.batch.canonical import Part
 from metro.dynamics.driving import turning
 from metro.dynamics.hits import Hit, fault
-from metro.joint_columns import Axes, axes_in
+from metro.joint_columns import Axes, axes_in, positions
 from metro.signals import plausible, quality
 from metro.signals.conversion import driving_point_sign, receptance, response_si, sensor_to_tool
 from metro.signals.record_quality import RecordQuality
@@ -130,11 +130,17 @@ def poses(batch: Batch, recordings: Recordings) -> Iterator[Part]:
 
 
 def targets(batch: Batch, recordings: Recordings) -> Iterator[Part]:
-    """Yield the joint targets of each table of them, in the order in which they are approached."""
+    """Yield the targets of each table of them, in the order in which they are approached.
+
+    Joints are what is commanded: where a table has them, places of the tip beside them are left out.
+    """
     for run, file in files(batch, "targets"):
         table = recordings.table(file, "targets")
-        if table is not None and not recordings.doubt(file, _joints_at_odds(batch, table)):
-            yield {"run": run, **{str(name): table[name].astype(float) for name in table}}
+        if table is None:
+            continue
+        joints = positions([str(name) for name in table])
+        if not joints or not recordings.doubt(file, _joints_at_odds(batch, table)):
+            yield {"run": run, **{str(name): table[name].astype(float) for name in joints or table}}
 
 
 def _half_turned(table: pd.DataFrame) -> str:

@@ -20,6 +20,7 @@ from metro.robot.calibration.held_out import HeldOut
 from metro.robot.calibration.next_poses import next_poses
 from metro.robot.calibration.poses import Poses
 from metro.robot.calibration.study import FEWEST, STAGES, calibrated, left_out
+from metro.robot.inverse import OutOfReachError
 from metro.robot.kinematics import geometry_of_cell
 from metro.units import DEG, JSON, MM, Array
 
@@ -60,7 +61,11 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
         tables["pose_curves"] += _curves(run, found.final, poses)
         for other in served.get(run, ()):
             asked = targets[targets["run"] == other]
-            part, summary = corrected_targets(other, asked, found, poses, held)
+            try:
+                part, summary = corrected_targets(batch, asked, found, poses=poses, held=held)
+            except OutOfReachError as error:
+                reasons[f"targets of {other}"] = str(error)
+                continue
             tables["pose_targets"].append(part)
             block[run].setdefault("targets", {})[other] = summary
     block |= {"not_identified": reasons} if reasons else {}

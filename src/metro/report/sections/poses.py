@@ -58,7 +58,7 @@ def poses(results: Results) -> Section | None:
         items += [*_effects(one), *_repeats(one), _corrections(one), *corrected_targets(results, one)]
         items += _next(results, run)
     reasons = [f"{run}: {reason}." for run, reason in (block.get("not_identified") or {}).items()]
-    items += [Paragraph("No calibration by these poses:"), Bullets(reasons)] if reasons else []
+    items += [Paragraph("Not determined:"), Bullets(reasons)] if reasons else []
     return Section("The arm by measured poses", items) if items else None
 
 
