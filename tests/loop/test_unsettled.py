@@ -71,6 +71,7 @@ def test_an_effect_at_its_bound_has_converged_and_is_no_result():
         candidate=Candidate(found.candidate.base, (low, RIPPLE)),
         theta=np.append(found.theta, 0.0),
         covariance=np.pad(found.covariance, (0, 1), constant_values=1e-9),
+        pressed=np.append(found.pressed, 0.0),
     )
     beside = unsettled(both)  # of the one tried last, the fault is that another is at its bound with it
     assert beside == Statement("beside", {"effect": "bend", "why": why})

@@ -73,12 +73,12 @@ def _general_table(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool, angl
     pitch = general_basis(cutter, law, cut, along, true_path=true_path)
     basis = np.tile(pitch, (angles // count, 1, 1))
     if cut.pitch:
-        basis += _lost_at_the_floor(cutter, law, cut, true_path, angles)
+        basis += lost_at_the_floor(cutter, law, cut, true_path, angles)
     basis.flags.writeable = False
     return basis
 
 
-def _lost_at_the_floor(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool, angles: int) -> Array:
+def lost_at_the_floor(cutter: Cutter, law: EdgeLaw, cut: Cut, true_path: bool, angles: int) -> Array:
     """Return what the floor of a helix takes from the table of a cylinder: rounded ends are far below it."""
     cylinder, level = replace(cutter, corner=0.0, taper=0.0), replace(cut, pitch=0.0)
     with_floor, without = (force_basis(cylinder, law, each, true_path, angles) for each in (cut, level))

@@ -23,7 +23,7 @@ from metro.cutting.chip import Cut, feed_per_radian
 from metro.cutting.cutter import Cutter
 from metro.cutting.edges import Edges
 from metro.cutting.envelope import Meridian, meridian, place_at
-from metro.cutting.general_panels import RADIUS, Edge, Nodes, Scratch, panel_points
+from metro.cutting.general_panels import HEIGHT, RADIUS, Edge, Nodes, Scratch, panel_points
 from metro.cutting.general_teeth import Teeth, alone_from, reach, teeth_in
 from metro.cutting.law import EdgeLaw
 from metro.cutting.quadrature import is_linear, rule
@@ -32,6 +32,7 @@ from metro.units import Array
 Indices = npt.NDArray[np.intp]
 Values = TypeVar("Values", Indices, Array)
 POINTS = 4
+FINE = 33  # places of a panel among which the first and the last one to cut are sought
 
 
 class Window(NamedTuple):
@@ -47,12 +48,12 @@ class Points(NamedTuple):
 
     Attributes
     ----------
-    angle : index of the angle of the tool. sine, cosine : of the immersion.
+    at : index of the angle of the tool and of the tooth, in one. sine, cosine : of the immersion.
     up, out : sine and cosine of the edge angle κ. chip : normal to the edge, m.
     width, edge : weights of an integral over the meridian and over the edge times cos(helix), m.
     """
 
-    angle: Indices
+    at: Indices
     sine: Array
     cosine: Array
     up: Array
@@ -85,16 +86,36 @@ def _places(line: Meridian, lag: float, shares: Array) -> Array:
     return table
 
 
+class General(NamedTuple):
+    """A general cutter in a cut: the nodes of its edges, its teeth, and between which immersions they cut."""
+
+    nodes: Nodes
+    teeth: Teeth
+    window: Window
+
+
 def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_path: bool) -> Array:
-    """Force on a general cutter per unit of each coefficient, (angles, 3, 6), with edges ``along``.
+    """Force on a general cutter per unit of each coefficient, (angles, 3, 6), with edges ``along``."""
+    if cut.axial_depth <= 0.0:
+        return np.zeros((len(along.top), 3, 6))
+    general = in_cut(cutter, law, cut, 1.0 / along.depth, true_path=true_path)
+    return np.asarray(forces(general, law, along).sum(axis=1))
+
+
+def forces(general: General, law: EdgeLaw, along: Edges) -> Array:
+    """Force on each tooth of a general cutter per unit of each coefficient, (angles, teeth, 3, 6).
 
     Shear in N per N/m² of chip area; edge in N per N/m of edge × cos(helix), as on a cylinder. Exact to 1e-5
     of the largest force on circular paths, to 1e-4 on true ones besides what ``LEAST_RADIUS`` says; but where
     an edge only just touches the end of the cut, the length that is cut is known to a few per cent.
     """
-    if cut.axial_depth <= 0.0:
-        return np.zeros((len(along.top), 3, 6))
-    lag = 1.0 / along.depth
+    nodes, teeth, window = general
+    found = _points(teeth, teeth._replace(pitch=teeth.pitch[:1]), nodes, along, window)
+    return _summed(found, law.shear(found.chip), along.top.size).reshape(*along.top.shape, 3, 6)
+
+
+def in_cut(cutter: Cutter, law: EdgeLaw, cut: Cut, lag: float, *, true_path: bool) -> General:
+    """Return a general cutter in a cut whose edges lag by ``lag``, rad/m."""
     bare = replace(cutter, tooth_angles=(0.0,), runout_radius=0.0, runout_angle=0.0, reach=())
     feed, linear = cut.feed_per_tooth if true_path else 0.0, is_linear(law, feed_per_radian(cutter, cut))
     nodes, teeth = (
@@ -105,9 +126,7 @@ def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_
     farthest = outer + cutter.runout_radius + float(np.abs(cutter.reach or 0.0).max())
     alone = alone_from(teeth, cutter, inner)
     inward = math.asin(alone) if alone < 1.0 else math.inf
-    window = Window(*reach(teeth, farthest, cutter.radius - cutter.corner), inward)
-    found = _points(teeth, teeth._replace(pitch=teeth.pitch[:1]), nodes, along, window)
-    return _summed(found, law.shear(found.chip), len(along.top))
+    return General(nodes, teeth, Window(*reach(teeth, farthest, cutter.radius - cutter.corner), inward))
 
 
 @compiled_with_arrays
@@ -118,7 +137,7 @@ def _points(teeth: Teeth, alone: Teeth, nodes: Nodes, along: Edges, window: Wind
     most = 3 * passes + 6
     scratch = Scratch(np.empty((count + 1, most)), np.empty(2 + (count - 1) * most * (most + 1) // 2))
     room, found = 4 * top.size + len(scratch.breaks) * len(nodes.inner), 0
-    angle: Indices = np.empty(room, np.intp)
+    place: Indices = np.empty(room, np.intp)
     rows = np.empty((room, 7))
     for i in range(top.shape[0]):
         for j in range(top.shape[1]):
@@ -130,12 +149,12 @@ def _points(teeth: Teeth, alone: Teeth, nodes: Nodes, along: Edges, window: Wind
             for panel in range(panels):
                 if found + len(scratch.breaks) * len(nodes.inner) > room:
                     room *= 2
-                    angle, rows = _grown(angle, room), _grown(rows, room)
+                    place, rows = _grown(place, room), _grown(rows, room)
                 more = panel_points(which, nodes, Edge(j, panel, top[i, j]), scratch, rows[found:])
-                angle[found : found + more] = i
+                place[found : found + more] = i * top.shape[1] + j
                 found += more
     rows = rows[:found].T.copy()
-    return Points(angle[:found].copy(), rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
+    return Points(place[:found].copy(), rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
 
 @compiled_with_arrays
@@ -147,11 +166,11 @@ def _grown(values: Values, room: int) -> Values:
 
 
 @compiled_with_arrays
-def _summed(found: Points, shear: Array, angles: int) -> Array:
-    """Force per unit of each coefficient, (angles, 3, 6)."""
-    basis = np.zeros((angles, 3, 6))
+def _summed(found: Points, shear: Array, count: int) -> Array:
+    """Force per unit of each coefficient, (count, 3, 6)."""
+    basis = np.zeros((count, 3, 6))
     for k in range(len(shear)):
-        at = basis[found.angle[k]]
+        at = basis[found.at[k]]
         for column, size in ((0, shear[k] * found.width[k]), (3, found.edge[k])):
             ahead, aside = size * found.sine[k], size * found.cosine[k]
             at[0, column] -= aside
@@ -163,3 +182,9 @@ def _summed(found: Points, shear: Array, angles: int) -> Array:
             at[1, column + 2] += aside * found.out[k]
             at[2, column + 2] += size * found.up[k]
     return basis
+
+
+def lagging(nodes: Nodes) -> tuple[Array, Array, Array]:
+    """Return heights, radii, m, and the angle by which the edge lags, rad, finely along all panels."""
+    table = _places(nodes.line, nodes.lag, np.linspace(0.0, 1.0, FINE)).reshape(FINE * len(nodes.table), -1)
+    return table[:, HEIGHT], table[:, RADIUS], nodes.lag * table[:, HEIGHT]

@@ -6,6 +6,7 @@ combinations of their starting values; the noise is re-estimated from the residu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -55,6 +56,8 @@ class Fit:
     covariance : of ``[beta, theta]``, for a dispersion of one.
     wider : by how much the interval of each effect parameter is wider than that covariance says, (q,) at
         least one, since the runs differ by more.
+    pressed : by how many standard deviations each effect parameter at a bound would be beyond it, (q,); 0 of
+        one that is at none.
     step : by how much another step of the descent would move a parameter, in its standard deviation, at most.
     condition : of the whitened, scaled columns of base and effects; infinite: a parameter is not determined.
     log_likelihood : marginal, by run; ``chi2`` and ``elements``: whitened sum of squares and count, by run.
@@ -67,6 +70,7 @@ class Fit:
     noise: Noise
     covariance: Array
     wider: Array
+    pressed: Array
     step: float
     condition: float
     log_likelihood: Mapping[str, float]
@@ -106,6 +110,7 @@ class _End(NamedTuple):
 
     covariance: Array
     wider: Array
+    pressed: Array
     step: float
     condition: float
 
@@ -251,7 +256,7 @@ def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
         near = _distinct(sorted(zip(left, states, strict=True), key=lambda one: one[0]), ALIKE * min(left))
         reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
         state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
-    end = _End(fitted.covariance, fitted.wider, fitted.step, fitted.condition)
+    end = _End(fitted.covariance, fitted.wider, fitted.pressed, fitted.step, fitted.condition)
     return _finished(candidate, blocks, noise, state, end)
 
 
@@ -317,7 +322,23 @@ def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: 
     step = float((np.abs(solution(still, downhill)) / np.sqrt(np.diag(inverse(still)))).max(initial=0.0))
     if step > CONVERGED:
         step *= farthest(candidate, blocks, state, system)
-    return _End(covariance, wider, step, condition(normal))
+    return _End(covariance, wider, _pressed(normal, right, moving)[p:], step, condition(normal))
+
+
+def _pressed(normal: Array, right: Array, moving: np.ndarray) -> Array:
+    """Return by how many deviations each parameter at a bound, freed alone, would go beyond it, (p + q,).
+
+    The bound keeps it from there, so that its own interval says nothing of how sure the runs are of that.
+    """
+    beyond = np.zeros(len(right))
+    for place in np.flatnonzero(~moving):
+        freed = moving.copy()
+        freed[place] = True
+        part, at = normal[np.ix_(freed, freed)], np.count_nonzero(freed[:place])
+        variance = inverse(part)[at, at]
+        step = float(solution(part, right[freed])[at])
+        beyond[place] = abs(step) / math.sqrt(variance) if 0.0 < variance < np.inf else 0.0
+    return beyond
 
 
 def _finished(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, end: _End) -> Fit:

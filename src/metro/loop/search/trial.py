@@ -204,9 +204,10 @@ def unsettled(fitted: Fit) -> Statement | None:
         return Statement("not_converged", {"step": fitted.step})
     variance = np.diag(fitted.covariance)[len(fitted.beta) :] * fitted.dispersion
     half = HALF_INTERVAL * np.sqrt(np.maximum(variance, 0.0))
+    beyond_bound = fitted.pressed > HALF_INTERVAL * np.sqrt(fitted.dispersion)
     parts = fitted.candidate.parts(fitted.theta)
     for effect, place in parts:
-        why = _undetermined(effect, fitted.theta[place], half[place])
+        why = _undetermined(effect, fitted.theta[place], half[place], beyond_bound[place])
         if why is not None:  # of the one that was tried last, or of one that was there already
             tried_last = effect is fitted.candidate.effects[-1]
             return why if tried_last else Statement("beside", {"effect": effect.name, "why": why})
@@ -215,20 +216,26 @@ def unsettled(fitted: Fit) -> Statement | None:
     return beyond(fitted, fitted.blocks)
 
 
-def _undetermined(effect: Effect, value: Array, half: Array) -> Statement | None:
+def _undetermined(effect: Effect, value: Array, half: Array, pressed: np.ndarray) -> Statement | None:
     """Return why the parameters of an effect are no result; None where they are one.
 
-    The interval of each is as wide as its bounds, or an identified one is at a bound that the true value may
-    be beyond.
+    The interval of each is as wide as its bounds, or an identified one is at a bound that the runs place it
+    beyond: freed, its interval would not hold the bound. One that would is an estimate like any other.
+
+    Parameters
+    ----------
+    value, half : (k,) estimates and half of their intervals. pressed : (k,) which are beyond a bound.
     """
     settled = False
-    for parameter, at, width in zip(effect.parameters, value.tolist(), half.tolist(), strict=True):
+    for parameter, at, width, out in zip(
+        effect.parameters, value.tolist(), half.tolist(), pressed.tolist(), strict=True
+    ):
         if parameter.period is not None:
             identified = 2.0 * width < parameter.period
         else:
             identified = at - width > parameter.lower or at + width < parameter.upper
             outermost = set() if parameter.all_there_is else {parameter.lower, parameter.upper}
-            if identified and at in outermost - {parameter.neutral}:
+            if identified and out and at in outermost - {parameter.neutral}:
                 return Statement("implausible", {"parameter": parameter.name, "bound": at})
         settled = settled or identified
     return None if settled else Statement("undetermined")
