@@ -80,6 +80,18 @@ def test_an_effect_at_its_bound_has_converged_and_is_no_result():
     )
 
 
+@pytest.mark.parametrize(("deviations", "settled"), [(0.5, True), (3.0, False), (60.0, False)])
+def test_a_bound_that_a_freed_parameter_would_not_leave_by_much_refuses_no_effect(deviations, settled):
+    """Not where the estimate is counts, but whether the runs say that the true value is beyond."""
+    task = problem(3, truth=Wave(bend=0.2), phased=False)
+    free = fitted(task, BEND)
+    upper = free.theta[0] - deviations * np.sqrt(free.covariance[-1, -1] * free.dispersion)
+    low = replace(BEND, parameters=tuple(replace(p, upper=upper, starts=(0.01,)) for p in BEND.parameters))
+    found = fitted(task, low)
+    assert found.theta == pytest.approx([upper])
+    assert (unsettled(found) is None) is settled
+
+
 def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):
     task = problem(1, truth=Wave(bend=0.1), phased=False)
     base = fitted(task)

@@ -27,7 +27,7 @@ joints = st.tuples(*[st.floats(-1.2, 1.2) for _ in range(6)]).map(np.array)
 @given(joints, joints)
 @settings(max_examples=40, deadline=None)
 def test_the_tip_comes_to_where_it_is_wanted(q, away):
-    q = q + [0.0, 0.0, 0.0, 0.0, 0.9 if q[4] >= 0 else -0.9, 0.0]  # beside the singular wrist
+    q = q + np.array([0.0, 0.0, 0.0, 0.0, 0.9 if q[4] >= 0 else -0.9, 0.0])  # beside the singular wrist
     found = joints_at(ARM, ARM.tip(q)[None], ARM.flange_axes(q)[None], q + 0.15 * away)[0]
     assert ARM.tip(found) == pytest.approx(ARM.tip(q), abs=2e-8)
     assert ARM.flange_axes(found) == pytest.approx(ARM.flange_axes(q), abs=2e-7)

@@ -115,7 +115,10 @@ def test_a_place_that_the_arm_does_not_reach_is_named(found):
 @pytest.mark.parametrize(
     ("columns", "words"),
     [
-        (["x_mm", "y_mm"], "lacks of targets: q1_deg, q2_deg, … of the joints, or x_mm, y_mm, z_mm of the tip"),
+        (
+            ["x_mm", "y_mm"],
+            "lacks of targets: q1_deg, q2_deg, … of the joints, or x_mm, y_mm, z_mm of the tip",
+        ),
         (["x_mm", "y_mm", "z_mm", "rx_deg"], "lacks of targets: ry_deg, rz_deg beside rx_deg"),
     ],
 )

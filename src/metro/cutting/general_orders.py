@@ -23,9 +23,9 @@ from metro.cutting.law import EdgeLaw
 from metro.cutting.passes import ALIKE
 from metro.units import Array, ComplexArray
 
-# Per degree of an arc. Orders up to the 48th have an error of 6e-4 of the force (rms) in a side cut with a
-# rounded end, 1e-4 in a slot; nearly three times as many leave a fourth of that.
-NODES = 0.75
+# Per degree of an arc. Orders up to the 48th then have an error of 1e-4 to 1e-3 of the force (rms) with a
+# rounded end, of 2e-3 with a ball, of 3e-3 without a helix; sixteen times as many leave less than 2e-4.
+NODES = 1.0
 PER_ORDER = 4.0  # nodes, at least, per period of the highest order in the arc
 
 
