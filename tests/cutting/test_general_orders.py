@@ -75,7 +75,7 @@ moved = {
     "pitch": lambda c, h: replace(
         c, tooth_angles=(c.tooth_angles[0], c.tooth_angles[1] - 1e-5 * h, *UNEVEN[2:])
     ),
-    "runout": lambda c, h: replace(c, runout_radius=c.runout_radius + 5e-8 * h),
+    "runout": lambda c, h: replace(c, runout_radius=c.runout_radius + 2e-8 * h),
 }
 
 

@@ -19,6 +19,7 @@ from metro.cutting.cutter import Cutter
 from metro.cutting.edges import Edges
 from metro.cutting.floor import floor_of
 from metro.cutting.general import General, forces, in_cut, lagging
+from metro.cutting.general_teeth import Teeth
 from metro.cutting.law import EdgeLaw
 from metro.cutting.passes import ALIKE
 from metro.units import Array, ComplexArray
@@ -76,14 +77,31 @@ def _arcs(cutter: Cutter, general: General, span: float) -> tuple[Array, Array]:
     """Return the immersions of the leading end between which each tooth cuts anything, (teeth,) rad.
 
     A raw edge that the tooth reaches from outside is crossed at each height where the local radius, on true
-    paths with the tooth's deviation, comes to its line; the rest of the edge lags.
+    paths with the tooth's deviation, comes to its line. Else a chip begins and ends where the pass that left
+    least does, which teeth that deviate move. The rest of the edge lags.
     """
     teeth, window = general.teeth, general.window
     height, radius, lag = lagging(general.nodes)
-    radius = radius + (cutter.radius_deviation(height) if teeth.true_path else np.zeros((cutter.teeth, 1)))
-    low, high = np.full(cutter.teeth, window.low), np.full(cutter.teeth, window.high + span)
+    deviation = cutter.radius_deviation(height)
+    radius = radius + (deviation if teeth.true_path else 0.0 * deviation)
+    begins = np.arcsin(np.clip(_least_chip(teeth, deviation), -1.0, 1.0))
+    low = np.maximum(window.low, (begins + window.low + lag).min(axis=1))
+    high = np.minimum(window.high, (window.high - begins + lag).max(axis=1) - span) + span
     for line, ends, towards in ((teeth.begins, low, np.min), (teeth.ends, high, np.max)):
         if line.there and line.outer:
             crossing = np.arccos(np.clip(line.line / np.maximum(radius, 1e-12), -1.0, 1.0))
             ends[:] = towards(crossing + lag, axis=1)
     return low, high
+
+
+def _least_chip(teeth: Teeth, deviation: Array) -> Array:
+    """Return by how much more the passes before a tooth reach, over what the feed makes of it, (teeth, n).
+
+    Of all passes the largest: the sine of the immersion at which the chip begins on circles.
+    """
+    count = len(deviation)
+    ahead = [np.roll(deviation, -m, axis=0) for m in range(1, len(teeth.pitch) + 1)]
+    travel = teeth.feed * teeth.pitch[:, :, None]
+    if not travel.all():
+        return np.zeros_like(deviation)
+    return np.asarray(np.max((np.array(ahead) - deviation) / travel, axis=0)[:count])
