@@ -167,3 +167,23 @@ def test_a_speed_outside_those_of_the_tests_is_tried_with_care():
     assert {(cut["advice"], cut["why"]) for cut in cuts(tested=tested)} == {
         ("try", "no_test_at_such_a_speed")
     }
+
+
+@pytest.mark.parametrize("teeth", [1, 2])
+def test_the_bending_moment_of_a_slot_is_that_of_its_thickest_chip(teeth):
+    """One tooth without a helix at a time: at 90° the force is the root of the squares of both components."""
+    tool = {"diameter_mm": 12.0, "teeth": teeth, "overhang_mm": 45.0}
+    coefficients = {"ktc_n_mm2": 900.0, "krc_n_mm2": 300.0, "kte_n_mm": 15.0, "kre_n_mm": 20.0}
+    milling = Milling.of({"tool": tool, "coefficients": coefficients}, {})
+    feed, depth = 0.08, 1.5
+    force = depth * math.hypot(900.0 * feed + 15.0, 300.0 * feed + 20.0)
+    expected = force * 1e-3 * (45.0 - 0.5 * depth)
+    found = milling.bending("slot", "slot", 12e-3, feed * 1e-3, depth * 1e-3)
+    assert found == pytest.approx(expected, rel=1e-4)
+
+
+def test_without_an_overhang_or_a_radial_coefficient_no_bending_is_stated():
+    assert MILLING.bending("slot", "slot", 12e-3, 1e-4, 1e-3) is None
+    assert all(cut["bending_nm"] is None for cut in cuts())
+    tool = {**MANIFEST["tool"], "overhang_mm": 45.0}
+    assert Milling.of({**MANIFEST, "tool": tool}, {}).lateral is None

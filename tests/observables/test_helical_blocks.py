@@ -82,7 +82,8 @@ def test_the_direction_of_feed_is_found_where_the_force_is_along_one_axis(axis, 
     assert force[axis] < 0.05 * force[1 - axis]
     noise = Noise(budget=0.007, scatter=np.full(7, 0.01), repeats={"hole": 1})
     candidate = Candidate(MODEL)
-    known = Fit(candidate, np.zeros(0), BETA, {}, noise, np.eye(7), np.zeros(0), 0.0, 1.0, {}, {}, {}, (run,))
+    none = np.zeros(0)
+    known = Fit(candidate, none, BETA, {}, noise, np.eye(7), none, none, 0.0, 1.0, {}, {}, {}, (run,))
     rest = run.measured - score(known, [run]).predict(run)
     assert np.linalg.norm(rest) < 1e-3 * np.linalg.norm(run.measured)
 

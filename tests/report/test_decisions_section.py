@@ -76,6 +76,12 @@ def test_cuts_that_must_not_be_used_are_listed_with_the_reason():
     assert any(getattr(item, "text", "") == WHY["verdict_unexplained"] for item in section.items)
 
 
+def test_a_bending_moment_that_is_known_is_beside_the_torque():
+    section = decisions(with_verdict(recommended_cuts=[{**CUT, "bending_nm": 5.67}]))
+    (table,) = [item for item in section.items if isinstance(item, Table)]
+    assert table.rows[0][5] == "2.3, 5.7"
+
+
 def test_a_report_has_the_section_after_page_one_only_where_something_is_decided():
     titles = [section.title for section in report_sections(with_verdict(decisions=JUDGED))]
     assert titles[1] == "Decisions"

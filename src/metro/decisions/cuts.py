@@ -15,7 +15,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from metro.cutting.engagement import engagement
+from metro.cutting.chip import Cut
+from metro.cutting.cutter import Cutter
+from metro.cutting.declared import cutter_of
+from metro.cutting.engagement import Engagement, engagement
+from metro.cutting.force import force_basis
+from metro.cutting.law import EdgeLaw
 from metro.units import JSON, MM, N_MM, N_MM2, RPM, Array
 
 MOST = 3  # pockets of a position
@@ -31,14 +36,42 @@ SURE = ("clean", "explained", "partly_explained")
 
 
 @dataclass(frozen=True)
+class Lateral:
+    """What bends a tool at its holder, SI.
+
+    Attributes
+    ----------
+    cutter : without runout. overhang : from the holder to the tip, m.
+    coefficients : K_tc, K_rc, K_te and K_re.
+    """
+
+    cutter: Cutter
+    overhang: float
+    coefficients: tuple[float, float, float, float]
+
+    def moment(self, arc: Engagement, feed: float, depth: float) -> float:
+        """Largest moment at the holder over a revolution, N m: lateral force times the way to mid-depth.
+
+        Of a rigid tool on a straight path; the axial force, which is near the axis, is left out.
+        """
+        basis = force_basis(self.cutter, EdgeLaw(), Cut(feed, depth, arc))[:, :2]
+        force = basis[..., [0, 1, 3, 4]] @ np.array(self.coefficients)
+        return float(np.hypot(*force.T).max()) * (self.overhang - 0.5 * depth)
+
+
+@dataclass(frozen=True)
 class Milling:
-    """Tool and coefficients of a batch, SI; ``hole_radius`` of helical cuts."""
+    """Tool and coefficients of a batch, SI; ``hole_radius`` of helical cuts.
+
+    ``lateral``: what bends the tool, where that is known.
+    """
 
     radius: float
     teeth: int
     ktc: float
     kte: float
     hole_radius: float = 0.0
+    lateral: Lateral | None = None
 
     @classmethod
     def of(cls, manifest: JSON, identified: JSON) -> Milling | None:
@@ -46,16 +79,21 @@ class Milling:
         tool = manifest.get("tool") or {}
         declared = manifest.get("coefficients") or {}
         waveform = (identified.get("force") or {}).get("waveform") or {}
-        ktc, kte = (
+        ktc, krc, kte, kre = (
             declared.get(f"{name}_{unit}", (waveform.get(name) or {}).get("value"))
-            for name, unit in (("ktc", "n_mm2"), ("kte", "n_mm"))
+            for name, unit in (("ktc", "n_mm2"), ("krc", "n_mm2"), ("kte", "n_mm"), ("kre", "n_mm"))
         )
         if ktc is None or kte is None or not {"diameter_mm", "teeth"} <= set(tool):
             return None
         edge = math.cos(math.radians(tool.get("helix_deg", 0.0))) if _per_arc(declared) else 1.0
         hole = 0.5 * float(manifest.get("hole_diameter_mm") or 0.0) * MM
         radius, teeth = 0.5 * tool["diameter_mm"] * MM, int(tool["teeth"])
-        return cls(radius, teeth, ktc * N_MM2, kte / edge * N_MM, hole)
+        shear, sharp = ktc * N_MM2, kte / edge * N_MM
+        lateral = None
+        if krc is not None and kre is not None and "overhang_mm" in tool:
+            coefficients = (shear, krc * N_MM2, sharp, kre / edge * N_MM)
+            lateral = Lateral(cutter_of(tool), tool["overhang_mm"] * MM, coefficients)
+        return cls(radius, teeth, shear, sharp, hole, lateral)
 
     def width(self, operation: str, radial_depth: float) -> float:
         """Width of the chip's section, m: volume over depth and feed. A hole is removed as a whole."""
@@ -72,6 +110,15 @@ class Milling:
         chip = feed * (math.cos(arc.entry) - math.cos(arc.exit))
         length = arc.exit - arc.entry
         return self.teeth * self.radius / (2.0 * math.pi) * (self.ktc * chip + self.kte * length)
+
+    def bending(
+        self, operation: str, direction: str, radial_depth: float, feed: float, depth: float
+    ) -> float | None:
+        """Largest bending moment at the holder, N m; None where overhang or coefficients are not known."""
+        if self.lateral is None:
+            return None
+        arc = engagement(operation, direction, radial_depth, self.radius)
+        return self.lateral.moment(arc, feed, depth)
 
 
 def _per_arc(declared: JSON) -> bool:
@@ -122,8 +169,9 @@ def recommended_cuts(
     list of JSON
         ``position``, ``spindle_rpm``, ``axial_depth_mm``, whether that is the reach of the evidence
         (``at_reach``), the other settings, ``probability_stable`` (at least), ``removal_cm3_min``,
-        ``torque_nm``, ``power_kw``, ``chatter_hz`` (at the boundary there), ``advice``: ``use``, ``try``
-        (begin at half the depth and listen: no test confirms it) or ``do_not``; ``why`` as a code.
+        ``torque_nm``, ``power_kw``, ``bending_nm`` (None without overhang), ``chatter_hz`` (at the
+        boundary there), ``advice``: ``use``, ``try`` (begin at half the depth and listen: no test confirms
+        it) or ``do_not``; ``why`` as a code.
     """
     found = []
     for position, rows in lobes.groupby("position", sort=False):
@@ -184,6 +232,7 @@ def _cut(row: pd.Series, depth_mm: float, milling: Milling) -> JSON:
         "removal_cm3_min": 60.0 * removal * 1e6,
         "torque_nm": torque,
         "power_kw": torque * speed / 1e3,
+        "bending_nm": milling.bending(operation, direction, radial_m, feed, depth),
         "chatter_hz": float(row["chatter_hz"]),
     }
 

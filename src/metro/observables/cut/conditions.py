@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from metro.batch.axes import signed_axes
 from metro.batch.batch import Batch
 from metro.batch.capabilities import blank_settings
-from metro.cutting.cutter import Cutter, evenly_pitched
+from metro.cutting.cutter import Cutter
+from metro.cutting.declared import cutter_of
 from metro.cutting.engagement import engagement
 from metro.cutting.force import COEFFICIENTS, Cut, mean_force
 from metro.cutting.law import EdgeLaw
@@ -29,19 +31,12 @@ def cutter(batch: Batch) -> Cutter | Refusal:
     missing = [key for key in ("diameter_mm", "teeth") if key not in tool]
     if missing:
         return Refusal(f"batch.yaml: tool.{missing[0]} is not given")
-    pitch = tool.get("pitch_deg")
-    angles = tuple(np.cumsum([0.0, *pitch[:-1]]) * DEG) if pitch else evenly_pitched(tool["teeth"])
     runout = (batch.manifest.get("known") or {}).get("tool_runout", {})
     runout = runout if {"radius_um", "angle_deg"} <= set(runout) else {}
-    end, inserts = tool.get("end"), "cutting_edge_angle_deg" in tool
-    return Cutter(
-        radius=tool["diameter_mm"] * MM / 2,
-        helix=tool.get("helix_deg", 0.0) * DEG,
-        tooth_angles=tuple(float(angle) for angle in angles),
+    return replace(
+        cutter_of(tool),
         runout_radius=runout.get("radius_um", 0.0) * UM,
         runout_angle=runout.get("angle_deg", 0.0) * DEG,
-        corner=(0.5 * tool["diameter_mm"] if end == "ball" else tool.get("corner_radius_mm", 0.0)) * MM,
-        taper=(90.0 - tool["cutting_edge_angle_deg"] if inserts else tool.get("taper_deg", 0.0)) * DEG,
     )
 
 

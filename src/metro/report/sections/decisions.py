@@ -123,37 +123,43 @@ def _cuts(verdict: JSON) -> list[Item]:
     rows = [
         [
             str(cut["position"]),
-            *(number(_float(cut[name]), digits) for name, digits in COLUMNS.values()),
+            *(_numbers(cut, names) for names in COLUMNS.values()),
             ADVICE[str(cut["advice"])],
         ]
         for cut in cuts[:MOST]
     ]
     caption = (
         "Cuts that are stable with a probability of 0.975 or more, at the lower end of the depth's band. "
-        "Torque and power are means over a revolution; chatter is the frequency that would be heard beyond "
-        "the boundary."
+        "Torque and power are means over a revolution; bending is the largest moment at the holder; chatter "
+        "is the frequency that would be heard beyond the boundary."
     )
     table = Table(
         ["position", *COLUMNS, "advice"],
         rows,
         caption,
-        [1, 0.8, 0.8, 0.8, 1.3, 1, 0.9, 0.9, 1.3],
+        [1, 0.8, 0.8, 0.8, 1.2, 1.3, 0.9, 0.9, 1.3],
         numeric=list(range(1, 8)),
     )
     reasons = dict.fromkeys(WHY[str(cut["why"])] for cut in cuts)
     return [Heading("Recommended cuts"), *(Paragraph(text) for text in reasons), table]
 
 
-# Title of a column → the entry of a recommended cut, and its digits.
+# Title of a column → the entries of a recommended cut in it, each with its digits.
 COLUMNS = {
-    "speed (rpm)": ("spindle_rpm", 4),
-    "depth (mm)": ("axial_depth_mm", 2),
-    "feed (mm)": ("feed_per_tooth_mm", 2),
-    "removal (cm³/min)": ("removal_cm3_min", 2),
-    "torque (N m)": ("torque_nm", 2),
-    "power (kW)": ("power_kw", 2),
-    "chatter (Hz)": ("chatter_hz", 3),
+    "speed (rpm)": {"spindle_rpm": 4},
+    "depth (mm)": {"axial_depth_mm": 2},
+    "feed (mm)": {"feed_per_tooth_mm": 2},
+    "removal (cm³/min)": {"removal_cm3_min": 2},
+    "torque, bending (N m)": {"torque_nm": 2, "bending_nm": 2},
+    "power (kW)": {"power_kw": 2},
+    "chatter (Hz)": {"chatter_hz": 3},
 }
+
+
+def _numbers(cut: Mapping[str, object], names: Mapping[str, int]) -> str:
+    """Write the entries of a column of a cut, those that are known."""
+    known = [number(_float(cut[name]), digits) for name, digits in names.items() if cut.get(name) is not None]
+    return ", ".join(known) or "–"
 
 
 def _float(value: object) -> float:
