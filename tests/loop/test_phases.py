@@ -32,7 +32,8 @@ def with_phases(found: Fit, phases: np.ndarray) -> Fit:
     theta = np.zeros(len(FREE.parameters))
     candidate = Candidate(found.candidate.base, (FREE,))
     covariance = 1e-4 * np.eye(len(found.beta) + len(theta))
-    known = replace(found, candidate=candidate, theta=theta, covariance=covariance)
+    unpressed = np.zeros(len(theta))
+    known = replace(found, candidate=candidate, theta=theta, covariance=covariance, pressed=unpressed)
     return replace(known, blocks=blocks, nuisance=nuisance)
 
 
