@@ -24,8 +24,8 @@ from metro.cutting.law import EdgeLaw
 from metro.cutting.passes import ALIKE
 from metro.units import Array, ComplexArray
 
-# Per degree of an arc: as dear as a table of 360 angles. Orders up to the 48th have an error of 1e-4 to 1e-3 of
-# the force (rms) with a rounded end, of up to 4e-3 with a ball or without a helix (the table: 3e-3, 2e-2).
+# Per degree of an arc: as dear as a table of 360 angles. Orders up to the 48th have an error of 1e-4 to 1e-3
+# of the force (rms) with a rounded end, of up to 4e-3 with a ball or without a helix (the table: 3e-3, 2e-2).
 NODES = 0.75
 PER_ORDER = 4.0  # nodes, at least, per period of the highest order in the arc
 

@@ -130,7 +130,7 @@ function frame(host, plot, drawing, redrawn) {
     html("p", { id: `${id}-help` }, plot.help));
   fill(drawing, { tabindex: "0", role: "application", "aria-label": plot.title, "aria-describedby": `${id}-help` });
   const figure = fill(html("figure", { class: "plot", id, "aria-label": plot.title }), {}, [
-    html("h4", {}, `${plot.title} `, choice), tools, legend, drawing, read, spoken,
+    html(plot.heading || "h4", {}, `${plot.title} `, choice), tools, legend, drawing, read, spoken,
     ...(plot.note ? [html("p", { class: "note" }, plot.note)] : []), help]);
   host.append(figure);
   let keyed = false, said = "", width = WIDEST;

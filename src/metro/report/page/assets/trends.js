@@ -14,6 +14,6 @@ function trends(host, batches) {
       lines: [{ name: "identified", look: "measured", y: entries.map(({ value }) => value), low: half(-1), high: half(1) }] };
   });
   const most = curves.reduce((best, one) => (one.rows.length > best.rows.length ? one : best));
-  chart(host, { title: "Trend", x: "batch", keys: ["quantity"], curves, first: most.key,
+  chart(host, { title: "Trend", heading: "h3", x: "batch", keys: ["quantity"], curves, first: most.key,
     note: host.dataset.note, help: host.dataset.help });
 }
