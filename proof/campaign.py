@@ -15,7 +15,6 @@ from pathlib import Path
 from metro.batch.processed import read_batch
 from metro.memory.history import Record
 from metro.memory.remember import remember
-from metro.stages.campaign import first_start
 from metro.units import JSON
 from proof.layout import Layout
 from proof.run import run
@@ -92,7 +91,7 @@ def _record(out: Layout, name: str) -> Record:
     batch = read_batch(out.processed / name)
     verdict, identified = (_read(out.reports / name / f"{kind}.json") for kind in ("verdict", "identified"))
     loop = _read(out.processed / name / "loop.json")
-    return Record(name, batch.manifest, first_start(batch.runs), verdict, loop, identified)
+    return Record(name, batch.manifest, batch.started, verdict, loop, identified)
 
 
 def _read(path: Path) -> JSON:
