@@ -32,7 +32,7 @@ from metro.units import Array
 Indices = npt.NDArray[np.intp]
 Values = TypeVar("Values", Indices, Array)
 POINTS = 4
-FINE = 33  # places of a panel among which the first and the last one to cut are sought
+FINE = 41  # places of a panel among which the first and the last one to cut are sought
 
 
 class Window(NamedTuple):

@@ -15,12 +15,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter
 from metro.cutting.declared import cutter_of
 from metro.cutting.engagement import Engagement, engagement
-from metro.cutting.force import force_basis
-from metro.cutting.law import EdgeLaw
 from metro.units import JSON, MM, N_MM, N_MM2, RPM, Array
 
 MOST = 3  # pockets of a position
@@ -54,6 +51,11 @@ class Lateral:
 
         Of a rigid tool on a straight path; the axial force, which is near the axis, is left out.
         """
+        # The force needs numba, which a verdict without lobes does without.
+        from metro.cutting.chip import Cut
+        from metro.cutting.force import force_basis
+        from metro.cutting.law import EdgeLaw
+
         basis = force_basis(self.cutter, EdgeLaw(), Cut(feed, depth, arc))[:, :2]
         force = basis[..., [0, 1, 3, 4]] @ np.array(self.coefficients)
         return float(np.hypot(*force.T).max()) * (self.overhang - 0.5 * depth)
