@@ -26,8 +26,8 @@ from metro.cutting.law import EdgeLaw
 from metro.cutting.passes import ALIKE
 from metro.units import Array, ComplexArray
 
-# Per degree of an arc: as dear as a table of 360 angles. Orders up to the 48th have an error of at most 1.5e-3
-# of the force (rms), 2.5e-3 without a helix (the table: 7e-3, 1.6e-2); 16 per degree leave less than 2.5e-4.
+# Per degree of an arc: as dear as a table of 360 angles. Orders up to the 48th have an error of 1.5e-3 of the
+# force (rms) at most, 2.5e-3 without a helix (the table: 7e-3, 1.6e-2); 16 per degree leave below 2.5e-4.
 NODES = 0.75
 CROWDED = 0.15  # share of the nodes that crowd at either end
 PER_ORDER = 4.0  # nodes, at least, per period of the highest order in the arc
