@@ -4,23 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kr160_arm import DH
 
 from metro.robot.inverse import OutOfReachError, joints_at, nearest_joints
 from metro.robot.kinematics import Arm, rotation, transform
 
-KR160 = np.array(
-    [
-        [0.0, -90.0, 500.0, 250.0],
-        [-90.0, 0.0, 0.0, 610.0],
-        [0.0, -90.0, 0.0, 70.0],
-        [0.0, 90.0, 860.0, 0.0],
-        [0.0, -90.0, 0.0, 0.0],
-        [0.0, 0.0, 215.0, 0.0],
-    ]
-) * [np.pi / 180, np.pi / 180, 1e-3, 1e-3]  # fmt: skip
-ARM = Arm(
-    KR160, np.array([0.02, -0.03, 0.25]), transform(np.array([1.1, 0.2, 0.4]), rotation(0.1, -0.2, 0.7))
-)
+ARM = Arm(DH, np.array([0.02, -0.03, 0.25]), transform(np.array([1.1, 0.2, 0.4]), rotation(0.1, -0.2, 0.7)))
 joints = st.tuples(*[st.floats(-1.2, 1.2) for _ in range(6)]).map(np.array)
 
 

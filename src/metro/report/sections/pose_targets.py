@@ -14,7 +14,7 @@ from metro.units import JSON
 
 MOST = 8
 ABOUT = (
-    "Joint targets of {run}, corrected: command these, and the point comes to where the nominal arm has it. "
+    "Corrected targets of {run}. Command these, and the point comes to where the nominal arm has it. "
     "{shown} of {count}; all are in table pose_targets. Before: error as predicted without the correction. "
     "After: median and 97.5th percentile, by the errors of poses that no fit saw, the instrument's included."
 )
