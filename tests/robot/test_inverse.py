@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from kr160_arm import DH
 
-from metro.robot.inverse import OutOfReachError, joints_at, nearest_joints
+from metro.robot.inverse import LEVER, OutOfReachError, _moves, _turned, joints_at, nearest_joints
 from metro.robot.kinematics import Arm, rotation, transform
 
 ARM = Arm(DH, np.array([0.02, -0.03, 0.25]), transform(np.array([1.1, 0.2, 0.4]), rotation(0.1, -0.2, 0.7)))
@@ -20,6 +20,16 @@ def test_the_tip_comes_to_where_it_is_wanted(q, away):
     found = joints_at(ARM, ARM.tip(q)[None], ARM.flange_axes(q)[None], q + 0.15 * away)[0]
     assert ARM.tip(found) == pytest.approx(ARM.tip(q), abs=2e-8)
     assert ARM.flange_axes(found) == pytest.approx(ARM.flange_axes(q), abs=2e-7)
+
+
+@given(joints)
+@settings(max_examples=20, deadline=None)
+def test_what_joints_move_is_the_derivative_of_place_and_turn(q):
+    found, step = _moves(ARM, q), 1e-6
+    for i, one in enumerate(step * np.eye(6)):
+        assert found[:3, i] == pytest.approx((ARM.tip(q + one) - ARM.tip(q - one)) / (2 * step), abs=1e-7)
+        about = _turned(ARM.flange_axes(q + one)[None], ARM.flange_axes(q - one)[None])[0]
+        assert found[3:, i] == pytest.approx(LEVER * about / (2 * step), abs=1e-7)
 
 
 def test_a_path_is_followed_in_one_posture():
