@@ -80,6 +80,12 @@ def test_a_bending_moment_that_is_known_is_beside_the_torque():
     section = decisions(with_verdict(recommended_cuts=[{**CUT, "bending_nm": 5.67}]))
     (table,) = [item for item in section.items if isinstance(item, Table)]
     assert table.rows[0][5] == "2.3, 5.7"
+    assert "bending" in table.header[5]
+    assert "bending" in table.caption
+    without = decisions(with_verdict(recommended_cuts=[CUT]))
+    (table,) = [item for item in without.items if isinstance(item, Table)]
+    assert table.header[5] == "torque (N m)"
+    assert "bending" not in table.caption
 
 
 def test_a_report_has_the_section_after_page_one_only_where_something_is_decided():

@@ -120,6 +120,7 @@ def _cuts(verdict: JSON) -> list[Item]:
     cuts: Sequence[Mapping[str, object]] = verdict.get("recommended_cuts") or []
     if not cuts:
         return []
+    bent = any(cut.get("bending_nm") is not None for cut in cuts[:MOST])
     rows = [
         [
             str(cut["position"]),
@@ -130,11 +131,11 @@ def _cuts(verdict: JSON) -> list[Item]:
     ]
     caption = (
         "Cuts that are stable with a probability of 0.975 or more, at the lower end of the depth's band. "
-        "Torque and power are means over a revolution; bending is the largest moment at the holder; chatter "
-        "is the frequency that would be heard beyond the boundary."
+        f"Torque and power are means over a revolution; {BENDING if bent else ''}chatter is the frequency "
+        "that would be heard beyond the boundary."
     )
     table = Table(
-        ["position", *COLUMNS, "advice"],
+        ["position", *(TORQUE if name == BENT and not bent else name for name in COLUMNS), "advice"],
         rows,
         caption,
         [1, 0.8, 0.8, 0.8, 1.2, 1.3, 0.9, 0.9, 1.3],
@@ -144,13 +145,15 @@ def _cuts(verdict: JSON) -> list[Item]:
     return [Heading("Recommended cuts"), *(Paragraph(text) for text in reasons), table]
 
 
+TORQUE, BENT = "torque (N m)", "torque, bending (N m)"
+BENDING = "bending is the largest moment at the holder; "
 # Title of a column → the entries of a recommended cut in it, each with its digits.
 COLUMNS = {
     "speed (rpm)": {"spindle_rpm": 4},
     "depth (mm)": {"axial_depth_mm": 2},
     "feed (mm)": {"feed_per_tooth_mm": 2},
     "removal (cm³/min)": {"removal_cm3_min": 2},
-    "torque, bending (N m)": {"torque_nm": 2, "bending_nm": 2},
+    BENT: {"torque_nm": 2, "bending_nm": 2},
     "power (kW)": {"power_kw": 2},
     "chatter (Hz)": {"chatter_hz": 3},
 }
