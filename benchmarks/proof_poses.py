@@ -1,14 +1,16 @@
 """What a calibration names, misses and makes up on simulated arms of other geometry, and what it promises.
 
-``python benchmarks/proof_poses.py [draws] [size]``: arms of ``virtual_cell/tracked_arm.py`` (an industrial
-one, one with three parallel axes, one of seven joints), each with its own hidden effects, errors of all rows
-that the poses can show, a tracker of 0.02 to 0.04 mm somewhere, 1 % of readings off by millimetres,
-temperatures that wander. 600 poses each. Effects are ``size`` times as large as drawn (1). Every third arm is
-also sent to corrected targets.
+``python benchmarks/proof_poses.py [draws] [--size 1] [--stations 0] [--load 0]``: arms of
+``virtual_cell/tracked_arm.py`` (an industrial one, one with three parallel axes, one of seven joints), each
+with its own hidden effects, errors of all rows that the poses can show, a tracker of 0.02 to 0.04 mm
+somewhere, 1 % of readings off by millimetres, temperatures that wander. 600 poses each. Effects are ``size``
+times as large as drawn. Every third arm is also sent to corrected targets. With ``stations``, wires from so
+many places measure in the tracker's place; with ``load`` (kg), the second half of the poses carries it.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections import Counter
 from dataclasses import dataclass, field
@@ -20,11 +22,12 @@ from metro.robot.calibration.compensation import corrected
 from metro.robot.calibration.determined import determined
 from metro.robot.calibration.model import State, free_of_geometry, jacobian
 from metro.robot.calibration.poses import Poses, approached
+from metro.robot.calibration.start import placed
 from metro.robot.calibration.study import Calibration, calibrated, left_out
 from metro.units import DEG, Array
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from virtual_cell.tracked_arm import TrackedArm, tracked
+from virtual_cell.tracked_arm import TrackedArm, spanned, tracked
 
 POSES, TARGETS, OUTLIERS = 600, 100, 0.01
 SCATTER = 1e-3  # m, about the declared arm: what it leaves undetermined has no error either
@@ -88,13 +91,17 @@ class Tally:
 
 def main() -> None:
     """Print a table over the draws of each geometry."""
-    draws = int(sys.argv[1]) if len(sys.argv) > 1 else 12
-    size = float(sys.argv[2]) if len(sys.argv) > 2 else 1.0
+    reader = argparse.ArgumentParser()
+    reader.add_argument("draws", type=int, nargs="?", default=12)
+    reader.add_argument("--size", type=float, default=1.0)
+    reader.add_argument("--stations", type=int, default=0)
+    reader.add_argument("--load", type=float, default=0.0)
+    asked = reader.parse_args()
     whole = Tally()
     for place, name in enumerate(ARMS):
         tally = Tally()
-        for draw in range(draws):
-            one(name, 1000 * place + draw, size, tally, serves=draw % 3 == 0)
+        for draw in range(asked.draws):
+            one(name, 1000 * place + draw, asked, tally, serves=draw % 3 == 0 and not asked.stations)
         print(name, _told(tally))
         for key in ("named", "open", "missed", "invented"):
             getattr(whole, key).update(getattr(tally, key))
@@ -122,19 +129,28 @@ def _told(tally: Tally) -> str:
     )
 
 
-def one(name: str, seed: int, size: float, tally: Tally, *, serves: bool) -> None:
+def one(name: str, seed: int, asked: argparse.Namespace, tally: Tally, *, serves: bool) -> None:
     """Draw an arm, calibrate it and add to the tally; with ``serves`` correct targets, too."""
     rng = np.random.default_rng(seed)
     rows, reach, masses = (np.array(each, dtype=float) for each in ARMS[name])
     rows = np.column_stack([rows * (DEG, DEG, 1.0, 1.0), np.zeros(len(rows))])
     q = rng.uniform(-reach, reach, (POSES, len(reach)))
-    arm, hidden = _drawn(rows, masses, q, size, rng)
+    arm, hidden = _drawn(rows, masses, q, asked.size, rng)
     warmth, sigma = np.cumsum(rng.normal(0, 0.15, POSES)), rng.uniform(2e-5, 4e-5, POSES)
-    day = warmth, np.linspace(0, 1, POSES)
-    at = tracked(arm, q, day, sigma, np.random.default_rng(seed + 7))
+    load = np.where(np.arange(POSES) < POSES // 2, 0.0, asked.load)
+    day = warmth, np.linspace(0, 1, POSES), load
     wrong = rng.uniform(size=POSES) < OUTLIERS
-    at[wrong] += rng.normal(0, 2e-3, (int(wrong.sum()), 3))
-    poses = Poses(q, at, sigma, np.arange(POSES, dtype=float), 20.0 + warmth, approached(q))
+    noise = np.random.default_rng(seed + 7)
+    if asked.stations:
+        stations = noise.uniform([-2.0, -2.0, -0.5], [2.0, 2.0, 0.5], (asked.stations, 3))
+        lengths = spanned(arm, q, day, stations=stations, sigma=sigma, rng=noise)
+        lengths[wrong] += rng.normal(0, 2e-3, (int(wrong.sum()), asked.stations))
+        poses = placed(_by_wires(q, lengths, sigma, warmth, load), rows[:, :4])
+    else:
+        at = tracked(arm, q, day, sigma, noise)
+        at[wrong] += rng.normal(0, 2e-3, (int(wrong.sum()), 3))
+        time = np.arange(POSES, dtype=float)
+        poses = Poses(q, at, sigma, time, 20.0 + warmth, approached(q), payload=load)
     found = calibrated(poses, rows[:, :4])
     _score(found, hidden, tally)
     tally.off += _parameters(found, arm)
@@ -145,7 +161,8 @@ def one(name: str, seed: int, size: float, tally: Tally, *, serves: bool) -> Non
         wanted = found.fits[0].state.position(targets)
 
         def missed(own: Array, noise: float) -> Array:
-            last, own_sigma = (np.full(TARGETS, warmth[-1]), np.ones(TARGETS)), np.full(TARGETS, noise)
+            last = np.full(TARGETS, warmth[-1]), np.ones(TARGETS), np.full(TARGETS, load[-1])
+            own_sigma = np.full(TARGETS, noise)
             at = tracked(arm, own, last, own_sigma, np.random.default_rng(seed + 7))
             return np.asarray(np.linalg.norm(at - wanted, axis=1))
 
@@ -154,6 +171,24 @@ def one(name: str, seed: int, size: float, tally: Tally, *, serves: bool) -> Non
         seen = missed(made.q, 3e-5)
         tally.promised += list(made.after[:, 0])
         tally.inside += list((seen > made.after[:, 1]) & (seen < made.after[:, 2]))
+
+
+def _by_wires(q: Array, lengths: Array, sigma: Array, warmth: Array, load: Array) -> Poses:
+    """Return lengths (m, s) as poses, one row for each."""
+    count, stations = lengths.shape
+    again = np.repeat(np.arange(count), stations)
+    return Poses(
+        q[again],
+        np.full((len(again), 3), np.nan),
+        sigma[again],
+        again.astype(float),
+        20.0 + warmth[again],
+        approached(q)[again],
+        pose=again,
+        distance=lengths.ravel(),
+        station=np.tile(np.arange(stations), count),
+        payload=load[again],
+    )
 
 
 def _drawn(
@@ -222,7 +257,8 @@ def _parameters(found: Calibration, arm: TrackedArm) -> list[float]:
     sd = np.sqrt(np.diag(fit.covariance))
     free = np.flatnonzero(fit.free)
     change = (fit.state.rows - arm.rows).ravel()
-    off = [change[place - 9] / sd[k] for k, place in enumerate(free) if place >= 9]
+    head = fit.state.head
+    off = [change[place - head] / sd[k] for k, place in enumerate(free) if place >= head]
     for k, effect in enumerate(fit.effects):
         own = fit.values[k]
         if effect.code == "eccentricity" and len(arm.turned.get(effect.joint, ())) == 2:

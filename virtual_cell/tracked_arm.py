@@ -51,7 +51,7 @@ class TrackedArm:
             found.append((turn, origin))
         return found
 
-    def true_angles(self, q: Array, came: Array) -> Array:
+    def true_angles(self, q: Array, came: Array, load: float = 0.0) -> Array:
         """Return where the joints really are, (n,), at readings (n,) approached from ``came`` (n,)."""
         angles = q.copy()
         for joint, coefficients in self.turned.items():
@@ -59,23 +59,29 @@ class TrackedArm:
             angles[joint] += np.sum(coefficients * np.column_stack([np.cos(orders), np.sin(orders)]))
         if self.lag is not None:
             angles = angles - self.lag * came
-        return np.asarray(angles + self.compliance * self._torques(q)[1])
+        return np.asarray(angles + self.compliance * self._torques(q, load)[1])
 
-    def point(self, q: Array, came: Array, warmth: float = 0.0, part: float = 0.0) -> Array:
-        """Return the point (3,) in the base, m; ``warmth`` in kelvin, ``part`` of the series that is over."""
-        turn, origin = self.frames(self.true_angles(q, came))[-1]
+    def point(
+        self, q: Array, came: Array, warmth: float = 0.0, part: float = 0.0, load: float = 0.0
+    ) -> Array:
+        """Return the point (3,) in the base, m.
+
+        ``warmth`` in kelvin, ``part`` of the series that is over, ``load`` at the flange in kg.
+        """
+        turn, origin = self.frames(self.true_angles(q, came, load))[-1]
         at = origin + turn.apply(self.tool)
         if self.base:
-            moment = self._torques(q)[0]
+            moment = self._torques(q, load)[0]
             at = at + self.base * np.cross([moment[0], moment[1], 0.0], at)
         at = at * (1.0 + self.growth * warmth)
         return np.asarray(at if self.drift is None else at + part * self.drift)
 
-    def _torques(self, q: Array) -> tuple[Array, Array]:
+    def _torques(self, q: Array, load: float) -> tuple[Array, Array]:
         """Return the weights' moment about the base (3,), and their torques about the axes (n,), N m."""
         at = self.frames(q)
-        centres = np.array([CENTRE * first[1] + (1.0 - CENTRE) * last[1] for first, last in pairwise(at)])
-        weights = -GRAVITY * self.masses[:, None] * [0.0, 0.0, 1.0]
+        own = [CENTRE * first[1] + (1.0 - CENTRE) * last[1] for first, last in pairwise(at)]
+        centres = np.array([*own, at[-1][1]])
+        weights = -GRAVITY * np.append(self.masses, load)[:, None] * [0.0, 0.0, 1.0]
         torques = [
             np.sum(np.cross(centres[joint:] - origin, weights[joint:]), axis=0) @ turn.apply([0.0, 0.0, 1.0])
             for joint, (turn, origin) in enumerate(at[:-1])
@@ -94,14 +100,32 @@ def came_from(q: Array) -> Array:
 
 
 def tracked(
-    arm: TrackedArm, q: Array, day: tuple[Array, Array], sigma: Array, rng: np.random.Generator
+    arm: TrackedArm, q: Array, day: tuple[Array, ...], sigma: Array, rng: np.random.Generator
 ) -> Array:
     """Return what a tracker that stands anywhere sees of the point at readings (m, n): (m, 3), m.
 
-    ``day``: of each pose how warm it is, (m,) K, and which part of the series is over, (m,). ``sigma``: (m,)
-    standard deviation of a coordinate, m. Where the tracker stands is drawn first.
+    ``day``: of each pose how warm it is, (m,) K, which part of the series is over, (m,), and the load, (m,)
+    kg. ``sigma``: (m,) standard deviation of a coordinate, m. Where the tracker stands is drawn first.
     """
     place = Rotation.from_euler("xyz", [rng.normal(0, 0.03), rng.normal(0, 0.03), rng.uniform(-3, 3)])
     foot, came = rng.normal(0, 2.0, 3), came_from(q)
     points = [arm.point(*each) for each in zip(q, came, *day, strict=True)]
     return np.asarray(place.apply(points) + foot + sigma[:, None] * rng.normal(size=(len(q), 3)))
+
+
+def spanned(
+    arm: TrackedArm,
+    q: Array,
+    day: tuple[Array, ...],
+    *,
+    stations: Array,
+    sigma: Array,
+    rng: np.random.Generator,
+) -> Array:
+    """Return the lengths (m, s), m, of wires from stations (s, 3) in the arm's base to the point.
+
+    As for :func:`tracked`; ``sigma``: (m,) standard deviation of a length, m.
+    """
+    points = np.array([arm.point(*each) for each in zip(q, came_from(q), *day, strict=True)])
+    lengths = np.linalg.norm(points[:, None] - stations, axis=2)
+    return np.asarray(lengths + sigma[:, None] * rng.normal(size=lengths.shape))

@@ -64,7 +64,7 @@ def fault_of(names: Sequence[str]) -> str:
 
 
 def fault_of_poses(names: Sequence[str]) -> str:
-    """Say which position of a joint a table of poses lacks, or has too much; "" where it is whole."""
+    """Say which position of a joint a table lacks, or has too much; "" where it is whole."""
     own = [name for name in POSITIONS if name in names]
     count = len(positions(own))
     if count < 2:

@@ -38,7 +38,7 @@ def example(kind, rows=12):
     if KINDS[kind].rising:
         table[KINDS[kind].rising] = np.arange(rows) * 0.25
     sigmas = {f"sigma_{axis}mm" for axis in ("", "x_", "y_", "z_")}
-    for name in {"coherence", *sigmas} & {*table}:  # never below zero
+    for name in {"coherence", "distance_mm", "payload_kg", *sigmas} & {*table}:  # never below zero
         table[name] = table[name].abs()
     return table
 

@@ -17,7 +17,7 @@ ERRORS = np.zeros((6, 4))
 ERRORS[1, 3], ERRORS[4, 0], ERRORS[4, 1] = 8e-4, 9e-4, -7e-4
 BLANK = [
     *("q7_deg", "q8_deg", "q9_deg", "rx_deg", "ry_deg", "rz_deg", "q1", "q2", "q3", "q4"),
-    *("t_s", "temperature_c", "sigma_mm", "target", "point"),
+    *("t_s", "temperature_c", "sigma_mm", "target", "point", "distance_mm", "station", "payload_kg"),
     *("sigma_x_mm", "sigma_y_mm", "sigma_z_mm"),
 ]
 

@@ -64,11 +64,8 @@ def _words(text):
     return " ".join(re.sub(r"[│┃╭╮╰╯─━]", " ", text).split())
 
 
-@pytest.fixture(scope="module")
-def found(tmp_path_factory):
-    """Return what is identified, the words of the PDF and those of the page."""
-    root = tmp_path_factory.mktemp("poses")
-    folder = batch(root, series())
+def closed(root, folder):
+    """Return what is identified, the words of the PDF and those of the page, and where the tables are."""
     processed, reports = root / "processed", root / "reports"
     settings = yaml.safe_load((ROOT / "config/config.yaml").read_text())["loop"]
     ingest(folder, root, processed, {}, "c0de")
@@ -82,6 +79,12 @@ def found(tmp_path_factory):
     page = html.unescape(re.sub(r"<[^>]+>", " ", (reports / "report.html").read_text()))
     identified = json.loads((reports / "identified.json").read_text())
     return identified, " ".join(text.split()), " ".join(page.split()), processed
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    root = tmp_path_factory.mktemp("poses")
+    return closed(root, batch(root, series()))
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +124,10 @@ def test_the_report_and_the_page_print_the_medians_that_the_results_have(found):
 
 def test_the_verdict_names_the_longer_link_with_errors_on_poses_left_out(found, judged):
     assert judged["status"] == "explained"
-    assert (judged["unit"], judged["held_out"]) == ("mm", {"poses": 260, "by": "region"})
+    assert (judged["unit"], judged["held_out"]) == (
+        "mm",
+        {"poses": 260, "by": "region", "of": "coordinate"},
+    )
     for when in ("before", "after"):
         low, high = judged[when]["ci95"]
         assert low < judged[when]["rms"] < high
@@ -231,3 +237,61 @@ def test_import_recognises_poses_and_asks_for_units_and_the_robot(tmp_path):
     read = pd.read_parquet(tmp_path / "processed/poses.parquet")
     assert read["q6_deg"].to_numpy() == pytest.approx(np.rad2deg(table["wrist_3_joint"]), rel=1e-9)
     assert set(read["temperature_c"]) == {21.5}
+
+
+STATIONS = np.array([[3.6, -2.4, 0.2], [3.9, -0.1, 0.5], [1.8, 0.6, 0.8]])  # m, in the tracker's frame
+
+
+def wires(count=120, sigma=3e-5):
+    """Return the lengths of three wires at poses of the same arm, a row each."""
+    errors = np.zeros((6, 4))
+    errors[1, 3] = 8e-4
+    q = np.repeat(drawn(count, seed=5), 3, axis=0)
+    noise = sigma * np.random.default_rng(6).standard_normal(3 * count)
+    apart = measured(q[::3], errors).repeat(3, axis=0) - np.tile(STATIONS, (count, 1))
+    table = pd.DataFrame(np.rad2deg(q), columns=[f"q{i}_deg" for i in range(1, 7)])
+    length = 1e3 * (np.linalg.norm(apart, axis=1) + noise)
+    return table.assign(distance_mm=length, station=np.tile([1, 2, 3], count), sigma_mm=1e3 * sigma)
+
+
+def of_wires(root, table):
+    folder = batch(root, series(50))
+    table.to_csv(folder / "wires.csv", index=False)
+    (folder / "batch.yaml").write_text("format: 1\nbatch: poses\nsource: measured\ncell: arm\n")
+    (folder / "runs.csv").write_text("run,poses,targets\nr01,wires.csv,targets.csv\n")
+    table.filter(like="q").head(3).to_csv(folder / "targets.csv", index=False)
+    return folder
+
+
+def test_wires_from_three_stations_find_the_longer_link_and_say_what_they_do_not_show(tmp_path):
+    identified, text, page, processed = closed(tmp_path, of_wires(tmp_path, wires()))
+    block = identified["pose"]["r01"]
+    assert (block["poses"], block["rows"], block["measured"]) == (120, 360, "distances")
+    length = block["corrections"]["joint 2 length"]
+    assert length["ci95"][0] < 0.8 < length["ci95"][1]
+    assert length["ci95"][1] - length["ci95"][0] < 0.06
+    at = np.array([[one[axis]["value"] for axis in "xyz"] for one in block["stations"]])
+    apart = np.linalg.norm(at[0] - at[2])
+    assert apart == pytest.approx(1e3 * np.linalg.norm(STATIONS[0] - STATIONS[2]), abs=0.1)
+    assert "do not show where the arm's base is" in identified["pose"]["not_identified"]["targets of r01"]
+    verdict = json.loads((processed.parent / "reports/verdict.json").read_text())["observables"]["pose"]
+    assert verdict["held_out"] == {"poses": 120, "by": "region", "of": "distance"}
+    assert verdict["status"] == "explained"
+    assert verdict["after"]["rms"] == pytest.approx(0.03, rel=0.2)
+    rows = pd.read_parquet(processed / "comparison.parquet")
+    assert rows.groupby("axis").size().to_dict() == {"distance": 360}
+    for words in (text, page):
+        assert "Absolute difference between measured and predicted distance" in words
+        assert "rms in a distance" in words
+
+
+def test_neither_positions_nor_distances_are_named(tmp_path):
+    folder = of_wires(tmp_path, wires().drop(columns="distance_mm"))
+    said = _words(checked(folder).output)
+    assert "lacks the column x_mm, y_mm, z_mm of measured poses" in said
+    assert "expected x_mm, y_mm, z_mm (or distance_mm in their place)" in said
+
+
+def test_distances_in_metres_are_refused(tmp_path):
+    folder = of_wires(tmp_path, wires().assign(distance_mm=lambda t: t["distance_mm"] * 1e-3))
+    assert "columns distance_mm: the poses are within" in _words(checked(folder).output)

@@ -34,6 +34,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "poses": (
         *("run", *POSITIONS, "x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg", "q1", "q2", "q3", "q4"),
         *("t_s", "temperature_c", "sigma_mm", "sigma_x_mm", "sigma_y_mm", "sigma_z_mm", "target", "point"),
+        *("distance_mm", "station", "payload_kg"),
     ),
     "targets": ("run", *POSITIONS, *PLACE, *TURNED),
     "hit": (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,6 +33,7 @@ class Kind:
     ----------
     title : what to call such a file in a message.
     required, optional : column names, units in the names.
+    instead : those of the optional ones that take the place of the required ones where they are there.
     rising : the column that grows strictly from row to row, or "".
     whole : columns that hold whole numbers.
     least : the smallest number of rows.
@@ -48,15 +49,31 @@ class Kind:
     least: int = 8
     samples: bool = False
     fault: Callable[[Sequence[str]], str] = lambda _names: ""
+    instead: tuple[str, ...] = ()
 
     @property
     def columns(self) -> tuple[str, ...]:
         """All columns that it may have."""
         return (*self.required, *self.optional)
 
+    @property
+    def expected(self) -> str:
+        """The required columns, as a message lists them."""
+        listed = ", ".join(self.required)
+        return f"{listed} (or {', '.join(self.instead)} in their place)" if self.instead else listed
+
+    def lacking(self, names: Collection[str]) -> list[str]:
+        """Return the required columns that are not among ``names``."""
+        if self.instead and all(name in names for name in self.instead):
+            return []
+        return [name for name in self.required if name not in names]
+
 
 SIGMAS = ("sigma_x_mm", "sigma_y_mm", "sigma_z_mm")
-OF_A_POSE = ("t_s", "temperature_c", "sigma_mm", *SIGMAS, "target", "point")
+OF_A_POSE = (
+    *("t_s", "temperature_c", "sigma_mm", *SIGMAS, "target", "point"),
+    *("distance_mm", "station", "payload_kg"),
+)
 KINDS: dict[str, Kind] = {
     "force": Kind(
         "a force record", ("t_s", "fx_n", "fy_n", "fz_n"), ("spindle_deg",), rising="t_s", samples=True
@@ -74,11 +91,12 @@ KINDS: dict[str, Kind] = {
     ),
     "poses": Kind(
         "measured poses",
-        ("x_mm", "y_mm", "z_mm"),
-        (*POSITIONS, "rx_deg", "ry_deg", "rz_deg", "q1", "q2", "q3", "q4", *OF_A_POSE),
-        whole=("target", "point"),
+        PLACE,
+        (*POSITIONS, *TURNED, "q1", "q2", "q3", "q4", *OF_A_POSE),
+        whole=("target", "point", "station"),
         samples=True,
         fault=fault_of_poses,
+        instead=("distance_mm",),
     ),
     "targets": Kind("targets", (), (*POSITIONS, *PLACE, *TURNED), least=1, fault=fault_of_targets),
     "cloud": Kind("a point cloud", ("x_mm", "y_mm", "z_mm"), least=3),
@@ -91,7 +109,7 @@ KINDS: dict[str, Kind] = {
 RANGES = {
     "frequency_hz": (0.0, np.inf),
     "coherence": (0.0, 1.0 + 1e-6),
-    **dict.fromkeys(("sigma_mm", *SIGMAS), (0.0, np.inf)),
+    **dict.fromkeys(("sigma_mm", *SIGMAS, "distance_mm", "payload_kg"), (0.0, np.inf)),
 }
 
 
@@ -111,7 +129,7 @@ def columns_to_read(path: Path, kind: Kind, names: Sequence[str]) -> list[str]:
     FormatError
         Where a required column is missing or a wanted one appears twice.
     """
-    missing = [name for name in kind.required if name not in names]
+    missing = kind.lacking(names)
     if missing:
         present = ", ".join(name for name in names if name) or "none"
         spare = [name for name in names if name not in kind.columns]
@@ -119,7 +137,7 @@ def columns_to_read(path: Path, kind: Kind, names: Sequence[str]) -> list[str]:
         meant = ", ".join(f'"{other}" for {name}' for name, other in near.items() if other)
         hint = f" (did you mean {meant}? Name it so, or map it under files in batch.yaml)" if meant else ""
         message = f"lacks the column {', '.join(missing)} of {kind.title}{hint}: found the columns {present}"
-        raise FormatError(path, f"{message}, expected {', '.join(kind.required)}")
+        raise FormatError(path, f"{message}, expected {kind.expected}")
     wanted = [name for name in (*kind.required, *kind.optional) if name in names]
     _check_whole_kind(path, kind, wanted, names)
     for name in wanted:

@@ -305,7 +305,7 @@ def _clock(taken: Mapping[str, tuple[str, Own, float]]) -> Clock | None:
 def _check_complete(
     source: Source, mapping: FileMapping, kind: Kind, here: Contents, there: set[str]
 ) -> None:
-    missing = [name for name in kind.required if name not in there]
+    missing = kind.lacking(there)
     if not missing and (fault := kind.fault(sorted(there))):
         message = f"batch.yaml, {mapping.key}: says nothing of {fault}"
         raise FormatError(source.path, f"{message}, expected under columns for {kind.title}{_listed(here)}")

@@ -15,7 +15,7 @@ import pandas as pd
 from metro.loop.fitting.held_out import COMPARISON
 from metro.loop.statement import Statement
 from metro.loop.verdict.verdict import error
-from metro.units import JSON
+from metro.units import JSON, Array
 
 NAME, UNIT = "pose", "mm"
 DECIDES = "region"  # errors on poses of quarters of the workspace that no fit saw are before and after
@@ -35,7 +35,8 @@ EFFECTS = {
 TORN = 0.5  # probability that an effect has at most where another does as well in its place
 WORST = ("unexplained", "undetermined", "partly_explained", "explained", "clean")
 CHANCE = 0.05  # of a rest as far beyond the known noise where it is no more than that
-MEDIAN_SD = 1.124  # relative standard deviation of the median of chi-squared of three, times the root of m
+# Relative standard deviation of the median of chi-squared of so many degrees of freedom, times the root of m.
+MEDIAN_SD = {1: 2.333, 3: 1.124}
 MILLIDEGREES = 180.0 / math.pi  # of 1 mrad
 
 
@@ -49,10 +50,11 @@ def judged(block: JSON, errors: pd.DataFrame, seed: int) -> tuple[JSON, JSON, pd
     series = {run: one for run, one in block.items() if run != "not_identified"}
     if not series:
         return None
-    held = errors[errors["kind"] == DECIDES]
-    clusters = held["run"].astype(str) + "/" + held["region"].astype(str)
+    held = errors[errors["kind"] == DECIDES].reset_index(drop=True)
     rows = _rows(held)
-    by_cluster = rows.assign(run=np.tile(clusters.to_numpy(), 3))
+    regions = held["run"].astype(str) + "/" + held["region"].astype(str)
+    by_cluster = rows.assign(run=regions.loc[rows.index].to_numpy())
+    rows = rows.reset_index(drop=True)
     left = {run: _significant(one) for run, one in series.items()}
     effects = [
         effect for run, one in series.items() for effect in _effects(one, run if series_of(block) else "")
@@ -66,7 +68,11 @@ def judged(block: JSON, errors: pd.DataFrame, seed: int) -> tuple[JSON, JSON, pd
         "unit": UNIT,
         "noise_floor": floor,
         "held_out_runs": [],
-        "held_out": {"poses": len(held), "by": DECIDES},
+        "held_out": {
+            "poses": len(held[["run", "pose"]].drop_duplicates()),
+            "by": DECIDES,
+            "of": "coordinate" if "nominal_x_mm" in held else "distance",
+        },
         "before": before,
         "after": after,
         "verification": None,
@@ -97,16 +103,30 @@ def probability(p_value: float) -> float:
 
 
 def _rows(held: pd.DataFrame) -> pd.DataFrame:
-    """Return rows of the comparison: each coordinate of each pose, x of all, then y, then z."""
-    parts = []
-    for axis in "xyz":
-        at = held[f"{axis}_mm"]
-        rows: dict[str, object] = dict.fromkeys(COMPARISON)
-        rows |= {"observable": NAME, "run": held["run"].astype(str), "axis": axis, "unit": UNIT}
-        rows |= {"measured": at, "sigma": held["sigma_mm"]}
-        rows |= {"before": at - held[f"nominal_{axis}_mm"], "after": at - held[f"effects_{axis}_mm"]}
-        parts.append(pd.DataFrame(rows, columns=list(COMPARISON), index=held.index))
-    return pd.concat(parts, ignore_index=True)
+    """Return rows of the comparison: each coordinate of each pose, x of all, then y, then z.
+
+    Of a measured distance that alone. The index is that of ``held``.
+    """
+    by_place = held if "distance_mm" not in held else held[held["distance_mm"].isna()]
+    by_line = held.drop(by_place.index)
+    parts = [_coordinate(by_place, axis) for axis in "xyz"] if len(by_place) else []
+    return pd.concat([*parts, *([_coordinate(by_line, "distance")] if len(by_line) else [])])
+
+
+def _coordinate(held: pd.DataFrame, axis: str) -> pd.DataFrame:
+    at = held[f"{axis}_mm"]
+    rows: dict[str, object] = dict.fromkeys(COMPARISON)
+    rows |= {"observable": NAME, "run": held["run"].astype(str), "axis": axis, "unit": UNIT}
+    rows |= {"measured": at, "sigma": held["sigma_mm"]}
+    rows |= {"before": at - held[f"nominal_{axis}_mm"], "after": at - held[f"effects_{axis}_mm"]}
+    return pd.DataFrame(rows, columns=list(COMPARISON), index=held.index)
+
+
+def _errors(held: pd.DataFrame, stage: str) -> Array:
+    """Return the errors (k,) mm of a stage, in all coordinates of positions and of all distances."""
+    columns = [name for axis in ("x", "y", "z", "distance") if (name := f"{stage}_{axis}_mm") in held]
+    errors = held[columns].to_numpy(dtype=float)
+    return np.asarray(errors[np.isfinite(errors)])
 
 
 def _significant(one: JSON) -> bool:
@@ -120,8 +140,18 @@ def _significant(one: JSON) -> bool:
     beyond = (one["scatter"]["value"] / one["noise"]["value"]) ** 2
     if one["noise"]["source"] == "repeats":  # the scatter then has them in it
         beyond -= 1.0
-    spread = MEDIAN_SD**2 / one["poses"] + 2.0 / one["noise"].get("freedom", math.inf)
+    spread = MEDIAN_SD[_dimensions(one)] ** 2 / _count(one) + 2.0 / one["noise"].get("freedom", math.inf)
     return bool(beyond > norm.isf(CHANCE) * math.sqrt(spread))
+
+
+def _dimensions(one: JSON) -> int:
+    """Return how many coordinates of a pose were measured: its position, or its distance alone."""
+    return 1 if one.get("measured") == "distances" else 3
+
+
+def _count(one: JSON) -> int:
+    """Return how many positions or distances a series has: from several stations, several of a pose."""
+    return int(one["rows"] if "rows" in one else one["poses"])
 
 
 def _status(one: JSON, rest: bool) -> str:
@@ -168,7 +198,7 @@ def _effect(effect: JSON, one: JSON) -> JSON:
         "effect": _name(effect),
         "probability": min(chance, TORN) if torn else chance,
         "p_value": effect["p_value"],
-        "held_out_gain": log_likelihood(effect["gain"], one["poses"]),
+        "held_out_gain": log_likelihood(effect["gain"], one),
         "parameters": {
             **({"joint": effect["joint"]} if "joint" in effect else {}),
             **dict(_parameter(effect["effect"], name, value) for name, value in effect["parameters"].items()),
@@ -197,9 +227,9 @@ def _parameter(code: str, name: str, value: JSON) -> tuple[str, JSON]:
     return key, {"value": scale * value["value"], "ci95": ends, "unit": unit}
 
 
-def log_likelihood(gain: float, poses: int) -> float:
-    """Return a mean gain of left-out regions (docs/poses.md) as a log-likelihood of all poses."""
-    return 1.5 * gain * poses
+def log_likelihood(gain: float, one: JSON) -> float:
+    """Return a mean gain of left-out regions (docs/poses.md) as a log-likelihood of all poses of a series."""
+    return float(0.5 * _dimensions(one) * gain * _count(one))
 
 
 def _candidates(one: JSON) -> list[JSON]:
@@ -209,7 +239,7 @@ def _candidates(one: JSON) -> list[JSON]:
             **({"joint": trial["joint"]} if "joint" in trial else {}),
             "probability": None,
             "held_out_rms": None,
-            "held_out_gain": log_likelihood(trial["gain"], one["poses"]),
+            "held_out_gain": log_likelihood(trial["gain"], one),
             "p_value": trial["p_value"],
             "why_not": Statement("pose_no_gain", {"gain": trial["gain"], "p_value": trial["p_value"]}),
         }
@@ -260,7 +290,8 @@ def _unexplained(series: Mapping[str, JSON], left: Mapping[str, bool], after: JS
 
 
 def _rest(one: JSON) -> JSON:
-    return {"scatter": one["scatter"]["value"], "noise": one.get("noise")}
+    measured = one.get("measured", "positions")
+    return {"scatter": one["scatter"]["value"], "noise": one.get("noise"), "measured": measured}
 
 
 def _told(one: JSON, rest: bool) -> JSON:
@@ -295,7 +326,6 @@ def _story(rows: pd.DataFrame, held: pd.DataFrame, effects: list[JSON]) -> JSON:
     }
     path = []
     for stage, names in steps.items():
-        errors = held[[f"{stage}_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
-        rms = float(np.sqrt(np.mean(errors**2)))
+        rms = float(np.sqrt(np.mean(_errors(held, stage) ** 2)))
         path.append({"added": names, "held_out_rms": rms, "nrmse": rms / signal})
     return {"unit": UNIT, "path": path}

@@ -89,13 +89,13 @@ def turns(names: list[str], values_deg: Array) -> str:
     return f"{fault}: they seem to be in radians, expected degrees: state the unit under files in batch.yaml"
 
 
-def positions(points_mm: Array) -> str:
-    """Check the unit of the positions (m, 3) of measured poses in millimetres."""
+def positions(points_mm: Array, columns: str = "x_mm, y_mm, z_mm") -> str:
+    """Check the unit of the positions (m, 3), or distances (m, 1), of measured poses in millimetres."""
     size, (low, high) = float(np.ptp(points_mm, axis=0).max()), WORKSPACE_MM
     if low <= size <= high:
         return ""
     unit = "metres" if size < low else "micrometres"
-    fault = f"columns x_mm, y_mm, z_mm: the poses are within {size:.4g}, expected {low:g} to {high:g} mm"
+    fault = f"columns {columns}: the poses are within {size:.4g}, expected {low:g} to {high:g} mm"
     return f"{fault}: they seem to be in {unit}: state the unit under files in batch.yaml"
 
 

@@ -119,10 +119,11 @@ def poses(batch: Batch, recordings: Recordings) -> Iterator[Part]:
         table = recordings.table(file, "poses")
         if table is None:
             continue
+        measured = list(POINT) if set(POINT) <= set(table) else ["distance_mm"]
         wrong = (
             _joints_at_odds(batch, table)
             or _half_turned(table)
-            or plausible.positions(table[list(POINT)].to_numpy())
+            or plausible.positions(table[measured].to_numpy(), ", ".join(measured))
         )
         if not recordings.doubt(file, wrong):
             recordings.note_read(file, run, table)

@@ -87,7 +87,8 @@ def _left(values: JSON) -> str:
         noise = one["noise"]
         beside = f", beside {noise['value']:.2g} mm that {SOURCES[noise['source']]}" if noise else ""
         named = f" in series {run}" if values["several"] else ""
-        parts.append(f"{one['scatter']:.2g} mm in a coordinate{named}{beside}")
+        what = "distance" if one["measured"] == "distances" else "coordinate"
+        parts.append(f"{one['scatter']:.2g} mm in a {what}{named}{beside}")
     return "; ".join(parts)
 
 

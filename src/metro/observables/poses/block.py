@@ -8,10 +8,10 @@ import numpy as np
 
 from metro.observables.quantity import quantity
 from metro.robot.calibration.ceiling import ceiling
-from metro.robot.calibration.effects import Effect
+from metro.robot.calibration.effects import COMPLIANCE, Effect
 from metro.robot.calibration.fit import Fit
 from metro.robot.calibration.held_out import HeldOut, median
-from metro.robot.calibration.model import KINDS, names
+from metro.robot.calibration.model import BASE, KINDS, names
 from metro.robot.calibration.performance import repeated, spread
 from metro.robot.calibration.poses import Poses
 from metro.robot.calibration.rounding import moved_by_rounding
@@ -26,11 +26,14 @@ def series_block(found: Calibration, held: tuple[HeldOut, ...], poses: Poses, ta
     """Return all that is said of a series; ``target`` (m,): number of the commanded pose, or NaN."""
     final, known = found.final, found.determined
     target = target[poses.point == 0]
+    measured = "distances" if poses.by_distance else "positions"
     labels, head = names(final.state), final.state.head
     left = ceiling(final, poses)
     step, rounded = moved_by_rounding(final, poses.first)
     return {
-        "poses": len(poses.first),
+        "poses": len(np.unique(poses.first.pose)),
+        "measured": measured,
+        "rows": len(poses.first),
         "points": int(poses.point.max()) + 1,
         "scatter": {"value": final.scale / MM, "unit": "mm"},
         "noise": _noise(poses.first, target, rounded),
@@ -39,6 +42,7 @@ def series_block(found: Calibration, held: tuple[HeldOut, ...], poses: Poses, ta
         "observability": known.o1 / MM,
         "redundant": [labels[place] for place in range(head, len(labels)) if not known.kept[place]],
         "tool": _tool(final),
+        **({"stations": _stations(final)} if poses.by_distance else {}),
         "corrections": _corrections(found),
         "geometry": _by_joint(found),
         "effects": _effects(found, poses),
@@ -55,7 +59,7 @@ def series_block(found: Calibration, held: tuple[HeldOut, ...], poses: Poses, ta
             for one in found.found.trials
         ],
         "rivals": [list(pair) for pair in found.found.rivals],
-        "errors": {one.kind: _of_held_out(one) for one in held},
+        "errors": {one.kind: _of_held_out(one, poses) for one in held},
         "ceiling": {
             "parts": dict(left.parts),
             "share": left.share,
@@ -86,8 +90,26 @@ def _noise(poses: Poses, target: Array, rounded: float) -> JSON | None:
 
 
 def _tool(fit: Fit) -> JSON:
-    sd, tool = np.sqrt(np.diag(fit.covariance))[6:9], np.atleast_2d(fit.state.tool)[0]
-    return {axis: quantity(float(tool[k]) / MM, float(sd[k]) / MM, "mm") for k, axis in enumerate("xyz")}
+    first = len(BASE)
+    return _place(np.atleast_2d(fit.state.tool)[0], _deviations(fit)[first : first + 3])
+
+
+def _stations(fit: Fit) -> list[JSON]:
+    """Return where the stations of distances are, in the base frame of the rows."""
+    first = fit.state.head - fit.state.stations.size
+    sd = _deviations(fit)[first : fit.state.head].reshape(-1, 3)
+    return [_place(at, each) for at, each in zip(fit.state.stations, sd, strict=True)]
+
+
+def _place(at: Array, sd: Array) -> JSON:
+    return {axis: quantity(float(at[k]) / MM, float(sd[k]) / MM, "mm") for k, axis in enumerate("xyz")}
+
+
+def _deviations(fit: Fit) -> Array:
+    """Return the standard deviation of each parameter of the geometry, (head + 5 n); 0 unless free."""
+    sd = np.zeros(len(fit.free))
+    sd[fit.free] = np.sqrt(np.diag(fit.covariance))[: int(fit.free.sum())]
+    return sd
 
 
 def _changes(found: Calibration) -> tuple[np.ndarray, Array]:
@@ -101,8 +123,7 @@ def _changes(found: Calibration) -> tuple[np.ndarray, Array]:
 def _corrections(found: Calibration) -> JSON:
     labels = names(found.final.state)
     places, change = _changes(found)
-    head = found.final.state.head
-    sd = np.sqrt(np.diag(found.final.covariance))[head : head + len(places)]
+    sd = _deviations(found.final)[places]
     return {
         labels[place]: _corrected(labels[place], float(value), float(each))
         for place, value, each in zip(places, change, sd, strict=True)
@@ -119,7 +140,8 @@ def _by_joint(found: Calibration) -> list[JSON]:
     from scipy.stats import chi2
 
     places, change = _changes(found)
-    own = slice(found.final.state.head, found.final.state.head + len(places))
+    end = int(found.final.free.sum())
+    own = slice(end - len(places), end)
     covariance = found.final.covariance[own, own]
     joint = (places - found.final.state.head) // len(KINDS)
     entries = []
@@ -165,6 +187,8 @@ def _unit(effect: Effect, label: str, prismatic: np.ndarray) -> tuple[float, str
     """Return the unit of a parameter: mm where it shifts a joint or the point, mm/m of a scale, else mrad."""
     if label == "scale":
         return 1e-3, "mm/m"
+    if label == COMPLIANCE:
+        return MRAD, "µrad/(N m)"  # of rad/(kN m)
     shifts = bool(prismatic[effect.joint]) if effect.joint >= 0 else label in ("x", "y", "z")
     return (MM, "mm") if shifts else (MRAD, "mrad")
 
@@ -194,8 +218,8 @@ def least_zero(size: JSON) -> JSON:
     return size | {"ci95": [None if end is None else max(0.0, end) for end in size["ci95"]]}
 
 
-def _of_held_out(one: HeldOut) -> JSON:
-    found: JSON = {"poses": len(one.which)}
+def _of_held_out(one: HeldOut, poses: Poses) -> JSON:
+    found: JSON = {"poses": len(np.unique(poses.pose[one.which]))}
     for stage, distances in zip(STAGES, one.distances, strict=True):
         value, low, high = (each / MM for each in median(distances))
         found[stage] = {

@@ -21,8 +21,8 @@ POSES = Description(
     name=NAME,
     title="the arm by measured poses",
     assumes="Joints turn by their readings about the axes of the declared geometry; links and base are "
-    "rigid. Corrections and effects are added to that. A series has one load on the flange, so that what it "
-    "bends the arm by is not parted from what the arm's own weight does.",
+    "rigid. Corrections and effects are added to that. Unless payload_kg changes within a series, what the "
+    "load bends is not parted from what the arm's own weight does.",
     tables=TABLES,
     shown=TABLES,
     needs=needs,

@@ -19,6 +19,7 @@ from metro.robot.calibration.fit import HALVINGS, Fit
 from metro.robot.calibration.held_out import HeldOut
 from metro.robot.calibration.next_poses import next_poses
 from metro.robot.calibration.poses import Poses
+from metro.robot.calibration.start import placed
 from metro.robot.calibration.study import FEWEST, STAGES, calibrated, left_out
 from metro.robot.inverse import OutOfReachError
 from metro.robot.kinematics import geometry_of_cell
@@ -26,6 +27,7 @@ from metro.units import DEG, JSON, MM, Array
 
 CURVE_STEP = 0.5 * DEG  # between the points of a curve that is drawn
 SHIFT_STEP = 0.002  # m, of a joint that shifts
+NO_FRAME = "distances do not show where the arm's base is: measure positions to correct targets"
 NO_ARM = "the cell has no arm (arm.dh or arm.urdf in cell.yaml)"
 
 
@@ -43,8 +45,9 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
             continue
         rows = read("poses", run)
         poses, target = poses_of(rows, euler_of(batch))
-        if len(poses.first) < FEWEST:
-            reasons[run] = f"found {len(poses.first)} poses, expected at least {FEWEST}"
+        poses = placed(poses, geometry)
+        if (count := len(np.unique(poses.pose))) < FEWEST:
+            reasons[run] = f"found {count} poses, expected at least {FEWEST}"
             continue
         try:
             if wrong := misread(rows, euler_of(batch), geometry):
@@ -61,6 +64,9 @@ def observe(batch: Batch, read: Tables) -> tuple[dict[str, pd.DataFrame], JSON]:
         tables["pose_curves"] += _curves(run, found.final, poses)
         for other in served.get(run, ()):
             asked = targets[targets["run"] == other]
+            if poses.by_distance:
+                reasons[f"targets of {other}"] = NO_FRAME
+                continue
             try:
                 part, summary = corrected_targets(batch, asked, found, poses=poses, held=held)
             except OutOfReachError as error:
@@ -88,15 +94,18 @@ def _served(batch: Batch) -> dict[str, list[str]]:
 def _errors(run: str, poses: Poses, held: tuple[HeldOut, ...]) -> pd.DataFrame:
     """Return the held-out errors: measured position, and measured less predicted by each fit, mm.
 
-    ``region``: of the workspace, within which errors are alike.
+    ``region``: of the workspace, within which errors are alike. Where distances were measured the place is
+    that of the declared flange, and the errors are those of ``distance_mm``.
     """
     parts, region = [], poses.parted(HALVINGS) + 1
+    axes = ("distance",) if poses.by_distance else ("x", "y", "z")
     for one in held:
         x, y, z = poses.at[one.which].T / MM
         part = {"run": run, "kind": one.kind, "pose": poses.pose[one.which] + 1, "region": region[one.which]}
         part |= {"x_mm": x, "y_mm": y, "z_mm": z, "sigma_mm": _stated(poses.sigma[one.which] / MM)}
+        part |= {"distance_mm": poses.distance[one.which] / MM} if poses.by_distance else {}
         for stage, errors in zip(STAGES, one.errors, strict=True):
-            part |= {f"{stage}_{axis}_mm": errors[:, k] / MM for k, axis in enumerate("xyz")}
+            part |= {f"{stage}_{axis}_mm": errors[:, k] / MM for k, axis in enumerate(axes)}
         parts.append(pd.DataFrame(part))
     return pd.concat(parts, ignore_index=True)
 

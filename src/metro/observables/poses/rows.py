@@ -6,13 +6,14 @@ y of the measured frame. How that frame sits on the flange is then as free as wh
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
-from metro.joint_columns import axes_of
+from metro.joint_columns import PLACE, axes_of
 from metro.robot.calibration.poses import Poses, approached, evenly
 from metro.robot.calibration.start import nominal
 from metro.robot.kinematics import Geometry
@@ -38,33 +39,28 @@ def poses_of(rows: pd.DataFrame, euler: str = FIXED_AXES) -> tuple[Poses, Array]
     """
     axes = axes_of(rows)
     q = rows[axes.positions].to_numpy(dtype=float) * axes.units
-    at = rows[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
+    at = rows[list(PLACE)].to_numpy(dtype=float) * MM
     point = np.nan_to_num(rows["point"].to_numpy(dtype=float), nan=1.0).astype(int)
     point = np.unique(point, return_inverse=True)[1].ravel()
-    pose = _poses(q, point)
+    pose = _poses(q, point, rows["station"].to_numpy(dtype=float))
     time = rows["t_s"].to_numpy(dtype=float)
     time = time if np.isfinite(time).all() else pose.astype(float)
     sigma = np.nan_to_num(_sigma(rows)) * MM
     warm = rows["temperature_c"].to_numpy(dtype=float)
-    found = Poses(q, at, sigma, time, warm, approached(q), pose, point)
+    # A tracker may state the distance, too; it counts where there is no position.
+    distance = np.where(np.isnan(at).any(axis=1), rows["distance_mm"].to_numpy(dtype=float) * MM, np.nan)
+    station = np.nan_to_num(rows["station"].to_numpy(dtype=float), nan=1.0).astype(int)
+    station = np.unique(station, return_inverse=True)[1].ravel()
+    payload = np.nan_to_num(rows["payload_kg"].to_numpy(dtype=float))
+    found = Poses(q, at, sigma, time, warm, approached(q), pose, point, distance, station, payload)
     target, turn = rows["target"].to_numpy(dtype=float), _orientation(rows, euler)
     if turn is None:
         return found, target
     again = np.repeat(np.arange(len(q)), 3)
     beside = np.stack([np.zeros_like(at), turn[:, :, 0], turn[:, :, 1]], axis=1).reshape(-1, 3)
-    more = found.of(again)
     places = found.point[again] * 3 + np.tile(np.arange(3), len(q))
-    with_turn = Poses(
-        more.q,
-        more.at + LEVER * beside,
-        more.sigma,
-        more.time,
-        more.temperature,
-        more.came,
-        more.pose,
-        places,
-    )
-    return with_turn, target[again]
+    more = found.of(again)
+    return replace(more, at=more.at + LEVER * beside, point=places), target[again]
 
 
 def misread(rows: pd.DataFrame, euler: str, geometry: Geometry) -> str:
@@ -72,7 +68,7 @@ def misread(rows: pd.DataFrame, euler: str, geometry: Geometry) -> str:
 
     A wrong order has the points beside the measured one centimetres from where the arm has them.
     """
-    if rows[list(ANGLES)].isna().to_numpy().any():
+    if rows[[*ANGLES, *PLACE]].isna().to_numpy().any():
         return ""
     some = rows.iloc[evenly(len(rows), SOME)]
     scatter = {
@@ -97,9 +93,13 @@ def _sigma(rows: pd.DataFrame) -> Array:
     return np.where(np.isnan(stated), np.sqrt(np.mean(each**2, axis=1)), stated)
 
 
-def _poses(q: Array, point: np.ndarray) -> np.ndarray:
-    """Return numbers of poses (m,): that of the row before where the joints are the same, its point later."""
-    same = (q[1:] == q[:-1]).all(axis=1) & (point[1:] > point[:-1])
+def _poses(q: Array, point: np.ndarray, station: Array) -> np.ndarray:
+    """Return numbers of poses (m,): that of the row before where joints are the same.
+
+    Its point is then a later one, or its station.
+    """
+    later = (point[1:] > point[:-1]) | ((point[1:] == point[:-1]) & (station[1:] > station[:-1]))
+    same = (q[1:] == q[:-1]).all(axis=1) & later
     return np.concatenate([[0], np.cumsum(~same)])
 
 

@@ -26,9 +26,9 @@ GAP = 3.0  # steps between readings from which on a curve is interrupted
 
 
 def _distance(errors: pd.DataFrame, stage: str) -> Array:
-    return np.asarray(
-        np.linalg.norm(errors[[f"{stage}_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float), axis=1)
-    )
+    """Return how far off poses are, (m,) mm: the length of the error, or the error of a measured distance."""
+    columns = [name for axis in ("x", "y", "z", "distance") if (name := f"{stage}_{axis}_mm") in errors]
+    return np.asarray(np.linalg.norm(np.nan_to_num(errors[columns].to_numpy(dtype=float)), axis=1))
 
 
 def distances(errors: pd.DataFrame) -> Figure:
@@ -47,7 +47,8 @@ def distances(errors: pd.DataFrame) -> Figure:
                 lw=1.1,
                 label=f"{label}, median {np.median(values):.2g} mm",
             )
-        axes.set_xlabel("distance between measured and predicted position (mm)")
+        what = "position" if errors.get("distance_mm") is None else "distance"
+        axes.set_xlabel(f"difference between measured and predicted {what} (mm)")
         axes.set_ylabel("poses")
         axes.legend()
     return figure

@@ -17,11 +17,15 @@ from metro.units import JSON
 KINDS = {"random": "at random", "region": "by region", "time": "by time"}
 STAGES = {"nominal": "nominal geometry", "geometry": "corrected geometry", "effects": "with effects"}
 ABOUT_ERRORS = (
-    "Distance between measured and predicted position (mm) of poses that no fit saw, for which effects were "
+    "{what} (mm) of poses that no fit saw, for which effects were "
     "chosen anew: median with its 95 % interval, 95th percentile in brackets. At random: a fifth; by "
-    "region and by time: each quarter of the workspace and of the series in turn. Base and tool are always "
+    "region and by time: each quarter of the workspace and of the series in turn. {frames} are always "
     "fitted."
 )
+MEASURED = {
+    "positions": ("Distance between measured and predicted position", "Base and tool"),
+    "distances": ("Absolute difference between measured and predicted distance", "Stations and tool"),
+}
 ABOUT_CORRECTIONS = (
     "Corrections of the Denavit-Hartenberg rows with 95 % intervals, by the scatter between poses and "
     "between regions. Those that these poses cannot separate are left at 0: {redundant}. Condition "
@@ -39,6 +43,10 @@ ABOUT_REPEATS = (
     "Poses that were taken several times, mm, as ISO 9283 defines them: accuracy AP, from where each model "
     "expects the point by the readings; repeatability RP; variation by the direction of approach, vAP."
 )
+ABOUT_STATIONS = (
+    "Places from which the distances were measured, mm, in the base frame of the rows, where the angle and "
+    "the height about the first axis are those of the declared arm."
+)
 ABOUT_EFFECTS = (
     "What the effects move the measured point by (rms over the poses, less what a change of the geometry "
     "would do alike), by how much each made the squared residual of left-out regions smaller (with its "
@@ -55,7 +63,8 @@ def poses(results: Results) -> Section | None:
         items += [Heading(f"Series {run}, {one['poses']} poses")] if len(series) > 1 else []
         items += [Paragraph(said(one)), _errors_table(one)]
         items += [*([] if at == 0 else _histogram(_left_out(results, run))), *_drawn(results, run)]
-        items += [*_effects(one), *_repeats(one), _corrections(one), *corrected_targets(results, one)]
+        items += [*_effects(one), *_repeats(one), _corrections(one), *_stations(one)]
+        items += corrected_targets(results, one)
         items += _next(results, run)
     reasons = [f"{run}: {reason}." for run, reason in (block.get("not_identified") or {}).items()]
     items += [Paragraph("Not determined:"), Bullets(reasons)] if reasons else []
@@ -89,10 +98,11 @@ def said(one: JSON) -> str:
     noise = (one.get("noise") or {}).get("value") or 0.0
     scatter = one["scatter"]["value"]
     beyond = " beyond that of the instrument" if noise else ""
+    coordinate = "distance" if one.get("measured") == "distances" else "coordinate"
     left = (
         "What stays is no more than the noise of the instrument."
         if scatter < LEAST_OF_NOISE * noise
-        else f"What stays has a standard deviation of {number(scatter, 2)} mm in a coordinate{beyond}."
+        else f"What stays has a standard deviation of {number(scatter, 2)} mm in a {coordinate}{beyond}."
     )
     serves = (
         " What else this batch computes with the arm uses the corrected geometry, without the effects."
@@ -125,7 +135,9 @@ def _errors_table(one: JSON) -> Table:
         ]
         for kind, errors in one["errors"].items()
     ]
-    return Table(["left out", "poses", *STAGES.values()], rows, ABOUT_ERRORS, [0.8, 0.6, 1.6, 1.6, 1.6])
+    what, frames = MEASURED[one.get("measured", "positions")]
+    about = ABOUT_ERRORS.format(what=what, frames=frames)
+    return Table(["left out", "poses", *STAGES.values()], rows, about, [0.8, 0.6, 1.6, 1.6, 1.6])
 
 
 def _effects(one: JSON) -> list[Item]:
@@ -207,6 +219,15 @@ def _corrections(one: JSON) -> Table:
     return Table(["parameter", "correction"] * 2, pairs, caption, [1.1, 1.2] * 2, small=True)
 
 
+def _stations(one: JSON) -> list[Item]:
+    places = one.get("stations") or []
+    rows = [
+        [str(at), *(quantity(place[axis], with_unit=False) for axis in "xyz")]
+        for at, place in enumerate(places, start=1)
+    ]
+    return [Table(["station", "x", "y", "z"], rows, ABOUT_STATIONS, small=True)] if rows else []
+
+
 def _next(results: Results, run: str) -> list[Item]:
     table = results.tables.get("pose_next")
     mine = None if table is None else table[table["run"] == run]
@@ -240,9 +261,10 @@ def _drawn(results: Results, run: str) -> list[Item]:
     items: list[Item] = []
     errors, curves = _left_out(results, run), results.tables.get("pose_curves")
     if errors is not None:
+        frame = "instrument's frame" if errors.get("distance_mm") is None else "arm's base frame"
         caption = (
-            "Error over the workspace, of poses left out by region: mean distance in each cell, in two "
-            "planes of the instrument's frame, without the outermost 0.2 % of the poses. Each map has its "
+            "Error over the workspace, of poses left out by region: mean of each cell, in two "
+            f"planes of the {frame}, without the outermost 0.2 % of the poses. Each map has its "
             "own colours: 2 % of the cells are above them."
         )
         items.append(Picture(figures.maps(errors), caption, caption))

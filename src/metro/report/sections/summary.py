@@ -272,6 +272,6 @@ def _share(error: JSON, entry: JSON) -> str:
     A position has no size that its error could be a share of.
     """
     if "held_out" in entry:
-        return "rms in a coordinate"
+        return f"rms in a {entry['held_out'].get('of', 'coordinate')}"
     point = error.get("rms") is not None and known_interval(error) is None
     return f"{percent(error.get('nrmse'))} of the signal{'; one condition: no interval' if point else ''}"

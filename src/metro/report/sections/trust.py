@@ -132,7 +132,7 @@ def _size(entry: JSON) -> str:
     if unit == "1" or not unit:
         return f"{number(high, 2)} rms of the probability"
     if "held_out" in entry:
-        return f"{number(high, 2)} {unit} rms in a coordinate"
+        return f"{number(high, 2)} {unit} rms in a {entry['held_out'].get('of', 'coordinate')}"
     share = after.get("nrmse")
     of_signal = f" rms ({percent(share * high / rms)} of the signal{alone})" if share and rms else " rms"
     return f"{number(high, 2)} {unit}{of_signal}"

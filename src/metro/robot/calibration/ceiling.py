@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from metro.robot.calibration import measured
 from metro.robot.calibration.fit import Fit, predicted
 from metro.robot.calibration.model import jacobian, turning
 from metro.robot.calibration.poses import Poses, evenly
@@ -54,23 +55,24 @@ class _Kind:
     Attributes
     ----------
     at : (m, k) coordinates in lengths over which values stay alike. turn : whether they are angles that
-        close after ``turn`` lengths; 0: they do not. along : (m, 3) what a unit value moves the point by,
-        scaled to a mean square of 3; None: as much along each axis, independently.
+        close after ``turn`` lengths; 0: they do not. along : (m, d) what a unit value does to what is seen,
+        scaled to a mean square of d; None: as much to each of the ``dims``, independently.
     """
 
     name: str
     at: Array
     turn: float = 0.0
     along: Array | None = None
+    dims: int = 3
 
     def covariance(self, some: np.ndarray | slice, others: np.ndarray | slice) -> Array:
-        """Return the covariance (a, 3, b, 3) of some poses with others, for a variance of 1."""
+        """Return the covariance (a, d, b, d) of some poses with others, for a variance of 1."""
         apart = self.at[some, None] - self.at[None, others]
         if self.turn:
             apart = (apart + self.turn / 2) % self.turn - self.turn / 2
         alike = np.exp(-np.sqrt(np.sum(apart**2, axis=2)))
         if self.along is None:
-            return np.asarray(alike[:, None, :, None] * np.eye(3)[None, :, None, :])
+            return np.asarray(alike[:, None, :, None] * np.eye(self.dims)[None, :, None, :])
         return np.asarray(np.einsum("ab,ai,bj->aibj", alike, self.along[some], self.along[others]))
 
 
@@ -79,11 +81,13 @@ def ceiling(fit: Fit, poses: Poses) -> Ceiling:
     poses = poses.first
     own = poses.of(_with_neighbours(fit, poses))
     at, q = predicted(fit.state, fit.effects, fit.values, own)
-    residuals = own.at - at
+    residuals = measured.residuals(fit.state, at, own)
+    dims = residuals.shape[1]
     size = np.linalg.norm(residuals, axis=1, keepdims=True)
-    far = FAR * np.sqrt(3.0 * (fit.scale**2 + own.sigma[:, None] ** 2))
+    far = FAR * np.sqrt(dims * (fit.scale**2 + own.sigma[:, None] ** 2))
     residuals = residuals * np.minimum(1.0, far / np.maximum(size, 1e-12))
-    kinds = tuple(_kinds(fit, own, turning(fit.state, jacobian(fit.state, q)[1])))
+    moves = turning(fit.state, jacobian(fit.state, q)[1])
+    kinds = tuple(_kinds(fit, own, measured.seen(fit.state, at, own, moves)))
     power = float(np.mean(residuals**2))
     variances = _variances(kinds, residuals)
     alone = max(power - float(variances.sum()), 1e-3 * power)
@@ -114,18 +118,19 @@ def _with_neighbours(fit: Fit, poses: Poses) -> np.ndarray:
 
 
 def _kinds(fit: Fit, poses: Poses, moves: Array) -> Iterator[_Kind]:
-    """Yield the kinds that these poses can show; ``moves`` (m, 3, n) of the joints."""
+    """Yield the kinds that these poses can show; ``moves`` (m, d, n) of the joints, as seen."""
+    dims = moves.shape[1]
     size = np.sqrt(np.mean(np.sum(moves**2, axis=1), axis=0))
     for joint, shifts in enumerate(fit.state.prismatic):
         if np.ptp(poses.q[:, joint]) > 0.0 and size[joint] > 1e-3 * size.max():
             length = OF_SHIFT if shifts else OF_JOINT
             turn = 0.0 if shifts else 2.0 * np.pi / length
-            along = np.sqrt(3.0) * moves[:, :, joint] / size[joint]
+            along = np.sqrt(dims) * moves[:, :, joint] / size[joint]
             yield _Kind(f"joint {joint + 1}", poses.q[:, [joint]] / length, turn, along)
-    yield _Kind(POSE, poses.q * _levers(fit, poses) / OF_POSE)
+    yield _Kind(POSE, poses.q * _levers(fit, poses) / OF_POSE, dims=dims)
     for name, values in ((TIME, poses.time), (TEMPERATURE, poses.temperature)):
         if np.isfinite(values).all() and np.ptp(values) > 0.0:
-            yield _Kind(name, values[:, None] / (OF_SPAN * np.ptp(values)))
+            yield _Kind(name, values[:, None] / (OF_SPAN * np.ptp(values)), dims=dims)
 
 
 def _variances(kinds: tuple[_Kind, ...], residuals: Array) -> Array:
@@ -154,13 +159,13 @@ def _unseen_share(
     from scipy.linalg import cho_factor, cho_solve
     from scipy.stats import t
 
-    count = len(residuals)
+    count, dims = residuals.shape
     used = [(kind, v) for kind, v in zip(kinds, variances, strict=True) if v > 0.0]
     left = residuals.copy()
     if used:
         everyone = np.arange(count)
-        whole = sum(v * kind.covariance(everyone, everyone).reshape(3 * count, -1) for kind, v in used)
-        fold = np.repeat(np.random.default_rng(0).permutation(count) % FOLDS, 3)
+        whole = sum(v * kind.covariance(everyone, everyone).reshape(dims * count, -1) for kind, v in used)
+        fold = np.repeat(np.random.default_rng(0).permutation(count) % FOLDS, dims)
         for one in range(FOLDS):
             out, rest = fold == one, fold != one
             factor = cho_factor(whole[np.ix_(rest, rest)] + alone * np.eye(int(rest.sum())))

@@ -49,7 +49,7 @@ def corrected(q: Array, nominal: Fit, final: Fit, poses: Poses, held: tuple[Held
     """Correct targets ``q`` (m, n), in the order in which they are approached.
 
     ``nominal``, ``final``: fits to ``poses``; ``held``: errors on poses that were left out of such fits.
-    Drift and temperature are those of the last pose.
+    Drift, temperature and load are those of the last pose.
     """
     wanted, turns = nominal.state.position(q), nominal.state.frames(q)[0][-1][:, :3, :3]
     like = _at(q, poses)
@@ -75,7 +75,7 @@ def corrected(q: Array, nominal: Fit, final: Fit, poses: Poses, held: tuple[Held
 def _at(q: Array, poses: Poses) -> Poses:
     """Return targets as poses of the day of the last one that was measured."""
     count = len(q)
-    last = {name: np.full(count, getattr(poses, name)[-1]) for name in ("time", "temperature")}
+    last = {name: np.full(count, getattr(poses, name)[-1]) for name in ("time", "temperature", "payload")}
     return Poses(q, np.zeros((count, 3)), np.zeros(count), came=approached(q), **last)
 
 

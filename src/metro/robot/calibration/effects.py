@@ -13,6 +13,7 @@ import numpy as np
 
 from metro.robot.calibration.model import State
 from metro.robot.calibration.poses import Poses
+from metro.robot.rigid_body import GRAVITY
 from metro.units import DEG, Array
 
 PLAUSIBLE = 5e-3  # rad or m: standard deviation of what a correction or an effect may be before the data
@@ -21,6 +22,8 @@ SPACING = 4.0 * DEG  # of a curve's knots: it follows up to some 36 cycles per t
 SHIFT_SPACING = 0.02  # m, of a joint that shifts
 OLD = 1e-3  # K or s of range below which nothing can be said of a drift
 
+LOADED = 1e3  # N m of the load, to which a joint's compliance is given: it then turns by some 5 mrad
+COMPLIANCE = "compliance"  # name of that parameter
 SHORT = 0.01  # of the longest offset or length of a row: along less than that no mass lies
 Basis = Callable[[Poses, State], Array]
 Link = tuple[int, bool]  # joint from 0, and whether its length is meant and not its offset
@@ -61,10 +64,11 @@ def library(poses: Poses, nominal: State, up: Array) -> tuple[Effect, ...]:
     ``nominal``: rows of the arm. ``up`` (3,): the vertical in the base frame of the rows.
     """
     links, joints = _links(nominal), range(len(nominal.rows))
+    loaded = bool(np.ptp(poses.payload) > 0.0)
     return (
         *(effect for joint in joints for effect in _of_joint(joint, nominal, poses)),
-        *(effect for joint in joints for effect in _of_gravity(joint, nominal, links, up)),
-        *_of_all(poses, links, up),
+        *(effect for joint in joints for effect in _of_gravity(joint, nominal, links, up, loaded)),
+        *_of_all(poses, links, up, loaded),
     )
 
 
@@ -86,20 +90,23 @@ def _of_joint(joint: int, nominal: State, poses: Poses) -> Iterator[Effect]:
     yield Effect("curve", "curve of the reading", joint, curve, (), OF_CURVE, late=True)
 
 
-def _of_gravity(joint: int, nominal: State, links: Sequence[Link], up: Array) -> Iterator[Effect]:
+def _of_gravity(
+    joint: int, nominal: State, links: Sequence[Link], up: Array, loaded: bool
+) -> Iterator[Effect]:
     # A mass along a joint's own offset lies on its axis.
     own = tuple(link for link in links if link[0] >= joint and link != (joint, False))
     if nominal.prismatic[joint] or not own:
         return
-    elasticity = _elasticity(joint, own, up)
-    yield Effect("elasticity", "elasticity under gravity", joint, elasticity, _names(own))
+    elasticity = _elasticity(joint, own, up, loaded)
+    yield Effect("elasticity", "elasticity under gravity", joint, elasticity, _names(own, loaded))
     yield Effect("torque_side", "play by the side of gravity's torque", joint, _side(joint, up), ("play",))
 
 
-def _of_all(poses: Poses, links: Sequence[Link], up: Array) -> Iterator[Effect]:
+def _of_all(poses: Poses, links: Sequence[Link], up: Array, loaded: bool) -> Iterator[Effect]:
     # The first link turns with the first joint alone, as does an error of its row.
     own = tuple(link for link in links if link[0] > 0)
-    yield Effect("base_tilt", "tilt of the base under the arm's weight", -1, _base_tilt(own, up), _names(own))
+    tilt, title = _base_tilt(own, up, loaded), "tilt of the base under the arm's weight"
+    yield Effect("base_tilt", title, -1, tilt, _names(own, loaded))
     if np.ptp(poses.time) > OLD:
         centre, span = float(np.mean(poses.time)), float(np.ptp(poses.time))
         moved = _drift(lambda p: (p.time - centre) / span)
@@ -110,8 +117,9 @@ def _of_all(poses: Poses, links: Sequence[Link], up: Array) -> Iterator[Effect]:
         yield Effect("warmth", "growth with temperature", -1, warm, ("x", "y", "z", "scale"))
 
 
-def _names(links: Sequence[Link]) -> tuple[str, ...]:
-    return tuple(f"{'length' if length else 'offset'} of link {joint + 1}" for joint, length in links)
+def _names(links: Sequence[Link], loaded: bool) -> tuple[str, ...]:
+    own = tuple(f"{'length' if length else 'offset'} of link {joint + 1}" for joint, length in links)
+    return (*own, COMPLIANCE) if loaded else own
 
 
 def _eccentricity(joint: int) -> Basis:
@@ -130,22 +138,36 @@ def _moments(links: Sequence[Link], poses: Poses, state: State, up: Array) -> li
     return [np.cross(direction, down) for direction in along]
 
 
-def _elasticity(joint: int, links: Sequence[Link], up: Array) -> Basis:
-    """Compliance times first moment of what hangs on each link: a torque about the joint's axis each."""
+def _of_load(poses: Poses, frames: Array, joint: int, state: State, up: Array) -> Array:
+    """Moment (m, 3) about a joint's origin of the load, which hangs at the flange, over :data:`LOADED`."""
+    weight = -GRAVITY * poses.payload[:, None] / LOADED * (state.base[:3, :3] @ up)
+    return np.cross(frames[-1][:, :3, 3] - frames[joint][:, :3, 3], weight)
+
+
+def _elasticity(joint: int, links: Sequence[Link], up: Array, loaded: bool) -> Basis:
+    """Compliance times first moment of what hangs on each link: a torque about the joint's axis each.
+
+    Of a load of which the mass is known, the compliance alone.
+    """
 
     def basis(poses: Poses, state: State) -> Array:
-        axis = state.frames(poses.q)[0][joint][:, :3, 2]
-        return np.stack([np.sum(each * axis, axis=1) for each in _moments(links, poses, state, up)], axis=-1)
+        frames = state.frames(poses.q)[0]
+        moments = _moments(links, poses, state, up)
+        moments += [_of_load(poses, frames, joint, state, up)] if loaded else []
+        axis = frames[joint][:, :3, 2]
+        return np.stack([np.sum(each * axis, axis=1) for each in moments], axis=-1)
 
     return basis
 
 
-def _base_tilt(links: Sequence[Link], up: Array) -> Basis:
+def _base_tilt(links: Sequence[Link], up: Array, loaded: bool) -> Basis:
     """Turn of the base by a compliance, alike about all horizontal axes, times the moments of the links."""
 
     def basis(poses: Poses, state: State) -> Array:
         lever = state.position(poses.q, poses.point) - state.base[:3, 3]
-        return np.stack([np.cross(turn, lever) for turn in _moments(links, poses, state, up)], axis=-1)
+        moments = _moments(links, poses, state, up)
+        moments += [_of_load(poses, state.frames(poses.q)[0], 0, state, up)] if loaded else []
+        return np.stack([np.cross(turn, lever) for turn in moments], axis=-1)
 
     return basis
 

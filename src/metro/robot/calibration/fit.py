@@ -1,9 +1,9 @@
 """Geometry and effects fitted to measured poses, robustly, with covariances that the residual itself shows.
 
-Residuals are of Student's t with four degrees of freedom in three dimensions (Lange, Little & Taylor, J. Am.
-Stat. Assoc. 84 (1989) 881), of a scale that the median residual gives. The covariance is that of an
-M-estimator: by the scores of poses, and by the sums of the scores of regions, since what no effect explains
-is alike among neighbours. Of each parameter the largest variance counts.
+Residuals are of Student's t with four degrees of freedom in three dimensions, or one of distances (Lange,
+Little & Taylor, J. Am. Stat. Assoc. 84 (1989) 881), of a scale that the median residual gives. The covariance
+is that of an M-estimator: by the scores of poses, and by the sums of the scores of regions, since what no
+effect explains is alike among neighbours. Of each parameter the largest variance counts.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from metro.robot.calibration import measured
 from metro.robot.calibration.effects import PLAUSIBLE, Effect
 from metro.robot.calibration.model import State, jacobian, moved, turning
 from metro.robot.calibration.poses import Poses
 from metro.units import Array
 
 TAILS = 4.0  # degrees of freedom of Student's t
-CHI2_HALF = 2.365974  # median of chi-squared of three degrees of freedom
+CHI2_HALF = {1: 0.454936, 3: 2.365974}  # median of chi-squared of so many degrees of freedom
 STEPS = 20
 SETTLED = 1e-3  # of the largest step over its standard error, from which on a fit has converged
 HALVINGS = 5  # of the workspace: the scores of 32 regions are summed for the covariance
@@ -80,7 +81,8 @@ def columns(state: State, derivatives: Array, effects: Sequence[Effect], poses: 
 
 def scale_of(residuals: Array, sigma: Array) -> float:
     """Return the standard deviation of a coordinate beyond that of the instrument, by the median residual."""
-    beyond = float(np.median(np.sum(residuals**2, axis=1))) / CHI2_HALF - float(np.median(sigma)) ** 2
+    half = CHI2_HALF[residuals.shape[1]]
+    beyond = float(np.median(np.sum(residuals**2, axis=1))) / half - float(np.median(sigma)) ** 2
     return float(np.sqrt(max(beyond, 1e-18)))
 
 
@@ -89,7 +91,7 @@ def weights_of(residuals: Array, sigma: Array) -> tuple[Array, Array, float]:
     scale = scale_of(residuals, sigma)
     variance = scale**2 + sigma**2
     out = np.sum(residuals**2, axis=1) / variance
-    return (TAILS + 3.0) / (TAILS + out) / variance, out, scale
+    return (TAILS + residuals.shape[1]) / (TAILS + out) / variance, out, scale
 
 
 def fitted(
@@ -106,10 +108,12 @@ def fitted(
     precision = np.concatenate([of_rows, *widths]) ** -2.0
     for _ in range(STEPS):
         at, q = predicted(state, effects, values, poses)
-        residuals = poses.at - at
+        residuals = measured.residuals(state, at, poses)
         weight, out, scale = weights_of(residuals, poses.sigma)
         _, derivatives = jacobian(state, q, poses.point)
-        parts = [derivatives[..., free], *columns(state, derivatives, effects, poses)]
+        moves = columns(state, derivatives, effects, poses)
+        parts = [measured.seen_of_geometry(state, at, poses, derivatives)[..., free]]
+        parts += [measured.seen(state, at, poses, each) for each in moves]
         design = np.concatenate(parts, axis=-1)
         now = np.concatenate([_change(state, start)[free], *values])
         weighted = (design * weight[:, None, None]).reshape(-1, len(precision))
@@ -124,7 +128,7 @@ def fitted(
         if float(np.max(step**2 * np.diag(information))) < SETTLED**2:
             break
     scores = np.einsum("mik,mi->mk", design, residuals * weight[:, None])
-    covariance = _covariance(scores, out, information, poses.parted(HALVINGS))
+    covariance = _covariance(scores, out, information, poses.parted(HALVINGS), residuals.shape[1])
     return Fit(state, free, tuple(effects), tuple(values), scale, covariance)
 
 
@@ -133,15 +137,15 @@ def _change(state: State, start: State) -> Array:
     return np.concatenate([np.zeros(state.head), (state.rows - start.rows).ravel()])
 
 
-def _covariance(scores: Array, out: Array, information: Array, region: np.ndarray) -> Array:
+def _covariance(scores: Array, out: Array, information: Array, region: np.ndarray, dims: int) -> Array:
     """Return the covariance by information, by poses and by regions: of each parameter the largest.
 
-    ``scores``: (m, p) of the poses. ``out``: (m,) their squared scaled residuals.
+    ``scores``: (m, p) of the poses. ``out``: (m,) their squared scaled residuals, in ``dims`` dimensions.
     """
     inverse = np.linalg.inv(information)
     # The mean slope of the influence function is less than the mean weight, of which ``information`` is made.
-    relative = (TAILS + 3.0) / (TAILS + out)
-    slope = relative - (2.0 / 3.0) * (TAILS + 3.0) * out / (TAILS + out) ** 2
+    relative = (TAILS + dims) / (TAILS + out)
+    slope = relative - (2.0 / dims) * (TAILS + dims) * out / (TAILS + out) ** 2
     stretch = (np.mean(relative) / np.mean(slope)) ** 2
     together = np.zeros((int(region.max()) + 1, scores.shape[1]))
     np.add.at(together, region, scores)

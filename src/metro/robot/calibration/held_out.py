@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.robot.calibration.fit import Fit
+from metro.robot.calibration.measured import residuals
 from metro.robot.calibration.poses import Poses
 from metro.units import Array
 
@@ -26,7 +27,8 @@ class HeldOut:
     Attributes
     ----------
     kind : random, region or time. which : (m,) numbers of the rows, of the first point alone.
-    errors : (fits, m, 3) m, measured less predicted, by one fit after the other.
+    errors : (fits, m, d) m, measured less predicted, by one fit after the other: of d = 3 coordinates, or
+        of the distance.
     """
 
     kind: str
@@ -51,7 +53,8 @@ def held_out(poses: Poses, fits: Fitting) -> tuple[HeldOut, ...]:
         parts = []
         for out in folds:
             left = fits(some.of(~out))
-            parts.append(np.stack([some.at[out] - fit.predicted(some.of(out)) for fit in left]))
+            unseen = some.of(out)
+            parts.append(np.stack([residuals(fit.state, fit.predicted(unseen), unseen) for fit in left]))
         which = np.concatenate([chosen[out] for out in folds])
         first = poses.point[which] == 0
         found.append(HeldOut(kind, which[first], np.concatenate(parts, axis=1)[:, first]))

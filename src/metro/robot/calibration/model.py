@@ -11,7 +11,7 @@ is exact at every iterate. The base is turned by a rotation vector from where it
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -33,12 +33,15 @@ class State:
     prismatic : (n,) bool.
     base : (4, 4) of the rows' base in the frame of the measurement. tool : (3,) m, in the last frame; of
         several points (k, 3).
+    stations : (s, 3) from which distances were measured, m, in the rows' base frame, where ``base`` then
+        stays: a distance does not show how the frame of the measurement is turned.
     """
 
     rows: Array
     prismatic: np.ndarray
     base: Array
     tool: Array
+    stations: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     def frames(self, q: Array) -> tuple[Array, Array]:
         """Frames (n + 1, m, 4, 4) before and after each joint; x axes (n, m, 3) before β turns them."""
@@ -66,8 +69,8 @@ class State:
 
     @property
     def head(self) -> int:
-        """Number of the parameters of base and points, which those of the rows follow."""
-        return len(BASE) + self.tool.size
+        """Number of the parameters of base, points and stations, which those of the rows follow."""
+        return len(BASE) + self.tool.size + self.stations.size
 
     def arm_to(self, point: np.ndarray | None, count: int) -> Array:
         """Return where the point of each of ``count`` rows is in the last frame, (m, 3); None: the first."""
@@ -82,16 +85,22 @@ class State:
 
 
 def names(state: State) -> tuple[str, ...]:
-    """Return the parameters in the order of :func:`jacobian`: base, tool, then five for each joint."""
+    """Return the parameters as :func:`jacobian` has them: base, points, stations, five for each joint."""
     count = state.tool.size // len(TOOL)
     tools = TOOL if count == 1 else tuple(f"{one} of point {k}" for k in range(1, count + 1) for one in TOOL)
-    return (*BASE, *tools, *(f"joint {i} {kind}" for i in range(1, len(state.rows) + 1) for kind in KINDS))
+    stations = tuple(f"{axis} of station {k}" for k in range(1, len(state.stations) + 1) for axis in "xyz")
+    return (
+        *BASE,
+        *tools,
+        *stations,
+        *(f"joint {i} {kind}" for i in range(1, len(state.rows) + 1) for kind in KINDS),
+    )
 
 
 def jacobian(state: State, q: Array, which: np.ndarray | None = None) -> tuple[Array, Array]:
     """Return the positions (m, 3), and derivatives (m, 3, head + 5 n) by the parameters of :func:`names`.
 
-    ``which``: (m,) point on the flange, from 0; None: the first.
+    ``which``: (m,) point on the flange, from 0; None: the first. The places of stations move no point.
     """
     frames, normals = state.frames(q)
     last = frames[-1]
@@ -101,6 +110,7 @@ def jacobian(state: State, q: Array, which: np.ndarray | None = None) -> tuple[A
     columns += [np.cross(axis, point - state.base[:3, 3]) for axis in np.eye(3)]
     for one in range(state.tool.size // len(TOOL)):
         columns += [last[:, :3, k] * (own == one)[:, None] for k in range(3)]
+    columns += [np.zeros_like(point)] * state.stations.size
     for i in range(len(state.rows)):
         axis, lever = frames[i][:, :3, 2], point - frames[i][:, :3, 3]
         tip = point - frames[i + 1][:, :3, 3]
@@ -124,16 +134,21 @@ def moved(state: State, step: Array) -> State:
     base[:3, :3] = Rotation.from_rotvec(step[3:6]).as_matrix() @ base[:3, :3]
     base[:3, 3] += step[:3]
     rows = state.rows + step[state.head :].reshape(-1, len(KINDS))
-    tool = state.tool + step[len(BASE) : state.head].reshape(state.tool.shape)
-    return replace(state, base=base, tool=tool, rows=rows)
+    points = len(BASE) + state.tool.size
+    tool = state.tool + step[len(BASE) : points].reshape(state.tool.shape)
+    stations = state.stations + step[points : state.head].reshape(-1, 3)
+    return replace(state, base=base, tool=tool, stations=stations, rows=rows)
 
 
 def free_of_geometry(state: State) -> np.ndarray:
-    """Return which parameters a calibration may free, (head + 5 n): a tilt at nearly parallel axes alone.
+    """Return which parameters a calibration may free, (head + 5 n).
 
-    Where axes are not parallel the tilt is no more than a combination of the others.
+    A tilt at nearly parallel axes alone: where they are not parallel it is no more than a combination of the
+    others. The base where positions were measured.
     """
     near = np.abs(np.sin(state.rows[:, 1])) < NEAR_PARALLEL
     per_joint = np.ones((len(state.rows), len(KINDS)), dtype=bool)
     per_joint[:, -1] = near
-    return np.concatenate([np.ones(state.head, dtype=bool), per_joint.ravel()])
+    head = np.ones(state.head, dtype=bool)
+    head[: len(BASE)] = not len(state.stations)
+    return np.concatenate([head, per_joint.ravel()])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from metro.robot.calibration.fit import Fit
+from metro.robot.calibration.measured import seen_of_geometry
 from metro.robot.calibration.model import jacobian
 from metro.robot.calibration.poses import Poses
 from metro.units import Array
@@ -24,10 +25,11 @@ def next_poses(fit: Fit, poses: Poses, count: int = CHOSEN, seed: int = 0) -> tu
     """
     free = int(fit.free.sum())
     q = _candidates(fit, poses, seed)
-    shifts = jacobian(fit.state, q)[1][..., fit.free]
+    shifts = _seen(fit, q)[..., fit.free]
     covariance = fit.covariance[:free, :free]
     before = np.linalg.slogdet(covariance)[1]
-    variance = fit.scale**2 * np.eye(3)
+    noise = float(np.median(poses.sigma))
+    variance = (fit.scale**2 + noise**2) * np.eye(shifts.shape[1])
     chosen: list[int] = []
     left: list[float] = []
     for _ in range(min(count, len(q))):
@@ -40,6 +42,19 @@ def next_poses(fit: Fit, poses: Poses, count: int = CHOSEN, seed: int = 0) -> tu
         chosen.append(best)
         left.append(float(np.exp(0.5 * (np.linalg.slogdet(covariance)[1] - before) / free)))
     return q[chosen], np.array(left)
+
+
+def _seen(fit: Fit, q: Array) -> Array:
+    """Return what is seen of the geometry at joints (k, n): (k, 3, p), or (k, s, p) from all s stations."""
+    at, derivatives = jacobian(fit.state, q)
+    if not len(fit.state.stations):
+        return derivatives
+    blank = np.zeros(len(q))
+    from_each = [
+        Poses(q, at, blank, blank, blank, q, distance=blank, station=np.full(len(q), station))
+        for station in range(len(fit.state.stations))
+    ]
+    return np.concatenate([seen_of_geometry(fit.state, at, one, derivatives) for one in from_each], axis=1)
 
 
 def _candidates(fit: Fit, poses: Poses, seed: int) -> Array:

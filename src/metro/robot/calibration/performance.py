@@ -40,9 +40,11 @@ class Repeated:
 def repeated(poses: Poses, target: Array, fits: tuple[Fit, ...]) -> tuple[Repeated, ...]:
     """Return the figures of each pose that was taken :data:`FEWEST` times or more.
 
-    ``target``: (m,) number of the commanded pose; NaN where it has none.
+    ``target``: (m,) number of the commanded pose; NaN where it has none. Distances have none of them.
     """
-    found = []
+    found: list[Repeated] = []
+    if poses.by_distance:
+        return ()
     for number in np.unique(target[np.isfinite(target)]):
         own = poses.of(target == number)
         if len(own) >= FEWEST:
@@ -52,18 +54,20 @@ def repeated(poses: Poses, target: Array, fits: tuple[Fit, ...]) -> tuple[Repeat
 
 
 def spread(poses: Poses, target: Array) -> tuple[float, int]:
-    """Return the standard deviation of a coordinate among repeats of a pose, m, and its degrees of freedom.
+    """Return the standard deviation of a coordinate or distance among repeats, m, and its degrees of freedom.
 
-    Repeats that came from the same directions; (0, 0) without any.
+    Repeats that came from the same directions, seen from the same station; (0, 0) without any.
     """
     square, freedom = 0.0, 0
     for number in np.unique(target[np.isfinite(target)]):
         own = poses.of(target == number)
-        ways = np.unique(own.came, axis=0, return_inverse=True)[1].ravel()
+        values = own.distance[:, None] if own.by_distance else own.at
+        alike = np.column_stack([own.came, own.station])
+        ways = np.unique(alike, axis=0, return_inverse=True)[1].ravel()
         for way in np.unique(ways):
-            at = own.at[ways == way]
+            at = values[ways == way]
             square += float(np.sum((at - at.mean(axis=0)) ** 2))
-            freedom += 3 * (len(at) - 1)
+            freedom += at.shape[1] * (len(at) - 1)
     return (float(np.sqrt(square / freedom)), freedom) if freedom else (0.0, 0)
 
 

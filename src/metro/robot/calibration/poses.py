@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,10 @@ class Poses:
     came : (m, n) direction in which each joint moved last, −1, 1, or 0 where it is not known.
     pose : (m,) which rows are of one pose, that of several points on the flange; each its own where left out.
     point : (m,) which point on the flange it is, from 0; all the first where left out.
+    distance : (m,) m, from a station to the point, where that alone was measured; NaN where left out.
+        ``at`` is then where the declared arm has the point, and serves to part the workspace only.
+    station : (m,) from which the distance was measured, from 0; all from the first where left out.
+    payload : (m,) kg on the flange beyond what it always carries; 0 where left out.
     """
 
     q: Array
@@ -36,20 +40,34 @@ class Poses:
     came: Array
     pose: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     point: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    distance: Array = field(default_factory=lambda: np.zeros(0))
+    station: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    payload: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        if len(self.pose) != len(self.q):
-            object.__setattr__(self, "pose", np.arange(len(self.q)))
-        if len(self.point) != len(self.q):
-            object.__setattr__(self, "point", np.zeros(len(self.q), dtype=int))
+        count = len(self.q)
+        usual = {
+            "pose": np.arange(count),
+            "point": np.zeros(count, dtype=int),
+            "distance": np.full(count, np.nan),
+            "station": np.zeros(count, dtype=int),
+            "payload": np.zeros(count),
+        }
+        for name, values in usual.items():
+            if len(getattr(self, name)) != count:
+                object.__setattr__(self, name, values)
 
     def __len__(self) -> int:
         return len(self.q)
 
     def of(self, chosen: np.ndarray) -> Poses:
         """Return some of the poses; from where each was approached stays known."""
-        fields = ("q", "at", "sigma", "time", "temperature", "came", "pose", "point")
-        return replace(self, **{name: getattr(self, name)[chosen] for name in fields})
+        return replace(self, **{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
+
+    @property
+    def by_distance(self) -> bool:
+        """Whether distances from stations were measured, and no positions."""
+        return bool(np.isfinite(self.distance).all())
 
     def thinned(self, count: int) -> Poses:
         """Return poses with at most so many rows, every so many where there are more."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from metro.robot.calibration.fit import Fit
+from metro.robot.calibration.measured import seen
 from metro.robot.calibration.model import jacobian, turning
 from metro.robot.calibration.poses import Poses
 from metro.units import DEG, Array
@@ -35,10 +36,11 @@ def steps(q: Array) -> Array:
 
 
 def moved_by_rounding(fit: Fit, poses: Poses) -> tuple[Array, float]:
-    """Return the steps (n,) of the readings, and what they move a coordinate of the point by, rms, m.
+    """Return the steps (n,) of the readings, and what they move a coordinate or the distance by, rms, m.
 
     A rounded reading is off by anything within half a step: by the step over the root of twelve, rms.
     """
     found = steps(poses.q)
-    moves = turning(fit.state, jacobian(fit.state, poses.q)[1]) * found / np.sqrt(12.0)
+    at, derivatives = jacobian(fit.state, poses.q)
+    moves = seen(fit.state, at, poses, turning(fit.state, derivatives)) * found / np.sqrt(12.0)
     return found, float(np.sqrt(np.mean(np.sum(moves**2, axis=2))))

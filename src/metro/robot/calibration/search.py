@@ -16,6 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from metro.robot.calibration import measured
 from metro.robot.calibration.effects import PLAUSIBLE, Effect
 from metro.robot.calibration.fit import TAILS, Fit, columns, weights_of
 from metro.robot.calibration.model import jacobian
@@ -69,7 +70,7 @@ class _Search:
 
     Attributes
     ----------
-    design : (m, 3, p) of geometry and all effects. residuals : (m, 3) of the geometry alone.
+    design : (m, d, p) of geometry and all effects. residuals : (m, d) of the geometry alone.
     blocks : of every effect the places of its columns. precision : (p,) of the priors.
     """
 
@@ -129,19 +130,21 @@ class _Search:
                 schur = rest[np.ix_(new, new)] - rest[np.ix_(new, have)] @ carried
                 added = np.linalg.solve(schur, pull[new] - rest[np.ix_(new, have)] @ values)
                 changed.append(left - design[:, new] @ added + known @ (carried @ added))
-            losses[:, region] = [self.loss(each.reshape(-1, 3), self.sigma[mine]) for each in changed]
+            shape = self.residuals[mine].shape
+            losses[:, region] = [self.loss(each.reshape(shape), self.sigma[mine]) for each in changed]
         return losses[0], losses[1:]
 
     def loss(self, residuals: Array, sigma: Array) -> float:
-        """Mean of -⅔ times the log-likelihood of poses, of Student's t, less that of no residual.
+        """Mean of −2/d times the log-likelihood of poses, of Student's t in d dimensions, less that of none.
 
         It grows as the logarithm of the squared residual where this is as the scale has it.
         """
         out = np.sum(residuals**2, axis=1) / (self.scale**2 + sigma**2)
-        return float((TAILS + 3.0) / 3.0 * np.mean(np.log1p(out / TAILS)))
+        dims = residuals.shape[1]
+        return float((TAILS + dims) / dims * np.mean(np.log1p(out / TAILS)))
 
     def remaining(self) -> Array:
-        """Residuals (m, 3) of the fit with the chosen effects to all regions."""
+        """Residuals (m, d) of the fit with the chosen effects to all regions."""
         have = self.places(self.chosen)
         total = sum(self.information) + np.diag(self.precision)
         values = np.linalg.solve(total[np.ix_(have, have)], sum(self.gradient)[have])
@@ -153,14 +156,17 @@ def search(poses: Poses, fit: Fit, effects: Sequence[Effect]) -> Found:
     some = poses.thinned(MOST)
     state = fit.state
     at, derivatives = jacobian(state, some.q, some.point)
-    parts = [derivatives[..., fit.free], *columns(state, derivatives, effects, some)]
+    parts = [measured.seen_of_geometry(state, at, some, derivatives)[..., fit.free]]
+    moves = columns(state, derivatives, effects, some)
+    parts += [measured.seen(state, at, some, each) for each in moves]
     ends = np.cumsum([0, *(part.shape[-1] for part in parts)])
     blocks = [np.arange(a, b) for a, b in pairwise(ends)]
     geometry = np.where(np.flatnonzero(fit.free) < state.head, np.inf, PLAUSIBLE)
     priors = [geometry, *(np.full(len(own), one.prior) for own, one in zip(blocks[1:], effects, strict=True))]
     design = np.concatenate(parts, axis=-1)
+    left = measured.residuals(state, at, some)
     model = _Search(
-        design, some.at - at, some.sigma, some.regions, blocks[0], blocks[1:], np.concatenate(priors) ** -2.0
+        design, left, some.sigma, some.regions, blocks[0], blocks[1:], np.concatenate(priors) ** -2.0
     )
     early = [place for place, effect in enumerate(effects) if not effect.late]
     late = [place for place, effect in enumerate(effects) if effect.late]

@@ -10,7 +10,8 @@ from metro.robot.calibration.determined import Determined, determined
 from metro.robot.calibration.effects import Effect, library
 from metro.robot.calibration.fit import Fit, columns, fitted, predicted
 from metro.robot.calibration.held_out import HeldOut, held_out
-from metro.robot.calibration.model import free_of_geometry, jacobian
+from metro.robot.calibration.measured import seen, seen_of_geometry
+from metro.robot.calibration.model import BASE, free_of_geometry, jacobian
 from metro.robot.calibration.poses import Poses
 from metro.robot.calibration.search import Found, search
 from metro.robot.calibration.start import nominal
@@ -48,17 +49,23 @@ def calibrated(poses: Poses, geometry: Geometry) -> Calibration:
     Raises
     ------
     ValueError
-        Where the poses do not determine even the place of the base.
+        Where the poses do not determine even the place of the base, or those of the stations.
     """
     poses = poses.thinned(MOST)
     as_declared, up = nominal(poses, geometry)
     state = as_declared.state
-    known = determined(
-        jacobian(state, poses.q, poses.point)[1], free_of_geometry(state), as_declared.scale, state.head
+    at, derivatives = jacobian(state, poses.q, poses.point)
+    shown = seen_of_geometry(state, at, poses, derivatives)
+    known = determined(shown, free_of_geometry(state), as_declared.scale, state.head)
+    stations = slice(state.head - state.stations.size, state.head)
+    placed, what = (
+        (known.kept[stations], "the places of the stations")
+        if poses.by_distance
+        else (known.kept[: len(BASE)], "the place of the arm's base")
     )
-    if not known.kept[:6].all():
+    if not placed.all():
         scatter = f"they scatter by {as_declared.scale / MM:.3g} mm about the declared arm"
-        raise ValueError(f"the poses do not determine the place of the arm's base: {scatter}")
+        raise ValueError(f"the poses do not determine {what}: {scatter}")
     corrected = fitted(poses, state, known.kept)
     found = search(poses, corrected, library(poses, state, up))
     return Calibration(
@@ -73,7 +80,7 @@ def left_out(poses: Poses, geometry: Geometry) -> tuple[HeldOut, ...]:
 
 @dataclass(frozen=True)
 class Size:
-    """How much an effect moves the measured point, rms over the poses, m, with its standard deviation."""
+    """How much an effect moves the point or changes its distance, rms over poses, m; standard deviation."""
 
     effect: Effect
     moves: float
@@ -82,12 +89,13 @@ class Size:
 
 def sizes(fit: Fit, poses: Poses) -> tuple[Size, ...]:
     """Return how much each effect moves the point, less what corrections of the geometry would do alike."""
-    _, q = predicted(fit.state, fit.effects, fit.values, poses)
+    place, q = predicted(fit.state, fit.effects, fit.values, poses)
     _, derivatives = jacobian(fit.state, q, poses.point)
-    geometry, _ = np.linalg.qr(derivatives[..., fit.free].reshape(3 * len(poses), -1))
+    shown = seen_of_geometry(fit.state, place, poses, derivatives)[..., fit.free]
+    geometry, _ = np.linalg.qr(shown.reshape(-1, shown.shape[-1]))
     found = []
     for at, part in enumerate(columns(fit.state, derivatives, fit.effects, poses)):
-        own = part.reshape(len(geometry), -1)
+        own = seen(fit.state, place, poses, part).reshape(len(geometry), -1)
         own = own - geometry @ (geometry.T @ own)
         form = own.T @ own / len(poses)
         values, covariance = fit.values[at], fit.covariance[fit.place(at), fit.place(at)]
