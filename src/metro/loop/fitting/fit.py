@@ -127,13 +127,15 @@ def fit(
     ``start``, a fit of the same or of a simpler candidate, gives the base parameters and the noise to begin
     with; effect parameters that it lacks are started from all combinations of their starting values, group
     after group, and the best few are followed. A fit whose cost would stay above ``bound``, under the noise
-    to begin with, is given up where that is seen. Fits are kept; one without a bound is as good as any.
+    to begin with, is given up where that is seen. Fits are kept: one that was followed to its end is as good
+    as any, and one that was given up at a bound would be at a lower one.
     """
     kept = _kept(candidate, blocks, prior, start)
-    known = np.inf if np.inf in kept else bound
-    if known not in kept:
-        kept[known] = _fitted(candidate, blocks, prior, start, bound)
-    return kept[known]
+    for known, fitted in kept.items():
+        if bound <= known or _below(fitted, known, start, prior):
+            return fitted
+    kept[bound] = _fitted(candidate, blocks, prior, start, bound)
+    return kept[bound]
 
 
 @lru_cache(maxsize=256)
@@ -143,6 +145,11 @@ def _kept(
     """Return the place where fits are kept, by their bounds."""
     del candidate, blocks, prior, start
     return {}
+
+
+def _below(fitted: Fit, bound: float, start: Fit | None, prior: Noise) -> bool:
+    """Whether a fit stayed below its bound, so that it was followed to its end."""
+    return cost_under(fitted, start.noise if start else prior) <= bound
 
 
 def _fitted(

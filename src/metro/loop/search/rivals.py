@@ -89,6 +89,7 @@ def _round(
     weight: dict[str, float] = {}
     rivals: list[Rival] = []
     better: Fit | None = None
+    effects = [effect for effect in effects if not _leaves_much(current, effect, prior)]
     for effect in current.candidate.effects:
         smaller, current = parted(base, current, effect, prior)
         others = _replaced(current, smaller, effects, prior)
@@ -109,6 +110,17 @@ def _round(
         if better is None and first > 0:
             better = others[first - 1]
     return Contest(current, weight, tuple(rivals)), better
+
+
+def _leaves_much(current: Fit, effect: Effect, prior: Noise) -> bool:
+    """Whether what is not of the library leaves a significant residual even beside all that was chosen.
+
+    In the place of one of these effects it then leaves no less.
+    """
+    if not effect.resembled or effect.key in _keys(current):
+        return False
+    beside = Candidate(current.candidate.base, (*current.candidate.effects, effect))
+    return unlike(effect, fit(beside, current.blocks, prior, current))
 
 
 def _odds(effects: Sequence[Effect], fits: Sequence[Fit]) -> list[float]:

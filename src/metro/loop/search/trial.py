@@ -76,8 +76,20 @@ def tried(
 
     Effects that are further ``behind`` the foremost one in log-likelihood are not followed to their end, and
     no condition is left out for them: they are tried again once that one is added. Where none of the others
-    passes the gates, they are followed after all.
+    passes the gates, they are followed after all. What is not of the library is tried where nothing of it may
+    be added at once: a cause of the library goes before it, and the contest weighs it in its place.
     """
+    library = [effect for effect in effects if not effect.resembled]
+    trials = _judged(current, library, prior, gates, least, behind=behind)
+    if len(library) == len(effects) or any(not (trial.why_not or trial.beside) for trial in trials):
+        return trials
+    return _judged(current, effects, prior, gates, least, behind=behind)
+
+
+def _judged(
+    current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, least: float, *, behind: float
+) -> list[Trial]:
+    """Try effects against one another, as :func:`tried` says."""
     raced, bound = _raced(current, effects, prior, gates, least, behind=behind)
     trials = _gated(raced, gates, least)
     given_up = {trial.effect.key for trial in trials if cost_under(trial.fit, current.noise) > bound}
