@@ -63,14 +63,32 @@ class Points(NamedTuple):
     edge: Array
 
 
-@lru_cache(maxsize=64)
-def _nodes(bare: Cutter, depth: float, lag: float, feed: float, *, linear: bool) -> Nodes:
-    """Return the nodes of a cutter of which nothing but its end and its helix is given."""
+class Outline(NamedTuple):
+    """What a cutter looks like: heights and radii, m, and the angle by which the edge lags, rad, finely.
+
+    ``inner``, ``outer``: the least and the largest radius of the nodes, m.
+    """
+
+    height: Array
+    radius: Array
+    lag: Array
+    inner: float
+    outer: float
+
+
+@lru_cache(maxsize=1024)
+def _nodes(bare: Cutter, depth: float, lag: float, feed: float, *, linear: bool) -> tuple[Nodes, Outline]:
+    """Return the nodes of a cutter of which nothing but its end and its helix is given, and its outline."""
     line = meridian(bare, depth, lag, feed)
     places, weights = rule(POINTS, linear)
     shares = np.sort(np.concatenate([[0.0, 0.5, 1.0], places]))
     table = _places(line, lag, shares)
-    return Nodes(line, lag, shares, np.isin(shares, places).nonzero()[0], weights, table)
+    fine = _places(line, lag, np.linspace(0.0, 1.0, FINE)).reshape(FINE * len(table), -1)
+    radius = table[..., RADIUS]
+    outline = Outline(
+        fine[:, HEIGHT], fine[:, RADIUS], lag * fine[:, HEIGHT], float(radius.min()), float(radius.max())
+    )
+    return Nodes(line, lag, shares, np.isin(shares, places).nonzero()[0], weights, table), outline
 
 
 @compiled_with_arrays
@@ -87,11 +105,12 @@ def _places(line: Meridian, lag: float, shares: Array) -> Array:
 
 
 class General(NamedTuple):
-    """A general cutter in a cut: the nodes of its edges, its teeth, and between which immersions they cut."""
+    """A general cutter in a cut: the nodes of its edges, its teeth, between which immersions they cut."""
 
     nodes: Nodes
     teeth: Teeth
     window: Window
+    outline: Outline
 
 
 def general_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, along: Edges, *, true_path: bool) -> Array:
@@ -109,7 +128,7 @@ def forces(general: General, law: EdgeLaw, along: Edges) -> Array:
     of the largest force on circular paths, to 1e-4 on true ones besides what ``LEAST_RADIUS`` says; but where
     an edge only just touches the end of the cut, the length that is cut is known to a few per cent.
     """
-    nodes, teeth, window = general
+    nodes, teeth, window, _ = general
     found = _points(teeth, teeth._replace(pitch=teeth.pitch[:1]), nodes, along, window)
     return _summed(found, law.shear(found.chip), along.top.size).reshape(*along.top.shape, 3, 6)
 
@@ -118,15 +137,13 @@ def in_cut(cutter: Cutter, law: EdgeLaw, cut: Cut, lag: float, *, true_path: boo
     """Return a general cutter in a cut whose edges lag by ``lag``, rad/m."""
     bare = replace(cutter, tooth_angles=(0.0,), runout_radius=0.0, runout_angle=0.0, reach=())
     feed, linear = cut.feed_per_tooth if true_path else 0.0, is_linear(law, feed_per_radian(cutter, cut))
-    nodes, teeth = (
-        _nodes(bare, cut.axial_depth, lag, feed, linear=linear),
-        teeth_in(cutter, cut, true_path=true_path),
-    )
-    inner, outer = float(nodes.table[..., RADIUS].min()), float(nodes.table[..., RADIUS].max())
-    farthest = outer + cutter.runout_radius + float(np.abs(cutter.reach or 0.0).max())
-    alone = alone_from(teeth, cutter, inner)
+    nodes, outline = _nodes(bare, cut.axial_depth, lag, feed, linear=linear)
+    teeth = teeth_in(cutter, cut, true_path=true_path)
+    farthest = outline.outer + cutter.runout_radius + max(map(abs, cutter.reach), default=0.0)
+    alone = alone_from(teeth, cutter, outline.inner)
     inward = math.asin(alone) if alone < 1.0 else math.inf
-    return General(nodes, teeth, Window(*reach(teeth, farthest, cutter.radius - cutter.corner), inward))
+    window = Window(*reach(teeth, farthest, cutter.radius - cutter.corner), inward)
+    return General(nodes, teeth, window, outline)
 
 
 @compiled_with_arrays
@@ -182,9 +199,3 @@ def _summed(found: Points, shear: Array, count: int) -> Array:
             at[1, column + 2] += aside * found.out[k]
             at[2, column + 2] += size * found.up[k]
     return basis
-
-
-def lagging(nodes: Nodes) -> tuple[Array, Array, Array]:
-    """Return heights, radii, m, and the angle by which the edge lags, rad, finely along all panels."""
-    table = _places(nodes.line, nodes.lag, np.linspace(0.0, 1.0, FINE)).reshape(FINE * len(nodes.table), -1)
-    return table[:, HEIGHT], table[:, RADIUS], nodes.lag * table[:, HEIGHT]

@@ -20,7 +20,7 @@ from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter
 from metro.cutting.edges import Edges
 from metro.cutting.floor import floor_of
-from metro.cutting.general import General, forces, in_cut, lagging
+from metro.cutting.general import General, forces, in_cut
 from metro.cutting.general_teeth import Teeth
 from metro.cutting.law import EdgeLaw
 from metro.cutting.passes import ALIKE
@@ -99,8 +99,8 @@ def _arcs(cutter: Cutter, general: General, span: float) -> tuple[Array, Array]:
     least does, which teeth that deviate move. The rest of the edge lags.
     """
     teeth, window = general.teeth, general.window
-    height, radius, lag = lagging(general.nodes)
-    deviation = cutter.radius_deviation(height)
+    _, radius, lag, *_ = general.outline
+    deviation = cutter.radius_deviation(general.outline.height)
     radius = radius + (deviation if teeth.true_path else 0.0 * deviation)
     begins = np.arcsin(np.clip(_least_chip(teeth, deviation), -1.0, 1.0))
     low = np.maximum(window.low, (begins + window.low + lag).min(axis=1))

@@ -34,6 +34,9 @@ from metro.observables.problem import Block
 from metro.units import Array
 
 FOLLOWED = 4  # starts of new effect parameters that are followed to the end; of a single one, all are
+OF_A_LIKENESS = (
+    2  # of what is not of the library: its parameters are no result, and it takes half of the time
+)
 FIRST_STEPS, KEPT = 3, 2  # where little is left to explain, after so many steps so many are kept
 HOPELESS = 1.0  # and none, where twice the log-likelihood has not gained that much per parameter: chance does
 SAME = 0.05  # difference of the costs of two descents that ended in one place: each stops before its very end
@@ -170,7 +173,7 @@ def _fitted(
             trials.append((search_nuisance(candidate, blocks, noise, state, around), state))
         best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
     if start and fresh:
-        followed = best if len(fresh) == 1 else best[:FOLLOWED]
+        followed = best if len(fresh) == 1 else best[: _followed(candidate)]
         first = _lowest_first(candidate, blocks, noise, followed, steps=FIRST_STEPS, bound=bound, known=start)
         best = _distinct(first, SAME)
         if noise_room.within_budget(blocks, noise):
@@ -183,6 +186,10 @@ def _fitted(
     near = _distinct([one for one in reached if one[0] < reached[0][0] + UNDECIDED], SAME)
     refined = [_refined(candidate, blocks, prior, noise, state, rounds=ROUNDS) for state in near]
     return max(refined, key=lambda fitted: fitted.total)
+
+
+def _followed(candidate: Candidate) -> int:
+    return OF_A_LIKENESS if candidate.effects[-1].resembled else FOLLOWED
 
 
 def _distinct(reached: Sequence[tuple[float, State]], apart: float) -> list[State]:
