@@ -46,6 +46,7 @@ def descend(
     known: Known | None = None,
     rival: float = np.inf,
     slopes: Sequence[Array] | None = None,
+    trusted: bool = False,
 ) -> tuple[State, float]:
     """Follow Levenberg's and Marquardt's steps to where none promises to gain anything that counts.
 
@@ -62,6 +63,7 @@ def descend(
         if it gained ``HOPE`` times what its next step promises.
     slopes : of each block, derivatives by the first effect parameters (n, k) near the start. They are used as
         long as steps keep much of their promise, and not to end the descent. None: none are known.
+    trusted : whether these derivatives may end it, too: the end is hardly away from where they hold.
 
     Returns
     -------
@@ -73,13 +75,13 @@ def descend(
     for step in range(1, steps + 1):
         left = max(enough, (system.cost - rival) / HOPE)
         taken = _step(candidate, blocks, state, system, damping, own=own, enough=left)
-        if taken is None and slopes and left == enough:
+        if taken is None and slopes and left == enough and not trusted:
             system, slopes = at(state, derivatives=free), None
             taken = _step(candidate, blocks, state, system, damping, own=own, enough=left)
         if taken is None:
             break
         state, damping = taken.state, taken.damping
-        if (taken.gained < enough and not slopes) or step == steps:
+        if (taken.gained < enough and (trusted or not slopes)) or step == steps:
             return state, at(state, derivatives="none").cost
         slopes = slopes if taken.kept > MUCH else None
         system = at(state, derivatives=free, slopes=slopes)

@@ -6,29 +6,23 @@ combinations of their starting values; the noise is re-estimated from the residu
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate, started
-from metro.loop.fitting.covariance import between_runs, wider_than
-from metro.loop.fitting.descent import ITERATIONS, descend, farthest, free, polish
+from metro.loop.fitting.descent import ITERATIONS, descend, polish
+from metro.loop.fitting.end import CONVERGED, End, end_of
 from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.nuisances import costs, search_nuisance
 from metro.loop.fitting.system import (
     State,
-    condition,
     effect_slopes,
-    inverse,
     linearised,
-    normal_equations,
-    solution,
 )
 from metro.observables.problem import Block
 from metro.units import Array
@@ -43,9 +37,6 @@ SAME = 0.05  # difference of the costs of two descents that ended in one place: 
 ALIKE = 1e-9  # relative difference of the sums of squares of starts that are the same
 UNDECIDED = 0.1  # differences in twice the log-likelihood that the noise, once known better, may turn round
 ROUNDS, SETTLED = 12, 0.2  # of noise estimation and descent; gain in twice the log-likelihood that ends them
-# Where a prediction is rough (that of a tool too soft to be in balance) no step leads on down, although the
-# derivatives promise one. An interval that is off by half a deviation holds the truth in 92 cases of 100.
-CONVERGED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,16 +97,6 @@ class Fit:
         """Prediction of a block of this fit in the fit's basis, (n,) SI."""
         matrix, offset = self.candidate.model(self.theta).design(block, self.nuisance[block.run], self.beta)
         return offset + matrix @ self.beta
-
-
-class _End(NamedTuple):
-    """What a linearisation at the end of a descent says of it; see :class:`Fit`."""
-
-    covariance: Array
-    wider: Array
-    pressed: Array
-    step: float
-    condition: float
 
 
 def fit(
@@ -244,17 +225,30 @@ def cost_under(fitted: Fit, noise: Noise) -> float:
 
 
 def refit(start: Fit, blocks: Sequence[Block], prior: Noise) -> Fit:
-    """Fit the same candidate to other blocks, from where ``start`` ended (leave-one-condition-out)."""
+    """Fit the same candidate to other blocks, from where ``start`` ended (leave-one-condition-out).
+
+    The derivatives are those of ``start`` as long as steps keep much of their promise.
+    """
     nuisance = {run: value.copy() for run, value in start.nuisance.items()}
     state = State(start.theta.copy(), start.beta.copy(), nuisance)
-    return _refined(start.candidate, blocks, prior, start.noise, state, rounds=1)
+    slopes = effect_slopes(start.candidate, blocks, state)
+    noise = _reestimated(start.candidate, blocks, prior, start.noise, state)
+    state, _ = descend(start.candidate, blocks, noise, state, slopes=slopes, trusted=True)
+    end = end_of(start.candidate, blocks, noise, state, slopes if _near(start, state) else None)
+    return _finished(start.candidate, blocks, noise, state, end)
+
+
+def _near(start: Fit, state: State) -> bool:
+    """Whether the effect parameters are within a standard deviation of where they were."""
+    sd = np.sqrt(np.diag(start.covariance)[len(start.beta) :])
+    return bool((np.abs(state.theta - start.theta) <= sd).all())
 
 
 def polished(fitted: Fit) -> Fit:
     """Follow a fit from where its likelihood tells no more to where its parameters have all their digits."""
     state = State(fitted.theta, fitted.beta, dict(fitted.nuisance))
     state = polish(fitted.candidate, fitted.blocks, fitted.noise, state)
-    end = _end_of(fitted.candidate, fitted.blocks, fitted.noise, state)
+    end = end_of(fitted.candidate, fitted.blocks, fitted.noise, state)
     return _finished(fitted.candidate, fitted.blocks, fitted.noise, state, end)
 
 
@@ -270,7 +264,7 @@ def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
         near = _distinct(sorted(zip(left, states, strict=True), key=lambda one: one[0]), ALIKE * min(left))
         reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
         state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
-    end = _End(fitted.covariance, fitted.wider, fitted.pressed, fitted.step, fitted.condition)
+    end = End(fitted.covariance, fitted.wider, fitted.pressed, fitted.step, fitted.condition)
     return _finished(candidate, blocks, noise, state, end)
 
 
@@ -299,63 +293,26 @@ def _refined(
     candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State, *, rounds: int
 ) -> Fit:
     """Re-estimate the noise from the residual and descend, in turn, until that gains next to nothing."""
-    # It takes numba, which a prediction of a robot or a face by a known fit does without.
-    from metro.loop.fitting.reestimate import reestimated
-
     before = np.inf
     for _ in range(rounds):
-        noise = reestimated(candidate, blocks, prior, noise, state)
+        noise = _reestimated(candidate, blocks, prior, noise, state)
         state, cost = descend(candidate, blocks, noise, state)
         if before - cost < SETTLED:
             break
         before = cost
-    return _finished(candidate, blocks, noise, state, _end_of(candidate, blocks, noise, state))
+    return _finished(candidate, blocks, noise, state, end_of(candidate, blocks, noise, state))
 
 
-def _end_of(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State) -> _End:
-    """Covariance of base and effect parameters, (p + q, p + q), and how well the end was reached.
+def _reestimated(
+    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State
+) -> Noise:
+    # It takes numba, which a prediction of a robot or a face by a known fit does without.
+    from metro.loop.fitting.reestimate import reestimated
 
-    The base parameters scatter from run to run, and the runs say how far that leaves them off. What the model
-    gets wrong where an effect shows may be the same in all runs: the variances of the effect parameters allow
-    for that, and their intervals are wider still where the runs differ by more. Whether an effect is there is
-    no question of how much of it there is in which run: conditions left out answer that.
-    """
-    system, wide = (
-        linearised(candidate, blocks, kind, state) for kind in (noise, noise_room.all_alike(noise))
-    )
-    normal, right = normal_equations(system)
-    covariance, alike = inverse(normal), inverse(normal_equations(wide)[0])
-    p = len(state.beta)
-    factor = between_runs(system)
-    wider = wider_than(np.diag(alike)[p:], np.diag(covariance)[p:] * factor[p:] ** 2)
-    factor[p:] = 1.0
-    covariance *= np.outer(factor, factor)
-    covariance[p:, p:] = alike[p:, p:]
-    moving = free(candidate, state, right)
-    still, downhill = normal[np.ix_(moving, moving)], right[moving]
-    step = float((np.abs(solution(still, downhill)) / np.sqrt(np.diag(inverse(still)))).max(initial=0.0))
-    if step > CONVERGED:
-        step *= farthest(candidate, blocks, state, system)
-    return _End(covariance, wider, _pressed(normal, right, moving)[p:], step, condition(normal))
+    return reestimated(candidate, blocks, prior, noise, state)
 
 
-def _pressed(normal: Array, right: Array, moving: np.ndarray) -> Array:
-    """Return by how many deviations each parameter at a bound, freed alone, would go beyond it, (p + q,).
-
-    The bound keeps it from there, so that its own interval says nothing of how sure the runs are of that.
-    """
-    beyond = np.zeros(len(right))
-    for place in np.flatnonzero(~moving):
-        freed = moving.copy()
-        freed[place] = True
-        part, at = normal[np.ix_(freed, freed)], np.count_nonzero(freed[:place])
-        variance = inverse(part)[at, at]
-        step = float(solution(part, right[freed])[at])
-        beyond[place] = abs(step) / math.sqrt(variance) if 0.0 < variance < np.inf else 0.0
-    return beyond
-
-
-def _finished(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, end: _End) -> Fit:
+def _finished(candidate: Candidate, blocks: Sequence[Block], noise: Noise, state: State, end: End) -> Fit:
     system = linearised(candidate, blocks, noise, state, derivatives="none")
     elements = {block.run: len(block.measured) for block in blocks}
     return Fit(
