@@ -21,6 +21,7 @@ SINGLE = (
     "loop/fitting/noise.py",
     "loop/fitting/expectation.py",
     "loop/fitting/fit.py",
+    "loop/fitting/end.py",
     "loop/fitting/reestimate.py",
     "loop/fitting/covariance.py",
     "loop/ceiling.py",
