@@ -121,11 +121,13 @@ def _told(tally: Tally) -> str:
         f"{name} {sum(getattr(tally, name).values())}" for name in ("named", "open", "missed", "invented")
     )
     held = np.mean(np.abs(tally.off) < 1.96)
+    found = f"{tally.arms} arms: {counts}; intervals hold {held:.1%} of {len(tally.off)} parameters"
+    if not tally.inside:
+        return found
     errors = [1e3 * float(np.median(each)) for each in (tally.before, tally.after, tally.promised)]
     return (
-        f"{tally.arms} arms: {counts}; intervals hold {held:.1%} of {len(tally.off)} parameters; targets "
-        f"{errors[0]:.3f} mm off, corrected {errors[1]:.3f} mm, promised {errors[2]:.3f} mm, "
-        f"{np.mean(tally.inside):.1%} of {len(tally.inside)} inside their intervals"
+        f"{found}; targets {errors[0]:.3f} mm off, corrected {errors[1]:.3f} mm, promised "
+        f"{errors[2]:.3f} mm, {np.mean(tally.inside):.1%} of {len(tally.inside)} inside their intervals"
     )
 
 

@@ -16,6 +16,7 @@ KINDS = {
     "time": "a drift of the arm, its base or the instrument",
     "temperature": "a growth that the temperature as recorded does not follow",
 }
+OTHER_LOAD = "the poses again with another load on the flange (payload_kg)"
 PARTS = {
     "pose": "is alike at poses that are close in all joints",
     "time": "changes with time",
@@ -150,7 +151,7 @@ def _next(values: JSON) -> str:
         elif kind in ("time", "temperature"):
             parts.append(f"for the residual of {run}: one pose again and again while the arm warms up")
         elif kind == "pose":
-            parts.append(f"for the residual of {run}: the poses again with another load on the flange")
+            parts.append(f"for the residual of {run}: {OTHER_LOAD}")
     if values["without_noise"]:
         parts.append("a few poses five times each or sigma_mm, to know how much of the residual is noise")
     return "; ".join(parts) or "the poses of table pose_next, which lower the errors of the geometry most"
@@ -158,8 +159,11 @@ def _next(values: JSON) -> str:
 
 def _telling(rivals: Sequence[str]) -> str:
     if "base_tilt" in rivals:
-        return "a point on the base beside the one on the flange, the arm stretched out to several sides"
-    return "the poses again with another load on the flange"
+        return (
+            f"{OTHER_LOAD}; or a point on the base beside the one on the flange, the arm stretched out to "
+            "several sides"
+        )
+    return OTHER_LOAD
 
 
 def _no_gain(values: JSON) -> str:
