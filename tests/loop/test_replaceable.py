@@ -10,7 +10,7 @@ from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, effect, problem
 
 from metro.loop.fitting import fit as fit_room
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import cost_under, fit
+from metro.loop.fitting.fit import cost_under, fit, refit
 from metro.loop.fitting.noise import first_noise
 from metro.loop.search import rivals as rivals_room
 from metro.loop.search.replaceable import FAR, Change
@@ -129,3 +129,17 @@ def test_a_fit_below_its_bound_serves_any_and_one_above_serves_lower_ones(monkey
     assert made == ["bend", "ripple"]
     assert fit_of(RIPPLE, np.inf) is not given_up
     assert made == ["bend", "ripple", "ripple"]
+
+
+def test_a_fit_without_a_condition_ends_where_new_derivatives_end_it():
+    _, current, prior = fits(Wave(bend=0.3, ripple=0.2), BEND, RIPPLE)
+    others = [block for block in current.blocks if block.condition != "identify-3"]
+    held = refit(current, others, prior)
+    whole = fit_room._refined(
+        current.candidate, others, prior, current.noise,
+        fit_room.State(current.theta.copy(), current.beta.copy(), dict(current.nuisance)), rounds=1,
+    )  # fmt: skip
+    sd = np.sqrt(np.diag(whole.covariance))[len(whole.beta) :]
+    assert np.abs(held.theta - current.theta).max() > 1e-4
+    assert (np.abs(held.theta - whole.theta) < 0.1 * sd).all()
+    assert np.sqrt(np.diag(held.covariance)[2:]) == pytest.approx(sd, rel=0.02)

@@ -116,3 +116,10 @@ def test_angles_in_another_order_than_stated_are_named_with_the_right_one():
 def test_the_uncertainty_of_a_pose_is_that_of_its_coordinates():
     rows = table(drawn(3), sigma_x_mm=0.03, sigma_y_mm=0.0, sigma_z_mm=0.04, sigma_mm=[np.nan, np.nan, 0.1])
     assert poses_of(rows)[0].sigma * 1e3 == pytest.approx([0.05 / np.sqrt(3), 0.05 / np.sqrt(3), 0.1])
+
+
+def test_an_orientation_beside_a_distance_is_left_out():
+    rows = table(drawn(20, seed=1), "xyz", distance_mm=1500.0).assign(x_mm=np.nan, y_mm=np.nan, z_mm=np.nan)
+    poses, _ = poses_of(rows, "xyz")
+    assert poses.by_distance
+    assert len(poses) == 20

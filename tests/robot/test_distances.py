@@ -116,7 +116,7 @@ def test_poses_to_measure_next_are_seen_from_all_stations(found):
     q, left = next_poses(calibration.final, own, count=5)
     assert (np.abs(q) <= REACH).all()
     assert (np.diff(left) < 0.0).all()
-    assert left[-1] < 0.99
+    assert 0.9 < left[0] < 1.0  # one of 401 poses, measured no better than the others
 
 
 def test_repeats_of_distances_give_the_noise_and_no_accuracy_of_positions():

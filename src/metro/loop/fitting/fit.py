@@ -28,9 +28,7 @@ from metro.observables.problem import Block
 from metro.units import Array
 
 FOLLOWED = 4  # starts of new effect parameters that are followed to the end; of a single one, all are
-OF_A_LIKENESS = (
-    2  # of what is not of the library: its parameters are no result, and it takes half of the time
-)
+OF_A_LIKENESS = 2  # the same of an effect that is not of the library: its parameters are no result
 FIRST_STEPS, KEPT = 3, 2  # where little is left to explain, after so many steps so many are kept
 HOPELESS = 1.0  # and none, where twice the log-likelihood has not gained that much per parameter: chance does
 SAME = 0.05  # difference of the costs of two descents that ended in one place: each stops before its very end

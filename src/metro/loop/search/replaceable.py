@@ -1,7 +1,7 @@
 """Whether an effect could stand in for another one: whether it can make what that one makes.
 
 Most effects cannot, and to fit each in the place of each other takes most of a search. Here it is asked to
-first order: how much of the change that an effect makes is left if the other parameters and the signatures of
+first order: how much of the change that an effect makes remains if the other parameters and the signatures of
 the other effect take of it what they can.
 """
 
@@ -59,7 +59,7 @@ class Change:
         return np.concatenate([self.smaller.theta, [one.neutral for one in effect.parameters]])
 
     def _lost(self, left: float) -> float:
-        """Log-likelihood that a squared change loses where the noise is estimated from what is left."""
+        """Log-likelihood that a squared change loses where the noise is estimated from the residual."""
         return 0.5 * self.count * math.log1p(left / self.count)
 
     def _left(self, signatures: list[Array]) -> float:

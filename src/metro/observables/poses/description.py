@@ -22,7 +22,7 @@ POSES = Description(
     title="the arm by measured poses",
     assumes="Joints turn by their readings about the axes of the declared geometry; links and base are "
     "rigid. Corrections and effects are added to that. Unless payload_kg changes within a series, what the "
-    "load bends is not parted from what the arm's own weight does.",
+    "load bends cannot be distinguished from what the arm's own weight does.",
     tables=TABLES,
     shown=TABLES,
     needs=needs,

@@ -54,7 +54,7 @@ def poses_of(rows: pd.DataFrame, euler: str = FIXED_AXES) -> tuple[Poses, Array]
     payload = np.nan_to_num(rows["payload_kg"].to_numpy(dtype=float))
     found = Poses(q, at, sigma, time, warm, approached(q), pose, point, distance, station, payload)
     target, turn = rows["target"].to_numpy(dtype=float), _orientation(rows, euler)
-    if turn is None:
+    if turn is None or found.by_distance:  # points beside one of which the distance is known have none
         return found, target
     again = np.repeat(np.arange(len(q)), 3)
     beside = np.stack([np.zeros_like(at), turn[:, :, 0], turn[:, :, 1]], axis=1).reshape(-1, 3)

@@ -31,6 +31,11 @@ def _distance(errors: pd.DataFrame, stage: str) -> Array:
     return np.asarray(np.linalg.norm(np.nan_to_num(errors[columns].to_numpy(dtype=float)), axis=1))
 
 
+def by_distance(errors: pd.DataFrame) -> bool:
+    """Whether the errors of a series are those of distances; another series of the batch may have these."""
+    return "distance_mm" in errors and bool(errors["distance_mm"].notna().any())
+
+
 def distances(errors: pd.DataFrame) -> Figure:
     """Draw histograms of the distances; ``errors``: rows of ``pose_errors``."""
     with style.style():
@@ -47,7 +52,7 @@ def distances(errors: pd.DataFrame) -> Figure:
                 lw=1.1,
                 label=f"{label}, median {np.median(values):.2g} mm",
             )
-        what = "position" if errors.get("distance_mm") is None else "distance"
+        what = "distance" if by_distance(errors) else "position"
         axes.set_xlabel(f"difference between measured and predicted {what} (mm)")
         axes.set_ylabel("poses")
         axes.legend()

@@ -261,7 +261,7 @@ def _drawn(results: Results, run: str) -> list[Item]:
     items: list[Item] = []
     errors, curves = _left_out(results, run), results.tables.get("pose_curves")
     if errors is not None:
-        frame = "instrument's frame" if errors.get("distance_mm") is None else "arm's base frame"
+        frame = "arm's base frame" if figures.by_distance(errors) else "instrument's frame"
         caption = (
             "Error over the workspace, of poses left out by region: mean of each cell, in two "
             f"planes of the {frame}, without the outermost 0.2 % of the poses. Each map has its "
