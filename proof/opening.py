@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import yaml
@@ -14,8 +15,8 @@ from proof import seal
 from proof.answers import answer, p_value
 from proof.layout import Layout
 from proof.oracles import oracles
-from proof.run import pose
-from proof.score import Score, score
+from proof.run import FAILURE, pose
+from proof.score import FAILED, Score, score
 from proof.show import draw, markdown, printed
 from proof.suite import DEFAULT
 from proof.tables import tables
@@ -50,6 +51,7 @@ def opened(out: Layout, jobs: int, limit: float | None = None) -> list[Score]:
             f"{len(waiting)} batches were not run, the first is {waiting[0]}: run them first"
         )
     scores = _scores(out, truth, jobs, limit, lambda name: _ours(out, name, about(truth)))
+    scores = [_with_reason(one, out.reports / one.batch / FAILURE) for one in scores]
     _shown(out, truth, scores, "", _versions(out, truth))
     return scores
 
@@ -64,6 +66,7 @@ def opened_for(
     truth = seal.unseal(out.truth, out.seal)
     pose(out, jobs, limit)
     scores = _scores(out, truth, jobs, limit, lambda name: answer(answers, name, about(truth)))
+    scores = [_with_reason(one, answers / f"{one.batch}.{FAILURE}") for one in scores]
     _shown(out, truth, scores, f"-{program}", f" What {program} says of them.")
     return scores
 
@@ -91,8 +94,15 @@ def _scores(
     ]
 
 
+def _with_reason(one: Score, file: Path) -> Score:
+    """Return a score that says why its batch failed, where it did and somebody wrote it down."""
+    if one.status != FAILED or not file.is_file():
+        return one
+    return replace(one, failure=file.read_text().strip().splitlines()[-1])
+
+
 def _finished(out: Layout, name: str) -> bool:
-    return any((out.reports / name / file).is_file() for file in ("run.json", "failed.txt"))
+    return any((out.reports / name / file).is_file() for file in ("run.json", FAILURE))
 
 
 def _ours(out: Layout, name: str, about: str) -> JSON | None:

@@ -20,11 +20,12 @@ from metro.stages.problem_file import FILE
 from metro.units import JSON
 from metro.workflow import Plan
 from proof.layout import Layout
-from proof.limit import OutOfTimeError, bounded
+from proof.limit import OutOfTimeError, bounded, ended
 from proof.progress import tracked
 
 STAGES = ("ingest", "identify", "predict", "loop", "verdict")
 CHECKOUT = Path(__file__).parents[1]
+FAILURE = "failed.txt"
 FAILED = 3  # exit code of a process whose batch failed, with the reason in its folder
 
 
@@ -50,6 +51,11 @@ class Job:
     def mark(self) -> Path:
         """File that is written last: the code that ran, and the seconds that each stage took."""
         return self.reports / "run.json"
+
+    @property
+    def reason(self) -> Path:
+        """File with the reason why the batch failed: where it was, and in the last line what was wrong."""
+        return self.reports / FAILURE
 
     @property
     def done(self) -> bool:
@@ -113,10 +119,11 @@ def alone(done: Callable[[Job], str | None], job: Job) -> str | None:
     process = get_context("spawn").Process(target=_ended, args=(done, job))
     process.start()
     process.join()
-    if process.exitcode not in (0, FAILED):
+    if process.exitcode:
         _tidied(job)
+    if process.exitcode not in (0, FAILED):
         job.reports.mkdir(parents=True, exist_ok=True)
-        (job.reports / "failed.txt").write_text(f"its process ended with exit code {process.exitcode}\n")
+        job.reason.write_text(f"its process ended with exit code {process.exitcode}\n")
     return job.folder.name if process.exitcode else None
 
 
@@ -151,14 +158,14 @@ def _planned(out: Layout, stages: Sequence[str]) -> list[Job]:
 
 def _closed(job: Job) -> str | None:
     """Run the stages of a batch; return its name where one failed, and leave the reason in its folder."""
-    for file in ("run.json", "verdict.json", "failed.txt"):
+    for file in ("run.json", "verdict.json", FAILURE):
         (job.reports / file).unlink(missing_ok=True)
     try:
-        with bounded(job.limit):
+        with bounded(job.limit, ended(job.reason, FAILED)):
             seconds = {stage: _timed(job, stage) for stage in job.settings}
-    except (Exception, OutOfTimeError):
+    except Exception:
         job.reports.mkdir(parents=True, exist_ok=True)
-        (job.reports / "failed.txt").write_text(traceback.format_exc())
+        job.reason.write_text(traceback.format_exc())
         return job.folder.name
     finally:
         _tidied(job)

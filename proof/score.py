@@ -46,6 +46,7 @@ class Score:
     cannot_be_seen : effects that these data cannot reveal, by the verdict.
     p_value : that is stated for nothing being missing.
     seconds : the stages took.
+    failure : why the batch failed, where it did.
     """
 
     batch: str
@@ -72,6 +73,7 @@ class Score:
     cannot_be_seen: tuple[str, ...] = ()
     p_value: float | None = None
     seconds: float | None = None
+    failure: str | None = None
 
     @property
     def seen(self) -> bool:

@@ -22,7 +22,7 @@ from proof.limit import OutOfTimeError, bounded
 from proof.opening import about_suite
 from proof.oracles import gates, posed
 from proof.progress import tracked
-from proof.run import pose
+from proof.run import FAILURE, pose
 
 PROGRAMS: dict[str, Callable[[Given], Handler[JSON]]] = {
     "base": Base,
@@ -57,7 +57,7 @@ def _answer(name: str, out: Layout, batch: str, observable: str, limit: float | 
             entry = entry_of(name, out, batch, observable)
     except (Exception, OutOfTimeError):
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / f"{batch}.failed.txt").write_text(traceback.format_exc())
+        (folder / f"{batch}.{FAILURE}").write_text(traceback.format_exc())
         return
     write_json(folder / f"{batch}.json", {"format": 1, "batch": batch, "observables": {observable: entry}})
 

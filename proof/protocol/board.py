@@ -83,8 +83,17 @@ def _suite(row: JSON) -> str:
     return (
         f"Commit `{row['commit'][:12]}`, {row['date']}: {row['batches']} batches of style "
         f"{row['style']}: {seen}, of {row['outside_kinds']} kinds. Sealed as `{row['seal']}`. "
-        f"A batch that took more than {row['limit_s']:g} s of processor time has failed.\n"
+        f"A batch that took more than {row['limit_s']:g} s of processor time has failed.\n{_failures(row)}"
     )
+
+
+def _failures(row: JSON) -> str:
+    """Say which batches failed, and why; rows before this was written down do not say."""
+    lines = [
+        f"\n- {batch} failed: {reason or 'the reason is not known'}."
+        for batch, reason in row.get("failures", {}).items()
+    ]
+    return "".join([*lines, "\n"]) if lines else ""
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

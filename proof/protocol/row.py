@@ -9,7 +9,7 @@ import numpy as np
 
 from metro.units import JSON
 from proof.figures import demanded, further, kind, over_floor, undecided
-from proof.score import Score, Stated
+from proof.score import FAILED, Score, Stated
 from proof.statistics import Figure, binned, brier, calibration_error, share, uniform
 from proof.tables import KINDS
 
@@ -32,6 +32,7 @@ def row(program: str, scores: Sequence[Score], head: JSON) -> JSON:
         "program": program,
         **head,
         "counts": {name: _counts([*kind(scores, name)]) for name in KINDS},
+        "failures": {s.batch: s.failure for s in scores if s.status == FAILED},
         "outside_kinds": len({s.hidden for s in kind(scores, "outside")}),
         "figures": [_figure(figure) for figure in figures],
         "named": _calibration(named),

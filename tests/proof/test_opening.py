@@ -99,8 +99,13 @@ def test_a_proof_that_is_not_finished_is_not_opened(out):
 
 def test_a_batch_that_failed_counts_against(out):
     (out.reports / "blind-2/run.json").unlink()
-    (out.reports / "blind-2/failed.txt").write_text("ValueError")
-    opened(out, 1)
+    (out.reports / "blind-2/failed.txt").write_text("Traceback\n  in the loop\nValueError: no teeth\n")
+    found = {one.batch: one for one in opened(out, 1)}
+    assert {name: one.failure for name, one in found.items()} == {
+        "blind-1": None,
+        "blind-2": "ValueError: no teeth",
+        "blind-3": None,
+    }
     assert rows(out, "Statuses")["one effect, seen"][-1] == "1"
     assert rows(out, "What lies behind")["batches that the pipeline ran through"][0] == "66.7 %"
 

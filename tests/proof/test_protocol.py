@@ -165,6 +165,18 @@ def test_the_calibration_error_of_what_is_calibrated_is_zero_and_of_what_is_sure
     assert np.isnan(calibration_error([]))
 
 
+def test_the_row_and_the_board_say_why_a_batch_failed(tmp_path):
+    late = "it took more than 60 s of processor time"
+    reasons = {"a": late, "b": None}
+    failed = [Score(name, "none", (), {}, "failed", {}, failure=why) for name, why in reasons.items()]
+    found = row("metro", [*scores(), *failed], HEAD)
+    assert found["failures"] == reasons
+    file, page = tmp_path / "log.jsonl", tmp_path / "board.md"
+    log.append(file, found)
+    board.write(file, page)
+    assert f"- a failed: {late}.\n- b failed: the reason is not known.\n" in page.read_text()
+
+
 def test_uniform_p_values_have_no_distance_and_those_of_a_blind_program_do():
     even = (np.arange(40) + 0.5) / 40
     assert uniform(even)[0] == pytest.approx(0.0125)

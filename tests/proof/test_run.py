@@ -1,10 +1,13 @@
 """Each batch runs in a process of its own: one that dies does not take the others along."""
 
+import math
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 
-from proof.run import Job, alone
+from proof.limit import bounded, ended
+from proof.run import FAILED, Job, alone
 
 
 def job(folder):
@@ -32,3 +35,20 @@ def test_a_batch_that_failed_keeps_its_reason_and_one_that_ran_through_has_none(
     assert alone(fails, job(tmp_path)) == "blind-01"
     assert alone(passes, job(tmp_path)) is None
     assert not (tmp_path / "reports").exists()
+
+
+def swallows(job):
+    """Use up the time in code that catches every exception, as what compiled code calls may do."""
+    with bounded(job.limit, ended(job.reason, FAILED)):
+        while True:
+            try:
+                math.factorial(2000)
+            except BaseException:
+                continue
+
+
+def test_a_batch_that_takes_too_long_ends_whatever_it_does_and_says_where_it_was(tmp_path):
+    assert alone(swallows, replace(job(tmp_path), limit=0.2)) == "blind-01"
+    reason = (tmp_path / "reports" / "failed.txt").read_text()
+    assert "swallows" in reason
+    assert reason.endswith("it took more than 0.2 s of processor time\n")
