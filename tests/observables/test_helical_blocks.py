@@ -102,8 +102,14 @@ def test_at_an_axial_feed_that_no_run_tells_the_thrust_is_uncertain():
     assert _at_other_feeds((told, same), TOOL)[0].unidentified is None
     assert _at_other_feeds((told, same), TOOL)[1].unidentified is None
     unidentified = _at_other_feeds((told, other), TOOL)[1].unidentified
-    # N R K (s − s told) along z, in the mean alone
-    thrust = 4 * 6e-3 * UNIDENTIFIED_KFAC * 3e-6
+    # N R K (s − s told) along z, in the mean alone; and edges that differ in height begin to cut in between
+    of_feed = 4 * 6e-3 * UNIDENTIFIED_KFAC * 3e-6
+    known = told.measured.reshape(BLOCKS, 3, -1)[:, 2, 0].mean()
+    rng = np.random.default_rng(3)
+    behind = rng.exponential(5e-6, (100_000, 3))
+    begin = ((behind > 4e-6) & (behind < 7e-6)).sum(axis=1) / 4
+    of_edges = abs(known) * np.sqrt(np.mean(begin**2))
     by_axis = unidentified.reshape(BLOCKS, 3, -1)
-    assert by_axis[:, 2, 0] == pytest.approx(np.full(BLOCKS, thrust))
+    assert by_axis[:, 2, 0] == pytest.approx(np.full(BLOCKS, np.hypot(of_feed, of_edges)), rel=0.01)
+    assert of_edges > of_feed
     assert np.count_nonzero(unidentified) == BLOCKS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import cast
@@ -41,6 +42,7 @@ UNIDENTIFIED_KFAC = (
     140.0 * N_MM2
 )  # rms of what it may be: anything up to the 243 N/mm² that [T] table 4 found
 CHATTERED = "no"  # in the column ``stable``
+HEIGHTS = 5.0 * UM  # mean by which a bottom edge stands back behind the lowest one, of a tool that is good
 LEAST_FEED_RATIO = 1.1  # between axial feeds at which the thrust of an unknown K_Fac differs
 
 
@@ -67,6 +69,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         cutting_force.end_note(batch, tool),
         _path_note(tool, blocks),
         *_give_note(batch, observed["spindle"]),
+        *_thrust_note(blocks),
         f"Forces are compared per revolution up to spindle order {blocks[0].setting.highest}, "
         "in the work frame"
         + (" (helical runs: in the frame that turns with the orbit)." if helical else "."),
@@ -141,22 +144,62 @@ def _axial_feeds(blocks: tuple[Block, ...]) -> list[float]:
 
 def _at_other_feeds(blocks: tuple[Block, ...], tool: Cutter) -> tuple[Block, ...]:
     """Allow helical runs at another axial feed than the one that was identified to have another thrust."""
-    identified_feed = float(np.mean(_axial_feeds(blocks)))
-    return tuple(
-        replace(block, unidentified=_unidentified_thrust(block, tool, identified_feed))
-        if block.setting.helix
-        else block
-        for block in blocks
-    )
+    feeds = _axial_feeds(blocks)
+    identified = [block for block in blocks if block.role == "identify" and block.setting.helix]
+    thrust = float(np.mean([abs(_mean_thrust(block)) for block in identified]))
+
+    def with_unknown(block: Block) -> Block:
+        feed = block.setting.helix.axial_feed
+        edges = thrust * _other_edges(tool.teeth, feed, min(max(feed, min(feeds)), max(feeds)))
+        unknown = _unidentified_thrust(block, tool, float(np.mean(feeds)), edges)
+        return replace(block, unidentified=unknown)
+
+    return tuple(with_unknown(block) if block.setting.helix else block for block in blocks)
 
 
-def _unidentified_thrust(block: Block, tool: Cutter, identified_feed: float) -> Array | None:
-    """Direction (n, 1) of the thrust of an unknown K_Fac, at an axial feed other than the identified one."""
+def _mean_thrust(block: Block) -> float:
+    """Return the measured mean force along z of a block, N."""
+    axial = block.zeros[:, 2]
+    return float(block.measured @ axial / (axial @ axial))
+
+
+def _unidentified_thrust(block: Block, tool: Cutter, identified_feed: float, edges: float) -> Array | None:
+    """Direction (n, 1) of what is unknown of the thrust at an axial feed other than the identified one.
+
+    That is K_Fac, and the thrust of ``edges``, N, that begin to cut, or stop, between the two feeds.
+    """
     helix = block.setting.helix
     if max(helix.axial_feed, identified_feed) <= LEAST_FEED_RATIO * min(helix.axial_feed, identified_feed):
         return None
     per_unit = bottom_thrust(tool, helix)[0] * (1.0 - identified_feed / helix.axial_feed)
-    return np.asarray(UNIDENTIFIED_KFAC * per_unit * block.zeros[:, 2:])
+    return np.asarray(math.hypot(UNIDENTIFIED_KFAC * per_unit, edges) * block.zeros[:, 2:])
+
+
+def _other_edges(teeth: int, feed: float, other: float) -> float:
+    """Return the rms share of bottom edges that cut at one axial feed per tooth, m, and not at another one.
+
+    An edge cuts where the tool sinks by more than the edge stands back behind the lowest one, whose height is
+    taken as exponential, of mean ``HEIGHTS``: all but the lowest are such edges, each for itself. Those that
+    begin to cut between two identified feeds would show there.
+    """
+    between = abs(math.exp(-feed / HEIGHTS) - math.exp(-other / HEIGHTS))
+    others = teeth - 1
+    return math.sqrt(others * between * (1.0 - between) + (others * between) ** 2) / teeth
+
+
+def _thrust_note(blocks: tuple[Block, ...]) -> tuple[str, ...]:
+    """Say of which runs the thrust of the bottom edges is not known, and how large that is."""
+    others = [block for block in blocks if block.role != "identify"]
+    unknown = {one.run: one.unidentified for one in others if one.unidentified is not None}
+    if not unknown:
+        return ()
+    largest = max(float(np.abs(each).max()) for each in unknown.values())
+    return (
+        f"The helical runs {', '.join(unknown)} have another axial feed than those of the identification. "
+        "How much thrust the bottom edges cause there is not known: neither K_Fac nor, as edges differ in "
+        f"height by some micrometres, how many of them cut. Their mean force along z is left open by up to "
+        f"{largest:.2g} N (one standard deviation).",
+    )
 
 
 def report(
