@@ -169,6 +169,7 @@ COMPOSED = {
         {"time_constant_s": [4.0, 1.0, 8.0]},
         reciprocal,
     ),
+    "amplifier_filter": ({"corner_hz": 900.0, "order": 2.0}, {"corner_hz": 1500.0, "order": 3.0}, None),
     "chip_size_effect": ({"exponent": 0.1}, {"exponent": 0.25}, added),
     "chipped_tooth": (
         {"tooth": 1, "length_um": 20.0, "height_mm": 1.5},

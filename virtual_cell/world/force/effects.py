@@ -106,6 +106,13 @@ def _resonance(m: Making, p: Parameters) -> Making:
     return m.with_(table=replace(table, bare=table.bare * factor, damping=damping))
 
 
+def _filter(m: Making, p: Parameters) -> Making:
+    """Leave the low pass of an earlier job on: it is the lowest in the chain."""
+    amplifier = m.cell.amplifier
+    cutoff = p["corner_hz"] / amplifier.rate
+    return m.with_(amplifier=replace(amplifier, order=int(p["order"]), cutoff=cutoff))
+
+
 def _drift_drawn(rng: np.random.Generator, _: Making) -> Parameters:
     if rng.uniform() < 0.5:
         return {"time_constant_s": [drawn_size(rng, 3.0, 30.0) for _ in range(3)]}
@@ -157,6 +164,11 @@ INSIDE: Mapping[str, Hidden[Making]] = {
         "angle_deg", lambda r, _: {"angle_deg": drawn_signed(r, 2.5, 9.0)}, _rotation
     ),
     "dynamometer_resonance": Hidden("frequency_hz[3] damping[3]", _resonance_drawn, _resonance),
+    "amplifier_filter": Hidden(
+        "corner_hz order",
+        lambda r, _: {"corner_hz": drawn_size(r, 250.0, 1200.0), "order": int(r.integers(1, 5))},
+        _filter,
+    ),
     "charge_drift": Hidden("slope_n_s[3]? time_constant_s[3]?", _drift_drawn, _drift),
     "tool_end": Hidden("corner_radius_mm", _end_drawn, _end),
 }

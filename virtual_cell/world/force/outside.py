@@ -162,9 +162,9 @@ OUTSIDE: Mapping[str, Hidden[Making]] = {
         lambda r, _: {"exponent": drawn_size(r, 0.12, 0.6)},
         lambda m, p: _caused(m, work.SpeedDependence(p["exponent"], m.plans[0].spindle_rpm * RPM)),
     ),
-    "filter_left_on": Hidden(
-        "frequency_hz",
-        lambda r, _: {"frequency_hz": drawn_size(r, 250.0, 1500.0)},
-        lambda m, p: _caused(m, machine.FilterLeftOn(p["frequency_hz"])),
+    "sagging_gain": Hidden(
+        "axis share",
+        lambda r, _: {"axis": _axis(r), "share": drawn_size(r, 0.04, 0.3)},
+        lambda m, p: _caused(m, machine.SaggingGain(p["axis"], p["share"])),
     ),
 }

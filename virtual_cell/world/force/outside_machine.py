@@ -114,15 +114,18 @@ class MovingResonance(Cause):
 
 
 @dataclass(frozen=True)
-class FilterLeftOn(Cause):
-    """The amplifier's low pass was left on from an earlier job."""
+class SaggingGain(Cause):
+    """A plug that corrodes: one channel reads ever less of its force as the session goes on."""
 
-    hz: float
+    axis: int
+    share: float
 
     def signal(self, moment: Moment, t: Array, read: Array) -> Array:
-        """Second order, well damped."""
+        """Scale one channel."""
         del t
-        return np.stack([filtered(one, moment.rate, self.hz, 0.75) for one in read.T], axis=1)
+        scaled = read.copy()
+        scaled[:, self.axis] *= 1.0 - self.share * moment.share
+        return scaled
 
 
 def filtered(load: Array, rate: float, hz: float, damping: float) -> Array:

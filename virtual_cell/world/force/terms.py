@@ -82,6 +82,13 @@ def _of_sensor(cell: Cell) -> dict[str, Term]:
         ),
         "dynamometer_resonance": Term({"frequency_hz": _list(hz), "damping": _list(damping)}, apart),
         "dynamometer_crosstalk": Term(_crosstalk(cell.table.gains), tilt),
+        "amplifier_filter": Term(
+            {
+                "corner_hz": _digits(cell.amplifier.cutoff * cell.amplifier.rate),
+                "order": cell.amplifier.order,
+            },
+            0.0,
+        ),
         "charge_drift": Term({"slope_n_s": _list(cell.amplifier.drift)}, 0.0),
     }
     if float(cell.amplifier.constant.min()) < LONG:
