@@ -166,7 +166,7 @@ INSIDE: Mapping[str, Hidden[Making]] = {
     "dynamometer_resonance": Hidden("frequency_hz[3] damping[3]", _resonance_drawn, _resonance),
     "amplifier_filter": Hidden(
         "corner_hz order",
-        lambda r, _: {"corner_hz": drawn_size(r, 250.0, 1200.0), "order": int(r.integers(1, 5))},
+        lambda r, _: {"corner_hz": drawn_size(r, 250.0, 1150.0), "order": int(r.integers(1, 5))},
         _filter,
     ),
     "charge_drift": Hidden("slope_n_s[3]? time_constant_s[3]?", _drift_drawn, _drift),
