@@ -53,7 +53,7 @@ def row(cells: Sequence[str]) -> str:
 
 
 def _cause(forms: list[Effect], meanings: Mapping[str, str]) -> list[str]:
-    """Return the section of a cause: forms that are told alike share a table."""
+    """Return the section of a cause: forms with the same description share a table."""
     lines = [f"### {forms[0].name}\n", f"{_what(*forms)}\n"]
     for effects in _alike(forms):
         first = effects[0]
@@ -82,7 +82,7 @@ def _parameter(effect: Effect, name: str, meaning: str) -> str:
 
 
 def _alike(forms: Iterable[Effect]) -> list[list[Effect]]:
-    """Group the forms that are told alike, whatever the joint."""
+    """Group the forms with the same description, whatever the joint."""
     groups: dict[tuple[object, ...], list[Effect]] = {}
     for effect in forms:
         joint = effect.where.get("joint") not in {None, "all"}

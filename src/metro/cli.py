@@ -226,8 +226,8 @@ def next_runs(
 ) -> None:
     """Plan the few runs that would decide what a batch leaves open, in an order drawn at random.
 
-    They tell apart what is undetermined, describe what is left, show what cannot be seen, or tighten what
-    makes predictions unsure. Repeats the search of the loop stage, and takes as long.
+    They decide between explanations, describe the residual, show effects that these runs cannot reveal, or
+    narrow the intervals of parameters. Repeats the search of the loop stage, and takes as long.
 
     Example: `metro next side-milling-17 --limit axial_depth_mm=0.5:4 --out next.csv`
     """
@@ -309,8 +309,8 @@ def verify(
 ) -> None:
     """Recompute the hashes from raw files to report, and say what changed since the reports were made.
 
-    The exit code is 1 when a file differs. Other code, settings or packages are told; they change nothing in
-    a report that is there.
+    The exit code is 1 when a file differs. Other code, settings or packages are listed; they change nothing
+    in a report that exists already.
 
     Example: `metro verify kr160-side`
     """

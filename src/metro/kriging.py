@@ -43,7 +43,7 @@ class Kriged:
         return self.trend + shared @ self.weights, sd
 
     def left_out(self) -> tuple[Array, Array]:
-        """Errors and standard deviations (n, p) of each value as told by the others, the trend kept.
+        """Errors and standard deviations (n, p) of each value as predicted by the others, the trend kept.
 
         Dubrule (1983): both are in the inverse of the covariances, without solving anew.
         """

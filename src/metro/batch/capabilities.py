@@ -103,7 +103,7 @@ def capability(
 def nothing_computed(capabilities: Sequence[Capability], unfit: Sequence[str] = ()) -> list[Finding]:
     """Report that nothing can be computed from a batch, where it is so: with what each of its data lacks.
 
-    ``unfit``: why recordings were left out, each with its file; what is left may be nothing.
+    ``unfit``: why recordings were left out, each with its file; there may be none left.
     """
     if not capabilities or any(each.source for each in capabilities):
         return []

@@ -56,11 +56,11 @@ def load_findings(table: Table) -> Iterator[Finding]:
 
 
 def with_their_load(table: Table) -> tuple[Table, list[Finding]]:
-    """Leave out load tests whose tip moves against the load, where another test stands in for each.
+    """Leave out load tests whose tip moves against the load, where another test replaces each.
 
-    Another test stands in if it loads the same place along the same line and its tip moves with the load:
+    Another test replaces it if it loads the same place along the same line and its tip moves with the load:
     nothing that is loaded at rest moves against its load, so that of two such tests it is known which is
-    wrong. A test that nothing stands in for is kept, and is an error of :func:`load_findings`.
+    wrong. A test that nothing replaces is kept, and is an error of :func:`load_findings`.
 
     Returns
     -------

@@ -2,7 +2,7 @@
 
 A pocket is a speed at which more material can be removed, surely stable, than at the speeds about it. Its
 depth is the lower end of the boundary's 95 % band, at the worst of the speed itself and its neighbours on the
-diagram: a spindle does not turn exactly as it is told.
+diagram: a spindle does not turn exactly as programmed.
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ def _nearest(known: list[int], count: int, distance: Array | None) -> tuple[int,
 
 
 def _paired(known: Seen, new: Seen) -> tuple[np.ndarray, Array]:
-    """Partner (m,) of each new mode among the known ones, −1 without one, and their likeness (m,)."""
+    """Partner (m,) of each new mode among the known ones, −1 without one, and how similar they are (m,)."""
     from scipy.optimize import linear_sum_assignment
 
     way = np.abs(np.log(new.frequency[:, None] / known.frequency[None, :]))

@@ -33,7 +33,7 @@ EFFECT = Effect(
     parameters=(EffectParameter("growth_per_mm", "1", 0.0, 1.0, 0.01, starts=(0.02,), plausible=0.1),),
     apply=apply,
     belongs_to=("tool",),
-    resembled=True,  # by labels at few speeds, a tool that is less stiff for any reason looks alike
+    resembled=True,  # by labels at few speeds, any tool that is less stiff has the same signature
     signature=(
         "High lobes are lower than predicted, and the chatter frequency is lower where the cut is deep."
     ),

@@ -11,7 +11,7 @@ from metro.observables.force.model import ForceModel
 
 X, Y, Z = range(3)
 # Row and column of the sensor's matrix that each share changes. What is turned within the plane is another
-# effect, and the gains of x and z are taken for coefficients: neither can be told from forces of a cut.
+# effect, and the gains of x and z are taken for coefficients: neither is identifiable from forces of a cut.
 ENTRIES = {
     "x_in_z_percent": ((Z, X),),
     "y_in_z_percent": ((Z, Y),),

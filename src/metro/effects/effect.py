@@ -86,7 +86,7 @@ class Effect:
     resembled : true of a cause that is not one of the contract's: it is tried like the others, so that none
         of them is taken for it, but the verdict only says that the rest resembles it.
     form : where one cause has several models of which a batch has one (a drift in steps or in time; another
-        joint): what tells them apart, for the report.
+        joint): what distinguishes them, for the report.
     where : what of the contract's parameters the form says (``joint``): reported as it is.
     part : field of the model that it changes, where not every model of its observables has it (a printed
         table is predicted without an arm).

@@ -45,7 +45,7 @@ class ForcePrediction:
     table : ``angle_deg`` (of tooth 0, from an arbitrary zero), and of each axis of the work frame ``f*_n``
         with its 95 % interval ``f*_lo_n``, ``f*_hi_n``. Helical cuts: in the frame that turns with the orbit.
     effects : names of the effects that are included.
-    notes : what is left out, and what the interval does not contain.
+    notes : effects left out, and what the interval does not contain.
     """
 
     settings: Mapping[str, Any]

@@ -33,7 +33,7 @@ class LobePrediction:
     position : whose modes were used. settings : of the cut, by column of ``runs.csv``.
     table : ``rpm, depth_mm`` with the 95 % band ``depth_lo_mm, depth_hi_mm`` that contains the model's error,
         and ``chatter_hz``.
-    effects, notes : included effects; what is left out.
+    effects, notes : included effects; and those left out.
     samples : (s, k) boundary depths, m, under the uncertainty of modes and coefficients.
     """
 

@@ -84,7 +84,7 @@ def ceiling(problem: Problem, base: Fit) -> JSON | None:
         ``parts`` of the residual's power, by what they are proportional to, ``alone`` being what does not
         repeat; ``share`` of it that is predicted of conditions left out, with ``ci95`` by the conditions;
         ``noise_share`` that noise makes; ``places`` at which it is largest, with their shares; ``held_out``:
-        of each run that verifies, the ``share`` predicted and what is left relative to the signal;
+        of each run that verifies, the ``share`` predicted and the residual relative to the signal;
         ``words``: all that as a statement.
     """
     if not isinstance(problem.base, Overlaid):

@@ -1,4 +1,4 @@
-"""The verdict on an arm by measured poses: what was found, how sure it is, what is left and of which kind.
+"""The verdict on an arm by measured poses: what was found, how sure it is, the residual and its kind.
 
 It is written from what ``identify`` found (block ``pose`` of identified.json) and the errors on poses that
 were left out; nothing is fitted here.

@@ -1,6 +1,6 @@
 """What the flange carries, from logs with and without it, with the uncertainty of the drives in it.
 
-Of two logs of one motion the torques are subtracted: the arm and its friction cancel, and what is left is
+Of two logs of one motion the torques are subtracted: the arm and its friction cancel, and the difference is
 the load's, τ₂ − τ₁ = (1 + ε_j) Y_j π + friction that the load changes. The relative errors ε of the joints'
 drive constants are unknowns with a prior: what the constants share scales mass and moments alike, and no log
 of currents can show it; what they do not share shows in the joints' disagreement on one load.

@@ -11,7 +11,7 @@ import numpy as np
 
 from metro.units import Array
 
-LEVEL = 1e-12  # of cos(ry) squared: nearer to the poles rz and rx cannot be told apart
+LEVEL = 1e-12  # of cos(ry) squared: nearer to the poles rz and rx are not identifiable
 
 
 def matrix_of_quaternion(quaternion: Array) -> Array:

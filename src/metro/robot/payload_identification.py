@@ -27,8 +27,8 @@ class Carried:
     ----------
     mass : kg. centre : (3,) m. inertia : (6,) kg m² about the centre, xx, xy, xz, yy, yz, zz; NaN if the
         torques do not tell them.
-    covariance : (10, 10) of mass, centre and inertia; NaN where inertia is not told.
-    rms : (n,) N m, what is left of the torques of each joint. dof : of the residuals.
+    covariance : (10, 10) of mass, centre and inertia; NaN where inertia is not identifiable.
+    rms : (n,) N m, residual torque of each joint. dof : of the residuals.
     """
 
     mass: float

@@ -82,7 +82,7 @@ def _hits(table: pd.DataFrame) -> Iterator[Finding]:
 
 
 def digest(values: Array) -> str:
-    """Hash of values; "" where they are too few to be told apart."""
+    """Hash of values; "" where they are too few to differ."""
     values = values[np.isfinite(values)]
     if len(np.unique(values[: 64 * LEAST_VALUES])) < LEAST_VALUES:
         return ""

@@ -1,8 +1,8 @@
 """A batch read wholly: every file becomes canonical tables, and what is wrong with any of it is gathered.
 
 ``metro check`` and ingest are this one code. Ingest keeps the tables, the check removes them: so the check
-accepts what ingest accepts, refuses what it refuses, and says what can be computed from what is left after
-recordings that are not fit for use were left out.
+accepts what ingest accepts, refuses what it refuses, and says what can be computed from the files that remain
+after recordings that are not fit for use were left out.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Whole:
     Attributes
     ----------
     batch : as though recordings that are not fit for use had not been made.
-    stock : what is left, to compute from.
+    stock : the files and tables that remain, to compute from.
     sources : SHA-256 by file that the tables were made from.
     findings : what is wrong with the files, or with the data as a whole; an error refuses the batch.
     """
@@ -154,7 +154,7 @@ def read_whole(examined: Examined, place: Path) -> Whole:
 
 
 def _stock(before: Stock, batch: Batch, recordings: Recordings) -> Stock:
-    """Return what is left of what the tables said that there is."""
+    """Return what remains of what the tables list."""
     impacts = before.tables["impacts"]
     impacts = impacts[impacts["file"].isin(recordings.usable)]
     runs = batch.runs.reset_index()

@@ -12,7 +12,7 @@ from metro.units import Array
 CONTRADICTED = 0.025  # probability of a scatter this large or larger, below which a declared one is not taken
 WRONG = 0.05  # probability of the largest residual among all, below which a reading is named
 LEAST_SHARE = 1e-6  # of an error that shows in a residual: a reading with less is in no closed loop
-ALIKE = 0.99  # of the largest residual: readings as far off as that cannot be told apart
+ALIKE = 0.99  # of the largest residual: readings that deviate as much as that cannot be distinguished
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""An arm by measured poses: what was found, what is left and of which kind, what to measure next."""
+"""An arm by measured poses: what was found, the residual and its kind, what to measure next."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from metro.wording.candidates import Sentence
 from metro.wording.names import SURE, chance, listed, pair, plain
 
 BY = {"random": "at random", "region": "by region", "time": "by time"}
-LEAST_PART = 0.05  # of what is left, that is told
+LEAST_PART = 0.05  # of the residual, that is reported
 KINDS = {
     "pose": "a cause that changes with the pose and not with one joint alone, such as a link, a bearing or "
     "a load that yields",

@@ -26,7 +26,7 @@ from metro.units import Array
 # Of the way to the misfit estimated: a larger one lets the elements that are measured best weigh less, and is
 # then estimated smaller, so that whole steps would go to and fro about the point where it stays.
 MISFIT_STEP = 0.5
-# One less the squared cosine of signals² and of one size for all: from there on they are told from one size,
+# One less the squared cosine of signals² and of one size for all: from there on they differ from one size,
 # and what is missed whatever the signal from what grows with it. Signals that scatter by a tenth reach it.
 ONE_SIZE = 0.03
 LARGEST_ZERO = 4.0  # of its deviation: a zero that is farther off is something else that is taken for it
@@ -106,7 +106,7 @@ def _expected(
     Returns
     -------
     (k,) expected squares of the amplitudes of the directions.
-    (n,) what is left of the residual without them, where the misfit is as it is.
+    (n,) the residual without them, where the misfit is as it is.
     (axes, 2, 3) normal equations with their right side for relative misfit² and level².
     """
     known, once, variance = variances
@@ -184,7 +184,7 @@ def _alike(residuals: Sequence[tuple[Block, Array, Array]]) -> float:
 
     Parameters
     ----------
-    residuals : for each run: block, what is left of it (n,), and its variance (n,).
+    residuals : for each run: block, its residual (n,), and the variance of that (n,).
     """
     shared, possible = 0.0, 0.0
     for (one, left, variance), (other, right, its) in combinations(residuals, 2):

@@ -42,7 +42,7 @@ class Noise:
         elements that are measured best. What is missed is a smooth shape, the same in every run: about twelve
         neighbouring elements count as one piece of evidence.
     level : by axis, rms (SI) of what it misses whatever the size of the signal: the waves that gears leave on
-        a wall are as high after a light cut as after a heavy one. Runs with other signals tell it apart.
+        a wall are as high after a light cut as after a heavy one. Runs with other signals separate them.
     """
 
     budget: float

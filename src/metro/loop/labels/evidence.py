@@ -58,7 +58,7 @@ class Labels:
 
     @property
     def speeds(self) -> Array:
-        """(j,) speeds, each once: what is left out as a whole."""
+        """(j,) speeds, each once: tests at one speed are left out together."""
         tested: Array = np.unique(self.rpm[self.point])
         return tested
 

@@ -54,7 +54,7 @@ class LabelEvidence:
     seed: int
 
     def testable(self, log_depth: Array) -> Array:
-        """Return log depths, within the range in which the tests can tell one from another."""
+        """Return log depths, within the range in which the tests can distinguish them."""
         tested = self.tests.depth
         return np.clip(log_depth, tested.min() - _BEYOND, tested.max() + _BEYOND)
 

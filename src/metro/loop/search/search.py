@@ -67,7 +67,7 @@ def _visible(effects: Sequence[Effect], base: Fit) -> tuple[tuple[Effect, ...], 
     corner of a tool looks much like other coefficients, but not quite, and the rest is far above the noise.
 
     Where base parameters are strained far from what is believed of them, an effect that they absorb may be
-    why: a force that is known to 4 % stands in for a tip that is softer by a quarter. Then all are tried.
+    why: a force that is known to 4 % replaces a tip that is softer by a quarter. Then all are tried.
     """
     if _strained(base):
         return tuple(effects), {}

@@ -9,7 +9,7 @@ from metro.loop.search.outcome import Outcome
 from metro.loop.statement import Statement
 from metro.units import JSON
 
-FAR = 3.0  # standard deviations from what is believed, from which it is told
+FAR = 3.0  # standard deviations from what is believed, from which it is reported
 
 
 def beliefs(outcome: Outcome) -> list[JSON]:

@@ -208,7 +208,7 @@ def _face_json(table: pd.DataFrame) -> JSON:
     entry: JSON = {n: quantity(v, u, "um") for n, v, u in zip(names, read, sd, strict=True)}
     ends = table[["low_um", "high_um"]].to_numpy(dtype=float)
     entry["noise_corrected"] = {
-        # The interval under the noise is not symmetric, and begins at zero for a face not told from flat.
+        # The interval under the noise is not symmetric, and begins at zero for a face that may be flat.
         n: quantity(v, u, "um") | ({"ci95": end.tolist()} if np.isfinite(end).all() else {})
         for n, v, u, end in zip(names, corrected, sd, ends, strict=True)
         if n != "percentile_range"

@@ -75,7 +75,7 @@ def left(outside: Array, radius: float, length: float) -> Array:
     """Return what remains of a step of one that comes as the force falls while a cutter leaves the block.
 
     A part of the rim at the angle θ from the direction aside leaves when the axis is R sin θ before the edge:
-    of the force, what is left is the share of the cutter's width that is still cut, 1 − sin θ with
+    of the force, the remainder is the share of the cutter's width that is still cut, 1 − sin θ with
     R (1 − cos θ) the way since the front left. Each part of the step decays over ``length`` (m) to 1/e.
 
     Parameters

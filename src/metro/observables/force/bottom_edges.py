@@ -1,4 +1,4 @@
-"""Whether helical runs tell K_Fac from K_Fae, before any of them is cut: the sensitivity of the design.
+"""Whether helical runs identify both K_Fac and K_Fae, before any of them is cut: the design's sensitivity.
 
 The thrust of the bottom edges is N R (K_Fac s + K_Fae), with s the axial feed per tooth: a line over s. From
 run to run the thrust scatters by a share that hardly depends on s, so the slope of that line has the standard

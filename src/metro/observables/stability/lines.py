@@ -21,7 +21,7 @@ _SAME_LINE = 0.05  # of the step between lines: rates read from time stamps diff
 
 
 def on_common_lines(group: list[Receptance], notes: list[str]) -> list[Receptance]:
-    """Return receptances on the same lines. What is left out is named.
+    """Return receptances on the same lines. Files left out are named.
 
     All are kept on the lines that all have, if these are half of what most pairs have; else most pairs are.
     """
@@ -76,7 +76,7 @@ def clear_lines(
 ) -> np.ndarray:
     """Lines (n,) of FRFs (n, c) that hold more than drift and noise.
 
-    Told by the scatter of repeats where all have some; else by the coherence where all files have it; else
+    By the scatter of repeats where all have some; else by the coherence where all files have it; else
     by the course of the FRFs alone.
     """
     if variance is not None:

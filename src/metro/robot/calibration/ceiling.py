@@ -143,7 +143,7 @@ def _variances(kinds: tuple[_Kind, ...], residuals: Array) -> Array:
     for first in range(0, count, BLOCK):
         some = np.arange(first, min(first + BLOCK, count))
         parts = np.stack([kind.covariance(some, everyone) for kind in kinds])
-        parts[:, np.arange(len(some)), :, some] = 0.0  # a pose with itself is told by what does not repeat
+        parts[:, np.arange(len(some)), :, some] = 0.0  # a pose with itself is the part that does not repeat
         flat = parts.reshape(len(kinds), -1)
         normal += flat @ flat.T
         right += flat @ np.einsum("ai,bj->aibj", residuals[some], residuals).ravel()

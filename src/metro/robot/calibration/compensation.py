@@ -1,4 +1,4 @@
-"""Corrected joint targets: where the joints have to go for the arm to reach what it was told, and how near.
+"""Corrected joint targets: where the joints have to go for the arm to reach its targets, and how near.
 
 A target is where the nominal arm, on its best base and with its best tool, has the point at the commanded
 joints, and how it has the flange turned there. The corrected joints are those at which the calibrated arm has

@@ -42,7 +42,7 @@ class HeldOut:
 
 
 def held_out(poses: Poses, fits: Fitting) -> tuple[HeldOut, ...]:
-    """Fit to what is left and predict what was left out, for each way of leaving out.
+    """Fit to the poses that are kept and predict those left out, for each way of leaving out.
 
     ``fits``: all that is fitted, the choice of effects included, from the poses that it is given.
     """

@@ -4,7 +4,7 @@ The model is linear about the fitted geometry (corrections of some 10⁻³ leave
 region is its information matrix and gradient, and leaving one out is a subtraction. An effect is added where
 the squared residual of left-out regions falls: by more than chance over the regions, and by more than
 :data:`MATERIAL` of it. First those effects that have a shape, then curves, which could take
-the place of any; then all once more, in what is left; at last those with a shape must still earn their place.
+the place of any; then all once more, in the residual; at last those with a shape must still earn their place.
 """
 
 from __future__ import annotations
