@@ -21,8 +21,9 @@ def apply(model: ForceModel, values: Values) -> ForceModel:
 
 
 def _channel(number: int) -> tuple[EffectParameter, EffectParameter]:
-    # Nothing is damped by less than next to nothing, and beyond the upper bound nothing resonates.
-    damping = EffectParameter("damping", "1", 0.002, 0.7, 0.01, starts=(0.04,), group=number, neutral=0.04)
+    # Nothing is damped by less than next to nothing. A resonance that is damped by more than the upper bound
+    # magnifies by less than 2.5: what rolls off without magnifying is a filter, not a sensor that rings.
+    damping = EffectParameter("damping", "1", 0.002, 0.2, 0.01, starts=(0.04,), group=number, neutral=0.04)
     return (
         EffectParameter(
             "frequency_hz", "Hz", LOWEST, RIGID, 30.0, starts=STARTS, group=number, neutral=RIGID
