@@ -1,7 +1,8 @@
 """The force effects in the data of an independent simulator: found where they are, and nowhere else.
 
 Of tool_wear, chip_size_effect, entry_exit_force, pitch_error, orbit_stiffness, charge_drift, charge_leak,
-dynamometer_resonance, dynamometer_rotation and dynamometer_crosstalk; from metro.effects by their names.
+amplifier_filter, dynamometer_resonance, dynamometer_rotation and dynamometer_crosstalk; from metro.effects by
+their names.
 """
 
 import math
@@ -37,12 +38,13 @@ HIDDEN = {
     "pitch_error": None,
     "orbit_stiffness": {"amplitude": 0.12, "phase_deg": 100.0},
     "charge_drift": {"slope_n_s": [8.0, -6.0, 5.0]},
+    "amplifier_filter": {"corner_hz": 700.0, "order": 1},
     "dynamometer_resonance": {"frequency_hz": [900.0, 1100.0, 1400.0], "damping": [0.04, 0.05, 0.03]},
 }
 
 
 # Each of these is searched for a minute or more; the others show the same of tool, work and instrument.
-LONG = {"chip_size_effect", "entry_exit_force", "charge_drift", "pitch_error"}
+LONG = {"amplifier_filter", "chip_size_effect", "entry_exit_force", "charge_drift", "pitch_error"}
 NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in sorted(HIDDEN)]
 
 

@@ -1,4 +1,4 @@
-"""Amplifier filter: a low-pass filter between sensor and file that nobody wrote down."""
+"""Amplifier filter: a low-pass filter that is not declared weakens and delays what changes fast."""
 
 from __future__ import annotations
 
