@@ -53,6 +53,7 @@ RIGHT: Mapping[str, Right] = {
     "chipped_tooth": Right(frozenset({"tooth"}), r"tooth_\d"),
     "hard_spot": Right(frozenset({"path", "time"}), r"(shear|tangential)_force_by_time_step"),
     "speed_dependence": Right(frozenset({"speed"}), r"shear_force_by_speed"),
+    "lagging_channel": Right(frozenset({"frequency"}), r"lag_of_first_order"),
     "second_orbit_stiffness": Right(frozenset({"orbit"}), ""),
     "slow_growth": Right(frozenset({"travel"}), r"depth_by_travel(_saturating)?"),
     "tilted_surface": Right(frozenset({"path", "time"}), r"depth_by_path"),

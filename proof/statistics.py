@@ -28,10 +28,7 @@ class Demand:
 
 @dataclass(frozen=True)
 class Figure:
-    """A share (of ``count`` cases) or a median, its 95 % interval, and what is demanded of it.
-
-    ``exact``: of a share, the interval of Clopper and Pearson, which holds however few the cases are.
-    """
+    """A share (of ``count`` cases) or a median, its 95 % interval, and what is demanded of it."""
 
     label: str
     value: float
@@ -40,7 +37,6 @@ class Figure:
     count: int
     demand: Demand | None = None
     unit: str = "%"
-    exact: tuple[float, float] | None = None
 
     @property
     def met(self) -> bool | None:
@@ -49,33 +45,23 @@ class Figure:
 
     @property
     def missed_for_sure(self) -> bool:
-        """Whether the demand is missed by more than chance: nothing in the interval keeps it.
-
-        Of a share it is the exact one: Wilson's interval leaves out 0.85 after one miss in one case, which
-        happens by chance in 15 of 100.
-        """
-        low, high = self.exact or (self.low, self.high)
-        return self.demand is not None and self.count > 0 and not self.demand.met(low, high)
+        """Whether the demand is missed by more than chance: nothing in the interval keeps it."""
+        return self.demand is not None and self.count > 0 and not self.demand.met(self.low, self.high)
 
 
 def share(label: str, cases: Sequence[bool], demand: Demand | None = None) -> Figure:
     """Share of the cases that are true, with its Wilson interval."""
-    hits, count = sum(cases), len(cases)
-    value, exact = hits / count if cases else math.nan, _interval(hits, count, "beta")
-    return Figure(label, value, *wilson(hits, count), count, demand, exact=exact)
+    low, high = wilson(sum(cases), len(cases))
+    return Figure(label, sum(cases) / len(cases) if cases else math.nan, low, high, len(cases), demand)
 
 
 def wilson(hits: int, count: int) -> tuple[float, float]:
     """95 % interval of a binomial share (Wilson, J. Am. Stat. Assoc. 22 (1927) 209)."""
-    return _interval(hits, count, "wilson")
-
-
-def _interval(hits: int, count: int, method: str) -> tuple[float, float]:
     if count == 0:
         return 0.0, 1.0
     from statsmodels.stats.proportion import proportion_confint
 
-    low, high = proportion_confint(hits, count, method=method)
+    low, high = proportion_confint(hits, count, method="wilson")
     # at 0 and 1 an end is the share itself, which rounding must not undo
     return min(float(low), hits / count), max(float(high), hits / count)
 

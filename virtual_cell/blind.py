@@ -19,6 +19,8 @@ from virtual_cell.world.faces.causes import FACE_CAUSES
 from virtual_cell.write import Row
 
 HARDER = ("c", "d")  # styles of the harder world
+# The draws of styles a and b stay as they are when another effect can be simulated; style c draws it.
+DRAWN = tuple(name for name in EFFECTS if name != "amplifier_filter")
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ def _named(effects: Mapping[str, Parametrised], names: Iterable[str] = ()) -> di
 
 
 RECIPES = {
-    "force": Recipe(force.make, _named(EFFECTS), _named(force_world.HARDER)),
+    "force": Recipe(force.make, _named(EFFECTS, DRAWN), _named(force_world.HARDER)),
     **{
         observable: Recipe(
             partial(arm.make, about=observable),

@@ -28,7 +28,7 @@ class Dynamometer:
     noise, offset : standard deviations of the noise and of the zero of a run, N. capacity, step : range,
         resolution, N.
     resonance : per axis (Hz, damping) or None. slope : drift per axis, N/s. time_constant : s, or None: no
-        discharge. lag : time constant of the amplifier, s.
+        discharge. lag : (3,) time constant of the amplifier on each axis, s.
     """
 
     rate: float
@@ -42,7 +42,7 @@ class Dynamometer:
     resonance: tuple[tuple[float, float] | None, ...] = (None, None, None)
     slope: tuple[float, float, float] = (0.0, 0.0, 0.0)
     time_constant: tuple[float, float, float] | None = None
-    lag: float = 0.0
+    lag: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def rows(self) -> Array:
@@ -80,8 +80,8 @@ def _axis(sensor: Dynamometer, axis: int, load: Array, fine: float) -> Array:
     if sensor.time_constant is not None:
         tau = sensor.time_constant[axis]
         load = _through(([tau, 0.0], [tau, 1.0]), load, fine)
-    if sensor.lag > 0.0:
-        load = _through(([1.0], [sensor.lag, 1.0]), load, fine)
+    if sensor.lag[axis] > 0.0:
+        load = _through(([1.0], [sensor.lag[axis], 1.0]), load, fine)
     slow: Array = signal.resample_poly(load, 1, _OVERSAMPLE, padtype="line")
     return slow
 

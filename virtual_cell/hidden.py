@@ -15,7 +15,7 @@ import numpy as np
 from virtual_cell.flexible import Machine
 from virtual_cell.modes import Modes
 from virtual_cell.session import Session
-from virtual_cell.units import DEG, MM, N_MM, N_UM, UM
+from virtual_cell.units import DEG, MM, MS, N_MM, N_UM, UM
 
 Parameters = dict[str, Any]
 JOINT = "joint=1|2|3|4|5|6"
@@ -95,6 +95,12 @@ def _warm(session: Session, p: Parameters) -> Session:
     return replace(session, growth=p["growth_um"] * UM)
 
 
+def _lagging(session: Session, p: Parameters) -> Session:
+    lag = [0.0, 0.0, 0.0]
+    lag[p["axis"]] = p["time_constant_ms"] * MS
+    return _sensor(session, lag=(lag[0], lag[1], lag[2]))
+
+
 def _speed(session: Session, p: Parameters) -> Session:
     return replace(session, speed_exponent=p["exponent"])
 
@@ -151,7 +157,7 @@ EFFECTS: Mapping[str, Hidden[Session]] = {
     "amplifier_filter": Hidden(
         "corner_hz order",
         lambda r, _: {"corner_hz": drawn_size(r, 320.0, 5000.0), "order": 1},
-        lambda s, p: _sensor(s, lag=1.0 / (2.0 * np.pi * p["corner_hz"])),
+        lambda s, p: _sensor(s, lag=(1.0 / (2.0 * np.pi * p["corner_hz"]),) * 3),
     ),
     # outside of any library
     "chipped_tooth": Hidden(
@@ -168,6 +174,11 @@ EFFECTS: Mapping[str, Hidden[Session]] = {
         lambda s, p: replace(s, hard_spot=p["ktc_step"], hard_from=p["from_share"]),
     ),
     "speed_dependence": Hidden("exponent", lambda r, _: {"exponent": drawn_size(r, 0.05, 0.3)}, _speed),
+    "lagging_channel": Hidden(
+        "axis time_constant_ms",
+        lambda r, _: {"axis": int(r.integers(3)), "time_constant_ms": drawn_size(r, 0.03, 0.5)},
+        _lagging,
+    ),
     "second_orbit_stiffness": Hidden(
         "amplitude phase_deg",
         lambda r, _: {"amplitude": drawn_size(r, 0.03, 0.25), "phase_deg": drawn_angle(r)},

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
 
 from proof.statistics import Demand, binned, brier, median, share, wilson
 
@@ -45,18 +44,6 @@ def test_a_demand_is_missed_by_the_value_and_for_sure_by_the_interval():
     assert share("", [True] * 35 + [False] * 15, Demand(0.95)).missed_for_sure
     assert share("", [True] * 50, Demand(0.90, 0.98)).met is False
     assert share("", [], Demand(0.95)).met is None
-
-
-@pytest.mark.parametrize(("cases", "sure"), [([False], False), ([False, False], True)])
-def test_one_miss_in_one_case_may_be_chance_and_two_in_two_are_not(cases, sure):
-    # 0.15 and 0.15² of all times, where 2.5 % are the limit
-    assert share("", cases, Demand(0.85)).missed_for_sure is sure
-
-
-def test_the_exact_interval_is_that_of_the_binomial_distribution():
-    low, high = share("", [True] * 3 + [False] * 7).exact
-    assert stats.binom.sf(2, 10, low) == pytest.approx(0.025)
-    assert stats.binom.cdf(3, 10, high) == pytest.approx(0.025)
 
 
 def test_bins_hold_every_statement_once_and_brier_is_the_mean_square():

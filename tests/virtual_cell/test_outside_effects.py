@@ -44,8 +44,8 @@ def turns(force, per_turn=81.92):
     return np.array([force[a:b].mean(axis=0) for a, b in itertools.pairwise(edges)])
 
 
-def test_a_lag_passes_a_sine_as_a_first_order_low_pass():
-    sensor = Dynamometer(10000.0, "tool", np.eye(3), lag=0.3 * MS, **QUIET)
+def test_a_channel_that_lags_passes_a_sine_as_a_first_order_low_pass_and_the_others_pass_all_of_it():
+    sensor = Dynamometer(10000.0, "tool", np.eye(3), lag=(0.3 * MS, 0.0, 0.0), **QUIET)
     _, read = record(
         sensor,
         lambda t: np.sin(2 * np.pi * 400.0 * t)[:, None] * np.ones(3),
@@ -53,7 +53,8 @@ def test_a_lag_passes_a_sine_as_a_first_order_low_pass():
         np.random.default_rng(0),
     )
     expected = 1.0 / np.hypot(1.0, 2 * np.pi * 400.0 * 0.3 * MS)
-    assert np.sqrt(2.0) * np.std(read[500:1500, 0]) == pytest.approx(expected, rel=0.01)
+    size = np.sqrt(2.0) * np.std(read[500:1500], axis=0)
+    assert size == pytest.approx([expected, 1.0, 1.0], rel=0.01)
 
 
 def test_a_tilted_surface_makes_the_mean_force_grow_with_the_depth_along_the_feed(tmp_path):
