@@ -1,4 +1,5 @@
 import pytest
+import yaml
 from conftest import edit
 
 from metro.batch.check import check
@@ -108,3 +109,37 @@ def test_a_run_whose_settings_are_blank_is_not_counted_and_the_others_are(batch)
     force = answers(batch)["force"]
     assert force.source.startswith("3 runs with a dynamometer file")
     assert "spindle_rpm in 1 of 4 of these runs" in force.missing
+
+
+def faulty(content, path=()):
+    """Every document that differs from one in the type of a single value, with the place of the value."""
+    for key, value in content.items():
+        for other in ("four", [4], {"a": "b"}, 4, None, True):
+            if type(other) is not type(value):
+                yield (*path, key), {**content, key: other}
+        if isinstance(value, dict):
+            for place, inner in faulty(value, (*path, key)):
+                yield place, {**content, key: inner}
+
+
+@pytest.mark.parametrize("name", ["batch.yaml", "cell.yaml"])
+def test_a_value_of_a_wrong_type_is_named_or_missing_and_stops_no_check(armed, name):
+    edit(armed / "batch.yaml", "tool_in_flange_mm", "hole_diameter_mm: 16\ntool_in_flange_mm")
+    orbit = (armed / "runs.csv").read_text().replace(",slot,6000", ",helical,6000").replace("\nr", "\n90,r")
+    (armed / "runs.csv").write_text(f"orbit_rpm,{orbit}")
+    content = yaml.safe_load((armed / name).read_text())
+    assert check(armed, armed, able=capabilities).ok
+    refused = 0
+    for place, wrong in faulty(content):
+        (armed / name).write_text(yaml.safe_dump(wrong))
+        report = check(armed, armed, able=capabilities)
+        named = any(place[0] in finding.column.split(".") for finding in report.problems)
+        refused += named and not report.ok
+    assert refused > len(content)
+
+
+def test_what_an_entry_that_is_refused_is_needed_for_cannot_be_computed(batch):
+    edit(batch / "batch.yaml", "teeth: 4", "teeth: four")
+    can = {each.name: each for each in check(batch, batch, able=capabilities).capabilities}
+    assert can["force"].source == ""
+    assert can["force"].missing == ("tool.teeth in batch.yaml",)

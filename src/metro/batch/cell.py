@@ -9,8 +9,8 @@ import numpy as np
 
 from metro.batch.arm import counts, with_joints
 from metro.batch.documents import Likeness, read_yaml, schema_findings
-from metro.batch.entries import UNKNOWN
-from metro.batch.findings import Finding, Severity, linked_outside, misspelt
+from metro.batch.entries import UNKNOWN, without_entries
+from metro.batch.findings import Finding, Severity, errors, linked_outside, misspelt
 from metro.units import JSON
 
 FILE = "cell.yaml"
@@ -45,7 +45,7 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
 
     Returns
     -------
-    cell : the description; ``{"cell": name}`` for a machine of which nothing is known.
+    cell : the description without what an error refuses; ``{"cell": name}`` for a machine of which nothing is known.
     source : the file that it comes from; None where nothing is known.
     findings : what is wrong, missing or assumed.
     """
@@ -80,11 +80,10 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
     if isinstance(stations, str) and (Path(stations).is_absolute() or ".." in Path(stations).parts):
         message = f'found "{stations}", expected a table beside {source.name}'
         findings.append(Finding("error", file, message, column="stations"))
-        content = {key: value for key, value in content.items() if key != "stations"}
     if content.get("joint_stiffness_nm_rad") and not content.get("arm"):
         message = "is of no use without arm.dh or arm.urdf, which says where the joints are"
         findings.append(Finding("warning", file, message, column="joint_stiffness_nm_rad"))
-    return content, source, findings
+    return without_entries(content, (finding.column for finding in errors(findings))), source, findings
 
 
 def _bodies(arm: JSON, file: str) -> Iterator[Finding]:

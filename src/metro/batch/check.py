@@ -165,7 +165,7 @@ def examine(folder: Path, cells: Path, holdout: JSON) -> Examined:
     findings += file_findings(folder, tables["runs"], tables["impacts"], sound.get(SECTION) or {})
     findings += [*tables_agree(cell, tables), *effects_agree(cell, sound.get("known") or {}, FILE)]
     runs = filled(tables["runs"].frame, sound)
-    findings += [*design_findings(runs, tables["runs"].file), *_about_the_whole(manifest, tables, runs)]
+    findings += [*design_findings(runs, tables["runs"].file), *_about_the_whole(sound, tables, runs)]
     roles = plan(runs, holdout["share"], holdout["seed"])
     given = {run: role for role in ("identify", "validate") for run in roles[role]}
     runs["role"] = pd.Series([given.get(run, "") for run in runs["run"]], runs.index, dtype=str)

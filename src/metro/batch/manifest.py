@@ -10,8 +10,8 @@ import numpy as np
 
 from metro.batch.axes import AXES, signed_axes
 from metro.batch.documents import Likeness, read_yaml, schema_findings
-from metro.batch.entries import FILE, entry
-from metro.batch.findings import Finding, Severity, linked_outside, shown
+from metro.batch.entries import FILE, entry, without_entries
+from metro.batch.findings import Finding, Severity, errors, linked_outside, shown
 from metro.batch.known import known_findings
 from metro.batch.planned import NUMBERS
 from metro.batch.sources import mapping_findings
@@ -24,7 +24,7 @@ ORTHONORMAL = 1e-3  # printed direction cosines are rounded
 
 
 def read_manifest(folder: Path) -> tuple[JSON, list[Finding]]:
-    """Read and validate ``batch.yaml`` as written (no defaults); what is wrong comes with it.
+    """Read and validate ``batch.yaml`` (no defaults); what is wrong comes with it, and is left out.
 
     Parameters
     ----------
@@ -44,7 +44,8 @@ def read_manifest(folder: Path) -> tuple[JSON, list[Finding]]:
     for section, check in SECTIONS.items():
         if section in content and not any(_overlap(section, column) for column in faulty):
             findings += check(content[section])
-    return content, [*findings, *_overdue(content), *_about_the_folder(content, folder)]
+    sound = without_entries(content, (finding.column for finding in errors(findings)))
+    return sound, [*findings, *_overdue(sound), *_about_the_folder(content, folder)]
 
 
 def with_defaults(manifest: JSON) -> JSON:
