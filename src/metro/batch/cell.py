@@ -45,7 +45,8 @@ def read_cell(folder: Path, cells: Path, name: str) -> tuple[JSON, Path | None, 
 
     Returns
     -------
-    cell : the description without what an error refuses; ``{"cell": name}`` for a machine of which nothing is known.
+    cell : the description without what an error refuses; ``{"cell": name}`` for a machine of which nothing
+        is known.
     source : the file that it comes from; None where nothing is known.
     findings : what is wrong, missing or assumed.
     """

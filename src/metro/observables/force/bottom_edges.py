@@ -42,7 +42,7 @@ def advice(axial_feeds: Sequence[float]) -> str:
     if not axial_feeds or told_apart(axial_feeds):
         return ""
     wide, count = spread(axial_feeds), max(LEAST_RUNS, len(axial_feeds))
-    apart = max(axial_feeds) - min(axial_feeds)
+    apart = round(PER_UM * (max(axial_feeds) - min(axial_feeds)), 3)  # no feed is known to a nanometre
     beforehand = f"± {WIDE * MAY_BE / PER_MM:.2g} times K_Fae per mm"
     if wide * MAY_BE > SCATTER:
         now = f"give it ± {_two_digits(WIDE * SCATTER / wide / PER_MM)} (beforehand: {beforehand})"
@@ -50,8 +50,8 @@ def advice(axial_feeds: Sequence[float]) -> str:
         now = f"tell no more of it than is known beforehand ({beforehand})"
     return (
         f"axial feeds at least {PER_UM * needed(count):.2g} µm per tooth apart, in {count} runs; those of "
-        f"the helical runs are {PER_UM * apart:.2g} µm apart and {now}. A steeper helix or a narrower hole has "
-        "larger ones"
+        f"the helical runs are {_two_digits(apart)} µm apart and {now}. A steeper helix or a narrower hole "
+        "has larger ones"
     )
 
 
