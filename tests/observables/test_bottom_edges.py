@@ -32,12 +32,12 @@ def test_two_feeds_as_far_apart_as_is_said_tell_it_and_nearer_ones_do_not():
 
 
 def test_what_is_lacking_is_said_with_the_feeds_that_would_do():
-    assert "0.18 µm apart and tell no more of it than is known beforehand" in advice(PUBLISHED)
+    assert "0.18 µm apart and do not determine it better than is known beforehand" in advice(PUBLISHED)
     assert "at least 4.8 µm" in advice(PUBLISHED)
     nearly = [0.7 * feed for feed in (0.0, 0.0, needed(4), needed(4))]
     assert "give it ± 5.9 (beforehand: ± 8.2 times K_Fae per mm)" in advice(nearly)
     rounded = [PUBLISHED[0], PUBLISHED[0] * (1.0 + 1e-15)]  # a difference of rounding is none
-    assert "0 µm apart and tell no more" in advice(rounded)
+    assert "0 µm apart and do not determine it" in advice(rounded)
     assert advice(STEEP) == advice([]) == ""
 
 

@@ -47,7 +47,7 @@ def advice(axial_feeds: Sequence[float]) -> str:
     if wide * MAY_BE > SCATTER:
         now = f"give it ± {_two_digits(WIDE * SCATTER / wide / PER_MM)} (beforehand: {beforehand})"
     else:
-        now = f"tell no more of it than is known beforehand ({beforehand})"
+        now = f"do not determine it better than is known beforehand ({beforehand})"
     return (
         f"axial feeds at least {PER_UM * needed(count):.2g} µm per tooth apart, in {count} runs; those of "
         f"the helical runs are {_two_digits(apart)} µm apart and {now}. A steeper helix or a narrower hole "
