@@ -44,7 +44,7 @@ def test_it_reaches_from_a_flat_end_to_a_ball():
     effect = tool_end.adapt(tool_end.EFFECT, problem([1e-3, 2e-3]))
     (corner,) = effect.parameters
     assert (corner.lower, corner.upper) == (0.0, pytest.approx(5.0))
-    assert corner.all_there_is
+    assert corner.nothing_above
     assert effect.apply(MODEL, {"corner_radius_mm": 0.0}).cutter == MODEL.cutter
     assert effect.apply(MODEL, {"corner_radius_mm": 5.0}).cutter.corner == R
     assert effect.apply(MODEL, {"corner_radius_mm": 9.0}).cutter.corner == R

@@ -126,7 +126,8 @@ def _parameter(one: EffectParameter, value: float) -> str:
     short = float(f"{value:.4g}")
     starts = (short, -short) if one.lower == -one.upper and short else (short,)
     neutral = f", neutral={one.neutral!r}" if one.neutral else ""
-    bound = ", all_there_is=True" if one.all_there_is else ""
+    limits = [name for name in ("nothing_below", "nothing_above") if getattr(one, name)]
+    bound = "".join(f", {name}=True" for name in limits)
     return (
         f'EffectParameter("{one.name}", "{one.unit}", {_short(one.lower)}, {_short(one.upper)}, '
         f"{_short(one.scale)}, starts={starts!r}{neutral}{bound})"

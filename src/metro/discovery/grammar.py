@@ -261,7 +261,15 @@ def _bend(axis: str, sign: float, preload: float) -> Entry:
     side, of = ("positive", f"F_{axis}") if sign > 0 else ("negative", f"−F_{axis}")
     most = max(4.0 * preload, 100.0)
     inner = EffectParameter(
-        "preload_n", "N", 0.0, most, 0.05 * most, starts=(preload,), neutral=preload, all_there_is=True
+        "preload_n",
+        "N",
+        0.0,
+        most,
+        0.05 * most,
+        starts=(preload,),
+        neutral=preload,
+        nothing_below=True,
+        nothing_above=True,
     )
     plan = Blueprint.of(Bend, axis=axis, sign=sign, preload=Given("preload_n"), share=Given("share"))
     return Entry(

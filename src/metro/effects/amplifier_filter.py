@@ -65,7 +65,17 @@ EFFECT = Effect(
     observables=("force",),
     parameters=(
         EffectParameter("corner_hz", "Hz", LOWEST, OPEN, 30.0, starts=STARTS, neutral=OPEN),
-        EffectParameter("order", "1", 1.0, 8.0, 0.3, starts=(2.0, 5.0), neutral=2.0, all_there_is=True),
+        EffectParameter(
+            "order",
+            "1",
+            1.0,
+            8.0,
+            0.3,
+            starts=(2.0, 5.0),
+            neutral=2.0,
+            nothing_below=True,
+            nothing_above=True,
+        ),
     ),
     apply=apply,
     belongs_to=("instrument",),

@@ -28,7 +28,7 @@ def _channel(number: int) -> tuple[EffectParameter, EffectParameter]:
         EffectParameter(
             "frequency_hz", "Hz", LOWEST, RIGID, 30.0, starts=STARTS, group=number, neutral=RIGID
         ),
-        replace(damping, all_there_is=True),
+        replace(damping, nothing_below=True),
     )
 
 

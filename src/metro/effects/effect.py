@@ -38,8 +38,8 @@ class EffectParameter:
         those of later groups ``neutral`` meanwhile.
     neutral : value at which the parameter's group changes nothing.
     choices : what the values 0, 1, … stand for, where the parameter is a choice among these.
-    all_there_is : whether nothing can be beyond the bounds: no tool is rounder than a ball. A value at such a
-        bound may be true, at any other the true one would be beyond it.
+    nothing_below, nothing_above : whether nothing can be beyond the lower, the upper bound: no tool is
+        rounder than a ball. A value at such a bound may be true, at any other the true one would be beyond it.
     optional : whether those who declare the effect may leave it out; it is ``neutral`` then.
     local : whether it is another quantity in each observable (an amplitude along another axis): where one
         cause shows in several, the others are shared.
@@ -58,7 +58,8 @@ class EffectParameter:
     neutral: float = 0.0
     choices: tuple[str, ...] = ()
     local: bool = False
-    all_there_is: bool = False
+    nothing_below: bool = False
+    nothing_above: bool = False
     optional: bool = False
 
 

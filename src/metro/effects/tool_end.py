@@ -48,7 +48,7 @@ EFFECT = Effect(
     name="tool_end",
     observables=("force",),
     parameters=(
-        EffectParameter("corner_radius_mm", "mm", 0.0, 100.0, 0.5, starts=(1.0, 5.0), all_there_is=True),
+        EffectParameter("corner_radius_mm", "mm", 0.0, 100.0, 0.5, starts=(1.0, 5.0), nothing_above=True),
     ),
     apply=apply,
     belongs_to=("tool",),

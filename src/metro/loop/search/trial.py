@@ -246,8 +246,9 @@ def _undetermined(effect: Effect, value: Array, half: Array, pressed: np.ndarray
             identified = 2.0 * width < parameter.period
         else:
             identified = at - width > parameter.lower or at + width < parameter.upper
-            outermost = set() if parameter.all_there_is else {parameter.lower, parameter.upper}
-            if identified and out and at in outermost - {parameter.neutral}:
+            below = at == parameter.lower and not parameter.nothing_below
+            above = at == parameter.upper and not parameter.nothing_above
+            if identified and out and (below or above) and at != parameter.neutral:
                 return Statement("implausible", {"parameter": parameter.name, "bound": at})
         settled = settled or identified
     return None if settled else Statement("undetermined")
