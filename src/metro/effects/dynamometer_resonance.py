@@ -22,13 +22,15 @@ def apply(model: ForceModel, values: Values) -> ForceModel:
 
 def _channel(number: int) -> tuple[EffectParameter, EffectParameter]:
     # Nothing is damped by less than next to nothing. A resonance that is damped by more than the upper bound
-    # magnifies by less than 2.5: what rolls off without magnifying is a filter, not a sensor that rings.
+    # magnifies by less than 2.5: what rolls off without magnifying is a filter, not a sensor that rings. Far
+    # below its frequency a resonance magnifies and delays a little, as much else does: only where its damping
+    # is determined do the records reach so far that they show it.
     damping = EffectParameter("damping", "1", 0.002, 0.2, 0.01, starts=(0.04,), group=number, neutral=0.04)
     return (
         EffectParameter(
             "frequency_hz", "Hz", LOWEST, RIGID, 30.0, starts=STARTS, group=number, neutral=RIGID
         ),
-        replace(damping, nothing_below=True),
+        replace(damping, nothing_below=True, decisive=True),
     )
 
 

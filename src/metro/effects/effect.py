@@ -39,7 +39,8 @@ class EffectParameter:
     neutral : value at which the parameter's group changes nothing.
     choices : what the values 0, 1, … stand for, where the parameter is a choice among these.
     nothing_below, nothing_above : whether nothing can be beyond the lower, the upper bound: no tool is
-        rounder than a ball. A value at such a bound may be true, at any other the true one would be beyond it.
+        rounder than a ball. A value at such a bound may be true, at any other the true value is beyond it.
+    decisive : whether its group is not shown where it is not determined: what has no damping does not ring.
     optional : whether those who declare the effect may leave it out; it is ``neutral`` then.
     local : whether it is another quantity in each observable (an amplitude along another axis): where one
         cause shows in several, the others are shared.
@@ -60,6 +61,7 @@ class EffectParameter:
     local: bool = False
     nothing_below: bool = False
     nothing_above: bool = False
+    decisive: bool = False
     optional: bool = False
 
 

@@ -232,13 +232,15 @@ def _undetermined(effect: Effect, value: Array, half: Array, pressed: np.ndarray
     """Return why the parameters of an effect are no result; None where they are one.
 
     The interval of each is as wide as its bounds, or an identified one is at a bound that the runs place it
-    beyond: freed, its interval would not hold the bound. One that would is an estimate like any other.
+    beyond: freed, its interval would not hold the bound. One that would is an estimate like any other. A
+    group of parameters counts where those that are decisive for it are determined.
 
     Parameters
     ----------
     value, half : (k,) estimates and half of their intervals. pressed : (k,) which are beyond a bound.
     """
-    settled = False
+    settled: set[int] = set()
+    open_ended: set[int] = set()
     for parameter, at, width, out in zip(
         effect.parameters, value.tolist(), half.tolist(), pressed.tolist(), strict=True
     ):
@@ -250,8 +252,11 @@ def _undetermined(effect: Effect, value: Array, half: Array, pressed: np.ndarray
             above = at == parameter.upper and not parameter.nothing_above
             if identified and out and (below or above) and at != parameter.neutral:
                 return Statement("implausible", {"parameter": parameter.name, "bound": at})
-        settled = settled or identified
-    return None if settled else Statement("undetermined")
+        if identified:
+            settled.add(parameter.group)
+        elif parameter.decisive:
+            open_ended.add(parameter.group)
+    return None if settled - open_ended else Statement("undetermined")
 
 
 def beyond(fitted: Fit, blocks: Sequence[Block]) -> Statement | None:
