@@ -92,6 +92,27 @@ def test_a_bound_that_a_freed_parameter_would_not_leave_by_much_refuses_no_effec
     assert (unsettled(found) is None) is settled
 
 
+@pytest.mark.parametrize(("limit", "refused"), [("nothing_above", False), ("nothing_below", True)])
+def test_a_bound_refuses_an_effect_unless_it_is_the_one_that_is_a_physical_limit(limit, refused):
+    low = [replace(p, upper=0.05, starts=(0.01,), **{limit: True}) for p in BEND.parameters]
+    found = fitted(problem(3, truth=Wave(bend=0.2), phased=False), replace(BEND, parameters=tuple(low)))
+    assert found.theta == pytest.approx([0.05])
+    assert (unsettled(found) is not None) is refused
+
+
+@pytest.mark.parametrize("decisive", [False, True])
+@pytest.mark.parametrize("group", [0, 1])
+def test_a_group_whose_decisive_parameter_is_open_does_not_show_the_effect(group, decisive):
+    found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
+    half = 2.0 * float(np.sqrt(found.covariance[-1, -1] * found.dispersion))
+    (bend,) = BEND.parameters
+    ends = {"lower": found.theta[0] - 0.9 * half, "upper": found.theta[0] + 0.9 * half}
+    vague = replace(bend, name="vague", group=1, decisive=decisive, **ends)
+    both = replace(BEND, parameters=(replace(bend, group=group), vague))
+    why = trial._undetermined(both, np.repeat(found.theta, 2), np.full(2, half), np.zeros(2, dtype=bool))
+    assert (why is None) is (group == 0 or not decisive)
+
+
 def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):
     task = problem(1, truth=Wave(bend=0.1), phased=False)
     base = fitted(task)
