@@ -50,13 +50,22 @@ def test_every_line_of_the_tutorial_works_and_finds_what_was_hidden(tmp_path):
         shown = [radius["value"], np.diff(radius["ci95"])[0] / 2, angle["value"] % 90]
         numbers = [float(value) for value in values]
         assert [*numbers[:2], numbers[2] % 90] == pytest.approx(shown, rel=0.02)
+    errors = re.findall(r"falls from\s+([\d.]+)[^(]*(?:\([^)]*\) N)? to ([\d.]+) ", page)
+    for batch, printed in zip(("first-cuts", "my-slots"), errors, strict=True):
+        force = force_of(lab, batch)
+        found = [force[when]["rms"] for when in ("before", "after")]
+        assert [float(value) for value in printed] == pytest.approx(found, rel=0.05)
     document = pypdfium2.PdfDocument(lab / "reports/first-cuts/report.pdf")
     assert "tool runout" in document[0].get_textpage().get_text_range()
     assert [path.name for path in tmp_path.iterdir()] == ["lab"]
 
 
+def force_of(lab, batch):
+    return json.loads((lab / f"reports/{batch}/verdict.json").read_text())["observables"]["force"]
+
+
 def runout_of(lab, batch):
-    verdict = json.loads((lab / f"reports/{batch}/verdict.json").read_text())["observables"]["force"]
+    verdict = force_of(lab, batch)
     assert verdict["status"] == "explained"
     (runout,) = verdict["effects"]
     assert runout["effect"] == "tool_runout"
