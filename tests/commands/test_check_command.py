@@ -33,7 +33,10 @@ def test_what_is_no_batch_does_not_hinder_the_check_of_the_others(check):
     Path("data/raw/notes").mkdir()
     result = check("data/raw/notes", "data/raw/sound")
     assert result.exit_code == 2
-    assert result.stderr == "data/raw/notes: holds no batch.yaml: not the folder of a batch\n"
+    assert result.stderr == (
+        "data/raw/notes: holds no batch.yaml: not the folder of a batch; "
+        "metro import FILES makes one of a lab's files\n"
+    )
     assert "the batch can be run" in result.stdout
     assert [one["batch"] for one in json.loads(check("data/raw/notes", "sound", "--json").stdout)] == [
         "data/raw/sound"

@@ -58,7 +58,10 @@ def test_raw_batches_are_in_the_folders_that_the_settings_name(own_campaign):
             'is a file, expected the folder of a batch (did you mean "data/raw/late"?)',
         ),
         ("data/raw/late/force/r1.csv", "r1.csv: is a file, expected the folder of a batch"),
-        ("data/raw/late/force", "force: holds no batch.yaml: not the folder of a batch"),
+        (
+            "data/raw/late/force",
+            "holds no batch.yaml: not the folder of a batch; metro import FILES makes one of a lab's files",
+        ),
     ],
 )
 def test_what_names_no_raw_batch_is_told_with_what_was_meant(own_campaign, given, told):

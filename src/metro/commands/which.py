@@ -77,9 +77,8 @@ def raw_folder(given: str) -> Path:
     if folder is not None:
         return folder
     if path.is_dir():
-        raise wrong_call(
-            given, f"holds no {RAW_FILE}: not the folder of a batch{suggestion(path.name, known)}"
-        )
+        near = suggestion(path.name, known) or "; metro import FILES makes one of a lab's files"
+        raise wrong_call(given, f"holds no {RAW_FILE}: not the folder of a batch{near}")
     raise _no_such_batch(given, path.name, known)
 
 

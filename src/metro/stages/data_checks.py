@@ -8,11 +8,12 @@ from metro.batch.batch import Batch
 from metro.batch.findings import Finding
 from metro.batch.processed import Tables
 from metro.slips.copies import copies
+from metro.slips.cut_short import cut_short
 
 DataCheck = Callable[[Batch, Tables], Iterable[Finding]]
 
 # Each looks at the whole of a batch; an error refuses it, a warning is shown.
-DATA_CHECKS: tuple[DataCheck, ...] = (copies,)
+DATA_CHECKS: tuple[DataCheck, ...] = (copies, cut_short)
 
 
 def data_findings(batch: Batch, read: Tables) -> Iterator[Finding]:
