@@ -92,7 +92,26 @@ def test_flatness_is_by_the_standard_where_all_faces_have_it(key, name):
     }
     value, about = rows({"faces": faces})[name]
     assert value == "20.0 ± 2.0 µm (b) and 40.0 ± 2.0 µm (a)"
-    assert about.endswith("flattest and least flat of 2 faces")
+    assert about.endswith("with its noise; flattest and least flat of 2 faces")
+
+
+def test_flatness_is_that_of_the_surface_under_the_noise_of_the_scan():
+    read = {run: {"xm": made.q(um, 2.0, "um")} for run, um in (("a", 40.0), ("b", 42.0))}
+    columns = {
+        "run": ["a", "b", "a"],
+        "index_name": ["xm", "xm", "xa"],
+        "corrected_um": [38.0, 30.0, 1.0],
+        "low_um": [36.0, 27.0, 0.9],
+        "high_um": [40.0, 33.0, 1.1],
+    }
+    table = pd.DataFrame(columns)
+    value, about = rows({"faces": read}, face_indices=table)["range X_m"]
+    assert value == "30.0 ± 3.0 µm (b) and 38.0 ± 2.0 µm (a)"
+    assert about.endswith("its noise removed; flattest and least flat of 2 faces")
+    unknown = table.assign(high_um=[40.0, np.nan, 1.1])  # of one face the noise is not known
+    value, about = rows({"faces": read}, face_indices=unknown)["range X_m"]
+    assert value == "40.0 ± 2.0 µm (a) and 42.0 ± 2.0 µm (b)"
+    assert about.endswith("with its noise; flattest and least flat of 2 faces")
 
 
 def test_page_one_gives_the_results_before_the_verdict():

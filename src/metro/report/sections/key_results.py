@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -31,7 +32,7 @@ def key_results(results: Results) -> list[Item]:
         *_modes(results.identified.get("modes") or []),
         *_boundary(results),
         *_stiffness(results),
-        *_faces(results.identified.get("faces") or {}),
+        *_faces(results),
     ]
     if not rows:
         return []
@@ -127,19 +128,43 @@ def _stiffness(results: Results) -> Iterator[Row]:
         yield "least static stiffness", value, f"load tests{f' at {place}' if place else ''}"
 
 
-def _faces(faces: JSON) -> Iterator[Row]:
-    """Give the flatness of the flattest and of the least flat face: by ISO 12781 where it is known."""
+def _faces(results: Results) -> Iterator[Row]:
+    """Give the flatness of the flattest and of the least flat face: by ISO 12781 where it is known.
+
+    Without the scan's noise where that is known of all faces: noise makes every face less flat, and may make
+    another one the flattest.
+    """
+    faces: JSON = results.identified.get("faces") or {}
     found = {run: face for run, face in faces.items() if isinstance(face, dict) and face.get("xm")}
     if not found:
         return
     standard = all(face.get("fltt") for face in found.values())
     key, name = ("fltt", "flatness FLTt") if standard else ("xm", "range X_m")
-    by_size = sorted(found, key=lambda run: float(found[run][key]["value"]))
+    corrected = _without_noise(results, key)
+    clean = set(found) <= set(corrected)
+    sizes = corrected if clean else {run: face[key] for run, face in found.items()}
+    by_size = sorted(found, key=lambda run: float(sizes[run]["value"]))
     ends = list(dict.fromkeys([by_size[0], by_size[-1]]))
-    value = listing([f"{quantity(found[run][key])} ({run})" for run in ends])
+    value = listing([f"{quantity(sizes[run])} ({run})" for run in ends])
     about = "ISO 12781, filtered scan" if standard else "scan, unfiltered"
+    about += ", its noise removed" if clean else ", with its noise"
     which = f"; flattest and least flat of {len(found)} faces" if len(ends) > 1 else ""
     yield name, value, about + which
+
+
+def _without_noise(results: Results, key: str) -> dict[str, JSON]:
+    """Return an index of each face whose interval without the scan's noise is known."""
+    table = results.tables.get("face_indices")
+    rows = [] if table is None else table[table["index_name"] == key].to_dict("records")
+    return {
+        str(row["run"]): {
+            "value": row["corrected_um"],
+            "ci95": [row["low_um"], row["high_um"]],
+            "unit": "um",
+        }
+        for row in rows
+        if math.isfinite(row["high_um"])
+    }
 
 
 def _in_n_um(entry: JSON) -> str:
