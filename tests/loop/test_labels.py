@@ -10,6 +10,7 @@ from label_toy import GATES, SHIFT, SLOPE, TWIN, Line, problem
 from scipy.stats import norm
 from worded import in_words
 
+from metro.loop.labels.next_test import any_tests
 from metro.loop.labels.verdict import judge_labels
 from metro.loop.labels.verification import log_likelihood, surprise_alone
 from metro.wording.statements import worded
@@ -183,7 +184,7 @@ def test_labels_that_contradict_every_hypothesis_are_unexplained():
 def test_too_few_tests_are_insufficient_for_effects():
     _, verdict, story, _ = closed(Line(), (SHIFT, SLOPE), seed=3, rpm=np.array([4000.0, 5000.0]))
     assert verdict["candidates"] == []
-    assert "speeds, not held out, are needed" in story["noise"]["words"]
+    assert "at least 6 at 3 speeds are needed that are not held out" in story["noise"]["words"]
 
 
 def test_a_mode_that_may_be_missing_is_to_be_sought_at_its_frequency():
@@ -196,3 +197,10 @@ def test_a_mode_that_may_be_missing_is_to_be_sought_at_its_frequency():
     assert "expected to rise from 0.60 to 0.90" in words
     still = worded({"code": "next_test", "values": {**values, "leading": 0.602}})
     assert "One test changes little: the most probable cause has a probability of 0.60" in still
+
+
+@pytest.mark.parametrize(("tests", "said"), [(12, "give about half of them"), (11, "two depths at each")])
+def test_who_has_tests_enough_is_asked_to_share_them_and_not_to_cut_more(tests, said):
+    asked = in_words(any_tests(pd.DataFrame({"run": [f"c{i}" for i in range(tests)]})))
+    assert said in asked
+    assert (f"no new cut: {tests} labelled tests are held out" in asked) is (tests == 12)

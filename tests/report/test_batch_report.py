@@ -126,7 +126,7 @@ def test_modes_without_a_driving_point_have_no_stiffness_and_the_first_page_show
         ("partly_explained", "A significant residual remains"),
         ("undetermined", "Possible causes: tool wear or charge drift."),
         ("unexplained", "no effect of the library explains"),
-        ("insufficient", "too few runs to decide"),
+        ("insufficient", "too few identification runs to decide"),
     ],
 )
 def test_every_status_has_its_sentence(status, words):

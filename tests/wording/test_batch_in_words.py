@@ -21,7 +21,7 @@ VERDICT = {
     "effects": [],
     "candidates": [{"effect": "tool_wear", "why_not": {"code": "beaten", "values": {}}}],
     "indistinguishable": [],
-    "next_experiment": {"code": "any_tests", "values": {}},
+    "next_experiment": {"code": "any_tests", "values": {"held_out": 0, "enough": False}},
     "unexplained": {
         "rms": None,
         "signature": {"code": "residual", "values": {"parts": [{"code": "unbelieved", "values": {}}, "b"]}},

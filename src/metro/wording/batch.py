@@ -24,7 +24,7 @@ STATUSES = {
     "unexplained": "There is a significant residual that no effect of the library explains; nothing was "
     "added.",
     "contradicted": "The data contradict the declaration of the batch; no cause was sought.",
-    "insufficient": "There are too few runs to decide whether the residual is significant.",
+    "insufficient": "There are too few identification runs to decide whether the residual is significant.",
 }
 
 

@@ -58,6 +58,15 @@ def _test_beside(values: JSON) -> str:
     )
 
 
+def _any_tests(values: JSON) -> str:
+    if values["enough"]:
+        return (
+            f"no new cut: {values['held_out']} labelled tests are held out; in runs.csv give about half of "
+            "them, at three speeds or more, the role identify"
+        )
+    return "tests with a stable or unstable label, two depths at each of three speeds, half of them held out"
+
+
 def _surprise(values: JSON) -> str:
     return (
         f"{values['weighed']} tests at {values['speeds']} speeds were used to compare causes; with a "
@@ -68,8 +77,8 @@ def _surprise(values: JSON) -> str:
 def _surprise_alone(values: JSON) -> str:
     tests, speeds = values["tests_needed"], values["speeds_needed"]
     return (
-        f"{values['weighed']} labelled tests are available to compare causes; at least {tests} at {speeds} "
-        f"speeds, not held out, are needed. {_verified(values)}"
+        f"{values['weighed'] or 'No'} labelled tests have the role identify; to compare causes, at least "
+        f"{tests} at {speeds} speeds are needed that are not held out. {_verified(values)}"
     )
 
 
@@ -96,8 +105,7 @@ SENTENCES: Mapping[str, Sentence] = {
     "lacking": _lacking,
     "test": _test,
     "next_test": _next_test,
-    "any_tests": "tests with a stable or unstable label, two depths at each of three speeds, half of them "
-    "held out",
+    "any_tests": _any_tests,
     "test_beside": _test_beside,
     "verification_of_labels": _verification_of_labels,
     "surprise": _surprise,

@@ -15,7 +15,7 @@ import pandas as pd
 
 from metro.effects.effect import Effect
 from metro.loop.labels.evidence import Labels
-from metro.loop.labels.next_test import NextTest, advice, beside, next_tests
+from metro.loop.labels.next_test import NextTest, advice, any_tests, beside, next_tests
 from metro.loop.labels.problem import tests_of
 from metro.loop.labels.search import (
     LEAST_SPEEDS,
@@ -229,7 +229,7 @@ def _candidates(judged: _Judged) -> list[JSON]:
 def _next(judged: _Judged) -> Statement:
     if judged.outcome and judged.suggested and judged.status in ("undetermined", "insufficient"):
         return advice(judged.suggested, judged.outcome)
-    return beside(judged.rows) if judged.outcome else Statement("any_tests")
+    return beside(judged.rows) if judged.outcome else any_tests(judged.rows)
 
 
 def _story(task: Labelled, judged: _Judged, verdict: JSON, gates: Gates) -> JSON:

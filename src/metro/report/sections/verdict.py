@@ -38,7 +38,8 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
         "undetermined": f"{start}: {_undetermined(entry)} {_rivals(entry)}{tested}",
         "unexplained": f"{start}: the base model has a significant error that no effect of the library "
         f"explains. {tested} {_residual(entry, left)}",
-        "insufficient": f"{start}: there are too few runs to decide whether an effect is missing. {tested}",
+        "insufficient": f"{start}: there are too few identification runs to decide whether an effect is "
+        f"missing. {tested}",
     }
     if entry.get("contradicted"):
         return (
