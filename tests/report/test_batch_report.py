@@ -170,6 +170,31 @@ def test_an_error_that_did_not_change_is_said_once():
     assert "goes from" not in verdict_words("force", synthetic.observable("unexplained", 5.0, 5.0))
 
 
+def test_a_change_that_is_smaller_than_what_is_printed_is_no_fall():
+    entry = synthetic.observable(before=11.8, after=11.79, effects=[synthetic.RUNOUT])
+    said = verdict_words("force", entry)
+    assert "falls" not in said
+    assert "the error does not change" in said
+    assert "What was found rests on the identification runs." in said
+
+
+def test_where_nothing_was_added_it_is_said_what_changed_the_error():
+    fell = verdict_words("lobes", synthetic.observable("insufficient", before=0.34, after=0.23, unit="1"))
+    assert "with the effects found in other observables" in fell
+    named = verdict_words("force", synthetic.observable(effects=[synthetic.RUNOUT]))
+    assert "other observables" not in named
+
+
+@pytest.mark.parametrize(
+    ("ratio", "holds", "shown"), [(0.9, True, False), (1.2, True, True), (3.0, False, True)]
+)
+def test_what_the_held_out_runs_do_not_show_is_said_to_be_seen_in_the_others_alone(ratio, holds, shown):
+    verification = {"ratio": ratio, "holds": holds, "words": "Verification on 2 held-out runs."}
+    said = verdict_words("force", synthetic.observable("unexplained", verification=verification))
+    assert "over the identification runs the base model has a significant error" in said
+    assert ("The held-out runs do not show it." not in said) is shown
+
+
 def test_parameters_lose_the_unit_in_their_name():
     assert parameter_name("radius_um", {"value": 1.0, "unit": "um"}) == "radius"
     assert parameter_name("slope_n_s", {"value": 1.0, "unit": "N/s"}) == "slope"

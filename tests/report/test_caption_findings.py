@@ -45,6 +45,8 @@ def test_differences_are_put_beside_those_of_noise_alone():
     [
         ([("a", 8.0, 2.0)], "falls from 8.0 % to 2.0 % of the signal"),
         ([("a", 8.0, 8.0)], "8.0 % of the signal; no effect was added"),
+        ([("a", 8.0, 7.99)], "does not fall; it is 8.0 % of the signal"),
+        ([("a", 8.0, 2.0), ("b", 5.0, 4.99)], "fall in 1 of 2 cases"),
         ([("a", 8.0, 2.0), ("b", 5.0, 5.0)], "fall in 1 of 2 cases; the largest remaining error is 5.0 %"),
         ([("a", 8.0, 8.0), ("b", 5.0, 5.0)], "No effect was added"),
     ],

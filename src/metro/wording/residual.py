@@ -94,7 +94,9 @@ def _above_floor(values: JSON) -> str:
 def _verification(values: JSON) -> str:
     """Say how the final model does on the held-out runs; nothing is decided by it."""
     runs = f"{values['runs']} held-out run{'s' if values['runs'] > 1 else ''}"
-    ratio = f"{values['ratio']:.2g} times that expected from noise and uncertain parameters"
+    times = f"{values['ratio']:.2g}"
+    size = "as large as that" if times == "1" else f"{times} times that"
+    ratio = f"{size} expected from noise and uncertain parameters"
     if values["ratio"] <= 1.0:
         words = f"Verification on {runs}: the error is {ratio}."
     elif values["holds"]:

@@ -19,16 +19,18 @@ _OF_BASE_MODEL = "The error of the base model is "
 
 
 def changed(rows: Sequence[Change]) -> str:
-    """Say which errors the added effects reduced, and which remaining error is the largest."""
-    fell = [row for row in rows if row.after < row.before]
+    """Say which errors the added effects reduced, by as much as is printed, and which is the largest left."""
+    fell = [row for row in rows if row.after < row.before and _percent(row.after) != _percent(row.before)]
     largest = max(rows, key=lambda row: row.after)
     if len(rows) == 1:
         (row,) = rows
-        if not fell:
+        if row.after == row.before:
             return f"The held-out error is {_percent(row.after)} of the signal; no effect was added."
+        if not fell:
+            return f"The held-out error does not fall; it is {_percent(row.after)} of the signal."
         return f"The held-out error falls from {_percent(row.before)} to {_percent(row.after)} of the signal."
     least = f"the largest remaining error is {_percent(largest.after)} of the signal, {largest.label}."
-    if not fell:
+    if all(row.after == row.before for row in rows):
         return f"No effect was added; {least}"
     return f"Held-out errors fall in {len(fell)} of {len(rows)} cases; {least}"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from metro.report.figures.verdicts import Change
 from metro.report.numbers import listing, percent, with_interval, words
 from metro.report.parameters import effect_words
@@ -36,8 +38,8 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
         "partly_explained": f"{start}: {part} {tested} A significant residual remains. "
         f"{_residual(entry, left)}",
         "undetermined": f"{start}: {_undetermined(entry)} {_rivals(entry)}{tested}",
-        "unexplained": f"{start}: the base model has a significant error that no effect of the library "
-        f"explains. {tested} {_residual(entry, left)}",
+        "unexplained": f"{start}: over the identification runs the base model has a significant error that "
+        f"no effect of the library explains. {tested}{_unconfirmed(entry)} {_residual(entry, left)}",
         "insufficient": f"{start}: there are too few identification runs to decide whether an effect is "
         f"missing. {tested}",
     }
@@ -55,6 +57,13 @@ def _clean(entry: JSON) -> str:
     if share is not None and share > NOTHING_SEEN and not _dimensionless(entry):
         return "what was measured is no larger than the noise, so that it does not test the base model."
     return "the base model explains the identification runs; no effect is missing."
+
+
+def _unconfirmed(entry: JSON) -> str:
+    """Say that the held-out runs do not show what the identification runs leave unexplained, if so."""
+    verification = entry.get("verification") or {}
+    within = verification.get("holds") and (verification.get("ratio") or math.inf) <= 1.0
+    return " The held-out runs do not show it." if within else ""
 
 
 def _undetermined(entry: JSON) -> str:
@@ -167,7 +176,14 @@ def _fall(entry: JSON) -> str:
     if before["rms"] == after["rms"]:
         share = "" if _dimensionless(entry) else f" ({share_before} of the signal)"
         return f"{where} {what} is {old}{share}."
+    if share_before == share_after and not _dimensionless(entry):
+        return (
+            f"{where} the error does not change: {old} before and {new} after ({share_after} of the signal). "
+            "What was found rests on the identification runs."
+        )
     share = "" if _dimensionless(entry) else f" ({share_before} to {share_after} of the signal)"
+    if not entry.get("effects"):  # the boundary is predicted with the effects of the force
+        share += " with the effects found in other observables"
     verb = "falls" if after["rms"] < before["rms"] else "rises"
     return f"{where} {what} {verb} from {old} to {new}{share}."
 
@@ -176,7 +192,7 @@ def _residual(entry: JSON, left: str) -> str:
     unexplained = entry.get("unexplained") or {}
     if not unexplained.get("signature"):
         return ""
-    return f"Remaining error: {left or plain(str(unexplained['signature']))}."
+    return f"Remaining error of the identification runs: {left or plain(str(unexplained['signature']))}."
 
 
 def left_words(results: Results, observable: str) -> str:
