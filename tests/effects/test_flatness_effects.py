@@ -18,6 +18,7 @@ from metro.loop.fitting.fit import fit, score
 from metro.loop.fitting.noise import first_noise
 from metro.loop.search.search import search
 from metro.loop.verdict.verdict import parameters
+from metro.observables.flatness.model import _shaped
 from metro.observables.flatness.setup import Setup
 
 
@@ -210,6 +211,20 @@ def test_what_is_outside_the_library_is_most_like_a_cause_of_its_kind(made, name
     likeness = total.pop(name)
     assert effect_of(task, name).resembled
     assert likeness > max(total.values()) + likelier
+
+
+def test_a_bow_is_over_all_passages_alike_and_no_face_is_finished_anew_for_it():
+    task = problem()
+    block, effect = task.role("identify")[0], effect_of(task, "fixture_bow")
+    task.base.design(block, np.zeros(1))
+    finished = _shaped.cache_info().misses
+    bent = Candidate(task.base, (effect,)).model(np.array([40.0, -25.0, 30.0]))
+    height = bent.design(block, np.zeros(1))[1] - task.base.design(block, np.zeros(1))[1]
+    setting = block.setting
+    bow = setting.mean(bent.setup.bowed(setting.x, setting.y, setting.size))
+    np.testing.assert_allclose(height, setting.shape(bow), atol=1e-12)
+    assert np.ptp(height) > 20e-6
+    assert _shaped.cache_info().misses == finished
 
 
 def test_a_form_of_third_degree_is_what_its_parameters_say():

@@ -198,7 +198,9 @@ class FlatnessModel:
             loaded = _loaded(self.fields, setting)
             return np.hstack([np.zeros((count, len(self.believed))), loaded]), np.zeros(count)
         off = self._off(setting, beta)
-        terms, offset, harder, rising = _shaped(self, setting, phases_of(self.vibration, nuisance), off)
+        flat = replace(self, setup=self.setup.cutting)
+        terms, offset, harder, rising = _shaped(flat, setting, phases_of(self.vibration, nuisance), off)
+        offset = offset + setting.mean(self.setup.bowed(setting.x, setting.y, setting.size))
         columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
         parts = [*([setting.plane] if self.placed else []), setting.form]
         parts += [harder[:, None], np.outer(rising, np.array(self.ringing) == setting.pose)]
@@ -278,30 +280,31 @@ def _shaped(
 ) -> tuple[Array, Array, Array, Array]:
     """Return means over each bin: terms of the basis, (bins, terms); heights, (bins,) m, whatever these are.
 
+    A bow of the work moves all passages over a point alike: it is no part of what is kept here.
+
     The heights are the offset, and what is gained per relative rise of the force and of the frequencies. Both
     gains hold for the compliance of the load tests alone, so that they are linear in the base parameters. The
     result is cached because noise and parameters are estimated in turn, many times over.
     """
     share, above_static = model.finished(setting, np.array(phases), off)
-    bowed = model.setup.bowed(setting.x, setting.y, setting.size)
     basis, tuning = model._basis(setting), model.tuning(off)
     terms = np.einsum("nk,nkt->nt", share, _terms(basis, setting))
     harder = _static(basis, setting) + rung(setting, tuning)
     heights = [above_static, *(model.structure.in_cut(one) for one in (harder, sharper(setting, tuning)))]
     offset, forced, rising = setting.mean(np.stack([(share * one).sum(axis=1) for one in heights], axis=1)).T
-    return setting.mean(terms), offset + setting.mean(bowed), forced, rising
+    return setting.mean(terms), offset, forced, rising
 
 
 @lru_cache(maxsize=64)
 def _terms(basis: Basis, setting: FaceSetting) -> Array:
     """Return the basis' terms where the tool was at each passage, (n, k, terms)."""
     at = setting.passages
-    return np.asarray(basis(at.x.ravel(), at.y.ravel()).reshape(*at.x.shape, -1))
+    return np.asarray(basis(at.x.T.ravel(), at.y.T.ravel()).T.reshape(-1, *at.x.T.shape).T)
 
 
 @lru_cache(maxsize=64)
 def _static(basis: Basis, setting: FaceSetting) -> Array:
     """Return the static height of the tip by the load tests, at each passage, (n, k) m."""
     at = setting.passages
-    rows = heights_design(basis, at.x.ravel(), at.y.ravel(), setting.force)
-    return np.asarray((rows @ setting.loaded).reshape(at.x.shape))
+    rows = heights_design(basis, at.x.T.ravel(), at.y.T.ravel(), setting.force)
+    return np.asarray((rows @ setting.loaded).reshape(at.x.T.shape).T)

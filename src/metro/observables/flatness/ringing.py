@@ -116,11 +116,11 @@ class Ringing:
 
     def at(self, heights: Array, passages: Passages) -> Array:
         """Interpolate ``heights`` (passes, n) at passages, (points, k)."""
-        place = passages.along / self.speed / self.step
+        place = passages.along.T / self.speed / self.step
         before = np.clip(np.floor(place).astype(np.intp), 0, heights.shape[1] - 2)
         share = place - before
-        low, high = heights[passages.number, before], heights[passages.number, before + 1]
-        return np.asarray(low + share * (high - low))
+        low, high = heights[passages.number.T, before], heights[passages.number.T, before + 1]
+        return np.asarray((low + share * (high - low)).T)
 
 
 def _tuned(modes: TipModes, factor: float) -> TipModes:

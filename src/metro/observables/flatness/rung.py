@@ -35,9 +35,9 @@ def rung(setting: FaceSetting, tuning: float) -> Array:
     if ringing is None:
         return np.zeros(setting.passages.along.shape)
     place = math.log(tuning) / NODES
-    moved = sum(weight * _moved(ringing, node) for node, weight in _cubic(place))
-    of_teeth = ringing.tuned(tuning).of_teeth(setting.passages)
-    return np.asarray(ringing.at(np.asarray(moved), setting.middle) + of_teeth)
+    moved = sum(weight * _at_passages(setting, node) for node, weight in _cubic(place))
+    of_teeth = ringing.tuned(tuning).of_teeth(setting.passages) if ringing.teeth else 0.0
+    return np.asarray(moved + of_teeth)
 
 
 def sharper(setting: FaceSetting, tuning: float) -> Array:
@@ -53,6 +53,14 @@ def _cubic(place: float) -> list[tuple[int, float]]:
     first = math.floor(place) - 1
     share = place - first
     return [(first + i, math.prod((share - j) / (i - j) for j in range(4) if j != i)) for i in range(4)]
+
+
+@lru_cache(maxsize=1024)
+def _at_passages(setting: FaceSetting, node: int) -> Array:
+    """Ringing at one node at each passage of a face, (n, k), kept: tunings nearby are made from the same."""
+    ringing = setting.ringing
+    assert ringing is not None
+    return ringing.at(_moved(ringing, node), setting.middle)
 
 
 @lru_cache(maxsize=1024)

@@ -6,7 +6,7 @@ All of them are zero in a base model; each part is set by one effect of the libr
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -43,10 +43,15 @@ class Setup:
     cubic: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     entry: tuple[tuple[float, float, float], ...] = ()
 
+    @property
+    def cutting(self) -> Setup:
+        """What of it :meth:`cuts` has: all but the form of the work."""
+        return replace(self, bow=Setup.bow, cubic=Setup.cubic)
+
     def cuts(self, x: Array, y: Array, passages: Passages, pace: Pace) -> Array:
         """Additional height of the cut at the points ``x``, ``y`` (n,) at each passage, (n, k) m."""
         about_x, about_y = self.tilt
-        higher = np.zeros(passages.along.shape)
+        higher = np.zeros_like(passages.along)
         if about_x or about_y:
             higher = (y[:, None] - passages.y) * about_x - (x[:, None] - passages.x) * about_y
         if self.growth:
@@ -84,7 +89,7 @@ def left(outside: Array, radius: float, length: float) -> Array:
     """
     way, since, share = _leaving(radius, max(float(outside.max(initial=0.0)) + radius, radius))
     remains = (share * np.exp(-since / length)).sum(axis=1)
-    return np.asarray(np.interp(outside + radius, way, remains, left=0.0))
+    return np.asarray(np.interp((outside + radius).T, way, remains, left=0.0).T)
 
 
 @lru_cache(maxsize=64)
@@ -101,6 +106,6 @@ def _leaving(radius: float, most: float) -> tuple[Array, Array, Array]:
 def swung(vibration: Vibration, phase: float, passages: Passages, pace: Pace) -> Array:
     """Height of a vibrating tip, at passages (n, k), m; each face has its own ``phase``, rad."""
     if not vibration.amplitude:
-        return np.zeros(passages.along.shape)
+        return np.zeros_like(passages.along)
     turn = 2 * math.pi * vibration.frequency * pace.time(passages) + phase
     return np.asarray(vibration.amplitude * np.sin(turn))
