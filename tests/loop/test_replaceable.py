@@ -63,6 +63,30 @@ def test_the_share_that_is_left_is_that_of_least_squares():
     assert change._left(signatures) == pytest.approx(float(left @ left), rel=1e-6)
 
 
+def test_a_shape_is_where_it_starts_while_the_size_beside_it_is_none():
+    """A bend of ``size`` over ``length``: at the length zero, which no bound lets it have, it is nothing."""
+
+    def apply(model, values):
+        return replace(model, bend=model.bend + values["size"] / values["length"])
+
+    size = replace(BEND.parameters[0], name="size", starts=(0.0,))
+    length = replace(size, name="length", lower=0.5, upper=5.0, starts=(2.0, 4.0))
+    drawn = replace(BEND, name="drawn", parameters=(size, length), apply=apply)
+    base, current, _ = fits(Wave(bend=0.2), BEND)
+    change = Change(base, current)
+    assert change._idle(drawn).tolist() == [0.0, 2.0]
+    with np.errstate(all="raise"):
+        made = [np.concatenate(one) for one in change._signatures(drawn)]
+    (bent,) = (
+        np.concatenate(change._made_by(change._with(BEND), np.array([size.scale / 2.0]), before))
+        for before in [[base.predict(block) for block in base.blocks]]
+    )
+    of_size, of_length = made[-2:]
+    np.testing.assert_allclose(of_size, bent)
+    assert not of_length.any()
+    assert change.could_be(drawn)
+
+
 def test_a_small_change_may_be_made_by_anything():
     base, current, _ = fits(Wave(bend=0.004), BEND)
     change = Change(base, current)

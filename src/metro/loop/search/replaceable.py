@@ -48,15 +48,24 @@ class Change:
     def _has_unknowns(self, effect: Effect) -> bool:
         """Whether an effect gives runs unknowns of its own, such as a phase: no start says what it can do."""
         smaller = self.smaller
-        model = self._with(effect).model(self._neutral(effect))
+        model = self._with(effect).model(self._idle(effect))
         block = smaller.blocks[0]
         return bool(model.nuisance_starts(block).shape[1] > len(smaller.nuisance[block.run]))
 
     def _with(self, effect: Effect) -> Candidate:
         return Candidate(self.smaller.candidate.base, (*self.smaller.candidate.effects, effect))
 
-    def _neutral(self, effect: Effect) -> Array:
-        return np.concatenate([self.smaller.theta, [one.neutral for one in effect.parameters]])
+    def _idle(self, effect: Effect) -> Array:
+        """Return the parameters of the smaller fit, and beside them such that the effect is off.
+
+        A shape, as a length or an order, has no value at which the effect is off: nothing is neutral within
+        its bounds. It is where it starts, since a size says nothing there without a shape.
+        """
+        idle = [
+            one.neutral if one.lower <= one.neutral <= one.upper else one.starts[0]
+            for one in effect.parameters
+        ]
+        return np.concatenate([self.smaller.theta, idle])
 
     def _lost(self, left: float) -> float:
         """Log-likelihood that a squared change loses where the noise is estimated from the residual."""
@@ -77,14 +86,14 @@ class Change:
 
     def _signatures(self, effect: Effect) -> Iterator[list[Array]]:
         """Yield what an effect makes of each block, whitened, from each of its starts."""
-        smaller, candidate, neutral = self.smaller, self._with(effect), self._neutral(effect)
+        smaller, candidate, idle = self.smaller, self._with(effect), self._idle(effect)
         before = [smaller.predict(block) for block in smaller.blocks]
         for places in candidate.groups(len(smaller.theta)):
-            for theta in started(candidate, neutral, places):
+            for theta in started(candidate, idle, places):
                 yield self._made_by(candidate, theta, before)
         for at, parameter in enumerate(effect.parameters, start=len(smaller.theta)):
-            theta = neutral.copy()
-            theta[at] += parameter.scale if parameter.neutral < parameter.upper else -parameter.scale
+            theta = idle.copy()
+            theta[at] += parameter.scale if idle[at] < parameter.upper else -parameter.scale
             yield self._made_by(candidate, theta, before)
 
     def _made_by(self, candidate: Candidate, theta: Array, before: list[Array]) -> list[Array]:
