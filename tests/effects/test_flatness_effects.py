@@ -20,6 +20,7 @@ from metro.loop.search.search import search
 from metro.loop.verdict.verdict import parameters
 from metro.observables.flatness.model import _shaped
 from metro.observables.flatness.setup import Setup
+from metro.observables.problem import predictions
 
 
 def tilted(dx, dy, **_cut):
@@ -211,6 +212,21 @@ def test_what_is_outside_the_library_is_most_like_a_cause_of_its_kind(made, name
     likeness = total.pop(name)
     assert effect_of(task, name).resembled
     assert likeness > max(total.values()) + likelier
+
+
+@pytest.mark.parametrize("placed", [True, False])
+def test_a_prediction_at_many_phases_is_that_of_the_design_at_each(placed):
+    task = problem(placed=placed)
+    effects = [effect_of(task, name) for name in ("path_vibration", "stiffness_scale", "fixture_bow")]
+    theta = np.array([1.7, 8.0, 0.8, 40.0, -25.0, 30.0])
+    model = Candidate(task.base, tuple(effects)).model(theta)
+    beta = 0.02 * np.random.default_rng(5).normal(size=len(model.parameters))
+    for block in task.blocks:
+        nuisances = model.nuisance_starts(block)
+        each = [
+            offset + matrix @ beta for matrix, offset in (model.design(block, n, beta) for n in nuisances)
+        ]
+        np.testing.assert_allclose(predictions(model, block, nuisances, beta), each, rtol=1e-9, atol=1e-12)
 
 
 def test_a_bow_is_over_all_passages_alike_and_no_face_is_finished_anew_for_it():

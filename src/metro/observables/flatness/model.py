@@ -13,11 +13,12 @@ from metro.observables.flatness.path import Pace, Passages
 from metro.observables.flatness.ringing import Ringing
 from metro.observables.flatness.rung import FINE, rung, sharper
 from metro.observables.flatness.setup import Setup, swung
+from metro.observables.flatness.tip import static, terms, tip
 from metro.observables.problem import Block, Parameter
 from metro.observables.waviness.model import Vibration, phase_starts, phases_of
 from metro.structure import Structure
 from metro.surface.footprint import RADIUS
-from metro.surface.tip_stiffness import POWERS, Basis, Rows, heights_design
+from metro.surface.tip_stiffness import POWERS, Basis, Rows
 from metro.units import UM, Array
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ FORM = ("form_xx", "form_xy", "form_yy")  # of the scanner: curvatures, as the h
 # cubic, and to 0.2 % for a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
 KINK = 0.1 * UM  # passages whose cuts differ by less finish a place together: teeth are less even than that
+
+NO_SHARE = math.log(np.finfo(float).tiny)  # logarithm of the share of a passage that finishes nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +179,7 @@ class FlatnessModel:
             for i, j in POWERS[: part.basis.terms]
         )
 
-    @property
+    @cached_property
     def believed(self) -> tuple[Parameter, ...]:
         """Place and form of the scanner; by how much the force is off, and the tip's frequencies by pose."""
         place = [Parameter(name, "um", UM) for name in (*(PLACE if self.placed else ()), *FORM)]
@@ -198,21 +201,66 @@ class FlatnessModel:
             loaded = _loaded(self.fields, setting)
             return np.hstack([np.zeros((count, len(self.believed))), loaded]), np.zeros(count)
         off = self._off(setting, beta)
-        flat = replace(self, setup=self.setup.cutting)
-        terms, offset, harder, rising = _shaped(flat, setting, phases_of(self.vibration, nuisance), off)
+        shared, offset, harder, rising = _shaped(
+            self._cutting, setting, phases_of(self.vibration, nuisance), off
+        )
         offset = offset + setting.mean(self.setup.bowed(setting.x, setting.y, setting.size))
-        columns = self.structure.in_cut((setting.force[:, None] * terms[:, None, :]).reshape(len(terms), -1))
+        columns = self.structure.in_cut(
+            (setting.force[:, None] * shared[:, None, :]).reshape(len(shared), -1)
+        )
         parts = [*([setting.plane] if self.placed else []), setting.form]
         parts += [harder[:, None], np.outer(rising, np.array(self.ringing) == setting.pose)]
         parts += [_own(part, setting.pose, columns) for part in self.fields]
         return setting.shape(np.hstack(parts)), setting.shape(offset - off * rising)
 
+    def predictions(self, block: Block, nuisances: Array, beta: Array) -> Array:
+        """Heights (k, n) m at each of ``nuisances`` (k, m), as :meth:`design` gives them.
+
+        Only the heights under ``beta`` are averaged, and not those of each column: this is what most of a
+        search consists of.
+        """
+        setting = block.setting
+        if not isinstance(setting, FaceSetting):
+            matrix, offset = self.design(block, np.zeros(0), beta)
+            return np.tile(offset + matrix @ beta, (len(nuisances), 1))
+        off = self._off(setting, beta)
+        height = self.structure.in_cut(self._tip(setting, beta, off))
+        form = np.hstack([*([setting.plane] if self.placed else []), setting.form])
+        common = form @ beta[: form.shape[1]]
+        common = common + setting.mean(self.setup.bowed(setting.x, setting.y, setting.size))
+        predicted = []
+        for nuisance in nuisances:
+            share, above = _finished(self._cutting, setting, phases_of(self.vibration, nuisance), off)
+            predicted.append(common + setting.mean((share * (above + height)).sum(axis=1)))
+        return setting.shape(np.reshape(predicted, (-1, len(common))).T).T
+
+    def _tip(self, setting: FaceSetting, beta: Array, off: float) -> Array:
+        """Return the height of the tip at each passage by ``beta``, (n, k) m, as stiff as in load tests."""
+        believed, first = [one.name for one in self.believed], len(self.believed)
+        for part in self.fields:
+            count = int(part.used.sum())
+            if part.pose == setting.pose:
+                coefficients = np.zeros(len(part.used))
+                coefficients[part.used] = beta[first : first + count]
+            first += count
+        higher = float(beta[self._ringing_place(setting)]) - off if setting.pose in self.ringing else 0.0
+        gains = float(beta[believed.index(FORCE)]), higher
+        return tip(self._basis(setting), setting, tuple(coefficients.tolist()), gains, self.tuning(off))
+
+    @cached_property
+    def _cutting(self) -> FlatnessModel:
+        """What of the model determines which passage finishes a place: a bow moves all of them alike."""
+        return replace(self, setup=self.setup.cutting)
+
     def _off(self, setting: FaceSetting, beta: Array | None) -> float:
         """Return by how much the frequencies of the tip are off, relative, to the grid."""
         if beta is None or setting.pose not in self.ringing:
             return 0.0
-        place = len(self.believed) - len(self.ringing) + self.ringing.index(setting.pose)
-        return FINE * round(float(beta[place]) / FINE)
+        return FINE * round(float(beta[self._ringing_place(setting)]) / FINE)
+
+    def _ringing_place(self, setting: FaceSetting) -> int:
+        """Return the place in ``beta`` of how far the frequencies of the tip are off at the face's pose."""
+        return len(self.believed) - len(self.ringing) + self.ringing.index(setting.pose)
 
     def tuning(self, off: float) -> float:
         """Return the tip's frequencies in the cut over those of the load tests with the declared mass.
@@ -233,11 +281,12 @@ class FlatnessModel:
         """
         height, above_static = self._heights(setting, nuisance, off)
         lowest = height.min(axis=1, keepdims=True)
-        height = np.where(np.isfinite(lowest), height, 0.0)  # passes too far apart leave places uncut
-        share = np.exp((np.where(np.isfinite(lowest), lowest, 0.0) - height) / KINK)
-        share /= share.sum(axis=1, keepdims=True)
-        together = KINK * np.log(np.maximum(share, np.finfo(float).tiny))
-        return share, above_static + together
+        cut = np.isfinite(lowest)  # passes too far apart leave places uncut
+        lower = np.where(cut, lowest, 0.0) - np.where(cut, height, 0.0)
+        exponent = np.maximum(lower / KINK, NO_SHARE)
+        share = np.exp(exponent)
+        total = share.sum(axis=1, keepdims=True)
+        return share / total, above_static + KINK * (exponent - np.log(total))
 
     def heights(self, setting: FaceSetting, nuisance: Array) -> Array:
         """Height of the cut at each passage by the load tests, (n, k) m; infinite if there is no passage."""
@@ -254,7 +303,7 @@ class FlatnessModel:
         return np.where(passages.valid, static + above_static, np.inf), above_static
 
     def _static(self, setting: FaceSetting) -> Array:
-        return _static(self._basis(setting), setting)
+        return static(self._basis(setting), setting)
 
     def _basis(self, setting: FaceSetting) -> Basis:
         return next(part.basis for part in self.fields if part.pose == setting.pose)
@@ -274,37 +323,28 @@ def _loaded(fields: tuple[PoseField, ...], setting: LoadSetting) -> Array:
     return np.hstack([_own(part, setting.pose, rows.get(part.pose, none)) for part in fields])
 
 
+# A step that is tried is asked for its prediction, and then for its design where it is taken.
+@lru_cache(maxsize=64)
+def _finished(
+    model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], off: float
+) -> tuple[Array, Array]:
+    return model.finished(setting, np.array(phases), off)
+
+
 @lru_cache(maxsize=512)
 def _shaped(
     model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], off: float
 ) -> tuple[Array, Array, Array, Array]:
     """Return means over each bin: terms of the basis, (bins, terms); heights, (bins,) m, whatever these are.
 
-    A bow of the work moves all passages over a point alike: it is no part of what is kept here.
-
     The heights are the offset, and what is gained per relative rise of the force and of the frequencies. Both
     gains hold for the compliance of the load tests alone, so that they are linear in the base parameters. The
     result is cached because noise and parameters are estimated in turn, many times over.
     """
-    share, above_static = model.finished(setting, np.array(phases), off)
+    share, above_static = _finished(model, setting, phases, off)
     basis, tuning = model._basis(setting), model.tuning(off)
-    terms = np.einsum("nk,nkt->nt", share, _terms(basis, setting))
-    harder = _static(basis, setting) + rung(setting, tuning)
+    shared = np.einsum("nk,nkt->nt", share, terms(basis, setting))
+    harder = static(basis, setting) + rung(setting, tuning)
     heights = [above_static, *(model.structure.in_cut(one) for one in (harder, sharper(setting, tuning)))]
     offset, forced, rising = setting.mean(np.stack([(share * one).sum(axis=1) for one in heights], axis=1)).T
-    return setting.mean(terms), offset, forced, rising
-
-
-@lru_cache(maxsize=64)
-def _terms(basis: Basis, setting: FaceSetting) -> Array:
-    """Return the basis' terms where the tool was at each passage, (n, k, terms)."""
-    at = setting.passages
-    return np.asarray(basis(at.x.T.ravel(), at.y.T.ravel()).T.reshape(-1, *at.x.T.shape).T)
-
-
-@lru_cache(maxsize=64)
-def _static(basis: Basis, setting: FaceSetting) -> Array:
-    """Return the static height of the tip by the load tests, at each passage, (n, k) m."""
-    at = setting.passages
-    rows = heights_design(basis, at.x.T.ravel(), at.y.T.ravel(), setting.force)
-    return np.asarray((rows @ setting.loaded).reshape(at.x.T.shape).T)
+    return setting.mean(shared), offset, forced, rising
