@@ -251,7 +251,15 @@ def polished(fitted: Fit) -> Fit:
 
 
 def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
-    """Evaluate a fit on blocks it has not seen: only their nuisances are estimated, nothing else moves."""
+    """Evaluate a fit on blocks it has not seen: only their nuisances are estimated, nothing else moves.
+
+    It is kept: the verdict and the story of the search ask for the same trials.
+    """
+    return _scored(fitted, tuple(blocks))
+
+
+@lru_cache(maxsize=64)
+def _scored(fitted: Fit, blocks: tuple[Block, ...]) -> Fit:
     candidate, noise = fitted.candidate, fitted.noise
     model = candidate.model(fitted.theta)
     state = State(fitted.theta, fitted.beta, {})
@@ -260,10 +268,19 @@ def score(fitted: Fit, blocks: Sequence[Block]) -> Fit:
         states = [State(state.theta, state.beta, {block.run: start}) for start in starts]
         left = costs(model, block, noise, state.beta, starts).tolist()
         near = _distinct(sorted(zip(left, states, strict=True), key=lambda one: one[0]), ALIKE * min(left))
-        reached = [descend(candidate, [block], noise, each, own=True) for each in near[:FOLLOWED]]
-        state.nuisance |= min(reached, key=lambda pair: pair[1])[0].nuisance
+        state.nuisance |= _own_lowest(candidate, block, noise, near[:FOLLOWED]).nuisance
     end = End(fitted.covariance, fitted.wider, fitted.pressed, fitted.step, fitted.condition)
     return _finished(candidate, blocks, noise, state, end)
+
+
+def _own_lowest(candidate: Candidate, block: Block, noise: Noise, states: Sequence[State]) -> State:
+    """Follow each state of a block's own unknowns down, as long as it may come below those before it."""
+    lowest, best = np.inf, states[0]
+    for state in states:
+        end, cost = descend(candidate, [block], noise, state, own=True, rival=lowest)
+        if cost < lowest:
+            lowest, best = cost, end
+    return best
 
 
 def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> Array:

@@ -34,7 +34,7 @@ FORM = ("form_xx", "form_xy", "form_yy")  # of the scanner: curvatures, as the h
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
 KINK = 0.1 * UM  # passages whose cuts differ by less finish a place together: teeth are less even than that
 
-NO_SHARE = math.log(np.finfo(float).tiny)  # logarithm of the share of a passage that finishes nothing
+NO_SHARE = math.log(1e-30)  # logarithm of the share of a passage that finishes nothing, were it metres high
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,10 +280,8 @@ class FlatnessModel:
         ``off`` is the relative error of the tip's frequencies.
         """
         height, above_static = self._heights(setting, nuisance, off)
-        lowest = height.min(axis=1, keepdims=True)
-        cut = np.isfinite(lowest)  # passes too far apart leave places uncut
-        lower = np.where(cut, lowest, 0.0) - np.where(cut, height, 0.0)
-        exponent = np.maximum(lower / KINK, NO_SHARE)
+        with np.errstate(invalid="ignore"):  # a place that no pass reaches: all passages finish it alike
+            exponent = np.fmax((height.min(axis=1, keepdims=True) - height) / KINK, NO_SHARE)
         share = np.exp(exponent)
         total = share.sum(axis=1, keepdims=True)
         return share / total, above_static + KINK * (exponent - np.log(total))

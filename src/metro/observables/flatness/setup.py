@@ -107,5 +107,14 @@ def swung(vibration: Vibration, phase: float, passages: Passages, pace: Pace) ->
     """Height of a vibrating tip, at passages (n, k), m; each face has its own ``phase``, rad."""
     if not vibration.amplitude:
         return np.zeros_like(passages.along)
-    turn = 2 * math.pi * vibration.frequency * pace.time(passages) + phase
-    return np.asarray(vibration.amplitude * np.sin(turn))
+    ahead, aside = _waves(vibration.frequency, passages, pace)
+    along, across = vibration.amplitude * math.cos(phase), vibration.amplitude * math.sin(phase)
+    return np.asarray(along * ahead + across * aside)
+
+
+# A search asks for one frequency at many phases: each run's own, and for each of them its derivatives.
+@lru_cache(maxsize=64)
+def _waves(frequency: float, passages: Passages, pace: Pace) -> tuple[Array, Array]:
+    """Return sine and cosine of a frequency in time at passages, (n, k) each."""
+    turn = 2.0 * math.pi * frequency * pace.time(passages)
+    return np.sin(turn), np.cos(turn)
