@@ -6,6 +6,7 @@ import pytest
 from toy import BEND, GATES, RIPPLE, SCATTER, Wave, problem
 
 from metro.loop.checks.between import Between
+from metro.loop.checks.evidence import missed
 from metro.loop.checks.restless import Restless
 from metro.loop.checks.signature import Line
 from metro.loop.search.forward import forward
@@ -52,6 +53,16 @@ def test_the_share_explained_is_of_the_power_within_and_between_runs(bent):
     # The difference between conditions came to light with the effects, and is held neither for nor against.
     assert replace(bent, **base, **left).explained == pytest.approx(1 - 0.05 / 0.25)
     assert replace(bent, **base, lines=(), restless=None, between=None).explained == 1.0
+
+
+def test_what_an_effect_took_of_a_misfit_that_hid_all_places_is_explained(bent):
+    """A vibration with another phase in every run: the base model shows no place, and then a small one."""
+    steady = dict.fromkeys(("base_between", "between", "base_restless", "restless"))
+    bare = replace(bent, base_lines=(), lines=(line(0.02),), **steady)
+    taken = missed(bent.base) ** 2 - missed(bent.final) ** 2
+    assert taken > 10 * 0.02**2
+    assert bare.explained == pytest.approx(taken / (taken + 0.02**2))
+    assert replace(bare, final=bent.base).explained == 0.0  # nothing was taken
 
 
 def test_a_scatter_that_changes_the_prediction_too_little_is_no_finding():
