@@ -62,7 +62,8 @@ def test_runs_above_the_noise_floor_are_counted_and_the_worst_is_named():
     ]
     assert (
         findings.above_floor(blocks, 2.5, "N")
-        == "1 of 3 runs exceeds the noise floor; b has the largest residual, 3.00 N."
+        == "1 of 3 runs exceeds the noise floor, as about half of them do where nothing is missing; "
+        "b has the largest residual, 3.00 N."
     )
     assert findings.above_floor(blocks, 9.0, "N").startswith("None of 3 runs exceeds")
 
@@ -78,4 +79,7 @@ def test_the_order_and_the_tooth_that_are_missed_most_are_named():
 
 def test_the_worst_speed_of_a_stability_boundary_is_told():
     boundary = pd.DataFrame({"rpm": [1000.0, 2000.0], "depth_mm": [0.5, 0.2]})
-    assert "up to 0.200 mm (reached at 2000 rpm)" in findings.lowest_boundary(boundary, [("depth_mm", "")])
+    told = findings.lowest_boundary(boundary, [("depth_mm", "")])
+    assert "up to 0.200 mm (reached at 2000 rpm, the end of the computed speeds)" in told
+    within = pd.DataFrame({"rpm": [1000.0, 2000.0, 3000.0], "depth_mm": [0.5, 0.2, 0.6]})
+    assert "up to 0.200 mm (reached at 2000 rpm)." in findings.lowest_boundary(within, [("depth_mm", "")])

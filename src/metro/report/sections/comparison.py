@@ -86,21 +86,19 @@ def _values(frame: pd.DataFrame, name: str, merit: list[Item], *, alone: bool) -
 def _curves(frame: pd.DataFrame, name: str, words: str, *, alone: bool) -> list[Item]:
     """Overlay, and maps where there are places on a face."""
     runs, shown = frame["run"].nunique(), figures.shown_runs(frame, alone=alone)
-    part = f" Runs {listing(shown)} of {runs}." if runs > len(shown) else ""
     blocks = frame["angle_deg"].notna().all() and frame["t_s"].nunique() > 1
     repeats = " One time block of each run is drawn." if blocks else ""
     abreast = ABREAST if len(figures.axes_of(frame)) > 1 else len(shown)
     items: list[Item] = []
     for i in range(0, len(shown), abreast):
         runs_here = shown[i : i + abreast]
-        about = f"{findings.left(frame)} {WHAT_IS_DRAWN.format(name)}{part}{repeats}"
+        drawn = frame[frame["run"].isin(runs_here)]
+        many = "Runs" if len(runs_here) > 1 else "Run"
+        part = f" {many} {listing(runs_here)} of {runs}." if runs > len(runs_here) else ""
         items.append(
             Picture(
-                figures.overlay(frame[frame["run"].isin(runs_here)], name, alone=alone),
-                f"{findings.left(frame[frame['run'].isin(runs_here)])} {WHAT_IS_DRAWN.format(name)} Runs "
-                f"{listing(runs_here)}."
-                if i
-                else about,
+                figures.overlay(drawn, name, alone=alone),
+                f"{findings.left(drawn)} {WHAT_IS_DRAWN.format(name)}{part}{repeats}",
                 f"Measured and predicted {name} for {listing(runs_here)}; {words}.",
             )
         )

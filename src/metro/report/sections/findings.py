@@ -113,7 +113,8 @@ def above_floor(blocks: Sequence[JSON], floor: float | None, shown: str | None) 
     some = (
         f"{above or 'None'} of {len(residuals)} runs {'exceed' if above > 1 else 'exceeds'} the noise floor"
     )
-    return f"{some}; {most}."
+    usual = ", as about half of them do where nothing is missing" if 0 < above <= len(residuals) / 2 else ""
+    return f"{some}{usual}; {most}."
 
 
 def lowest_boundary(boundary: pd.DataFrame, columns: Sequence[tuple[str, str]]) -> str:
@@ -123,7 +124,9 @@ def lowest_boundary(boundary: pd.DataFrame, columns: Sequence[tuple[str, str]]) 
         known = boundary[boundary[column].notna()]
         if len(known):
             row = known.iloc[int(known[column].argmin())]
-            depths.append(f"{number(row[column])} mm (reached at {number(row['rpm'], 4)} rpm){name}")
+            end = row["rpm"] in (boundary["rpm"].min(), boundary["rpm"].max())
+            at = f"{number(row['rpm'], 4)} rpm{', the end of the computed speeds' if end else ''}"
+            depths.append(f"{number(row[column])} mm (reached at {at}){name}")
     return f"At every speed a cut is stable up to {listing(depths)}." if depths else ""
 
 

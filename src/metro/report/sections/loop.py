@@ -172,7 +172,10 @@ def _residual_items(entry: JSON, record: JSON, left: str) -> list[Item]:
         hidden.setdefault(str(one.get("why") or ""), []).append(words(str(one["effect"])))
     if hidden:
         alike = [plain(f"{listing(names)}: {why}".rstrip(": ")) for why, names in hidden.items()]
-        items += [Paragraph("These effects cannot be detected in this batch:"), Bullets(alike)]
+        items += [
+            Paragraph("These effects cannot be detected in this batch, or only from a size on:"),
+            Bullets(alike),
+        ]
     if next_run := next_words(entry):
         items.append(Paragraph(f"What to do next: {next_run}."))
     return items
