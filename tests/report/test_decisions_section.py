@@ -52,6 +52,17 @@ def test_page_one_has_the_cut_that_removes_most_and_none_that_is_advised_against
     assert best_cut({"recommended_cuts": [better]}) == []
 
 
+def test_of_several_positions_that_which_bears_least_gives_the_recommended_cut():
+    deeper = {**CUT, "position": "2", "axial_depth_mm": 0.08, "removal_cm3_min": 9.0}
+    slower = {
+        **CUT,
+        "axial_depth_mm": 0.09,
+        "removal_cm3_min": 0.01,
+    }  # at the same position, but removes less
+    (line,) = best_cut({"recommended_cuts": [deeper, CUT, slower]})
+    assert "0.061 mm deep (position 1, which bears least of 2; position 2 bears 0.080 mm" in line
+
+
 def test_the_table_begins_with_what_does_not_conform():
     section = decisions(with_verdict(decisions=JUDGED))
     (table,) = [item for item in section.items if isinstance(item, Table)]

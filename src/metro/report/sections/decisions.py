@@ -61,16 +61,29 @@ def _plural(name: str) -> str:
 
 
 def best_cut(verdict: JSON) -> list[str]:
-    """Say the cut with the largest removal rate that is not advised against."""
+    """Say the cut that removes most and is not advised against, at the position that bears least.
+
+    A part is seldom cut at one position alone.
+    """
     cuts = [cut for cut in verdict.get("recommended_cuts") or [] if cut["advice"] != "do_not"]
     if not cuts:
         return []
-    best = max(cuts, key=lambda cut: cut["removal_cm3_min"])
+    of_position: dict[str, JSON] = {}
+    for cut in sorted(cuts, key=lambda cut: cut["removal_cm3_min"]):
+        of_position[str(cut["position"])] = cut
+    best = min(of_position.values(), key=lambda cut: cut["removal_cm3_min"])
+    most = max(of_position.values(), key=lambda cut: cut["removal_cm3_min"])
+    where = f"position {best['position']}"
+    if len(of_position) > 1:
+        where += (
+            f", which bears least of {len(of_position)}; position {most['position']} bears "
+            f"{number(most['axial_depth_mm'], 2)} mm at {number(most['spindle_rpm'], 4)} rpm"
+        )
     sure = probability(best["probability_stable"])
     reach = ", as deep as these runs let one judge" if best.get("at_reach") else ""
     return [
         f"Recommended cut: {number(best['spindle_rpm'], 4)} rpm, {number(best['axial_depth_mm'], 2)} mm deep"
-        f"{reach} (position {best['position']}): stable with probability {sure} or more, "
+        f"{reach} ({where}): stable with probability {sure} or more, "
         f"{number(best['removal_cm3_min'], 2)} cm³/min, {number(best['torque_nm'], 2)} N m. "
         f"{WHY[best['why']]}"
     ]
