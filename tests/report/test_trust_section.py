@@ -70,6 +70,15 @@ def test_predictions_that_miss_something_are_not_to_be_relied_on(status):
     assert "4.0 times the noise" in said
 
 
+@pytest.mark.parametrize(("ratio", "within"), [(0.9, True), (1.3, False)])
+def test_what_holds_on_the_held_out_runs_is_trusted_for_such_cuts_alone(ratio, within):
+    verification = {"holds": True, "ratio": ratio, "words": ""}
+    (said,) = trust(results(force=entry("unexplained", noise_floor=0.5, verification=verification)))
+    assert ("on the held-out runs the predictions are accurate to" in said) is within
+    assert ("do not use the predictions for other cuts than those" in said) is within
+    assert ("do not use the predictions, which have an error" in said) is not within
+
+
 def test_without_enough_runs_nothing_is_to_be_relied_on():
     assert (
         "no prediction was tested, so none can be relied on"

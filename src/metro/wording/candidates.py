@@ -15,7 +15,7 @@ LEAST_SHARE = 0.05  # percent, which one decimal shows as 0.0
 def _not_converged(values: JSON) -> str:
     step = float(values["step"])
     by = f"{step:.2g}" if step < FEW_DIGITS else f"{step:.0f}"
-    return f"the fit did not converge (next step: {by} standard deviations)"
+    return f"the fit did not converge (next step: {by} standard deviations), so that it was not tested"
 
 
 def _implausible(values: JSON) -> str:
@@ -76,11 +76,12 @@ def _absorbed(values: JSON) -> str:
 
 
 def _hidden_by_zeros(values: JSON) -> str:
-    least = f"{float(values['least']):.2g} {printed(values['unit'])}".rstrip()
+    least = float(f"{values['least']:.2g}")  # without an exponent, which two digits of 150 would have
+    size = f"{least:g} {printed(values['unit'])}".rstrip()
     return (
         "the offset and the position that are fitted in each run absorb all but "
         f"{100 * values['share']:.1f} % "
-        f"of it: it can be detected from {least} on"
+        f"of it: it can be detected from a size of {size} on"
     )
 
 

@@ -212,8 +212,10 @@ def tested_boundary(results: Results, frame: pd.DataFrame) -> list[Picture]:
     right = {k: int(((frame[k] > 0.5) == (frame["measured"] > 0.5)).sum()) for k in ("before", "after")}
     caption = (
         f"Stability boundary and held-out test cuts. The predicted side is right for {right['before']} of "
-        f"{len(frame)} cuts with the base model and for {right['after']} with the effects found."
+        f"{len(frame)} cuts with the base model"
     )
+    changed = bool((frame["before"] != frame["after"]).any())
+    caption += f" and for {right['after']} with the effects found." if changed else "."
     chart = figures.lobes_chart(boundary, placed(results, frame), results.tables.get("lobe_islands"))
     return [Picture(chart, caption, caption)]
 

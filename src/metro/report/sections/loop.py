@@ -71,10 +71,12 @@ def _signature(name: str, record: JSON) -> list[Picture]:
         return []
     full = [f"{e.get('axis') or ''} {e['label']}".strip() for e in entries if e.get("significant")]
     significant_places = (
-        f"{len(full)} of {len(entries)} parts exceed" if full else f"None of {len(entries)} parts exceeds"
+        f"{len(full)} of {len(entries)} parts exceed the noise by more than chance"
+        if full
+        else f"None of {len(entries)} parts exceeds the noise by more than chance"
     )
     bars = " (full bars)" if full else ""
-    caption = f"{name}: residual by pattern and axis. {significant_places} the noise{bars}."
+    caption = f"{name}: residual by pattern and axis. {significant_places}{bars}."
     alt = "Significant: " + (", ".join(full[:6]) if full else "nothing") + "."
     return [Picture(figures.signature(entries), caption, alt)]
 

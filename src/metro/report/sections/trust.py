@@ -98,11 +98,16 @@ def _reach(observable: str, entry: JSON) -> str:
         model = "predictions with the effects found" if entry.get("effects") else "predictions"
         return f"{name}: the {model} are accurate to {size}."
     after, floor = (entry.get("after") or {}).get("rms"), entry.get("noise_floor")
+    within = verification.get("holds") and (verification.get("ratio") or math.inf) <= 1.0
+    if within and status in ("unexplained", "partly_explained"):
+        return (
+            f"{name}: on the held-out runs the predictions are accurate to {size}, but the identification "
+            "runs have an error that is not explained: do not use the predictions for other cuts than those."
+        )
     times = f", {number(after / floor, 2)} times the noise floor" if after and floor and after > floor else ""
     return (
         f"{name}: do not use the predictions, which have an error of up to {size}{times}. The measured "
-        "values "
-        "are usable."
+        "values are usable."
     )
 
 
