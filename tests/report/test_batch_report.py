@@ -1,5 +1,6 @@
 """The report of a batch: what it says, and that it says it the same way each time."""
 
+import re
 import subprocess
 from dataclasses import replace
 
@@ -67,6 +68,12 @@ def test_the_list_of_source_files_has_the_sum_that_sha256sum_would_give(pages):
     text = " ".join(pages)
     assert summed.stdout.split()[0] in text
     assert all(name in text and digest[:12] in text for name, digest in named)
+
+
+def test_tables_are_numbered_without_gaps(pages):
+    numbers = [int(number) for number in re.findall(r"Table (\d+)[.:]", " ".join(pages))]
+    assert "signature" in " ".join(pages)  # of those who approve: a table without a title
+    assert numbers == list(range(1, len(numbers) + 1))
 
 
 def test_failed_checks_come_before_what_was_checked(pages):
