@@ -62,7 +62,7 @@ def test_what_passes_for_scatter_is_unexplained_where_repeats_do_not_scatter():
     assert closed(task)["status"] == "clean"
     verdict = closed(scaled(task, 3.0, 1.08))
     assert verdict["status"] == "unexplained"
-    assert "differ between conditions" in verdict["unexplained"]["signature"]
+    assert "differ between the conditions" in verdict["unexplained"]["signature"]
     assert "largest in identify-3" in verdict["unexplained"]["signature"]
     signal = np.sqrt(np.mean([block.measured**2 for block in task.role("validate")]))
     assert verdict["unexplained"]["rms"] == pytest.approx(0.035 * signal, rel=0.3)
@@ -83,7 +83,7 @@ def test_a_rest_between_conditions_that_an_effect_lays_bare_is_no_evidence_again
     assert beside.explained == alone.explained > 0.99
     verdict = closed(scaled(task, 3.0, 1.08))
     assert verdict["status"] == "partly_explained"
-    assert "differ between conditions" in verdict["unexplained"]["signature"]
+    assert "differ between the conditions" in verdict["unexplained"]["signature"]
 
 
 def test_differences_between_conditions_that_stay_are_unexplained():

@@ -49,8 +49,9 @@ def _step(values: JSON) -> str:
 
 def _between(values: JSON) -> str:
     return (
-        f"the base parameters differ between conditions by {100 * values['relative']:.2g} % of the signal, "
-        f"which exceeds the scatter of repeats; the difference is largest in {values['condition']}"
+        "the base parameters differ between the conditions of the identification by "
+        f"{100 * values['relative']:.2g} % of the signal, which exceeds the scatter of repeats; the difference "
+        f"is largest in {values['condition']}"
     )
 
 
@@ -86,8 +87,9 @@ def _unseen(values: JSON) -> str:
 
 def _above_floor(values: JSON) -> str:
     return (
-        f"the prediction of left-out conditions has {values['ratio']:.2g} times the error that noise "
-        f"explains ({_chance(values['p_value'])}), the largest in {values['condition']}"
+        "the prediction of identification conditions, each left out in turn, has "
+        f"{values['ratio']:.2g} times the error that noise explains "
+        f"({_chance(values['p_value'])}), the largest in {values['condition']}"
     )
 
 
