@@ -50,8 +50,8 @@ def _step(values: JSON) -> str:
 def _between(values: JSON) -> str:
     return (
         "the base parameters differ between the conditions of the identification by "
-        f"{100 * values['relative']:.2g} % of the signal, which exceeds the scatter of repeats; the difference "
-        f"is largest in {values['condition']}"
+        f"{100 * values['relative']:.2g} % of the signal, which exceeds the scatter of repeats; the "
+        f"difference is largest in {values['condition']}"
     )
 
 

@@ -153,7 +153,7 @@ def signature(entries: Sequence[JSON]) -> Figure:
                     (bar,) = axes.barh(at, _share(entry), 0.9 * thick, color=face, lw=0.7)
                     bar.set(edgecolor=colour, hatch=hatch)
         axes.set_yticks([-i for i in range(len(labels))], [_shown(label) for label in labels], fontsize=8)
-        axes.set(ylim=(0.4 - len(labels), 0.6), xlabel="beyond the noise (% of the signal)")
+        axes.set(ylim=(0.4 - len(labels), 0.6), xlabel="residual less the mean noise (% of the signal)")
         axes.set_xlim(0, 1.05 * max(SMALLEST, *map(_share, entries)))
         axes.grid(visible=False, axis="y")
         if len(names) > 1:
