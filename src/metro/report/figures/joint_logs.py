@@ -20,6 +20,9 @@ ACROSS = 3
 def friction(curve: pd.DataFrame, table: pd.DataFrame) -> Figure:
     """Draw the friction of each joint over its speed, in bins, and the line of Coulomb and viscous friction.
 
+    Without the constant part, which is weight as much as an error of the zero. Where a motion does not
+    determine Coulomb friction, how the torque divides into friction and weight is open: nothing is drawn.
+
     Parameters
     ----------
     curve : rows of ``joint_log_curve`` of one run. table : of ``joint_log`` of it.
@@ -30,10 +33,17 @@ def friction(curve: pd.DataFrame, table: pd.DataFrame) -> Figure:
         for axes, joint in places:
             part = curve[curve["joint"] == joint].sort_values("speed_deg_s")
             row = table[table["joint"] == joint].iloc[0]
+            axes.set_title(f"joint {joint}", loc="left")
             speed = part["speed_deg_s"].to_numpy(float)
+            offset, level, slope = (float(row[n]) for n in ("offset", "coulomb", "viscous"))
+            if not np.isfinite(level):
+                where = {"ha": "center", "va": "center", "transform": axes.transAxes}
+                axes.text(0.5, 0.5, "not determined", fontsize="small", **where)
+                continue
+            offset, slope = np.nan_to_num([offset, slope]).tolist()
             axes.errorbar(
                 speed,
-                part["friction"],
+                part["friction"] - offset,
                 part["sd"],
                 fmt="o",
                 ms=2.5,
@@ -41,13 +51,11 @@ def friction(curve: pd.DataFrame, table: pd.DataFrame) -> Figure:
                 elinewidth=0.6,
                 label="measured",
             )
-            offset, level, slope = (np.nan_to_num(float(row[n])) for n in ("offset", "coulomb", "viscous"))
-            line = offset + level * np.sign(speed) + slope * np.radians(speed)
+            line = level * np.sign(speed) + slope * np.radians(speed)
             for way in (speed < 0, speed > 0):
                 if way.any():
                     label = "Coulomb and viscous" if way[0] else None
                     axes.plot(speed[way], line[way], color=style.AFTER, label=label)
-            axes.set_title(f"joint {joint}", loc="left")
         _name(figure, places, "speed (°/s)", f"friction ({unit})")
     return figure
 
@@ -85,7 +93,9 @@ def _name(figure: Figure, places: list[tuple[Axes, int]], below: str, left: str)
     for axes in _last(places):
         axes.set_xlabel(below)
     figure.supylabel(left, fontsize="medium")
-    style.legend_above(figure, places[0][0])
+    named = next((axes for axes, _ in places if axes.get_legend_handles_labels()[1]), None)
+    if named:
+        style.legend_above(figure, named)
 
 
 def _last(places: list[tuple[Axes, int]]) -> Iterator[Axes]:

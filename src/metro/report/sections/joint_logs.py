@@ -149,8 +149,9 @@ def _curves(results: Results, table: pd.DataFrame) -> list[Item]:
     items: list[Item] = []
     for run in list(curve["run"].drop_duplicates())[:RUNS]:
         caption = (
-            f"Friction by speed in run {run}: means of bins with their scatter, the torque of the links "
-            "taken away, and the line of Coulomb and viscous friction."
+            f"Friction by speed in run {run}: means of bins with their scatter, the torque of the links and "
+            "what is constant taken away, and the line of Coulomb and viscous friction. Where the motion "
+            "does not determine Coulomb friction, the torque may be weight as well, and nothing is drawn."
         )
         drawn = figures.friction(curve[curve["run"] == run], table[table["run"] == run])
         items.append(Picture(drawn, caption, caption))

@@ -46,7 +46,8 @@ def joint_facts(results: Results) -> list[Item]:
     run = str(curve["run"].iloc[0])
     one = identified["joints"]["runs"][run]
     pairs = zip(one["joints"], one["coulomb"], strict=True)
-    known = [(joint, value) for joint, value in pairs if value["value"] is not None]
+    # Friction opposes the motion: an interval that reaches zero determines none.
+    known = [(joint, value) for joint, value in pairs if value["value"] is not None and value["ci95"][0] > 0]
     if known:
         joint, value = max(known, key=lambda pair: abs(pair[1]["value"]))
         facts.append(("largest Coulomb friction", quantity(value), f"joint {joint}, run {run}"))
