@@ -37,8 +37,7 @@ def friction(curve: pd.DataFrame, table: pd.DataFrame) -> Figure:
             speed = part["speed_deg_s"].to_numpy(float)
             offset, level, slope = (float(row[n]) for n in ("offset", "coulomb", "viscous"))
             if not np.isfinite(level):
-                where = {"ha": "center", "va": "center", "transform": axes.transAxes}
-                axes.text(0.5, 0.5, "not determined", fontsize="small", **where)
+                axes.text(0.5, 0.5, "not determined", ha="center", va="center", transform=axes.transAxes)
                 continue
             offset, slope = np.nan_to_num([offset, slope]).tolist()
             axes.errorbar(
