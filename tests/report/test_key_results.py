@@ -79,6 +79,23 @@ def test_the_least_stiffness_is_that_of_the_softest_direction_that_was_loaded():
     assert value == ["0.500 ± 0.010 N/µm along y", "load tests at A, P2"]
 
 
+def test_the_least_stiffness_is_of_a_pose_in_which_the_runs_cut_where_one_was_loaded():
+    loads = pd.DataFrame(
+        [
+            {"pose": pose, "point": "", "tests": 6}
+            | {f"k{axis}{end}_n_um": k for axis in "xyz" for end in ("", "_low", "_high")}
+            for pose, k in (("p1", 0.5), ("p2", 0.3))
+        ]
+    )
+    for cut, told in (("p1", ("0.500", "load tests at p1, where the runs cut")), ("p9", ("0.300", "at p2"))):
+        runs = pd.DataFrame({"pose": [cut]}, index=["r1"])
+        batch = Results(Batch("b", {}, {}, runs, {}), {"load_points": loads}, {}, {}, {})
+        (table,) = key_results(batch)
+        (row,) = table.rows
+        assert row[1].startswith(told[0])
+        assert row[2].endswith(told[1])
+
+
 def test_a_joint_that_was_not_determined_is_named_and_no_number_is_invented():
     joints = [made.q(1.8e6, 0.03e6, "N m/rad"), {"value": None, "ci95": [None, None], "unit": "N m/rad"}]
     value, _ = rows({"arm": {"joint_stiffness": joints}})["joint stiffness 1 to 2"]

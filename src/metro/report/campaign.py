@@ -221,7 +221,7 @@ def _undetermined(entries: list[tuple[str, str, JSON]], identified: Mapping[str,
         if row["unexplained"]:
             sentences.append(f"{batch}, {title(name)}: unexplained residual, {plain(row['unexplained'])}.")
         if row["status"] == "insufficient":
-            sentences.append(f"{batch}, {title(name)}: there are too few runs to decide.")
+            sentences.append(f"{batch}, {title(name)}: there are too few identification runs to decide.")
     missing = _missing(identified)
     items: list[Item] = [Bullets(sentences)] if sentences else [Paragraph("Every residual was explained.")]
     if missing:

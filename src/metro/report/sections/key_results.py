@@ -106,7 +106,7 @@ def _boundary(results: Results) -> Iterator[Row]:
 
 
 def _stiffness(results: Results) -> Iterator[Row]:
-    """Give the stiffness of the joints, and the least stiffness at the tool by load tests."""
+    """Give the stiffness of the joints, and the least at the tool by load tests, of poses that cut if any."""
     joints = (results.identified.get("arm") or {}).get("joint_stiffness") or []
     known = [entry for entry in joints if isinstance(entry, dict) and entry.get("value") is not None]
     if known:
@@ -119,13 +119,17 @@ def _stiffness(results: Results) -> Iterator[Row]:
         )
     table = results.tables.get("load_points")
     rows: list[Mapping[Any, Any]] = [] if table is None else list(table.to_dict("records"))
+    poses = set(results.batch.runs["pose"].astype(str)) if "pose" in results.batch.runs else set()
+    cut = [row for row in rows if str(row["pose"]) and str(row["pose"]) in poses]
+    rows = cut or rows
     axes = [(row, axis) for row in rows for axis in "xyz" if row[f"k{axis}_n_um"] > 0]
     if axes:
         row, axis = min(axes, key=lambda one: float(one[0][f"k{one[1]}_n_um"]))
         low_high = [row[f"k{axis}_{end}_n_um"] for end in ("low", "high")]
         place = ", ".join(filter(None, [str(row["pose"]), str(row["point"])]))
         value = f"{with_interval(row[f'k{axis}_n_um'], low_high)} N/µm along {axis}"
-        yield "least static stiffness", value, f"load tests{f' at {place}' if place else ''}"
+        about = f"load tests{f' at {place}' if place else ''}{', where the runs cut' if cut else ''}"
+        yield "least static stiffness", value, about
 
 
 def _faces(results: Results) -> Iterator[Row]:

@@ -130,8 +130,15 @@ def agreement(methods: pd.DataFrame, boundary: pd.DataFrame | None) -> list[str]
             notes.append(f"{words} by {_spread(known)}, over {len(known)} speeds.")
         missing = len(change) - len(known)
         if missing and column != "single_mode_mm":
-            notes.append(f"At {missing} speeds that method found no boundary near the default one's.")
+            notes.append(f"At {missing} speeds {_METHODS[column]} found no boundary near the default one's.")
     return notes
+
+
+_METHODS = {
+    "semidiscretisation_mm": "semi-discretisation",
+    "tool_mm": "the solution with the tool's helix, pitch and runout",
+    "cdsem_mm": "CDSEM",
+}
 
 
 def _spread(change: Array) -> str:
