@@ -7,7 +7,7 @@ import pytest
 import synthetic_results as synthetic
 
 from metro.report.content import Picture, Table
-from metro.report.results import Results
+from metro.report.results import Results, without_lone_intervals
 from metro.report.sections.summary import first_words, summary
 from metro.report.sections.trust import IDENTIFIED, MEASURED, UNTESTED, trust, trust_in, untested
 from metro.report.sections.verdict import next_words
@@ -165,3 +165,13 @@ def test_a_verification_that_fails_says_not_to_use_the_predictions_whatever_the_
         )
         assert "predictions are accurate to" in good
         assert "do not use the predictions" in bad
+
+
+def test_repeats_of_one_condition_have_no_interval_of_an_error_in_any_report():
+    error = {"rms": 2.0, "nrmse": 0.1, "ci95": [1.0, 4.0]}
+    told = {"force": {"held_out_runs": ["r1", "r2"], "before": error, "after": error}}
+    runs = pd.DataFrame({"condition": ["slot", "slot"]}, index=["r1", "r2"])
+    alone = without_lone_intervals({"observables": told}, runs)["observables"]["force"]
+    assert alone["before"] == alone["after"] == {**error, "ci95": None}
+    several = runs.assign(condition=["slot", "side"])
+    assert without_lone_intervals({"observables": told}, several)["observables"] == told

@@ -193,7 +193,7 @@ def _verdicts(entries: list[tuple[str, str, JSON]]) -> list[Item]:
     ]
     header = ["batch", "observable", "verdict", "before", "after", "unit", "noise", "effects added"]
     caption = (
-        "Errors on held-out runs (rms, with 95 % intervals where these are known) before "
+        "Errors on held-out runs (rms, with 95 % intervals; none where one condition was held out) before "
         "and after the effects that were found."
     )
     return [Table(header, rows, caption, [1.5, 1.3, 1, 1.25, 1.25, 0.5, 0.75, 2.1])] if rows else []

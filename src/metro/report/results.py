@@ -42,25 +42,13 @@ class Results:
 
     def verdicts(self) -> dict[str, JSON]:
         """Verdict by observable, in the contract's order; of one held-out condition without intervals."""
-        entries = with_facts(self.verdict, self.loop).get("observables") or {}
+        told = without_lone_intervals(with_facts(self.verdict, self.loop), self.batch.runs)
+        entries = told.get("observables") or {}
         return {
-            name: self._honest(entries[name])
+            name: entries[name]
             for name in [*names(), *sorted(set(entries) - set(names()))]
             if name in entries
         }
-
-    def _honest(self, entry: JSON) -> JSON:
-        """Drop the intervals over held-out runs where these are repeats of one condition.
-
-        Parts of runs that were held out have intervals of their own.
-        """
-        if "held_out" in entry:
-            return entry
-        known = self.batch.runs["condition"].to_dict() if "condition" in self.batch.runs else {}
-        if len({known.get(run, run) for run in entry.get("held_out_runs") or []}) > 1:
-            return entry
-        errors = {when: {**error, "ci95": None} for when in ("before", "after") if (error := entry.get(when))}
-        return {**entry, **errors}
 
     def loop_record(self, observable: str) -> JSON:
         """Return what the loop recorded of an observable; empty where it recorded nothing."""
@@ -76,6 +64,24 @@ class Results:
             (table["observable"] == observable) & table["measured"].notna() & table["before"].notna()
         ]
         return None if rows.empty else rows.fillna({"after": rows["before"]}).reset_index(drop=True)
+
+
+def without_lone_intervals(verdict: JSON, runs: pd.DataFrame) -> JSON:
+    """Return the content of verdict.json without intervals over held-out runs that are of one condition.
+
+    Parts of runs that were held out have intervals of their own.
+    """
+    known = runs["condition"].to_dict() if "condition" in runs else {}
+
+    def shown(entry: JSON) -> JSON:
+        held = {known.get(run, run) for run in entry.get("held_out_runs") or []}
+        if "held_out" in entry or len(held) > 1:
+            return entry
+        errors = {when: {**error, "ci95": None} for when in ("before", "after") if (error := entry.get(when))}
+        return {**entry, **errors}
+
+    entries = {name: shown(entry) for name, entry in (verdict.get("observables") or {}).items()}
+    return {**verdict, "observables": entries}
 
 
 def with_facts(verdict: JSON, loop: JSON) -> JSON:

@@ -15,7 +15,7 @@ from metro.memory.remember import remember
 from metro.observables.catalogue import drawn_tables
 from metro.report.campaign import campaign_report, campaign_sections, campaign_table
 from metro.report.page.build import campaign_page
-from metro.report.results import Results, with_facts
+from metro.report.results import Results, with_facts, without_lone_intervals
 from metro.units import JSON
 
 # What the page draws of the loop, beside the observed tables.
@@ -47,12 +47,16 @@ def campaign(
     failed = {batch: _reason(Path(log)) for batch, log in (unfinished or {}).items()}
     provenance = {"code": code, "settings": json.dumps(settings), "batches": json.dumps(sorted(verdicts))}
     links = {f.name: quote(os.path.relpath(f / "report.pdf", out)) for f in reports}
-    pdf = campaign_report(verdicts, identified, memory, failed, links)
+    shown = {
+        name: without_lone_intervals(verdict, read_batch(processed / name).runs)
+        for name, verdict in verdicts.items()
+    }
+    pdf = campaign_report(shown, identified, memory, failed, links)
     write_table(out / "summary.parquet", campaign_table(verdicts, failed), provenance)
     write_json(out / "memory.json", memory)
     write_atomically(out / "summary.pdf", lambda stream: stream.write(pdf))
     page = campaign_page(
-        campaign_sections(verdicts, identified, memory, failed),
+        campaign_sections(shown, identified, memory, failed),
         (
             _results(processed / f.name, verdicts[f.name], identified[f.name])
             for f in sorted(reports, key=_name)

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator
 
 from metro import __version__
 from metro.observables.catalogue import assumptions, title
 from metro.report.content import Bullets, Heading, Item, Paragraph, Section, Table
+from metro.report.numbers import number
 from metro.report.phrases import sentence
 from metro.report.results import Results
 from metro.report.sections.identity import identity
 from metro.units import JSON
 
 LONGEST, SHORT, DIGITS = 240, 16, 12
+NOT_PREDICTED = ("lobes", "pose")  # what is identified by a model, and may be tested on nothing
 
 
 def provenance(results: Results) -> Section:
@@ -23,13 +26,31 @@ def provenance(results: Results) -> Section:
 
 
 def _limits(results: Results) -> list[Item]:
-    notes = []
+    """Say what the models assume that predict, and those that only identified something."""
+    notes = [*_of_modes(results)]
+    known = {name: results.identified.get(name) for name in NOT_PREDICTED if name not in results.verdicts()}
+    notes += [f"{sentence(title(n)).rstrip('.')}: {sentence(assumptions(n))}" for n, v in known.items() if v]
     for observable in results.verdicts():
         own = [str(note) for note in results.loop_record(observable).get("notes") or []]
         limit = [] if results.batch.manifest.get("source") == "published" else [assumptions(observable)]
         text = " ".join(sentence(note) for note in [*limit, *own] if note)
         notes.append(f"{sentence(title(observable)).rstrip('.')}: {text}")
     return [Heading("Limits of the models"), Bullets(notes, small=True)] if notes else []
+
+
+def _of_modes(results: Results) -> Iterator[str]:
+    """Say what modes assume, and which frequencies they do not reach."""
+    used = results.tables.get("frf_used")
+    if not results.identified.get("modes"):
+        return
+    reach = "the frequencies that were measured"
+    if used is not None and len(used):
+        low, high = used["frequency_hz"].min(), used["frequency_hz"].max()
+        reach = f"the band of the frequency responses that were used, {number(low)} to {number(high)} Hz"
+    yield (
+        "Modes: linear and viscously damped, the same at every amplitude and speed. Outside "
+        f"{reach}, nothing is known of them; a mode there, as of the tool, may lower the stability boundary."
+    )
 
 
 def _code(results: Results) -> list[Item]:
