@@ -141,7 +141,10 @@ def _force(force: JSON, drawn: list[Item], effects: str) -> list[Item]:
     items += [Bullets([f"{str(warning).rstrip('.')}." for warning in warnings])] if warnings else []
     speeds = force.get("spindle_rpm") or {}
     if speeds:
-        items.append(_by_run(speeds, "spindle speed", "Spindle speed from each record."))
+        about = "Spindle speed from each record by its own clock, whose error comes on top."
+        if any(None in speed["ci95"] for speed in speeds.values()):
+            about += " Of a cut too short to be divided, its interval is not known."
+        items.append(_by_run(speeds, "spindle speed", about))
     return items
 
 
