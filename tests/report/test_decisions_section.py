@@ -63,6 +63,16 @@ def test_of_several_positions_that_which_bears_least_gives_the_recommended_cut()
     assert "0.061 mm deep (position 1, which bears least of 2; position 2 bears 0.080 mm" in line
 
 
+def test_what_to_do_is_said_once_whatever_the_reasons():
+    near = {**CUT, "advice": "try", "why": "no_test_below_the_band"}
+    far = {**CUT, "advice": "try", "why": "no_test_at_such_a_speed"}
+    section = decisions(with_verdict(recommended_cuts=[near, far]))
+    (told,) = [item.text for item in section.items if isinstance(item, Paragraph)]
+    assert told.count("Begin at half the depth and listen.") == 1
+    assert "No test cut confirms this boundary." in told
+    assert "The test cuts were made at other speeds." in told
+
+
 def test_the_table_begins_with_what_does_not_conform():
     section = decisions(with_verdict(decisions=JUDGED))
     (table,) = [item for item in section.items if isinstance(item, Table)]

@@ -22,11 +22,12 @@ NAMES = {
 WORDS = {"conforms": "conforms", "does_not_conform": "does not conform", "undecided": "undecided"}
 FIRST = ("does_not_conform", "undecided", "conforms")  # order of the rows
 MOST = 16  # rows
+LISTEN = " Begin at half the depth and listen."
 WHY = {
     "tests_confirm_the_band": "The test cuts below the limit of this boundary were stable.",
-    "no_test_below_the_band": "No test cut confirms this boundary. Begin at half the depth and listen.",
-    "no_test_at_such_a_speed": "The test cuts were made at other speeds. Begin at half the depth and listen.",
-    "too_few_tests": "Too few test cuts confirm this boundary. Begin at half the depth and listen.",
+    "no_test_below_the_band": f"No test cut confirms this boundary.{LISTEN}",
+    "no_test_at_such_a_speed": f"The test cuts were made at other speeds.{LISTEN}",
+    "too_few_tests": f"Too few test cuts confirm this boundary.{LISTEN}",
     "tests_chatter_below_the_band": "Do not use these cuts: test cuts below the limit chattered.",
     "verdict_unexplained": "Do not use these cuts: the tests contradict the boundary for an unknown reason.",
     "verdict_undetermined": "Do not use these cuts: the tests do not determine why the boundary is wrong.",
@@ -154,8 +155,10 @@ def _cuts(verdict: JSON) -> list[Item]:
         [1, 0.8, 0.8, 0.8, 1.2, 1.3, 0.9, 0.9, 1.3],
         numeric=list(range(1, 8)),
     )
-    reasons = dict.fromkeys(WHY[str(cut["why"])] for cut in cuts)
-    return [Heading("Recommended cuts"), *(Paragraph(text) for text in reasons), table]
+    given = dict.fromkeys(WHY[str(cut["why"])] for cut in cuts)
+    reasons = " ".join(text.removesuffix(LISTEN) for text in given)
+    reasons += LISTEN if any(text.endswith(LISTEN) for text in given) else ""
+    return [Heading("Recommended cuts"), Paragraph(reasons), table]
 
 
 TORQUE, BENT = "torque (N m)", "torque, bending (N m)"
