@@ -9,7 +9,7 @@ import synthetic_results as synthetic
 from metro.report.content import Picture, Table
 from metro.report.results import Results, without_lone_intervals
 from metro.report.sections.summary import first_words, summary
-from metro.report.sections.trust import IDENTIFIED, MEASURED, UNTESTED, trust, trust_in, untested
+from metro.report.sections.trust import IDENTIFIED, MEASURED, PRINTED, UNTESTED, trust, trust_in, untested
 from metro.report.sections.verdict import next_words
 
 RUNS = pd.DataFrame(
@@ -120,6 +120,7 @@ def test_what_was_not_identified_does_not_hold_within_an_interval():
     assert untested({"format": 1, "arm": {"not_identified": {"waviness": "no arm"}}, "faces": {}}) == UNTESTED
     assert untested({"faces": {"r1": {}}, "texture": {"r1": {}}, "arm": {"not_identified": {}}}) == MEASURED
     assert untested({"faces": {"r1": {}}, "modes": [{}]}) == IDENTIFIED
+    assert untested({"modes": [{}]}, printed=True) == PRINTED
 
 
 def test_what_to_measure_next_says_where_the_verdict_does_without():

@@ -18,6 +18,10 @@ IDENTIFIED = (
     f"{UNTESTED} The identified values are valid within their intervals for the declared set-up. How well "
     "they predict a cut is not known."
 )
+PRINTED = (
+    f"{UNTESTED} The values are as they were printed. Where no interval was printed, there is none here, nor "
+    "of what was computed from them. How well they predict a cut is not known."
+)
 MEASURED = (
     f"{UNTESTED} The values describe the measured part of the surface only. Their intervals include the "
     "contributions that are stated with them."
@@ -44,18 +48,20 @@ def trust(results: Results) -> list[str]:
         said = " ".join(filter(None, [_reach(name, entry), _causes(entry)]))
         alike.setdefault(_tested(results, entry), []).append(said)
     return [f"{' '.join(said)} {tested}".rstrip() for tested, said in alike.items()] or [
-        untested(results.identified)
+        untested(results.identified, printed=results.batch.manifest.get("source") == "published")
     ]
 
 
-def untested(identified: JSON) -> str:
-    """Say what figures are worth that no prediction was tested with: identified ones, or of a surface."""
+def untested(identified: JSON, *, printed: bool = False) -> str:
+    """Say what figures are worth that no prediction was tested with: identified, printed, or of a surface."""
     found = {name for name, block in identified.items() if name not in ABOUT and _has_values(block)}
     if not found:
         return UNTESTED
     if found == {"pose"}:
         return POSED
-    return MEASURED if found <= set(OF_SURFACES) else IDENTIFIED
+    if found <= set(OF_SURFACES):
+        return MEASURED
+    return PRINTED if printed else IDENTIFIED
 
 
 def _has_values(block: JSON) -> bool:
