@@ -126,4 +126,4 @@ def test_an_arm_that_is_much_softer_is_one_and_it_is_said_what_it_would_take_wit
     assert max(abs(one["after"]) / one["sd"] for one in told) < 3.0
     words = worded(to_json(strained(told, outcome)))
     assert words.startswith("Without stiffness scale, errors of the instruments would have to be: ")
-    assert "known within ±10 %, with it" in words
+    assert "known within ±10 %; with this effect: " in words

@@ -156,7 +156,10 @@ def _strained(values: JSON) -> str:
     for one in map(_in_percent, values["far"]):
         known = f"known within ±{2.0 * one['sd']:.2g} {printed(one['unit'])}"
         if abs(one["before"]) > values["limit"] * one["sd"]:
-            then = f", with {'them' if len(effects) > 1 else 'it'} {one['after']:.2g}" if effects else ""
+            after = f"{one['after']:.2g} {printed(one['unit'])}".rstrip()
+            then = (
+                f"; with {'these effects' if len(effects) > 1 else 'this effect'}: {after}" if effects else ""
+            )
             without.append(
                 f"{belief(one['name'])} {one['before']:.2g} {printed(one['unit'])} ({known}{then})"
             )
