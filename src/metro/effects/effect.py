@@ -40,8 +40,7 @@ class EffectParameter:
     choices : what the values 0, 1, … stand for, where the parameter is a choice among these.
     nothing_below, nothing_above : whether nothing can be beyond the lower, the upper bound: no tool is
         rounder than a ball. A value at such a bound may be true, at any other the true value is beyond it.
-    decisive : whether its group is not shown where it is not determined as the effect is added: what has no
-        damping does not ring.
+    decisive : whether its group is not shown where it is not determined: what has no damping does not ring.
     optional : whether those who declare the effect may leave it out; it is ``neutral`` then.
     local : whether it is another quantity in each observable (an amplitude along another axis): where one
         cause shows in several, the others are shared.
