@@ -113,27 +113,6 @@ def test_a_group_whose_decisive_parameter_is_open_does_not_show_the_effect(group
     assert (why is None) is (group == 0 or not decisive)
 
 
-def test_what_was_determined_when_it_was_added_may_be_left_open_by_another_one():
-    found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
-    half = 2.0 * float(np.sqrt(found.covariance[-1, -1] * found.dispersion))
-    (bend,) = BEND.parameters
-    ends = {"lower": found.theta[0] - 0.9 * half, "upper": found.theta[0] + 0.9 * half}
-    vague = replace(BEND, parameters=(bend, replace(bend, name="vague", decisive=True, **ends)))
-    size = float(found.theta[0])
-
-    def both(*effects):
-        count = sum(len(effect.parameters) for effect in effects)
-        base, own = np.diag(found.covariance)[:-1], found.covariance[-1, -1]
-        covariance = np.diag(np.concatenate([base, np.full(count, own)]))
-        candidate = Candidate(found.candidate.base, effects)
-        changed = {"theta": np.full(count, size), "covariance": covariance, "pressed": np.zeros(count)}
-        return unsettled(replace(found, candidate=candidate, **changed))
-
-    assert both(vague) == Statement("undetermined")
-    assert both(RIPPLE, vague) == Statement("undetermined")
-    assert both(vague, RIPPLE) is None
-
-
 def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):
     task = problem(1, truth=Wave(bend=0.1), phased=False)
     base = fitted(task)

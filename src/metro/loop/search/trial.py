@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from metro.effects.effect import Effect, EffectParameter
+from metro.effects.effect import Effect
 from metro.loop.checks import signature as residual
 from metro.loop.checks.evidence import Evidence, compare, hold_out, leave_out, missed, weights
 from metro.loop.checks.left_out import left_out
@@ -219,19 +219,13 @@ def unsettled(fitted: Fit) -> Statement | None:
     beyond_bound = fitted.pressed > HALF_INTERVAL * np.sqrt(fitted.dispersion)
     parts = fitted.candidate.parts(fitted.theta)
     for effect, place in parts:
-        tried_last = effect is fitted.candidate.effects[-1]
-        # What was determined when it was added is not refuted where another one beside it leaves it open.
-        shown = effect if tried_last else replace(effect, parameters=_none_decisive(effect))
-        why = _undetermined(shown, fitted.theta[place], half[place], beyond_bound[place])
+        why = _undetermined(effect, fitted.theta[place], half[place], beyond_bound[place])
         if why is not None:  # of the one that was tried last, or of one that was there already
+            tried_last = effect is fitted.candidate.effects[-1]
             return why if tried_last else Statement("beside", {"effect": effect.name, "why": why})
     if repeated := tied(fitted):
         return Statement("tied", vars(repeated))
     return beyond(fitted, fitted.blocks)
-
-
-def _none_decisive(effect: Effect) -> tuple[EffectParameter, ...]:
-    return tuple(replace(parameter, decisive=False) for parameter in effect.parameters)
 
 
 def _undetermined(effect: Effect, value: Array, half: Array, pressed: np.ndarray) -> Statement | None:
