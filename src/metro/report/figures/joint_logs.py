@@ -38,6 +38,7 @@ def friction(curve: pd.DataFrame, table: pd.DataFrame) -> Figure:
             offset, level, slope = (float(row[n]) for n in ("offset", "coulomb", "viscous"))
             if not np.isfinite(level):
                 axes.text(0.5, 0.5, "not determined", ha="center", va="center", transform=axes.transAxes)
+                axes.set(xticks=[], yticks=[])
                 continue
             offset, slope = np.nan_to_num([offset, slope]).tolist()
             axes.errorbar(
