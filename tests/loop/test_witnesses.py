@@ -223,3 +223,24 @@ def test_a_condition_that_is_left_out_has_no_part_in_what_predicts_it(pair, monk
     one.sharing([replace(other, covariance=np.array([[np.inf]]))])
     assert len({round(theta, 6) for theta, _ in own}) == 5  # four conditions, and all
     assert [value for _, value in own] == pytest.approx([theta for theta, _ in own])
+
+
+def test_what_is_shared_may_be_one_of_several_parameters_of_an_effect(pair):
+    """Two parameters or more had not fitted the standard errors of none, and one had passed unseen."""
+    one, _ = pair
+    prior = one.closed.outcome.prior
+    wide = fit(Candidate(Wave(), (BEND, RIPPLE)), one.smaller.blocks, prior, one.smaller)
+    assert len(wide.theta) > 1
+    given = one.at(wide, np.array([0.1]))
+    alone = fit(Candidate(Wave(bend=0.1, ripple=float(wide.theta[1]))), one.smaller.blocks, prior)
+    assert given.theta.size == 0
+    for block in one.smaller.blocks:
+        bent, known = (each.candidate.model(each.theta) for each in (given, alone))
+        for got, wanted in zip(
+            bent.design(block, given.nuisance[block.run], given.beta),
+            known.design(block, given.nuisance[block.run], given.beta),
+            strict=True,
+        ):
+            assert got == pytest.approx(wanted)
+    standard_error = np.sqrt(np.diag(alone.covariance))
+    assert (np.abs(given.beta - alone.beta) < 0.5 * standard_error).all()

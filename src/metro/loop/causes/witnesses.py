@@ -84,7 +84,9 @@ class Witness:
         theta = fitted.theta.copy()
         theta[self.places] = value
         given = Candidate(fitted.candidate.model(theta))
-        start = replace(fitted, candidate=given, theta=np.zeros(0))
+        base = len(fitted.beta)
+        covariance = fitted.covariance[:base, :base]
+        start = replace(fitted, candidate=given, theta=np.zeros(0), covariance=covariance)
         return refit(start, fitted.blocks, self.closed.outcome.prior)
 
     def sharing(self, others: Sequence[Witness]) -> Witness:
