@@ -199,8 +199,8 @@ def test_a_mode_that_may_be_missing_is_to_be_sought_at_its_frequency():
     assert "One test changes little: the most probable cause has a probability of 0.60" in still
 
 
-@pytest.mark.parametrize(("tests", "said"), [(12, "give about half of them"), (11, "two depths at each")])
-def test_who_has_tests_enough_is_asked_to_share_them_and_not_to_cut_more(tests, said):
-    asked = in_words(any_tests(pd.DataFrame({"run": [f"c{i}" for i in range(tests)]})))
-    assert said in asked
-    assert (f"no new cut: {tests} labelled tests are held out" in asked) is (tests == 12)
+@pytest.mark.parametrize(("tests", "speeds", "enough"), [(12, 3, True), (11, 3, False), (12, 2, False)])
+def test_who_has_tests_enough_is_asked_to_share_them_and_not_to_cut_more(tests, speeds, enough):
+    asked = in_words(any_tests(tests, speeds))
+    assert ("give about half of them" in asked) is enough
+    assert ("two depths at each" in asked) is not enough

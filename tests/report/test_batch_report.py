@@ -182,7 +182,7 @@ def test_a_change_that_is_smaller_than_what_is_printed_is_no_fall():
     said = verdict_words("force", entry)
     assert "falls" not in said
     assert "the error does not change" in said
-    assert "What was found rests on the identification runs." in said
+    assert "The identification runs alone show what was found." in said
 
 
 def test_where_nothing_was_added_it_is_said_what_changed_the_error():

@@ -62,7 +62,7 @@ def test_runs_above_the_noise_floor_are_counted_and_the_worst_is_named():
     ]
     assert (
         findings.above_floor(blocks, 2.5, "N")
-        == "1 of 3 runs exceeds the noise floor, as about half of them do where nothing is missing; "
+        == "1 of 3 runs exceeds the noise floor, as up to half of them do where nothing is missing; "
         "b has the largest residual, 3.00 N."
     )
     assert findings.above_floor(blocks, 9.0, "N").startswith("None of 3 runs exceeds")

@@ -26,9 +26,11 @@ def cut_short(batch: Batch, read: Tables) -> Iterator[Finding]:
     share = {}
     for run in batch.with_files("dynamometer"):
         length = float(runs["cut_length_mm"][run]) * MM
-        times = [piece["t_s"].to_numpy(float) for piece in read.pieces("force", run) if len(piece)]
-        if times and length > 0.0 and feed[run] > 0.0:
-            share[run] = (times[-1][-1] - times[0][0]) * float(feed[run]) / length
+        ends = [
+            piece["t_s"].iloc[[0, -1]].to_numpy(float) for piece in read.pieces("force", run) if len(piece)
+        ]
+        if ends and length > 0.0 and feed[run] > 0.0:
+            share[run] = float(ends[-1][-1] - ends[0][0]) * float(feed[run]) / length
     usual = float(np.median(list(share.values()))) if len(share) >= LEAST_RUNS else 0.0
     for run, covered in share.items():
         if covered < SHORT * usual:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from metro.loop.labels.hypotheses import Hypothesis, changed
-from metro.loop.labels.search import LEAST_TESTS, NOTHING, LabelOutcome, Weighed
+from metro.loop.labels.search import LEAST_SPEEDS, LEAST_TESTS, NOTHING, LabelOutcome, Weighed
 from metro.loop.labels.unknown import UNKNOWN, curves
 from metro.loop.statement import Statement
 from metro.observables.labelled import Labelled
@@ -121,11 +121,12 @@ def _directly(names: Sequence[str], outcome: LabelOutcome) -> list[JSON]:
 def beside(rows: pd.DataFrame) -> Statement:
     """State what to test next where no effect is in question: where the prediction is least sure."""
     if rows.empty:
-        return any_tests(rows)
+        return any_tests(0, 0)
     closest = rows.iloc[int(np.argmin(np.abs(rows["after"].to_numpy() - 0.5)))]
     return Statement("test_beside", {"run": str(closest["run"]), "probability": float(closest["after"])})
 
 
-def any_tests(rows: pd.DataFrame) -> Statement:
-    """State which tests would let effects be weighed: held-out ones, where there are enough to share."""
-    return Statement("any_tests", {"held_out": len(rows), "enough": len(rows) >= 2 * LEAST_TESTS})
+def any_tests(held_out: int, speeds: int) -> Statement:
+    """State which tests would let effects be weighed: those held out at so many speeds, if enough to share."""
+    enough = held_out >= 2 * LEAST_TESTS and speeds >= LEAST_SPEEDS
+    return Statement("any_tests", {"held_out": held_out, "enough": enough})

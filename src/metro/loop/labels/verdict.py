@@ -138,7 +138,7 @@ def judge_labels(
         "effects": (upstream if judged.upstream else []) + _effects(judged),
         "candidates": _candidates(judged),
         "indistinguishable": pairs(judged.outcome) if judged.outcome else [],
-        "next_experiment": _next(judged),
+        "next_experiment": _next(task, judged),
         "unexplained": None,
     }
     if judged.residual and figures["after"]:
@@ -226,10 +226,12 @@ def _candidates(judged: _Judged) -> list[JSON]:
     return [entry for entry in entries if not set(entry["effect"].split(" + ")) <= claimed]
 
 
-def _next(judged: _Judged) -> Statement:
+def _next(task: Labelled, judged: _Judged) -> Statement:
     if judged.outcome and judged.suggested and judged.status in ("undetermined", "insufficient"):
         return advice(judged.suggested, judged.outcome)
-    return beside(judged.rows) if judged.outcome else any_tests(judged.rows)
+    if judged.outcome:
+        return beside(judged.rows)
+    return any_tests(len(judged.rows), len(tests_of(task, "validate")[0].speeds))
 
 
 def _story(task: Labelled, judged: _Judged, verdict: JSON, gates: Gates) -> JSON:

@@ -113,7 +113,7 @@ def above_floor(blocks: Sequence[JSON], floor: float | None, shown: str | None) 
     some = (
         f"{above or 'None'} of {len(residuals)} runs {'exceed' if above > 1 else 'exceeds'} the noise floor"
     )
-    usual = ", as about half of them do where nothing is missing" if 0 < above <= len(residuals) / 2 else ""
+    usual = ", as up to half of them do where nothing is missing" if 0 < above <= len(residuals) / 2 else ""
     return f"{some}{usual}; {most}."
 
 

@@ -47,7 +47,7 @@ def joint_facts(results: Results) -> list[Item]:
     one = identified["joints"]["runs"][run]
     pairs = zip(one["joints"], one["coulomb"], strict=True)
     # Friction opposes the motion: an interval that reaches zero determines none.
-    known = [(joint, value) for joint, value in pairs if value["value"] is not None and value["ci95"][0] > 0]
+    known = [(joint, value) for joint, value in pairs if (value["ci95"][0] or 0.0) > 0.0]
     if known:
         joint, value = max(known, key=lambda pair: abs(pair[1]["value"]))
         facts.append(("largest Coulomb friction", quantity(value), f"joint {joint}, run {run}"))

@@ -177,9 +177,10 @@ def _fall(entry: JSON) -> str:
         share = "" if _dimensionless(entry) else f" ({share_before} of the signal)"
         return f"{where} {what} is {old}{share}."
     if share_before == share_after and not _dimensionless(entry):
+        shown = " The identification runs alone show what was found." if entry.get("effects") else ""
         return (
-            f"{where} the error does not change: {old} before and {new} after ({share_after} of the signal). "
-            "What was found rests on the identification runs."
+            f"{where} the error does not change: {old} before and {new} after ({share_after} of the signal)."
+            f"{shown}"
         )
     share = "" if _dimensionless(entry) else f" ({share_before} to {share_after} of the signal)"
     if not entry.get("effects"):  # the boundary is predicted with the effects of the force
