@@ -127,6 +127,6 @@ def beside(rows: pd.DataFrame) -> Statement:
 
 
 def any_tests(held_out: int, speeds: int) -> Statement:
-    """State which tests would let effects be weighed: those held out at so many speeds, if enough to share."""
+    """State which tests would let effects be weighed: those held out, if they are enough to share."""
     enough = held_out >= 2 * LEAST_TESTS and speeds >= LEAST_SPEEDS
     return Statement("any_tests", {"held_out": held_out, "enough": enough})
