@@ -7,7 +7,7 @@ import pytest
 from chip_grids import bounds_of, chips_left
 
 from metro.cutting.chip import Cut
-from metro.cutting.corners import raw_edges
+from metro.cutting.corners import is_outer, raw_edges
 from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import engagement
 from metro.cutting.force import force_basis, mean_basis
@@ -57,7 +57,7 @@ def test_between_tip_and_foot_the_edge_is_between_the_tip_and_what_was_cleared(d
     for row in np.ndindex(before.rows.shape[:2]):
         rows = before.rows[row]
         limits = bounds_of(before, raw, *row)[1][side]
-        tip, foot = limits if raw.outer[side] else limits[::-1]
+        tip, foot = limits if is_outer(side, line) else limits[::-1]
 
         def edge(phi, rows=rows):
             """Chip, tip and edge, from the axis, on the ray at φ."""

@@ -238,3 +238,17 @@ def test_from_a_tool_that_hardly_differs_one_step_gives_the_derivative(cut, true
         change = force(runout, soft, start) - force(8e-6, 1.0, start)
         assert rms(change - expected) < 0.02 * rms(expected)
         assert rms(expected) > 1e-5 * rms(force(8e-6, 1.0))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.499, 0.4999, 0.5, 0.5001, 0.501, 0.7])
+@pytest.mark.parametrize("direction", ["up", "down"])
+@pytest.mark.parametrize("runout", [0.0, 3e-6])
+def test_on_true_paths_a_stiff_tool_is_rigid_also_where_the_raw_edge_is_at_the_axis(runout, direction, share):
+    """At half immersion the line of the edge is where the tool's deflection puts it, to either side of it."""
+    cut = Cut(FEED, DEPTH, engagement("side", direction, share * 2.0 * RADIUS, RADIUS))
+    cutter = tool(runout=runout)
+    stiff = rigid(cutter, cut, true_path=True)
+    assert rms(yielding(cutter, cut, 1e-15 * np.eye(2), true_path=True) - stiff) < 1e-6 * rms(stiff)
+    soft = yielding(cutter, cut, 1e-7 * np.eye(2), true_path=True)
+    circles = yielding(cutter, cut, 1e-7 * np.eye(2)) - rigid(cutter, cut)
+    assert rms(soft - stiff - circles) < 0.02 * rms(stiff)

@@ -34,6 +34,6 @@ def bounds_of(before, raw, angle, tooth):
     """Bounds of the arc of a tooth at an angle of the tool, rad, and what corners there are."""
     rows = before.rows[angle % len(before.rows), tooth % before.rows.shape[1]]
     at, arc = angle % raw.line.shape[1], empty_arc(len(rows))
-    here = RawHere(tuple(raw.immersion[:, at].tolist()), tuple(raw.line[:, at].tolist()), raw.outer)
+    here = RawHere(tuple(raw.immersion[:, at].tolist()), tuple(raw.line[:, at].tolist()))
     count = find_arc(before.scale, rows, here, EVERYWHERE, arc)
     return arc.bounds[:count], arc.corner

@@ -1,7 +1,7 @@
 """Where around the tool a tooth cuts, at one angle of the tool: between its ends, and pass by pass.
 
-Of the passes that may bound the chip the least counts. On circular paths each is A sin φ + B cos φ, so ends
-and crossings of passes are closed forms; on true paths Newton steps from there settle them.
+Of the passes that may bound the chip the least counts. On circular paths each is A sin φ + B cos φ + C, so
+ends and crossings of passes are closed forms; on true paths Newton steps from there settle them.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from metro.compiled import compiled
-from metro.cutting.corners import BEGINS, ENDS, LARGEST_STEP, RawHere, foot_at, tip_at
-from metro.cutting.passes import COSINE, SINE, Row, Scale, chip_left, chip_slope, row_of
+from metro.cutting.corners import BEGINS, ENDS, LARGEST_STEP, RawHere, foot_at, is_outer, tip_at
+from metro.cutting.passes import COSINE, LEVEL, SINE, Row, Scale, chip_left, chip_slope, row_of
 from metro.units import Array
 
 STEPS_TO_ENDS, STEPS = 3, 2  # an error of a crossing counts in second order only
@@ -58,7 +58,7 @@ def find_arc(scale: Scale, rows: Array, raw: RawHere, near: Near, arc: Arc) -> i
 
     Parameters
     ----------
-    rows : (passes, 7) of the passes. raw : edges of the work.
+    rows : (passes, 9) of the passes. raw : edges of the work.
     near : around the edge; bounds elsewhere are left out, or are ends of circular paths. arc : is written.
     """
     bounds = arc.bounds
@@ -86,12 +86,13 @@ def find_arc(scale: Scale, rows: Array, raw: RawHere, near: Near, arc: Arc) -> i
 @compiled
 def _limits(scale: Scale, rows: Array, near: Near, raw: RawHere, side: int) -> tuple[float, float]:
     """Immersions at a raw edge at which the chip vanishes, and from or to which it is whole, rad."""
+    outer = is_outer(side, raw.line[side])
     tip = tip_at(scale.radius, rows, raw.line[side])
     foot = tip
     if _covers(near, math.sin(tip), math.cos(tip)):
-        towards = 1.0 if (side == BEGINS) == raw.outer[side] else -1.0
+        towards = 1.0 if (side == BEGINS) == outer else -1.0
         foot = foot_at(scale, rows, raw.line[side], towards, tip)
-    return (tip, foot) if raw.outer[side] else (foot, tip)
+    return (tip, foot) if outer else (foot, tip)
 
 
 @compiled
@@ -117,7 +118,13 @@ def _ends(scale: Scale, rows: Array, near: Near) -> tuple[float, float]:
     low, high = -math.inf, math.inf
     for m in range(len(rows)):
         root = math.atan2(-rows[m, COSINE], rows[m, SINE])
-        low, high = max(low, root), min(high, root + math.pi)
+        late = 0.0
+        if rows[m, LEVEL] != 0.0:
+            length = math.sqrt(rows[m, SINE] ** 2 + rows[m, COSINE] ** 2)
+            if not rows[m, LEVEL] < length:  # a chip at any immersion
+                continue
+            late = math.asin(min(-rows[m, LEVEL] / length, 1.0))
+        low, high = max(low, root + late), min(high, root + math.pi - late)
     if scale.true_path:
         low, high = _end(scale, rows, near, low, 1.0), _end(scale, rows, near, high, -1.0)
     return low, high
@@ -154,30 +161,44 @@ def _crossings(scale: Scale, rows: Array, near: Near, bounds: Array) -> int:
         for other in range(one + 1, len(rows)):
             a = rows[one, SINE] - rows[other, SINE]
             b = rows[one, COSINE] - rows[other, COSINE]
+            level = rows[one, LEVEL] - rows[other, LEVEL]
             length = math.copysign(math.sqrt(a * a + b * b), b)
-            if length == 0.0:
+            if length == 0.0 or not abs(level) < abs(length):
                 continue
-            sine, cosine = b / length, -a / length
-            if _covers(near, sine, cosine) and _is_least(rows, one, sine, cosine, margin):
-                phi = _settled(scale, row_of(rows, one), row_of(rows, other), math.atan2(sine, cosine))
-                count = inserted(bounds, count, phi)
-            if scale.true_path and sine < stray and _covers(near, -sine, -cosine):  # a little outside 0…π
-                opposite = math.atan2(sine, cosine)
-                opposite += math.pi if opposite < 1.0 else -math.pi
-                phi = _settled(scale, row_of(rows, one), row_of(rows, other), opposite)
-                count = inserted(bounds, count, phi)
+            # Of the two crossings the first is that within 0…π; beside a level the other one may be, too.
+            off = -level / length
+            across = math.sqrt(1.0 - off * off)
+            for side in (1.0, -1.0):
+                sine = (off * a + side * across * b) / length
+                cosine = (off * b - side * across * a) / length
+                if not _covers(near, sine, cosine):
+                    continue
+                if side > 0.0 or level != 0.0:
+                    counts = _is_least(rows, one, sine, cosine, margin)
+                else:
+                    counts = scale.true_path and -sine < stray  # a little outside 0…π
+                if counts:
+                    phi = _settled(scale, row_of(rows, one), row_of(rows, other), _around(sine, cosine))
+                    count = inserted(bounds, count, phi)
     return count
+
+
+@compiled
+def _around(sine: float, cosine: float) -> float:
+    """Return an immersion from its sine and cosine, from −π/2 to 3π/2: a chip is around π/2."""
+    phi = math.atan2(sine, cosine)
+    return phi + TURN if phi < -0.5 * math.pi else phi
 
 
 @compiled
 def _is_least(rows: Array, one: int, sine: float, cosine: float, margin: float) -> bool:
     """Whether on circles a pass leaves a chip, and none less by a margin, m."""
-    crossed = rows[one, SINE] * sine + rows[one, COSINE] * cosine
+    crossed = rows[one, SINE] * sine + rows[one, COSINE] * cosine + rows[one, LEVEL]
     if not crossed > -margin:
         return False
     least = math.inf
     for m in range(len(rows)):
-        least = min(least, rows[m, SINE] * sine + rows[m, COSINE] * cosine)
+        least = min(least, rows[m, SINE] * sine + rows[m, COSINE] * cosine + rows[m, LEVEL])
     return bool(crossed < least + margin)
 
 

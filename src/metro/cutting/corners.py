@@ -21,6 +21,9 @@ from metro.units import Array
 LARGEST_STEP = 0.3  # rad, from a bound to first order towards the true one
 STEPS = 3
 BEGINS, ENDS = 0, 1  # the edge that begins the arc, and the one that ends it
+# Of the radius: an edge so near to the axis is passed within AT_ONCE × chip / radius, in rad. There a ray is
+# along the edge, and where the two meet is the quotient of two numbers that are no more than rounding.
+AT_ONCE = 1e-6
 
 
 class RawEdges(NamedTuple):
@@ -30,12 +33,10 @@ class RawEdges(NamedTuple):
     ----------
     immersion : (2, angles or 1) at which the arc begins and ends there, rad; infinite where it does not.
     line : (2, angles or 1) y of the edges that teeth pass little by little, m; not a number for others.
-    outer : (2,) whether the outer part of the chip is there.
     """
 
     immersion: Array
     line: Array
-    outer: tuple[bool, bool]
 
 
 class RawHere(NamedTuple):
@@ -43,7 +44,6 @@ class RawHere(NamedTuple):
 
     immersion: tuple[float, float]
     line: tuple[float, float]
-    outer: tuple[bool, bool]
 
 
 def raw_edges(engagement: Engagement, radius: float, true_path: bool, aside: Array | None = None) -> RawEdges:
@@ -56,11 +56,11 @@ def raw_edges(engagement: Engagement, radius: float, true_path: bool, aside: Arr
     immersion = np.array([engagement.entry if begins else -math.inf, engagement.exit if ends else math.inf])
     cosine = np.array([math.cos(engagement.entry), math.cos(engagement.exit)])
     line = radius * cosine[:, None] - (np.zeros(1) if aside is None else aside)
-    return RawEdges(
-        np.repeat(immersion[:, None], line.shape[1], axis=1),
-        np.where(np.array(passed)[:, None], line, math.nan),
-        (bool(cosine[0] < 0.0), bool(cosine[1] >= 0.0)),
-    )
+    immersion = np.repeat(immersion[:, None], line.shape[1], axis=1)
+    little_by_little = np.repeat(np.array(passed)[:, None], line.shape[1], axis=1)
+    at_once = little_by_little & (np.abs(line) < AT_ONCE * radius)
+    immersion[at_once] = np.arccos(line[at_once] / radius)
+    return RawEdges(immersion, np.where(little_by_little & ~at_once, line, math.nan))
 
 
 def shifted(raw: RawEdges, radius: float, aside: Array) -> RawEdges:
@@ -72,9 +72,21 @@ def shifted(raw: RawEdges, radius: float, aside: Array) -> RawEdges:
 
 
 @compiled
+def raw_here(raw: RawEdges, at: int) -> RawHere:
+    """Return the raw edges at one of the angles."""
+    return RawHere((raw.immersion[0, at], raw.immersion[1, at]), (raw.line[0, at], raw.line[1, at]))
+
+
+@compiled
+def is_outer(side: int, line: float) -> bool:
+    """Whether the outer part of the chip is there: the axis is not yet, or no longer, in the work."""
+    return line < 0.0 if side == BEGINS else line > 0.0
+
+
+@compiled
 def beyond(radius: float, own: Row, line: float, sine: float, cosine: float) -> float:
     """How far the tip of a tooth is beyond an edge on the ray, m; ``own`` is the row of the tooth."""
-    return radius + own.off_sine * sine + own.off_cosine * cosine - line / cosine
+    return radius + own.off_sine * sine + own.off_cosine * cosine + own.off_level - line / cosine
 
 
 @compiled
@@ -95,7 +107,7 @@ def tip_at(radius: float, rows: Array, line: float) -> float:
 
 @compiled
 def foot_at(scale: Scale, rows: Array, line: float, towards: float, tip: float) -> float:
-    """Immersion at which the edge comes to what the first of the passes (passes, 7) cleared, rad.
+    """Immersion at which the edge comes to what the first of the passes (passes, 9) cleared, rad.
 
     ``towards``: in which sense that is from the ``tip``. Where there is no chip at the tip it is there.
     """

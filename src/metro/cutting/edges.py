@@ -14,7 +14,7 @@ import numpy.typing as npt
 from metro.compiled import compiled, compiled_with_arrays
 from metro.cutting.arcs import EVERYWHERE, TURN, Arc, Near, empty_arc, find_arc
 from metro.cutting.chip import Cut
-from metro.cutting.corners import BEGINS, ENDS, LARGEST_STEP, RawEdges, RawHere, beyond
+from metro.cutting.corners import BEGINS, ENDS, LARGEST_STEP, RawEdges, beyond, is_outer, raw_here
 from metro.cutting.cutter import Cutter
 from metro.cutting.floor import Floor, floor_at, floor_of
 from metro.cutting.passes import Passes, Row, Scale, chip_left, row_of
@@ -61,8 +61,8 @@ class Pieces(NamedTuple):
     angle : (pieces,) index of the angle of the tool. bounding : (pieces,) of the pass, 0 the last one.
     bounds : (pieces, 4) immersions at which the piece begins and ends, rad; y of either raw edge, m, where
         the piece is in a corner of the work there, else not a number.
-    passed, own : (pieces, 7) of the pass that bounds the chip, and of the tooth itself.
-    scale : of the passes. outer : of the raw edges. depth : what a radian of edge spans, m/rad.
+    passed, own : (pieces, 9) of the pass that bounds the chip, and of the tooth itself.
+    scale : of the passes. depth : what a radian of edge spans, m/rad.
     """
 
     angle: Indices
@@ -71,7 +71,6 @@ class Pieces(NamedTuple):
     passed: Array
     own: Array
     scale: Scale
-    outer: tuple[bool, bool]
     depth: float
 
     @property
@@ -88,7 +87,7 @@ def pieces(before: Passes, raw: RawEdges, along: Edges) -> Pieces:
 @compiled_with_arrays
 def _pieces(
     before: Passes, raw: RawEdges, along: Edges, arc: Arc
-) -> tuple[Indices, Indices, Array, Array, Array, Scale, tuple[bool, bool]]:
+) -> tuple[Indices, Indices, Array, Array, Array, Scale]:
     """Return what ``Pieces`` are made of but for the depth."""
     scale, rows, top, span, ends = before.scale, before.rows, along.top, along.span, arc.bounds
     floor = along.floor
@@ -99,9 +98,7 @@ def _pieces(
     places, bounds, whose = np.empty((room, 2), np.intp), np.empty((room, 4)), np.empty(room, np.intp)
     for i in range(angles):
         at = i % raws
-        here = RawHere(
-            (raw.immersion[0, at], raw.immersion[1, at]), (raw.line[0, at], raw.line[1, at]), raw.outer
-        )
+        here = raw_here(raw, at)
         for j in range(teeth):
             if _in_air(top[i, j], span):
                 continue
@@ -120,11 +117,11 @@ def _pieces(
                         low, high = _below(along, leading, low, high)
                     if high > low:
                         middle = 0.5 * (low + high)
-                        places[found, 0], places[found, 1] = i, _bounding(scale, passed, middle)
+                        places[found, 0], places[found, 1] = i, bounding_pass(scale, passed, middle)
                         whose[found] = j
                         bounds[found, LOW], bounds[found, HIGH] = low, high
-                        bounds[found, LINES] = _line(here.line[BEGINS], arc.corner[BEGINS], middle)
-                        bounds[found, LINES + 1] = _line(here.line[ENDS], arc.corner[ENDS], middle)
+                        bounds[found, LINES] = corner_line(here.line[BEGINS], arc.corner[BEGINS], middle)
+                        bounds[found, LINES + 1] = corner_line(here.line[ENDS], arc.corner[ENDS], middle)
                         found += 1
                 leading += TURN
     bounding, own = np.empty((found, rows.shape[3])), np.empty((found, rows.shape[3]))
@@ -134,7 +131,7 @@ def _pieces(
             bounding[k, column] = rows[i, j, places[k, 1], column]
             own[k, column] = rows[i, j, -1, column]
     angle, which = places[:found, 0].copy(), places[:found, 1].copy()
-    return angle, which, bounds[:found].copy(), bounding, own, scale, raw.outer
+    return angle, which, bounds[:found].copy(), bounding, own, scale
 
 
 @compiled
@@ -167,7 +164,7 @@ def _depth_below(along: Edges, leading: float, immersion: float) -> float:
 
 
 @compiled
-def _line(line: float, corner: Array, immersion: float) -> float:
+def corner_line(line: float, corner: Array, immersion: float) -> float:
     """Return the line of a raw edge where an immersion is in its corner, else not a number."""
     return line if (immersion - corner[0]) * (immersion - corner[1]) < 0.0 else math.nan
 
@@ -190,7 +187,7 @@ def _twice(values: Array) -> Array:
 
 
 @compiled
-def _bounding(scale: Scale, rows: Array, immersion: float) -> int:
+def bounding_pass(scale: Scale, rows: Array, immersion: float) -> int:
     """Return which pass bounds the chip."""
     sine, cosine = math.sin(immersion), math.cos(immersion)
     which, least = 0, math.inf
@@ -207,14 +204,13 @@ class Piece(NamedTuple):
     passed: Row
     own: Row
     line: tuple[float, float]
-    outer: tuple[bool, bool]
 
 
 @compiled
 def piece_of(cut: Pieces, at: int) -> Piece:
     """Return one of the pieces."""
     line = (cut.bounds[at, LINES], cut.bounds[at, LINES + 1])
-    return Piece(row_of(cut.passed, at), row_of(cut.own, at), line, cut.outer)
+    return Piece(row_of(cut.passed, at), row_of(cut.own, at), line)
 
 
 @compiled
@@ -223,8 +219,8 @@ def chip_of(scale: Scale, piece: Piece, sine: float, cosine: float) -> float:
     chip = chip_left(scale, piece.passed, sine, cosine)
     if not math.isnan(piece.line[BEGINS]):
         edge = beyond(scale.radius, piece.own, piece.line[BEGINS], sine, cosine)
-        chip = edge if piece.outer[BEGINS] else chip - edge
+        chip = edge if is_outer(BEGINS, piece.line[BEGINS]) else chip - edge
     if not math.isnan(piece.line[ENDS]):
         edge = beyond(scale.radius, piece.own, piece.line[ENDS], sine, cosine)
-        chip = edge if piece.outer[ENDS] else chip - edge
+        chip = edge if is_outer(ENDS, piece.line[ENDS]) else chip - edge
     return max(chip, 0.0)

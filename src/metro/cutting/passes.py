@@ -40,6 +40,7 @@ class Row(NamedTuple):
     sine, cosine : A and B of the chip, m.
     off_sine, off_cosine : the same of the deviation from the radius of the tooth that made the pass, m.
     moved_x, moved_y : how the tip moved along x and y as it made the pass, m/rad.
+    level, off_level : what chip and deviation have beside these waves, at any immersion alike, m.
     """
 
     pitch: float
@@ -49,9 +50,11 @@ class Row(NamedTuple):
     off_cosine: float
     moved_x: float
     moved_y: float
+    level: float
+    off_level: float
 
 
-PITCH, SINE, COSINE, OFF_SINE, OFF_COSINE, MOVED_X, MOVED_Y = range(len(Row._fields))
+PITCH, SINE, COSINE, OFF_SINE, OFF_COSINE, MOVED_X, MOVED_Y, LEVEL, OFF_LEVEL = range(len(Row._fields))
 
 
 class Passes(NamedTuple):
@@ -59,8 +62,9 @@ class Passes(NamedTuple):
 
     Attributes
     ----------
-    scale : of all of them. rows : (angles, teeth, passes, 7) of each a ``Row``, the last pass of a turn last.
-        Angles or teeth that are alike are stored once.
+    scale : of all of them. rows : (angles, teeth, passes, 9) of each a ``Row``, the last pass of a turn last.
+        Angles or teeth that are alike are stored once; heights in the place of angles
+        (:func:`passes_at`).
     """
 
     scale: Scale
@@ -78,6 +82,8 @@ def row_of(rows: Array, at: int) -> Row:
         rows[at, OFF_COSINE],
         rows[at, MOVED_X],
         rows[at, MOVED_Y],
+        rows[at, LEVEL],
+        rows[at, OFF_LEVEL],
     )
 
 
@@ -88,9 +94,9 @@ def chip_left(scale: Scale, row: Row, sine: float, cosine: float) -> float:
     A later tooth meets a tip that moved where that was δ = feed × pitch cos φ / radius later than a pitch
     ago.
     """
-    chip = row.sine * sine + row.cosine * cosine
+    chip = row.sine * sine + row.cosine * cosine + row.level
     if scale.true_path:
-        reach = row.off_sine * sine + row.off_cosine * cosine + scale.radius
+        reach = row.off_sine * sine + row.off_cosine * cosine + row.off_level + scale.radius
         later = (scale.feed / scale.radius) * row.pitch * cosine
         chip += _path_excess(scale.feed, row.pitch, reach, sine, cosine)
         chip -= later * (row.moved_x * sine + row.moved_y * cosine)
@@ -133,6 +139,28 @@ def passes(cutter: Cutter, cut: Cut, true_path: bool, angle: Array, *, every: bo
     rows[..., SINE] += feed * pitch
     rows[..., COSINE] += curve_excess(curvature, feed * pitch)
     rows[..., OFF_SINE], rows[..., OFF_COSINE] = turned.imag, turned.real
+    return Passes(Scale(feed, cutter.radius, true_path), rows)
+
+
+def passes_at(cutter: Cutter, cut: Cut, true_path: bool, height: Array) -> Passes:
+    """Return the passes before each tooth at heights (n,) above the tip, m, whatever the angle of the tool.
+
+    At one height a tooth's deviation is one number. Where nothing deviates, one height is returned for all.
+    """
+    deviation = cutter.radius_deviation(height)
+    off = deviation.any()
+    deviation = deviation if off else deviation[:, :1]
+    curvature = cut.curvature if true_path else 0.0
+    pitch = pitches(cutter.tooth_angles, cutter.teeth if off or curvature else 1)
+    steps = np.arange(1, len(pitch) + 1)[:, None]
+    earlier = deviation[(np.arange(cutter.teeth) + steps) % cutter.teeth]
+    feed = feed_per_radian(cutter, cut)
+    rows = np.zeros((deviation.shape[1], cutter.teeth, len(pitch), len(Row._fields)))
+    rows[..., PITCH] = pitch.T
+    rows[..., SINE] = feed * pitch.T
+    rows[..., COSINE] = curve_excess(curvature, feed * pitch.T)
+    rows[..., LEVEL] = (deviation - earlier).T
+    rows[..., OFF_LEVEL] = earlier.T
     return Passes(Scale(feed, cutter.radius, true_path), rows)
 
 

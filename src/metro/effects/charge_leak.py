@@ -23,7 +23,15 @@ EFFECT = Effect(
     observables=("force",),
     parameters=tuple(
         EffectParameter(
-            "time_constant_s", "s", 0.02, NEVER, 1.0, starts=(0.5, 3.0, 20.0), group=number, neutral=NEVER
+            "time_constant_s",
+            "s",
+            0.02,
+            NEVER,
+            1.0,
+            starts=(0.5, 3.0, 20.0),
+            group=number,
+            neutral=NEVER,
+            reciprocal=True,
         )
         for number in range(CHANNELS)
     ),

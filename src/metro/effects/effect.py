@@ -54,6 +54,7 @@ class EffectParameter:
     starts: tuple[float, ...]
     period: float | None = None
     length: str = ""
+    reciprocal: bool = False
     plausible: float | None = None
     group: int = 0
     neutral: float = 0.0

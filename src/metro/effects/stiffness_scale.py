@@ -24,7 +24,7 @@ BESIDE = (0.45, 0.6, 0.75, 0.88, 0.96, 1.04, 1.14, 1.37, 1.67, 2.1)
 OF_MACHINE = Effect(
     name="stiffness_scale",
     observables=("flatness",),
-    parameters=(EffectParameter("factor", "1", 0.2, 5.0, 0.05, starts=BESIDE, neutral=1.0),),
+    parameters=(EffectParameter("factor", "1", 0.2, 5.0, 0.05, starts=BESIDE, neutral=1.0, reciprocal=True),),
     apply=apply,
     signature=(
         "Deformation or deviation in proportion to the predicted one, over all runs and places. "
@@ -45,7 +45,7 @@ def _gives_way(effect: Effect, problem: Any) -> Effect | Refusal:
 
 
 # Without waves, one start on each side of the neutral factor is enough.
-AWAY = (EffectParameter("factor", "1", 0.2, 5.0, 0.05, starts=(0.8, 1.2), neutral=1.0),)
+AWAY = (EffectParameter("factor", "1", 0.2, 5.0, 0.05, starts=(0.8, 1.2), neutral=1.0, reciprocal=True),)
 OF_SIDE_CUTS = replace(
     OF_MACHINE,
     observables=("force",),

@@ -17,7 +17,7 @@ def apply(model: ForceModel, values: Values) -> ForceModel:
 
 
 def _stiffness(name: str) -> EffectParameter:
-    return EffectParameter(name, "N/um", 0.8, 200.0, 1.0, starts=(6.0,), neutral=200.0)
+    return EffectParameter(name, "N/um", 0.8, 200.0, 1.0, starts=(6.0,), neutral=200.0, reciprocal=True)
 
 
 EFFECT = Effect(

@@ -204,7 +204,8 @@ def polish(
 def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, Array]) -> State:
     """Add steps to a state; angles are turned into their period, other effect parameters kept in bounds.
 
-    A step of a plane vector's length and angle is one along them where it begins, straight on.
+    A step of a plane vector's length and angle is one along them where it begins, straight on; one of what
+    acts by its reciprocal is one of that.
     """
     p = len(state.beta)
     theta = state.theta + common[p:]
@@ -213,7 +214,10 @@ def _moved(candidate: Candidate, state: State, common: Array, own: Mapping[str, 
         theta[angle] = state.theta[angle] + math.degrees(math.atan2(turn, theta[length]))
         theta[length] = math.hypot(theta[length], turn)
     for i, parameter in enumerate(candidate.parameters):
-        if parameter.period:
+        if parameter.reciprocal:
+            inverse = 1.0 / state.theta[i] - common[p + i] / state.theta[i] ** 2
+            theta[i] = 1.0 / min(max(inverse, 1.0 / parameter.upper), 1.0 / parameter.lower)
+        elif parameter.period:
             theta[i] = parameter.lower + (theta[i] - parameter.lower) % parameter.period
         else:
             theta[i] = min(max(theta[i], parameter.lower), parameter.upper)

@@ -24,13 +24,19 @@ def least_significant(fitted: Fit) -> tuple[Effect, float]:
 def _p_value(fitted: Fit, effect: Effect, place: slice) -> float:
     """Test of all sizes together (Wald), by F on the degrees of freedom of intervals.
 
-    An angle is no size, nor what has no value at which it changes nothing, as a frequency.
+    An angle is no size, nor what has no value at which it changes nothing, as a frequency. The size of what
+    acts by its reciprocal is that.
     """
     from scipy.stats import f
 
     p = len(fitted.beta)
     covariance = fitted.covariance[p:, p:][place, place] * fitted.dispersion
-    away = fitted.theta[place] - np.array([one.neutral for one in effect.parameters])
+    theta, neutral = fitted.theta[place], np.array([one.neutral for one in effect.parameters])
+    inverse = np.array([one.reciprocal for one in effect.parameters])
+    turned = np.where(inverse, -1.0 / np.where(inverse, theta, 1.0) ** 2, 1.0)
+    covariance = covariance * np.outer(turned, turned)
+    away = theta - neutral
+    away[inverse] = 1.0 / theta[inverse] - 1.0 / neutral[inverse]
     sized = np.array(
         [one.period is None and one.lower <= one.neutral <= one.upper for one in effect.parameters]
     )

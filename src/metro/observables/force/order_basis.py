@@ -10,7 +10,8 @@ import numpy as np
 
 from metro.cutting.chipped import Chipped
 from metro.cutting.cutter import Cutter
-from metro.cutting.force import Cut, force_basis, lost_at_the_floor, placed
+from metro.cutting.cylinder_orders import cylinder_orders
+from metro.cutting.force import Cut, lost_at_the_floor, placed
 from metro.cutting.general_orders import general_orders
 from metro.cutting.law import EdgeLaw
 from metro.cutting.yielding_steady import NotBalancedError, yielding
@@ -18,9 +19,7 @@ from metro.observables.force.dynamometer import Recording
 from metro.signals.orders import amplitudes, to_orders
 from metro.units import Array, ComplexArray
 
-# Of the table of a force whose orders are taken: half of what a waveform that is drawn has. The orders up to
-# the 48th are then off by 2e-4 of the force (rms), 2e-3 without a helix, and a fit takes half as long.
-ANGLES = 360
+ANGLES = 360  # of the table of what the floor of a helix takes from a force: half of what a drawn one has
 FEEDS = (
     0.0,
     math.pi / 3.0,
@@ -43,14 +42,11 @@ def shares_of_feeds(recording: Recording, direction: Array) -> Array:
 @lru_cache(maxsize=4096)
 def order_basis(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, true_path: bool) -> ComplexArray:
     """Amplitudes of the orders of the force on a rigid tool, (orders, 3, 6): read-only, it is kept."""
-    if cutter.cylindrical:
-        basis = amplitudes(to_orders(force_basis(cutter, law, cut, true_path, ANGLES), highest))
-    else:
-        there = placed(cutter, cut, true_path)
-        basis = general_orders(there, law, cut, highest, true_path=true_path)
-        if cut.pitch:
-            lost_there = lost_at_the_floor(there, law, cut, true_path, ANGLES)
-            basis += amplitudes(to_orders(lost_there, highest))
+    of_shape = cylinder_orders if cutter.cylindrical else general_orders
+    basis = of_shape(placed(cutter, cut, true_path), law, cut, highest, true_path=true_path)
+    if cut.pitch:
+        lost_there = lost_at_the_floor(cutter, law, cut, true_path, ANGLES)
+        basis += amplitudes(to_orders(lost_there, highest))
     basis.flags.writeable = False
     return basis
 
