@@ -74,3 +74,18 @@ def test_a_length_and_its_angle_go_straight_on():
     assert after == pytest.approx([5.0, 90.0 + np.degrees(np.arctan2(4.0, 3.0))])
     backwards_through_nothing = np.array([0.0, -8.0, 0.0])
     assert _moved(candidate, begun, backwards_through_nothing, {}).theta == pytest.approx([5.0, 270.0])
+
+
+def test_a_step_of_a_stiffness_is_one_of_its_reciprocal():
+    """From 6 to 2: a Gauss-Newton step of what is in proportion to 1/k is exact along 1/k, and past 0 in k."""
+    parameters = (
+        EffectParameter("k", "N/um", 0.8, 200.0, 1.0, (6.0,), neutral=200.0, reciprocal=True),
+        EffectParameter("plain", "N/um", 0.8, 200.0, 1.0, (6.0,), neutral=200.0),
+    )
+    soft = Effect("soft", ("toy",), parameters, lambda model, _: model, "", "", "")
+    candidate = Candidate(Curve(bent, 1), (soft,))
+    step = np.array([0.0, *[-36.0 * (1.0 / 2.0 - 1.0 / 6.0)] * 2])
+    there = _moved(candidate, State(np.array([6.0, 6.0]), np.zeros(1), {}), step, {})
+    assert there.theta == pytest.approx([2.0, 0.8])
+    beyond = _moved(candidate, State(np.array([6.0, 6.0]), np.zeros(1), {}), -10.0 * step, {})
+    assert beyond.theta == pytest.approx([200.0, 126.0])

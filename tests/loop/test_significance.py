@@ -51,3 +51,17 @@ def test_what_is_significant_stays_and_what_is_not_goes(monkeypatch):
     assert {one.effect.name: one.why_not and one.why_not.code for one in found.trials}[
         "bend"
     ] == "holds_nothing"
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "deviation", "least", "most"), [(20, 10, 0.05, 0.15), (100, 100, 0.5, 1.0)]
+)
+def test_the_size_of_a_stiffness_is_its_compliance(bent, stiffness, deviation, least, most):
+    """Of 20 ± 10 N/µm the compliance is 0.05 ± 0.025, little more than nothing; from 200 it is 18 deviations."""
+    parameter = replace(BEND.parameters[0], lower=0.8, upper=200.0, neutral=200.0, reciprocal=True)
+    alone = fit(Candidate(bent.candidate.base, (BEND,)), bent.blocks, bent.noise)
+    candidate = replace(alone.candidate, effects=(replace(BEND, parameters=(parameter,)),))
+    covariance = alone.covariance.copy()
+    covariance[-1, -1] = deviation**2 / alone.dispersion
+    there = replace(alone, candidate=candidate, theta=np.array([float(stiffness)]), covariance=covariance)
+    assert least < least_significant(there)[1] < most

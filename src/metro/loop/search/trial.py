@@ -148,10 +148,16 @@ def _gated(trials: Sequence[Trial], gates: Gates, least: float) -> list[Trial]:
 
 
 def _refused(trial: Trial, gates: Gates, least: float) -> Statement | None:
-    """Return why an effect may not be added, by its fit on all runs; None: it may."""
+    """Return why an effect may not be added, by its fit on all runs; None: it may.
+
+    That it gains no more than chance comes first: a fit that gains nothing is not followed to its end.
+    """
+    by_evidence = _why_not(trial.evidence, trial.q_value, gates, least)
+    if by_evidence and trial.evidence.statistic < len(trial.effect.parameters):
+        return by_evidence
     return (
         unsettled(trial.fit)
-        or _why_not(trial.evidence, trial.q_value, gates, least)
+        or by_evidence
         or (Statement("unlike") if unlike(trial.effect, trial.fit) else None)
     )
 
