@@ -77,7 +77,7 @@ def test_a_length_and_its_angle_go_straight_on():
 
 
 def test_a_step_of_a_stiffness_is_one_of_its_reciprocal():
-    """From 6 to 2: a Gauss-Newton step of what is in proportion to 1/k is exact along 1/k, and past 0 in k."""
+    """From 6 to 2: a step of what is in proportion to 1/k is exact along 1/k, and goes past 0 along k."""
     parameters = (
         EffectParameter("k", "N/um", 0.8, 200.0, 1.0, (6.0,), neutral=200.0, reciprocal=True),
         EffectParameter("plain", "N/um", 0.8, 200.0, 1.0, (6.0,), neutral=200.0),

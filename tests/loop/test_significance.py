@@ -57,7 +57,7 @@ def test_what_is_significant_stays_and_what_is_not_goes(monkeypatch):
     ("stiffness", "deviation", "least", "most"), [(20, 10, 0.05, 0.15), (100, 100, 0.5, 1.0)]
 )
 def test_the_size_of_a_stiffness_is_its_compliance(bent, stiffness, deviation, least, most):
-    """Of 20 ± 10 N/µm the compliance is 0.05 ± 0.025, little more than nothing; from 200 it is 18 deviations."""
+    """Of 20 ± 10 N/µm the compliance is 0.05 ± 0.025: little, although 20 is 18 deviations from 200."""
     parameter = replace(BEND.parameters[0], lower=0.8, upper=200.0, neutral=200.0, reciprocal=True)
     alone = fit(Candidate(bent.candidate.base, (BEND,)), bent.blocks, bent.noise)
     candidate = replace(alone.candidate, effects=(replace(BEND, parameters=(parameter,)),))
