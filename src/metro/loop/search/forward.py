@@ -15,6 +15,7 @@ from dataclasses import replace
 from metro.effects.effect import Effect
 from metro.loop.checks.evidence import compare, hold_out, leave_out
 from metro.loop.fitting.fit import Fit
+from metro.loop.search.replaceable import is_needed
 from metro.loop.search.rivals import Contest, believed, contested
 from metro.loop.search.significance import least_significant
 from metro.loop.search.strategy import Choice, SearchSpace
@@ -148,10 +149,13 @@ def _pruned(current: Fit, space: SearchSpace) -> tuple[Fit, set[str]]:
 
     On conditions left out, an effect gains what it gains on the runs of the fit less one for each of its
     parameters (Stone 1977, J. R. Stat. Soc. B 39, 44). Where that is far above what it must gain, no
-    condition is left out here: the contest with its rivals does that in the end.
+    condition is left out here, and where it is so to first order, nothing is fitted: the contest with its
+    rivals does that in the end.
     """
     dropped: set[str] = set()
     for effect in current.candidate.effects[:-1]:
+        if is_needed(current, effect):
+            continue
         smaller, current = parted(space.base, current, effect, space.prior)
         evidence = compare(smaller, current)
         expected = current.total - smaller.total - len(effect.parameters)

@@ -38,9 +38,14 @@ class Change:
         self.count = sum(map(len, self.made))
         self.alone = self._left([made[:, None][:, :0] for made in self.made])
 
+    @property
+    def lost(self) -> float:
+        """Log-likelihood that is lost without it, to first order in all that the smaller fit has."""
+        return self._lost(self.alone)
+
     def could_be(self, effect: Effect) -> bool:
         """Whether another effect may make so much of it that it has to be fitted to know."""
-        if self._lost(self.alone) < FAR or self._has_unknowns(effect):
+        if self.lost < FAR or self._has_unknowns(effect):
             return True
         left = self._left(list(map(np.column_stack, zip(*self._signatures(effect), strict=True))))
         return self._lost(left) < FAR or left < HALF * self.alone
@@ -104,6 +109,23 @@ class Change:
         ]
         made = zip(self.system.whiteners, after, before, strict=True)
         return [whiten(np.nan_to_num(there - here)) for whiten, there, here in made]
+
+
+def is_needed(current: Fit, effect: Effect) -> bool:
+    """Whether a fit loses so much without an effect that the smaller model need not be fitted to know.
+
+    To first order in all others. Of an effect that gives runs unknowns of their own it is not asked.
+    """
+    if effect.own:
+        return False
+    parts = dict(current.candidate.parts(current.theta))
+    kept = tuple(one for one in parts if one is not effect)
+    smaller = replace(
+        current,
+        candidate=Candidate(current.candidate.base, kept),
+        theta=np.delete(current.theta, parts[effect]),
+    )
+    return Change(smaller, current).lost > FAR
 
 
 def _beside_own(system: System) -> float:
