@@ -28,8 +28,9 @@ QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])  # turn, counter-clockwise
 class Displaced:
     """A tool at n even angles, rad, and the passes before it while nothing is displaced.
 
-    ``delay`` (2, 2, orders, passes, N): map from the spectrum of the displacement to that of what it was when
-    the earlier passes were made.
+    ``delay`` (orders, passes, N): factor from the spectrum of the displacement, as far as it goes, to that of
+    what it was when the earlier passes were made. ``turn`` (2, 2, passes, N): by what it had turned since;
+    None on a straight path: not at all.
     """
 
     cutter: Cutter
@@ -37,6 +38,7 @@ class Displaced:
     angle: Array
     before: Passes
     delay: ComplexArray
+    turn: Array | None
 
     def pieces(self, bent: Array, swept: bool = False) -> tuple[Pieces, RawEdges]:
         """Cut the edges of a tool displaced by ``bent`` into engaged pieces.
@@ -60,8 +62,11 @@ class Displaced:
         return pieces(before, raw, along), raw
 
     def _passes(self, bent: Array, swept: bool) -> Passes:
-        order = np.arange(self.delay.shape[2])[:, None, None]
-        earlier = np.einsum("abomj,ob->aomj", self.delay, np.fft.rfft(bent, axis=0))
+        order = np.arange(len(self.delay))[:, None, None]
+        spectrum = np.fft.rfft(bent, axis=0)[: len(order)].T
+        earlier = self.delay * spectrum[:, :, None, None]
+        if self.turn is not None:
+            earlier = np.einsum("abmj,bomj->aomj", self.turn, earlier)
         nearer = bent.T[:, None, :, None] - _waves(earlier, len(bent))
         rows = np.empty((*nearer.shape[2:], nearer.shape[1], self.before.rows.shape[3]))
         rows[:] = self.before.rows
@@ -72,11 +77,17 @@ class Displaced:
         return self.before._replace(rows=rows)
 
 
-def displaced(cutter: Cutter, cut: Cut, compliance: Array, count: int, true_path: bool) -> Displaced:
+def displaced(
+    cutter: Cutter, cut: Cut, compliance: Array, count: int, true_path: bool, orders: int | None = None
+) -> Displaced:
     """Return a tool on springs of a ``compliance`` (2, 2), m/N in the feed frame, at ``count`` even angles.
 
     On a curve the feed has turned since an earlier pass: a tooth met the same ray that much longer ago, and
     the force has turned with the feed while the springs have not, so that the displacement was C R C⁻¹ q.
+
+    Parameters
+    ----------
+    orders : of the displacement, from 0 on, that there are. None: as many as the angles can show.
     """
     angle = TURN * np.arange(count) / count
     cutter = placed(cutter, cut, true_path)
@@ -84,10 +95,13 @@ def displaced(cutter: Cutter, cut: Cut, compliance: Array, count: int, true_path
     before = passes(cutter, cut, true_path, angle, every=uneven)
     pitch = pitches(cutter.tooth_angles, before.rows.shape[2])
     turned = (cut.curvature if true_path else 0.0) * before.scale.feed * pitch
-    delay = np.exp(-1j * np.arange(count // 2 + 1)[:, None, None] * (pitch + turned))
+    order = np.arange(orders or count // 2 + 1)[:, None, None]
+    delay = np.exp(-1j * order * (pitch + turned))
+    if not turned.any():
+        return Displaced(cutter, cut, angle, before, delay, None)
     quarter = compliance @ QUARTER @ np.linalg.inv(compliance)
     turn = np.multiply.outer(np.eye(2), np.ones_like(pitch)) - np.multiply.outer(quarter, turned)
-    return Displaced(cutter, cut, angle, before, turn[:, :, None] * delay)
+    return Displaced(cutter, cut, angle, before, delay, turn)
 
 
 def _waves(spectrum: ComplexArray, count: int) -> Array:

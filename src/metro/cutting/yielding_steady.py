@@ -78,7 +78,8 @@ def yielding(
     bent = deflection(cutter, law, cut, coefficients, compliance, true_path=true_path, start=start)
     spectrum = np.fft.rfft(bent, axis=0) * (ANGLES / len(bent))
     finer = np.fft.irfft(spectrum, ANGLES, axis=0)
-    pieces, _ = displaced(cutter, cut, compliance, ANGLES, true_path).pieces(finer, swept=true_path)
+    tool = displaced(cutter, cut, compliance, ANGLES, true_path, orders=len(spectrum))
+    pieces, _ = tool.pieces(finer, swept=true_path)
     return Yielding(assembled(pieces, law, ANGLES), bent)
 
 

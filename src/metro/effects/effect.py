@@ -102,6 +102,8 @@ class Effect:
     belongs_to : what its parameters are a property of. A campaign follows them over the batches of one cell
         and, where they are of the tool or the work, of one tool and one material.
     comparable : whether its parameters mean the same in every batch, so that a campaign may follow them.
+    slow : whether a prediction with it takes many times as long: where effects are fitted anew, one after
+        another, it comes last.
     per : what its values are given for one by one: a list has an entry for each ``axis`` x, y and z of an
         instrument or for each ``tooth``; of an effect of a ``joint`` there is a form for each.
     sought : number of independent places (lines of a spectrum) among which ``adapt`` looked for it. The best
@@ -127,6 +129,7 @@ class Effect:
     sought: float = 1.0
     belongs_to: tuple[Owner, ...] = ("cell",)
     comparable: bool = True
+    slow: bool = False
     per: Per = ""
 
     @property

@@ -26,6 +26,7 @@ EFFECT = Effect(
     parameters=(_stiffness("kx_n_um"), _stiffness("ky_n_um")),
     apply=apply,
     belongs_to=("tool",),
+    slow=True,
     signature=(
         "What runout and pitch errors make of the force is smaller than their chips would make it, at every "
         "feed; side cuts change as the tool is pushed away from the free edge or pulled over it. A slot with "

@@ -320,9 +320,9 @@ def unlike(effect: Effect, fitted: Fit) -> bool:
 
 
 def without(base: Fit, kept: tuple[Effect, ...], prior: Noise) -> Fit:
-    """Refit with the effects that are kept, one after another on top of the ``base`` fit."""
+    """Refit with the effects that are kept, one after another on top of the ``base`` fit, slow ones last."""
     fitted = base
-    for effect in kept:
+    for effect in sorted(kept, key=lambda effect: effect.slow):
         candidate = Candidate(base.candidate.base, (*fitted.candidate.effects, effect))
         fitted = fit(candidate, base.blocks, prior, fitted)
     return fitted
