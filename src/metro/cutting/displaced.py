@@ -78,7 +78,7 @@ class Displaced:
 
 
 def displaced(
-    cutter: Cutter, cut: Cut, compliance: Array, count: int, true_path: bool, orders: int | None = None
+    cutter: Cutter, cut: Cut, compliance: Array, count: int, true_path: bool, *, orders: int | None = None
 ) -> Displaced:
     """Return a tool on springs of a ``compliance`` (2, 2), m/N in the feed frame, at ``count`` even angles.
 
