@@ -13,7 +13,7 @@ from metro.units import DEG
 
 HEADER = [
     *("joint", "Coulomb (N m)", "viscous (N m s/rad)"),
-    *("at top speed (N m)", "top speed (°/s)", "rest (N m)"),
+    *("at top speed (N m)", "top speed (°/s)", "residual (N m)"),
 ]
 
 

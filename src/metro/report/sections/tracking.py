@@ -18,10 +18,11 @@ def tracking(results: Results) -> list[Item]:
     if course is not None and sizes is not None:
         run = _shown(results, sizes)
         joint = int(sizes.loc[sizes["run"] == run, "joint"].iloc[0])
+        idle = " and in the idle run" if sizes["tip_idle_um"].notna().any() else ""
         caption = (
             f"{_finding(sizes)}Path error across the feed by the encoders, run {run}, means over bins: of "
-            f"flange and tip, in the cut and in the idle run; at the tip, of all joints and of joint {joint} "
-            f"alone; error and torque of joint {joint}. Dotted: the joint turns round."
+            f"flange and tip, in the cut{idle}; at the tip, of all joints and of joint {joint} alone; error "
+            f"and torque of joint {joint}. Dotted: the joint turns round."
         )
         picture = Picture(figures.tracking(course[course["run"] == run], joint), caption, caption)
         items += [Heading("Path error of flange and tip"), picture, _sizes(sizes)]
