@@ -80,7 +80,7 @@ def _failures(failed: pd.DataFrame) -> Table:
         [
             words(str(check)),
             _span(part["value"]),
-            _limit(part["limit"]),
+            _limit(part),
             str(part["message"].iloc[0]) + (f" (and {len(part) - 1} more alike)" if len(part) > 1 else ""),
             _where(part),
         ]
@@ -113,16 +113,26 @@ def _span(values: pd.Series) -> str:
     return ends[0] if ends[0] == ends[1] else " … ".join(ends)
 
 
-def _limit(limits: pd.Series) -> str:
-    known = limits.dropna().unique()
-    return "–" if len(known) == 0 else number(float(known[0])) if len(known) == 1 else "differs"
+def _limit(part: pd.DataFrame) -> str:
+    """Return the limit of checks of one kind, and on which side a value passes, where they show that."""
+    known = part[["value", "limit", "ok"]].dropna()
+    limits = part["limit"].dropna().unique()
+    if len(limits) != 1:
+        return "differs" if len(limits) else "–"
+    limit, passed = number(float(limits[0])), known["ok"].astype(bool)
+    if known.empty or (known["value"] == known["limit"]).all():
+        return limit
+    if ((known["value"] <= known["limit"]) == passed).all():
+        return f"≤ {limit}"
+    lower = ((known["value"] >= known["limit"]) == passed).all()
+    return limit if not lower else f"≥ {limit}" if limits[0] else "> 0"  # what has no span at all is dead
 
 
 def _checked(table: pd.DataFrame) -> Table:
     rows = []
     for check, part in table.groupby("check", sort=True):
         failed = int((~part["ok"].astype(bool)).sum())
-        ends = (_span(part["value"]), _limit(part["limit"]))
+        ends = (_span(part["value"]), _limit(part))
         rows.append([words(str(check)), MEANING.get(str(check), "–"), str(len(part)), str(failed), *ends])
     header = ["check", "its value", "times", "failed", "values", "limit"]
     return Table(header, rows, "What was checked.", [1.3, 2.8, 0.6, 0.6, 1.7, 0.8], numeric=[2, 3, 4, 5])
