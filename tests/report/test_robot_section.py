@@ -205,8 +205,15 @@ def test_without_an_idle_run_the_cut_is_drawn_alone():
     figure = tracking.tracking(course[course["log"] == "cut"], 4)
     assert [line.get_label() for line in figure.axes[0].get_lines()] == ["cut"]
     bare = sizes.drop(columns=["flange_idle_um", "tip_idle_um"])
-    [row] = table_with(content(robot_tracking=course, robot_tracking_size=bare), "Amplitude").rows
+    without = content(robot_tracking=course, robot_tracking_size=bare)
+    [row] = table_with(without, "Amplitude").rows
     assert row[:5] == ["r1", "2.0", "–", "9.0", "–"]
+    drawn = content(robot_tracking=course, robot_tracking_size=sizes)
+    said = [
+        next(item.caption for item in items if getattr(item, "caption", "").count("Path error across"))
+        for items in (drawn, without)
+    ]
+    assert ["in the cut and in the idle run;" in said[0], "in the cut;" in said[1]] == [True, True]
 
 
 def test_the_steady_deformation_is_compared_as_a_share_of_the_measured():

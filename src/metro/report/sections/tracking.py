@@ -18,7 +18,7 @@ def tracking(results: Results) -> list[Item]:
     if course is not None and sizes is not None:
         run = _shown(results, sizes)
         joint = int(sizes.loc[sizes["run"] == run, "joint"].iloc[0])
-        idle = " and in the idle run" if sizes["tip_idle_um"].notna().any() else ""
+        idle = " and in the idle run" if "tip_idle_um" in sizes else ""
         caption = (
             f"{_finding(sizes)}Path error across the feed by the encoders, run {run}, means over bins: of "
             f"flange and tip, in the cut{idle}; at the tip, of all joints and of joint {joint} alone; error "
