@@ -123,7 +123,7 @@ def _limit(part: pd.DataFrame) -> str:
     if known.empty or (known["value"] == known["limit"]).all():
         return limit
     if ((known["value"] <= known["limit"]) == passed).all():
-        return f"≤ {limit}"
+        return f"≤ {limit}" if limits[0] else limit  # there are no gaps, not fewer than none
     lower = ((known["value"] >= known["limit"]) == passed).all()
     return limit if not lower else f"≥ {limit}" if limits[0] else "> 0"  # what has no span at all is dead
 
