@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from metro.cutting.chip import Cut
 from metro.cutting.cutter import Cutter, evenly_pitched
@@ -89,21 +87,33 @@ def test_no_cut_has_no_orders():
     assert not cylinder_orders(FOUR, LAWS["linear"], of, HIGHEST, true_path=True).any()
 
 
-@given(
-    radius=st.floats(5e-7, 30e-6),
-    angle=st.floats(0.0, 2.0 * math.pi),
-    how=st.sampled_from(["slot", "down", "up"]),
-    name=st.sampled_from(["two teeth", "uneven"]),
-)
-@settings(max_examples=40, deadline=None)
-def test_orders_change_as_much_to_one_side_as_to_the_other(radius, angle, how, name):
-    cutter = replace(CUTTERS[name], runout_radius=radius, runout_angle=angle)
-    of = cut(cutter, how)
-    below, here, above = (
-        by_heights(replace(cutter, runout_radius=cutter.runout_radius + 2e-9 * h), LAWS["linear"], of, True)
-        for h in (-1, 0, 1)
-    )
-    assert np.linalg.norm(above - 2.0 * here + below) < 0.02 * np.linalg.norm(above - below)
+@pytest.mark.parametrize("name", ["run out", "uneven"])
+def test_without_a_feed_only_the_tooth_that_reaches_farthest_rubs(name):
+    of = replace(cut(CUTTERS[name], "up"), feed_per_tooth=0.0)
+    table = by_table(CUTTERS[name], LAWS["linear"], of, False)
+    found = by_heights(CUTTERS[name], LAWS["linear"], of, False)
+    assert np.linalg.norm(found - table) < 1e-3 * np.linalg.norm(table)
+
+
+def test_orders_bend_less_than_a_table_as_the_runout_grows():
+    """Drawn where no arc is about to close: a step of 2 nm to one side against one to the other.
+
+    Of 10 000 draws one jumps by 4e-4 of the force; where the runout nears the feed between two teeth, so that
+    an arc closes, true paths have jumps of up to 1.5e-4 in one draw of 200 (docs/numerics.md).
+    """
+    rng, bends = np.random.default_rng(5), []
+    for name in 150 * ["two teeth", "uneven"]:
+        radius, angle = rng.uniform(5e-7, 9e-6), rng.uniform(0.0, 2.0 * math.pi)
+        tool = replace(CUTTERS[name], runout_radius=radius, runout_angle=angle)
+        of = cut(tool, str(rng.choice(["slot", "down", "up"])))
+        tools = [replace(tool, runout_radius=radius + 2e-9 * h) for h in (-1, 0, 1)]
+        heights = [by_heights(each, LAWS["linear"], of, True) for each in tools]
+        table = [by_table(each, LAWS["linear"], of, True, 360) for each in tools]
+        size = np.linalg.norm(heights[1])
+        bends.append([np.linalg.norm(a - 2.0 * b + c) / size for a, b, c in (heights, table)])
+    of_heights, of_table = np.quantile(bends, 0.99, axis=0)
+    assert of_heights < 3e-7
+    assert of_table > 5.0 * of_heights
 
 
 def test_a_table_bends_where_the_orders_do_not():

@@ -13,7 +13,7 @@ from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import cost_under, fit, refit
 from metro.loop.fitting.noise import first_noise
 from metro.loop.search import rivals as rivals_room
-from metro.loop.search.replaceable import FAR, Change
+from metro.loop.search.replaceable import FAR, Change, is_needed
 from metro.loop.search.rivals import contested
 from metro.loop.search.trial import tried
 
@@ -167,3 +167,21 @@ def test_a_fit_without_a_condition_ends_where_new_derivatives_end_it():
     assert np.abs(held.theta - current.theta).max() > 1e-4
     assert (np.abs(held.theta - whole.theta) < 0.1 * sd).all()
     assert np.sqrt(np.diag(held.covariance)[2:]) == pytest.approx(sd, rel=0.02)
+
+
+def test_what_a_fit_loses_far_too_much_without_is_needed_and_what_another_makes_too_is_not():
+    _, current, _ = fits(Wave(bend=0.2), BEND, RIPPLE)
+    assert [is_needed(current, one) for one in (BEND, RIPPLE)] == [True, False]
+    _, twice, _ = fits(Wave(bend=0.2), BEND, TWIN)
+    assert not is_needed(twice, BEND)  # its twin takes all of it
+    phased = replace(BEND, own=1)
+    assert not is_needed(
+        replace(current, candidate=replace(current.candidate, effects=(phased, RIPPLE))), phased
+    )
+
+
+def test_to_first_order_it_is_what_a_fit_without_it_loses():
+    _, current, prior = fits(Wave(bend=0.2), BEND)
+    smaller = fit(Candidate(current.candidate.base), current.blocks, prior)
+    assert is_needed(current, BEND)
+    assert current.total - smaller.total > FAR

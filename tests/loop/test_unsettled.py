@@ -213,3 +213,22 @@ def test_what_leaves_no_prediction_where_a_condition_is_left_out_is_no_rival(mon
     why = Statement("no_prediction", {"run": "r4", "why": "too much bend"})
     monkeypatch.setattr(rivals, "beyond_left_out", lambda *_: why)
     assert not rivals.contested(base, bent, (BEND, TWIN), prior, GATES).rivals
+
+
+def test_what_gains_nothing_is_not_significant_whether_or_not_it_converged():
+    found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
+    astray = replace(found, step=5.0)
+    none = trial.Evidence(0.5, 0.6, {}, 0.1, 0.0)
+    one = trial.Trial(BEND, astray, none, q_value=0.6)
+    assert trial._refused(one, GATES, GATES.materiality).code == "no_evidence"
+    gains = replace(one, evidence=replace(none, statistic=80.0, p_value=1e-9), q_value=1e-9)
+    assert trial._refused(gains, GATES, GATES.materiality).code == "not_converged"
+
+
+def test_effects_that_are_slow_are_fitted_anew_last():
+    current = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
+    base = fitted(problem(1, truth=Wave(bend=0.1), phased=False))
+    slow = replace(BEND, slow=True)
+    again = trial.without(base, (slow, RIPPLE), base.noise)
+    assert again.candidate.effects == (RIPPLE, slow)
+    assert current.total <= again.total + 1.0

@@ -122,12 +122,13 @@ class _Late(NamedTuple):
 
     @classmethod
     def of(cls, cutter: Cutter, cut: Cut) -> _Late:
-        """Describe the passes of the other teeth before each one."""
+        """Describe the passes of the other teeth before each one; without a feed no chip begins late."""
         ahead = (np.arange(cutter.teeth) + np.arange(1, cutter.teeth)[:, None]) % cutter.teeth
         travel = feed_per_radian(cutter, cut) * pitches(cutter.tooth_angles, cutter.teeth)[:-1]
         crest = cutter.runout_radius * np.exp(1j * (cutter.runout_angle - np.asarray(cutter.tooth_angles)))
         reach = np.asarray(cutter.reach or (0.0,) * cutter.teeth)
-        return cls(travel, crest - crest[ahead], reach - reach[ahead], cutter.lag_per_depth)
+        wave = crest - crest[ahead] if cut.feed_per_tooth else np.zeros_like(travel, complex)
+        return cls(travel, wave, reach - reach[ahead], cutter.lag_per_depth)
 
     def at(self, angle: Array) -> Array:
         """Return the sine of the immersion at which a chip begins, (N, n), where κz is ``angle`` (n,)."""
