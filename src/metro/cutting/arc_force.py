@@ -30,15 +30,17 @@ def arc_force(cutter: Cutter, cut: Cut, multiple: int, highest: int) -> ComplexA
     Returns
     -------
     (H+1, 3, 2) m: amplitudes (:func:`metro.signals.orders.amplitudes`) of the force on the tool in the feed
-    frame, of a tangential and of a radial force of 1 N/m. Read-only: it is kept.
+    frame, of a tangential and of a radial force of 1 N/m.
     """
-    true = replace(cutter, runout_radius=0.0, runout_angle=0.0, reach=())
-    return _arc_force(true, replace(cut, feed_per_tooth=0.0), multiple, highest)
+    single = replace(cutter, tooth_angles=(0.0,), runout_radius=0.0, runout_angle=0.0, reach=())
+    each = _arc_force(single, replace(cut, feed_per_tooth=0.0), multiple, highest)
+    teeth = np.exp(1j * np.arange(highest + 1)[:, None] * np.array(cutter.tooth_angles)).sum(axis=1)
+    return np.asarray(teeth[:, None, None] * each)
 
 
 @lru_cache(maxsize=512)
 def _arc_force(cutter: Cutter, cut: Cut, multiple: int, highest: int) -> ComplexArray:
-    """Return :func:`arc_force`, of what it depends on alone: neither runout nor feed."""
+    """Return :func:`arc_force` of a tool of one tooth, on which neither runout nor feed acts: read-only."""
     orders = np.arange(highest + 1)[:, None]
     entry, leave = cut.engagement.entry, cut.engagement.exit
     nodes, weights = _nodes(NODES + 2 * highest)
@@ -50,9 +52,8 @@ def _arc_force(cutter: Cutter, cut: Cut, multiple: int, highest: int) -> Complex
         height = np.minimum(height, np.maximum(left, 0.0))
     lag = orders * cutter.lag_per_depth * height
     along = height * np.exp(-0.5j * lag) * np.sinc(0.5 * lag / math.pi)
-    teeth = np.exp(1j * orders * np.array(cutter.tooth_angles)).sum(axis=1, keepdims=True)
     scale = np.where(orders > 0, math.sqrt(2.0), 1.0) / (2.0 * math.pi)
-    wave = scale * teeth * along * np.exp(-1j * orders * phi) * (weights * np.cos(multiple * phi))
+    wave = scale * along * np.exp(-1j * orders * phi) * (weights * np.cos(multiple * phi))
     axes = np.array([[-cosine, -sine], [sine, -cosine], [np.zeros_like(phi)] * 2])  # 3, 2, nodes
     result = np.einsum("hn,acn->hac", wave, axes)
     result.flags.writeable = False

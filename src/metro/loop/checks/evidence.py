@@ -161,6 +161,19 @@ def leave_out(fitted: Fit, prior: Noise, moved: Callable[[Fit], Fit] | None = No
     }
 
 
+def most_left_out(fitted: Fit, like: Mapping[str, float]) -> dict[str, float]:
+    """Return an upper bound of :func:`leave_out`, keyed as that of another fit of the same runs, ``like``.
+
+    A fit that has seen the runs makes them likelier than one that has not: no condition is left out here.
+    """
+    likelihood = dict.fromkeys(like, 0.0)
+    for block in fitted.blocks:
+        name = block.condition if block.condition in likelihood else block.run
+        if name in likelihood:
+            likelihood[name] += fitted.log_likelihood[block.run]
+    return likelihood
+
+
 def by_condition(fitted: Fit) -> dict[str, float]:
     """Log-likelihood of each condition on the runs of the fit, less what its parameters gain by chance.
 

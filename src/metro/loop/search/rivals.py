@@ -13,13 +13,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from metro.effects.effect import Effect
-from metro.loop.checks.evidence import by_condition, leave_out, weights
+from metro.loop.checks.evidence import by_condition, leave_out, most_left_out, weights
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, cost_under, fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.search.replaceable import Change
 from metro.loop.search.trial import HOPELESS, Gates, beyond_left_out, parted, unlike, unsettled
+from metro.units import Array
 
+NEGLIGIBLE = 1e-3  # weight that no report shows, and no decision depends on
 RIVAL_WEIGHT = 0.05  # above it, another effect in the place of one that was chosen leaves it undecided
 
 
@@ -95,10 +97,8 @@ def _round(
         smaller, current = parted(base, current, effect, prior)
         others = _replaced(current, smaller, effects, prior)
         in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
-        left_out = [leave_out(fitted, prior) for fitted in (smaller, current, *others)]
-        within = [by_condition(fitted) for fitted in (smaller, current, *others)]
         odds = [1.0, *_odds(in_place, [current, *others])]
-        share = np.mean([weights(table, gates.seed, prior=odds) for table in (left_out, within)], axis=0)[1:]
+        share = _shares(smaller, [current, *others], odds, prior, gates)
         weight[effect.name] = float(share[0])
         for fitted, other in zip(others, share[1:], strict=True):
             if other > RIVAL_WEIGHT:
@@ -111,6 +111,23 @@ def _round(
         if better is None and first > 0:
             better = others[first - 1]
     return Contest(current, weight, tuple(rivals)), better
+
+
+def _shares(
+    smaller: Fit, fits: Sequence[Fit], odds: Sequence[float], prior: Noise, gates: Gates
+) -> Array:
+    """Return the weight of each of ``fits``, by the conditions left out and by the runs of the fit alike.
+
+    The ``smaller`` model, which has none of the effects, is one of the possibilities. Where its weight would
+    be negligible even if it predicted what is left out as well as it describes what it has seen, nothing is
+    left out of it: that takes as many fits as there are conditions.
+    """
+    within = [by_condition(fitted) for fitted in (smaller, *fits)]
+    left_out = [leave_out(fitted, prior) for fitted in fits]
+    share = weights([most_left_out(smaller, left_out[0]), *left_out], gates.seed, prior=odds)
+    if share[0] > NEGLIGIBLE:
+        share = weights([leave_out(smaller, prior), *left_out], gates.seed, prior=odds)
+    return np.asarray(np.mean([share, weights(within, gates.seed, prior=odds)], axis=0)[1:])
 
 
 def _leaves_much(current: Fit, effect: Effect, prior: Noise) -> bool:
