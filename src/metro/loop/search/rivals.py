@@ -113,9 +113,7 @@ def _round(
     return Contest(current, weight, tuple(rivals)), better
 
 
-def _shares(
-    smaller: Fit, fits: Sequence[Fit], odds: Sequence[float], prior: Noise, gates: Gates
-) -> Array:
+def _shares(smaller: Fit, fits: Sequence[Fit], odds: Sequence[float], prior: Noise, gates: Gates) -> Array:
     """Return the weight of each of ``fits``, by the conditions left out and by the runs of the fit alike.
 
     The ``smaller`` model, which has none of the effects, is one of the possibilities. Where its weight would
