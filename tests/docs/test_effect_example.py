@@ -150,6 +150,7 @@ def test_the_table_of_what_may_be_changed_is_that_of_the_models():
             "joints",
             "placed",
             "ringing",
+            "beside",
             "origin",
             "touched",
             "forces",

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from metro.observables.flatness.dynamics import TipDynamics, tip_block, tip_dynamics
+from metro.surface.tip_damping import SharedRatio
 from metro.surface.tip_stiffness import basis_over
 from metro.units import MM
 
@@ -46,7 +47,7 @@ def modes(position: str = "A", shift: float = 1.0, count: int = 3) -> pd.DataFra
     ratio = A0 / (2 * omega) + A1 * omega / 2
     return pd.DataFrame(
         {"position": position, "direction": "z", "frequency_hz": omega / (2 * np.pi), "frequency_sd_hz": 0.01}
-        | {"damping": ratio, "damping_sd": 0.02 * ratio}
+        | {"damping": ratio, "damping_sd": 0.02 * ratio, "stiffness_n_m": 1e6}
     )
 
 
@@ -67,11 +68,43 @@ def test_impacts_at_the_pose_or_at_a_point_of_it_tell_a0_and_a1() -> None:
 
 
 def test_impacts_elsewhere_one_mode_or_none_leave_the_damping_in_doubt() -> None:
-    for table in (modes("B"), modes("AB"), modes(count=1), pd.DataFrame()):
+    for table in (modes("B"), modes("AB"), pd.DataFrame()):
         found, _ = told(mass(1.0), table)
         assert isinstance(found, TipDynamics)
         assert found.damping is None
-    assert any("two are needed" in note for note in told(mass(1.0), modes(count=1))[1])
+    found, notes = told(mass(1.0), modes(count=1))
+    assert found.damping == SharedRatio(pytest.approx(modes(count=1)["damping"][0]))
+    assert any("two are needed" in note and "known to a factor of 2" in note for note in notes)
+
+
+def beside(stiffness: dict[str, float]) -> pd.DataFrame:
+    """Modes of M and K, blown along z, and one at 8 Hz along some axes that loses much less than theirs."""
+    theirs = modes()
+    other = [
+        {"position": "A", "direction": axis, "frequency_hz": 8.0 + 0.01 * at, "frequency_sd_hz": 0.01}
+        | {"damping": 0.01, "damping_sd": 1e-4, "stiffness_n_m": value}
+        for at, (axis, value) in enumerate(stiffness.items())
+    ]
+    return pd.concat([theirs, pd.DataFrame(other)], ignore_index=True)
+
+
+def test_a_mode_that_mass_and_stiffness_do_not_have_says_nothing_of_their_damping_but_swings_itself() -> None:
+    found, notes = told(mass(1.0), beside({"y": 4e6, "z": 1e8}))
+    assert found.damping.values == pytest.approx([A0, A1])
+    (mode,) = found.beside
+    assert mode.frequency == pytest.approx(2.0 * np.pi * 8.005)
+    assert (mode.ratio, mode.reach) == (pytest.approx(0.01), pytest.approx((0.0, 5e-4, 1e-4)))
+    assert any("those that blows along z show swing beside them" in note for note in notes)
+
+
+def test_a_mode_that_no_blow_along_z_shows_does_not_move_the_tip_along_z() -> None:
+    assert told(mass(1.0), beside({"x": 1e7, "y": 4e6}))[0].beside == ()
+
+
+def test_where_the_lowest_mode_is_another_one_nothing_is_said_to_swing_beside() -> None:
+    found, _ = told(mass(1.0), modes().assign(frequency_hz=0.5 * modes()["frequency_hz"]))
+    assert found.beside == ()
+    assert found.damping is not None
 
 
 def test_modes_that_mass_and_stiffness_do_not_have_are_told_and_the_lowest_of_them_is_to_be_checked() -> None:
@@ -80,7 +113,8 @@ def test_modes_that_mass_and_stiffness_do_not_have_are_told_and_the_lowest_of_th
     assert said.startswith("Pose A: ")
     assert said.endswith("The lowest of the arm's modes is among them: check mass.csv and loads.csv.")
     (said,) = [note for note in told(mass(1.0), modes(shift=1.3))[1] if "do not have" in note]
-    assert said.endswith("do not have 30.39 Hz along z. An arm has more modes than these three.")
+    assert said.endswith("these three: those that blows along z show swing beside them.")
+    assert "do not have 30.39 Hz along z." in said
     within = told(mass(0.8, 1.0, 1.2), modes(shift=1.05))[1]  # where the mass is known to some 20 %
     assert not any("do not have" in note for note in within)
 

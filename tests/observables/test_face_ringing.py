@@ -5,14 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import lsim
 
 from metro.batch.batch import Batch
 from metro.observables.cut import conditions as cutting_force
+from metro.observables.flatness.beside import Beside
 from metro.observables.flatness.doubt import damping_doubt
-from metro.observables.flatness.dynamics import TipDynamics
-from metro.observables.flatness.model import FaceSetting, FlatnessModel, PoseField
+from metro.observables.flatness.dynamics import ArmMode, TipDynamics
+from metro.observables.flatness.model import FaceSetting, FlatnessModel
 from metro.observables.flatness.path import Pace, force_over_period, make_path, passages
+from metro.observables.flatness.pose_field import PoseField
 from metro.observables.flatness.ringing import Ringing, make_ringing
+from metro.observables.problem import Block
 from metro.structure import Structure
 from metro.surface.tip_damping import Rayleigh, SharedRatio
 from metro.surface.tip_field import field_in
@@ -163,8 +167,8 @@ def test_without_a_size_of_the_work_or_a_mass_nothing_is_said_to_ring() -> None:
     assert make_ringing(batch, "r1", make_path(path()), dynamics(), COEFFICIENTS, full=np.zeros(3)) is None
 
 
-def test_a_damping_that_nothing_tells_is_in_doubt_by_as_much_as_faces_of_arms_differ() -> None:
-    rung, full = ringing(make_batch(), replace(dynamics(), damping=None))
+def face_of(rung: Ringing, full: np.ndarray) -> tuple[FaceSetting, PoseField]:
+    """Return discs in two passes under a force of 1 N along z, and the arm's compliance."""
     at_x, at_y = (
         c.ravel() for c in np.meshgrid(np.arange(12.0, 69.0, 4.0) * MM, np.array([12.0, 22.0]) * MM)
     )
@@ -183,7 +187,12 @@ def test_a_damping_that_nothing_tells_is_in_doubt_by_as_much_as_faces_of_arms_di
         loaded=np.concatenate([np.zeros(6), soft * np.array([1.16, 0.16, 0.0])]),
         ringing=rung,
     )
-    field = PoseField("A", basis, (True, True, True))
+    return setting, PoseField("A", basis, (True, True, True))
+
+
+def test_a_damping_that_nothing_tells_is_in_doubt_by_as_much_as_faces_of_arms_differ() -> None:
+    rung, full = ringing(make_batch(), replace(dynamics(), damping=None))
+    setting, field = face_of(rung, full)
     columns = damping_doubt(field, setting)
     assert columns is not None
     share, _ = FlatnessModel((field,)).finished(setting, np.zeros(1))
@@ -198,3 +207,40 @@ def test_a_damping_that_nothing_tells_is_in_doubt_by_as_much_as_faces_of_arms_di
     found = np.sqrt((columns**2).sum(axis=1))
     assert expected.max() > 0.5 * UM
     assert np.linalg.norm(found - expected) < 0.15 * np.linalg.norm(expected)
+
+
+def test_a_mode_beside_those_of_the_tip_takes_its_compliance_from_the_slower_ones() -> None:
+    """A force that is held: then both compliances give the same, at once the stiffer mode gives more."""
+    rung, _ = ringing(make_batch(), dynamics())
+    mode = ArmMode(2.0 * np.pi * 9.0, 0.03, (1e-4, 3e-4, 2e-4))
+    swing = rung.swung(mode)
+    step, force = rung.step, np.vstack([rung.force[:, :-1].reshape(-1, 3), rung.force[-1, -1:]])
+    time, lowest = step * np.arange(len(force)), float(rung.modes.frequency[:, 0].mean())
+    ratio = float(rung.damping.ratio(np.array(lowest)))
+    for axis, reach in enumerate(mode.reach):
+        apart = np.zeros(len(force))
+        for sign, (frequency, damping) in ((1, (mode.frequency, mode.ratio)), (-1, (lowest, ratio))):
+            system = ([frequency**2], [1.0, 2.0 * damping * frequency, frequency**2])
+            apart += sign * lsim(system, force[:, axis], time)[1]
+        truth = 2e-4 * reach * np.convolve(apart[:-1], rung.weights, mode="same")
+        np.testing.assert_allclose(swing[axis].ravel(), truth, atol=5e-3 * np.abs(truth).max())
+
+
+def test_design_and_prediction_of_a_face_agree_on_what_other_modes_give() -> None:
+    known = replace(dynamics(), beside=(ArmMode(2.0 * np.pi * 9.0, 0.03, (0.0, 3e-4, 2e-4)),))
+    rung, full = ringing(make_batch(), known)
+    setting, field = face_of(rung, full)
+    model = FlatnessModel((field,), ringing=("A",), beside=(Beside("A", known.beside),))
+    names = [one.name for one in model.parameters]
+    beta = np.zeros(len(names))
+    beta[[names.index(f"swing_1_{axis}_A") for axis in "yz"]] = -0.7, 1.1
+    count, none = len(setting.first), np.zeros(0)
+    zeros, axis = np.zeros((count, 0)), np.full(count, "z")
+    block = Block("r1", "c", "identify", 0, np.zeros(count), np.ones(count), setting, axis, zeros, none, {})
+    matrix, offset = model.design(block, np.zeros(1), beta)
+    predicted = model.predictions(block, np.zeros((1, 1)), beta)[0]
+    np.testing.assert_allclose(predicted, offset + matrix @ beta, atol=1e-12)
+    still = model.predictions(block, np.zeros((1, 1)), np.zeros(len(names)))[0]
+    assert np.abs(predicted - still).max() > 0.5 * UM
+    elsewhere = replace(model, beside=(Beside("B", known.beside),))
+    np.testing.assert_allclose(elsewhere.predictions(block, np.zeros((1, 1)), beta)[0], still, atol=1e-12)

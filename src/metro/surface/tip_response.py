@@ -66,6 +66,17 @@ def respond(modes: TipModes, ratio: Array, force: Array, step: float) -> Array:
     return np.asarray((modal * modes.shape[:, 2]).sum(axis=2).T)
 
 
+def swing(frequency: float, ratio: float, force: Array, step: float) -> Array:
+    """Return the motion (n, k) under forces (n, k), linear between samples, of an oscillator at rest.
+
+    It is in the unit of the force: the static motion is the force itself. ``frequency`` in rad/s.
+    """
+    every = np.full((1, force.shape[1]), frequency)
+    share = np.full_like(every, ratio)
+    once = _transition(every, share, step)
+    return np.asarray(_from_rest(every, share, once, frequency**2 * force[:, None], step)[:, 0, 0])
+
+
 def _from_rest(frequency: Array, ratio: Array, once: Array, push: Array, step: float) -> Array:
     """Modal place and speed (m + 1, 2, s, 3) in each segment, were it entered at rest in the origin.
 

@@ -19,6 +19,7 @@ BELIEFS = {
     r"place_tilt_([xy])": "tilt of the scanner along {}, at the edges of the work",
     r"form_(xx|xy|yy)": "curvature {} of the scanner's field, at the edges of the work",
     r"ringing_off_(\w+)": "frequencies of the tip at pose {}",
+    r"swing_(\d)_([xyz])_(\w+)": "mode {} beside those of the tip, by the force along {}, at pose {}",
     r"drive_lag": "lag of all torques behind the force",
     r"torque_gain": "gain of all torques",
     r"friction_under_load_joint_(\d)": "friction of joint {} under the load of the cut",

@@ -13,18 +13,7 @@ from metro.batch.batch import Batch
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness.doubt import damping_doubt
 from metro.observables.flatness.dynamics import TipDynamics, tip_dynamics
-from metro.observables.flatness.model import (
-    ACROSS,
-    AHEAD,
-    FORCE,
-    FORM,
-    PLACE,
-    BelievedSetting,
-    FaceSetting,
-    FlatnessModel,
-    LoadSetting,
-    PoseField,
-)
+from metro.observables.flatness.model import ACROSS, AHEAD, FaceSetting
 from metro.observables.flatness.noise import bin_sigma
 from metro.observables.flatness.path import (
     NARROW,
@@ -38,6 +27,7 @@ from metro.observables.flatness.path import (
 )
 from metro.observables.flatness.patterns import patterns
 from metro.observables.flatness.placing import plane_directions
+from metro.observables.flatness.pose_field import LoadSetting, PoseField
 from metro.observables.flatness.ringing import Ringing, make_ringing
 from metro.observables.problem import Block, Refusal
 from metro.observables.waviness.model import PHASES
@@ -52,11 +42,6 @@ from metro.surface.tip_stiffness import (
 from metro.units import DEG, MM, UM, Array
 
 REGISTERED_SD = 10 * UM  # of the place of one scan about that of all
-# Of the tip's frequencies: the reduced mass is declared, and known to some 5 % (drawings, or a hammer).
-FREQUENCY_SD = 0.025
-FORCE_SD = 0.04  # of the force by the coefficients: those of another bar, and corners that are not sharp
-PLACE_SD = 100 * UM  # of the declared place, in which all scans share an error: height, tilts at the edges
-FORM_SD = 5 * UM  # of the scanner's form over the work: how straight its axes are, and its field is flat
 GAUGE_SD = 0.1 * UM
 MOST_POINTS = 1200
 LEAST_COVERAGE, SECTORS = 0.75, 8
@@ -139,18 +124,6 @@ def _linearity(pose: str, loads: pd.DataFrame) -> list[str]:
         f"Pose {pose}: the compliance along the load changes by {100 * change:+.1f} % from {low:.0f} to "
         f"{high:.0f} N (mean of {len(changes)} tests); the model takes the line through both."
     ]
-
-
-def believed_block(model: FlatnessModel) -> Block:
-    """Return what is believed of the scanner, the force and the tip's frequencies beforehand."""
-    known = dict.fromkeys(PLACE, PLACE_SD) | dict.fromkeys(FORM, FORM_SD) | {FORCE: FORCE_SD}
-    sigma = np.array([known.get(one.name, FREQUENCY_SD) for one in model.believed])
-    names, zeros, none = [one.name for one in model.believed], np.zeros((len(sigma), 0)), np.zeros(0)
-    return Block(
-        *("believed", "believed", "calibrate", 0, np.zeros(len(sigma)), sigma, BelievedSetting()),
-        *(np.array(names), zeros, none, {}),
-        belief=True,
-    )
 
 
 def face_block(

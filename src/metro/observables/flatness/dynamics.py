@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.observables.quantity import quantity
-from metro.surface.tip_damping import Rayleigh, fit_rayleigh
+from metro.surface.tip_damping import Damping, Rayleigh, SharedRatio, fit_rayleigh
 from metro.surface.tip_field import MatrixField, choose_field, field_in, least_eigenvalue
 from metro.surface.tip_response import tip_modes
 from metro.surface.tip_stiffness import Basis, points_compliance
@@ -19,15 +19,36 @@ from metro.units import JSON, MM, Array
 MASS = ("mxx", "mxy", "mxz", "mxy", "myy", "myz", "mxz", "myz", "mzz")
 OF_THE_ARM = 2.0  # modes up to this factor times the highest of M and K belong to the arm
 SURE = 3.0  # standard errors
+ONE_MODE = 0.01  # relative difference of frequencies, at least, that makes two modes of blows along two axes
+
+
+@dataclass(frozen=True)
+class ArmMode:
+    """A mode of the arm that M and K of the tip do not have, as impacts show it.
+
+    Attributes
+    ----------
+    frequency : undamped, rad/s. ratio : damping ratio.
+    reach : by axis x, y, z the root of its static compliance, (m/N)^½, without its sign, which blows along
+        one axis at a time do not show; 0 where they do not show the mode.
+    """
+
+    frequency: float
+    ratio: float
+    reach: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class TipDynamics:
-    """M(P), C(P) = K(P)⁻¹ and the damping of the tip; ``damping`` is None if no impacts identify it."""
+    """M(P), C(P) = K(P)⁻¹ and the damping of the tip; ``damping`` is None if no impacts show any.
+
+    ``beside``: the modes that impacts show along z and that M and K do not have.
+    """
 
     mass: MatrixField
     compliance: MatrixField
-    damping: Rayleigh | None
+    damping: Damping | None
+    beside: tuple[ArmMode, ...] = ()
 
 
 def tip_dynamics(
@@ -69,8 +90,13 @@ def tip_dynamics(
             f"Pose {pose}: between its load points the compliance is not positive definite.",
         ]
     frequency = tip_modes(own(*places.T), np.linalg.inv(matrices)).frequency
-    damping, said = _damping(pose, frequency, 0.5 * error, modes)
-    return TipDynamics(own, compliance, damping), notes + said
+    of_arm = _of_the_arm(pose, modes, frequency)
+    others = _others(of_arm, frequency, 0.5 * error)
+    notes += _said_of_others(pose, frequency, of_arm, others)
+    if others[:1].any():  # then M or K is in doubt, and the measured modes may be theirs
+        others = np.zeros_like(others)
+    damping, said = _damping(pose, frequency, of_arm[~others])
+    return TipDynamics(own, compliance, damping, _beside(of_arm[others])), [*notes, *said]
 
 
 def _indefinite(
@@ -99,76 +125,104 @@ def _interpolated(pose: str, mass: MatrixField, points: int) -> list[str]:
     ]
 
 
-def _damping(
-    pose: str, frequency: Array, error: float, modes: pd.DataFrame
-) -> tuple[Rayleigh | None, list[str]]:
-    """Return a0, a1 of the measured modes of the arm, and notes on modes that M and K do not have.
+def _damping(pose: str, frequency: Array, table: pd.DataFrame) -> tuple[Damping | None, list[str]]:
+    """Return the damping by those measured modes that M and K have, and notes on it.
 
-    ``frequency`` (n, 3) rad/s: that of M and K at the load points, with the relative error ``error``.
+    A mode that they do not have is another structure's, and says nothing of theirs. ``frequency`` (n, 3)
+    rad/s: of M and K.
     """
-    table = _of_the_pose(pose, modes)
     if table.empty:
         return None, []
-    measured = 2 * np.pi * table["frequency_hz"].to_numpy(dtype=float)
-    arm = measured <= OF_THE_ARM * frequency.max()
-    table, measured = table[arm], measured[arm]
-    notes = list(_others(pose, frequency, error, table))
-    try:
-        rayleigh = fit_rayleigh(measured, *table[["damping", "damping_sd"]].to_numpy(dtype=float).T)
-    except ValueError:
-        return None, [
-            *notes,
-            _free(pose, f"the impacts show {len(table)} of the arm's modes, two are needed"),
-        ]
-    if rayleigh.ratio(frequency).min() <= 0:
-        return None, [*notes, _free(pose, "a0 and a1 of the impacts give a mode of M and K no damping")]
-    a0, a1 = rayleigh.values
-    sd = np.sqrt(np.diag(rayleigh.covariance))
-    misfit = f", missed by {rayleigh.misfit:.1f} times their errors" if rayleigh.misfit > 1 else ""
-    notes.append(
-        f"Pose {pose}: damping from {len(table)} modes of the impacts{misfit}: "
-        f"a0 {a0:.4g} ± {sd[0]:.1g} 1/s, a1 {a1:.4g} ± {sd[1]:.1g} s."
+    measured, (ratio, sd) = (
+        2 * np.pi * table["frequency_hz"].to_numpy(dtype=float),
+        table[["damping", "damping_sd"]].to_numpy(dtype=float).T,
     )
-    return rayleigh, notes
+    try:
+        rayleigh = fit_rayleigh(measured, ratio, sd)
+    except ValueError:
+        return _shared(pose, ratio, "the impacts show one of the modes of M and K, two are needed")
+    if rayleigh.ratio(frequency).min() <= 0:
+        return _shared(pose, ratio, "a0 and a1 of the impacts give a mode of M and K no damping")
+    a0, a1 = rayleigh.values
+    error = np.sqrt(np.diag(rayleigh.covariance))
+    misfit = f", missed by {rayleigh.misfit:.1f} times their errors" if rayleigh.misfit > 1 else ""
+    return rayleigh, [
+        f"Pose {pose}: damping from {len(table)} modes of the impacts{misfit}: "
+        f"a0 {a0:.4g} ± {error[0]:.1g} 1/s, a1 {a1:.4g} ± {error[1]:.1g} s."
+    ]
 
 
-def _free(pose: str, why: str) -> str:
-    return f"Pose {pose}: {why}: the modes share one damping ratio of 5 %, known to a factor of two."
+def _shared(pose: str, ratio: Array, why: str) -> tuple[SharedRatio, list[str]]:
+    """Return the ratio that measured modes have in the mean, for all modes, and a note."""
+    logarithm = np.log(ratio)
+    spread = float(logarithm.std(ddof=1)) if len(ratio) > 1 else SharedRatio.sd
+    shared = SharedRatio(float(np.exp(logarithm.mean())), spread)
+    words = f"the modes share the damping ratio of those measured, {100.0 * shared.value:.2g} %"
+    return shared, [f"Pose {pose}: {why}: {words}, known to a factor of {math.exp(spread):.2g}."]
 
 
-def _of_the_pose(pose: str, modes: pd.DataFrame) -> pd.DataFrame:
-    """Modes whose impacts were at the pose (``pose`` or ``pose/point``), with a known damping."""
+def _of_the_arm(pose: str, modes: pd.DataFrame, frequency: Array) -> pd.DataFrame:
+    """Return the arm's modes that impacts at the pose (``pose`` or ``pose/point``) show, rising."""
     if modes.empty:
         return modes
     place = modes["position"].astype(str)
     known = np.isfinite(modes["damping_sd"].astype(float)) & (modes["damping_sd"].astype(float) > 0)
-    return modes[((place == pose) | place.str.startswith(f"{pose}/")) & known]
+    of_arm = 2 * np.pi * modes["frequency_hz"].astype(float) <= OF_THE_ARM * frequency.max()
+    here = (place == pose) | place.str.startswith(f"{pose}/")
+    found: pd.DataFrame = modes[here & known & of_arm].sort_values("frequency_hz")
+    return found
 
 
-def _others(pose: str, frequency: Array, error: float, table: pd.DataFrame) -> Iterator[str]:
-    """Name the measured modes that differ from every mode of M and K by more than the errors of both.
+def _others(table: pd.DataFrame, frequency: Array, error: float) -> np.ndarray:
+    """Mark the measured modes that differ from every mode of M and K by more than the errors of both.
 
-    That some do is no contradiction: M and K of the tip hold three modes, an arm has more. The lowest of them
-    should be among the three.
+    ``frequency`` (n, 3) rad/s: that of M and K at the load points, with the relative ``error``.
     """
     low, high = frequency.min(axis=0) / (2 * np.pi), frequency.max(axis=0) / (2 * np.pi)
-    modes = table.sort_values("frequency_hz")
-    columns = (modes[name].to_numpy(dtype=float) for name in ("frequency_hz", "frequency_sd_hz"))
+    columns = (table[name].to_numpy(dtype=float) for name in ("frequency_hz", "frequency_sd_hz"))
     others = []
-    for measured, sd in zip(*columns, strict=True):
+    for measured, sd in zip(*columns, strict=True) if len(table) else ():
         off = np.maximum(np.maximum(low - measured, measured - high), 0.0)
         others.append(bool(off.min() > SURE * math.hypot(np.nan_to_num(sd), error * measured)))
-    if not any(others):
+    return np.array(others, dtype=bool)
+
+
+def _said_of_others(pose: str, frequency: Array, table: pd.DataFrame, others: np.ndarray) -> Iterator[str]:
+    """Name the modes that M and K do not have.
+
+    That there are some is no contradiction: M and K of the tip hold three modes, an arm has more. The lowest
+    of them should be among the three.
+    """
+    if not others.any():
         return
-    along = zip(modes["frequency_hz"], modes["direction"], others, strict=True)
+    along = zip(table["frequency_hz"], table["direction"], others, strict=True)
     listed = ", ".join(f"{hz:.4g} Hz along {direction}" for hz, direction, other in along if other)
+    low, high = frequency.min(axis=0) / (2 * np.pi), frequency.max(axis=0) / (2 * np.pi)
     three = ", ".join(f"{a:.4g} to {b:.4g} Hz" for a, b in zip(low, high, strict=True))
     why = (
         "The lowest of the arm's modes is among them: check mass.csv and loads.csv."
         if others[0]
-        else "An arm has more modes than these three."
+        else "An arm has more modes than these three: those that blows along z show swing beside them."
     )
     yield f"Pose {pose}: M and K (mass.csv, loads.csv: {three} over the face) do not have {listed}. {why}"
+
+
+def _beside(table: pd.DataFrame) -> tuple[ArmMode, ...]:
+    """Return the modes of a table, rising; what blows along several axes show at one frequency is one."""
+    if table.empty:
+        return ()
+    hz, sd = (table[name].to_numpy(dtype=float) for name in ("frequency_hz", "frequency_sd_hz"))
+    apart = np.maximum(SURE * np.hypot(sd[1:], sd[:-1]), ONE_MODE * hz[1:])
+    number = np.cumsum(np.append(0, np.diff(hz) > apart))
+    modes = []
+    for _, rows in table.groupby(number):
+        softest = rows.groupby("direction")["stiffness_n_m"].min()
+        stiffness = [float(softest.get(axis, math.nan)) for axis in "xyz"]
+        reach = [1.0 / math.sqrt(each) if each > 0.0 else 0.0 for each in stiffness]
+        if reach[2]:
+            frequency = 2.0 * math.pi * float(rows["frequency_hz"].mean())
+            modes.append(ArmMode(frequency, float(rows["damping"].mean()), (reach[0], reach[1], reach[2])))
+    return tuple(modes)
 
 
 def tip_block(damping: Mapping[str, Rayleigh]) -> JSON:

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from metro.observables.flatness.beliefs import FORCE, BelievedSetting, parameters
+from metro.observables.flatness.beside import Beside
+from metro.observables.flatness.beside import swung as swung_beside
 from metro.observables.flatness.path import Pace, Passages
+from metro.observables.flatness.pose_field import (
+    LoadSetting,
+    PoseField,
+    loaded_columns,
+    own_columns,
+)
 from metro.observables.flatness.ringing import Ringing
 from metro.observables.flatness.rung import FINE, rung, sharper
 from metro.observables.flatness.setup import Setup, swung
@@ -18,15 +27,13 @@ from metro.observables.problem import Block, Parameter
 from metro.observables.waviness.model import Vibration, phase_starts, phases_of
 from metro.structure import Structure
 from metro.surface.footprint import RADIUS
-from metro.surface.tip_stiffness import POWERS, Basis, Rows
+from metro.surface.tip_stiffness import POWERS, Basis
 from metro.units import UM, Array
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 ENTRIES = ("zx", "zy", "zz")
-FORCE = "force_off"
-PLACE = ("place_height", "place_tilt_x", "place_tilt_y")  # tilts as the height at the edges of the work
 FARTHEST = 0.7  # of what the tip's frequencies are off, as a logarithm: half or twice as high
 FORM = ("form_xx", "form_xy", "form_yy")  # of the scanner: curvatures, as the height at the edges of the work
 # Places across and along the feed, in radii of a disc, whose mean equals that over the disc: exactly for a
@@ -35,20 +42,6 @@ ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0,
 KINK = 0.1 * UM  # passages whose cuts differ by less finish a place together: teeth are less even than that
 
 NO_SHARE = math.log(1e-30)  # logarithm of the share of a passage that finishes nothing, were it metres high
-
-
-@dataclass(frozen=True, eq=False)
-class PoseField:
-    """The z row of the tip compliance over the face at one pose; ``entries`` (3,): those that loads show."""
-
-    pose: str
-    basis: Basis
-    entries: tuple[bool, ...]
-
-    @property
-    def used(self) -> np.ndarray:
-        """Mask of the coefficients (3 · terms) that are parameters of the model."""
-        return np.repeat(self.entries, self.basis.terms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,19 +124,6 @@ class FaceSetting:
 
 
 @dataclass(frozen=True)
-class BelievedSetting:
-    """What is believed of the scanner's place and of the ringing beforehand: evidence on these alone."""
-
-
-@dataclass(frozen=True, eq=False)
-class LoadSetting:
-    """The static load tests of one pose."""
-
-    pose: str
-    rows: Rows
-
-
-@dataclass(frozen=True)
 class FlatnessModel:
     """Height of the face over its programmed plane: that of the tip, (C(P) F)_z and the ringing about it.
 
@@ -156,6 +136,7 @@ class FlatnessModel:
     fields : the compliance over (x, y) at each pose, known from load tests.
     placed : whether the place of the scanner is declared. All scans share its error: height and two tilts.
     ringing : poses at which the tip rings; the mass declared there leaves its frequencies a bit off.
+    beside : modes of the arm that swing beside those of the tip.
     structure : stiffness of the arm in the cut, relative to these tests.
     setup : deviations of spindle, tool and work from the programmed setup.
     vibration : of the tip, from the start of the first pass; each face has its own phase of each wave.
@@ -164,6 +145,7 @@ class FlatnessModel:
     fields: tuple[PoseField, ...]
     placed: bool = False
     ringing: tuple[str, ...] = ()
+    beside: tuple[Beside, ...] = ()
     structure: Structure = field(default_factory=Structure)
     setup: Setup = field(default_factory=Setup)
     vibration: tuple[Vibration, ...] = ()
@@ -181,10 +163,8 @@ class FlatnessModel:
 
     @cached_property
     def believed(self) -> tuple[Parameter, ...]:
-        """Place and form of the scanner; by how much the force is off, and the tip's frequencies by pose."""
-        place = [Parameter(name, "um", UM) for name in (*(PLACE if self.placed else ()), *FORM)]
-        ringing = [Parameter(f"ringing_off_{pose}", "%", 0.01) for pose in self.ringing]
-        return (*place, Parameter(FORCE, "%", 0.01), *ringing)
+        """What is believed of beforehand."""
+        return parameters(placed=self.placed, beside=self.beside, ringing=self.ringing)
 
     def nuisance_starts(self, block: Block) -> Array:
         """Return starts of a face's nuisance, (k, m): the phase of each wave, and at least one."""
@@ -198,10 +178,10 @@ class FlatnessModel:
         if isinstance(setting, BelievedSetting):
             return np.eye(count, len(self.parameters)), np.zeros(count)
         if isinstance(setting, LoadSetting):
-            loaded = _loaded(self.fields, setting)
+            loaded = loaded_columns(self.fields, setting)
             return np.hstack([np.zeros((count, len(self.believed))), loaded]), np.zeros(count)
         off = self._off(setting, beta)
-        shared, offset, harder, rising = _shaped(
+        shared, offset, harder, rising, swings = _shaped(
             self._cutting, setting, phases_of(self.vibration, nuisance), off
         )
         offset = offset + setting.mean(self.setup.bowed(setting.x, setting.y, setting.size))
@@ -209,8 +189,13 @@ class FlatnessModel:
             (setting.force[:, None] * shared[:, None, :]).reshape(len(shared), -1)
         )
         parts = [*([setting.plane] if self.placed else []), setting.form]
-        parts += [harder[:, None], np.outer(rising, np.array(self.ringing) == setting.pose)]
-        parts += [_own(part, setting.pose, columns) for part in self.fields]
+        parts += [harder[:, None]]
+        parts += [
+            swings if each.pose == setting.pose else np.zeros((len(shared), len(each.parameters)))
+            for each in self.beside
+        ]
+        parts += [np.outer(rising, np.array(self.ringing) == setting.pose)]
+        parts += [own_columns(part, setting.pose, columns) for part in self.fields]
         return setting.shape(np.hstack(parts)), setting.shape(offset - off * rising)
 
     def predictions(self, block: Block, nuisances: Array, beta: Array) -> Array:
@@ -245,7 +230,16 @@ class FlatnessModel:
             first += count
         higher = float(beta[self._ringing_place(setting)]) - off if setting.pose in self.ringing else 0.0
         gains = float(beta[believed.index(FORCE)]), higher
-        return tip(self._basis(setting), setting, tuple(coefficients.tolist()), gains, self.tuning(off))
+        height = tip(self._basis(setting), setting, tuple(coefficients.tolist()), gains, self.tuning(off))
+        for each in self._beside(setting):
+            place = [believed.index(one.name) for one in each.parameters]
+            height = height + swung_beside(each.modes, setting) @ beta[place]
+        return height
+
+    def _beside(self, setting: FaceSetting) -> list[Beside]:
+        """Return the modes that swing beside those of the tip in a face, if there are any."""
+        rings = setting.ringing is not None
+        return [each for each in self.beside if each.pose == setting.pose and rings]
 
     @cached_property
     def _cutting(self) -> FlatnessModel:
@@ -307,20 +301,6 @@ class FlatnessModel:
         return next(part.basis for part in self.fields if part.pose == setting.pose)
 
 
-def _own(part: PoseField, pose: str, columns: Array) -> Array:
-    """Return those ``columns``, (n, 3 · terms) of a face at ``pose``, that are parameters; else zeros."""
-    count = int(part.used.sum())
-    return columns[:, part.used] if part.pose == pose else np.zeros((len(columns), count))
-
-
-@lru_cache(maxsize=16)
-def _loaded(fields: tuple[PoseField, ...], setting: LoadSetting) -> Array:
-    """Return the matrix of load tests, which no effect of a cut changes."""
-    rows = {part.pose: setting.rows.design(part.basis) for part in fields if part.pose == setting.pose}
-    none = np.zeros((len(setting.rows.displacement), 0))
-    return np.hstack([_own(part, setting.pose, rows.get(part.pose, none)) for part in fields])
-
-
 # A step that is tried is asked for its prediction, and then for its design where it is taken.
 @lru_cache(maxsize=64)
 def _finished(
@@ -332,12 +312,13 @@ def _finished(
 @lru_cache(maxsize=512)
 def _shaped(
     model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], off: float
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array, Array]:
     """Return means over each bin: terms of the basis, (bins, terms); heights, (bins,) m, whatever these are.
 
     The heights are the offset, and what is gained per relative rise of the force and of the frequencies. Both
-    gains hold for the compliance of the load tests alone, so that they are linear in the base parameters. The
-    result is cached because noise and parameters are estimated in turn, many times over.
+    gains hold for the compliance of the load tests alone, so that they are linear in the base parameters.
+    Last, (bins, parameters), what other modes give. The result is cached because noise and parameters are
+    estimated in turn, many times over.
     """
     share, above_static = _finished(model, setting, phases, off)
     basis, tuning = model._basis(setting), model.tuning(off)
@@ -345,4 +326,7 @@ def _shaped(
     harder = static(basis, setting) + rung(setting, tuning)
     heights = [above_static, *(model.structure.in_cut(one) for one in (harder, sharper(setting, tuning)))]
     offset, forced, rising = setting.mean(np.stack([(share * one).sum(axis=1) for one in heights], axis=1)).T
-    return setting.mean(shared), offset, forced, rising
+    others = [swung_beside(each.modes, setting) for each in model._beside(setting)]
+    swings = np.concatenate([*others, np.zeros((*share.shape, 0))], axis=-1)
+    swings = model.structure.in_cut(setting.mean(np.einsum("nk,nkt->nt", share, swings)))
+    return setting.mean(shared), offset, forced, rising, swings

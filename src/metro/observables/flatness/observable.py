@@ -16,7 +16,9 @@ from metro.batch.writing import writing
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness import NAME, TABLES
 from metro.observables.flatness.advice import advice, after_loop, planned_points, studied
-from metro.observables.flatness.blocks import FORM_SD, LOADS, Pose, believed_block, face_block, pose_of_loads
+from metro.observables.flatness.beliefs import FORM_SD, believed_block
+from metro.observables.flatness.beside import Beside
+from metro.observables.flatness.blocks import LOADS, Pose, face_block, pose_of_loads
 from metro.observables.flatness.dynamics import tip_block
 from metro.observables.flatness.model import FlatnessModel
 from metro.observables.flatness.noise import without_what_repeats
@@ -123,9 +125,20 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
     notes += [note for pose in known for note in pose.notes] + _limits(batch)
     placed = "to_work" in batch.instrument("scanner")
     rung = tuple(pose.field.pose for pose in known if pose.dynamics is not None)
-    model = FlatnessModel(tuple(pose.field for pose in known), placed=placed, ringing=rung)
+    ringing = {block.setting.pose for block in blocks if block.setting.ringing is not None}
+    beside = tuple(
+        Beside(pose.field.pose, pose.dynamics.beside)
+        for pose in known
+        if pose.dynamics is not None and pose.dynamics.beside and pose.field.pose in ringing
+    )
+    fields = tuple(pose.field for pose in known)
+    model = FlatnessModel(fields, placed=placed, ringing=rung, beside=beside)
     scatter = np.array([0.0 if one in model.believed else SCATTER for one in model.parameters])
-    evidence = (believed_block(model), *(pose.block for pose in known), *without_what_repeats(blocks))
+    evidence = (
+        believed_block(model.believed, beside),
+        *(pose.block for pose in known),
+        *without_what_repeats(blocks),
+    )
     said = tuple(dict.fromkeys(notes))
     return Problem(NAME, "mm", MM, model, evidence, scatter, SYSTEMATIC, said, unresolved=UNRESOLVED)
 
@@ -235,7 +248,7 @@ def struck_damping(observed: Mapping[str, pd.DataFrame]) -> dict[str, Rayleigh]:
     """Return a0 and a1 of each pose of the load tests for which impacts identified them."""
     poses = {str(name): _pose(str(name), observed) for name in observed["face_loads"]["pose"].unique()}
     known = {n: p.dynamics for n, p in poses.items() if isinstance(p, Pose) and p.dynamics is not None}
-    return {n: tip.damping for n, tip in known.items() if tip.damping is not None}
+    return {n: tip.damping for n, tip in known.items() if isinstance(tip.damping, Rayleigh)}
 
 
 def ranked_again(

@@ -15,14 +15,14 @@ from metro.cutting.cutter import Cutter
 from metro.cutting.force import COEFFICIENTS, force_basis
 from metro.cutting.law import EdgeLaw
 from metro.observables.cut import conditions as cutting_force
-from metro.observables.flatness.dynamics import TipDynamics
+from metro.observables.flatness.dynamics import ArmMode, TipDynamics
 from metro.observables.flatness.path import STEP, Passages, Path, force_over_period
 from metro.observables.problem import Refusal
 from metro.structure import Structure
 from metro.surface.footprint import RADIUS
 from metro.surface.tip_damping import Damping, SharedRatio
 from metro.surface.tip_harmonics import SLOW, at_rim, tooth_heights
-from metro.surface.tip_response import TipModes, disc_weights, respond, tip_modes
+from metro.surface.tip_response import TipModes, disc_weights, respond, swing, tip_modes
 from metro.units import MM, Array
 
 SEGMENT = 4 * MM  # M, C, K are constant over it
@@ -60,6 +60,7 @@ class Ringing:
     speed : feed, m/s. passes : their number; each has the same number of segments.
     weights : of the samples in the mean over the footprint.
     damping : of the modes. teeth : None if they pass too fast to move the tip.
+    beside : modes of the arm that swing beside these.
     """
 
     modes: TipModes
@@ -71,6 +72,7 @@ class Ringing:
     weights: Array
     damping: Damping
     teeth: Teeth | None
+    beside: tuple[ArmMode, ...] = ()
 
     def heights(self, structure: Structure, passages: Passages) -> Array:
         """Height of the tip over the static one under the full force, (points, k) m, mean over discs."""
@@ -89,6 +91,28 @@ class Ringing:
         moved = respond(self.modes, ratio, self.force, self.step) - self.static[:, None]
         return np.convolve(moved.ravel(), self.weights, mode="same").reshape(self.passes, -1)
 
+    def swung(self, mode: ArmMode) -> Array:
+        """Return what the height gains by each force along x, y, z if one of the other modes takes it, m.
+
+        The load tests measure the arm with all its modes. So the compliance of this one swings at its own
+        frequency, and no longer at the lowest one of the others: of that, the motion is taken away. Positive
+        reach along all axes is assumed.
+
+        Returns
+        -------
+        (3, passes, n), a mean over the footprint as of :meth:`moved`.
+        """
+        force = np.vstack([self.force[:, :-1].reshape(-1, 3), self.force[-1, -1:]])
+        lowest, ratio = self.modes.frequency[:, 0].mean(), self.damping.ratio(self.modes.frequency)
+        ratio = np.broadcast_to(ratio, self.modes.frequency.shape)[:, 0].mean()
+        own, other = (
+            swing(*each, force, self.step)[:-1]
+            for each in ((mode.frequency, mode.ratio), (float(lowest), float(ratio)))
+        )
+        heights = mode.reach[2] * np.array(mode.reach)[:, None] * (own - other).T
+        mean = [np.convolve(each, self.weights, mode="same") for each in heights]
+        return np.reshape(mean, (3, self.passes, -1))
+
     def of_teeth(self, passages: Passages) -> Array | float:
         """Height of the tip about its mean over a turn at each passage, (points, k) m; zero without teeth."""
         if self.teeth is None:
@@ -101,7 +125,9 @@ class Ringing:
     def _said(self) -> bytes:
         parts = (self.modes.frequency, self.modes.shape, self.static, self.force, self.weights)
         damping = self.damping.ratio(self.modes.frequency)
-        return b"".join(part.tobytes() for part in (*parts, damping, np.array([self.step, self.speed])))
+        beside = [each for mode in self.beside for each in (mode.frequency, mode.ratio, *mode.reach)]
+        given = np.array([self.step, self.speed, *beside])
+        return b"".join(part.tobytes() for part in (*parts, damping, given))
 
     def __eq__(self, other: object) -> bool:
         """Repeats of a cut have the same ringing (apart from the teeth), so one cache serves all of them."""
@@ -164,6 +190,7 @@ def make_ringing(
         disc_weights(RADIUS / speed, step),
         dynamics.damping or SharedRatio(),
         _teeth(batch, run, path, tool, dynamics=dynamics, values=values),
+        dynamics.beside,
     )
 
 
