@@ -70,3 +70,18 @@ def test_a_kind_is_named_only_where_more_than_chance_is_predicted(low, points):
     words = SENTENCES["ceiling"](values)
     assert ("end of the tool" in words) is points
     assert ("may be chance" in words) is not points
+
+
+def test_what_would_remain_of_a_held_out_run_is_not_called_its_error():
+    """The error of a run, 47 % of the signal, was stated as the 6 % that its prediction by others leaves."""
+    values = {
+        "parts": {"feed": 0.5, "same": 0.4, "alone": 0.1},
+        "share": 0.9,
+        "ci95": [0.8, 1.0],
+        "noise_share": 0.0,
+        "places": [{"axis": "x", "label": "order 2", "share": 1.0}],
+        "held_out": [{"run": "r03", "share": 0.98, "of_signal": 0.06}],
+    }
+    words = SENTENCES["ceiling"](values)
+    assert "98 % in held-out run r03 (an error of 6 % of the signal would remain)" in words
+    assert words.startswith("Of the squared error of the base model, 50 % grows with the feed")

@@ -207,8 +207,8 @@ def _ceiling(values: JSON) -> str:
     low, high = (100 * max(end, 0.0) for end in values["ci95"])
     parts = [f"{100 * share:.0f} % {PARTS[name]}" for name, share in named]
     held = "".join(
-        f", {100 * max(one['share'], 0.0):.0f} % in held-out run {one['run']} (whose error is "
-        f"{100 * one['of_signal']:.0f} % of the signal)"
+        f", {100 * max(one['share'], 0.0):.0f} % in held-out run {one['run']} (an error of "
+        f"{100 * one['of_signal']:.0f} % of the signal would remain)"
         for one in values["held_out"][:MOST_PLACES]
     )
     places = listed([f"{place['label']} in {place['axis']}" for place in values["places"]])
@@ -219,8 +219,8 @@ def _ceiling(values: JSON) -> str:
         else "That may be chance, so no kind of cause can be named."
     )
     return (
-        f"Of the error of the base model, {listed([*parts, _alone(values)])}. The other conditions predict "
-        f"{100 * values['share']:.0f} % ({low:.0f} to {high:.0f} %) of it in a left-out condition{held}, "
+        f"Of the squared error of the base model, {listed([*parts, _alone(values)])}. The other conditions "
+        f"predict {100 * values['share']:.0f} % ({low:.0f} to {high:.0f} %) of it in a left-out condition{held}, "
         f"which is as much as a cause could explain. It is largest at {places}. {kind}"
     )
 
