@@ -220,8 +220,8 @@ def _ceiling(values: JSON) -> str:
     )
     return (
         f"Of the squared error of the base model, {listed([*parts, _alone(values)])}. The other conditions "
-        f"predict {100 * values['share']:.0f} % ({low:.0f} to {high:.0f} %) of it in a left-out condition{held}, "
-        f"which is as much as a cause could explain. It is largest at {places}. {kind}"
+        f"predict {100 * values['share']:.0f} % ({low:.0f} to {high:.0f} %) of it in a left-out "
+        f"condition{held}, which is as much as a cause could explain. It is largest at {places}. {kind}"
     )
 
 
