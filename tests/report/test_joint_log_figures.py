@@ -8,6 +8,7 @@ from metro.batch.batch import Batch
 from metro.report.content import Facts
 from metro.report.figures import joint_logs as figures
 from metro.report.results import Results
+from metro.report.sections.joint_logs import NOT_IDENTIFIABLE, _friction
 from metro.report.sections.joint_words import joint_facts
 
 SPEED = np.array([-20.0, -10.0, 10.0, 20.0])
@@ -55,3 +56,35 @@ def test_a_friction_whose_interval_reaches_zero_is_no_result_of_page_one(low, de
     shown = {"joint_log": table, "joint_log_curve": curve}
     items = joint_facts(Results(Batch("b", {}, {}, pd.DataFrame(), {}), shown, identified, {}, {}))
     assert any(isinstance(item, Facts) for item in items) is determined
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "sd", "cell"),
+    [
+        ("gravity", 1200.0, 2750.0, NOT_IDENTIFIABLE),  # beside 20 N m, all that the joint exerts
+        ("gravity", 0.1, 0.2, "≤ 0.51"),  # an axis that is vertical carries no weight, and that is known
+        ("gravity", np.nan, np.nan, NOT_IDENTIFIABLE),
+        ("coulomb", 8.0, 1.0, "8.0 ± 2.0"),
+        ("coulomb", -0.03, 0.08, "≤ 0.13"),
+        ("viscous", 20.0, 57.0, "≤ 137"),  # 2 N m at the top speed
+        ("viscous", 20.0, 5700.0, NOT_IDENTIFIABLE),
+        ("inertia", 5.0, 42.0, NOT_IDENTIFIABLE),
+        ("inertia", 50.0, 4.0, "50.0 ± 8.2"),
+    ],
+)
+def test_what_a_motion_does_not_determine_is_said_to_be_so(name, value, sd, cell):
+    """A weight had been printed as 1200 ± 5600 N m."""
+    known = dict.fromkeys(("coulomb", "viscous", "gravity", "inertia"), 10.0)
+    row = {
+        "run": "idle",
+        "joint": 1,
+        "unit": "N m",
+        "condition": 9.0,
+        "torque_rms": 20.0,
+        "fastest_deg_s": 1.0,
+    }
+    row |= known | {f"{quantity}_sd": 0.1 for quantity in known} | {name: value, f"{name}_sd": sd}
+    made = _friction(pd.DataFrame([row]), {})
+    assert made.rows[0][2 + list(known).index(name)] == cell
+    assert ("Not identifiable:" in made.caption) is (cell == NOT_IDENTIFIABLE)
+    assert ("distinguished from zero" in made.caption) is cell.startswith("≤")

@@ -12,6 +12,7 @@ from metro.report.numbers import listing, number, probability, with_interval
 from metro.report.results import Results
 from metro.units import JSON, printed
 
+NOT_IDENTIFIABLE, AT_MOST = "not identifiable", "≤"
 T95 = 2.045  # Student's quantile of 29 degrees of freedom: intervals are of 30 stretches
 BEYOND = {
     "load": "friction grows with the torque that the links ask of the gear, by {size} of it",
@@ -83,13 +84,23 @@ def _friction(table: pd.DataFrame, about: JSON) -> Table:
     header += [f"inertia ({'A s²/rad' if amperes else 'kg m²'})"]
     rows = []
     for _, r in fitted.iterrows():
-        cells = [_interval(r[name], r[f"{name}_sd"]) for name in ("coulomb", "viscous", "gravity", "inertia")]
+        cells = [_identified(r, name) for name in ("coulomb", "viscous", "gravity", "inertia")]
         rows.append([str(r["run"]), str(r["joint"]), *cells])
     caption = (
         "Friction of the joints, the largest torque of the links' weight in the log, and the inertia about "
         "the joint's own axis in the middle of the motion, the motor's included, with 95 % intervals. Each "
         "joint is fitted on its own. "
     )
+    shown = [cell for row in rows for cell in row]
+    if NOT_IDENTIFIABLE in shown:
+        caption += (
+            "Not identifiable: this motion does not determine the quantity, whose interval is wider than the "
+            "value and than the torque of the joint. "
+        )
+    if any(cell.startswith(AT_MOST) for cell in shown):
+        caption += (
+            f"{AT_MOST}: it cannot be distinguished from zero; the upper end of the interval is given. "
+        )
     if amperes:
         caption += (
             "The drive constants are not known (drives.torque_per_ampere_nm_a in cell.yaml): currents in "
@@ -98,6 +109,23 @@ def _friction(table: pd.DataFrame, about: JSON) -> Table:
     else:
         caption += f"In the intervals: {about.get('drives', '')}."
     return Table(header, rows, caption, [1.1, 0.5, 1.4, 1.4, 1.4, 1.4], numeric=[1, 2, 3, 4, 5], small=True)
+
+
+def _identified(row: pd.Series, name: str) -> str:
+    """Write a quantity of a joint, or how large it may be, or that the log does not determine it.
+
+    An interval about zero that is narrow beside the torque of the joint determines a quantity: it is small.
+    An inertia is never zero, so that an interval about zero determines none.
+    """
+    value, half = float(row[name]), T95 * float(row[f"{name}_sd"])
+    if not math.isfinite(value):
+        return NOT_IDENTIFIABLE
+    if half <= abs(value):
+        return _interval(value, row[f"{name}_sd"])
+    speed = math.radians(float(row["fastest_deg_s"])) if name == "viscous" else 1.0
+    small = name != "inertia" and half * speed <= float(row["torque_rms"])
+    most = half + (abs(value) if name == "gravity" else value)  # a weight pulls either way
+    return f"{AT_MOST} {number(most, 2)}" if small else NOT_IDENTIFIABLE
 
 
 def _interval(value: float, sd: float) -> str:
