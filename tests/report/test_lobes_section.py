@@ -153,3 +153,54 @@ def test_without_a_boundary_there_is_nothing():
 def test_the_same_table_gives_the_same_bytes(draw):
     first, second = (to_svg(draw(synthetic.methods())) for _ in range(2))
     assert first == second
+
+
+def test_a_boundary_deeper_than_any_cutting_edge_ends_at_the_depth_that_a_tool_can_cut():
+    """Diagrams of a tool of 16 mm had reached to 300 mm."""
+    deep = synthetic.boundary().assign(depth_mm=lambda line: 14 * (line["rpm"] / 1000) ** 2)
+    none = TESTS[:0]
+    assert figures.top_of(deep["depth_mm"], none) > 100
+    assert figures.top_of(deep["depth_mm"], none, 64.0) == 64.0
+    assert figures.top_of(deep["depth_mm"], TESTS.assign(depth_mm=70.0), 64.0) == 70.0
+    # what lies wholly deeper is not left out: its least depth is drawn
+    assert figures.top_of(deep["depth_mm"] + 200, none, 64.0) > 214
+
+
+def test_depths_that_no_tool_cuts_are_named_and_not_tabulated():
+    tables = synthetic.tables()
+    own = tables["lobes_final"]
+    both = pd.concat([own, own.assign(position="2", depth_mm=1000.0)])
+    made = replace(synthetic.results(), tables={**tables, "lobes_final": both})
+    *_, chart, limits = [item for item in lobes.boundaries(made) if isinstance(item, Picture | Table)]
+    diameter = made.batch.manifest["tool"]["diameter_mm"]
+    assert f"beyond {4 * diameter} mm, 4 diameters of the tool, are not shown" in chart.caption
+    assert {row[2] for row in limits.rows} == {f"> {4 * diameter}"}
+    assert chart.figure.axes[0].get_ylim()[1] < 10  # of the position that can be cut
+
+
+def test_a_method_that_found_no_boundary_has_no_entry_in_the_legend():
+    lacking = synthetic.methods().assign(cdsem_mm=np.nan)
+    figure = figures.methods_chart(lacking)
+    drawn = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "single modes by CDSEM" not in drawn
+    assert len(drawn) == len(figures.METHODS) - 1
+
+
+@pytest.mark.parametrize("depth", [1.2, 9.0])
+def test_the_recommended_cut_is_a_star_on_the_boundary_of_its_position(depth):
+    cut = {"position": "1", "spindle_rpm": 2100.0, "axial_depth_mm": depth, "removal_cm3_min": 1.0}
+    verdict = {"recommended_cuts": [{**cut, "advice": "use"}, {**cut, "advice": "do_not"}]}
+    made = replace(synthetic.results(), verdict=verdict)
+    (picture,) = lobes.tested_boundary(made, made.compared("lobes"))
+    axes = picture.figure.axes[0]
+    (star,) = [line for line in axes.get_lines() if line.get_label() == "recommended cut"]
+    assert star.get_xydata().tolist() == [[2100.0, depth]]
+    assert axes.get_ylim()[1] > depth
+    assert "Star: the recommended cut." in picture.caption
+
+
+def test_a_cut_that_is_advised_against_is_no_star():
+    cut = {"position": "1", "spindle_rpm": 2100.0, "axial_depth_mm": 1.0, "removal_cm3_min": 1.0}
+    made = replace(synthetic.results(), verdict={"recommended_cuts": [{**cut, "advice": "do_not"}]})
+    (picture,) = lobes.tested_boundary(made, made.compared("lobes"))
+    assert "recommended cut" not in labels(picture.figure.axes[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -82,6 +82,18 @@ def legend_above(figure: Figure, axes: Axes) -> None:
     """Put the one legend of a figure in a row above all panels."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=max(1, len(labels)))
+
+
+def legend_of(figure: Figure, panels: Iterable[Axes]) -> None:
+    """Put one legend above all panels, with what any of them draws, and with nothing else."""
+    named = {
+        label: handle
+        for axes in panels
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        list(named.values()), list(named), loc="outside upper center", ncols=min(4, max(1, len(named)))
+    )
 
 
 def to_svg(figure: Figure) -> bytes:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from metro.report import style
-from metro.report.figures.lobes import drawn_with_tests, entries, panels_of
+from metro.report.figures.lobes import draw_advised, drawn_with_tests, panels_of
+from metro.units import JSON
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,23 +30,29 @@ BEYOND_CHATTER = 1.3
 ROUGHNESS = (("ra_um", "Ra (µm)"), ("rz_um", "Rz (µm)"))
 
 
-def tests_chart(boundary: pd.DataFrame, tests: pd.DataFrame) -> Figure:
+def tests_chart(
+    boundary: pd.DataFrame,
+    tests: pd.DataFrame,
+    *,
+    advised: Mapping[str, JSON],
+    deepest_mm: float,
+) -> Figure:
     """Draw every test on the lobes of its position, by the detection in its record; circle wrong labels.
 
     Parameters
     ----------
-    boundary : see :func:`metro.report.figures.lobes.lobes_chart`.
+    boundary, advised, deepest_mm : see :func:`metro.report.figures.lobes.lobes_chart`.
     tests : ``position, rpm, depth_mm, kind, probability, wrong_label``.
     """
     with style.style():
         figure, panels = panels_of(boundary)
         for position, axes in panels.items():
-            _, here = drawn_with_tests(axes, position, boundary, tests)
+            _, here = drawn_with_tests(axes, position, boundary, tests, deepest_mm)
             _marks(axes, here)
+            draw_advised(axes, advised.get(str(position)))
             if len(tests) <= NUMBERED:
                 _probabilities(axes, here)
-        handles, labels = max(panels.values(), key=entries).get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=4)
+        style.legend_of(figure, panels.values())
     return figure
 
 

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from metro.report import style
+from metro.units import JSON
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 POSITIONS = 8
+NO_CUTS: Mapping[str, JSON] = MappingProxyType({})
+LEAST_SHOWN = 0.25  # of a panel that the boundary takes where it is deeper than anybody cuts
 CUTS = ((0, "o", style.GREEN, "stable cut"), (1, "X", style.BEFORE, "chatter"))
 BANDS = (
     ("depth_lo_mm", "depth_hi_mm", 0.22, "95 %, with model error"),
@@ -28,7 +34,14 @@ METHODS = (
 )
 
 
-def lobes_chart(boundary: pd.DataFrame, tests: pd.DataFrame, islands: pd.DataFrame | None = None) -> Figure:
+def lobes_chart(
+    boundary: pd.DataFrame,
+    tests: pd.DataFrame,
+    islands: pd.DataFrame | None = None,
+    *,
+    advised: Mapping[str, JSON] = NO_CUTS,
+    deepest_mm: float = math.inf,
+) -> Figure:
     """Draw stability boundaries with their bands, islands of stability above them, and the test cuts.
 
     Parameters
@@ -36,27 +49,50 @@ def lobes_chart(boundary: pd.DataFrame, tests: pd.DataFrame, islands: pd.DataFra
     boundary : ``position, rpm, depth_mm, depth_lo_mm, depth_hi_mm, depth_p05_mm, depth_p95_mm, kind``.
     tests : ``position, rpm, depth_mm, measured`` (1 = unstable), ``before``, ``after``; may be empty.
     islands : ``position, rpm, from_mm, to_mm``.
+    advised : the recommended cut of each position.
+    deepest_mm : see :func:`top_of`.
     """
     with style.style():
         figure, panels = panels_of(boundary)
         for position, axes in panels.items():
-            line, here = drawn_with_tests(axes, position, boundary, tests)
+            line, here = drawn_with_tests(axes, position, boundary, tests, deepest_mm)
             if islands is not None:
                 _islands(axes, islands[islands["position"] == position], line)
             _cuts(axes, here)
-        style.legend_above(figure, max(panels.values(), key=entries))
+            draw_advised(axes, advised.get(str(position)))
+        style.legend_of(figure, panels.values())
     return figure
 
 
 def drawn_with_tests(
-    axes: Axes, position: object, boundary: pd.DataFrame, tests: pd.DataFrame
+    axes: Axes, position: object, boundary: pd.DataFrame, tests: pd.DataFrame, deepest_mm: float = math.inf
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Draw the boundary of a position, with room for its tests; return it by speed, and these tests."""
     line = boundary[boundary["position"] == position].sort_values("rpm")
     here = tests[tests["position"].astype(str) == str(position)]
     draw_boundary(axes, line)
-    axes.set_ylim(0, 1.15 * top_of(line["depth_mm"], here))
+    axes.set_ylim(0, 1.15 * top_of(line["depth_mm"], here, deepest_mm))
     return line, here
+
+
+def draw_advised(axes: Axes, cut: JSON | None) -> None:
+    """Mark the recommended cut, with room above it; nothing where there is none."""
+    if not cut:
+        return
+    depth = float(cut["axial_depth_mm"])
+    axes.plot(
+        *([cut["spindle_rpm"]], [depth]),
+        marker="*",
+        ms=11,
+        ls="",
+        mfc=style.YELLOW,
+        mec=style.MEASURED,
+        mew=0.6,
+        clip_on=False,
+        zorder=4,
+        label="recommended cut",
+    )
+    axes.set_ylim(top=max(axes.get_ylim()[1], 1.15 * depth))
 
 
 def panels_of(table: pd.DataFrame) -> tuple[Figure, dict[Any, Axes]]:
@@ -72,11 +108,6 @@ def panels_of(table: pd.DataFrame) -> tuple[Figure, dict[Any, Axes]]:
     for axes in flat[len(positions) :]:
         axes.set_visible(False)
     return figure, dict(zip(positions, flat, strict=False))
-
-
-def entries(axes: Axes) -> int:
-    """Count the entries of the panel's legend."""
-    return len(axes.get_legend_handles_labels()[1])
 
 
 def draw_boundary(axes: Axes, line: pd.DataFrame) -> None:
@@ -121,29 +152,37 @@ def _cuts(axes: Axes, tests: pd.DataFrame) -> None:
         )
 
 
-def top_of(depth: pd.Series, tests: pd.DataFrame) -> float:
-    """Return the upper end of the depth axis: it includes tests and lobes, but not the peaks between."""
-    depths = [2.5 * float(depth.min()), float(depth.quantile(0.8))]
-    return max([*depths, float(tests["depth_mm"].max())] if len(tests) else depths)
+def top_of(depth: pd.Series, tests: pd.DataFrame, deepest_mm: float = math.inf) -> float:
+    """Return the upper end of the depth axis: it includes tests and lobes, but not the peaks between.
+
+    ``deepest_mm``: the depth beyond which nobody cuts with the tool. What is deeper is left out, but for the
+    lowest depth of a boundary that lies there wholly.
+    """
+    lowest = float(depth.min())
+    depths = [2.5 * lowest, float(depth.quantile(0.8))]
+    top = min(max(depths), max(deepest_mm, (1.0 + LEAST_SHOWN) * lowest))
+    return max([top, float(tests["depth_mm"].max())] if len(tests) else [top])
 
 
-def methods_chart(methods: pd.DataFrame) -> Figure:
-    """Draw the boundary by each method, a panel per position.
+def methods_chart(methods: pd.DataFrame, deepest_mm: float = math.inf) -> Figure:
+    """Draw the boundary by each method that found one, a panel per position.
 
     Parameters
     ----------
-    methods : rows of ``lobe_methods``.
+    methods : rows of ``lobe_methods``. deepest_mm : see :func:`top_of`.
     """
     with style.style():
         figure, panels = panels_of(methods)
         for position, axes in panels.items():
             part = methods[methods["position"] == position].sort_values("rpm")
             for column, label, colour, line, mark in METHODS:
+                if not part[column].notna().any():
+                    continue
                 (drawn,) = axes.plot(part["rpm"], part[column], color=colour, ls=line, label=label)
                 drawn.set(marker=mark, markersize=5, markerfacecolor="none")
-            axes.set_ylim(0, 1.15 * max(top_of(part[c], part[:0]) for c in ("depth_mm", "single_mode_mm")))
-        handles, labels = next(iter(panels.values())).get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=3)
+            tops = (top_of(part[c], part[:0], deepest_mm) for c in ("depth_mm", "single_mode_mm"))
+            axes.set_ylim(0, 1.15 * max(tops))
+        style.legend_of(figure, panels.values())
     return figure
 
 
@@ -185,12 +224,15 @@ def _colours(count: int) -> list[str]:
     return [to_hex(colour) for colour in colormaps["turbo"](np.linspace(0.03, 0.97, count))]
 
 
-def positions_chart(boundary: pd.DataFrame) -> Figure:
+def positions_chart(
+    boundary: pd.DataFrame, advised: JSON | None = None, deepest_mm: float = math.inf
+) -> Figure:
     """Draw the boundaries of all positions in one panel; dashed where the modes were interpolated.
 
     Parameters
     ----------
-    boundary : ``position, rpm, depth_mm, interpolated``.
+    boundary : ``position, rpm, depth_mm, interpolated``. advised : the recommended cut. deepest_mm : see
+        :func:`top_of`.
     """
     groups = list(boundary.groupby("position", sort=False))
     with style.style():
@@ -199,6 +241,8 @@ def positions_chart(boundary: pd.DataFrame) -> Figure:
             look = "--" if line["interpolated"].any() else "-"
             axes.plot(line["rpm"], line["depth_mm"], color=colour, ls=look, label=f"position {position}")
         axes.set(xlabel="spindle speed (rpm)", ylabel="depth of cut (mm)")
-        axes.set_ylim(0, 1.15 * max(top_of(line["depth_mm"], line[:0]) for _, line in groups))
+        tops = sorted(top_of(line["depth_mm"], line[:0], deepest_mm) for _, line in groups)
+        axes.set_ylim(0, 1.15 * max([tops[0], *(top for top in tops if top <= deepest_mm)]))
+        draw_advised(axes, advised)
         figure.legend(loc="outside upper center", ncols=4)
     return figure

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from metro.report import style
-from metro.report.figures.lobes import entries
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,7 +57,7 @@ def over_positions(modes: pd.DataFrame, properties: Sequence[tuple[str, str, str
             row[0].set_ylabel("from the mean (%)")
         for axes in grid[-1]:
             axes.set_xlabel("position")
-        style.legend_above(figure, max((row[0] for row in grid), key=entries))
+        style.legend_of(figure, (row[0] for row in grid))
     return figure
 
 

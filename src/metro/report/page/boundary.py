@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from metro.report.cuts import deepest_cut
 from metro.report.figures.lobes import top_of
 from metro.report.numbers import number, probability, with_interval
 from metro.report.page.curves import HELP
@@ -26,9 +27,12 @@ def boundary_curves(results: Results, budget: int) -> JSON | None:
     compared = results.compared("lobes")
     cuts = None if compared is None else placed(results, compared)
     positions = list(after["position"].drop_duplicates())
-    several = len(positions) > 1
+    several, deepest = len(positions) > 1, deepest_cut(results.batch.manifest)
     curves = [
-        {"said": f"position {position}" * several, **_boundary(position, after, before, cuts, islands)}
+        {
+            "said": f"position {position}" * several,
+            **_boundary((position, deepest), after, before, cuts, islands),
+        }
         for position in positions
     ]
     shown = fitting(curves, budget, [-float(i) for i in range(len(curves))])
@@ -46,12 +50,14 @@ def boundary_curves(results: Results, budget: int) -> JSON | None:
 
 
 def _boundary(
-    position: object,
+    place: tuple[object, float],
     after: pd.DataFrame,
     before: pd.DataFrame | None,
     cuts: pd.DataFrame | None,
     islands: pd.DataFrame | None,
 ) -> JSON:
+    """Return the boundary at a place: its position, and the depth beyond which nobody cuts, mm."""
+    position, deepest = place
     line = after[after["position"] == position].sort_values("rpm").reset_index(drop=True)
     base = None if before is None else _at_speeds(before[before["position"] == position], line["rpm"])
     changed = base is not None and not np.allclose(
@@ -62,7 +68,7 @@ def _boundary(
         lines.append({"name": "base model", "look": "before", "y": packed(base["depth_mm"].to_numpy(float))})
     here = None if cuts is None else cuts[cuts["position"].astype(str) == str(position)]
     none = pd.DataFrame({"depth_mm": []})
-    top = 1.15 * top_of(line["depth_mm"], none if here is None else here)
+    top = 1.15 * top_of(line["depth_mm"], none if here is None else here, deepest)
     spans = [] if islands is None else islands[islands["position"] == position].to_dict("records")
     return {
         "key": [str(position)],

@@ -58,6 +58,7 @@ def _story(causes: list[JSON]) -> list[Item]:
 
 
 PARTS = ("total", "upstream", "own", "doubt")  # of an error that a force propagates to
+NORMAL = {"doubt": 1.96}  # from a standard deviation to half of a 95 % interval
 
 
 def cause_name(cause: JSON) -> str:
@@ -79,7 +80,10 @@ def upstream(results: Results) -> Section | None:
         [
             title(name),
             when,
-            *(f"{number(entry[when][part])} {printed(entry['unit'])}" for part in PARTS),
+            *(
+                f"{number(NORMAL.get(part, 1.0) * entry[when][part])} {printed(entry['unit'])}"
+                for part in PARTS
+            ),
             percent(entry[when]["share"]),
         ]
         for name, entry in chain.items()
@@ -97,7 +101,7 @@ def upstream(results: Results) -> Section | None:
     header += ["uncertainty", "share"]
     caption = (
         "Rms error by origin. Share: part of the mean square error that vanishes when the measured force is "
-        "used; negative where the two errors compensate. Uncertainty: one standard deviation."
+        "used; negative where the two errors compensate. Uncertainty: half of a 95 % interval."
     )
     table = Table(header, rows, caption, [1.5, 0.7, 1.2, 1.1, 1.2, 0.9, 0.7], numeric=[2, 3, 4, 5, 6])
     return Section("From force to shape", [Paragraph(text), table])

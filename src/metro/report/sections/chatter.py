@@ -6,13 +6,17 @@ import numpy as np
 import pandas as pd
 
 from metro.report.content import Bullets, Heading, Item, Picture, Table, gathered
+from metro.report.cuts import deepest_cut, not_drawn
 from metro.report.figures import chatter as figures
-from metro.report.numbers import listing, number, probability
+from metro.report.figures.lobes import POSITIONS
+from metro.report.numbers import listing, number, probability, with_interval
 from metro.report.results import Results
+from metro.report.sections.decisions import advised_cuts
 from metro.units import JSON
 
 LONGEST = 30
 UNDECIDED = 0.5  # probability of a record that does not decide
+NORMAL = 1.96
 SURELY = 0.9  # probability from which a cut is said to chatter
 KINDS = {
     "hopf": "Hopf",
@@ -35,7 +39,12 @@ def chatter_items(results: Results) -> list[Item]:
     if boundary is not None and tests["position"].notna().any():
         caption = "Test cuts on the stability boundary, classified by their own records"
         caption += ", with the probability of chatter." if len(tests) <= figures.NUMBERED else "."
-        items.append(Picture(figures.tests_chart(boundary, tests), caption, caption))
+        cuts, deepest = advised_cuts(results.verdict), deepest_cut(results.batch.manifest)
+        known = set(boundary["position"].astype(str).unique()[:POSITIONS])
+        caption += " Star: the recommended cut." if known & set(cuts) else ""
+        caption += not_drawn(boundary["depth_mm"], deepest)
+        chart = figures.tests_chart(boundary, tests, advised=cuts, deepest_mm=deepest)
+        items.append(Picture(chart, caption, caption))
     items += [_table(tests, results.batch.manifest), *_confusion(tests), Bullets(_words(tests))]
     return [*items, *_records(results, tests), *_roughness(tests)]
 
@@ -91,9 +100,8 @@ def _table(tests: pd.DataFrame, manifest: JSON) -> Table:
     ]
     more = f" The first {LONGEST} of {len(tests)}." if len(tests) > LONGEST else ""
     caption = (
-        "Chatter identified from the records: probability, kind, frequency with its standard deviation; "
-        "phase of the "
-        f"vibration from tooth to tooth (cycles), and the phase predicted at the boundary.{more}"
+        "Chatter identified from the records: probability, kind, frequency with its 95 % interval; phase of "
+        f"the vibration from tooth to tooth (cycles), and the phase predicted at the boundary.{more}"
     )
     widths = [1.4, 1, 1, 1, 1.5, 1.4, 0.8, 0.8]
     return Table(header, gathered(rows), caption, widths, numeric=[1, 2, 3, 5, 6, 7])
@@ -101,7 +109,8 @@ def _table(tests: pd.DataFrame, manifest: JSON) -> Table:
 
 def _row(row: pd.Series, teeth: int) -> list[str]:
     known = np.isfinite(row["chatter_hz"])
-    frequency = f"{row['chatter_hz']:.2f} ± {row['chatter_sd_hz']:.2f}" if known else "–"
+    half = NORMAL * float(row["chatter_sd_hz"])
+    frequency = with_interval(row["chatter_hz"], [row["chatter_hz"] - half, row["chatter_hz"] + half])
     passing = teeth * row["rpm"] / 60.0
     phases = [
         f"{hz / passing % 1.0:.2f}" if known and pd.notna(hz) else "–"

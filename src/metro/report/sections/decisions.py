@@ -61,18 +61,26 @@ def _plural(name: str) -> str:
     return {"conforms": "conform", "does_not_conform": "do not conform"}.get(name, WORDS[name])
 
 
+def advised_cuts(verdict: JSON) -> dict[str, JSON]:
+    """Return of each position the cut that removes most and is not advised against."""
+    cuts = [cut for cut in verdict.get("recommended_cuts") or [] if cut["advice"] != "do_not"]
+    return {str(cut["position"]): cut for cut in sorted(cuts, key=lambda cut: cut["removal_cm3_min"])}
+
+
+def least_of(cuts: Mapping[str, JSON]) -> JSON:
+    """Return the cut of the position that bears least."""
+    return min(cuts.values(), key=lambda cut: cut["removal_cm3_min"])
+
+
 def best_cut(verdict: JSON) -> list[str]:
     """Say the cut that removes most and is not advised against, at the position that bears least.
 
     A part is seldom cut at one position alone.
     """
-    cuts = [cut for cut in verdict.get("recommended_cuts") or [] if cut["advice"] != "do_not"]
-    if not cuts:
+    of_position = advised_cuts(verdict)
+    if not of_position:
         return []
-    of_position: dict[str, JSON] = {}
-    for cut in sorted(cuts, key=lambda cut: cut["removal_cm3_min"]):
-        of_position[str(cut["position"])] = cut
-    best = min(of_position.values(), key=lambda cut: cut["removal_cm3_min"])
+    best = least_of(of_position)
     most = max(of_position.values(), key=lambda cut: cut["removal_cm3_min"])
     where = f"position {best['position']}"
     if len(of_position) > 1:

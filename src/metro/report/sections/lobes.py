@@ -6,11 +6,13 @@ import numpy as np
 import pandas as pd
 
 from metro.report.content import Bullets, Heading, Item, Picture, Table
+from metro.report.cuts import deepest_cut, not_drawn
 from metro.report.figures import lobes as figures
 from metro.report.numbers import listing, number, probability, quantity
 from metro.report.results import Results
 from metro.report.sections import findings
 from metro.report.sections.chatter import chatter_items
+from metro.report.sections.decisions import advised_cuts, least_of
 from metro.units import JSON, Array
 
 LONGEST, SHORT = 30, 10
@@ -27,7 +29,7 @@ def boundaries(results: Results) -> list[Item]:
     methods, boundary = results.tables.get("lobe_methods"), results.tables.get("lobes_final")
     items += boundary_items(results)
     if methods is not None:
-        items += _methods(methods, boundary)
+        items += _methods(methods, boundary, deepest_cut(results.batch.manifest))
     stations = results.tables.get("lobe_stations")
     if boundary is not None and boundary["position"].nunique() > 1:
         best = boundary.groupby("position")["depth_mm"].min()
@@ -38,7 +40,12 @@ def boundaries(results: Results) -> list[Item]:
         )
         if boundary["interpolated"].any():
             caption += " Dashed: with modes interpolated between the positions where they were measured."
-        items += [Picture(figures.positions_chart(boundary), caption, caption), _limits(results, boundary)]
+        cuts = advised_cuts(results.verdict)
+        least = least_of(cuts) if cuts else None
+        caption += f" Star: the recommended cut, at position {least['position']}." if least else ""
+        caption += not_drawn(boundary["depth_mm"], deepest_cut(results.batch.manifest))
+        chart = figures.positions_chart(boundary, least, deepest_cut(results.batch.manifest))
+        items += [Picture(chart, caption, caption), _limits(results, boundary)]
     if stations is not None:
         items.append(_stations(stations))
     return items + chatter_items(results)
@@ -50,9 +57,18 @@ def boundary_items(results: Results) -> list[Item]:
     if boundary is None or results.compared("lobes") is not None:
         return []
     lowest = findings.lowest_boundary(boundary, [("depth_mm", "")])
-    caption = f"{lowest} Stability boundary with its bands.".lstrip()
-    chart = figures.lobes_chart(boundary, _NO_TESTS, results.tables.get("lobe_islands"))
-    return [Picture(chart, caption, caption)]
+    return [_boundary_chart(results, boundary, _NO_TESTS, f"{lowest} Stability boundary with its bands.")]
+
+
+def _boundary_chart(results: Results, boundary: pd.DataFrame, tests: pd.DataFrame, caption: str) -> Picture:
+    """Draw the boundary with its tests and the recommended cuts."""
+    cuts, deepest = advised_cuts(results.verdict), deepest_cut(results.batch.manifest)
+    known = set(boundary["position"].astype(str).unique()[: figures.POSITIONS])
+    caption += " Star: the recommended cut." if known & set(cuts) else ""
+    caption = f"{caption}{not_drawn(boundary['depth_mm'], deepest)}".lstrip()
+    islands = results.tables.get("lobe_islands")
+    chart = figures.lobes_chart(boundary, tests, islands, advised=cuts, deepest_mm=deepest)
+    return Picture(chart, caption, caption)
 
 
 def _limits(results: Results, boundary: pd.DataFrame) -> Table:
@@ -63,19 +79,20 @@ def _limits(results: Results, boundary: pd.DataFrame) -> Table:
         grid[grid.index.isin(cut)] if grid.index.isin(cut).any() else grid.iloc[:: max(1, len(grid) // SHORT)]
     )
     grid = grid.head(LONGEST)
-    rows = []
+    rows, deepest = [], deepest_cut(results.batch.manifest)
     for rpm, depths in grid.iterrows():
         known = depths.dropna()
         ratio = number(float(known.max() / known.min()), 2)
         ends = f"{known.idxmax()} / {known.idxmin()}"
-        rows.append([number(float(str(rpm)), 4), *(number(float(d)) for d in depths), ratio, ends])
+        cells = (f"> {deepest:g}" if d > deepest else number(float(d)) for d in depths)
+        rows.append([number(float(str(rpm)), 4), *cells, ratio, ends])
     spread = (grid.max(axis=1) / grid.min(axis=1)).dropna()
     least, most = (number(float(str(rpm)), 4) for rpm in (spread.idxmin(), spread.idxmax()))
     caption = (
         "Limit of the depth of cut (mm) by speed and position. The greatest is "
-        f"{number(spread.min(), 2)} times the least at {least} rpm and {number(spread.max(), 2)} times at "
-        f"{most} rpm."
+        f"{number(spread.min(), 2)} times the least at {least} rpm"
     )
+    caption += f" and {number(spread.max(), 2)} times at {most} rpm." if most != least else "."
     header = ["speed (rpm)", *map(str, grid.columns), "greatest / least", "at positions"]
     widths = [0.9, *([0.8] * len(grid.columns)), 1.1, 0.9]
     return Table(header, rows, caption, widths, numeric=list(range(len(header) - 1)), small=True)
@@ -94,17 +111,18 @@ def _lowest(blocks: list[JSON]) -> Table:
     return Table(["position", "lowest limit of the depth of cut"], rows, "Stability boundaries.", [1, 2])
 
 
-def _methods(methods: pd.DataFrame, boundary: pd.DataFrame | None) -> list[Item]:
+def _methods(methods: pd.DataFrame, boundary: pd.DataFrame | None, deepest: float) -> list[Item]:
     lines = [("depth_mm", " by all modes together"), ("single_mode_mm", " by single modes")]
     compared = methods[methods.groupby("position")["checked"].transform("any")]
     caption = (
         f"{findings.lowest_boundary(compared, lines)} The boundary by each method, with the "
         "coefficients of the base model. Published diagrams of this kind take the lowest of all "
         "modes solved alone, by complete discretisation with Euler's method (CDSEM)."
+        f"{not_drawn(compared['depth_mm'], deepest)}"
     )
     governing = f"{_governing_words(methods)} Direction and number by rising frequency."
     return [
-        Picture(figures.methods_chart(compared), caption, caption),
+        Picture(figures.methods_chart(compared, deepest), caption, caption),
         Bullets(agreement(methods, boundary)),
         Picture(figures.governing_modes(methods), governing, governing),
     ]
@@ -223,8 +241,7 @@ def tested_boundary(results: Results, frame: pd.DataFrame) -> list[Picture]:
     )
     changed = bool((frame["before"] != frame["after"]).any())
     caption += f" and for {right['after']} with the effects found." if changed else "."
-    chart = figures.lobes_chart(boundary, placed(results, frame), results.tables.get("lobe_islands"))
-    return [Picture(chart, caption, caption)]
+    return [_boundary_chart(results, boundary, placed(results, frame), caption)]
 
 
 def placed(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
