@@ -8,7 +8,10 @@ import pypdfium2
 import pytest
 import synthetic_results as synthetic
 
-from metro.report.batch_report import report_pdf, report_sections
+from metro.report.batch_report import drawn_once, report_pdf, report_sections
+from metro.report.content import Paragraph, Picture, Section
+from metro.report.document import Cover, compile_pdf
+from metro.report.figures import lobes as lobe_figures
 from metro.report.parameters import parameter_name
 from metro.report.sections.verdict import verdict_words
 
@@ -242,3 +245,33 @@ def test_of_stability_the_tests_on_the_predicted_side_come_before_the_error_of_a
     entry = synthetic.observable("clean", 0.4, 0.2, unit="1", verification={"words": "28 of 32 are right."})
     said = verdict_words("lobes", entry)
     assert said.index("28 of 32") < said.index("0.40")
+
+
+def chart(caption):
+    return Picture(lobe_figures.positions_chart(synthetic.boundary()), caption, caption)
+
+
+def test_a_figure_that_the_first_page_has_is_not_drawn_again():
+    """The boundary of a batch without tests, and that of held-out tests, were drawn twice."""
+    other = Picture(lobe_figures.methods_chart(synthetic.methods()), "Methods.", "")
+    sections = [
+        Section("Results", [chart("Lowest.")]),
+        Section("Identification", [other, chart("The same.")]),
+    ]
+    first, second = drawn_once(sections)
+    assert first == sections[0]
+    assert second.items[0] is other
+    assert second.items[1] == Paragraph("Drawn in section “Results”: The same.", "note")
+
+
+@pytest.mark.parametrize("look", ["verdict", "warning"])
+def test_a_box_is_not_torn_over_the_end_of_a_page(look):
+    box = " ".join(f"word{i}" for i in range(150))
+    sections = [
+        Section(f"Part {i}", [*[Paragraph("A line.")] * (6 + i % 5), Paragraph(box, look)]) for i in range(12)
+    ]
+    pages = text_of(compile_pdf(Cover("A title", "batch", "metro"), sections))
+    assert len(pages) > 3
+    assert sum("word149" in page for page in pages) > 3
+    for page in pages:
+        assert page.count("word0 ") == page.count("word149")

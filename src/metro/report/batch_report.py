@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from metro import __version__
-from metro.report.content import Section
+from metro.report.content import Item, Paragraph, Picture, Section
 from metro.report.document import Cover, compile_pdf
 from metro.report.results import Results
 from metro.report.sections.areal import areal
@@ -60,4 +61,16 @@ def report_sections(results: Results) -> list[Section]:
         terms(results),
         provenance(results),
     ]
-    return [section for section in sections if section is not None]
+    return drawn_once([section for section in sections if section is not None])
+
+
+def drawn_once(sections: Sequence[Section]) -> list[Section]:
+    """Replace each figure that an earlier section has already by a word on where it is."""
+    first: dict[bytes, str] = {}
+
+    def shown(item: Item, title: str) -> Item:
+        if not isinstance(item, Picture) or first.setdefault(item.svg, title) == title:
+            return item
+        return Paragraph(f"Drawn in section “{first[item.svg]}”: {item.caption}", "note")
+
+    return [replace(one, items=[shown(item, one.title) for item in one.items]) for one in sections]
