@@ -114,7 +114,7 @@ def test_nothing_could_be_identified_is_not_said_of_faces_that_were():
     )
     text = " ".join(text_of(pdf_of(some)))
     assert "Nothing could be identified" not in text
-    assert "in sections of its own: flatness of faces" in text
+    assert "are given in other sections: flatness of faces" in text
 
 
 def test_modes_without_a_driving_point_have_no_stiffness_and_the_first_page_shows_a_response():

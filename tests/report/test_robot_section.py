@@ -11,6 +11,7 @@ from metro.report.content import Bullets, Picture, Table
 from metro.report.figures import joint_torques, tracking
 from metro.report.figures import robot as figures
 from metro.report.sections.robot import robot
+from metro.report.sections.stiffness import arm_stiffness
 from metro.report.style import to_svg
 
 X = np.arange(-10.0, 60.0)
@@ -200,6 +201,14 @@ def test_flange_and_tip_are_drawn_with_the_joint_that_makes_most_of_it():
     assert "in 1 of 1 runs joint 4 makes most of it" in picture.caption
 
 
+def test_the_legend_of_the_path_error_lies_on_no_curve():
+    figure = tracking.tracking(strayed()[0], 4)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        *("cut", "idle run", "all joints", "joint 4 alone")
+    ]
+    assert not any(axes.get_legend() for axes in figure.axes)
+
+
 def test_without_an_idle_run_the_cut_is_drawn_alone():
     course, sizes = strayed()
     figure = tracking.tracking(course[course["log"] == "cut"], 4)
@@ -349,3 +358,55 @@ def test_the_line_of_friction_jumps_at_standstill_and_a_joint_without_points_has
     assert right[0] - left[-1] == pytest.approx(2 * (45.0 + 900.0 * np.pi / 180))
     assert len(figure.axes[5].get_lines()) == len(figure.axes[1].get_lines()) - 2
     assert to_svg(figure)
+
+
+SOFTER = {
+    "cause": "stiffness_scale",
+    "where": {},
+    "status": "confirmed",
+    "seen_in": ["force", "deformation"],
+    "parameters": {"factor": {"value": 0.5, "ci95": [0.48, 0.52], "unit": "1"}},
+}
+
+
+def stiffness_with(cause):
+    shapes = pd.concat([ellipsoids(), ellipsoids().assign(pose="load tests p1")])
+    made = results(arm_map=chart(), arm_ellipsoids=shapes)
+    return arm_stiffness(replace(made, loop={"causes": [cause]}))
+
+
+def test_the_stiffness_of_load_tests_is_compared_with_that_while_cutting():
+    """One table had twice what a verdict had found, without a word."""
+    _, table, use, picture = stiffness_with(SOFTER)
+    rest, cutting = table.rows[:2]
+    assert (rest[0], cutting[0]) == ("cut, by load tests", "cut, while cutting")
+    values = [[float(cell.split(" ")[0]) for cell in row[1:4]] for row in (rest, cutting)]
+    assert values[1] == pytest.approx([0.5 * value for value in values[0]], rel=0.02)
+    assert use.text.startswith(
+        "While cutting, the arm has 0.500 ± 0.020 times the stiffness of the load tests"
+    )
+    assert "for the deflection under cutting forces" in use.text
+    assert "by load tests" in picture.caption
+
+
+@pytest.mark.parametrize(
+    "change", [{"status": "contradiction"}, {"where": {"joint": 3}}, {"cause": "tip_give"}]
+)
+def test_without_one_factor_of_all_joints_nothing_is_compared(change):
+    _, table, picture = stiffness_with({**SOFTER, **change})
+    assert [row[0] for row in table.rows if row[0].startswith("cut")] == ["cut"]
+    assert "load tests" not in picture.caption
+
+
+def test_waviness_names_its_band():
+    runs = pd.DataFrame({"run": ["r1"], "shortest_mm": [0.8]})
+    waves = {"wa_measured": {"value": 0.5, "ci95": [0.4, 0.6], "unit": "um"}, "correlation": 0.9}
+    waves |= {"wa_predicted": waves["wa_measured"]}
+    parameters = pd.DataFrame({"run": ["r1"], "profile": ["W"]})
+    made = results(waviness_runs=runs, profile_parameters=parameters)
+    table = table_with(
+        robot(replace(made, identified={"arm": {"waviness": {"r1": waves}}})).items, "Waviness"
+    )
+    assert table.caption.startswith("Waviness of the wall from waves of 0.8 to 8 mm, measured and predicted")
+    assert "“Surface texture” are larger" in table.caption
+    assert table.header[1:3] == ["Wa wall", "Wa predicted"]

@@ -124,7 +124,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     errors = WallErrors(partial(model.per_newton, compliance=softness), model.per_radian, missed)
     walls, notes = wall_blocks(batch, observed, errors)
     if not walls:
-        return Refusal("; ".join(notes) or "no run has a profile")
+        return Refusal("; ".join(note.rstrip(".") for note in notes) or "no run has a profile")
     evidence = calibration(batch, model, observed["arm_loads"])
     if isinstance(evidence, Refusal):
         return evidence

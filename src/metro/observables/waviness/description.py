@@ -28,7 +28,7 @@ DESCRIPTION = Description(
         "controller's log is not in it."
     ),
     tables=TABLES,
-    shown=("waviness_points",),
+    shown=("waviness_points", "waviness_runs"),
     drawn=("waviness_points",),
     needs=needs,
 )

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOMAINS = (("time", "frequency (Hz)", "µm²/Hz"), ("path", "waves per mm", "µm² mm"))
-CUT, IDLE = (style.AFTER, "-", "cut"), (style.GREY, "--", "idle run")
+LOGS = {"cut": (style.AFTER, "-", "cut"), "idle": (style.GREY, "--", "idle run")}
 
 
 def tracking(course: pd.DataFrame, joint: int) -> Figure:
@@ -27,14 +27,14 @@ def tracking(course: pd.DataFrame, joint: int) -> Figure:
     logs = dict(tuple(course.groupby("log")))
     cut = logs["cut"]
     with style.style():
-        figure, grid = style.new_figure(2.5, 2, 2, sharex=True)
+        figure, grid = style.new_figure(2.8, 2, 2, sharex=True)
         for axes, what in zip(grid[0], ("flange", "tip"), strict=True):
-            for name, (colour, look, label) in (("cut", CUT), ("idle", IDLE)):
-                if name in logs:
-                    part = logs[name]
-                    axes.plot(part["x_mm"], part[f"{what}_um"], color=colour, ls=look, label=label)
-            axes.set_title(f"{what}, cut and idle run", loc="left")
-            axes.legend(loc="best")
+            known = [name for name in LOGS if name in logs]
+            for name in known:
+                colour, look, label = LOGS[name]
+                part = logs[name]
+                axes.plot(part["x_mm"], part[f"{what}_um"], color=colour, ls=look, label=label)
+            axes.set_title(f"{what}, {' and '.join(LOGS[name][2] for name in known)}", loc="left")
         grid[0][1].sharey(grid[0][0])
         _alone(grid[1][0], cut, joint)
         _drive(grid[1][1], cut, joint)
@@ -42,6 +42,7 @@ def tracking(course: pd.DataFrame, joint: int) -> Figure:
             axes.set_ylabel("error (µm)")
         for axes in grid[1]:
             axes.set_xlabel("along the wall (mm)")
+        style.legend_of(figure, (grid[0][0], grid[1][0]))
     return figure
 
 
@@ -49,13 +50,12 @@ def _alone(axes: Axes, cut: pd.DataFrame, joint: int) -> None:
     axes.plot(cut["x_mm"], cut["tip_um"], color=style.AFTER, label="all joints")
     axes.plot(cut["x_mm"], cut[f"joint{joint}_um"], color=style.BEFORE, ls="--", label=f"joint {joint} alone")
     axes.set_title("tip in the cut", loc="left")
-    axes.legend(loc="best")
 
 
 def _drive(axes: Axes, cut: pd.DataFrame, joint: int) -> None:
     """Error of the joint and its torque on two scales; a line where it turns round."""
     axes.plot(cut["x_mm"], cut[f"error{joint}_urad"], color=style.BEFORE)
-    axes.set_ylabel(f"error of joint {joint} (µrad)", color=style.BEFORE)
+    axes.set_ylabel("error (µrad)", color=style.BEFORE)
     other = axes.twinx()
     other.plot(cut["x_mm"], cut[f"torque{joint}_nm"], color=style.GREEN, lw=0.9)
     other.set_ylabel("torque (N m)", color=style.GREEN)

@@ -51,6 +51,19 @@ ELSEWHERE = {
     "calibration": "tool, work and payload",
     "joints": "the joints",
 }
+# What is shown run by run, and what its interval holds; other sections show the same of some runs.
+ABOUT_RUN_BLOCKS = {
+    "tip_force": (
+        "Force on the tip in the steady cut, mean of each run. The interval is that of its source: of a "
+        "dynamometer, the scatter of the signal over the number of turns. The force by the joints' torques "
+        "is another estimate, with an interval of its own."
+    ),
+    "deformation": (
+        "Deflection of the tip in each run, predicted by the final model along the axes of the work. The "
+        "interval is that of the model's parameters and of the force. The deformation of held-out walls is "
+        "measured, along their normal; its interval is that of the measurement."
+    ),
+}
 OF_ROBOT = ("observability", "waviness", "tip_force_by_torques")  # the robot's own section shows them
 LONGEST, ABREAST = 30, 3
 PLANE = ("xx", "xy", "yx", "yy")
@@ -90,7 +103,7 @@ def _elsewhere(identified: JSON) -> str:
     ]
     if not blocks:
         return "Nothing could be identified from this batch."
-    return f"What was identified from this batch is in sections of its own: {listing(blocks)}."
+    return f"The quantities identified from this batch are given in other sections: {listing(blocks)}."
 
 
 def _reasons(identified: JSON) -> list[tuple[str, str]]:
@@ -225,7 +238,8 @@ def _arm(arm: JSON) -> list[Item]:
     for key, name in RUN_BLOCKS.items():
         block = measured if key == "tip_force" else arm.get(key)
         if block and key not in OF_ROBOT:
-            tables.append(_by_run(block, name, f"{name.capitalize()}, run by run.", half=True))
+            about = ABOUT_RUN_BLOCKS.get(key, f"{name.capitalize()}, run by run.")
+            tables.append(_by_run(block, name, about, half=True))
     return [Heading("Robot"), *abreast(tables)] if tables else []
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from metro.report.content import Item, Table
 from metro.report.numbers import listing, number, quantity, with_interval
 from metro.report.results import Results
+from metro.report.sections.while_cutting import factor_of
 from metro.units import JSON, printed
 
 # The best of the sets of cutting coefficients that a batch has, and what it was identified from.
@@ -129,6 +130,8 @@ def _stiffness(results: Results) -> Iterator[Row]:
         place = ", ".join(filter(None, [str(row["pose"]), str(row["point"])]))
         value = f"{with_interval(row[f'k{axis}_n_um'], low_high)} N/µm along {axis}"
         about = f"load tests{f' at {place}' if place else ''}{', where the runs cut' if cut else ''}"
+        if factor := factor_of(results):
+            value += f"; {quantity({**factor, 'unit': None})} times as much while cutting"
         yield "least static stiffness", value, about
 
 

@@ -19,6 +19,7 @@ from metro.report.sections.tracking import tracking
 from metro.units import JSON
 
 SETTLED = 0.9  # share of the median deformation of a wall, from which on it counts as steady
+LONGEST_WAVE_MM = 8.0  # that is compared where batch.yaml states no instruments.profiler.cutoff_mm
 _WAVES = ("wa", "wq", "wt")
 
 
@@ -93,7 +94,9 @@ def _waviness(results: Results) -> list[Item]:
     blocks: JSON = (results.identified.get("arm") or {}).get("waviness") or {}
     items: list[Item] = [Heading("Waviness of the walls")]
     if blocks:
-        items.append(_waves(blocks))
+        traces = results.tables.get("profile_parameters")
+        longer = traces is not None and bool((traces["profile"] == "W").any())
+        items.append(_waves(blocks, waves_band(results), longer=longer))
         items += _shares(blocks)
     points = results.tables.get("robot_waves")
     if points is not None:
@@ -119,7 +122,17 @@ def _alike(blocks: JSON) -> str:
     return f"Wall and tip error correlate with {number(min(values), 2)} to {number(max(values), 2)}. "
 
 
-def _waves(blocks: JSON) -> Table:
+def waves_band(results: Results) -> str:
+    """Say between which lengths the waves of walls are compared with those of the tip; empty if not known."""
+    runs = results.tables.get("waviness_runs")
+    if runs is None:
+        return ""
+    longest = float(results.batch.instrument("profiler").get("cutoff_mm", LONGEST_WAVE_MM))
+    return f"{runs['shortest_mm'].max():.2g} to {longest:g} mm"
+
+
+def _waves(blocks: JSON, band: str, *, longer: bool) -> Table:
+    """Tabulate the waves in a band; ``longer``: the section on texture has the longer ones, too."""
     shown = [wave for wave in _WAVES if any(f"{wave}_measured" in block for block in blocks.values())]
     rows = []
     for run, block in list(blocks.items())[:LONGEST]:
@@ -131,8 +144,14 @@ def _waves(blocks: JSON) -> Table:
         alike = block.get("correlation")
         text = quantity(alike, with_unit=False) if isinstance(alike, dict) else number(alike, 2)
         rows.append([str(run), *cells, text])
-    names = [f"{wave.capitalize()} {kind}" for wave in shown for kind in ("wall", "told")]
-    caption = "Measured waviness of the wall (µm) and the prediction, with 95 % intervals where known."
+    names = [f"{wave.capitalize()} {kind}" for wave in shown for kind in ("wall", "predicted")]
+    within = f" from waves of {band}" if band else ""
+    caption = f"Waviness of the wall{within}, measured and predicted (µm), with 95 % intervals where known."
+    if longer:
+        caption += (
+            " The W parameters of the section “Surface texture” are larger: they include the longer waves, "
+            "up to the length of the wall."
+        )
     header = ["run", *names, "correlation"]
     return Table(header, rows, caption + more(len(blocks)), [0] * len(header), small=True)
 

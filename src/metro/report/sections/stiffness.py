@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import pandas as pd
 
-from metro.report.content import Bullets, Heading, Item, Picture, Table
+from metro.report.content import Bullets, Heading, Item, Paragraph, Picture, Table
 from metro.report.figures import robot as figures
 from metro.report.numbers import listing, number, with_interval
 from metro.report.results import Results
+from metro.report.sections.while_cutting import compared, factor_of, scaled
 
+BY_TESTS = "with 95 % intervals from those of the joints by load tests"
+BY_CELL = "from those of the joints, which cell.yaml states"
+CUT = "cut"  # the pose of the cuts in the tables of an arm
 LONGEST = 30
 FEW = 12  # stations that are all tabulated
 NORMAL = 1.96
@@ -20,19 +24,26 @@ def arm_stiffness(results: Results) -> list[Item]:
     if chart is None or shapes is None:
         return []
     rows = []
+    factor = factor_of(results)
     for pose, part in shapes.groupby("pose", sort=False):  # from the softest axis up
         soft = part.iloc[0]
         axis = ", ".join(number(soft[f"axis_{a}"], 2) for a in "xyz")
-        rows.append([str(pose), *(band(r["stiffness_n_um"], r["sd_n_um"]) for _, r in part.iterrows()), axis])
+        sizes = list(zip(part["stiffness_n_um"], part["sd_n_um"], strict=True))
+        name, cuts = str(pose), factor is not None and pose == CUT
+        rows.append([f"{name}, by load tests" if cuts else name, *(band(*size) for size in sizes), axis])
+        if factor and cuts:
+            rows.append([f"{name}, while cutting", *(scaled(*size, factor) for size in sizes), axis])
+    tested = bool(shapes["sd_n_um"].notna().any())
     caption = (
-        "Principal stiffnesses of the tip (N/µm) with 95 % intervals from those of the joints, and the "
-        "direction "
-        "in which it is softest, work frame."
+        f"Principal stiffnesses of the tip (N/µm) {BY_TESTS if tested else BY_CELL}, and the direction in "
+        "which it is softest, work frame."
     )
+    use = compared(results)
     header = ["pose", "softest", "middle", "stiffest", "softest along (x, y, z)"]
     items: list[Item] = [
         Heading("Stiffness of the arm at the tip"),
-        Table(header, rows[:LONGEST], caption, [1, 1.1, 1.1, 1.1, 1.5]),
+        Table(header, rows[:LONGEST], caption, [1.3 if use else 1, 1.1, 1.1, 1.1, 1.5]),
+        *([Paragraph(use)] if use else []),
     ]
     reached = int(chart["k_least_n_um"].notna().sum())
     if reached > 3:
@@ -44,6 +55,7 @@ def arm_stiffness(results: Results) -> list[Item]:
             "ellipsoid of "
             f"the pose “{shapes['pose'].iloc[0]}” from above and from the side."
         )
+        about += " All by load tests." if use else ""
         items.append(Picture(figures.stiffness(chart, shapes), about, about))
     return items
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import pandas as pd
@@ -15,6 +16,8 @@ from metro.units import printed
 LONGEST = 24
 FIRST = ("Ra", "Rz", "RSm", "Pa", "Pt", "PSm")  # on the first page, those that there are
 MOST_FACTS = 3
+NESTING = re.compile(r"λc = ([\d.]+) mm")
+BANDS = {"W": "all waves longer than λc = {} mm", "R": "waves shorter than λc = {} mm"}
 TITLES = {"P": "primary profile", "W": "waviness", "R": "roughness"}
 
 
@@ -77,7 +80,16 @@ def _about(part: pd.DataFrame, letter: str) -> str:
         if sources
         else "without intervals: one trace, of which the noise (instruments.profiler.sigma_mm) is not stated"
     )
-    return f"{TITLES[letter][0].upper()}{TITLES[letter][1:]}, parameters by ISO 21920-2; {intervals}."
+    title = f"{TITLES[letter][0].upper()}{TITLES[letter][1:]}"
+    return f"{title}, {_band(part, letter)}parameters by ISO 21920-2; {intervals}."
+
+
+def _band(part: pd.DataFrame, letter: str) -> str:
+    """Say which waves are in a profile, where all traces are parted at one length; else empty."""
+    known = {found[1] for notes in part["notes"] if (found := NESTING.search(str(notes)))}
+    if letter not in BANDS or len(known) != 1:
+        return ""
+    return f"{BANDS[letter].format(known.pop())}, "
 
 
 def _text(row: pd.Series) -> str:
