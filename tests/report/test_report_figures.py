@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 import synthetic_results as synthetic
 
-from metro.report.figures import comparison, face_pairing, surface, verdicts
+from metro.report.figures import comparison, face_pairing, study, surface, verdicts
 from metro.report.style import to_svg
 
 
@@ -143,3 +143,60 @@ def test_the_parity_of_faces_bears_the_unit_of_the_comparison():
     faces = pd.DataFrame({"run": ["r1", "r2"], **dict.fromkeys(columns, (0.1, 0.2))})
     left = face_pairing.parity(faces, "mm").axes[0]
     assert (left.get_xlabel(), left.get_ylabel()) == ("X_m measured (mm)", "predicted (mm)")
+
+
+def drawn(figure):
+    """Draw a figure, so that its layout is made; return what measures its texts."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return canvas.get_renderer()
+
+
+@pytest.mark.parametrize("name", ["r{}", "table 6, {}-66"])
+def test_long_names_of_runs_leave_the_residuals_their_room(name):
+    """The names had left a sixth of an inch of the axis, and its title was longer than the figure."""
+    blocks = [
+        {"run": name.format(56 + i), "role": "identify", "order": i, "rms_before": 0.03 + 0.01 * i}
+        for i in range(3)
+    ]
+    figure = verdicts.runs(blocks, "mm", 0.035)
+    renderer = drawn(figure)
+    axes = figure.axes[0]
+    assert axes.get_window_extent(renderer).height > 0.6 * figure.dpi
+    label = axes.yaxis.label.get_window_extent(renderer)
+    assert label.y0 >= 0.0
+    assert label.y1 <= figure.bbox.height
+
+
+def test_the_title_of_the_axis_of_patterns_is_not_cut_off():
+    entries = [
+        {"axis": "z", "label": f"pass {i} differs from the others", "relative": 0.01} for i in range(8)
+    ]
+    figure = verdicts.signature(entries)
+    renderer = drawn(figure)
+    assert figure.axes[0].xaxis.label.get_window_extent(renderer).x1 <= figure.bbox.width
+
+
+def test_the_legends_of_interactions_lie_on_no_point():
+    levels = [{"wrist": w, "depth": d, "side": o} for w in "AB" for d in "123" for o in "LT"]
+    ranking = [{"levels": one, "xm": {"value": 60.0 + 9 * i}} for i, one in enumerate(levels)]
+    figure = study.interactions(ranking)
+    renderer = drawn(figure)
+    for axes in figure.axes:
+        legend = axes.get_legend().get_window_extent(renderer)
+        assert legend.y0 >= axes.get_window_extent(renderer).y1 - 1.0
+        assert legend.y1 <= figure.bbox.height + 1.0
+
+
+def test_the_numbers_of_the_extremes_of_a_face_lie_apart():
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(0, 200, 5.0), np.arange(0, 100, 5.0)))
+    height = np.zeros(x.size)
+    height[np.flatnonzero((x == 150) & (y == 50))] = 46.0
+    height[np.flatnonzero((x == 155) & (y == 45))] = -139.0
+    frame = pd.DataFrame({"run": "r1", "x_mm": x, "y_mm": y, "deviation_um": height})
+    figure = surface.face_maps(pd.concat([frame.assign(run=f"r{i}") for i in range(8)]))
+    renderer = drawn(figure)
+    high, low = (text.get_window_extent(renderer) for text in figure.axes[0].texts)
+    assert min(high.y1, low.y1) <= max(high.y0, low.y0) + 1.0

@@ -105,7 +105,7 @@ def residuals(frame: pd.DataFrame, title: str) -> Figure:
         for axes, axis in zip(row, axes_names, strict=True):
             _residual(axes, frame[axis_labels(frame) == axis], predictions(frame))
             axes.set_title(axis or title, loc="left")
-        row[0].set_ylabel(_label("measured − predicted", frame))
+        row[0].set_ylabel(_label("residual", frame))
         style.legend_above(figure, row[0])
     return figure
 
@@ -117,7 +117,7 @@ def judged(frame: pd.DataFrame, title: str) -> Figure:
         figure, ((left, middle, right),) = style.new_figure(1.5, 1, 3)
         _residual(left, frame, drawn)
         left.set_title("Residual of all runs", loc="left")
-        left.set_ylabel(_label("measured − predicted", frame))
+        left.set_ylabel(_label("residual", frame))
         _equal(middle, frame, drawn)
         middle.set_title("Parity", loc="left")
         middle.set(xlabel=_label(f"{title}, measured", frame), ylabel=_label("predicted", frame))

@@ -33,7 +33,7 @@ def interactions(ranking: Sequence[JSON]) -> Figure:
     names = list(ranking[0]["levels"])
     pairs = list(itertools.combinations(names, 2))[:MOST_PAIRS]
     with style.style():
-        figure, grid = style.new_figure(2.7, 1, len(pairs), sharey=True)
+        figure, grid = style.new_figure(3.0, 1, len(pairs), sharey=True)
         for axes, (across, beside) in zip(grid[0], pairs, strict=True):
             _pair(axes, ranking, across, beside)
         grid[0][0].set_ylabel("$X_m$ (µm)", parse_math=True)
@@ -57,7 +57,7 @@ def _pair(axes: Axes, ranking: Sequence[JSON], across: str, beside: str) -> None
     axes.set_xticks(list(places.values()), list(places))
     axes.set_xlim(-0.35, len(places) - 0.65)
     axes.set_xlabel(across)
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
 
 
 def _level(factor: str, level: str) -> str:

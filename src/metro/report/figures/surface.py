@@ -20,6 +20,7 @@ RUNS = 2
 IN_UM = {"mm": 1e3, "um": 1.0}
 SHARE = 0.95  # of the points of a face lie within the scale of colours; the others are in its end colours
 MAPS = 16
+APART = 4.0  # points by which the numbers of two points are moved from each other
 
 
 def face_points(frame: pd.DataFrame) -> Figure:
@@ -107,14 +108,16 @@ def _extremes(axes: Axes, part: pd.DataFrame) -> None:
     """Mark the highest and the lowest point of a face, with their deviations (µm)."""
     known = part[part["deviation_um"].notna()]
     middle = float(known["x_mm"].mean())
-    for end in (known.nlargest(1, "deviation_um"), known.nsmallest(1, "deviation_um")):
+    ends = [known.nlargest(1, "deviation_um"), known.nsmallest(1, "deviation_um")]
+    highest = max(float(end["y_mm"].iloc[0]) for end in ends)
+    for end in ends:
         x, y, deviation = (float(end[name].iloc[0]) for name in ("x_mm", "y_mm", "deviation_um"))
         axes.plot(x, y, "+", ms=6, mew=1.0, color=style.MEASURED, clip_on=False)
         side = "right" if x > middle else "left"
         axes.annotate(
             f"{'+' if deviation > 0 else ''}{number(deviation, 2)}",
             (x, y),
-            (-5 if side == "right" else 5, 0),
+            (-5 if side == "right" else 5, APART if y == highest else -APART),
             textcoords="offset points",
             ha=side,
             va="center",

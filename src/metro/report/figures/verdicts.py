@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 PATTERNS, LONGEST = 8, 30  # most bars, and most characters of a bar's label
 SMALLEST = 0.1  # end of the axis if the residual is zero, % of the signal
-ABREAST = 1.45  # inches, of one of two figures side by side
+ABREAST = 1.6  # inches, of one of two figures side by side
+LETTER = 0.065  # inches, of a name that is written upwards
 HATCHES = ("", "/////", "xxxxx", "....", "-----", "+++++")  # axes in grey print
 MOST_NAMED = 18  # runs along an axis of half the width
 LABEL_ROOM = 36  # characters that fit side by side under a figure of half the width
@@ -82,8 +83,12 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
     ]
     rows = sorted(rows, key=lambda b: b.get("order") or 0)
     x, size = np.arange(1, len(rows) + 1), 22 if len(rows) <= MOST_NAMED else 8
+    step = -(-len(rows) // MOST_NAMED)
+    names = [str(b["run"]) for b in rows][::step]
+    upwards = sum(len(name) + 2 for name in names) > LABEL_ROOM
+    room = LETTER * max(map(len, names)) if upwards else 0.0
     with style.style():
-        figure, ((axes,),) = style.new_figure(ABREAST, width=style.HALF)
+        figure, ((axes,),) = style.new_figure(ABREAST + room, width=style.HALF)
         changed = any(b.get("rms_after") not in {None, b["rms_before"]} for b in rows)
         series = [
             ("rms_before", style.BEFORE, "D", "base model"),
@@ -104,9 +109,7 @@ def runs(blocks: Sequence[JSON], unit: str, floor: float | None) -> Figure:
             ylabel=f"rms residual ({printed(unit)})" if printed(unit) else "rms residual",
             xlabel="run, in the order of cutting",
         )
-        step = -(-len(rows) // MOST_NAMED)
-        rotation = 90 if sum(len(str(b["run"])) + 2 for b in rows[::step]) > LABEL_ROOM else 0
-        axes.set_xticks(x[::step], [str(b["run"]) for b in rows][::step], rotation=rotation)
+        axes.set_xticks(x[::step], names, rotation=90 if upwards else 0)
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=2)
     return figure
@@ -153,7 +156,7 @@ def signature(entries: Sequence[JSON]) -> Figure:
                     (bar,) = axes.barh(at, _share(entry), 0.9 * thick, color=face, lw=0.7)
                     bar.set(edgecolor=colour, hatch=hatch)
         axes.set_yticks([-i for i in range(len(labels))], [_shown(label) for label in labels], fontsize=8)
-        axes.set(ylim=(0.4 - len(labels), 0.6), xlabel="residual less the mean noise (% of the signal)")
+        axes.set(ylim=(0.4 - len(labels), 0.6), xlabel="residual less the mean noise\n(% of the signal)")
         axes.set_xlim(0, 1.05 * max(SMALLEST, *map(_share, entries)))
         axes.grid(visible=False, axis="y")
         if len(names) > 1:
