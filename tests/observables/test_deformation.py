@@ -385,6 +385,18 @@ def test_a_wall_of_unknown_side_is_refused(cell):
     assert "which wall was traced" in task.reason
 
 
+def test_reasons_are_joined_without_a_full_stop_between_them(cell, built):
+    """A summary had said: no idle_log.; No tip force."""
+    observed, _ = built
+    refused = pd.DataFrame(
+        {"run": "r1", "what": ["profile points", "tip force"], "reason": ["no profile", "no idle_log"]}
+    )
+    bare = dict(observed) | {"deformation_refused": refused, "profile_points": observed["profile_points"][:0]}
+    refusal = deformation.problem(cell.batch, bare, {})
+    assert isinstance(refusal, Refusal)
+    assert refusal.reason == "No profile points of r1: no profile; No tip force of r1: no idle_log"
+
+
 def test_an_arm_of_which_nothing_is_known_is_refused(cell):
     batch = replace(cell.batch, cell={"cell": "mystery"})
     refusal = deformation.observe(batch, FakeTables(cell.read), {})

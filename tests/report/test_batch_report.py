@@ -13,6 +13,7 @@ from metro.report.content import Paragraph, Picture, Section
 from metro.report.document import Cover, compile_pdf
 from metro.report.figures import lobes as lobe_figures
 from metro.report.parameters import parameter_name
+from metro.report.sections.causes import upstream
 from metro.report.sections.verdict import verdict_words
 
 
@@ -275,3 +276,13 @@ def test_a_box_is_not_torn_over_the_end_of_a_page(look):
     assert sum("word149" in page for page in pages) > 3
     for page in pages:
         assert page.count("word0 ") == page.count("word149")
+
+
+def test_the_uncertainty_of_errors_by_origin_is_half_of_a_95_percent_interval_as_any_other():
+    parts = {"total": 0.03, "upstream": 0.01, "own": 0.039, "doubt": 0.005, "share": -0.7}
+    made = replace(
+        synthetic.results(), loop={"chain": {"deformation": {"unit": "mm", "before": parts, "after": parts}}}
+    )
+    table = upstream(made).items[-1]
+    assert table.rows[0][table.header.index("uncertainty")] == "0.00980 mm"
+    assert "standard deviation" not in table.caption

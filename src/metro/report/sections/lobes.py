@@ -180,9 +180,13 @@ def _governing_words(methods: pd.DataFrame) -> str:
         order = part.sort_values("rpm")["governing_mode"].str.extract(r"(\d+)$")[0].astype(int)
         (rising if order.is_monotonic_increasing else falling).append(str(position))
     said = []
-    said += [f"its number rises with the speed at position {listing(rising)}"] if rising else []
-    said += [f"it falls again at position {listing(falling)}"] if falling else []
+    said += [f"its number rises with the speed at {_positions(rising)}"] if rising else []
+    said += [f"it falls again at {_positions(falling)}"] if falling else []
     return f"{words[:-1]}; {listing(said)}."
+
+
+def _positions(names: list[str]) -> str:
+    return f"position{'s' if len(names) > 1 else ''} {listing(names)}"
 
 
 def _stations(stations: pd.DataFrame) -> Table:

@@ -158,7 +158,8 @@ def _plan(results: Results) -> list[Item]:
         elsewhere = "; which printed rows were held out is said below" if results.verdicts() else ""
         return [Heading("Hold-out plan"), Paragraph(f"No run was held out: {reason}{elsewhere}.")]
     how = f"Made from the manifest before any signal was read: {plan.get('how', 'not stated')}"
-    seed = f" Seed {plan['seed']}." if plan.get("seed") is not None else ""
+    stated = plan.get("seed") is None or f"seed {plan['seed']}" in how
+    seed = "" if stated else f" Seed {plan['seed']}."
     used, held = (count_of(len(plan.get(role) or []), "run") for role in ("identify", "validate"))
     text = f"{how.rstrip('.')}.{seed} To identify on: {used}; held out: {held}."
     return [Heading("Hold-out plan"), Paragraph(text)]
