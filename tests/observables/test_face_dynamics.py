@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 
 from metro.observables.flatness.dynamics import TipDynamics, tip_block, tip_dynamics
-from metro.surface.tip_damping import SharedRatio
 from metro.surface.tip_stiffness import basis_over
 from metro.units import MM
 
@@ -63,18 +62,24 @@ def test_impacts_at_the_pose_or_at_a_point_of_it_tell_a0_and_a1() -> None:
         assert isinstance(found, TipDynamics)
         assert found.damping is not None
         assert found.damping.values == pytest.approx([A0, A1])
-        assert any("damping from 3 modes" in note for note in notes)
+        assert any("damping from 3 of the modes" in note for note in notes)
         assert not any("do not have" in note for note in notes)
 
 
-def test_impacts_elsewhere_one_mode_or_none_leave_the_damping_in_doubt() -> None:
+def test_impacts_elsewhere_or_none_leave_the_damping_in_doubt() -> None:
     for table in (modes("B"), modes("AB"), pd.DataFrame()):
         found, _ = told(mass(1.0), table)
         assert isinstance(found, TipDynamics)
         assert found.damping is None
-    found, notes = told(mass(1.0), modes(count=1))
-    assert found.damping == SharedRatio(pytest.approx(modes(count=1)["damping"][0]))
-    assert any("two are needed" in note and "known to a factor of 2" in note for note in notes)
+
+
+def test_one_mode_shows_the_damping_at_its_frequency() -> None:
+    one = modes(count=1)
+    found, notes = told(mass(1.0), one)
+    assert found.damping.ratio(2.0 * np.pi * one["frequency_hz"].to_numpy()) == pytest.approx(
+        one["damping"][0]
+    )
+    assert any("damping from 1 of the modes" in note for note in notes)
 
 
 def beside(stiffness: dict[str, float]) -> pd.DataFrame:

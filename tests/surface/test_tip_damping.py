@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from metro.surface.tip_damping import Rayleigh, SharedRatio, fit_rayleigh, rayleigh_of_matrices
+from metro.surface.tip_damping import (
+    Rayleigh,
+    SharedRatio,
+    damping_rows,
+    fit_rayleigh,
+    rayleigh_of_matrices,
+)
 from metro.surface.tip_response import TipModes, respond
 
 # Iglesias et al. 2025, section 3.1, point 25, wrists A and B
@@ -61,9 +67,22 @@ def test_modes_that_share_no_a0_and_a1_widen_the_error() -> None:
     assert np.sqrt(wide.covariance[1, 1]) > 5 * np.sqrt(fit_rayleigh(omega, smooth, sd).covariance[1, 1])
 
 
-def test_one_mode_tells_no_two_coefficients() -> None:
-    with pytest.raises(ValueError, match="two modes"):
-        fit_rayleigh(np.array([20.0, 20.0]), np.array([0.03, 0.04]), np.full(2, 1e-3))
+def test_of_one_mode_any_share_of_the_damping_may_go_with_the_mass() -> None:
+    omega, other, rng = 20.0, 12.0, np.random.default_rng(7)
+    found = fit_rayleigh(np.array([omega, omega]), np.array([0.03, 0.04]), np.full(2, 1e-4))
+    assert found.ratio(np.array([omega])) == pytest.approx(0.035, rel=1e-4)
+    share = rng.random(200_000)
+    drawn = 0.035 * (share * omega / other + (1.0 - share) * other / omega)
+    assert found.ratio(np.array([other])) == pytest.approx(drawn.mean(), rel=2e-3)
+    row = damping_rows(np.array([other]))[0]
+    assert row @ found.covariance @ row == pytest.approx(drawn.var(), rel=0.02)
+
+
+def test_modes_close_to_each_other_leave_none_without_damping_at_a_lower_frequency() -> None:
+    omega, ratio = 2.0 * np.pi * np.array([4.63, 4.63, 5.22]), np.array([0.067, 0.066, 0.092])
+    found = fit_rayleigh(omega, ratio, np.full(3, 6e-4))
+    assert (found.values >= 0.0).all()
+    assert found.ratio(0.7 * omega[:1]) > 0.05
 
 
 def test_the_doubts_of_a_shared_ratio_are_the_moments_of_a_normal_logarithm() -> None:

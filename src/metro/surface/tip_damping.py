@@ -86,23 +86,30 @@ def damping_rows(frequency: Array) -> Array:
 def fit_rayleigh(frequency: Array, ratio: Array, sd: Array) -> Rayleigh:
     """Weighted least squares of damping ratios (n,), each known to ``sd``, at ``frequency`` (n,) rad/s.
 
-    Where more than two modes miss a common a0 and a1 by more than their errors, these grow in proportion.
-
-    Raises
-    ------
-    ValueError
-        If fewer than two different frequencies are given.
+    Neither coefficient is negative: else modes that are close to each other would leave one at a lower
+    frequency, such as that of a softer arm, without any damping. Where the modes miss a common a0 and a1 by
+    more than their errors, these grow in proportion. Where they do so, or do not determine both, the share of
+    the damping that goes with the mass is taken as anything from none to all: at their mean frequency
+    a0/2ω − a1 ω/2 is then zero to the mean ratio over √3.
     """
-    if len(np.unique(frequency)) < 2:
-        raise ValueError("a0 and a1 take the damping of two modes of different frequency")
-    rows = damping_rows(frequency) / sd[:, None]
-    size = np.linalg.norm(rows, axis=0)
-    inverse = np.linalg.pinv(rows / size) / size[:, None]
-    values = inverse @ (ratio / sd)
-    dof = len(ratio) - 2
-    residual = ratio / sd - rows @ values
+    from scipy.optimize import nnls
+
+    def fitted(rows: Array, right: Array) -> tuple[Array, Array]:
+        size = np.linalg.norm(rows, axis=0)
+        inverse = np.linalg.pinv(rows / size) / size[:, None]
+        return nnls(rows / size, right)[0] / size, inverse @ inverse.T
+
+    rows, right = damping_rows(frequency) / sd[:, None], ratio / sd
+    several = len(np.unique(frequency)) > 1
+    values, covariance = fitted(rows, right)
+    residual, dof = right - rows @ values, len(ratio) - 2
     misfit = float(np.sqrt(residual @ residual / dof)) if dof > 0 else float("nan")
-    return Rayleigh(values, inverse @ inverse.T * max(1.0, np.nan_to_num(misfit)) ** 2, misfit)
+    if several and (values > 0.0).all() and not misfit > 1.0:
+        return Rayleigh(values, covariance, misfit)
+    wider = max(1.0, np.nan_to_num(misfit))
+    mean = damping_rows(np.atleast_1d(np.exp(np.log(frequency).mean()))) * [1.0, -1.0]
+    split = mean * math.sqrt(3.0) / float(ratio.mean())
+    return Rayleigh(*fitted(np.vstack([rows / wider, split]), np.append(right / wider, 0.0)), misfit)
 
 
 def rayleigh_of_matrices(mass: Array, stiffness: Array, damping: Array) -> tuple[Array, float]:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from metro.observables.quantity import quantity
-from metro.surface.tip_damping import Damping, Rayleigh, SharedRatio, fit_rayleigh
+from metro.surface.tip_damping import Rayleigh, fit_rayleigh
 from metro.surface.tip_field import MatrixField, choose_field, field_in, least_eigenvalue
 from metro.surface.tip_response import tip_modes
 from metro.surface.tip_stiffness import Basis, points_compliance
@@ -47,7 +47,7 @@ class TipDynamics:
 
     mass: MatrixField
     compliance: MatrixField
-    damping: Damping | None
+    damping: Rayleigh | None
     beside: tuple[ArmMode, ...] = ()
 
 
@@ -95,7 +95,7 @@ def tip_dynamics(
     notes += _said_of_others(pose, frequency, of_arm, others)
     if others[:1].any():  # then M or K is in doubt, and the measured modes may be theirs
         others = np.zeros_like(others)
-    damping, said = _damping(pose, frequency, of_arm[~others])
+    damping, said = _damping(pose, of_arm[~others])
     return TipDynamics(own, compliance, damping, _beside(of_arm[others])), [*notes, *said]
 
 
@@ -125,40 +125,22 @@ def _interpolated(pose: str, mass: MatrixField, points: int) -> list[str]:
     ]
 
 
-def _damping(pose: str, frequency: Array, table: pd.DataFrame) -> tuple[Damping | None, list[str]]:
+def _damping(pose: str, table: pd.DataFrame) -> tuple[Rayleigh | None, list[str]]:
     """Return the damping by those measured modes that M and K have, and notes on it.
 
-    A mode that they do not have is another structure's, and says nothing of theirs. ``frequency`` (n, 3)
-    rad/s: of M and K.
+    A mode that they do not have is another structure's, and says nothing of theirs.
     """
     if table.empty:
         return None, []
-    measured, (ratio, sd) = (
-        2 * np.pi * table["frequency_hz"].to_numpy(dtype=float),
-        table[["damping", "damping_sd"]].to_numpy(dtype=float).T,
-    )
-    try:
-        rayleigh = fit_rayleigh(measured, ratio, sd)
-    except ValueError:
-        return _shared(pose, ratio, "the impacts show one of the modes of M and K, two are needed")
-    if rayleigh.ratio(frequency).min() <= 0:
-        return _shared(pose, ratio, "a0 and a1 of the impacts give a mode of M and K no damping")
+    measured = 2 * np.pi * table["frequency_hz"].to_numpy(dtype=float)
+    rayleigh = fit_rayleigh(measured, *table[["damping", "damping_sd"]].to_numpy(dtype=float).T)
     a0, a1 = rayleigh.values
     error = np.sqrt(np.diag(rayleigh.covariance))
     misfit = f", missed by {rayleigh.misfit:.1f} times their errors" if rayleigh.misfit > 1 else ""
     return rayleigh, [
-        f"Pose {pose}: damping from {len(table)} modes of the impacts{misfit}: "
+        f"Pose {pose}: damping from {len(table)} of the modes that impacts show{misfit}: "
         f"a0 {a0:.4g} ± {error[0]:.1g} 1/s, a1 {a1:.4g} ± {error[1]:.1g} s."
     ]
-
-
-def _shared(pose: str, ratio: Array, why: str) -> tuple[SharedRatio, list[str]]:
-    """Return the ratio that measured modes have in the mean, for all modes, and a note."""
-    logarithm = np.log(ratio)
-    spread = float(logarithm.std(ddof=1)) if len(ratio) > 1 else SharedRatio.sd
-    shared = SharedRatio(float(np.exp(logarithm.mean())), spread)
-    words = f"the modes share the damping ratio of those measured, {100.0 * shared.value:.2g} %"
-    return shared, [f"Pose {pose}: {why}: {words}, known to a factor of {math.exp(spread):.2g}."]
 
 
 def _of_the_arm(pose: str, modes: pd.DataFrame, frequency: Array) -> pd.DataFrame:

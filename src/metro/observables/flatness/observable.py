@@ -248,7 +248,7 @@ def struck_damping(observed: Mapping[str, pd.DataFrame]) -> dict[str, Rayleigh]:
     """Return a0 and a1 of each pose of the load tests for which impacts identified them."""
     poses = {str(name): _pose(str(name), observed) for name in observed["face_loads"]["pose"].unique()}
     known = {n: p.dynamics for n, p in poses.items() if isinstance(p, Pose) and p.dynamics is not None}
-    return {n: tip.damping for n, tip in known.items() if isinstance(tip.damping, Rayleigh)}
+    return {n: tip.damping for n, tip in known.items() if tip.damping is not None}
 
 
 def ranked_again(
