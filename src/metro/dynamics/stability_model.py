@@ -3,18 +3,20 @@
 Softening needs no equation of its own: with mass and damping ratio constant, modes whose stiffness is ``f``
 times as large are ``sqrt(f)`` times as fast. Depth over stiffness and speed over frequency are all that the
 boundary depends on, so that at ``n`` it is ``f`` times what it is without softening at ``n / sqrt(f)``. With
-``f`` of each speed, every speed has its own structure, and still all are solved as one stack. What yields
-the more the deeper it cuts is solved for several ``f``: its boundary is where a depth and its ``f`` agree.
+``f`` of each speed, every speed has its own structure, and still all are solved as one stack. Where modes
+soften each by its own ``f``, speeds at which they are in one ratio make a stack. What yields the more the
+deeper it cuts is solved for several ``f``: its boundary is where a depth and its ``f`` agree.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from metro.dynamics.by_depth import boundary_of_edge
+from metro.dynamics.softening import Softening
 from metro.dynamics.system import Cut, Structure
 from metro.dynamics.zero_order import zero_order_boundary
 from metro.units import Array
@@ -22,6 +24,7 @@ from metro.units import Array
 COMPLIANCES = np.geomspace(1.0, 4.0, 17)  # relative, at which a structure that yields with depth is solved
 _DEPTHS = 300  # at which depth and compliance are compared
 _FAR = 1e3  # stable at any depth: times the deepest boundary
+_ALIKE = 9  # decimals to which the ratios of modes are compared
 
 
 @dataclass(frozen=True)
@@ -33,14 +36,14 @@ class StabilityModel:
     structure : modes of the tip, at standstill.
     cuts : the cut in each direction in which it is fed; the least stable counts.
     radius : of the tool, m.
-    softening : relative change of every stiffness per rev/min; mass and damping ratio are constant.
-    yielding : relative growth of every compliance per m of depth, likewise.
+    softening : changes of stiffnesses with the speed, which add up.
+    yielding : relative growth of every compliance per m of depth; mass and damping ratio are constant.
     """
 
     structure: Structure
     cuts: tuple[Cut, ...]
     radius: float
-    softening: float = 0.0
+    softening: tuple[Softening, ...] = ()
     yielding: float = 0.0
 
     def boundary(self, rpm: Array, *, scan: bool = True) -> tuple[Array, Array]:
@@ -53,28 +56,48 @@ class StabilityModel:
         ValueError
             When the stiffness vanishes at one of the speeds.
         """
-        factor = self._factor(rpm)
+        factor, ratio = self._factors(rpm)
         if self.yielding:
+            count = len(COMPLIANCES)
             softer = (factor / COMPLIANCES[:, None]).ravel()
-            depth, hz = self._at(np.tile(rpm, len(COMPLIANCES)), softer, scan=scan)
-            shape = (len(COMPLIANCES), len(rpm))
+            depth, hz = self._at(np.tile(rpm, count), softer, np.tile(ratio, (count, 1)), scan=scan)
+            shape = (count, len(rpm))
             return _agreed(depth.reshape(shape), hz.reshape(shape), self.yielding)
-        return self._at(rpm, factor, scan=scan)
+        return self._at(rpm, factor, ratio, scan=scan)
 
-    def _at(self, rpm: Array, factor: Array, *, scan: bool) -> tuple[Array, Array]:
-        """Return the boundary (k,) at speeds (k,) with ``factor`` (k,) times the stiffness."""
+    def _at(self, rpm: Array, factor: Array, ratio: Array, *, scan: bool) -> tuple[Array, Array]:
+        """Return the boundary (k,) at speeds (k,) with ``factor`` (k,) times the stiffness of the first mode.
+
+        ``ratio`` (k, m): of the factors of the modes to that.
+        """
+        depth, hz = np.empty(len(rpm)), np.empty(len(rpm))
+        ratios, stack = np.unique(ratio, axis=0, return_inverse=True)
+        for i, one in enumerate(ratios):
+            here, structure = stack.ravel() == i, self.structure.stiffer(one)
+            depth[here], hz[here] = self._stacked(structure, rpm[here], factor[here], scan=scan)
+        return depth, hz
+
+    def _stacked(
+        self, structure: Structure, rpm: Array, factor: Array, *, scan: bool
+    ) -> tuple[Array, Array]:
+        """Return the boundary (k,) with ``factor`` (k,) times every stiffness of one structure."""
         slowed = rpm / np.sqrt(factor)
-        boundaries = [boundary_of_edge(self.structure, cut, slowed, factor, scan=scan) for cut in self.cuts]
+        boundaries = [boundary_of_edge(structure, cut, slowed, factor, scan=scan) for cut in self.cuts]
         depth = np.stack([one.depth for one in boundaries])
         least = (depth.argmin(axis=0), np.arange(depth.shape[1]))
         chatter = np.stack([one.chatter_hz for one in boundaries])[least]
         return depth[least], np.sqrt(factor) * chatter
 
-    def _factor(self, rpm: Array) -> Array:
-        factor: Array = 1.0 + self.softening * np.asarray(rpm, dtype=float)
-        if np.any(factor <= 0.0):
+    def _factors(self, rpm: Array) -> tuple[Array, Array]:
+        """Return the factor (k,) on the stiffness of the first mode, and those of all over it (k, m)."""
+        modes = len(self.structure.omega)
+        every = np.ones((len(rpm), modes))
+        for one in self.softening:
+            every = every + one.of_modes(rpm, modes)
+        if np.any(every <= 0.0):
             raise ValueError(f"no stiffness left at {np.max(rpm):g} rev/min")
-        return factor
+        first = every[:, 0] if modes else np.ones(len(rpm))
+        return first, np.round(every / first[:, None], _ALIKE)
 
 
 def estimated(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Array]:
@@ -82,12 +105,13 @@ def estimated(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Arra
 
     The models have equally many modes, and cuts that differ in process damping alone.
     """
-    factor = np.stack([model._factor(rpm) for model in models])
+    factor, ratio = (np.stack(part) for part in zip(*(one._factors(rpm) for one in models), strict=True))
     if not any(model.yielding for model in models):
-        return _estimated(models, rpm, factor)
+        return _estimated(models, rpm, factor, ratio)
+    count = len(COMPLIANCES)
     softer = (factor[:, None] / COMPLIANCES[:, None]).reshape(len(models), -1)
-    depth, hz = _estimated(models, np.tile(rpm, len(COMPLIANCES)), softer)
-    shape = (len(models), len(COMPLIANCES), len(rpm))
+    depth, hz = _estimated(models, np.tile(rpm, count), softer, np.tile(ratio, (1, count, 1)))
+    shape = (len(models), count, len(rpm))
     boundaries = [
         _agreed(d, c, model.yielding)
         for d, c, model in zip(depth.reshape(shape), hz.reshape(shape), models, strict=True)
@@ -95,14 +119,21 @@ def estimated(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Arra
     return np.stack([d for d, _ in boundaries]), np.stack([c for _, c in boundaries])
 
 
-def _estimated(models: Sequence[StabilityModel], rpm: Array, factor: Array) -> tuple[Array, Array]:
-    """Estimate the boundaries (t, k) at speeds (k,) with ``factor`` (t, k) times the stiffness."""
+def _estimated(
+    models: Sequence[StabilityModel], rpm: Array, factor: Array, ratio: Array
+) -> tuple[Array, Array]:
+    """Estimate the boundaries (t, k) at speeds (k,); ``factor`` (t, k), ``ratio`` (t, k, m) of stiffnesses."""
     structures = [model.structure for model in models]
-    slowed = rpm / np.sqrt(factor)
-    boundaries = [
-        zero_order_boundary(structures, cuts, slowed) for cuts in zip(*(m.cuts for m in models), strict=True)
-    ]
-    depth, chatter = (np.stack(part) for part in zip(*boundaries, strict=True))
+    cuts, slowed = [model.cuts for model in models], rpm / np.sqrt(factor)
+    if np.any(ratio != 1.0):  # every speed has a structure of its own
+        structures = [
+            one.stiffer(row) for one, rows in zip(structures, ratio, strict=True) for row in rows
+        ]
+        cuts, slowed = [own for own in cuts for _ in rpm], slowed.reshape(-1, 1)
+    boundaries = [zero_order_boundary(structures, own, slowed) for own in zip(*cuts, strict=True)]
+    depth, chatter = (
+        np.stack(part).reshape(-1, *factor.shape) for part in zip(*boundaries, strict=True)
+    )
     least = depth.argmin(axis=0)[None]
     lowest, hz = (np.take_along_axis(part, least, axis=0)[0] for part in (depth, chatter))
     return factor * lowest, np.sqrt(factor) * hz

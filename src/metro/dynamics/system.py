@@ -65,6 +65,10 @@ class Structure:
         c, s = math.cos(angle), math.sin(angle)
         return replace(self, directions=self.directions @ np.array([[c, s], [-s, c]]))
 
+    def stiffer(self, factor: Array) -> Structure:
+        """Return the structure with ``factor`` (m,) times its stiffnesses, masses and damping ratios alike."""
+        return replace(self, omega=self.omega * np.sqrt(factor), stiffness=self.stiffness * factor)
+
     def with_mode(self, axis: int, omega: float, zeta: float, stiffness: float) -> Structure:
         """Return the structure with one more mode along direction ``axis``."""
         return Structure(

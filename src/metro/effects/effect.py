@@ -26,7 +26,7 @@ class EffectParameter:
     ----------
     name, unit : as in the contract's table of effects, e.g. ``radius_um`` in ``um``; values are given in this
         unit. Parameters of one name make a list (per axis, per tooth).
-    lower, upper : bounds of the search.
+    lower, upper : bounds of the search; where they are the same, nothing is sought.
     scale : a typical size: the step of the search and the yardstick of "not zero".
     starts : values from which the joint refit starts.
     plausible : standard deviation of a weak prior about zero (None: flat): of two explanations that the data
@@ -64,6 +64,11 @@ class EffectParameter:
     nothing_above: bool = False
     decisive: bool = False
     optional: bool = False
+
+    @property
+    def given(self) -> bool:
+        """Whether it has one value only, which says what the other parameters mean."""
+        return self.lower == self.upper
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,8 @@ class Hypothesis:
     Attributes
     ----------
     effects : those that act; none: the base model.
-    cube : (t, d) points of the unit cube. theta : (t, d) parameters there, in the units of the contract.
+    cube : (t, d) points of the unit cube, of what is sought. theta : (t, n) all parameters there, in the units
+        of the contract.
     prior : (t,) weights.
     depth, chatter : (t, p) log depth (m) and chatter frequency (Hz) at the boundary, at all points.
     unsure : (t, p) standard deviation of ``depth``, as far as it is not solved but learnt.
@@ -129,7 +130,7 @@ def hypothesis(
     """
     from scipy.stats import qmc
 
-    size = len(_parameters(effects))
+    size = sum(not parameter.given for _, parameter in _parameters(effects))
     if not size:
         depth, chatter = (part[None] for part in evidence.predict(_change((), np.zeros(0))))
         sure = np.zeros_like(depth)
@@ -230,8 +231,12 @@ def _longer(first: tuple[Array, ...], second: tuple[Array, ...]) -> tuple[Array,
 
 
 def _theta(effects: tuple[Effect, ...], cube: Array) -> Array:
-    """Parameters (t, d) at points of the cube."""
-    columns = [quantile(p, cube[:, i]) for i, (_, p) in enumerate(_parameters(effects))]
+    """Parameters (t, n) at points (t, d) of the cube, which has no coordinate for what is given."""
+    sought = iter(cube.T)
+    columns = [
+        np.full(len(cube), p.lower) if p.given else quantile(p, next(sought))
+        for _, p in _parameters(effects)
+    ]
     return np.stack(columns, axis=1)
 
 
@@ -315,6 +320,8 @@ def _estimate(parameter: EffectParameter, values: Array, weights: Array) -> JSON
         share = [float(weights[values == i].sum()) for i in range(len(parameter.choices))]
         first = int(np.argmax(share))
         return {"value": parameter.choices[first], "ci95": None, "unit": "", "probability": share[first]}
+    if parameter.given:
+        return {"value": parameter.lower, "ci95": None, "unit": parameter.unit}
     order = np.argsort(values)
     below = np.cumsum(weights[order]) - 0.5 * weights[order]
     low, middle, high = np.interp([0.025, 0.5, 0.975], below, values[order])
