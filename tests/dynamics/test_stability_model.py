@@ -7,6 +7,7 @@ import pytest
 from machines import TWO
 
 from metro.dynamics.lobes import spectral_radius, stability_boundary
+from metro.dynamics.softening import Softening
 from metro.dynamics.stability_model import StabilityModel, estimated
 from metro.dynamics.system import Cut, Structure
 
@@ -99,7 +100,7 @@ def test_the_receptance_of_turned_modes_is_a_turned_tensor():
 
 
 def test_each_speed_has_the_softened_structure_of_its_own():
-    model = StabilityModel(TWO, (SIDE, DAMPED), 0.006, softening=-8e-5)
+    model = StabilityModel(TWO, (SIDE, DAMPED), 0.006, softening=(Softening(-0.08, 1000.0),))
     depth, chatter = model.boundary(RPM)
     for i, rpm in enumerate(RPM):
         f = 1.0 - 8e-5 * rpm
@@ -111,7 +112,7 @@ def test_each_speed_has_the_softened_structure_of_its_own():
 
 def test_a_model_without_stiffness_is_refused():
     with pytest.raises(ValueError, match="no stiffness left at 1350"):
-        StabilityModel(TWO, (SIDE,), 0.006, softening=-1e-3).boundary(RPM)
+        StabilityModel(TWO, (SIDE,), 0.006, (Softening(-1.0, 1000.0),)).boundary(RPM)
 
 
 def test_a_mode_far_stiffer_than_the_rest_changes_nothing():
@@ -140,8 +141,10 @@ def test_what_yields_with_depth_is_stable_up_to_where_depth_and_compliance_agree
     assert np.quantile(np.abs(np.log(hz / heard)), [0.5, 0.9]) == pytest.approx([0.0, 0.0], abs=0.01)
 
 
-def test_a_yield_of_next_to_nothing_changes_nothing():
-    model, rpm = StabilityModel(TWO, (SIDE, DAMPED), 0.01, softening=-1e-4), np.linspace(800.0, 2600.0, 9)
+@pytest.mark.parametrize("shares", [(), (0.2, 0.9, 0.0, 0.5)])
+def test_a_yield_of_next_to_nothing_changes_nothing(shares):
+    softening = Softening(-0.1, 1000.0, shares=shares)
+    model, rpm = StabilityModel(TWO, (SIDE, DAMPED), 0.01, (softening,)), np.linspace(800.0, 2600.0, 9)
     for one in (lambda m: m.boundary(rpm), lambda m: tuple(p[0] for p in estimated([m], rpm))):
         for plain, yielded in zip(one(model), one(replace(model, yielding=1e-9)), strict=True):
             np.testing.assert_allclose(yielded, plain, rtol=1e-6)

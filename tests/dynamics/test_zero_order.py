@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from metro.dynamics.lobes import stability_boundary
+from metro.dynamics.softening import Softening
 from metro.dynamics.stability_model import StabilityModel, estimated
 from metro.dynamics.system import Cut, Structure
 from metro.dynamics.zero_order import zero_order_boundary
@@ -26,8 +27,8 @@ def test_it_is_exact_where_the_cut_does_not_vary(damping):
 def test_many_models_are_solved_as_each_alone_with_turned_modes_and_softening():
     slot = Cut(4, 0.3, 2.9, 8e8, 3.2e8)
     models = [
-        StabilityModel(TIP.turned(angle), (slot,), 6e-3, softening)
-        for angle, softening in ((0.0, 0.0), (0.4, 0.0), (0.0, -5e-5))
+        StabilityModel(TIP.turned(angle), (slot,), 6e-3, (Softening(softening, 1000.0),))
+        for angle, softening in ((0.0, 0.0), (0.4, 0.0), (0.0, -0.05))
     ]
     together = estimated(models, RPM)
     for i, model in enumerate(models):

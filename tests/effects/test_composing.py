@@ -280,7 +280,11 @@ COMPOSED = {
     ),
     "pitch_error": ({"pitch_deg": [0.5, -0.2, -0.3]}, {"pitch_deg": [-0.1, -0.3, 0.4]}, added),
     "process_damping": ({"coefficient_n_mm": 120.0}, {"coefficient_n_mm": 60.0}, added),
-    "spindle_speed_softening": ({"change_per_krpm": -0.02}, {"change_per_krpm": -0.03}, added),
+    "spindle_speed_softening": (
+        {"change_per_krpm": -0.02, "at_krpm": 3.0, "exponent": 1.5, "share": [0.8, 0.3]},
+        {"change_per_krpm": -0.03, "at_krpm": 3.0, "exponent": 1.5, "share": [0.8, 0.3]},
+        lambda a, b: a | {"change_per_krpm": a["change_per_krpm"] + b["change_per_krpm"]},
+    ),
     "spindle_tilt": (
         {"about_x_mrad": 0.5, "about_y_mrad": -0.3},
         {"about_x_mrad": -0.9, "about_y_mrad": 0.4},

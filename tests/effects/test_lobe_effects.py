@@ -21,7 +21,12 @@ VALUES = {
     "missing_mode": {"frequency_hz": 250.0, "damping": 0.02, "stiffness_n_um": 8.0, "axis": 1.0},
     "mode_coupling": {"angle_deg": 30.0},
     "process_damping": {"coefficient_n_mm": 120.0},
-    "spindle_speed_softening": {"change_per_krpm": -0.02},
+    "spindle_speed_softening": {
+        "change_per_krpm": -0.02,
+        "at_krpm": 3.0,
+        "exponent": 1.5,
+        "share": [0.9, 0.2],
+    },
     "depth_yielding": {"growth_per_mm": 0.1},
 }
 
@@ -82,10 +87,59 @@ def test_softening_is_relative_per_thousand_turns():
     assert softer.boundary(RPM[1:])[0] == pytest.approx(expected[0], rel=1e-4)
 
 
+def test_what_a_tip_loses_is_the_mean_over_its_modes_weighed_by_their_compliance():
+    """At the speed that is named: shares and exponent only say where and how, not how much."""
+    values = {"change_per_krpm": -0.05, "at_krpm": 3.0, "exponent": 1.8, "share": [0.7, 0.1]}
+    (softening,) = spindle_speed_softening.apply(MODEL, values).softening
+    changes = softening.of_modes(np.array([3000.0]), 2)[0]
+    assert changes @ (1.0 / STRUCTURE.stiffness) / np.sum(1.0 / STRUCTURE.stiffness) == pytest.approx(-0.15)
+    assert changes[0] / changes[1] == pytest.approx(7.0)
+
+
+def test_equal_shares_are_a_change_of_every_stiffness():
+    values = {"change_per_krpm": -0.02, "at_krpm": 3.0, "exponent": 1.4}
+    alike = spindle_speed_softening.apply(MODEL, values).boundary(RPM)
+    shared = spindle_speed_softening.apply(MODEL, values | {"share": [0.4, 0.4]}).boundary(RPM)
+    np.testing.assert_allclose(shared, alike, rtol=1e-6)
+
+
+def test_a_mode_that_no_bearing_holds_leaves_its_boundary_where_it_was():
+    """In a slot of even teeth along y alone: what softens moves across and does not touch it."""
+    work = Structure(np.array([1, 0]), STRUCTURE.omega, STRUCTURE.zeta, np.array([9e6, 7e12]))
+    model = replace(MODEL, structure=work)
+    values = {"change_per_krpm": -0.05, "share": [0.0, 1.0]}
+    # Weighed by compliance, all of the tip's change would be in a mode that it hardly feels.
+    softer = spindle_speed_softening.apply(model, values).boundary(RPM)
+    np.testing.assert_allclose(softer[0], model.boundary(RPM)[0], rtol=1e-3)
+
+
+@pytest.mark.parametrize("shares", [[0.5, 0.5], [0.02, 0.9]])
+def test_no_parameters_of_the_search_leave_a_mode_without_stiffness(shares):
+    problem = SimpleNamespace(cases=(SimpleNamespace(model=MODEL, rpm=RPM),), depth=np.array([1e-3, 4e-3]))
+    (effect,), _ = fitted_to((spindle_speed_softening.EFFECT,), problem)
+    change, at, exponent, *_ = effect.parameters
+    values = {"change_per_krpm": change.lower, "at_krpm": at.lower, "exponent": exponent.upper}
+    softer = effect.apply(MODEL, values | {"share": shares}).boundary(RPM)[0]
+    assert np.all(softer > 0.0)
+
+
+def test_shares_are_sought_of_the_modes_that_make_the_tip_flexible():
+    stiff = STRUCTURE.with_mode(0, 2 * np.pi * 500.0, 0.03, 3e9)
+    one = SimpleNamespace(model=replace(MODEL, structure=stiff), rpm=RPM)
+    shares = [p for p in spindle_speed_softening.adapt(spindle_speed_softening.EFFECT, SimpleNamespace(
+        cases=(one,))).parameters if p.name == "share"]  # fmt: skip
+    assert [p.given for p in shares] == [False, False, True]
+    # A list has one meaning at one place only.
+    two = SimpleNamespace(cases=(one, SimpleNamespace(model=MODEL, rpm=RPM)))
+    names = spindle_speed_softening.adapt(spindle_speed_softening.EFFECT, two).names
+    assert names == ("change_per_krpm", "at_krpm", "exponent")
+
+
 def test_bounds_follow_the_batch():
     problem = SimpleNamespace(cases=(SimpleNamespace(model=MODEL, rpm=RPM),), depth=np.array([1e-3, 4e-3]))
     effects, unable = fitted_to(library("lobes"), problem)
     bounds = {p.name: (p.lower, p.upper) for effect in effects for p in effect.parameters}
+    assert bounds["at_krpm"] == pytest.approx((3.6, 3.6))  # the mean of the speeds that are tested
     assert not unable
     assert bounds["frequency_hz"] == pytest.approx((0.4 * 310.0, 2.5 * 390.0))
     assert bounds["stiffness_n_um"] == pytest.approx((0.2 * 7.0, 20.0 * 7.0))

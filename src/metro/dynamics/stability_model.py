@@ -11,7 +11,7 @@ deeper it cuts is solved for several ``f``: its boundary is where a depth and it
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -77,9 +77,7 @@ class StabilityModel:
             depth[here], hz[here] = self._stacked(structure, rpm[here], factor[here], scan=scan)
         return depth, hz
 
-    def _stacked(
-        self, structure: Structure, rpm: Array, factor: Array, *, scan: bool
-    ) -> tuple[Array, Array]:
+    def _stacked(self, structure: Structure, rpm: Array, factor: Array, *, scan: bool) -> tuple[Array, Array]:
         """Return the boundary (k,) with ``factor`` (k,) times every stiffness of one structure."""
         slowed = rpm / np.sqrt(factor)
         boundaries = [boundary_of_edge(structure, cut, slowed, factor, scan=scan) for cut in self.cuts]
@@ -122,18 +120,14 @@ def estimated(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Arra
 def _estimated(
     models: Sequence[StabilityModel], rpm: Array, factor: Array, ratio: Array
 ) -> tuple[Array, Array]:
-    """Estimate the boundaries (t, k) at speeds (k,); ``factor`` (t, k), ``ratio`` (t, k, m) of stiffnesses."""
+    """Estimate the boundaries (t, k) with ``factor`` (t, k) and ``ratio`` (t, k, m) of the stiffnesses."""
     structures = [model.structure for model in models]
     cuts, slowed = [model.cuts for model in models], rpm / np.sqrt(factor)
     if np.any(ratio != 1.0):  # every speed has a structure of its own
-        structures = [
-            one.stiffer(row) for one, rows in zip(structures, ratio, strict=True) for row in rows
-        ]
+        structures = [one.stiffer(row) for one, rows in zip(structures, ratio, strict=True) for row in rows]
         cuts, slowed = [own for own in cuts for _ in rpm], slowed.reshape(-1, 1)
     boundaries = [zero_order_boundary(structures, own, slowed) for own in zip(*cuts, strict=True)]
-    depth, chatter = (
-        np.stack(part).reshape(-1, *factor.shape) for part in zip(*boundaries, strict=True)
-    )
+    depth, chatter = (np.stack(part).reshape(-1, *factor.shape) for part in zip(*boundaries, strict=True))
     least = depth.argmin(axis=0)[None]
     lowest, hz = (np.take_along_axis(part, least, axis=0)[0] for part in (depth, chatter))
     return factor * lowest, np.sqrt(factor) * hz

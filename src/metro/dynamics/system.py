@@ -66,7 +66,7 @@ class Structure:
         return replace(self, directions=self.directions @ np.array([[c, s], [-s, c]]))
 
     def stiffer(self, factor: Array) -> Structure:
-        """Return the structure with ``factor`` (m,) times its stiffnesses, masses and damping ratios alike."""
+        """Return the structure with ``factor`` (m,) times its stiffnesses, and the masses that it has."""
         return replace(self, omega=self.omega * np.sqrt(factor), stiffness=self.stiffness * factor)
 
     def with_mode(self, axis: int, omega: float, zeta: float, stiffness: float) -> Structure:

@@ -66,8 +66,8 @@ class Hypothesis:
     Attributes
     ----------
     effects : those that act; none: the base model.
-    cube : (t, d) points of the unit cube, of what is sought. theta : (t, n) all parameters there, in the units
-        of the contract.
+    cube : (t, d) points of the unit cube, a coordinate for each parameter that is sought.
+    theta : (t, n) all parameters there, in the units of the contract.
     prior : (t,) weights.
     depth, chatter : (t, p) log depth (m) and chatter frequency (Hz) at the boundary, at all points.
     unsure : (t, p) standard deviation of ``depth``, as far as it is not solved but learnt.
@@ -234,8 +234,7 @@ def _theta(effects: tuple[Effect, ...], cube: Array) -> Array:
     """Parameters (t, n) at points (t, d) of the cube, which has no coordinate for what is given."""
     sought = iter(cube.T)
     columns = [
-        np.full(len(cube), p.lower) if p.given else quantile(p, next(sought))
-        for _, p in _parameters(effects)
+        np.full(len(cube), p.lower) if p.given else quantile(p, next(sought)) for _, p in _parameters(effects)
     ]
     return np.stack(columns, axis=1)
 
