@@ -1,5 +1,7 @@
 """Parameters drawn from their prior and weighed: against integrals over a fine grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from label_toy import GATES, SHIFT, SLOPE, Line, problem
@@ -56,6 +58,23 @@ def test_what_is_not_solved_is_learnt_and_its_error_is_as_told():
     rough = np.stack([TASK.estimates([changed(found, i)])[0][0] for i in range(len(found.theta))]) - exact
     assert np.average(error**2, weights=weight) < 0.01 * np.average(rough**2, weights=weight)
     assert np.average(error**2, weights=weight) < 4.0 * np.average(found.unsure**2, weights=weight)
+
+
+def test_what_is_given_is_no_coordinate_of_the_search_and_has_no_interval():
+    (size,) = SLOPE.parameters
+    given = replace(size, name="at", lower=3.0, upper=3.0, plausible=None)
+    scaled = replace(
+        SLOPE,
+        parameters=(given, size),
+        apply=lambda model, values: SLOPE.apply(model, {"size": values["size"] * values["at"] / 3.0}),
+    )
+    found, plain = hypothesis((scaled,), EVIDENCE), hypothesis((SLOPE,), EVIDENCE)
+    np.testing.assert_array_equal(found.cube, plain.cube)
+    np.testing.assert_array_equal(found.theta, np.insert(plain.theta, 0, 3.0, axis=1))
+    assert found.log_evidence == pytest.approx(plain.log_evidence)
+    estimates = found.parameters("slope")
+    assert (estimates["at"]["value"], estimates["at"]["ci95"]) == (3.0, None)
+    assert estimates["size"]["ci95"] == pytest.approx(plain.parameters("slope")["size"]["ci95"])
 
 
 def test_nothing_has_one_prediction():
