@@ -140,17 +140,20 @@ def kernel(structure: Structure, arc: Arc, period: Array) -> Kernel:
     volterra = np.zeros((len(period), len(arc.time), len(arc.time)))
     for axis in np.unique(structure.axis):
         volterra += chip[:, None, axis] * _volterra(structure, axis, arc, period) * force[:, axis]
-    poles = np.concatenate([structure.poles, structure.poles.conj()])
-    residues = np.concatenate([structure.residues, structure.residues.conj()])
+    poles = np.concatenate([structure.poles, structure.poles.conj()], axis=-1)
+    residues = np.concatenate([structure.residues, structure.residues.conj()], axis=-1)
+    if structure.of_speeds:
+        poles, residues = poles[:, None], residues[:, None]
     direction = np.concatenate([structure.axis, structure.axis])
     growth = np.exp(period[:, None, None] * arc.time[:, None] * poles)
     per_period = np.where(arc.rate[:, None], period[:, None, None] * poles, 1.0)
     states = chip[:, direction] * growth * per_period
+    decay = np.exp(period[:, None, None] * poles)[:, 0]
     drive = (residues * force[:, direction] * arc.weight[:, None] * period[:, None, None] / growth).transpose(
         0, 2, 1
     )
     delayed = np.where(arc.rate, 0.0, 1.0)
-    return Kernel(period, volterra, states, drive, np.exp(period[:, None] * poles), delayed)
+    return Kernel(period, volterra, states, drive, decay, delayed)
 
 
 def _volterra(structure: Structure, axis: int, arc: Arc, period: Array) -> Array:
@@ -181,9 +184,9 @@ def _impulse_response(structure: Structure, axis: int, period: Array, lag: Array
     time = period * lag
     total = np.zeros(time.shape)
     for mode in np.flatnonzero(structure.axis == axis):
-        pole, residue = structure.poles[mode], structure.residues[mode]
+        pole, residue = (part[..., mode].reshape(-1, 1, 1) for part in (structure.poles, structure.residues))
         # 1 / (2i m omega_d) is imaginary: the pair adds up to a damped sine
-        decay = 2.0 * abs(residue) * np.exp(pole.real * time)
+        decay = 2.0 * np.abs(residue) * np.exp(pole.real * time)
         sine = np.sin(pole.imag * time)
         if rate:
             total += decay * period * (pole.real * sine + pole.imag * np.cos(pole.imag * time))

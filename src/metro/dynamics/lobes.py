@@ -62,13 +62,15 @@ class Boundary:
 def stability_boundary(structure: Structure, cut: Cut, rpm: Array, *, scan: bool = True) -> Boundary:
     """Find the lowest axial depth at which the cut is unstable, at spindle speeds ``rpm`` (k,), rev/min.
 
+    The structure may have modes of its own at each of them.
+
     Zero helix, linear regeneration: edge forces are not in it. Without a ``scan`` of all multiplier angles it
     takes half the time, and in about one case of a hundred an island of instability is missed (by up to a
     fifth of the depth in 1500 boundaries of ``docs/performance.md``).
     """
     rpm = np.asarray(rpm, dtype=float)
     result = _nothing(rpm)
-    if not collocation.panels_of(cut) or not len(structure.omega):
+    if not collocation.panels_of(cut) or not len(structure.axis):
         return result
     parts: list[Candidates] = []
     efforts = _EFFORTS if scan else _ESTIMATED_FIRST
@@ -76,7 +78,7 @@ def stability_boundary(structure: Structure, cut: Cut, rpm: Array, *, scan: bool
     for members in groups(structure, cut, rpm):
         group, hints = members, estimates.among(members)
         for effort in efforts:
-            part, missed, hints = _solve(structure, cut, rpm[group], effort, hints)
+            part, missed, hints = _solve(structure.at(group), cut, rpm[group], effort, hints)
             _enter(result, group, part)
             last = effort is efforts[-1]
             done = part.crossings.take(~missed[part.crossings.speed] | last)
@@ -89,7 +91,11 @@ def stability_boundary(structure: Structure, cut: Cut, rpm: Array, *, scan: bool
 
 def _estimates(structure: Structure, cut: Cut, rpm: Array) -> Candidates:
     """Where the boundary to zeroth order has its crossings, and flips at the same depths."""
-    (depth,), (hz,) = zero_order_boundary([structure], [cut], rpm[None])
+    if structure.of_speeds:
+        each = [structure.at(np.array(i)) for i in range(len(rpm))]
+        depth, hz = (part[:, 0] for part in zero_order_boundary(each, [cut] * len(rpm), rpm[:, None]))
+    else:
+        (depth,), (hz,) = zero_order_boundary([structure], [cut], rpm[None])
     known = np.flatnonzero(np.isfinite(depth))
     turned = 2.0 * np.pi * hz[known] * cut.tooth_period(rpm[known])
     theta = np.abs((turned + np.pi) % (2.0 * np.pi) - np.pi)
@@ -114,7 +120,7 @@ def groups(structure: Structure, cut: Cut, rpm: Array) -> Iterator[np.ndarray]:
 
 def _cycles(structure: Structure, cut: Cut, rpm: Array) -> Array:
     """Highest angular frequency times tooth period: radians of vibration to resolve in a period."""
-    radians: Array = structure.omega.max() * cut.tooth_period(rpm)
+    radians: Array = structure.omega.max(axis=-1) * cut.tooth_period(rpm)
     return radians
 
 
@@ -154,9 +160,10 @@ def _solve(
         before = before.take(before.inverse > 0.0)
         before = before.take(before.distinct())
         extra += _EXTRA_POINTS
-        arc, equation = discretised(structure, cut, rpm[speeds], effort[0], extra)
+        here = structure.at(speeds)
+        arc, equation = discretised(here, cut, rpm[speeds], effort[0], extra)
         refined = crossings.refine(equation, before, 2)
-        part = _lowest(structure, (arc, equation), rpm[speeds], refined, before)
+        part = _lowest(here, (arc, equation), rpm[speeds], refined, before)
         settled = (part.error <= _TOLERANCE * part.depth) | (resolution == _RESOLUTIONS - 1)
         missed[speeds], hints = _missed(equation, part, settled)
         _enter(result, speeds, part)
@@ -197,7 +204,9 @@ def _lowest(
     result.depth[hit] = 1.0 / refined.at.inverse[best]
     result.error[hit] = np.abs(refined.at.inverse[best] / before.inverse[best] - 1.0) * result.depth[hit]
     result.kind[hit] = kind(theta)
-    result.chatter_hz[hit] = chatter_hz(structure, arc, equation.period[hit], theta, refined.shape[best])
+    result.chatter_hz[hit] = chatter_hz(
+        structure.at(hit), arc, equation.period[hit], theta, refined.shape[best]
+    )
     return result
 
 

@@ -3,9 +3,9 @@
 Softening needs no equation of its own: with mass and damping ratio constant, modes whose stiffness is ``f``
 times as large are ``sqrt(f)`` times as fast. Depth over stiffness and speed over frequency are all that the
 boundary depends on, so that at ``n`` it is ``f`` times what it is without softening at ``n / sqrt(f)``. With
-``f`` of each speed, every speed has its own structure, and still all are solved as one stack. Where modes
-soften each by its own ``f``, speeds at which they are in one ratio make a stack. What yields the more the
-deeper it cuts is solved for several ``f``: its boundary is where a depth and its ``f`` agree.
+``f`` of each speed, every speed has its own structure, and still all are solved as one stack. Where each mode
+softens by its own, ``f`` is that of the first, and the structure has its modes at each speed. What yields the
+more the deeper it cuts is solved for several ``f``: its boundary is where a depth and its ``f`` agree.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from metro.units import Array
 
 COMPLIANCES = np.geomspace(1.0, 4.0, 17)  # relative, at which a structure that yields with depth is solved
 _DEPTHS = 300  # at which depth and compliance are compared
+_ROUNDING = 1e-12
 _FAR = 1e3  # stable at any depth: times the deepest boundary
-_ALIKE = 9  # decimals to which the ratios of modes are compared
 
 
 @dataclass(frozen=True)
@@ -70,15 +70,7 @@ class StabilityModel:
 
         ``ratio`` (k, m): of the factors of the modes to that.
         """
-        depth, hz = np.empty(len(rpm)), np.empty(len(rpm))
-        ratios, stack = np.unique(ratio, axis=0, return_inverse=True)
-        for i, one in enumerate(ratios):
-            here, structure = stack.ravel() == i, self.structure.stiffer(one)
-            depth[here], hz[here] = self._stacked(structure, rpm[here], factor[here], scan=scan)
-        return depth, hz
-
-    def _stacked(self, structure: Structure, rpm: Array, factor: Array, *, scan: bool) -> tuple[Array, Array]:
-        """Return the boundary (k,) with ``factor`` (k,) times every stiffness of one structure."""
+        structure = self.structure if _alike(ratio) else self.structure.stiffer(ratio)
         slowed = rpm / np.sqrt(factor)
         boundaries = [boundary_of_edge(structure, cut, slowed, factor, scan=scan) for cut in self.cuts]
         depth = np.stack([one.depth for one in boundaries])
@@ -95,7 +87,12 @@ class StabilityModel:
         if np.any(every <= 0.0):
             raise ValueError(f"no stiffness left at {np.max(rpm):g} rev/min")
         first = every[:, 0] if modes else np.ones(len(rpm))
-        return first, np.round(every / first[:, None], _ALIKE)
+        return first, every / first[:, None]
+
+
+def _alike(ratio: Array) -> bool:
+    """Return whether all modes change alike, but for rounding."""
+    return bool(np.all(np.abs(ratio - 1.0) < _ROUNDING))
 
 
 def estimated(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Array]:
@@ -123,7 +120,7 @@ def _estimated(
     """Estimate the boundaries (t, k) with ``factor`` (t, k) and ``ratio`` (t, k, m) of the stiffnesses."""
     structures = [model.structure for model in models]
     cuts, slowed = [model.cuts for model in models], rpm / np.sqrt(factor)
-    if np.any(ratio != 1.0):  # every speed has a structure of its own
+    if not _alike(ratio):  # every speed has a structure of its own
         structures = [one.stiffer(row) for one, rows in zip(structures, ratio, strict=True) for row in rows]
         cuts, slowed = [own for own in cuts for _ in rpm], slowed.reshape(-1, 1)
     boundaries = [zero_order_boundary(structures, own, slowed) for own in zip(*cuts, strict=True)]

@@ -28,7 +28,8 @@ class Structure:
     directions : (d, 2) unit vectors along which modes move, in the feed frame: x and y unless turned. Modes
         along neither couple the two.
 
-    A direction without modes is rigid.
+    A direction without modes is rigid. For a boundary at k speeds, frequencies, damping ratios and
+    stiffnesses may be those at each of them, (k, m).
     """
 
     axis: np.ndarray
@@ -38,13 +39,25 @@ class Structure:
     directions: Array = field(default_factory=lambda: np.eye(2))
 
     @property
+    def of_speeds(self) -> bool:
+        """Whether each speed has modes of its own."""
+        return self.omega.ndim > 1
+
+    def at(self, speeds: np.ndarray) -> Structure:
+        """Return the structure at speeds of some indices, or under a mask; one of all speeds as it is."""
+        if not self.of_speeds:
+            return self
+        omega, zeta, stiffness = (part[speeds] for part in (self.omega, self.zeta, self.stiffness))
+        return replace(self, omega=omega, zeta=zeta, stiffness=stiffness)
+
+    @property
     def poles(self) -> ComplexArray:
-        """(m,) poles with positive imaginary part, rad/s."""
+        """(..., m) poles with positive imaginary part, rad/s."""
         return self.omega * (-self.zeta + 1j * np.sqrt(1.0 - self.zeta**2))
 
     @property
     def residues(self) -> ComplexArray:
-        """(m,) residues of the receptance at :attr:`poles`: 1 / (2 i m omega_d), m/(N s)."""
+        """(..., m) residues of the receptance at :attr:`poles`: 1 / (2 i m omega_d), m/(N s)."""
         return self.omega**2 / (2j * self.stiffness * self.poles.imag)
 
     def mode(self, which: int) -> Structure:
@@ -53,9 +66,15 @@ class Structure:
         return Structure(axis, parts[0], parts[1], parts[2], self.directions)
 
     def receptance(self, omega: Array) -> ComplexArray:
-        """Receptance (..., 2, 2) of displacement by force, m/N, at angular frequencies of shape (...)."""
-        ratio = np.asarray(omega)[..., None] / self.omega
-        modal = 1.0 / (self.stiffness * (1.0 - ratio**2 + 2j * self.zeta * ratio))
+        """Receptance (..., 2, 2) of displacement by force, m/N, at angular frequencies of shape (...).
+
+        Of modes of k speeds: at frequencies (k, f).
+        """
+        own, zeta, stiffness = self.omega, self.zeta, self.stiffness
+        if self.of_speeds:
+            own, zeta, stiffness = own[:, None], zeta[:, None], stiffness[:, None]
+        ratio = np.asarray(omega)[..., None] / own
+        modal = 1.0 / (stiffness * (1.0 - ratio**2 + 2j * zeta * ratio))
         along = self.directions[self.axis]
         full: ComplexArray = np.einsum("...m,mi,mj->...ij", modal, along, along)
         return full
@@ -66,8 +85,13 @@ class Structure:
         return replace(self, directions=self.directions @ np.array([[c, s], [-s, c]]))
 
     def stiffer(self, factor: Array) -> Structure:
-        """Return the structure with ``factor`` (m,) times its stiffnesses, and the masses that it has."""
-        return replace(self, omega=self.omega * np.sqrt(factor), stiffness=self.stiffness * factor)
+        """Return the structure with ``factor`` (m,), or (k, m) of k speeds, times its stiffnesses.
+
+        Masses and damping ratios are constant.
+        """
+        omega = self.omega * np.sqrt(factor)
+        zeta = np.broadcast_to(self.zeta, omega.shape)
+        return replace(self, omega=omega, zeta=zeta, stiffness=self.stiffness * factor)
 
     def with_mode(self, axis: int, omega: float, zeta: float, stiffness: float) -> Structure:
         """Return the structure with one more mode along direction ``axis``."""
