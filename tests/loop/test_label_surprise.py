@@ -7,7 +7,7 @@ from label_toy import GATES, Line, problem
 from scipy import stats
 
 from metro.loop.labels.evidence import drawn_errors
-from metro.loop.labels.hypotheses import LabelEvidence, hypothesis
+from metro.loop.labels.hypotheses import Hypothesis, LabelEvidence, hypothesis
 from metro.loop.labels.problem import every_test
 from metro.loop.labels.surprise import drawn, surprise
 
@@ -46,6 +46,27 @@ def test_what_all_tests_get_wrong_alike_is_within_the_error_that_they_share():
 def test_labels_that_follow_a_curve_the_model_lacks_are_a_surprise():
     found = [surprised(labelled(Line(slope=0.5), seed), seed) for seed in range(10)]
     assert np.median(found) < 0.01
+
+
+def loose(seed):
+    """A hypothesis whose parameters leave many boundaries, and labels of a further one of these."""
+    task, rng = problem(Line(), 1), np.random.default_rng(seed)
+    tests = every_test(task)
+    many = rng.normal(size=(401, len(tests.rpm))) * 0.6
+    depth = Line().boundary(task.point_rpm) + many
+    errors = drawn_errors(tests, np.zeros((128, len(tests.rpm))), seed + 1000).of_size(tests.model_sd)
+    one = rng.integers(len(errors.sd))
+    labels = drawn(tests, depth[0] + errors.deviations[one], float(errors.sd[one]), rng)
+    none, alike = np.zeros((400, 0)), np.full(400, 1.0 / 400)
+    size = (400, len(errors.sd), len(tests.speeds))
+    mine = Hypothesis((), none, none, alike, depth[1:], depth[1:], np.zeros_like(depth[1:]), np.zeros(size))
+    return replace(tests, unstable=labels), mine, errors
+
+
+def test_where_parameters_leave_many_boundaries_it_is_small_as_often_as_it_says():
+    found = np.array([surprise(*loose(seed), seed) for seed in range(60)])
+    assert stats.kstest(found, "uniform").pvalue > 0.01
+    assert np.mean(found < 0.05) < 0.15
 
 
 def test_there_is_no_surprise_without_tests():

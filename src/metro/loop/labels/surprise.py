@@ -33,12 +33,15 @@ def drawn(tests: Labels, boundary: Array, sd: float, rng: np.random.Generator) -
 def surprise(tests: Labels, mine: Hypothesis, errors: Errors, seed: int) -> float:
     """Probability that labels drawn from a hypothesis are at least as unlikely as those measured.
 
-    The model's errors are as large as is usual: where they are larger, something is missing.
+    The model's errors are as large as is usual: where they are larger, something is missing. Labels are drawn
+    from other boundaries of the hypothesis than those by which they are weighed, as the measured ones are:
+    where its parameters leave many, labels look too likely by the very boundary that they were drawn from.
     """
     if not len(tests.depth):
         return 1.0
     rng, errors = np.random.default_rng([seed, 3]), errors.of_size(tests.model_sd)
     chosen = rng.choice(len(mine.prior), size=min(_BOUNDARIES, len(mine.prior)), p=mine.weights)
+    others = rng.choice(len(mine.prior), size=DRAWS, p=mine.weights)
     depth = mine.depth[chosen]
     silent = replace(tests, chatter_hz=np.full(len(tests.depth), np.nan))
     places = [tests.point == point for point in np.unique(tests.point)]
@@ -57,8 +60,8 @@ def surprise(tests: Labels, mine: Hypothesis, errors: Errors, seed: int) -> floa
 
     measured = evidence(tests.unstable)
     below = 0
-    for _ in range(DRAWS):
+    for other in mine.depth[others]:
         one = rng.integers(len(errors.sd))
-        boundary = depth[rng.integers(len(depth))] + errors.deviations[one]
+        boundary = other + errors.deviations[one]
         below += evidence(drawn(tests, boundary, float(errors.sd[one]), rng)) <= measured + 1e-9
     return (1 + below) / (1 + DRAWS)
