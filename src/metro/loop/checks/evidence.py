@@ -162,9 +162,10 @@ def leave_out(fitted: Fit, prior: Noise, moved: Callable[[Fit], Fit] | None = No
 
 
 def most_left_out(fitted: Fit, like: Mapping[str, float]) -> dict[str, float]:
-    """Return an upper bound of :func:`leave_out`, keyed as that of another fit of the same runs, ``like``.
+    """Return what :func:`leave_out` hardly exceeds, keyed as that of another fit of the same runs, ``like``.
 
-    A fit that has seen the runs makes them likelier than one that has not: no condition is left out here.
+    A fit that has seen the runs makes them likelier than one that has not, summed over them; a single
+    condition may by chance be the other way round. No condition is left out here.
     """
     likelihood = dict.fromkeys(like, 0.0)
     for block in fitted.blocks:
