@@ -70,11 +70,15 @@ def test_the_longer_side_tells_the_direction_whichever_axis_it_runs_along(size):
     assert error.max() < 5e-6
 
 
-def test_the_uncertainty_is_that_of_repeats():
+@pytest.mark.parametrize(("share", "depth"), [(1.0, 0.01), (0.4, 0.01), (0.4, 0.002)])
+def test_the_uncertainty_is_that_of_repeats(share, depth):
+    """Of whole sides, and of their first part, about which a turn moves the far corner; of strips, too."""
     errors, stated = [], []
     for seed in range(12):
         rng = np.random.default_rng(seed)
-        truth = block(("x-", "y-"), rng, depth=0.01)
+        truth = block(("x-", "y-"), rng, depth=depth)
+        near = (truth[:, :2] < share * SIZE[:2]).all(axis=1)
+        truth = truth[near | (truth[:, 2] > -1e-3)]
         scanned = moved(truth, rng, turn=0.05)
         registration = found(scanned)
         corners = truth[:, 2] > -1e-3
@@ -85,14 +89,39 @@ def test_the_uncertainty_is_that_of_repeats():
     assert (ratio > 0.1).all()
 
 
-def test_narrow_strips_of_sides_are_fitted_to_the_box():
+@pytest.mark.parametrize(("long", "method"), [(1.0, "3-2-1"), (0.04, "box")])
+def test_narrow_strips_of_sides_are_enough(long, method):
     rng = np.random.default_rng(0)
     truth = block(("x-", "y+"), rng, depth=0.002)
+    truth = truth[(truth[:, 2] > -1e-3) | (np.abs(truth[:, 0] + truth[:, 1] - SIZE[1]) < long)]
     scanned = moved(truth, rng, turn=0.1)
     registration = found(scanned)
-    assert registration.method == "box"
-    assert worst(registration, scanned, truth) < 15e-6
+    assert registration.method == method
+    assert worst(registration, scanned, truth) < 20e-6
     assert registration.condition > 1e-6
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_two_rows_of_points_of_each_side_place_a_coarse_scan(seed):
+    """A strip as deep as two or three pitches, within cells that hold points of the top as well."""
+    rng = np.random.default_rng(seed)
+    size, pitch, depth = np.array([0.168, 0.07, 0.01]), 1.24e-3, 3e-3
+    top = rng.uniform(0.0, 1.0, (round(size[0] * size[1] / pitch**2), 3)) * size
+    top[:, 2] = NOISE * rng.standard_normal(len(top))
+    sides = []
+    for axis in (0, 1):
+        side = rng.uniform(0.0, 1.0, (round(size[1 - axis] * depth / pitch**2), 3)) * size
+        side[:, axis] = NOISE * rng.standard_normal(len(side))
+        side[:, 2] = -rng.uniform(0.3e-3, depth, len(side))
+        sides.append(side)
+    truth = np.vstack([top, *sides])
+    scanned = moved(truth, rng, turn=0.2)
+    registration = found(scanned, size)
+    assert {"x-", "y-", "z+"} <= registration.faces.keys()
+    assert worst(registration, scanned, truth) < 4 * max(10e-6, registration.sd.max())
+    np.testing.assert_array_equal(
+        see_block(scanned, size).on_top(scanned, 1e-3)[: len(top)].mean() > 0.97, True
+    )
 
 
 @pytest.mark.parametrize("sides", [(), ("y-",), ("y-", "y+"), ("x+",)])

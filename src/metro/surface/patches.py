@@ -14,7 +14,10 @@ from metro.units import MM, Array
 
 CELL = 6.0  # pitches across a cell
 LEAST_POINTS = 10
-NARROW = 0.1  # least second over largest spread (variance) of a patch: not a line
+NARROW = (
+    0.02  # least second over largest spread (variance) of a patch: a strip of a cell's seventh, not a line
+)
+THIN = 0.1  # most that the least spread is of the second
 FLAT = 4.0  # times the median variance across a patch
 ALIKE = 0.8  # least cosine between a patch's normal and the axis that its face is named by
 FAR = 3.5  # robust deviations from a face's plane
@@ -22,19 +25,33 @@ FAR = 3.5  # robust deviations from a face's plane
 
 @dataclass(frozen=True)
 class Patches:
-    """Centres (m, 3) and unit normals (m, 3; of either sign) of patches, and the width of their cells."""
+    """Centres (m, 3), unit normals (m, 3; of either sign) of patches, and the width of their cells.
+
+    ``scatter`` : (m, 3, 3) covariance of the points of each.
+    """
 
     centres: Array
     normals: Array
     cell: float
+    scatter: Array
 
     def __getitem__(self, which: np.ndarray) -> Patches:
         """Return some of the patches."""
-        return Patches(self.centres[which], self.normals[which], self.cell)
+        return Patches(self.centres[which], self.normals[which], self.cell, self.scatter[which])
 
     def __len__(self) -> int:
         """Return the number of patches."""
         return len(self.centres)
+
+    @property
+    def normal(self) -> Array:
+        """Normal (3,), of either sign, of the plane of them all.
+
+        It is that of their points: the centres of a single row of patches lie in many planes.
+        """
+        centred = self.centres - self.centres.mean(axis=0)
+        between = centred.T @ centred / len(self)
+        return np.asarray(np.linalg.eigh(between + self.scatter.mean(axis=0))[1][:, 0])
 
 
 def find_patches(points: Array, pitch: float) -> Patches:
@@ -58,9 +75,9 @@ def find_patches(points: Array, pitch: float) -> Patches:
     enough = count >= LEAST_POINTS
     spread, vectors = np.linalg.eigh(scatter[enough])
     shaped = spread[:, 1] > NARROW * spread[:, 2]
-    shaped &= spread[:, 0] < NARROW * spread[:, 1]
+    shaped &= spread[:, 0] < THIN * spread[:, 1]
     flat = shaped & (spread[:, 0] <= FLAT * np.median(spread[shaped, 0])) if shaped.any() else shaped
-    return Patches(centres[enough][flat], vectors[flat, :, 0], cell)
+    return Patches(centres[enough][flat], vectors[flat, :, 0], cell, scatter[enough][flat])
 
 
 def block_faces(patches: Patches, middle: Array) -> dict[str, Patches]:
@@ -104,5 +121,4 @@ def _largest_plane(patches: Patches, axis: int) -> Patches:
 
 
 def _from_own_plane(patches: Patches) -> Array:
-    centred = patches.centres - patches.centres.mean(axis=0)
-    return np.asarray(centred @ np.linalg.eigh(centred.T @ centred)[1][:, 0])
+    return np.asarray((patches.centres - patches.centres.mean(axis=0)) @ patches.normal)

@@ -22,12 +22,16 @@ from metro.units import MM, UM, Array
 MOST_POINTS = 2_000_000  # of a larger cloud so many are drawn: a face's noise is averaged out long before
 ENOUGH = 20  # patches of a side that carry a datum of their own
 FEWEST = 6  # patches of a side: fewer may be a burr or a clamp
+EDGE = (
+    0.5 * MM
+)  # below the top's plane: what lies deeper is beyond a rounded edge, a burr or a bow of the top
 CONDITION = 1e-6  # of the normal equations with lengths over half the diagonal; a lone face has about 1e-16
 WORST = 0.1 * MM  # standard deviation of the place in the plane
 BEYOND = 0.05  # share of a side by which the top may run over the block, and of its patches that may do more
 STEPS = 20
 ROUNDED = 1e-12
 
+_CORNERS = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5]])  # of the top, from its middle
 NORMALS = {"x-": (-1, 0, 0), "x+": (1, 0, 0), "y-": (0, -1, 0), "y+": (0, 1, 0), "z+": (0, 0, 1)}
 
 
@@ -65,9 +69,14 @@ class Block:
     pitch: float
 
     @property
+    def known(self) -> dict[str, Patches]:
+        """The faces of enough patches to be one."""
+        return {name: face for name, face in self.faces.items() if len(face) >= FEWEST}
+
+    @property
     def has_sides(self) -> bool:
         """Whether more is seen than the top alone."""
-        return "z+" in self.faces and len(self.faces) > 1
+        return "z+" in self.known and len(self.known) > 1
 
     def on_top(self, points: Array, depth: float) -> np.ndarray:
         """Mask (n,) of the points within ``depth`` of the top's plane; of all, where no side is seen.
@@ -77,7 +86,7 @@ class Block:
         kept = np.ones(len(points), dtype=bool)
         if not self.has_sides:
             return kept
-        for name, face in self.faces.items():
+        for name, face in self.known.items():
             centre, normal = _plane(face, "xyz".index(name[0]))
             distance = (points - centre) @ normal  # grows along +x, +y, +z
             inside = {"-": distance > depth / 2, "+": distance < -depth / 2}[name[1]]
@@ -91,7 +100,21 @@ def see_block(points: Points, size: Array) -> Block:
     some = drawn(points, MOST_POINTS)
     low, high = np.percentile(some, [0.5, 99.5], axis=0)
     faces = block_faces(find_patches(some, pitch), (low + high) / 2)
+    if len(faces.get("z+", ())) >= ENOUGH:
+        faces = {"z+": faces["z+"]} | _below(some, pitch, faces["z+"], (low + high) / 2)
     return Block(faces, low, high, pitch)
+
+
+def _below(points: Array, pitch: float, top: Patches, middle: Array) -> dict[str, Patches]:
+    """Return the sides by the points below the top alone.
+
+    Beside the points of the top, a strip of a side that is narrower than a cell would be part of no flat
+    patch.
+    """
+    centre, up = _plane(top, 2)
+    deep = points[(points - centre) @ up < -max(EDGE, pitch / 2)]
+    faces = block_faces(find_patches(deep, pitch), middle) if len(deep) else {}
+    return {name: face for name, face in faces.items() if name != "z+"}
 
 
 def register(block: Block, size: Array) -> Registration:
@@ -102,7 +125,7 @@ def register(block: Block, size: Array) -> Registration:
     ValueError
         Saying what to scan, where the faces do not determine the place, or do not fit a block of that size.
     """
-    faces = {name: face for name, face in block.faces.items() if len(face) >= FEWEST}
+    faces = block.known
     if "z+" not in faces or len(faces["z+"]) < ENOUGH:
         raise ValueError(f"no top is seen along the scan's own z: {_wanted(block, 0.0)}")
     sides = {name: len(face) for name, face in faces.items() if name != "z+"}
@@ -170,9 +193,8 @@ def _three_two_one(faces: dict[str, Patches], datum: dict[str, str], size: Array
 
 def _plane(face: Patches, axis: int) -> tuple[Array, Array]:
     """Centre (3,) of a face, and its normal (3,) that points to +``axis``."""
-    centre = face.centres.mean(axis=0)
-    normal = np.linalg.eigh((face.centres - centre).T @ (face.centres - centre))[1][:, 0]
-    return centre, normal * np.sign(normal[axis])
+    normal = face.normal
+    return face.centres.mean(axis=0), normal * np.sign(normal[axis])
 
 
 def _reach(face: Patches, e: Array, shift: Array, size: Array, axis: int) -> float:
@@ -234,11 +256,30 @@ def _against_box(faces: dict[str, Patches], start: Array, size: Array) -> Regist
     condition = _condition(faces, rotation, shift, size)
     sd = np.full(2, np.inf)
     if condition >= CONDITION:
-        covariance = np.linalg.inv(design.T @ design) * (residual @ residual) / max(len(residual) - 6, 1)
-        arm = size[:2][::-1] / 2 / half  # a turn about z moves x by half the width in y
-        sd = np.sqrt(np.diag(covariance)[:2] + arm**2 * covariance[5, 5])
+        covariance = _covariance(design, residual, [len(face) for face in faces.values()])
+        sd = np.sqrt(np.max([_at(covariance, corner / half) for corner in _CORNERS * size[:2]], axis=0))
     counts = {name: len(face) for name, face in sorted(faces.items())}
     return Registration(rotation, shift, "box", counts, sd, condition)
+
+
+def _covariance(design: Array, residual: Array, counts: list[int]) -> Array:
+    """Covariance (6, 6) of shift and turn where the patches of each face scatter by as much as they do.
+
+    Patches of a narrow strip hold fewer points than those of the top, and scatter more.
+    """
+    ends = np.cumsum(counts)[:-1]
+    parts = zip(np.split(design, ends), np.split(residual, ends), strict=True)
+    freedom = 1.0 - 6.0 / max(len(residual), 7)
+    scatter = sum((np.mean(rest**2) / freedom * rows.T @ rows for rows, rest in parts), np.zeros((6, 6)))
+    inverse = np.linalg.inv(design.T @ design)
+    return np.asarray(inverse @ scatter @ inverse)
+
+
+def _at(covariance: Array, arm: Array) -> Array:
+    """Variance (2,) of x and y at an ``arm`` (2,) from the middle of the top, in lengths at half its diagonal."""
+    x, y = np.eye(6)[:2]
+    moved = np.array([x - arm[1] * np.eye(6)[5], y + arm[0] * np.eye(6)[5]])
+    return np.asarray(np.einsum("ij,jk,ik->i", moved, covariance, moved))
 
 
 def _turn(vector: Array) -> Array:
