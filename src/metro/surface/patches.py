@@ -14,9 +14,7 @@ from metro.units import MM, Array
 
 CELL = 6.0  # pitches across a cell
 LEAST_POINTS = 10
-NARROW = (
-    0.02  # least second over largest spread (variance) of a patch: a strip of a cell's seventh, not a line
-)
+NARROW = 0.02  # least second over largest spread (variance) of a patch: a strip, not a line
 THIN = 0.1  # most that the least spread is of the second
 FLAT = 4.0  # times the median variance across a patch
 ALIKE = 0.8  # least cosine between a patch's normal and the axis that its face is named by

@@ -22,9 +22,7 @@ from metro.units import MM, UM, Array
 MOST_POINTS = 2_000_000  # of a larger cloud so many are drawn: a face's noise is averaged out long before
 ENOUGH = 20  # patches of a side that carry a datum of their own
 FEWEST = 6  # patches of a side: fewer may be a burr or a clamp
-EDGE = (
-    0.5 * MM
-)  # below the top's plane: what lies deeper is beyond a rounded edge, a burr or a bow of the top
+EDGE = 0.5 * MM  # below the top's plane; rounded edges, burrs and the top's own form end above
 CONDITION = 1e-6  # of the normal equations with lengths over half the diagonal; a lone face has about 1e-16
 WORST = 0.1 * MM  # standard deviation of the place in the plane
 BEYOND = 0.05  # share of a side by which the top may run over the block, and of its patches that may do more
@@ -276,7 +274,7 @@ def _covariance(design: Array, residual: Array, counts: list[int]) -> Array:
 
 
 def _at(covariance: Array, arm: Array) -> Array:
-    """Variance (2,) of x and y at an ``arm`` (2,) from the middle of the top, in lengths at half its diagonal."""
+    """Variance (2,) of x and y at an ``arm`` (2,) from the middle of the top, in halves of its diagonal."""
     x, y = np.eye(6)[:2]
     moved = np.array([x - arm[1] * np.eye(6)[5], y + arm[0] * np.eye(6)[5]])
     return np.asarray(np.einsum("ij,jk,ik->i", moved, covariance, moved))
