@@ -63,7 +63,7 @@ def dynamics() -> TipDynamics:
 
 def ringing(batch: Batch, known: TipDynamics) -> tuple[Ringing, np.ndarray]:
     full = cutting_force.mean_force_on_tool(batch, "r1", COEFFICIENTS)
-    found = make_ringing(batch, "r1", make_path(path()), known, COEFFICIENTS, full=full)
+    found = make_ringing(batch, "r1", make_path(path()), known, COEFFICIENTS, full=full, disc=1.5e-3)
     assert isinstance(found, Ringing)
     return found, full
 
@@ -162,9 +162,15 @@ def test_teeth_count_only_where_they_are_slower_than_ten_times_the_highest_mode(
 
 def test_without_a_size_of_the_work_or_a_mass_nothing_is_said_to_ring() -> None:
     batch = make_batch()
-    assert make_ringing(batch, "r1", make_path(path()), None, COEFFICIENTS, full=np.zeros(3)) is None
+    assert (
+        make_ringing(batch, "r1", make_path(path()), None, COEFFICIENTS, full=np.zeros(3), disc=1.5e-3)
+        is None
+    )
     batch.manifest.pop("work")
-    assert make_ringing(batch, "r1", make_path(path()), dynamics(), COEFFICIENTS, full=np.zeros(3)) is None
+    assert (
+        make_ringing(batch, "r1", make_path(path()), dynamics(), COEFFICIENTS, full=np.zeros(3), disc=1.5e-3)
+        is None
+    )
 
 
 def face_of(rung: Ringing, full: np.ndarray) -> tuple[FaceSetting, PoseField]:
@@ -179,6 +185,7 @@ def face_of(rung: Ringing, full: np.ndarray) -> tuple[FaceSetting, PoseField]:
         pose="A",
         x=x,
         y=y,
+        disc=1.5e-3,
         first=np.arange(len(at_x)),
         passages=passages(make_path(path()), x, y, RADIUS),
         pace=Pace(0.04, 10.0, np.zeros(3), np.ones(3), 0.01),

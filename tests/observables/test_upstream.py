@@ -39,7 +39,16 @@ def test_the_measured_force_is_off_by_a_share_of_the_whole_along_each_axis():
 
 def test_a_face_takes_the_mean_force_and_what_has_no_force_takes_none():
     face = FaceSetting(
-        "P", *np.zeros((2, 3)), np.zeros(1, int), None, None, (np.nan, np.nan), np.ones(3), np.ones(3), None
+        "P",
+        *np.zeros((2, 3)),
+        1.5e-3,
+        np.zeros(1, int),
+        None,
+        None,
+        (np.nan, np.nan),
+        np.ones(3),
+        np.ones(3),
+        None,
     )
     fed = with_forces(block(face), FORCES, {})
     assert fed["before"].setting.force == pytest.approx([12.0, 24.0, 36.0])

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from metro.surface.footprint import of_the_face, sample
+from metro.surface.footprint import Window, of_the_face, sample
 
 RADIUS = 1.5
+DISC = Window(RADIUS, RADIUS)  # the clouds are in mm, and so is it
 
 
 def lattice(size: float = 60.0, pitch: float = 0.3, seed: int = 0) -> np.ndarray:
@@ -20,7 +21,7 @@ def test_discs_hold_the_points_that_a_search_of_all_finds() -> None:
     rng, cloud = np.random.default_rng(1), lattice(20.0, 0.5)
     cloud[:, 2] = rng.normal(size=len(cloud))
     x, y = rng.uniform(-2, 22, (2, 80))
-    found = sample(cloud, x, y, RADIUS)
+    found = sample(cloud, x, y, DISC)
     for i in range(len(x)):
         inside = cloud[np.hypot(cloud[:, 0] - x[i], cloud[:, 1] - y[i]) <= RADIUS, 2]
         assert found.count[i] == len(inside)
@@ -33,7 +34,7 @@ def test_discs_hold_the_points_that_a_search_of_all_finds() -> None:
 def test_a_wave_of_twelve_millimetres_keeps_0_925_of_its_height() -> None:
     cloud = lattice()
     cloud[:, 2] = np.cos(2 * np.pi * (cloud[:, 0] - 24.0) / 12.0)
-    found = sample(cloud, np.array([24.0, 36.0]), np.array([30.0, 30.0]), RADIUS)
+    found = sample(cloud, np.array([24.0, 36.0]), np.array([30.0, 30.0]), DISC)
     assert found.height == pytest.approx(0.925, abs=0.006)
 
 
@@ -41,12 +42,12 @@ def test_noise_about_a_tilted_surface_is_told_from_the_tilt() -> None:
     cloud = lattice()
     cloud[:, 2] = 0.5 * cloud[:, 0] - 0.2 * cloud[:, 1] + np.random.default_rng(2).normal(0, 0.02, len(cloud))
     x = np.linspace(5, 55, 200)
-    found = sample(cloud, x, np.full(200, 30.0), RADIUS)
+    found = sample(cloud, x, np.full(200, 30.0), DISC)
     assert np.sqrt(np.mean(found.sd**2)) == pytest.approx(0.02, rel=0.04)
 
 
 def test_coverage_is_whole_inside_half_at_an_edge_and_nothing_outside() -> None:
-    found = sample(lattice(), np.array([30.0, 59.9, 80.0]), np.full(3, 30.0), RADIUS)
+    found = sample(lattice(), np.array([30.0, 59.9, 80.0]), np.full(3, 30.0), DISC)
     assert found.coverage[0] == 1.0
     assert 0.4 <= found.coverage[1] <= 0.65
     assert (found.coverage[2], found.count[2]) == (0.0, 0)
@@ -60,7 +61,7 @@ def test_a_disc_over_the_edge_of_a_block_reads_the_face_or_nothing() -> None:
     cloud[:, 2] += rng.normal(0, 0.02 * mm, len(cloud))
     along = np.array([-0.9, -0.3, 0.3, 0.9, *np.arange(3.0, 57.0, 3.0)])
     x, y = np.tile(along, 20) * mm, np.repeat(np.linspace(5, 55, 20), len(along)) * mm
-    sampled = sample(cloud, x, y, RADIUS * mm)
+    sampled = sample(cloud, x, y, Window())
     heights = of_the_face(sampled)
     assert np.nanmin(sampled.height) < -1.0 * mm
     assert np.nanmin(heights) > -0.05 * mm
@@ -71,5 +72,5 @@ def test_a_steep_face_without_noise_is_read_whole() -> None:
     cloud = lattice() * 1e-3
     cloud[:, 2] = 0.02 * cloud[:, 0]
     x = np.linspace(5, 55, 50) * 1e-3
-    sampled = sample(cloud, x, np.full(50, 0.03), RADIUS * 1e-3)
+    sampled = sample(cloud, x, np.full(50, 0.03), Window())
     assert np.array_equal(of_the_face(sampled), sampled.height)

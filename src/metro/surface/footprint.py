@@ -1,7 +1,11 @@
-"""A cloud sampled at points of the path: mean height in a disc, which keeps most of waves beyond 5 mm."""
+"""A cloud sampled at points of the path: mean height in a disc, which keeps most of waves beyond 5 mm.
+
+Of a coarse cloud the disc is larger; where the passes are near each other it is narrower, and longer instead.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +15,36 @@ from metro.units import MM, UM, Array
 
 RADIUS = 1.5 * MM
 LEAST_POINTS = 5
+HELD = 7  # points that a disc should hold, so that few hold too few: up to a pitch of 1 mm it does
+LONGEST = 2 * RADIUS  # half axis of a disc: where it would be longer, it holds fewer points
 # Times the usual scatter within a disc, from which a disc holds more than the face. Of the fewest points that
 # a disc is read from, noise alone goes beyond four once in a million.
 BROKEN = 5.0
 LEAST_SCATTER = 1 * UM  # that counts: a cloud that was computed has none
+
+
+@dataclass(frozen=True)
+class Window:
+    """Half axes of a disc along and across a ``direction`` (a complex number of size one), m."""
+
+    along: float = RADIUS
+    across: float = RADIUS
+    direction: complex = 1.0 + 0.0j
+
+    def round(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return coordinates, (n,) each, in which the disc is round, of the radius :data:`RADIUS`."""
+        turned = (x + 1j * y) * np.conj(self.direction)
+        return turned.real * (RADIUS / self.along), turned.imag * (RADIUS / self.across)
+
+
+def window(pitch: float, room: float, direction: complex) -> Window:
+    """Return the disc that holds enough points of a cloud of this ``pitch``, m, NaN: not known.
+
+    ``room`` : half width that there is for it across the ``direction``, m.
+    """
+    radius = max(RADIUS, pitch * math.sqrt(HELD / math.pi))
+    across = min(radius, room)
+    return Window(min(radius**2 / across, LONGEST), across, direction)
 
 
 @dataclass(frozen=True)
@@ -32,9 +62,9 @@ class Footprint:
 
 
 def sample(
-    cloud: Points, x: Array, y: Array, radius: float = RADIUS, without: np.ndarray | None = None
+    cloud: Points, x: Array, y: Array, disc: Window | None = None, without: np.ndarray | None = None
 ) -> Footprint:
-    """Sample ``cloud`` (m, 3) in discs of ``radius`` about points ``x``, ``y`` (n,), all in one unit.
+    """Sample ``cloud`` (m, 3) in a ``disc`` about each of the points ``x``, ``y`` (n,), m.
 
     A disc's tilt is taken out of its standard deviation, which is that of noise about the local plane in x
     and y.
@@ -43,13 +73,16 @@ def sample(
     ----------
     without : places of points that do not count, ascending.
     """
+    disc = disc or Window()
     discs = _Discs.empty(len(x))
+    x, y = disc.round(x, y)
     for start, xyz in slices(cloud):
         points = xyz.T
         if without is not None:
             first, last = np.searchsorted(without, [start, start + len(points)])
             points = np.delete(points, without[first:last] - start, axis=0)
-        discs = discs.merge(_of_slice(points, x, y, radius))
+        points = np.column_stack([*disc.round(points[:, 0], points[:, 1]), points[:, 2]])
+        discs = discs.merge(_of_slice(points, x, y, RADIUS))
     enough, safe = discs.count >= LEAST_POINTS, np.maximum(discs.count - 3, 1)
     sd = np.sqrt(np.maximum(discs.about_plane(), 0.0) / safe)
     return Footprint(

@@ -16,7 +16,7 @@ from metro.batch.batch import Batch
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness.blocks import Pose, face_block
 from metro.observables.flatness.model import FORM
-from metro.observables.flatness.path import beside, work_size
+from metro.observables.flatness.path import beside, disc_along, work_size
 from metro.observables.flatness.placing import plane_directions
 from metro.observables.flatness.scan import POINT_COLUMNS
 from metro.observables.flatness.study import configuration, factors_of, levels_of, study
@@ -88,7 +88,8 @@ def planned_points(batch: Batch, read: Callable[..., pd.DataFrame]) -> pd.DataFr
 
 
 def _points(batch: Batch, run: str, path: pd.DataFrame) -> pd.DataFrame:
-    both = pd.concat([path.assign(aside=False), beside(path, RADIUS).assign(aside=True)], ignore_index=True)
+    both = pd.concat([path.assign(aside=False), beside(path).assign(aside=True)], ignore_index=True)
+    disc = disc_along(path, 0.0)
     place = both[["x_mm", "y_mm"]].to_numpy(dtype=float)
     size = np.array(work_size(batch)) / MM
     low, high = (np.zeros(2), size) if np.isfinite(size).all() else (place.min(axis=0), place.max(axis=0))
@@ -102,6 +103,8 @@ def _points(batch: Batch, run: str, path: pd.DataFrame) -> pd.DataFrame:
         sigma_mm=UM / MM,
         k=np.where(on, MANY, 0),
         coverage=on.astype(float),
+        disc_along_mm=disc.along / MM,
+        disc_across_mm=disc.across / MM,
     )[[*POINT_COLUMNS, "aside"]]
 
 

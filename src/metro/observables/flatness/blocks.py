@@ -14,7 +14,7 @@ from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness.doubt import damping_doubt
 from metro.observables.flatness.dynamics import TipDynamics, tip_dynamics
 from metro.observables.flatness.model import ACROSS, AHEAD, FaceSetting
-from metro.observables.flatness.noise import bin_sigma
+from metro.observables.flatness.noise import LAG, bin_sigma
 from metro.observables.flatness.path import (
     NARROW,
     Path,
@@ -31,7 +31,7 @@ from metro.observables.flatness.pose_field import LoadSetting, PoseField
 from metro.observables.flatness.ringing import Ringing, make_ringing
 from metro.observables.problem import Block, Refusal
 from metro.observables.waviness.model import PHASES
-from metro.surface.footprint import RADIUS
+from metro.surface.footprint import Window
 from metro.surface.tip_stiffness import (
     choose_basis,
     fit_z_row,
@@ -141,7 +141,9 @@ def face_block(
     tool = cutting_force.cutter(batch)
     if isinstance(tool, Refusal):
         return tool
-    bin_number = _bins(table["pass"].to_numpy())
+    along, across = (float(table[f"disc_{way}_mm"].iloc[0]) * MM for way in ("along", "across"))
+    disc = Window(along, across, path.direction)
+    bin_number = _bins(table, disc)
     narrow = narrow_passes(batch, run, path, tool.radius)
     compared = _compared(table, path, tool.radius) & ~_reached(table, path, narrow, tool.radius)
     table, bin_number = table[compared], bin_number[compared]
@@ -149,14 +151,15 @@ def face_block(
         return Refusal(
             "fewer than four path points lie on the scanned face, a radius away from entry and exit"
         )
-    x, y = _places(table, path)
+    x, y = _places(table, disc)
     turn = turn_from_declared(batch, run, path)
     force = cutting_force.turn_about_z(turn) @ cutting_force.mean_force_on_tool(batch, run, values)
-    ringing = make_ringing(batch, run, path, pose.dynamics, values, full=force)
+    ringing = make_ringing(batch, run, path, pose.dynamics, values, full=force, disc=disc.along)
     setting = FaceSetting(
         pose=pose.field.pose,
         x=x,
         y=y,
+        disc=disc.along,
         first=np.flatnonzero(np.diff(bin_number, prepend=-1)),
         passages=passages(path, x, y, tool.radius),
         pace=make_pace(batch, run, path, tool),
@@ -171,9 +174,9 @@ def face_block(
     return replace(block, unidentified=doubt), [*_said(run, turn, ringing), *_said_of_narrow(run, narrow)]
 
 
-def _places(table: pd.DataFrame, path: Path) -> tuple[Array, Array]:
+def _places(table: pd.DataFrame, disc: Window) -> tuple[Array, Array]:
     """Return the places (4 n,) that represent the discs of the points of a table, m."""
-    about = RADIUS * (AHEAD + 1j * ACROSS) * path.direction
+    about = (disc.along * AHEAD + 1j * disc.across * ACROSS) * disc.direction
     x = table["x_mm"].to_numpy()[:, None] * MM + about.real
     y = table["y_mm"].to_numpy()[:, None] * MM + about.imag
     return x.ravel(), y.ravel()
@@ -263,9 +266,17 @@ def _said_of_narrow(run: str, narrow: np.ndarray) -> list[str]:
     ]
 
 
-def _bins(number: np.ndarray) -> np.ndarray:
-    """Return the number of each point's bin: neighbours within a pass, about ``MOST_POINTS`` bins at most."""
-    width = math.ceil(len(number) / MOST_POINTS)
+def _bins(table: pd.DataFrame, disc: Window) -> np.ndarray:
+    """Return the number of each point's bin: neighbours within a pass, about ``MOST_POINTS`` bins at most.
+
+    Discs of one bin and of the next but one do not overlap.
+    """
+    number = table["pass"].to_numpy()
+    steps = np.hypot(*np.diff(table[["x_mm", "y_mm"]].to_numpy(dtype=float), axis=0).T) * MM
+    within = steps[np.diff(number) == 0]
+    step = float(np.median(within)) if within.size else math.inf
+    apart = 2.0 * disc.along / (LAG * step) if step > 0.0 else 1.0
+    width = math.ceil(max(len(number) / MOST_POINTS, apart))
     begins = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
     within = np.arange(len(number)) - np.repeat(begins, np.diff(np.append(begins, len(number))))
     return np.cumsum(within % width == 0)

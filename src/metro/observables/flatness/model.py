@@ -26,7 +26,6 @@ from metro.observables.flatness.tip import static, terms, tip
 from metro.observables.problem import Block, Parameter
 from metro.observables.waviness.model import Vibration, phase_starts, phases_of
 from metro.structure import Structure
-from metro.surface.footprint import RADIUS
 from metro.surface.tip_stiffness import POWERS, Basis
 from metro.units import UM, Array
 
@@ -51,6 +50,7 @@ class FaceSetting:
     Attributes
     ----------
     pose : of the arm. x, y : (4 n,) places of n points, m: four about each one, which represent its disc.
+    disc : half axis of the discs along the passes, m.
     first : index of the first point of each bin that is compared.
     passages : of the rim over the points. pace : their times. size : of the work along x and y, m; NaN if it
         is not known.
@@ -65,6 +65,7 @@ class FaceSetting:
     pose: str
     x: Array
     y: Array
+    disc: float
     first: np.ndarray
     passages: Passages
     pace: Pace
@@ -81,7 +82,7 @@ class FaceSetting:
     @cached_property
     def middle(self) -> Passages:
         """The passages, with the axis' position along the pass for the middle of each disc."""
-        ahead = np.tile(RADIUS * AHEAD, len(self.x) // len(AHEAD))
+        ahead = np.tile(self.disc * AHEAD, len(self.x) // len(AHEAD))
         return replace(self.passages, along=self.passages.along - ahead[:, None])
 
     def mean(self, values: Array) -> Array:

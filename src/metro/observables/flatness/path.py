@@ -16,6 +16,7 @@ from metro.cutting.engagement import Engagement
 from metro.cutting.force import COEFFICIENTS, Cut, mean_force
 from metro.cutting.law import EdgeLaw
 from metro.observables.cut import conditions as cutting_force
+from metro.surface.footprint import Window, window
 from metro.units import DEG, MM, Array
 
 RETURN_SPEED, RETURN_PAUSE = 0.2, 0.6  # m/s, s: values of the contract if return_s is blank
@@ -23,6 +24,7 @@ RAMP_POINTS = 17
 NARROW = 0.8  # of the declared width of cut, below which the force of a pass is another one
 ASIDE_POINTS = 2001  # over the work, by which widths are measured
 STEP = 0.01  # s, of the force along a pass
+NARROWEST = 1 * MM  # half width of a disc beside the path: twice its length is then still below 5 mm
 
 
 @dataclass(frozen=True)
@@ -143,16 +145,25 @@ def passages(path: Path, x: Array, y: Array, radius: float) -> Passages:
     return Passages(*map(np.asfortranarray, parts))
 
 
-def beside(table: pd.DataFrame, disc: float) -> pd.DataFrame:
+def disc_along(table: pd.DataFrame, pitch: float) -> Window:
+    """Return the disc over which heights are averaged along a path, of a cloud with this ``pitch``, m.
+
+    It is no wider than a third of the spacing of the passes, where discs of this width beside it show more.
+    """
+    path = make_path(table)
+    third = _third(path)
+    return window(pitch, third / 2 if third >= 2 * NARROWEST else math.inf, path.direction)
+
+
+def beside(table: pd.DataFrame) -> pd.DataFrame:
     """Return the points of a path table moved aside by a third of the spacing of its passes, to either side.
 
     A dished cutter leaves a groove along each pass, whose shape is only visible beside the middle. The table
-    is empty if discs of radius ``disc``, m, would overlap those of the path.
+    is empty if discs there would overlap those of the path.
     """
     path = make_path(table)
-    gaps = np.diff(np.sort(path.aside(*path.start.T)))
-    third = float(np.median(gaps[gaps > 0])) / 3 if (gaps > 0).any() else 0.0
-    if third < 2 * disc:
+    third = _third(path)
+    if third < 2 * NARROWEST:
         return table[:0]
     left = third / MM * np.array([-path.direction.imag, path.direction.real])
     return pd.concat(
@@ -162,6 +173,12 @@ def beside(table: pd.DataFrame, disc: float) -> pd.DataFrame:
         ],
         ignore_index=True,
     )
+
+
+def _third(path: Path) -> float:
+    """Return a third of the spacing of the passes, m; 0 if there is but one."""
+    gaps = np.diff(np.sort(path.aside(*path.start.T)))
+    return float(np.median(gaps[gaps > 0])) / 3 if (gaps > 0).any() else 0.0
 
 
 def turn_from_declared(batch: Batch, run: str, path: Path) -> float:

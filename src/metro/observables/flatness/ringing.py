@@ -19,7 +19,6 @@ from metro.observables.flatness.dynamics import ArmMode, TipDynamics
 from metro.observables.flatness.path import STEP, Passages, Path, force_over_period
 from metro.observables.problem import Refusal
 from metro.structure import Structure
-from metro.surface.footprint import RADIUS
 from metro.surface.tip_damping import Damping, SharedRatio
 from metro.surface.tip_harmonics import SLOW, at_rim, tooth_heights
 from metro.surface.tip_response import TipModes, disc_weights, respond, swing, tip_modes
@@ -162,17 +161,19 @@ def make_ringing(
     values: Mapping[str, float],
     *,
     full: Array,
+    disc: float,
 ) -> Ringing | None:
     """Return the inputs of the transients of a face; None if the batch does not give all of them.
 
-    ``full`` (3,) N: the mean force on the tool in full engagement, work frame.
+    ``full`` (3,) N: the mean force on the tool in full engagement, work frame. ``disc``: half axis of the
+    discs of its points along the passes, m.
     """
     tool = cutting_force.cutter(batch)
     if dynamics is None or isinstance(tool, Refusal) or "size_mm" not in (batch.manifest.get("work") or {}):
         return None
     force, period, speed = force_over_period(batch, run, values, path, tool)
     fastest = float(_modes_at(dynamics, *path.start.T).frequency.max()) / (2 * math.pi)
-    least = max(1 / STEP, PER_CYCLE * fastest, PER_CYCLE * speed / RADIUS)  # samples per second
+    least = max(1 / STEP, PER_CYCLE * fastest, PER_CYCLE * speed / disc)  # samples per second
     samples = max(1, round(SEGMENT / speed * least))
     count = math.ceil(period * least / samples)
     x, y = _way(path, period, speed, (np.arange(count) + 0.5) / count)
@@ -187,7 +188,7 @@ def make_ringing(
         step,
         speed,
         len(path.start),
-        disc_weights(RADIUS / speed, step),
+        disc_weights(disc / speed, step),
         dynamics.damping or SharedRatio(),
         _teeth(batch, run, path, tool, dynamics=dynamics, values=values),
         dynamics.beside,

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
-from metro.observables.flatness.path import beside
+from metro.observables.flatness.path import beside, disc_along
 from metro.observables.flatness.placing import Placed, place
 from metro.surface.face import NESTING_INDEX, Face, measure_face
 from metro.surface.face_noise import Noise
-from metro.surface.footprint import RADIUS, of_the_face, sample
+from metro.surface.footprint import Window, of_the_face, sample
 from metro.surface.points import Points, box
 from metro.units import JSON, MM, UM, Array
 
@@ -19,6 +19,7 @@ MAP_CELLS = 60
 POINT_COLUMNS: tuple[str, ...] = (
     *("run", "point", "pass", "x_mm", "y_mm", "s_mm"),
     *("programmed_z_mm", "z_mm", "sigma_mm", "k", "coverage"),
+    *("disc_along_mm", "disc_across_mm"),
 )
 FACE_TABLES: dict[str, tuple[str, ...]] = {
     "face_indices": (
@@ -74,11 +75,10 @@ def measured_run(
         return tables, "it has no path file, so its face cannot be paired with a prediction"
     if not placed.method:
         return tables, placed.remark
-    tables["face_points"] = _points(run, cloud, face.outliers, path, points)
-    aside = beside(path, RADIUS)
-    if len(aside):
-        at = aside[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
-        tables["face_beside"] = _points(run, cloud, face.outliers, aside, at)
+    disc = disc_along(path, face.spacing)
+    tables["face_points"] = _points(run, cloud, face.outliers, path, disc)
+    if len(aside := beside(path)):
+        tables["face_beside"] = _points(run, cloud, face.outliers, aside, disc)
     return tables, None
 
 
@@ -136,12 +136,13 @@ def _map(run: str, points: Array, deviations: Array) -> pd.DataFrame:
     )
 
 
-def _points(run: str, cloud: Points, outliers: np.ndarray, path: pd.DataFrame, points: Array) -> pd.DataFrame:
+def _points(run: str, cloud: Points, outliers: np.ndarray, path: pd.DataFrame, disc: Window) -> pd.DataFrame:
     """Heights in the discs of the path points; standard errors allow for noise correlated over a disc.
 
     A disc that holds more than the face has no height.
     """
-    sampled = sample(cloud, points[:, 0], points[:, 1], without=outliers)
+    points = path[["x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float) * MM
+    sampled = sample(cloud, points[:, 0], points[:, 1], disc, without=outliers)
     number = path["pass"].to_numpy()
     step = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(number) == 0)
     alone = sampled.sd / np.sqrt(np.maximum(sampled.count, 1))
@@ -163,6 +164,8 @@ def _points(run: str, cloud: Points, outliers: np.ndarray, path: pd.DataFrame, p
             "sigma_mm": sigma / MM,
             "k": sampled.count,
             "coverage": sampled.coverage,
+            "disc_along_mm": disc.along / MM,
+            "disc_across_mm": disc.across / MM,
         }
     )
 
