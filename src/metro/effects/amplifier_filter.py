@@ -30,8 +30,15 @@ class LowPass(Term):
         del model
         if self.corner >= OPEN:
             return None
-        hertz = setting.recording.speed * np.arange(orders)
-        return np.repeat(butterworth(hertz / self.corner, self.order)[:, None], 3, axis=1)
+        return _gain(self, setting.recording.speed, orders)
+
+
+@lru_cache(maxsize=1024)
+def _gain(filtered: LowPass, speed: float, orders: int) -> ComplexArray:
+    """Return the response (orders, 3) at the orders of a ``speed``, rev/s: read-only, it is kept."""
+    hertz = np.arange(orders, dtype=float) * speed
+    response = butterworth(hertz / filtered.corner, filtered.order)
+    return np.broadcast_to(response[:, None], (orders, 3))
 
 
 def butterworth(ratio: Array, order: float) -> ComplexArray:

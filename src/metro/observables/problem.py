@@ -10,7 +10,7 @@ nonlinear quantities are either parameters of an effect, which changes the model
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, runtime_checkable
@@ -193,6 +193,44 @@ def moved_from(model: Model, origin: Model) -> Model:
     if type(model) is type(origin) and _is_moved(type(model)):
         return cast(Moved, model).moved_from(origin)
     return model
+
+
+@runtime_checkable
+class Differing(Protocol):
+    """A model that shares work with models that hardly differ from it, such as for derivatives."""
+
+    def differences(
+        self, others: Sequence[Any], block: Block, nuisances: Array, beta: Array
+    ) -> tuple[Array, Array]:
+        """Return by how much predictions differ from that at the first of ``nuisances`` (1 + m, …), SI.
+
+        Those of ``others``, (q, n), and its own at the other nuisances, (m, n).
+        """
+        ...
+
+
+@cache
+def _is_differing(kind: type) -> bool:
+    """Whether models of a kind share work with models that hardly differ from them."""
+    return issubclass(kind, Differing)
+
+
+def differences(
+    model: Model, others: Sequence[Model], block: Block, nuisances: Array, beta: Array
+) -> tuple[Array, Array]:
+    """Return differences as :meth:`Differing.differences` does, of any model.
+
+    All are predicted by one way, so that what changes nothing differs by exactly zero.
+    """
+    if _is_differing(type(model)) and all(type(other) is type(model) for other in others):
+        return cast(Differing, model).differences(others, block, nuisances, beta)
+    unmoved = moved_from(model, model)
+    predicted = predictions(unmoved, block, nuisances[:1], beta)[0]
+    moved = [
+        predictions(moved_from(other, model), block, nuisances[:1], beta)[0] - predicted for other in others
+    ]
+    at_others = predictions(unmoved, block, nuisances[1:], beta) - predicted
+    return np.array(moved).reshape(-1, len(predicted)), at_others
 
 
 @runtime_checkable

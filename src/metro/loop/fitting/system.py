@@ -17,7 +17,7 @@ import numpy as np
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.noise import Noise, Whitener
-from metro.observables.problem import Block, Model, moved_from, predictions
+from metro.observables.problem import Block, Model, differences
 from metro.units import Array
 
 THETA_STEP = 1e-3  # in units of the parameter's scale
@@ -188,18 +188,13 @@ def sensitivities(
 ) -> tuple[Array, Array]:
     """Return derivatives of a block's prediction by the effect parameters (n, q) and by its unknowns (n, m).
 
-    ``moved``: the model with each effect parameter moved, of :func:`moved_models`. All are predicted by one
-    way, so that a parameter that changes nothing has a derivative of exactly zero and no direction.
+    ``moved``: the model with each effect parameter moved, of :func:`moved_models`. What changes nothing has a
+    derivative of exactly zero and no direction.
     """
-    here, unmoved = nuisance[None], moved_from(model, model)
-    predicted = predictions(unmoved, block, here, beta)[0]
-    effect = [
-        (predictions(moved_from(other, model), block, here, beta)[0] - predicted) / step
-        for other, step in moved
-    ]
-    places = nuisance + NUISANCE_STEP * np.eye(len(nuisance))
-    own = (predictions(unmoved, block, places, beta) - predicted) / NUISANCE_STEP
-    return np.array(effect).reshape(-1, len(predicted)).T, own.T
+    places = nuisance + NUISANCE_STEP * np.eye(len(nuisance) + 1, len(nuisance), -1)
+    effect, own = differences(model, [other for other, _ in moved], block, places, beta)
+    steps = np.array([step for _, step in moved]).reshape(-1, 1)
+    return (effect / steps).T, own.T / NUISANCE_STEP
 
 
 def moved_models(candidate: Candidate, theta: Array) -> list[tuple[Model, float]]:

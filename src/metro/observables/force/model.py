@@ -144,8 +144,60 @@ class ForceModel:
 
     def predictions(self, block: Block, nuisances: Array, beta: Array) -> Array:
         """Return the prediction (k, n) of a block at each of ``nuisances`` (k, m)."""
-        force = self._force(block.setting, beta) @ beta
-        read = self._rows(force[..., None], block.setting, nuisances)[..., 0]
+        return self._predicted(self._force(block.setting, beta) @ beta, block, nuisances)
+
+    def differences(
+        self, others: Sequence[ForceModel], block: Block, nuisances: Array, beta: Array
+    ) -> tuple[Array, Array]:
+        """Return by how much predictions at the first of ``nuisances`` differ, of others and at the others.
+
+        Of models that hardly differ from this one, (q, n), and of this one at the other nuisances, (m, n):
+        all that differs in nothing that a force or a reading depends on is computed once.
+        """
+        here, setting = self.moved_from(self), block.setting
+        models = [here, *(other.moved_from(self) for other in others)]
+        own = here._force(setting, beta) @ beta
+        forces = [own if model._cuts_like(here) else model._force(setting, beta) @ beta for model in models]
+        predicted = np.empty((len(models), len(block.zeros)))
+        left = list(range(len(models)))
+        while left:
+            first = left[0]
+            alike = [
+                i
+                for i in left
+                if forces[i].shape == forces[first].shape and models[i]._reads_like(models[first])
+            ]
+            stacked = np.stack([forces[i] for i in alike], axis=-1)
+            predicted[alike] = models[first]._rows(stacked, setting, nuisances[:1])[0].T
+            left = [i for i in left if i not in alike]
+        for i, model in enumerate(models):
+            predicted[i] = model._recorded(predicted[i : i + 1], block)[0]
+        moved = here._predicted(own, block, nuisances)
+        return predicted[1:] - predicted[0], moved[1:] - moved[0]
+
+    def _cuts_like(self, other: ForceModel) -> bool:
+        """Whether all that a force depends on is the same."""
+        mine, its = self.structure, other.structure
+        return (
+            self.cutter == other.cutter
+            and self.terms == other.terms
+            and (mine.compliance, mine.stiffness_factor) == (its.compliance, its.stiffness_factor)
+            and (self.law, self.chipped, self.true_path) == (other.law, other.chipped, other.true_path)
+            and self.bottom_edges == other.bottom_edges
+        )
+
+    def _reads_like(self, other: ForceModel) -> bool:
+        """Whether all that the reading of a force depends on is the same."""
+        mine, its = self.structure, other.structure
+        orbits = (mine.orbit_amplitude, mine.orbit_phase), (its.orbit_amplitude, its.orbit_phase)
+        return self.sensor == other.sensor and self.terms == other.terms and orbits[0] == orbits[1]
+
+    def _predicted(self, force: ComplexArray, block: Block, nuisances: Array) -> Array:
+        """Return the prediction (k, n) by a force (feeds, blocks or 1, orders, 3) at nuisances (k, m)."""
+        return self._recorded(self._rows(force[..., None], block.setting, nuisances)[..., 0], block)
+
+    def _recorded(self, read: Array, block: Block) -> Array:
+        """Return readings (k, n) as they are recorded: bent, and with what is not of the cut."""
         bent = added.bent(self.terms, read, block)
         return (read if bent is None else read + bent[0]) + self._offset(block)
 
@@ -202,10 +254,8 @@ class ForceModel:
         if setting.helix is not None:
             direction = nuisances[:, 1]
         if len(force) > 1:
-            shares = shares_of_feeds(recording, direction)
-            force = np.einsum(
-                "kbf,fchap->kbhap" if force.shape[1] == 1 else "kbf,fbhap->kbhap", shares, force
-            )
+            shares = np.moveaxis(shares_of_feeds(recording, direction), -1, 0)[..., None, None, None]
+            force = np.sum(shares * force[:, None], axis=0)
         response = added.seen(self.terms, transfer(self.sensor, recording, orders), self, setting)[None]
         if setting.helix is not None and self.structure.orbit_amplitude:
             feed = direction[:, None] + recording.orbit * np.array(recording.middles)
