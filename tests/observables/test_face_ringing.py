@@ -251,3 +251,28 @@ def test_design_and_prediction_of_a_face_agree_on_what_other_modes_give() -> Non
     assert np.abs(predicted - still).max() > 0.5 * UM
     elsewhere = replace(model, beside=(Beside("B", known.beside),))
     np.testing.assert_allclose(elsewhere.predictions(block, np.zeros((1, 1)), beta)[0], still, atol=1e-12)
+
+
+def test_a_face_changes_smoothly_with_the_frequencies_of_the_tip() -> None:
+    """A step in it, however small, ends a descent where derivatives promise more."""
+    rung, full = ringing(make_batch(), dynamics())
+    setting, field = face_of(rung, full)
+    model = FlatnessModel((field,), ringing=("A",))
+    names = [one.name for one in model.parameters]
+    count, none, place = len(setting.first), np.zeros(0), names.index("ringing_off_A")
+    zeros, axis = np.zeros((count, 0)), np.full(count, "z")
+    block = Block("r1", "c", "identify", 0, np.zeros(count), np.ones(count), setting, axis, zeros, none, {})
+
+    def height(off: float) -> np.ndarray:
+        beta = np.zeros(len(names))
+        beta[place] = off
+        matrix, offset = model.design(block, np.zeros(1), beta)
+        predicted = model.predictions(block, np.zeros((1, 1)), beta)[0]
+        np.testing.assert_allclose(predicted, offset + matrix @ beta, atol=1e-12)
+        return predicted
+
+    offs = np.linspace(-0.02, 0.02, 401)
+    change = np.diff([height(off) for off in offs], axis=0)
+    assert np.abs(change).max() > 1e-3 * UM  # it does change
+    # A jump would differ from its neighbours by all of itself, however small the steps.
+    assert np.abs(np.diff(change, axis=0)).max() < 0.2 * np.abs(change).max()

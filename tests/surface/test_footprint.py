@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metro.surface.footprint import Window, of_the_face, sample
+from metro.surface.footprint import Window, of_the_face, sample, window
 
 RADIUS = 1.5
 DISC = Window(RADIUS, RADIUS)  # the clouds are in mm, and so is it
@@ -74,3 +74,28 @@ def test_a_steep_face_without_noise_is_read_whole() -> None:
     x = np.linspace(5, 55, 50) * 1e-3
     sampled = sample(cloud, x, np.full(50, 0.03), Window())
     assert np.array_equal(of_the_face(sampled), sampled.height)
+
+
+def test_an_elongated_disc_holds_what_a_search_in_its_own_axes_finds() -> None:
+    rng, cloud = np.random.default_rng(5), lattice(20.0, 0.5)
+    cloud[:, 2] = rng.normal(size=len(cloud))
+    x, y = rng.uniform(2, 18, (2, 40))
+    turn = 0.4
+    found = sample(cloud, x, y, Window(2.5, 1.0, complex(np.cos(turn), np.sin(turn))))
+    for i in range(len(x)):
+        apart = cloud[:, :2] - [x[i], y[i]]
+        along, across = apart @ [np.cos(turn), np.sin(turn)], apart @ [-np.sin(turn), np.cos(turn)]
+        inside = cloud[np.hypot(along / 2.5, across / 1.0) <= 1.0, 2]
+        assert found.count[i] == len(inside)
+        assert found.height[i] == pytest.approx(inside.mean(), abs=1e-12)
+
+
+def test_a_disc_holds_enough_points_of_a_coarse_cloud_and_is_no_wider_than_its_room() -> None:
+    fine, coarse, narrow = (window(*given, 1j) for given in ((2e-4, 9.0), (1.3e-3, 9.0), (1.3e-3, 1.3e-3)))
+    assert (fine.along, fine.across) == (1.5e-3, 1.5e-3)
+    assert coarse.along == coarse.across
+    assert np.pi * coarse.along * coarse.across / 1.3e-3**2 == pytest.approx(7.0)
+    assert narrow.across == 1.3e-3
+    assert narrow.along * narrow.across == pytest.approx(coarse.along * coarse.across)
+    assert window(float("nan"), 9.0, 1.0).along == 1.5e-3
+    assert window(5e-3, 1.2e-3, 1.0).along == 3e-3

@@ -20,7 +20,7 @@ from metro.observables.flatness.pose_field import (
     own_columns,
 )
 from metro.observables.flatness.ringing import Ringing
-from metro.observables.flatness.rung import FINE, rung, sharper
+from metro.observables.flatness.rung import rung, sharper
 from metro.observables.flatness.setup import Setup, swung
 from metro.observables.flatness.tip import static, terms, tip
 from metro.observables.problem import Block, Parameter
@@ -229,9 +229,8 @@ class FlatnessModel:
                 coefficients = np.zeros(len(part.used))
                 coefficients[part.used] = beta[first : first + count]
             first += count
-        higher = float(beta[self._ringing_place(setting)]) - off if setting.pose in self.ringing else 0.0
-        gains = float(beta[believed.index(FORCE)]), higher
-        height = tip(self._basis(setting), setting, tuple(coefficients.tolist()), gains, self.tuning(off))
+        harder = float(beta[believed.index(FORCE)])
+        height = tip(self._basis(setting), setting, tuple(coefficients.tolist()), harder, self.tuning(off))
         for each in self._beside(setting):
             place = [believed.index(one.name) for one in each.parameters]
             height = height + swung_beside(each.modes, setting) @ beta[place]
@@ -248,10 +247,10 @@ class FlatnessModel:
         return replace(self, setup=self.setup.cutting)
 
     def _off(self, setting: FaceSetting, beta: Array | None) -> float:
-        """Return by how much the frequencies of the tip are off, relative, to the grid."""
+        """Return by how much the frequencies of the tip are off, relative."""
         if beta is None or setting.pose not in self.ringing:
             return 0.0
-        return FINE * round(float(beta[self._ringing_place(setting)]) / FINE)
+        return float(beta[self._ringing_place(setting)])
 
     def _ringing_place(self, setting: FaceSetting) -> int:
         """Return the place in ``beta`` of how far the frequencies of the tip are off at the face's pose."""

@@ -19,9 +19,7 @@ if TYPE_CHECKING:
     from metro.observables.flatness.model import FaceSetting
     from metro.observables.flatness.ringing import Ringing
 
-# Grid of relative frequencies about which the ringing is linearised, and the step of its slope: then the next
-# place of the grid goes on where the line about this one ends.
-FINE = 0.002
+FINE = 0.002  # relative change of the frequencies by which the slope of the ringing is taken
 NODES = 0.01  # spacing of nodes in the logarithm of the tuning, between which ringing is interpolated
 
 

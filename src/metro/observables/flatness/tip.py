@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from metro.observables.flatness.rung import rung, sharper
+from metro.observables.flatness.rung import rung
 from metro.surface.tip_stiffness import Basis, heights_design
 from metro.units import Array
 
@@ -36,17 +36,15 @@ def tip(
     basis: Basis,
     setting: FaceSetting,
     coefficients: tuple[float, ...],
-    gains: tuple[float, float],
+    harder: float,
     tuning: float,
 ) -> Array:
     """Return the height of the tip at each passage, (n, k) m, of one as stiff as in the load tests.
 
     Parameters
     ----------
-    coefficients : (3 · terms,) of the compliance, m/N. gains : relative rises of the force, and of the
-        frequencies over those of ``tuning``; of both, the compliance of the load tests says what they make.
+    coefficients : (3 · terms,) of the compliance, m/N. harder : relative rise of the force, of which the
+        compliance of the load tests says what it makes.
     """
-    harder, higher = gains
     height = terms(basis, setting) @ (setting.force @ np.reshape(coefficients, (3, -1)))
-    height = height + harder * (static(basis, setting) + rung(setting, tuning))
-    return np.asarray(height + higher * sharper(setting, tuning) if higher else height)
+    return np.asarray(height + harder * (static(basis, setting) + rung(setting, tuning)))
