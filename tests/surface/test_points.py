@@ -7,7 +7,7 @@ import pytest
 
 from metro.surface import points as room
 from metro.surface.face import measure_face
-from metro.surface.footprint import sample
+from metro.surface.footprint import Window, sample
 from metro.surface.plane import fit_plane
 from metro.surface.points import Spool, box, changed, drawn
 
@@ -139,5 +139,5 @@ def test_the_deviation_in_a_disc_is_that_of_a_fit_of_one_slope_after_the_other()
     for across in inside[:, :2].T:
         centred = across - across.mean()
         rest = rest - (centred @ rest) / (centred @ centred) * centred
-    found = sample(points, np.zeros(1), np.zeros(1), 1.0)
+    found = sample(points, np.zeros(1), np.zeros(1), Window(1.0, 1.0))
     assert found.sd[0] == pytest.approx(np.sqrt(rest @ rest / (len(inside) - 3)), rel=1e-9)
