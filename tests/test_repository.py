@@ -155,6 +155,12 @@ def test_domain_code_neither_reads_nor_writes_files():
     assert [path for path in modules if opening.search(path.read_text())] == []
 
 
+def test_files_of_tests_have_names_of_their_own():
+    """Pytest imports them by their names alone: of two with one name, the second is not run."""
+    names = [path.name for path in (ROOT / "tests").rglob("test_*.py")]
+    assert sorted(names) == sorted(set(names))
+
+
 def test_every_effect_has_a_test():
     files = ROOT.glob("src/metro/effects/*.py")
     effects = {path.stem for path in files if re.search(r"^EFFECT = ", path.read_text(), re.MULTILINE)}
