@@ -97,7 +97,8 @@ def test_narrow_strips_of_sides_are_enough(long, method):
     scanned = moved(truth, rng, turn=0.1)
     registration = found(scanned)
     assert registration.method == method
-    assert worst(registration, scanned, truth) < 20e-6
+    # Where a strip ends before the far corner, its error there grows as the lever does.
+    assert worst(registration, scanned, truth) < 15e-6 / min(long / SIZE[0], 1.0)
     assert registration.condition > 1e-6
 
 
