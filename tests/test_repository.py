@@ -31,7 +31,7 @@ ROOMS = {
     "batch": {"formats"},
     "signals": set(),
     "cutting": {"signals", "compiled"},
-    "dynamics": {"signals", "cutting"},
+    "dynamics": {"signals", "cutting", "compiled"},
     "robot": {"signals"},
     "surface": {"signals"},
     "observables": {"batch", "signals", "structure", "kriging", *PHYSICS},

@@ -104,6 +104,7 @@ def meridian(cutter: Cutter, depth: float, lag: float, feed: float = 0.0) -> Mer
     On true paths a ``feed`` per tooth, m, apart, a tooth leaves the cut by feed/(2 r) later than half a turn
     after it entered, and lags by lag × z: with the height it leaves ever earlier at first, then ever later.
     The corner is cut where that turns, so that in no panel an edge leaves the cut and comes back to it.
+    An edge without a lag leaves ever earlier.
     """
     rc, steepest = cutter.corner, 0.5 * math.pi - cutter.taper
     top = rc * (1.0 - math.cos(steepest))  # where the corner ends
@@ -113,7 +114,7 @@ def meridian(cutter: Cutter, depth: float, lag: float, feed: float = 0.0) -> Mer
         lagging = lag * rc * (1.0 - math.cos(last))
         count = max(math.ceil(last / LARGEST_TURN), math.ceil(lagging / LARGEST_LAG))
         angles = np.linspace(0.0, last, count + 1)
-        turning = _turning(cutter, feed / (2.0 * lag)) if feed else last
+        turning = _turning(cutter, feed / (2.0 * lag)) if feed and lag else last
         if turning < last:
             rest = math.ceil((last - turning) / last * count)
             angles = np.append(0.0, np.linspace(turning, last, rest + 1))
