@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metro.signals.steady import segments, turns
+from metro.signals.steady import segments, turns, zero_line
 
 TURN = 100  # samples per revolution
 
@@ -85,6 +85,20 @@ def test_air_is_found_whatever_the_zero_of_the_amplifier(zero):
     assert not found.quiet[21:].any()
     assert found.turns.mean[found.quiet].mean(axis=0) == pytest.approx([zero, zero], abs=0.1)
     assert 30 * TURN <= found.steady.start <= 36 * TURN
+
+
+@pytest.mark.parametrize("size", [0.15, 0.3, 1.0])
+def test_air_is_found_on_both_sides_of_a_small_cut_while_the_zero_drifts(size):
+    """The charge drifts on from 12 to 24 while a force is cut that is hardly larger."""
+    signal = record(20, 4, 60, 4, after=20, zero=0.0) * size
+    signal += np.linspace(12.0, 24.0, len(signal))[:, None]
+    found = segments(turns([signal], TURN), settling=4 * TURN)
+    assert found.quiet[:19].all()
+    assert found.quiet[-19:].all()
+    assert not found.quiet[21:87].any()
+    start, drift = zero_line(found.turns.mean, found.quiet, 54.0)
+    assert start == pytest.approx([12.0, 12.0], abs=0.1)
+    assert drift * 108 == pytest.approx([12.0, 12.0], abs=0.1)
 
 
 def test_noise_is_no_force_beside_a_zero_that_is_off():

@@ -61,10 +61,10 @@ def turns(pieces: Iterable[Array], samples_per_revolution: float) -> Turns:
 def segments(record: Turns, settling: int) -> Segments:
     """Find the steady cut and the air in a record by the level of the force in each revolution.
 
-    The level is the rms of all channels about the air's zero, less the noise there. Revolutions below 12 % of
-    the typical level are air; the cut is the longest run above half of it. Where the record shows an end of
-    the cut, what the tool needs to get wholly in or out is cut away there: the force looks steady well before
-    the engagement is.
+    The level is the rms of all channels about the air's zero, which may drift, less the noise there.
+    Revolutions below 12 % of the typical level are air; the cut is the longest run above half of it. Where
+    the record shows an end of the cut, what the tool needs to get wholly in or out is cut away there: the
+    force looks steady well before the engagement is.
 
     Parameters
     ----------
@@ -84,7 +84,8 @@ def segments(record: Turns, settling: int) -> Segments:
     quiet = _in_air(record)
     zero, noise = np.zeros(record.mean.shape[1]), 0.0
     if quiet.any():
-        zero, noise = record.mean[quiet].mean(axis=0), float(np.median(_swing(record)[quiet]))
+        zero = _zero(record, quiet, float(np.flatnonzero(~quiet).mean()))
+        noise = float(np.median(_swing(record)[quiet]))
     level = _level(record, zero, noise)
     typical = np.median(level[level > 0.5 * np.quantile(level, 0.9)])
     first, last = _longest(level > CUTTING * typical)
@@ -97,23 +98,46 @@ def segments(record: Turns, settling: int) -> Segments:
     return Segments(record, slice(start, stop), _clear(level < IN_AIR * typical))
 
 
+def zero_line(mean: Array, quiet: np.ndarray, cut: float) -> tuple[Array, Array]:
+    """Zero at the start of a record and its drift per revolution, (channels,) each, by readings in the air.
+
+    Parameters
+    ----------
+    mean : (turns, channels) of each revolution. quiet : (turns,) which are in the air; some are.
+    cut : revolution in the middle of the cut. There is no drift where the air is on one side of it alone.
+    """
+    middle = np.arange(len(mean)) + 0.5
+    sides = [quiet & (middle < cut), quiet & (middle > cut)]
+    if not all(side.any() for side in sides):
+        return mean[quiet].mean(axis=0), np.zeros(mean.shape[1])
+    (before, after), (first, last) = ([of[side].mean(axis=0) for side in sides] for of in (mean, middle))
+    drift = (after - before) / (last - first)
+    return before - first * drift, drift
+
+
+def _zero(record: Turns, quiet: np.ndarray, cut: float) -> Array:
+    """Return the zero in each revolution, (turns, channels)."""
+    start, drift = zero_line(record.mean, quiet, cut)
+    return np.asarray(start + (np.arange(len(record.mean))[:, None] + 0.5) * drift)
+
+
 def _in_air(record: Turns) -> np.ndarray:
     """Revolutions that may be in the air (turns,), before their zero is known.
 
-    They have little force, or a constant one: an amplifier whose charge has drifted since it was reset shows
-    a zero far from nought. A constant force is no cut where elsewhere it swings, about another mean. (On a
-    helix the mean of a cut turns with the orbit.)
+    They have a constant force, about another mean than where it swings: an amplifier whose charge has drifted
+    since it was reset shows a zero far from nought, and it drifts on while the tool cuts. Where that cannot
+    be told (on a helix the mean of a cut turns with the orbit), they have little force.
     """
     level = _level(record, np.zeros(record.mean.shape[1]))
-    quiet = level < IN_AIR * np.quantile(level, 0.9)
+    quiet: np.ndarray = level < IN_AIR * np.quantile(level, 0.9)
     swing = _swing(record)
     least, most = float(np.sort(swing)[:3].mean()), float(np.quantile(swing, 0.9))
-    if quiet.any() or most < LIVELIER * least:
+    if most < LIVELIER * least:
         return quiet
-    still = swing < least + IN_AIR * (most - least)
-    zero = record.mean[still].mean(axis=0)
-    moved = float(np.linalg.norm(np.median(record.mean[swing > CUTTING * most], axis=0) - zero))
-    wanders = float(np.sqrt(((record.mean[still] - zero) ** 2).sum(axis=1).mean()))
+    still, lively = swing < least + IN_AIR * (most - least), swing > CUTTING * most
+    about = record.mean - _zero(record, still, float(np.flatnonzero(lively).mean()))
+    moved = float(np.linalg.norm(np.median(about[lively], axis=0)))
+    wanders = float(np.sqrt((about[still] ** 2).sum(axis=1).mean()))
     return still if moved > MOVED * most and wanders < IN_AIR * moved else quiet
 
 
@@ -125,7 +149,7 @@ def _clear(quiet: np.ndarray) -> np.ndarray:
 
 
 def _level(record: Turns, zero: Array, noise: float = 0.0) -> Array:
-    """Rms of all channels about a zero in each revolution, less what there is in the air."""
+    """Rms of all channels about a zero, (channels,) or (turns, channels), less the noise: (turns,)."""
     about = (record.square - 2.0 * zero * record.mean + zero**2).sum(axis=1)
     return np.asarray(np.sqrt(np.maximum(about - noise**2, 0.0)))
 

@@ -295,26 +295,13 @@ def about_air(batch: Batch, run: str, read: Tables, wall: Wall) -> AboutAir | Re
         segments = steady.segments(turns, round(record.rate * wall.leaving / cutting_force.feed(batch, run)))
     except ValueError as error:
         return Refusal(str(error))
-    zero, drift = _zero_line(segments, turns.length / record.rate)
-    return AboutAir(record, zero, drift, segments.steady)
-
-
-def _zero_line(segments: steady.Segments, turn: float) -> tuple[Array, Array]:
-    """Return the zero at the start of a record, N, and its drift, N/s, by what is read in the air.
-
-    ``turn``: time of a revolution, s. An amplifier that drifts by a tenth of a newton a second is wrong by
-    more than the noise after a path of ten seconds.
-    """
-    mean, middle = segments.turns.mean, turn * (np.arange(len(segments.quiet)) + 0.5)
     if not segments.quiet.any():
-        return np.zeros(3), np.zeros(3)
-    cut = 0.5 * turn * (segments.steady.start + segments.steady.stop) / segments.turns.length
-    sides = [segments.quiet & (middle < cut), segments.quiet & (middle > cut)]
-    if not all(side.any() for side in sides):
-        return mean[segments.quiet].mean(axis=0), np.zeros(3)
-    (before, after), (first, last) = ([of[side].mean(axis=0) for side in sides] for of in (mean, middle))
-    drift = (after - before) / (last - first)
-    return before - first * drift, drift
+        return AboutAir(record, np.zeros(3), np.zeros(3), segments.steady)
+    # An amplifier that drifts by a tenth of a newton a second is wrong by more than the noise after a path of
+    # ten seconds.
+    middle = 0.5 * (segments.steady.start + segments.steady.stop) / turns.length
+    zero, drift = steady.zero_line(turns.mean, segments.quiet, middle)
+    return AboutAir(record, zero, drift * record.rate / turns.length, segments.steady)
 
 
 def from_coefficients(
