@@ -76,6 +76,11 @@ def test_a_record_shorter_than_a_revolution_has_none():
         segments(found, 0)
 
 
+def test_a_dead_channel_is_no_cut():
+    with pytest.raises(ValueError, match="nought in the whole record"):
+        segments(turns([np.zeros((20 * TURN, 3))], TURN), settling=0)
+
+
 @pytest.mark.parametrize("zero", [0.0, 20.0, 60.0, -90.0])
 def test_air_is_found_whatever_the_zero_of_the_amplifier(zero):
     """A charge amplifier that was reset long before the record begins far from nought."""

@@ -73,7 +73,7 @@ def segments(record: Turns, settling: int) -> Segments:
     Raises
     ------
     ValueError
-        If less than six revolutions are left, or the record is shorter than one.
+        If less than six revolutions are left, the record is shorter than one, or it shows no force.
     """
     length, samples, count = record.length, record.samples, len(record.mean)
     if count == 0:
@@ -87,6 +87,8 @@ def segments(record: Turns, settling: int) -> Segments:
         zero = _zero(record, quiet, float(np.flatnonzero(~quiet).mean()))
         noise = float(np.median(_swing(record)[quiet]))
     level = _level(record, zero, noise)
+    if not level.any():
+        raise ValueError("the force is nought in the whole record")
     typical = np.median(level[level > 0.5 * np.quantile(level, 0.9)])
     first, last = _longest(level > CUTTING * typical)
     start = first * length + (settling if first > 0 else 0)
@@ -125,14 +127,14 @@ def _in_air(record: Turns) -> np.ndarray:
     """Revolutions that may be in the air (turns,), before their zero is known.
 
     They have a constant force, about another mean than where it swings: an amplifier whose charge has drifted
-    since it was reset shows a zero far from nought, and it drifts on while the tool cuts. Where that cannot
-    be told (on a helix the mean of a cut turns with the orbit), they have little force.
+    since it was reset shows a zero far from nought, and it drifts on while the tool cuts. Where that does not
+    decide (on a helix the mean of a cut turns with the orbit), they have little force.
     """
     level = _level(record, np.zeros(record.mean.shape[1]))
     quiet: np.ndarray = level < IN_AIR * np.quantile(level, 0.9)
     swing = _swing(record)
     least, most = float(np.sort(swing)[:3].mean()), float(np.quantile(swing, 0.9))
-    if most < LIVELIER * least:
+    if most <= LIVELIER * least:
         return quiet
     still, lively = swing < least + IN_AIR * (most - least), swing > CUTTING * most
     about = record.mean - _zero(record, still, float(np.flatnonzero(lively).mean()))
