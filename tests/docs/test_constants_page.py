@@ -42,6 +42,7 @@ SINGLE = (
     "effects/joint_backlash.py",
     "observables/stability/boundary.py",
     "robot/drive_torques.py",
+    "robot/presliding.py",
 )
 KINDS = ("derived", "calibrated", "chosen", "numerical")
 ROW = re.compile(r"\| `([^`]+)`, `([^`]+)` \| `([^`]+)` \| (.+?) \| \*\*(\w+)\*\*(.*) \|")

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 from metro.effects.effect import Effect, EffectParameter, per_joint
 from metro.effects.parts import WithDrives
 from metro.robot.drive_torques import PRESLIDING
+from metro.units import MRAD
 
 MOST = 2.0  # mrad: twice what is found of joints with gears
+
+
+def _following(joint: int) -> Callable[[Effect, Any], Effect]:
+    """Return what starts the turn of a joint's friction from that which its idle runs show."""
+
+    def adapt(effect: Effect, problem: Any) -> Effect:
+        turn = problem.base.drives.turns(joint + 1)[joint] / MRAD
+        level, follows = effect.parameters
+        return replace(effect, parameters=(level, replace(follows, starts=(turn, 0.0), neutral=turn)))
+
+    return adapt
 
 
 def _of(joint: int) -> Effect:
     def apply(model: WithDrives, values: Mapping[str, float]) -> WithDrives:
         drives = model.drives.with_friction(joint, reversal=values["torque_nm"])
-        return replace(model, drives=drives.with_presliding(joint, values["presliding_mrad"] * 1e-3))
+        return replace(model, drives=drives.with_presliding(joint, values["presliding_mrad"] * MRAD))
 
     return Effect(
         name="friction_reversal",
@@ -28,14 +41,15 @@ def _of(joint: int) -> Effect:
                 0.0,
                 MOST,
                 0.05,
-                starts=(PRESLIDING / 1e-3, 0.0),
-                neutral=PRESLIDING / 1e-3,
+                starts=(PRESLIDING / MRAD, 0.0),
+                neutral=PRESLIDING / MRAD,
                 optional=True,
                 nothing_below=True,
                 nothing_above=True,
             ),
         ),
         apply=apply,
+        adapt=_following(joint),
         part="drives",
         signature=(
             "The torque of one joint has a constant error that changes sign where the joint reverses, over "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -37,7 +38,8 @@ class DriveTorques:
     ----------
     reversal : Coulomb level of the cut less that of the idle run, N m.
     warmup : slope of the Coulomb level from the start of the cut's log, N m/s.
-    presliding : turn over which the friction of a joint follows when it turns round, rad (or m).
+    presliding : turn over which the friction of a joint follows when it turns round, rad (or m); NaN of a
+        joint where it is not known, which is taken as ``PRESLIDING``.
     viscous : friction in proportion to the joint's speed, the cut's less the idle run's, N m s/rad.
     ripple : of the gears, in the cut alone (what both runs have at the same place cancels).
     """
@@ -61,23 +63,32 @@ class DriveTorques:
 
     def with_presliding(self, joint: int, turn: float) -> DriveTorques:
         """Return these with the friction of one joint, from 0, following over another ``turn``, rad."""
-        return replace(self, presliding=put(self.presliding, joint, turn, PRESLIDING))
+        return replace(self, presliding=put(self.presliding, joint, turn, math.nan))
 
-    def at(self, q: Array, rate: Array, t: Array, width: Array | float = 0.0) -> Array:
+    def turns(self, count: int) -> list[float]:
+        """Return the turn over which the friction of each of ``count`` joints follows, rad."""
+        known = of_joints(self.presliding, count, math.nan)
+        return [PRESLIDING if math.isnan(turn) else turn for turn in known.tolist()]
+
+    def at(
+        self, q: Array, rate: Array, t: Array, width: Array | float = 0.0, start: Array | None = None
+    ) -> Array:
         """Torque (m, n), N m, on top of that of the idle run, each the mean over ``width`` s.
 
         Parameters
         ----------
         q, rate : (m, n) angles, rad, and speeds, rad/s, of the joints. t : (m,) s from the log's start.
+        start : (n,) friction over its level where the path begins, −1 … 1; else the joints moved as there.
         """
         reversal, warmup, viscous = (
             of_joints(each, rate.shape[1]) for each in (self.reversal, self.warmup, self.viscous)
         )
         torque = rate * viscous if viscous.any() else np.zeros_like(rate)
-        presliding = of_joints(self.presliding, rate.shape[1], PRESLIDING)
+        turns = self.turns(rate.shape[1])
         for joint in np.flatnonzero((reversal != 0.0) | (warmup != 0.0)):
             level = reversal[joint] + t * warmup[joint]
-            torque[:, joint] += level * _slid(Same(q), Same(rate), int(joint), float(presliding[joint]))
+            first = None if start is None else float(start[joint])
+            torque[:, joint] += level * _slid(Same(q), Same(rate), int(joint), turns[joint], first)
         for one in self.ripple:
             angle = one.order * q[:, one.joint]
             cycles = one.order * rate[:, one.joint] * width / (2.0 * np.pi)
@@ -88,29 +99,33 @@ class DriveTorques:
 
 # A search asks for the friction of one joint along one run again and again, and only its level differs.
 @lru_cache(maxsize=256)
-def _slid(q: Same[Array], rate: Same[Array], joint: int, presliding: float) -> Array:
-    return slid(q.value[:, joint], rate.value[:, joint], presliding)
+def _slid(q: Same[Array], rate: Same[Array], joint: int, presliding: float, start: float | None) -> Array:
+    return slid(q.value[:, joint], rate.value[:, joint], presliding, start)
 
 
-def slid(q: Array, rate: Array, presliding: float) -> Array:
+def slid(q: Array, rate: Array, presliding: float, start: float | None = None) -> Array:
     """Friction along a path over its level, (m,), −1 … 1.
 
     It follows the way, whatever the speed: once a joint turns round, it tends to the other level over the
     turn of ``presliding`` (Dahl, AIAA J. 14 (1976) 1675, exactly for each step). Without presliding it
-    follows the speed, and is between its levels where that is near none. Before the path begins, the joint
-    was moving as at its start.
+    follows the speed, and is between its levels where that is near none.
 
     Parameters
     ----------
     q, rate : (m,) rad and rad/s along the path; no friction where no speed is known. presliding : rad.
+    start : of it where the path begins, −1 … 1; without it the joint moved before as it does there.
     """
     if presliding <= 0.0 or not rate.any():
         return np.tanh(rate / TURNING)
-    away = np.flatnonzero(np.abs(q - q[0]) > STARTED * presliding)
-    state = float(np.sign(q[away[0]] - q[0])) if len(away) else 0.0
+    state = _as_it_moves(q, presliding) if start is None else start
     steps = np.diff(q)
     kept = np.exp(-np.abs(steps) / presliding)
     along = [state]
     for share, more in zip(kept.tolist(), (np.sign(steps) * (1.0 - kept)).tolist(), strict=True):
         along.append(share * along[-1] + more)
     return np.array(along)
+
+
+def _as_it_moves(q: Array, presliding: float) -> float:
+    away = np.flatnonzero(np.abs(q - q[0]) > STARTED * presliding)
+    return float(np.sign(q[away[0]] - q[0])) if len(away) else 0.0

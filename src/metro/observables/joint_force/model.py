@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from metro.observables.problem import Block, Parameter
-from metro.robot.drive_torques import PRESLIDING, DriveTorques, slid
+from metro.robot.drive_torques import DriveTorques
 from metro.robot.kinematics import Arm, Geometry, axes
 from metro.robot.payload import Payload, gravity_torque
 from metro.robot.statics import Flange, flange_of, joint_torque, tip_jacobian_of
@@ -68,6 +68,8 @@ class TorqueRun:
     t, width : (m,) middle and length of the bin's time, s, by the dynamometer's clock. since : (m,) the same
         from the start of the log.
     force : the dynamometer's record.
+    start : (n,) friction of the joints over its level where the path begins, −1 … 1; without it they moved
+        before as they do there. turn : (n,) over which it follows, rad; NaN where it is not identified.
     """
 
     q: Array
@@ -76,6 +78,8 @@ class TorqueRun:
     since: Array
     width: Array
     force: ForceRecord
+    start: Array | None = None
+    turn: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +179,7 @@ def along(dh: Same[Geometry], run: TorqueRun) -> Flange:
 @lru_cache(maxsize=256)
 def driven(drives: DriveTorques, dh: Same[Geometry], run: TorqueRun) -> Array:
     """Waves (k m,), N m, of the torques of the drives; not to be changed."""
-    torque = drives.at(run.q, run.rate, run.since, run.width)[:, axes(dh.value).turning]
+    torque = drives.at(run.q, run.rate, run.since, run.width, run.start)[:, axes(dh.value).turning]
     return in_waves(torque) if torque.any() else np.zeros(torque.size)
 
 
@@ -218,7 +222,9 @@ def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
 @lru_cache(maxsize=256)
 def rubbing(run: TorqueRun, joints: tuple[int, ...]) -> Array:
     """Waves (k m, k) of the friction of each joint that turns, over its level."""
-    states = np.stack([slid(run.q[:, joint], run.rate[:, joint], PRESLIDING) for joint in joints], axis=1)
+    turn = () if run.turn is None else tuple(run.turn.tolist())
+    one = DriveTorques((1.0,) * run.q.shape[1], presliding=turn)
+    states = one.at(run.q, run.rate, run.since, start=run.start)[:, joints]
     return np.stack([in_waves(states * joint) for joint in np.eye(len(joints))], axis=1)
 
 

@@ -29,15 +29,16 @@ from metro.observables.joint_force.model import (
     rubbing,
     running,
 )
-from metro.observables.joint_force.tables import NOISE, WANDER, observe
+from metro.observables.joint_force.tables import NOISE, START, TURN, observe, slow_noise
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
+from metro.robot.drive_torques import DriveTorques
 from metro.robot.drives import declared, drives_of_cell
 from metro.robot.kinematics import Arm, arm_of_cell
 from metro.robot.statics import driven_jacobian
 from metro.signals.waves import variance, waves
-from metro.units import JSON, MS, Array
+from metro.units import JSON, MRAD, MS, Array
 
 SCATTER = 0.01
 CALIBRATED = 0.01  # relative error of an axis of the dynamometer, in all runs
@@ -66,15 +67,14 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         return Refusal(" ".join(left_out))
     forces = dict(tuple(observed["tool_force"].groupby("run")))
     roles = batch.runs["role"].to_dict()
-    # one run tells little of its slow noise: all of them together do
-    levels = observed["joint_torque"].groupby("run")[arm.axes.driven(WANDER)].first()
-    wander = np.sqrt((levels**2).mean().to_numpy())
+    torques = dict(tuple(observed["joint_torque"].groupby("run", sort=False)))
+    wander = slow_noise(list(torques.values()), arm.axes)
     blocks = tuple(
-        _block(batch.runs.loc[str(run)], table, forces[run], arm, wander)
-        for run, table in observed["joint_torque"].groupby("run", sort=False)
+        _block(batch.runs.loc[str(run)], table, torque_run(table, forces[run]), arm, wander)
+        for run, table in torques.items()
         if roles[run] in {"identify", "validate"}
     )
-    apart = [str(run) for run, rows in observed["joint_torque"].groupby("run") if not rows["meet"].all()]
+    apart = [str(run) for run, rows in torques.items() if not rows["meet"].all()]
     notes = (
         "The torques of the cut less those of the idle run at the same place are what the dynamometer's "
         "force asks of the joints; friction and gravity are those of the idle run.",
@@ -90,7 +90,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         ),
         *left_out,
     )
-    model = JointForceModel(arm)
+    model = JointForceModel(arm, DriveTorques(presliding=_turns(observed["joint_torque"], arm)))
     scatter = np.zeros(len(model.parameters))
     scatter[0] = SCATTER
     return Problem(
@@ -103,6 +103,13 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         notes=notes,
         basis_unit="N m",
     )
+
+
+def _turns(torques: pd.DataFrame, arm: Arm) -> tuple[float, ...]:
+    """Return the turn over which the friction of each joint follows, rad; NaN where it is not identified."""
+    turns = np.full(len(arm.axes), np.nan)
+    turns[arm.axes.turning] = torques[arm.axes.driven(TURN)].to_numpy()[0] * MRAD
+    return tuple(turns.tolist())
 
 
 def _instruments(batch: Batch, arm: Arm, blocks: Sequence[Block]) -> Block:
@@ -135,9 +142,9 @@ def _largest(arm: Arm, blocks: Sequence[Block]) -> Array:
     )
 
 
-def _block(row: Any, table: pd.DataFrame, force: pd.DataFrame, arm: Arm, wander: Array) -> Block:
+def _block(row: Any, table: pd.DataFrame, setting: TorqueRun, arm: Arm, wander: Array) -> Block:
     """Torques of the run whose row of the run table is ``row``, in waves along its path."""
-    setting, count, axes = torque_run(table, force), len(table), arm.axes
+    count, axes = len(table), arm.axes
     noise = table[axes.driven(NOISE)].to_numpy()[0]
     white = noise**2 / table["samples"].iloc[0]
     solve = _least_squares(arm, setting, np.sqrt(white))
@@ -173,7 +180,10 @@ def torque_run(table: pd.DataFrame, force: pd.DataFrame) -> TorqueRun:
     axes = axes_of(table)
     q, rate = (table[names].to_numpy() * axes.units for names in (axes.positions, axes.rates))
     time, since, width = (table[name].to_numpy() for name in ("t_s", "since_s", "width_s"))
-    return TorqueRun(q, rate, time, since, width, record)
+    start, turn = np.zeros(len(axes)), np.full(len(axes), np.nan)
+    start[axes.turning] = table[axes.driven(START)].to_numpy()[0]
+    turn[axes.turning] = table[axes.driven(TURN)].to_numpy()[0] * MRAD
+    return TorqueRun(q, rate, time, since, width, record, start, turn)
 
 
 def _lengths(s_mm: Array) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
+from metro.joint_columns import Axes
 from metro.observables.arm import tip_force
 from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import FORCE
@@ -18,16 +20,18 @@ from metro.observables.joint_force.model import ForceRecord, running
 from metro.observables.problem import Refusal
 from metro.robot.drive_torques import TURNING
 from metro.robot.kinematics import Arm, arm_of_cell
+from metro.robot.presliding import IdlePath, presliding
 from metro.signals import align, kalman
 from metro.signals.intervals import uneven
-from metro.signals.waves import wandering
-from metro.units import JSON, MM, MS, Array
+from metro.signals.waves import variance, wandering
+from metro.units import JSON, MM, MRAD, MS, Array
 
 # After a start from rest the joints' friction first winds up, over 1e-4 to 1e-3 rad: some millimetres of the
 # path at a lever of a metre and more. Cut and idle run may have started elsewhere.
 SETTLED, OF_AIR = 5 * MM, 1.0 / 3.0
 GRID = 5 * MS
-NOISE, WANDER = "noise{}_nm", "wander{}_nm"
+NOISE, WANDER, IDLE = "noise{}_nm", "wander{}_nm", "idle{}_nm"
+START, TURN = "start{}", "presliding{}_mrad"
 AT_AN_END = 0.1  # s by which the clocks of log and dynamometer may be apart, of a record that ends in the cut
 LEAST_BINS = 8  # of the path
 
@@ -53,7 +57,7 @@ def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataF
     if not torques and not refused:
         return Refusal("no run has a robot_log, an idle_log and a dynamometer record")
     return {
-        **({"joint_torque": pd.concat(torques, ignore_index=True)} if torques else {}),
+        **({"joint_torque": _with_presliding(torques, arm.axes)} if torques else {}),
         **({"tool_force": pd.concat(forces, ignore_index=True)} if forces else {}),
         "joint_force_refused": pd.DataFrame(refused, columns=["run", "reason"], dtype=str),
     }
@@ -142,7 +146,39 @@ def _torque(
     columns |= dict(zip(axes.rates, (rates / axes.units).T, strict=True))
     columns |= dict(zip(axes.driven(NOISE), np.sqrt(white[0] + white[1]), strict=True))
     columns |= dict(zip(axes.driven(WANDER), np.sqrt(2.0 * idling), strict=True))
+    columns |= dict(zip(axes.driven(IDLE), idle_torque.T, strict=True))
     return pd.DataFrame(columns)
+
+
+def _with_presliding(runs: list[pd.DataFrame], axes: Axes) -> pd.DataFrame:
+    """Put all runs into one table, with the state of friction at the start of each and how it follows.
+
+    The torques of the idle runs, from which both are identified, are not kept.
+    """
+    wander = slow_noise(runs, axes)
+    columns = zip(*(axes.driven(name) for name in (IDLE, NOISE, START, TURN)), strict=True)
+    found: list[dict[str, float]] = [{} for _ in runs]
+    for joint, slow, (own, noise, start, turn) in zip(axes.turning, wander, columns, strict=True):
+        paths = []
+        for table in runs:
+            q, rate = (table[names[joint]].to_numpy() for names in (axes.positions, axes.rates))
+            # Of the noise of the difference, half of its variance is that of the idle run.
+            white = 0.5 * table[noise].iloc[0] ** 2 / table["samples"].iloc[0]
+            sd = np.sqrt(variance(len(table), np.array([white]), np.array([0.5 * slow**2])))[:, 0]
+            unit = axes.units[joint]
+            paths.append(IdlePath(q * unit, rate * unit, table[own].to_numpy(), sd))
+        friction = presliding(paths)
+        for row, state in zip(found, friction.start, strict=True):
+            row |= {start: float(state), turn: friction.turn / MRAD}
+    idle = axes.driven(IDLE)
+    kept = [table.drop(columns=idle).assign(**row) for table, row in zip(runs, found, strict=True)]
+    return pd.concat(kept, ignore_index=True)
+
+
+def slow_noise(runs: Sequence[pd.DataFrame], axes: Axes) -> Array:
+    """Return the level of the slow noise (k,), N m, rms over the runs: one of them tells little of it."""
+    levels = np.array([table[axes.driven(WANDER)].iloc[0] for table in runs], dtype=float)
+    return np.asarray(np.sqrt((levels**2).mean(axis=0)))
 
 
 def _settled(pair: align.Aligned, x: Array) -> align.Aligned:
