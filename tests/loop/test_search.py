@@ -210,21 +210,6 @@ def test_an_effect_that_helps_one_condition_alone_is_not_added():
     assert trial_room._not_held_out(even, GATES) is None
 
 
-def test_an_effect_for_which_base_parameters_stand_in_need_not_improve_a_condition():
-    """A clock that is off by 100 ms is fitted as a lag that is ten times what is believed of one."""
-    held_out = {"instruments": 45.0, "a": -0.9, "b": -0.6, "c": -0.5}
-    spared = Evidence(50.0, 1e-6, held_out, size=0.1, missed=0.0, believed=frozenset({"instruments"}))
-    assert trial_room._not_held_out(spared, GATES) is None
-    worse = replace(spared, held_out=held_out | {"b": -5.0, "c": -4.0})
-    assert trial_room._not_held_out(worse, GATES) == Statement(
-        "better_in_few", {"share": pytest.approx(1 / 3)}
-    )
-    odd = replace(
-        spared, held_out={"instruments": 5.0, "a": 40.0, "b": -0.9, "c": -0.9, "d": -0.9, "e": -0.9}
-    )
-    assert trial_room._not_held_out(odd, GATES) == Statement("better_in_few", {"share": pytest.approx(1 / 3)})
-
-
 def test_an_effect_smaller_than_half_of_what_stays_unexplained_is_added_on_trial_only():
     evidence = Evidence(statistic=50.0, p_value=1e-6, held_out={}, size=0.02, missed=0.05)
     assert trial_room._why_not(evidence, 0.0, GATES, 0.004) is None

@@ -1,15 +1,28 @@
 """What the joint force model predicts in one step, against its design, and the weight it carries."""
 
+import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from metro.observables.joint_force.model import Instruments, JointForceModel, TorqueRun, running
+from metro.effects.effect import fitted_to
+from metro.effects.library import library
+from metro.observables.joint_force.model import (
+    Instruments,
+    JointForceModel,
+    TorqueRun,
+    driven,
+    in_waves,
+    rubbing,
+    running,
+)
 from metro.robot.drive_torques import DriveTorques, Ripple, slid
 from metro.robot.kinematics import arm_of_cell, forward
 from metro.robot.payload import GRAVITY, Payload, gravity_torque
 from metro.robot.statics import flange_of
+from metro.same import Same
 
 DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
 ARM = arm_of_cell({"arm": {"dh": DH}}, {"tool_in_flange_mm": [210, 0, 280]})
@@ -69,3 +82,28 @@ def test_friction_is_that_of_the_joint_along_its_path():
     faster = DriveTorques(reversal=(0.0, 3.0), presliding=(0.0, 0.05)).at(Q, RUN.rate, T)
     np.testing.assert_allclose(faster[:, 1], 3.0 * slid(Q[:, 1], RUN.rate[:, 1], 0.05), atol=1e-12)
     assert np.abs(faster - torque).max() > 0.1
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_friction_begins_in_the_state_and_follows_over_the_turn_of_its_run(joint):
+    """What is left of another state at the start fades as exp(-way / turn), whatever the joint does then."""
+    turn, start = np.full(6, np.nan), np.zeros(6)
+    turn[joint], start[joint] = 0.05, -0.3
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(Q[:, joint])))])
+    fading = in_waves(np.exp(-way / 0.05)[:, None])
+    of_joint = slice(81 * joint, 81 * (joint + 1))
+    run, other = (replace(RUN, turn=turn, start=start + shift * np.eye(6)[joint]) for shift in (0.0, 0.5))
+    shapes = [rubbing(one, tuple(range(6)))[of_joint, joint] for one in (run, other)]
+    np.testing.assert_allclose(shapes[1] - shapes[0], 0.5 * fading, atol=1e-10)
+    drives = DriveTorques().with_friction(joint, reversal=3.0).with_presliding(joint, 0.05)
+    torques = [driven(drives, Same(ARM.dh), one)[of_joint] for one in (run, other)]
+    np.testing.assert_allclose(torques[1] - torques[0], 1.5 * fading, atol=1e-10)
+
+
+def test_a_change_of_friction_is_sought_from_the_turn_that_idle_runs_show():
+    base = JointForceModel(ARM, DriveTorques(presliding=(math.nan, 0.5e-3)))
+    reversals = tuple(effect for effect in library("joint_force") if effect.name == "friction_reversal")
+    effects, _ = fitted_to(reversals, SimpleNamespace(base=base))
+    turns = {effect.form: effect.parameters[1] for effect in effects}
+    assert [turns[f"joint {i}"].starts[0] for i in (1, 2, 3)] == pytest.approx([0.3, 0.5, 0.3])
+    assert turns["joint 2"].neutral == pytest.approx(0.5)

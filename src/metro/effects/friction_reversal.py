@@ -9,9 +9,8 @@ from typing import Any
 from metro.effects.effect import Effect, EffectParameter, per_joint
 from metro.effects.parts import WithDrives
 from metro.robot.drive_torques import PRESLIDING
+from metro.robot.presliding import MOST
 from metro.units import MRAD
-
-MOST = 2.0  # mrad: twice what is found of joints with gears
 
 
 def _following(joint: int) -> Callable[[Effect, Any], Effect]:
@@ -39,7 +38,7 @@ def _of(joint: int) -> Effect:
                 "presliding_mrad",
                 "mrad",
                 0.0,
-                MOST,
+                MOST / MRAD,
                 0.05,
                 starts=(PRESLIDING / MRAD, 0.0),
                 neutral=PRESLIDING / MRAD,

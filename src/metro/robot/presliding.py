@@ -17,9 +17,9 @@ from metro.robot.drive_torques import PRESLIDING, slid
 from metro.signals.waves import SMOOTH, waves
 from metro.units import MRAD, Array
 
-# Turns that are tried, rad: 0.1 to 1 mrad is what is found of joints with gears (docs/robot.md), and as much
-# beside.
-LEAST, MOST = 0.04 * MRAD, 2.0 * MRAD
+# Turns that are tried, rad: 0.1 to 1 mrad is what is found of joints with gears (docs/robot.md); half the
+# least and twice the largest of them.
+LEAST, MOST = 0.05 * MRAD, 2.0 * MRAD
 TRIED = 9
 # Of -2 log-likelihood, two standard deviations: a turn is identified where half and twice of it are this much
 # worse, and a joint came from elsewhere than as it moves at its start where that is this much better.

@@ -28,9 +28,6 @@ from metro.units import Array
 
 FAULTY = 0.01  # share of conditions that are another than their files say
 TOUCHED = 0.01  # of the largest gain or loss at a left-out condition: below it, the condition is not touched
-BY_CHANCE = (
-    1.92  # half of the 95 % quantile of chi-square: by more, one parameter rarely changes a likelihood
-)
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,6 @@ class Evidence:
     size : rms change of the prediction over the rms of the signal. missed : rms of what the larger candidate
         misses beyond the noise, over that of the signal.
     sought : number of places among which the additional effects were sought, on all runs.
-    believed : entries of ``held_out`` that are no conditions, but what is believed of base parameters.
     """
 
     statistic: float
@@ -54,7 +50,6 @@ class Evidence:
     size: float
     missed: float
     sought: float = 1.0
-    believed: frozenset[str] = frozenset()
 
     @property
     def gain(self) -> float:
@@ -65,15 +60,10 @@ class Evidence:
     def better_share(self) -> float:
         """Share of the left-out conditions that the larger candidate predicts better.
 
-        Those that it hardly touches (an orbit that only holes have) say nothing either way. Where base
-        parameters stand in for what it is, it improves no condition, but spares them an unlikely value: then
-        conditions that lose what a further parameter loses by chance do not speak against it.
+        Those that it hardly touches (an orbit that only holes have) say nothing either way.
         """
         gains = np.array([*self.held_out.values()])
-        hardly = TOUCHED * np.abs(gains).max(initial=0.0)
-        spared = sum(self.held_out.get(name, 0.0) for name in self.believed)
-        loss = max(hardly, BY_CHANCE) if spared > 0.5 * gains[gains > 0].sum() else hardly
-        touched = gains[(gains > hardly) | (gains < -loss)]
+        touched = gains[np.abs(gains) > TOUCHED * np.abs(gains).max(initial=0.0)]
         return float(np.mean(touched > 0)) if len(touched) else 0.0
 
 
@@ -93,8 +83,7 @@ def hold_out(evidence: Evidence, smaller_out: Mapping[str, float], larger: Fit, 
     out = leave_out(larger, prior)
     # Where neither predicts a condition, as where all runs are of one, nothing is gained.
     gains = {name: 0.0 if out[name] == value else out[name] - value for name, value in smaller_out.items()}
-    believed = frozenset(block.condition for block in larger.blocks if block.belief)
-    return replace(evidence, held_out=gains, believed=believed)
+    return replace(evidence, held_out=gains)
 
 
 def _sought(fitted: Fit) -> float:

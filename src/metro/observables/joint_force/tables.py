@@ -176,7 +176,7 @@ def _with_presliding(runs: list[pd.DataFrame], axes: Axes) -> pd.DataFrame:
 
 
 def slow_noise(runs: Sequence[pd.DataFrame], axes: Axes) -> Array:
-    """Return the level of the slow noise (k,), N m, rms over the runs: one of them tells little of it."""
+    """Return the level of the slow noise (k,), N m, rms over the runs: each says little of it."""
     levels = np.array([table[axes.driven(WANDER)].iloc[0] for table in runs], dtype=float)
     return np.asarray(np.sqrt((levels**2).mean(axis=0)))
 
