@@ -97,7 +97,7 @@ def _compared(
     period = _period(effect, name, teeth)
     if period is not None:
         true = true + period * np.round((value - true) / period)
-    elif effect == "pitch_error":
+    elif effect in ("pitch_error", "uneven_teeth"):
         turned = [np.roll(true, shift) for shift in range(len(true))]
         true = min(turned, key=lambda order: float(np.sum((order - value) ** 2)))
     scale = 1.0 if period is not None else largest or float(np.abs(true).max())

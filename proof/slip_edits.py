@@ -110,7 +110,8 @@ def set_teeth(content: dict[str, Any], count: int) -> bool:
         return False
     tool.pop("pitch_deg", None)
     tool["teeth"] = count
-    content.get("known", {}).pop("pitch_error", None)
+    for of_teeth in ("pitch_error", "uneven_teeth"):
+        content.get("known", {}).pop(of_teeth, None)
     return True
 
 

@@ -123,3 +123,19 @@ def test_a_table_jumps_where_the_nodes_of_an_arc_do_not():
     true = np.linalg.norm(by_table(cutter, of, True) - by_table(less, of, True))
     assert jump > 2.0 * true
     assert step == pytest.approx(true, rel=0.1)
+
+
+def test_orders_do_not_jump_where_the_longest_arc_comes_to_have_a_node_more():
+    """The case by which it was found: the jump was as large as five steps, and a descent ended there."""
+    of = Cut(1.04e-4, 1.8e-3, engagement("slot", "slot", 12e-3, 6e-3))
+    waves = []
+    for share in np.linspace(0.0, 1.0, 21):
+        throw = (9.475e-7 + 1.4e-8 * share) * np.array([-1.0, 1.0, -1.0, 1.0])
+        four = Cutter(
+            6e-3, math.radians(40.0), evenly_pitched(4), 8.34e-7 + 5e-8 * share, 5.4227 + 0.0524 * share,
+            reach=tuple(throw.tolist()), corner=3.82e-4 + 3e-6 * share,
+        )  # fmt: skip
+        waves.append(general_orders(placed(four, of, True), LAW, of, 24, true_path=True) @ K)
+    steps = np.linalg.norm(np.diff(waves, axis=0).reshape(20, -1), axis=1)
+    bends = np.linalg.norm(np.diff(waves, 2, axis=0).reshape(19, -1), axis=1)
+    assert bends.max() < 0.1 * steps.mean()

@@ -311,6 +311,7 @@ COMPOSED = {
         phasor("radius_um", "angle_deg"),
     ),
     "tool_wear": ({"edge_growth_per_m": 0.1}, {"edge_growth_per_m": 0.25}, added),
+    "uneven_teeth": ({"longer_um": [3.0, -2.0, -1.0]}, {"longer_um": [-1.0, 2.0, -1.0]}, added),
 }
 OWN = [effect for effect in library() if effect.apply.__module__.startswith("metro.")]
 # Of the forms by joint those of the arm that is made here, which has six.

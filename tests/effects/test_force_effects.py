@@ -1,8 +1,8 @@
 """The force effects in the data of an independent simulator: found where they are, and nowhere else.
 
-Of tool_wear, chip_size_effect, entry_exit_force, pitch_error, orbit_stiffness, charge_drift, charge_leak,
-amplifier_filter, dynamometer_resonance, dynamometer_rotation and dynamometer_crosstalk; from metro.effects by
-their names.
+Of tool_wear, uneven_teeth, chip_size_effect, entry_exit_force, pitch_error, orbit_stiffness, charge_drift,
+charge_leak, amplifier_filter, dynamometer_resonance, dynamometer_rotation and dynamometer_crosstalk; from
+metro.effects by their names.
 """
 
 import math
@@ -24,10 +24,12 @@ from metro.effects import (
     orbit_stiffness,
     pitch_error,
     tool_wear,
+    uneven_teeth,
 )
 from metro.effects.library import library
 from metro.observables.force.dynamometer import Dynamometer, Recording, transfer
 from metro.observables.force.model import ForceModel
+from metro.observables.problem import Refusal
 from metro.signals.orders import amplitudes, from_amplitudes
 
 MODEL = ForceModel(Cutter(6e-3, 0.5, evenly_pitched(3)), EdgeLaw())
@@ -118,6 +120,24 @@ def test_pitch_errors_add_up_to_nothing_and_reach_every_tooth():
     turned = pitch_error.apply(MODEL, {"pitch_deg": values}).cutter.tooth_angles
     assert np.degrees(np.subtract(turned, MODEL.cutter.tooth_angles)) == pytest.approx(values)
     assert np.linalg.matrix_rank(adapted.matrix) == MODEL.cutter.teeth - 1
+
+
+def test_uneven_teeth_are_what_neither_an_offset_nor_another_diameter_makes():
+    five = replace(MODEL, cutter=Cutter(6e-3, 0.5, evenly_pitched(5)))
+    adapted = uneven_teeth.adapt(uneven_teeth.EFFECT, type("Task", (), {"base": five})())
+    longer = adapted.values(np.array([4.0, -3.0]))["longer_um"]
+    angles = np.array(five.cutter.tooth_angles)
+    for made in (np.ones(5), np.cos(angles), np.sin(angles)):
+        assert np.dot(longer, made) == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.matrix_rank(adapted.matrix) == 2
+    once = uneven_teeth.apply(five, {"longer_um": longer})
+    reach = uneven_teeth.apply(once, {"longer_um": longer}).cutter.reach
+    assert np.array(reach) == pytest.approx(2e-6 * np.array(longer))
+
+
+def test_of_three_teeth_runout_makes_every_difference():
+    refused = uneven_teeth.adapt(uneven_teeth.EFFECT, type("Task", (), {"base": MODEL})())
+    assert isinstance(refused, Refusal)
 
 
 def test_the_orbit_multiplies_the_axial_force_and_keeps_the_cutter():

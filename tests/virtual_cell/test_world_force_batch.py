@@ -15,6 +15,7 @@ from virtual_cell.recipes import force
 from virtual_cell.recipes.force_world import HARDER, _drawn, drawn_programme
 from virtual_cell.session import spread
 from virtual_cell.world.force.cell import cut_run
+from virtual_cell.world.force.cutter import effective_runout
 from virtual_cell.world.force.effects import INSIDE
 from virtual_cell.world.force.outside import OUTSIDE
 from virtual_cell.world.force.people import drawn_habits, order
@@ -70,6 +71,20 @@ def test_the_teeth_stand_where_the_truth_says(making):
     np.testing.assert_allclose(
         in_contract_terms(made.cell, made.plans)["pitch_error"].parameters["pitch_deg"], asked, atol=1e-3
     )
+
+
+def test_what_teeth_differ_by_beyond_runout_is_no_offset_of_the_axis(making):
+    radial = np.array([3.0, -1.0, 2.0, -4.0]) * 1e-6
+    good = replace(making.cell.tool, axial=0.0, twist=0.0, bend=0.0, runout=0.0)
+    bare = replace(good, angles=np.arange(4) * np.pi / 2, radial=radial)
+    cell = replace(making.cell, tool=bare)
+    longer = np.array(in_contract_terms(cell, making.plans)["uneven_teeth"].parameters["longer_um"])
+    offset = effective_runout(bare, 0.0)
+    rest = bare.radial * 1e6 - (offset * np.exp(-1j * bare.angles)).real * 1e6
+    assert longer == pytest.approx(rest - rest.mean(), abs=1e-3)
+    assert longer == pytest.approx([2.5, -2.5, 2.5, -2.5], abs=1e-3)
+    three = replace(cell, tool=replace(bare, angles=bare.angles[:3], radial=bare.radial[:3]))
+    assert "uneven_teeth" not in in_contract_terms(three, making.plans)
 
 
 def test_a_machine_that_sways_makes_the_wave_that_was_asked_for(making):

@@ -11,13 +11,14 @@ the force itself.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from metro.cutting.arcs import TURN
-from metro.cutting.chip import Cut
-from metro.cutting.cutter import Cutter
+from metro.cutting.chip import Cut, feed_per_radian
+from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.edges import Edges
 from metro.cutting.floor import floor_of
 from metro.cutting.general import General, forces, in_cut
@@ -47,11 +48,13 @@ def general_orders(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, *, true
     low, high = _arcs(cutter, general, span)
     even = bool(np.ptp(cutter.pitch(1)) < ALIKE and not cutter.runout_radius and not any(cutter.reach))
     count = 1 if even else cutter.teeth
-    longest = float((high - low)[:count].max())
-    if longest <= 0.0:
+    if float((high - low)[:count].max()) <= 0.0:
         return waves
-    nodes = math.ceil(max(NODES * 360.0, PER_ORDER * highest) * longest / TURN)
-    place, weight = _crowded(nodes)
+    good = replace(
+        cutter, tooth_angles=evenly_pitched(cutter.teeth), runout_radius=0.0, runout_angle=0.0, reach=()
+    )
+    longest = _longest_arc(good, law, cut, true_path=true_path)
+    place, weight = _crowded(math.ceil(max(NODES * 360.0, PER_ORDER * highest) * longest / TURN))
     arc = np.maximum(high - low, 0.0)[:count]
     top, weight = low[:count] + arc * place[:, None], arc * weight[:, None]
     depth = cut.axial_depth / span if span else math.inf
@@ -64,6 +67,21 @@ def general_orders(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, *, true
     waves += (each.real @ found + 1j * (each.imag @ found)).reshape(waves.shape)
     waves[1:] *= math.sqrt(2.0)
     return waves
+
+
+@lru_cache(maxsize=1024)
+def _longest_arc(good: Cutter, law: EdgeLaw, cut: Cut, *, true_path: bool) -> float:
+    """Return the immersion, rad, for which teeth have nodes: by a ``good`` tool with a flat or a ball end.
+
+    Were it that of the arcs as they are, the number of nodes would change by one where a deviation of the
+    teeth or a corner grows, and the force would jump by the difference of two quadratures. A descent with
+    steps below that ends there.
+    """
+    good = replace(good, corner=round(good.corner / good.radius) * good.radius)
+    span = abs(good.lag_per_depth * cut.axial_depth)
+    low, high = _arcs(good, in_cut(good, law, cut, span / cut.axial_depth, true_path=true_path), span)
+    # A tooth that reaches farther meets the path of a turn ago, half of that travel over the radius earlier.
+    return max(float((high - low).max()), 0.0) + feed_per_radian(good, cut) * TURN / good.radius
 
 
 @lru_cache(maxsize=256)

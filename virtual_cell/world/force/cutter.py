@@ -138,10 +138,21 @@ def effective_runout(tool: RealTool, z: float) -> complex:
 
     Unequal teeth differ in length as those of an eccentric tool do, of three teeth wholly so.
     """
+    (x, y, _), _ = _eccentric(tool)
+    return complex(tool.axis(np.array([z]))[0] + complex(x, y))
+
+
+def beyond_runout(tool: RealTool) -> Array:
+    """By how much each tooth (N,) reaches farther, m, than an offset and another diameter make it."""
+    return _eccentric(tool)[1]
+
+
+def _eccentric(tool: RealTool) -> tuple[Array, Array]:
+    """Offset along x and y and growth, m, that unequal teeth resemble most, and what they leave (N,)."""
     ray = np.stack([np.cos(tool.angles), np.sin(tool.angles), np.ones(tool.teeth)], axis=1)
     radial = np.broadcast_to(np.asarray(tool.radial, dtype=float), (tool.teeth,))
-    x, y, _ = np.linalg.lstsq(ray, radial, rcond=None)[0]
-    return complex(tool.axis(np.array([z]))[0] + complex(x, y))
+    found = np.linalg.lstsq(ray, radial, rcond=None)[0]
+    return np.asarray(found), np.asarray(radial - ray @ found)
 
 
 def uneven_pitch(tool: RealTool, z: float) -> Array:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter
-from metro.observables.problem import Model
+from metro.observables.problem import Block, Model, unpredicted
 from metro.units import Array
+
+EASED = 6  # times that a start is halved, at most, until its model predicts every block
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,34 @@ class Candidate:
         fresh = self.parameters[known:]
         numbers = sorted({parameter.group for parameter in fresh})
         return [[known + i for i, p in enumerate(fresh) if p.group == number] for number in numbers]
+
+
+def predicting(candidate: Candidate, blocks: Sequence[Block], theta: Array, beta: Array, known: int) -> Array:
+    """Ease the effects from the parameter ``known`` on until every block is predicted, or they are too small.
+
+    A descent does not go where nothing is predicted (a tool so soft that it would not cut steadily), and
+    could not begin there either.
+    """
+    for _ in range(EASED):
+        model = candidate.model(theta)
+        if not any(unpredicted(model, block, beta) for block in blocks):
+            break
+        theta = _eased(candidate, theta, known)
+    return theta
+
+
+def _eased(candidate: Candidate, theta: Array, known: int) -> Array:
+    """Return ``theta`` with the effects halfway to where they are off, from the parameter ``known`` on.
+
+    A parameter that acts by its reciprocal is halved there; an angle, and a shape that is never off, stay.
+    """
+    result = theta.copy()
+    for i, one in enumerate(candidate.parameters[known:], start=known):
+        if one.reciprocal:
+            result[i] = 2.0 / (1.0 / theta[i] + 1.0 / one.neutral)
+        elif one.period is None and one.lower <= one.neutral <= one.upper:
+            result[i] = 0.5 * (theta[i] + one.neutral)
+    return result
 
 
 def started(candidate: Candidate, theta: Array, places: list[int]) -> list[Array]:

@@ -21,7 +21,7 @@ from metro.loop.fitting.system import (
     own_step,
     solution,
 )
-from metro.observables.problem import Block, predictions
+from metro.observables.problem import Block, predictions, unpredicted
 from metro.units import Array
 
 ITERATIONS = 40
@@ -162,8 +162,10 @@ def _way(
 
 
 def _squares(candidate: Candidate, blocks: Sequence[Block], state: State, system: System) -> float:
-    """Sum of squares at another state under the weights of a system; infinite where the model overflows."""
+    """Sum of squares at another state under the weights of a system; infinite where nothing is predicted."""
     model = candidate.model(state.theta)
+    if any(unpredicted(model, block, state.beta) for block in blocks):
+        return np.inf
     pull = system.pull + np.concatenate([state.beta, state.theta]) - system.at
     total = float(pull @ system.weight @ pull)
     for block, whiten in zip(blocks, system.whiteners, strict=True):

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from metro.loop.fitting import noise as noise_room
-from metro.loop.fitting.candidate import Candidate, started
+from metro.loop.fitting.candidate import Candidate, predicting, started
 from metro.loop.fitting.descent import ITERATIONS, descend, polish
 from metro.loop.fitting.end import CONVERGED, End, end_of
 from metro.loop.fitting.least_squares import least_squares
@@ -109,8 +109,8 @@ def fit(
     ``start``, a fit of the same or of a simpler candidate, gives the base parameters and the noise to begin
     with; effect parameters that it lacks are started from all combinations of their starting values, group
     after group, and the best few are followed. A fit whose cost would stay above ``bound``, under the noise
-    to begin with, is given up where that is seen. Fits are kept: one that was followed to its end is as good
-    as any, and one that was given up at a bound would be at a lower one.
+    to begin with, is given up where that is seen, with the noise of that place. Fits are kept: one that was
+    followed to its end is as good as any, and one that was given up at a bound would be at a lower one.
     """
     kept = _kept(candidate, blocks, prior, start)
     for known, fitted in kept.items():
@@ -148,7 +148,7 @@ def _fitted(
     for places in candidate.groups(len(known)) or [[]]:
         trials: list[tuple[float, State]] = []
         for given in started(candidate, best[0].theta, places):
-            state = State(given, beta.copy(), {})
+            state = State(predicting(candidate, blocks, given, beta, len(known)), beta.copy(), {})
             trials.append((search_nuisance(candidate, blocks, noise, state, around), state))
         best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
     if start and fresh:
@@ -161,7 +161,9 @@ def _fitted(
                 return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
     reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS, bound=bound, known=start)
     if reached[0][0] > bound:
-        return _refined(candidate, blocks, prior, noise, reached[0][1], rounds=0)
+        state = reached[0][1]
+        noise = _reestimated(candidate, blocks, prior, noise, state)
+        return _refined(candidate, blocks, prior, noise, state, rounds=0)
     near = _distinct([one for one in reached if one[0] < reached[0][0] + UNDECIDED], SAME)
     refined = [_refined(candidate, blocks, prior, noise, state, rounds=ROUNDS) for state in near]
     return max(refined, key=lambda fitted: fitted.total)

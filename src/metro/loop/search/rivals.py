@@ -17,6 +17,7 @@ from metro.loop.checks.evidence import by_condition, leave_out, most_left_out, w
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, cost_under, fit
 from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.race import raced
 from metro.loop.search.replaceable import Change
 from metro.loop.search.trial import HOPELESS, Gates, beyond_left_out, parted, unlike, unsettled
 from metro.units import Array
@@ -163,8 +164,8 @@ def _strain(effect: Effect, fitted: Fit) -> float:
 def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Noise) -> list[Fit]:
     """Fit every other effect in place of the one that ``smaller`` lacks; those not far behind.
 
-    One that cannot make what that one makes is not fitted. One that is far behind under the noise of
-    ``smaller``, which hides the most, is so under any that comes after: it is not followed to its end.
+    One that cannot make what that one makes is not fitted, and one that stays far behind is not followed to
+    its end.
     """
     bound = cost_under(current, smaller.noise) + 2.0 * HOPELESS
     others = {effect.name for effect in smaller.candidate.effects}
@@ -174,8 +175,8 @@ def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Nois
     for effect in effects:
         if effect.name not in others and effect.key not in present and change.could_be(effect):
             candidate = Candidate(current.candidate.base, (*smaller.candidate.effects, effect))
-            fitted = fit(candidate, current.blocks, prior, smaller, bound)
-            near = fitted.total > current.total - HOPELESS and not unlike(effect, fitted)
+            fitted, stopped = raced(candidate, smaller, prior, bound, current.total - HOPELESS)
+            near = not stopped and fitted.total > current.total - HOPELESS and not unlike(effect, fitted)
             if near and not beyond_left_out(fitted, prior):
                 fits.append(fitted)
     return fits

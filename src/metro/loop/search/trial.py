@@ -16,9 +16,10 @@ from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, cost_under, fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.nuisances import search_nuisance
+from metro.loop.fitting.race import raced
 from metro.loop.fitting.system import State, ahead, linearised, normal_equations
 from metro.loop.statement import Statement
-from metro.observables.problem import Block, Limited
+from metro.observables.problem import Block, unpredicted
 from metro.units import Array
 
 LEAST_BETTER = 0.4  # share of the left-out conditions that an effect must predict better
@@ -90,37 +91,37 @@ def _judged(
     current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, least: float, *, behind: float
 ) -> list[Trial]:
     """Try effects against one another, as :func:`tried` says."""
-    raced, bound = _raced(current, effects, prior, gates, least, behind=behind)
-    trials = _gated(raced, gates, least)
-    given_up = {trial.effect.key for trial in trials if cost_under(trial.fit, current.noise) > bound}
+    made, given_up = _made(current, effects, prior, gates, least, behind=behind)
+    trials = _gated(made, gates, least)
     far = _far_behind(trials, given_up, behind)
     judged = _held_out(current, [far.get(trial.effect.key, trial) for trial in trials], prior, gates)
     if not far or not all(trial.why_not for trial in judged):
         return judged
     if given_up:
-        raced, _ = _raced(current, effects, prior, gates, least, behind=np.inf)
-    return _held_out(current, _gated(raced, gates, least), prior, gates)
+        made, _ = _made(current, effects, prior, gates, least, behind=np.inf)
+    return _held_out(current, _gated(made, gates, least), prior, gates)
 
 
-def _raced(
+def _made(
     current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates, least: float, *, behind: float
-) -> tuple[list[Trial], float]:
-    """Fit the effects, the most promising one first; return trials before any gate, and the bound.
+) -> tuple[list[Trial], set[tuple[str, str]]]:
+    """Fit the effects, the most promising one first; return trials before any gate, and which were given up.
 
-    The bound is the cost, under the noise to begin with, beyond which an effect is too far behind the
-    foremost one that may be added at once. That noise hides the most: what is far behind under it is so under
-    any that is known better.
+    An effect is given up where it stays too far behind the foremost one that may be added at once.
     """
     trials: dict[Effect, Trial] = {}
-    bound = np.inf
+    given_up: set[tuple[str, str]] = set()
+    bound, foremost = np.inf, -np.inf
     for effect in sorted(effects, key=lambda each: _promised(current, each)):
         candidate = Candidate(current.candidate.base, (*current.candidate.effects, effect))
-        larger = fit(candidate, current.blocks, prior, current, bound)
+        larger, stopped = raced(candidate, current, prior, bound, foremost - behind)
+        given_up |= {effect.key} if stopped else set()
         trials[effect] = Trial(effect, larger, compare(current, larger))
         cautious = replace(trials[effect], q_value=len(effects) * trials[effect].evidence.p_value)
         if not _refused(cautious, gates, least) and not small_beside_residual(cautious.evidence):
             bound = min(bound, cost_under(larger, current.noise) + 2.0 * behind)
-    return [trials[effect] for effect in effects], bound
+            foremost = max(foremost, larger.total)
+    return [trials[effect] for effect in effects], given_up
 
 
 def _promised(current: Fit, effect: Effect) -> float:
@@ -268,9 +269,7 @@ def _undetermined(effect: Effect, value: Array, half: Array, pressed: np.ndarray
 def beyond(fitted: Fit, blocks: Sequence[Block]) -> Statement | None:
     """Name the first of ``blocks`` for which a fitted model has no prediction, and why; None: it has all."""
     model = fitted.candidate.model(fitted.theta)
-    if not isinstance(model, Limited):
-        return None
-    reasons = ((block.run, model.beyond(block, fitted.beta)) for block in blocks)
+    reasons = ((block.run, unpredicted(model, block, fitted.beta)) for block in blocks)
     return next((Statement("no_prediction", {"run": run, "why": why}) for run, why in reasons if why), None)
 
 

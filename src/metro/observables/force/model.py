@@ -21,6 +21,7 @@ from metro.observables.force.order_basis import (
     FEEDS,
     Orders,
     Soft,
+    in_balance,
     lost,
     order_basis,
     shares_of_feeds,
@@ -318,8 +319,9 @@ class ForceModel:
 
     def beyond(self, block: Block, beta: Array) -> str:
         """Say that a tool this soft would not cut steadily, if force and deflection have no equilibrium."""
+        setting = block.setting
         if not any(self.structure.compliance) or all(
-            each.balanced for each in self._yielding(block.setting, beta)
+            in_balance(soft, setting.highest) for soft in self._soft(setting, beta)
         ):
             return ""
         return "force and deflection find no balance: a tool this soft would not cut steadily"

@@ -83,35 +83,43 @@ class Soft(NamedTuple):
 
 
 class Orders(NamedTuple):
-    """Amplitudes of the orders of a tool that yields; its deflection, None where it is not balanced."""
+    """Amplitudes of the orders of a tool that yields, and its deflection."""
 
     orders: ComplexArray
-    bent: Array | None
-
-    @property
-    def balanced(self) -> bool:
-        """Whether the orders are those of its whole compliance."""
-        return self.bent is not None
+    bent: Array
 
 
-@lru_cache(maxsize=1024)
 def yielding_orders(soft: Soft, highest: int, start: Soft | None) -> Orders:
     """Return the orders of a tool that yields; the compliance is halved until the tool cuts steadily.
 
-    A search then has a slope to follow. A fit that ends there is not a result (``ForceModel.beyond``).
-    ``start``: a tool that hardly differs.
+    Such a tool is no result (``ForceModel.beyond``). ``start``: a tool that hardly differs.
     """
+    found = in_balance(soft, highest, start)
+    while found is None:
+        along, across, mixed = soft.spring
+        soft = soft._replace(spring=(0.5 * along, 0.5 * across, 0.5 * mixed))
+        found = in_balance(soft, highest, start)
+    return found
+
+
+@lru_cache(maxsize=1024)
+def in_balance(soft: Soft, highest: int, start: Soft | None = None) -> Orders | None:
+    """Return the orders of a tool that yields, which are kept; None where it would not cut steadily."""
     along, across, mixed = soft.spring
     compliance, sharp = np.array([[along, mixed], [mixed, across]]), np.array(soft.coefficients)
-    tool, balanced = (soft.cutter, soft.law, soft.cut), True
-    bent = yielding_orders(start, highest, None).bent if start else None
-    while True:
-        try:
-            found = yielding(*tool, sharp, compliance, true_path=soft.true_path, start=bent)
-        except NotBalancedError:
-            compliance, balanced = 0.5 * compliance, False
-        else:
-            break
+    near = in_balance(start, highest) if start else None
+    try:
+        found = yielding(
+            soft.cutter,
+            soft.law,
+            soft.cut,
+            sharp,
+            compliance,
+            true_path=soft.true_path,
+            start=None if near is None else near.bent,
+        )
+    except NotBalancedError:
+        return None
     orders = amplitudes(to_orders(found.basis, highest))
     orders.flags.writeable = False
-    return Orders(orders, found.bent if balanced else None)
+    return Orders(orders, found.bent)
