@@ -10,6 +10,7 @@ from metro.loop.fitting import fit as fit_room
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import cost_under, fit
 from metro.loop.fitting.noise import first_noise
+from metro.loop.fitting.race import raced
 from metro.loop.search import forward as forward_room
 from metro.loop.search import rivals as rivals_room
 from metro.loop.search import trial as room
@@ -68,19 +69,32 @@ def test_those_behind_are_weighed_after_all_where_the_foremost_does_not_pass(bas
     assert set(left_out) == {"bend", "ripple"}
 
 
-def test_a_fit_is_given_up_above_its_bound_and_followed_to_its_end_below(base):
+def test_a_fit_is_given_up_above_its_bound_and_followed_to_its_end_below(base, monkeypatch):
     prior = first_noise(GATES.model_form_budget, np.full(2, 0.01), base.blocks)
     start = replace(base, noise=base.noise.sound)  # it hides nothing of what is missed
     whole = fit(Candidate(base.candidate.base, (BEND,)), base.blocks, prior, start)
     bound = cost_under(whole, start.noise) + 2.0 * HOPELESS
-    hopeless, near = (
-        fit(Candidate(base.candidate.base, (one,)), base.blocks, prior, start, bound)
-        for one in (RIPPLE, TWIN)
-    )
-    assert hopeless.noise is start.noise  # it was not estimated anew
+    near = fit(Candidate(base.candidate.base, (TWIN,)), base.blocks, prior, start, bound)
+    estimated, estimate = [], fit_room._reestimated
+    monkeypatch.setattr(fit_room, "_reestimated", lambda *a: estimated.append(a) or estimate(*a))
+    hopeless = fit(Candidate(base.candidate.base, (RIPPLE,)), base.blocks, prior, start, bound)
+    assert len(estimated) == 1  # where it was given up
     assert hopeless.total < whole.total - HOPELESS
     assert near.noise is not start.noise
     assert near.total == pytest.approx(whole.total, abs=0.01)
+
+
+def test_what_is_behind_under_the_noise_of_the_smaller_model_alone_is_followed_to_its_end(base):
+    """What the smaller model misses makes that noise large where an effect may gain most."""
+    prior = first_noise(GATES.model_form_budget, np.full(2, 0.01), base.blocks)
+    candidate = Candidate(base.candidate.base, (BEND,))
+    whole = fit(candidate, base.blocks, prior, base)
+    bound = cost_under(whole, base.noise) - 1.0  # nobody comes below it
+    for least in (whole.total + 1.0, whole.total - HOPELESS):
+        fitted, given_up = raced(candidate, base, prior, bound, least)
+        assert given_up == (least > whole.total)
+    assert fitted.total == pytest.approx(whole.total, abs=0.01)
+    assert fitted.converged
 
 
 def test_rivals_are_the_same_as_without_a_bound(base, monkeypatch):

@@ -12,6 +12,7 @@ from metro.loop.fitting import fit as fit_room
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import cost_under, fit, refit
 from metro.loop.fitting.noise import first_noise
+from metro.loop.fitting.race import raced
 from metro.loop.search import rivals as rivals_room
 from metro.loop.search.replaceable import FAR, Change, is_needed
 from metro.loop.search.rivals import contested
@@ -100,9 +101,9 @@ def test_only_those_that_could_are_fitted_in_a_contest(monkeypatch):
 
     def counted(candidate, *rest):
         asked.append(candidate.effects[-1].name)
-        return fit(candidate, *rest)
+        return raced(candidate, *rest)
 
-    monkeypatch.setattr(rivals_room, "fit", counted)
+    monkeypatch.setattr(rivals_room, "raced", counted)
     contest = contested(base, current, (BEND, TWIN, RIPPLE, SPIKE), prior, GATES)
     assert set(asked) == {"twin"}
     assert [rival.pair for rival in contest.rivals] == [("bend", "twin")]
@@ -113,11 +114,15 @@ def test_a_likeness_that_leaves_much_beside_all_is_fitted_in_the_place_of_none(m
     base, current, prior = fits(Wave(bend=0.2, ripple=0.3), BEND)
     asked = []
 
-    def counted(candidate, *rest):
-        asked.append([one.name for one in candidate.effects])
-        return fit(candidate, *rest)
+    def counted(how):
+        def asking(candidate, *rest):
+            asked.append([one.name for one in candidate.effects])
+            return how(candidate, *rest)
 
-    monkeypatch.setattr(rivals_room, "fit", counted)
+        return asking
+
+    monkeypatch.setattr(rivals_room, "fit", counted(fit))
+    monkeypatch.setattr(rivals_room, "raced", counted(raced))
     contested(base, current, (BEND, like), prior, GATES)
     assert asked == [["bend", "like"]]
 

@@ -117,8 +117,8 @@ def test_an_effect_whose_fit_is_no_result_is_not_claimed(monkeypatch):
     task = problem(1, truth=Wave(bend=0.1), phased=False)
     base = fitted(task)
     assert [t.why_not for t in tried(base, [BEND], base.noise, GATES, 0.004)] == [None]
-    halted = trial.fit
-    monkeypatch.setattr(trial, "fit", lambda *given: replace(halted(*given), step=2.0))
+    halted = trial.raced
+    monkeypatch.setattr(trial, "raced", lambda *given: (replace(halted(*given)[0], step=2.0), False))
     assert tried(base, [BEND], base.noise, GATES, 0.004)[0].why_not.code == "not_converged"
 
 

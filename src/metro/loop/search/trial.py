@@ -151,8 +151,10 @@ def _gated(trials: Sequence[Trial], gates: Gates, least: float) -> list[Trial]:
 def _refused(trial: Trial, gates: Gates, least: float) -> Statement | None:
     """Return why an effect may not be added, by its fit on all runs; None: it may.
 
-    That it gains no more than chance comes first: a fit that gains nothing is not followed to its end.
+    That nothing is predicted comes first, then that it gains no more than chance: a fit that gains nothing is not followed to its end.
     """
+    if nothing := beyond(trial.fit, trial.fit.blocks):
+        return nothing
     by_evidence = _why_not(trial.evidence, trial.q_value, gates, least)
     if by_evidence and trial.evidence.statistic < len(trial.effect.parameters):
         return by_evidence
@@ -215,10 +217,13 @@ def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> 
 def unsettled(fitted: Fit) -> Statement | None:
     """Return why a fit is no result; None where it is one.
 
-    It did not converge, or determines no parameter of an effect, or these would have to be larger than they
-    may be, or what should begin at any time begins at the same one in every repeat, or its model does not
-    hold there.
+    Its model does not hold there, or it did not converge, or determines no parameter of an effect, or these
+    would have to be larger than they may be, or what should begin at any time begins at the same one in every
+    repeat.
     """
+    # Where nothing is predicted a descent could not leave, and did not converge.
+    if nothing := beyond(fitted, fitted.blocks):
+        return nothing
     if not fitted.converged:
         return Statement("not_converged", {"step": fitted.step})
     variance = np.diag(fitted.covariance)[len(fitted.beta) :] * fitted.dispersion
@@ -232,7 +237,7 @@ def unsettled(fitted: Fit) -> Statement | None:
             return why if tried_last else Statement("beside", {"effect": effect.name, "why": why})
     if repeated := tied(fitted):
         return Statement("tied", vars(repeated))
-    return beyond(fitted, fitted.blocks)
+    return None
 
 
 def _undetermined(effect: Effect, value: Array, half: Array, pressed: np.ndarray) -> Statement | None:
