@@ -242,11 +242,6 @@ class Limited(Protocol):
         ...
 
 
-def unpredicted(model: Model, block: Block, beta: Array) -> str:
-    """Return why a model has no valid prediction of a block, in words after the run's name; or empty."""
-    return model.beyond(block, beta) if isinstance(model, Limited) else ""
-
-
 @dataclass(frozen=True)
 class Made:
     """A proposed row of the run table: the row of run ``like`` with some settings changed.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter
-from metro.observables.problem import Block, Model, unpredicted
+from metro.observables.problem import Block, Limited, Model
 from metro.units import Array
 
 EASED = 6  # times that a start is halved, at most, until its model predicts every block
@@ -58,6 +58,11 @@ class Candidate:
         fresh = self.parameters[known:]
         numbers = sorted({parameter.group for parameter in fresh})
         return [[known + i for i, p in enumerate(fresh) if p.group == number] for number in numbers]
+
+
+def unpredicted(model: Model, block: Block, beta: Array) -> str:
+    """Return why a model has no valid prediction of a block, in words after the run's name; or empty."""
+    return model.beyond(block, beta) if isinstance(model, Limited) else ""
 
 
 def predicting(candidate: Candidate, blocks: Sequence[Block], theta: Array, beta: Array, known: int) -> Array:

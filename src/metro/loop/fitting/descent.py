@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.candidate import Candidate, unpredicted
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.system import (
     Known,
@@ -21,7 +21,7 @@ from metro.loop.fitting.system import (
     own_step,
     solution,
 )
-from metro.observables.problem import Block, predictions, unpredicted
+from metro.observables.problem import Block, predictions
 from metro.units import Array
 
 ITERATIONS = 40

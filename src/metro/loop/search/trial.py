@@ -12,14 +12,14 @@ from metro.loop.checks import signature as residual
 from metro.loop.checks.evidence import Evidence, compare, hold_out, leave_out, missed, weights
 from metro.loop.checks.left_out import left_out
 from metro.loop.checks.phases import tied
-from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.candidate import Candidate, unpredicted
 from metro.loop.fitting.fit import Fit, cost_under, fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.nuisances import search_nuisance
 from metro.loop.fitting.race import raced
 from metro.loop.fitting.system import State, ahead, linearised, normal_equations
 from metro.loop.statement import Statement
-from metro.observables.problem import Block, unpredicted
+from metro.observables.problem import Block
 from metro.units import Array
 
 LEAST_BETTER = 0.4  # share of the left-out conditions that an effect must predict better
@@ -151,7 +151,8 @@ def _gated(trials: Sequence[Trial], gates: Gates, least: float) -> list[Trial]:
 def _refused(trial: Trial, gates: Gates, least: float) -> Statement | None:
     """Return why an effect may not be added, by its fit on all runs; None: it may.
 
-    That nothing is predicted comes first, then that it gains no more than chance: a fit that gains nothing is not followed to its end.
+    That nothing is predicted comes first, then that it gains no more than chance: a fit that gains nothing is
+    not followed to its end.
     """
     if nothing := beyond(trial.fit, trial.fit.blocks):
         return nothing
