@@ -15,7 +15,7 @@ from virtual_cell.recipes import force
 from virtual_cell.recipes.force_world import HARDER, _drawn, drawn_programme
 from virtual_cell.session import spread
 from virtual_cell.world.force.cell import cut_run
-from virtual_cell.world.force.cutter import effective_runout
+from virtual_cell.world.force.cutter import effective_runout, uneven
 from virtual_cell.world.force.effects import INSIDE
 from virtual_cell.world.force.outside import OUTSIDE
 from virtual_cell.world.force.people import drawn_habits, order
@@ -83,8 +83,24 @@ def test_what_teeth_differ_by_beyond_runout_is_no_offset_of_the_axis(making):
     rest = bare.radial * 1e6 - (offset * np.exp(-1j * bare.angles)).real * 1e6
     assert longer == pytest.approx(rest - rest.mean(), abs=1e-3)
     assert longer == pytest.approx([2.5, -2.5, 2.5, -2.5], abs=1e-3)
-    three = replace(cell, tool=replace(bare, angles=bare.angles[:3], radial=bare.radial[:3]))
+    three = replace(bare, angles=bare.angles[:3], radial=bare.radial[:3], twist=np.zeros(3))
+    three = replace(cell, tool=three)
     assert "uneven_teeth" not in in_contract_terms(three, making.plans)
+
+
+def test_a_lower_tooth_reaches_farther_along_the_corner(making):
+    """By as much as it is lower over the tangent of the angle from the tip, in slices of even angle."""
+    corner = 1e-3
+    height = 1.0 - np.cos(np.radians(18.0 * np.arange(6)))
+    middle = 0.5 * (height[1:] + height[:-1])
+    out = np.sum(np.diff(height) / np.tan(np.arccos(1.0 - middle)))
+    good = replace(making.cell.tool, radial=0.0, twist=0.0, bend=0.0, runout=0.0, corner=corner)
+    lower = np.array([1.0, -1.0, 1.0, -1.0]) * 1e-7
+    tool = replace(good, angles=np.arange(4) * np.pi / 2, axial=lower)
+    longer, apart = uneven(tool, corner)
+    assert longer == pytest.approx(out * lower, rel=0.01)
+    assert apart > 0.3
+    assert uneven(tool, 20 * corner)[0] == pytest.approx(out * lower / 20, rel=0.01)
 
 
 def test_a_machine_that_sways_makes_the_wave_that_was_asked_for(making):

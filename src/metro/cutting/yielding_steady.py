@@ -156,31 +156,20 @@ class _Spring:
 
 
 def _balanced(spring: _Spring) -> Array:
-    """Follow Newton's steps from the undeflected tool, each shortened until the residual falls.
-
-    Where not even a short one makes it fall, none of those after it leads to a balance either, as a rule.
-    """
+    """Follow Newton's steps from the undeflected tool, each shortened until the residual falls."""
     balance = spring.balance(np.zeros((len(spring.tool.angle), 2)))
     for _ in range(STEPS):
         if balance.within(TOLERANCE):
             return balance.bent
-        nearer = _nearer(spring, balance)
-        if nearer is None:
-            break
-        balance = nearer
+        step = _step(spring, balance)
+        for share in SHARES:
+            tried = spring.balance(balance.bent + share * step)
+            if np.sum(tried.residual**2) < np.sum(balance.residual**2):
+                break
+        balance = tried
     if balance.within(ACCEPTED):
         return balance.bent
     raise NotBalancedError(float(np.abs(balance.residual).max()))
-
-
-def _nearer(spring: _Spring, balance: _Balance) -> _Balance | None:
-    """Take a step that makes the residual fall; None: no share of Newton's does."""
-    step = _step(spring, balance)
-    for share in SHARES:
-        tried = spring.balance(balance.bent + share * step)
-        if np.sum(tried.residual**2) < np.sum(balance.residual**2):
-            return tried
-    return None
 
 
 def _step(spring: _Spring, balance: _Balance) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from metro.effects.effect import Effect, EffectParameter, Values
 from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem, Refusal
-from metro.units import DEG, Array
+from metro.units import DEG
 
 
 def apply(model: ForceModel, values: Values) -> ForceModel:
@@ -20,28 +20,28 @@ def apply(model: ForceModel, values: Values) -> ForceModel:
     return replace(model, cutter=replace(model.cutter, tooth_angles=tuple(float(a) for a in turned)))
 
 
-def contrasts(teeth: int, first: int = 1) -> Array:
-    """Return waves around the tool from the ``first`` on, (teeth, waves): columns that add up to nothing."""
-    return np.array(
-        [
-            [math.sqrt(2.0 / teeth) * wave(2.0 * math.pi * (k * j) / teeth) for j in range(teeth)]
-            for k in range(first, teeth // 2 + 1)
-            for wave in ((math.cos,) if 2 * k == teeth else (math.cos, math.sin))
-        ]
-    ).T
+def by_tooth(effect: Effect, teeth: int, first: int = 1) -> Effect:
+    """Give each tooth its deviation, of waves around the tool from the ``first`` on: these add up to nothing.
+
+    An effect has as many parameters as there are such waves, one less than teeth from the first on.
+    """
+    waves = [
+        [math.sqrt(2.0 / teeth) * wave(2.0 * math.pi * (k * j) / teeth) for j in range(teeth)]
+        for k in range(first, teeth // 2 + 1)
+        for wave in ((math.cos,) if 2 * k == teeth else (math.cos, math.sin))
+    ]
+    return replace(
+        effect,
+        parameters=tuple(replace(effect.parameters[0]) for _ in waves),
+        mixing=tuple(zip(*waves, strict=True)),
+    )
 
 
 def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
     """Give each tooth its deviation; they add up to nothing, so there is one parameter less than teeth."""
     base: Any = problem.base
     teeth = base.cutter.teeth
-    if teeth < 2:
-        return Refusal("the tool has one tooth")
-    return replace(
-        effect,
-        parameters=tuple(replace(effect.parameters[0]) for _ in range(teeth - 1)),
-        mixing=tuple(tuple(float(x) for x in row) for row in contrasts(teeth)),
-    )
+    return by_tooth(effect, teeth) if teeth > 1 else Refusal("the tool has one tooth")
 
 
 EFFECT = Effect(

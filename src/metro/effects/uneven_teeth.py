@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, Values
-from metro.effects.pitch_error import contrasts
+from metro.effects.pitch_error import by_tooth
 from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem, Refusal
 from metro.units import UM
@@ -27,13 +27,9 @@ def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
     base: Any = problem.base
     teeth = base.cutter.teeth
     if teeth < 2 * FIRST:
-        return Refusal("of three teeth or fewer, an offset of the axis makes every difference in length")
-    mixing = contrasts(teeth, FIRST)
-    return replace(
-        effect,
-        parameters=tuple(replace(effect.parameters[0]) for _ in range(mixing.shape[1])),
-        mixing=tuple(tuple(float(x) for x in row) for row in mixing),
-    )
+        reason = "an offset of the axis makes every difference in length of three teeth or fewer"
+        return Refusal(f"{reason}: declare tool_runout instead", moot=True)
+    return by_tooth(effect, teeth, FIRST)
 
 
 EFFECT = Effect(

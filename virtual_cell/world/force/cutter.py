@@ -45,10 +45,10 @@ class RealTool(Tool):
 
     def points(self, z: Array) -> tuple[Array, Array]:
         """Return radius and angle about the spindle axis, both (N, S), of the points at heights ``z``."""
-        height = z + self._each(self.axial)
-        bare = self.radius - self.drop(height) + self._each(self.radial)
+        height = z + self.each(self.axial)
+        bare = self.radius - self.drop(height) + self.each(self.radial)
         bare[self.chipped_tooth, z < self.chipped_height] -= self.chipped_by
-        helix = self.helix + self._each(self.twist)
+        helix = self.helix + self.each(self.twist)
         angle = self.angles[:, None] - height * np.tan(helix) / self.radius
         seen = self.axis(z) * np.exp(-1j * angle)
         along, across = bare + seen.real, seen.imag
@@ -79,7 +79,7 @@ class RealTool(Tool):
         straight = float(round_part[-1]) + left * np.arange(1, count + 1) / count
         return np.concatenate([round_part if self.corner > 0.0 else [0.0], straight])
 
-    def _each(self, values: Any) -> Array:
+    def each(self, values: Any) -> Array:
         """Return what differs from tooth to tooth as a column (N, 1)."""
         return np.broadcast_to(np.asarray(values, dtype=float), (self.teeth,))[:, None]
 
@@ -138,21 +138,32 @@ def effective_runout(tool: RealTool, z: float) -> complex:
 
     Unequal teeth differ in length as those of an eccentric tool do, of three teeth wholly so.
     """
-    (x, y, _), _ = _eccentric(tool)
+    radial = np.broadcast_to(np.asarray(tool.radial, dtype=float), (tool.teeth,))
+    (x, y, _), _ = _eccentric(tool, radial)
     return complex(tool.axis(np.array([z]))[0] + complex(x, y))
 
 
-def beyond_runout(tool: RealTool) -> Array:
-    """By how much each tooth (N,) reaches farther, m, than an offset and another diameter make it."""
-    return _eccentric(tool)[1]
+def uneven(tool: RealTool, depth: float) -> tuple[Array, float]:
+    """By how much each tooth (N,) reaches farther, m, than an offset and another diameter make it.
+
+    It is the mean over the slices of the ``depth`` (m): a lower tooth reaches farther out along the corner.
+    The second value is the largest deviation from that mean (rms over the depth), relative to the largest
+    reach.
+    """
+    edges = tool.bounds(depth)
+    z, share = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges) / depth
+    farther = tool.drop(z) - tool.drop(z + tool.each(tool.axial)) + tool.each(tool.radial)
+    off = np.stack([_eccentric(tool, reach)[1] for reach in farther.T], axis=1)
+    mean = off @ share
+    apart = np.sqrt((off - mean[:, None]) ** 2 @ share).max()
+    return mean, float(apart / max(np.abs(mean).max(), 1e-12))
 
 
-def _eccentric(tool: RealTool) -> tuple[Array, Array]:
-    """Offset along x and y and growth, m, that unequal teeth resemble most, and what they leave (N,)."""
+def _eccentric(tool: RealTool, reach: Array) -> tuple[Array, Array]:
+    """Offset along x and y and growth, m, that the reach (N,) of teeth resembles most, and the remainder."""
     ray = np.stack([np.cos(tool.angles), np.sin(tool.angles), np.ones(tool.teeth)], axis=1)
-    radial = np.broadcast_to(np.asarray(tool.radial, dtype=float), (tool.teeth,))
-    found = np.linalg.lstsq(ray, radial, rcond=None)[0]
-    return np.asarray(found), np.asarray(radial - ray @ found)
+    found = np.linalg.lstsq(ray, reach, rcond=None)[0]
+    return np.asarray(found), np.asarray(reach - ray @ found)
 
 
 def uneven_pitch(tool: RealTool, z: float) -> Array:

@@ -14,9 +14,8 @@ from virtual_cell.session import Plan, orbit_rpm
 from virtual_cell.units import DEG, MM, N_UM, RPM, UM
 from virtual_cell.world.force.cell import Cell, engaged, on_tool, programmed_moment
 from virtual_cell.world.force.cutter import (
-    RealTool,
-    beyond_runout,
     effective_runout,
+    uneven,
     uneven_pitch,
     wear_per_metre,
 )
@@ -69,18 +68,18 @@ def _of_tool(cell: Cell) -> dict[str, Term]:
             {"pitch_deg": [round(float(off) / DEG, 4) for off in pitch]},
             float(twist / max(float(np.abs(pitch).max()), 1e-12)),
         ),
-        **_uneven(tool),
+        **_uneven(cell),
         "tool_wear": Term({"edge_growth_per_m": _digits(wear)}, apart),
         "tool_end": Term({"corner_radius_mm": _digits(tool.corner / MM)}, 0.0),
     }
 
 
-def _uneven(tool: RealTool) -> dict[str, Term]:
+def _uneven(cell: Cell) -> dict[str, Term]:
     """Say how teeth differ beyond another diameter and an offset of the axis; three or fewer do not."""
-    if tool.teeth < 4:
+    if cell.tool.teeth < 4:
         return {}
-    off = [round(float(each) / UM, 4) for each in beyond_runout(tool)]
-    return {"uneven_teeth": Term({"longer_um": off}, 0.0)}
+    off, apart = uneven(cell.tool, cell.depth)
+    return {"uneven_teeth": Term({"longer_um": [round(float(each) / UM, 4) for each in off]}, apart)}
 
 
 def _of_metal(cell: Cell) -> dict[str, Term]:

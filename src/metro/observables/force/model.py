@@ -321,7 +321,7 @@ class ForceModel:
         """Say that a tool this soft would not cut steadily, if force and deflection have no equilibrium."""
         setting = block.setting
         if not any(self.structure.compliance) or all(
-            in_balance(soft, setting.highest) for soft in self._soft(setting, beta)
+            in_balance(soft, setting.highest, None) for soft in self._soft(setting, beta)
         ):
             return ""
         return "force and deflection find no balance: a tool this soft would not cut steadily"

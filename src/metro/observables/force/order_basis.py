@@ -103,11 +103,11 @@ def yielding_orders(soft: Soft, highest: int, start: Soft | None) -> Orders:
 
 
 @lru_cache(maxsize=1024)
-def in_balance(soft: Soft, highest: int, start: Soft | None = None) -> Orders | None:
+def in_balance(soft: Soft, highest: int, start: Soft | None) -> Orders | None:
     """Return the orders of a tool that yields, which are kept; None where it would not cut steadily."""
     along, across, mixed = soft.spring
     compliance, sharp = np.array([[along, mixed], [mixed, across]]), np.array(soft.coefficients)
-    near = in_balance(start, highest) if start else None
+    near = in_balance(start, highest, None) if start else None
     try:
         found = yielding(
             soft.cutter,
