@@ -21,7 +21,7 @@ STAGES = "Stages, in their order (called by snakemake)"
 
 
 class Readable(TyperGroup):
-    """Commands that tell an error of the user's making in words: exit code 2 of a wrong call, else 1."""
+    """Commands that report an error of the user's making in words: exit code 2 of a wrong call, else 1."""
 
     def invoke(self, ctx: Any) -> Any:
         """Call the command."""
@@ -200,7 +200,7 @@ def explain(
     reports: Results = Path("reports"),
     as_json: AsJson = False,
 ) -> None:
-    """Tell what the first page of a report tells: verdicts, causes, what to trust, what to measure next.
+    """Print what is on the first page of a report: verdicts, causes, what to trust, what to measure next.
 
     Example: `metro explain kr160-side deformation`
     """

@@ -1,4 +1,4 @@
-"""``metro explain``: what the first page of a report tells, in a terminal."""
+"""``metro explain``: the first page of a report, in a terminal."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rich.table import Table as Grid
 
 FEW = 5  # candidates shown where all observables are
-# What the first page tells besides verdicts; a table without rows is left out, as in a report.
+# What is on the first page besides verdicts; a table without rows is left out, as in a report.
 TABLES = ("published_errors", "qc", "chatter_runs", "lobes_final", "lobe_runs", "load_points")
 COLOURS = {"clean": "green", "explained": "green", "insufficient": "yellow", "undetermined": "yellow"}
 

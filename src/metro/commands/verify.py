@@ -162,7 +162,7 @@ def _cell(raw: Path, processed: Path, cells: Path) -> Iterator[Difference]:
 
 
 def _same_stations(now: Path, was: Path) -> bool:
-    """Tell whether the table of stations has the rows that ingest read."""
+    """Return whether the table of stations has the rows that ingest read."""
     import pandas as pd
 
     from metro.batch.processed import COLUMNS

@@ -90,7 +90,7 @@ def not_modelled(observable: str, known: Mapping[str, Mapping[str, Any]]) -> lis
 
 
 def _matches(effect: Effect, values: Mapping[str, Any]) -> bool:
-    """Tell whether values are exactly those that a form of an effect needs: by name, place and number."""
+    """Return whether values are exactly those that a form of an effect needs: by name, place and number."""
     return (
         {*effect.names, *effect.where} == {*values, *effect.left_out}
         and all(values[key] == value for key, value in effect.where.items())

@@ -4,7 +4,7 @@ The residuals of the runs are laid over one another. Each harmonic of them is ta
 same in every run, of what is proportional to a circumstance (feed, depth, …), and of what does not repeat:
 random amplitudes, whose variances all harmonics share and maximum likelihood finds. With these variances any
 condition is predicted from the others; what that explains is a ceiling for causes, whatever they are, and the
-variances tell which kind of cause is missing.
+variances say which kind of cause is missing.
 """
 
 from __future__ import annotations

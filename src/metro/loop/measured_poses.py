@@ -249,7 +249,7 @@ def _candidates(one: JSON) -> list[JSON]:
 
 
 def _rivals(one: JSON) -> list[tuple[str, str]]:
-    """Return pairs of effects of which these poses do not tell which it is, by their contract's names."""
+    """Return pairs of effects that these poses do not distinguish, by their contract's names."""
     names = {trial["effect"]: _named(trial) for trial in one["tried"]}
     return [(names[first], names[second]) for first, second in one["rivals"]]
 

@@ -174,7 +174,7 @@ def _known(tried: JSON) -> list[JSON]:
 
 
 def _counts(tried: JSON, status: str) -> bool:
-    """Tell whether the estimate of an effect that was not claimed counts: no residual, no best of many."""
+    """Return whether the estimate of an effect that was not claimed counts: no residual, no best of many."""
     return status in SETTLED and tried.get("verdict") == "rejected" and tried.get("chosen_among") == 1
 
 

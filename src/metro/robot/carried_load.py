@@ -65,7 +65,7 @@ def carried_load(evidence: Sequence[Sequence[Evidence]], drives: Array) -> Load:
     Parameters
     ----------
     evidence : of each of n joints what :func:`of_pair` or :func:`of_logs` made of its logs; empty of a joint
-        that tells nothing. drives : (n, n) covariance of the relative errors of the drive constants.
+        that determines nothing. drives : (n, n) covariance of the relative errors of the drive constants.
 
     Raises
     ------

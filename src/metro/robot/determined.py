@@ -1,8 +1,9 @@
 """Least squares of many columns, of which the data determine only some combinations.
 
-The columns of a rigid arm outnumber what its torques can tell. The fit keeps the directions that the data
-determine; a combination of the coefficients has a value only where it lies within these. Its error is that
-of a jackknife over stretches (Miller, Biometrika 61, 1974), since neighbouring samples are not independent.
+The columns of a rigid arm outnumber what its torques can determine. The fit keeps the directions that the
+data determine; a combination of the coefficients has a value only where it lies within these. Its error is
+that of a jackknife over stretches (Miller, Biometrika 61, 1974), since neighbouring samples are not
+independent.
 """
 
 from __future__ import annotations

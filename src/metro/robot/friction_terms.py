@@ -19,7 +19,7 @@ LEVEL = 0.01  # probability by chance of any one further term in a joint without
 SPEEDS = (0.03, 0.06, 0.12, 0.25, 0.5)  # of the joint's fastest, at which a Stribeck curve may have fallen
 FOLDS = 6  # parts of the log, each held out once
 MOST = 4
-WARMING = 1.0  # K that a joint must have warmed by, to tell more than the time does
+WARMING = 1.0  # K that a joint must have warmed by, to show more than the time does
 TURNS = 6  # of the torque of the links and the friction that it makes
 
 Key = tuple[str, float]

@@ -16,7 +16,7 @@ from metro.robot.rigid_body import PARAMETERS, torque_regressor
 from metro.units import Array
 
 TELLS = 1e-3  # least singular value over the greatest, of parameters scaled to a like size
-STATIC = 4  # mass and its first moments: what torques at rest may tell
+STATIC = 4  # mass and its first moments: what torques at rest may determine
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Carried:
     Attributes
     ----------
     mass : kg. centre : (3,) m. inertia : (6,) kg m² about the centre, xx, xy, xz, yy, yz, zz; NaN if the
-        torques do not tell them.
+        torques do not determine them.
     covariance : (10, 10) of mass, centre and inertia; NaN where inertia is not identifiable.
     rms : (n,) N m, residual torque of each joint. dof : of the residuals.
     """
@@ -53,7 +53,7 @@ def identify_payload(
     Raises
     ------
     ValueError
-        If the samples do not tell mass and centre.
+        If the samples do not determine mass and centre.
 
     Notes
     -----

@@ -31,7 +31,7 @@ BETTER = 0.8
 ALIKE = 1.1  # misfit over the least: bookkeepings that the waveform does not distinguish
 MOST_NAMED = 3
 ENDS = (0.4, 1.0)  # corner radii over the radius: a bull nose and a ball
-LEAST_RATIO = 1.2  # between depths of cut that tell a corner
+LEAST_RATIO = 1.2  # between depths of cut that show a corner
 END, AXES_AND_END = "end", "axes and end"  # kinds: the end alone is another one, or the axes as well
 
 

@@ -13,7 +13,7 @@ from metro.observables.stability.modal_test import receptances
 
 
 def frf_export(processed: Path, out: Path, position: str) -> list[str]:
-    """Write the FRFs of a position, all lines of them, as datasets 58b; return what to tell the user.
+    """Write the FRFs of a position, all lines of them, as datasets 58b; return what to print.
 
     They are those that modal identification starts from: receptances in m/N, estimated from the hammer
     records (H1 of gated hits) or as the FRF files hold them, repeats averaged. ``position`` may be "" where

@@ -136,7 +136,7 @@ def _rows(runs: pd.DataFrame, aim: Aim) -> list[tuple[Row, int]]:
 
 
 def _tests(state: Closing, name: str, limits: Limits, most: int) -> list[Asked]:
-    """Return the tests of stability that tell most about an undecided cause, at different speeds."""
+    """Return the most informative tests of stability for an undecided cause, at different speeds."""
     promised = state.stories[name].get("experiments") or []
     states = state.verdicts[name].get("next_experiment")
     if not states:

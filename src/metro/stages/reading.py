@@ -100,12 +100,12 @@ class Recordings:
         self.note(file, run, [quality.Finding(*note) for note in table.attrs.get("notes", ())])
 
     def doubt(self, file: str, message: str) -> bool:
-        """Gather a problem of a file, where there is one (""); tell whether there is."""
+        """Gather a problem of a file, where there is one (""); return whether there is."""
         self.problems += [Problem("error", file, message)] if message else []
         return bool(message)
 
     def copied(self, file: str, column: str, values: Array, blow: Hashable) -> bool:
-        """Gather a problem where a channel has the bits of one of another file; tell whether it has.
+        """Gather a problem where a channel has the bits of one of another file; return whether it has.
 
         Several responses of one ``blow`` share its force.
         """
@@ -128,7 +128,7 @@ class Recordings:
         return filled(given.file, one.record) if given and given.file else file
 
     def fit(self, file: str, run: str, column: str, findings: list[quality.Finding]) -> bool:
-        """Note findings on a run's recording; tell whether it can be used, and leave it out otherwise."""
+        """Note findings on a run's recording; return whether it can be used, and leave it out otherwise."""
         failed = [each.check in MUST_PASS and not each.ok for each in findings]
         noted = [
             each._replace(message=f"{each.message}{LEFT_OUT}") if bad else each

@@ -64,7 +64,7 @@ def force(batch: Batch, recordings: Recordings) -> Iterator[Part]:
 
 
 def _fit_force(batch: Batch, recordings: Recordings, run: str, file: str, record: RecordQuality) -> bool:
-    """Gather what there is to say of a force record; tell whether it can be used."""
+    """Gather what there is to say of a force record; return whether it can be used."""
     rate = batch.instrument("dynamometer").get("rate_hz")
     recordings.zeros[run] = record.zero
     unit = plausible.clock_of(record.step, rate) or _force_unit(batch, run, record.largest)

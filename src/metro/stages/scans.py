@@ -24,7 +24,7 @@ from metro.surface.scene_faces import scene_of
 from metro.units import Array
 
 PIECE = 1 << 18  # points in memory at a time
-SAMPLE = 1 << 12  # points of a piece that are kept to tell the extents from
+SAMPLE = 1 << 12  # points of a piece that are kept to estimate the extents from
 
 SEEN = 20_000  # points that a scan which is no face is looked at with
 PART = 0.1  # of them, on a plane or in a group of its own, that a message to the user names
@@ -71,7 +71,7 @@ def scan(batch: Batch, recordings: Recordings) -> Iterator[Part]:
 
 
 def _size(points: Array, batch: Batch, run: str) -> Iterator[quality.Finding]:
-    """Yield the size of a cloud, and a doubt of its unit where the length of the cut alone tells of one."""
+    """Yield the size of a cloud, and a doubt of its unit where the length of the cut alone shows one."""
     placed = "to_work" in batch.instrument("scanner")
     try:
         size = extents(points, placed=placed)

@@ -19,7 +19,7 @@ ALIKE = 0.99  # of the largest residual: readings that deviate as much as that c
 class SlopeNoise:
     """Standard deviation of a reading, rad, its degrees of freedom (inf: known), and what it is from.
 
-    ``sigma`` is NaN and ``source`` "" where nothing tells it.
+    ``sigma`` is NaN and ``source`` "" where nothing determines it.
     """
 
     sigma: float

@@ -71,7 +71,7 @@ class Profile:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter with its 95 % interval, SI; the ends are NaN where nothing tells them."""
+    """A parameter with its 95 % interval, SI; the ends are NaN where nothing determines them."""
 
     value: float
     low: float = math.nan

@@ -55,7 +55,7 @@ class Arrivals:
         return now - since
 
     def complete(self, path: Path) -> bool:
-        """Tell whether a file has been at rest for long enough to be read."""
+        """Return whether a file has been at rest for long enough to be read."""
         quiet = self.quiet(path)
         if quiet < QUIET_S:
             return False
@@ -74,7 +74,7 @@ def stamp_of(path: Path) -> Stamp | None:
 
 
 def being_written(path: Path) -> bool | None:
-    """Tell whether a process of this machine has a file open to write; None where the system cannot say.
+    """Return whether a process of this machine has a file open to write; None where the system cannot say.
 
     Linux grants a read lease of a file only while nobody has it open to write. Other systems, file systems
     of a network and files of other users grant none.
@@ -98,7 +98,7 @@ def being_written(path: Path) -> bool | None:
 
 
 def _ends_within_a_line(path: Path) -> bool:
-    """Tell whether a text lacks the end of its last line, as most texts do that are not all there."""
+    """Return whether a text lacks the end of its last line, as most texts do that are not all there."""
     if path.suffix.lower() not in TEXTS:
         return False
     try:

@@ -24,7 +24,7 @@ class Journal:
         self._keys = {each.key for each in self.judgements}
 
     def has(self, key: str) -> bool:
-        """Tell whether a file with this content and this row was judged."""
+        """Return whether a file with this content and this row was judged."""
         return key in self._keys
 
     def add(self, judgement: Judgement) -> None:

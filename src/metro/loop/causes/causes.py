@@ -16,7 +16,7 @@ from metro.loop.checks.signature import q_values
 from metro.loop.search.trial import LEAST_BETTER, Gates
 
 CONTRADICTION = 0.01  # p-value of the differences below which observables do not speak of one thing
-SPEAKS = 0.05  # p-value below which an observable that did not name a cause bears witness of it
+SPEAKS = 0.05  # p-value below which an observable that did not name a cause is evidence of it
 AS_GOOD = 2.0 * math.log(20.0)  # twice the log-likelihood within which two causes are confounded
 SEVERAL = 2  # observables that must show a cause which none of them named alone
 MANY = 20.0  # logarithm of the odds beyond which nobody counts
@@ -27,8 +27,8 @@ class Judged:
     """A cause and its standing: what all witnesses say, and how sure it is.
 
     ``status``: ``together`` (named by none alone), ``contradiction``, ``confirmed`` (by another observable
-    than the one that named it), ``alone`` (the others cannot tell). ``or_else``: causes that explain the same
-    as well.
+    than the one that named it), ``alone`` (the others do not determine it). ``or_else``: causes that explain
+    the same as well.
     """
 
     cause: Cause
@@ -79,7 +79,7 @@ def _updated(probability: float, gain: float) -> float:
 
 
 def _together(keys: Sequence[Key], closed: Mapping[str, Closed], gates: Gates) -> list[Judged]:
-    """Return causes that nobody named, which all together bear witness of.
+    """Return causes that nobody named, of which all together are evidence.
 
     What is sought among many places is not among them: in each observable the best place is one by chance.
     """

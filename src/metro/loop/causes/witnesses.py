@@ -45,7 +45,7 @@ class Witness:
     names_it : whether its own verdict names the cause.
     smaller, larger : fits without the cause and with it. evidence : the larger one's over the smaller one.
     value, covariance : of the s shared parameters, (s,) and (s, s), in the units of the contract; an infinite
-        variance where it tells nothing.
+        variance where it determines nothing.
     places : (s,) of the shared parameters in ``larger.theta``.
     doubt : (s,) standard deviations by the error that all of its runs may share.
     least : smallest relative change of the prediction that counts there.

@@ -16,7 +16,9 @@ from metro.loop.fitting.fit import Fit
 from metro.observables.problem import Block
 from metro.units import Array
 
-DETERMINED = 0.05  # share of a parameter's scatter that a run must tell for its deviation to count
+DETERMINED = (
+    0.05  # how well a run must determine a parameter for its deviation to count, as a share of the scatter
+)
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ def between_conditions(fitted: Fit) -> Between | None:
     """Compare the conditions' deviations of the base parameters with those of the repeats.
 
     An analysis of variance of each run's expected deviations, each in units of its own spread, with as many
-    degrees of freedom per run as it tells parameters. None where no condition is repeated.
+    degrees of freedom per run as it determines parameters. None where no condition is repeated.
     """
     from scipy.stats import f
 
@@ -76,7 +78,7 @@ def _deviations(fitted: Fit, block: Block) -> tuple[Array, Array, Array, Array]:
     """Return a run's deviations of the p scattering parameters, by their own spread and by the scatter.
 
     Then the mean square of what a unit of the second changes, over that of the signal, (p, p), and which
-    share of the scatter of each parameter the run tells, (p,).
+    share of the scatter of each parameter that the run determines, (p,).
     """
     model = fitted.candidate.model(fitted.theta)
     matrix, offset = model.design(block, fitted.nuisance[block.run], fitted.beta)

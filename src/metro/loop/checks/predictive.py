@@ -26,7 +26,7 @@ from metro.loop.fitting.system import (
 from metro.observables.problem import Block
 from metro.units import Array
 
-STAYS = 1e-9  # deviation, in units of its size, of a base parameter that the fit does not tell: as it is
+STAYS = 1e-9  # deviation, in units of its size, of a base parameter that the fit does not determine: as it is
 
 
 def predictive(fitted: Fit, blocks: Sequence[Block]) -> float:

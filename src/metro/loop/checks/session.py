@@ -32,7 +32,7 @@ class Step:
 
 
 def scan(fitted: Fit, seed: int) -> Step | None:
-    """Find the largest step of a base parameter along the session; None where the runs cannot tell.
+    """Find the largest step of a base parameter along the session; None where the runs do not determine it.
 
     Each run's own deviation of each base parameter is compared with the other runs of its condition alone;
     under no change these are exchangeable, which is the null distribution: the cumulative sum in the order of

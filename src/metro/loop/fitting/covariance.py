@@ -1,12 +1,12 @@
-"""How well the runs tell the parameters: what happens to them when one run is left out.
+"""How well the runs determine the parameters: what happens to them when one run is left out.
 
 The weights of the fit hold a declared model-form budget, so the inverse of its normal matrix says how far the
-parameters may be off if the model were that wrong. How far they are off by chance shows between the runs: the
+parameters may deviate if the model were that wrong. Their random errors show between the runs: the
 elements of a run share its coefficients, its phase and its zero, the runs share nothing. Without run i the
 parameters move by (N − A_i)⁻¹ s_i, with N the normal matrix, A_i the run's part in it and s_i the run's
 score. The sum of the squares of these moves is the cluster-robust variance CR3; the degrees of freedom of a
 parameter are Satterthwaite's for that sum (Bell & McCaffrey 2002, Survey Methodology 28), so a parameter that
-few runs tell has a wide interval however many runs there are.
+few runs determine has a wide interval however many runs there are.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ import numpy as np
 from metro.loop.fitting.system import System, inverse, normal_equations
 from metro.units import Array
 
-ENOUGH = 2.0  # degrees of freedom from which the runs tell how far a parameter is off
+ENOUGH = 2.0  # degrees of freedom from which the runs say how large the error of a parameter is
 
 
 def between_runs(system: System) -> Array:
-    """Deviation that the runs tell over that of the normal matrix, of base and effect parameters, (p + q,).
+    """Deviation that the runs show over that of the normal matrix, of base and effect parameters, (p + q,).
 
     It is stated for Student's t with one degree of freedom less than there are runs, by which intervals are
-    written. A parameter with less than ``ENOUGH`` degrees of freedom (a single run tells it, or two) keeps
-    the deviation of the normal matrix: its factor is one.
+    written. A parameter with less than ``ENOUGH`` degrees of freedom (one or two runs determine it) keeps the
+    deviation of the normal matrix: its factor is one.
     """
     parts = [_part(system, run) for run in range(len(system.rows))]
     normals, scores = (np.array(each) for each in zip(*parts, strict=True))

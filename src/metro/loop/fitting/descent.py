@@ -185,7 +185,7 @@ def polish(
 ) -> State:
     """Follow whole steps from the end of a descent, as long as each leaves less ahead than the one before.
 
-    There the cost no longer tells: it is flat to rounding where the parameters have half of their digits.
+    There the cost no longer decides: it is flat to rounding where the parameters have half of their digits.
     """
     nearest, best = np.inf, state
     for _ in range(steps):

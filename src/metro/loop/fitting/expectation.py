@@ -160,7 +160,7 @@ def _towards(square: float, known: float) -> float:
 def _squares(moment: Array) -> tuple[float, float]:
     """Least squares for relative misfit² and level², neither of them negative.
 
-    Where all runs have signals of one size nothing tells the two apart: then all is relative.
+    Where all runs have signals of one size nothing distinguishes the two: then all is relative.
 
     Parameters
     ----------

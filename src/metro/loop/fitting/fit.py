@@ -245,7 +245,7 @@ def _near(start: Fit, state: State) -> bool:
 
 
 def polished(fitted: Fit) -> Fit:
-    """Follow a fit from where its likelihood tells no more to where its parameters have all their digits."""
+    """Follow a fit from where its likelihood says no more to where its parameters have all their digits."""
     state = State(fitted.theta, fitted.beta, dict(fitted.nuisance))
     state = polish(fitted.candidate, fitted.blocks, fitted.noise, state)
     end = end_of(fitted.candidate, fitted.blocks, fitted.noise, state)

@@ -36,7 +36,7 @@ class Noise:
         out over them.
     everywhere : conditions that what a model gets wrong is shared by, too.
     alike : how much of the error that repeats may share (``Block.alike``) they do share, as a part of its
-        variance; the rest is each run's own. All of it, until the repeats tell.
+        variance; the rest is each run's own. All of it, until repeats determine it.
     misfit : by axis, relative rms of what the model at hand misses, spread evenly over the elements. It is
         estimated with each fit, so that a model that misses much does not bend its parameters to please the
         elements that are measured best. What is missed is a smooth shape, the same in every run: about twelve

@@ -261,7 +261,7 @@ def changed(chosen: Hypothesis, which: int) -> Callable[[Any], Any]:
 class _Nearby:
     """Normal clouds about points (h, c), folded back at the faces of the cube; ``width`` (c,).
 
-    They tell of its first c coordinates; the others are uniform.
+    They determine its first c coordinates; the others are uniform.
     """
 
     centres: Array

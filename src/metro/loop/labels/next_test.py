@@ -1,4 +1,4 @@
-"""Which test to make next: the speed and depth whose label would tell most about what holds."""
+"""Which test to make next: the speed and depth whose label would be the strongest evidence."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class NextTest:
 
 
 def next_tests(problem: Labelled, outcome: LabelOutcome) -> list[NextTest]:
-    """Try tests between the speeds that were tested, within their depths; the most telling first."""
+    """Try tests between the speeds that were tested, within their depths; the most informative first."""
     speeds = np.unique(problem.point_rpm)
     between = 0.5 * (speeds[1:] + speeds[:-1])
     used = problem.depth[problem.point >= 0]

@@ -127,7 +127,7 @@ class LabelOutcome:
 
 
 def enough(tests: Labels) -> bool:
-    """Whether tests can tell anything of effects."""
+    """Whether tests can be evidence of effects."""
     return len(tests.depth) >= LEAST_TESTS and len(tests.speeds) >= LEAST_SPEEDS
 
 
@@ -238,7 +238,7 @@ def _lead(outcome: LabelOutcome) -> Weighed | None:
 
 
 def pairs(outcome: LabelOutcome) -> list[list[str]]:
-    """Return what the tests cannot tell apart: the lead's effects, each with each rival."""
+    """Return what the tests cannot distinguish: the foremost effects, each with each rival."""
     lead = outcome.lead.names if outcome.lead else ()
     if outcome.unsettled:
         return [[outcome.lacking[0].names[0], NOTHING]]

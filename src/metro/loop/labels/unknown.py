@@ -1,6 +1,6 @@
 """A cause that the library lacks: the boundary is off by a smooth curve over the speeds and over its depth.
 
-An effect that explains labels better than nothing does may still be the wrong one: tests that tell no more
+An effect that explains labels better than nothing does may still be the wrong one: tests that show no more
 than "less stable than predicted" fit several causes, known or not. So every effect is weighed against this
 curve, too. It has more freedom than an effect and pays for that in evidence: what an effect truly does is
 more likely under the effect, what it only resembles is not.

@@ -1,4 +1,4 @@
-"""What to measure next: the feasible runs that would tell two explanations apart, or show a hidden effect.
+"""What to measure next: the feasible runs that would distinguish two explanations, or show a hidden effect.
 
 Before a run is made, each of two fitted models says what it would measure, and how sure it is of that. If one
 of them is true, the logarithm of the Bayes factor in its favour has a mean and a variance that follow from
@@ -75,7 +75,7 @@ class _Forecast:
 
 @lru_cache(maxsize=64)
 def prospects(one: Fit, other: Fit, proposals: tuple[Proposal, ...]) -> tuple[Prospect, ...]:
-    """Return what each proposal promises for telling two fits apart, the best first.
+    """Return what each proposal promises for distinguishing two fits, the best first.
 
     Parameters
     ----------

@@ -189,7 +189,7 @@ def _deformation(model: DeformationModel, wall: CutWall, fit: BaseFit) -> JSON:
     mean = deflected(fit.beta)
     cut = model.believed_force(wall, fit.beta)
     each = model.contributions(cut.commanded, cut.force)[wall.kept].mean(axis=0)
-    # It is linear in what is believed of the force, so that a step of any size tells the slope.
+    # It is linear in what is believed of the force, so that a step of any size gives the slope.
     steps = np.eye(len(fit.beta))[count:]
     each = np.hstack([each, *((deflected(fit.beta + step) - mean)[:, None] for step in steps)])
     sd = np.sqrt(np.einsum("ai,ij,aj->a", each, fit.covariance, each))

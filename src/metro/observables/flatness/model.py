@@ -59,7 +59,7 @@ class FaceSetting:
         passage was the lowest.
     ringing : None if the mass of the arm is not known; the tip then follows the force statically.
     unplaced : (bins, 3) orthonormal heights of an offset and two tilts, which are left out of the measured
-        and the predicted heights, because the scan's place does not tell them; None where it does.
+        and the predicted heights, because the scan's place does not determine them; None where it does.
     """
 
     pose: str

@@ -6,7 +6,7 @@ deviation scatter × thrust / (N R √Σ(s − s̄)²), or, as the thrust is nea
 
     sd(K_Fac) / K_Fae = scatter / √Σ(s − s̄)².
 
-What K_Fac / K_Fae may be is known beforehand to within ``MAY_BE``. Runs that do not halve this tell nothing.
+What K_Fac / K_Fae may be is known beforehand to within ``MAY_BE``: runs must halve that.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def needed(runs: int) -> float:
 
 
 def advice(axial_feeds: Sequence[float]) -> str:
-    """Say which axial feeds per tooth would tell K_Fac; "" where those given, m, one a run, do."""
+    """Say which axial feeds per tooth would determine K_Fac; "" where those given, m, one a run, do."""
     if not axial_feeds or told_apart(axial_feeds):
         return ""
     wide, count = spread(axial_feeds), max(LEAST_RUNS, len(axial_feeds))

@@ -34,7 +34,7 @@ def needs(stock: Stock) -> tuple[Capability, ...]:
 
 
 def _feeds(stock: Stock, runs: pd.DataFrame) -> list[str]:
-    """Say which axial feeds the helical runs lack to tell the coefficients of the bottom edges."""
+    """Say which axial feeds the helical runs lack to determine the coefficients of the bottom edges."""
     teeth = (stock.manifest.get("tool") or {}).get("teeth")
     holes = runs[(runs["operation"] == "helical") & (runs["role"] == "identify")]
     known = holes[["axial_depth_mm", "orbit_rpm", "spindle_rpm"]].dropna()

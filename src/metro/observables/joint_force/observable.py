@@ -244,7 +244,7 @@ def beside(batch: Batch, read: Tables, identified: JSON) -> tuple[dict[str, pd.D
     tables = friction.observe(batch, read)
     free, blocks = joint_logs.observe(batch, read)
     if free and isinstance(tables, Refusal):
-        tables = Refusal("")  # the joint logs tell the friction
+        tables = Refusal("")  # the joint logs determine the friction
     arm = {**friction.report(tables).get("arm", {}), **force_without_dynamometer(batch, read, identified)}
     return ({} if isinstance(tables, Refusal) else tables) | free, {**({"arm": arm} if arm else {}), **blocks}
 

@@ -20,7 +20,7 @@ from metro.robot.kinematics import Geometry
 from metro.robot.orientation import matrix_of_quaternion
 from metro.units import DEG, MM, Array
 
-LEVER = 0.1  # m: a tracker that tells 0.03 mm and 0.3 mrad tells these points as well as the first
+LEVER = 0.1  # m: a tracker with 0.03 mm and 0.3 mrad measures these points as well as the first
 SOME, WORSE = 200, 3.0  # poses that are tried; times the scatter of the best order, from which on it is wrong
 SIGMAS = ("sigma_x_mm", "sigma_y_mm", "sigma_z_mm")
 ANGLES, QUATERNION = ("rx_deg", "ry_deg", "rz_deg"), ("q1", "q2", "q3", "q4")

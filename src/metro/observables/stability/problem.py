@@ -28,7 +28,7 @@ class LabelProblem:
     notes : what was assumed or left out.
     cases : the models that predict the tests at places whose modes were measured.
     point : (n,) of each test among the speeds of all cases, −1 where it is in none.
-    chatter_hz : (n,) measured where the test chattered and its record tells, else NaN.
+    chatter_hz : (n,) measured where the test chattered and its record shows it, else NaN.
     model_sd : standard deviation of the logarithm of the depth for what the models leave out.
     label_error : probability that a label is wrong whatever the depth.
     """

@@ -2,8 +2,8 @@
 
 The residual is taken as a sum of random functions: of one joint's angle alone (what a gear or an encoder
 does), of the pose (what links, bearings and loads do), of time, of temperature, and of what does not repeat.
-Their variances are those by which the products of the residuals of pairs of poses are best told (Haseman &
-Elston, Behav. Genet. 2 (1972) 3), none below zero. With them, poses are predicted from others: what that
+Their variances are those by which the products of the residuals of pairs of poses are described best (Haseman
+& Elston, Behav. Genet. 2 (1972) 3), none below zero. With them, poses are predicted from others: what that
 explains is a ceiling for causes, whatever they are.
 """
 
@@ -134,7 +134,7 @@ def _kinds(fit: Fit, poses: Poses, moves: Array) -> Iterator[_Kind]:
 
 
 def _variances(kinds: tuple[_Kind, ...], residuals: Array) -> Array:
-    """Return the variance of each kind that tells the products of the residuals of different poses best."""
+    """Return variances of the kinds that describe products of residuals of different poses best."""
     from scipy.optimize import nnls
 
     count = len(residuals)
