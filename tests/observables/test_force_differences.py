@@ -12,6 +12,7 @@ from metro.cutting.force import Cut
 from metro.cutting.helical import Helix
 from metro.cutting.law import EdgeLaw
 from metro.effects.amplifier_filter import LowPass
+from metro.observables.force import order_basis as basis_room
 from metro.observables.force.dynamometer import Recording, Resonance
 from metro.observables.force.model import ForceModel, ForceSetting, Structure
 from metro.observables.force.terms import Bend, Push
@@ -66,3 +67,14 @@ def test_differences_are_those_of_predictions(compliance, helix):
     assert not moved[0].any()
     changes = [each.any() for each in moved[1:]]
     assert changes == [True] * 4 + [helix is not None] + [True] * 3 + [helix is None]
+
+
+def test_a_tool_that_was_asked_whether_it_is_in_balance_is_not_solved_again(monkeypatch):
+    solved, solve = [], basis_room.yielding
+    monkeypatch.setattr(basis_room, "yielding", lambda *a, **k: solved.append(a) or solve(*a, **k))
+    block = block_of(ForceSetting(CUT, 0.3, 16, Recording((0.2,), 0.4, 80.0), 0.0))
+    model = ForceModel(TOOL, EdgeLaw(), structure=Structure(compliance=(1.7e-7, 4.3e-8)))
+    assert not model.beyond(block, BETA)
+    predictions(model, block, PLACES, BETA)
+    model.design(block, PLACES[0], BETA)
+    assert len(solved) == 1
