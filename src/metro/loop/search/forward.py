@@ -26,8 +26,7 @@ SIGNIFICANT = (
     0.05  # p-value of an effect by its own interval, above which that holds none: the 95 % of intervals
 )
 MUCH = 0.1  # of the signal, by which an effect moves the prediction whatever its interval holds
-# Of a model: five that every machine has (runout, uneven teeth, end, resonance, crosstalk), and two.
-MOST_EFFECTS = 7
+MOST_EFFECTS = 6  # of a model: four that every machine has (runout, end, resonance, crosstalk), and two
 # Trials by what a model has, in whatever order it was added, and what was tried on top of that.
 Known = dict[tuple[frozenset[Effect], tuple[tuple[str, str], ...]], list[Trial]]
 
