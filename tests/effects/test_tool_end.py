@@ -1,4 +1,4 @@
-"""The tool's end as a candidate effect, and the drift that no record shows."""
+"""The tool's end as a candidate effect."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -10,7 +10,7 @@ from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import Cut
 from metro.cutting.law import EdgeLaw
-from metro.effects import charge_drift, tool_end
+from metro.effects import tool_end
 from metro.observables.force.dynamometer import Recording
 from metro.observables.force.model import ForceModel, ForceSetting, Structure
 from metro.observables.problem import Refusal
@@ -21,15 +21,13 @@ BETA = np.array([900e6, 300e6, -200e6, 15e3, 20e3, -2e3])
 RECORDING = Recording((0.5,), 1.0, 20.0)
 
 
-def setting(depth, recording=RECORDING):
-    return ForceSetting(Cut(0.05e-3, depth, Engagement(0.0, np.pi)), 0.0, 12, recording, 0.0)
+def setting(depth):
+    return ForceSetting(Cut(0.05e-3, depth, Engagement(0.0, np.pi)), 0.0, 12, RECORDING, 0.0)
 
 
-def problem(depths, model=MODEL, recordings=None):
-    recordings = recordings or [RECORDING] * len(depths)
+def problem(depths, model=MODEL):
     blocks = tuple(
-        SimpleNamespace(setting=setting(depth, recording), role="identify", zeros=np.zeros((1, 3)))
-        for depth, recording in zip(depths, recordings, strict=True)
+        SimpleNamespace(setting=setting(depth), role="identify", zeros=np.zeros((1, 3))) for depth in depths
     )
     return SimpleNamespace(base=model, blocks=blocks, role=lambda _: blocks)
 
@@ -57,26 +55,3 @@ def test_a_yielding_tool_with_a_corner_has_the_force_of_both():
     yields = replace(ball, structure=springs)._force(setting(2e-3), BETA)
     assert yields == pytest.approx(stiff, rel=0.02, abs=0.02 * np.abs(stiff).max())
     assert np.abs(yields - stiff).max() > 0.0
-
-
-def read(slope, sd):
-    return replace(RECORDING, slope=(0.0, 0.0, slope), slope_sd=(0.5, 0.5, sd))
-
-
-def test_no_drift_is_faster_than_the_means_of_the_revolutions():
-    seen = [read(slope, 3.0) for slope in (-0.7, 1.7, 8.5, -17.9, -4.7)]
-    effect = charge_drift.adapt(charge_drift.EFFECT, problem([1e-3] * 5, recordings=seen))
-    z = effect.parameters[2]
-    assert -60.0 < z.lower < 0.0 < z.upper < 60.0
-    assert effect.parameters[0].upper < 2.0
-
-
-def test_a_drift_that_all_records_show_is_within_the_bounds():
-    seen = [read(slope, 0.5) for slope in (7.6, 8.2, 8.3)]
-    z = charge_drift.adapt(charge_drift.EFFECT, problem([1e-3] * 3, recordings=seen)).parameters[2]
-    assert z.lower < 0.0
-    assert z.upper > 8.3
-
-
-def test_records_that_were_not_read_leave_the_drift_open():
-    assert charge_drift.adapt(charge_drift.EFFECT, problem([1e-3])) is charge_drift.EFFECT

@@ -11,7 +11,7 @@ from metro.loop.checks.phases import TIED, tied
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, fit
 from metro.loop.fitting.noise import first_noise
-from metro.loop.search.trial import unsettled
+from metro.loop.search.settled import unsettled
 
 FREE = replace(BEND, name="path_vibration", own=1)
 CONDITIONS, REPEATS = 4, 2

@@ -11,9 +11,10 @@ from metro.loop.checks.left_out import left_out
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import fit
 from metro.loop.fitting.noise import first_noise
-from metro.loop.search import rivals, trial
+from metro.loop.search import rivals, settled, trial
 from metro.loop.search.search import search
-from metro.loop.search.trial import tried, unsettled
+from metro.loop.search.settled import unsettled
+from metro.loop.search.trial import tried
 from metro.loop.statement import Statement
 from metro.loop.verdict import verdict
 
@@ -43,11 +44,11 @@ def test_an_effect_that_the_base_imitates_is_not_determined():
 def test_an_effect_of_which_the_runs_leave_everything_open_is_not_determined():
     found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
     half = 2.0 * float(np.sqrt(found.covariance[-1, -1] * found.dispersion))
-    for width, settled in ((0.9 * half, False), (1.1 * half, True)):
+    for width, determined in ((0.9 * half, False), (1.1 * half, True)):
         ends = {"lower": found.theta[0] - width, "upper": found.theta[0] + width}
         narrow = replace(BEND, parameters=tuple(replace(p, **ends) for p in BEND.parameters))
         bounded = replace(found, candidate=Candidate(found.candidate.base, (narrow,)))
-        assert (unsettled(bounded) is None) is settled
+        assert (unsettled(bounded) is None) is determined
 
 
 def test_an_effect_that_may_not_be_negative_and_is_nothing_is_at_no_end():
@@ -80,6 +81,29 @@ def test_an_effect_at_its_bound_has_converged_and_is_no_result():
     )
 
 
+@pytest.mark.parametrize(("alike", "reason"), [(0.0, False), (0.5, False), (0.99, True), (-0.99, True)])
+def test_an_effect_is_refused_for_another_one_only_where_it_is_the_reason(alike, reason):
+    """Of the interval of one, the part that another one takes is gone where that is known: 1 - r² is left."""
+    found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
+    half = 2.0 * float(np.sqrt(found.covariance[-1, -1] * found.dispersion))
+    ends = {"lower": found.theta[0] - 0.5 * half, "upper": found.theta[0] + 0.5 * half}
+    vague = replace(BEND, parameters=tuple(replace(p, **ends) for p in BEND.parameters))
+    deviation = np.sqrt(np.append(np.diag(found.covariance), 1e-6))
+    covariance = np.diag(deviation**2)
+    covariance[-1, -2] = covariance[-2, -1] = alike * deviation[-1] * deviation[-2]
+    both = replace(
+        found,
+        candidate=Candidate(found.candidate.base, (vague, RIPPLE)),
+        theta=np.append(found.theta, 0.1),
+        covariance=covariance,
+        pressed=np.append(found.pressed, 0.0),
+    )
+    beside = Statement("beside", {"effect": "bend", "why": Statement("undetermined")})
+    assert unsettled(both) == beside
+    assert unsettled(both, RIPPLE) == (beside if reason else None)
+    assert unsettled(both, vague) == Statement("undetermined")
+
+
 @pytest.mark.parametrize(("deviations", "settled"), [(0.5, True), (3.0, False), (60.0, False)])
 def test_a_bound_that_a_freed_parameter_would_not_leave_by_much_refuses_no_effect(deviations, settled):
     """Not where the estimate is counts, but whether the runs say that the true value is beyond."""
@@ -109,7 +133,7 @@ def test_a_group_whose_decisive_parameter_is_open_does_not_show_the_effect(group
     ends = {"lower": found.theta[0] - 0.9 * half, "upper": found.theta[0] + 0.9 * half}
     vague = replace(bend, name="vague", group=1, decisive=decisive, **ends)
     both = replace(BEND, parameters=(replace(bend, group=group), vague))
-    why = trial._undetermined(both, np.repeat(found.theta, 2), np.full(2, half), np.zeros(2, dtype=bool))
+    why = settled._undetermined(both, np.repeat(found.theta, 2), np.full(2, half), np.zeros(2, dtype=bool))
     assert (why is None) is (group == 0 or not decisive)
 
 

@@ -19,7 +19,8 @@ from metro.loop.fitting.fit import Fit, cost_under, fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.race import raced
 from metro.loop.search.replaceable import Change
-from metro.loop.search.trial import HOPELESS, Gates, beyond_left_out, parted, unlike, unsettled
+from metro.loop.search.settled import beyond_left_out, unsettled
+from metro.loop.search.trial import HOPELESS, Gates, parted, unlike
 from metro.units import Array
 
 NEGLIGIBLE = 1e-3  # weight that no report shows, and no decision depends on
@@ -60,7 +61,7 @@ def believed(effect: Effect, weight: float, fitted: Fit) -> tuple[bool, bool, fl
     than they may be, or are not determined.
     """
     counts = not effect.resembled and weight > RIVAL_WEIGHT
-    return counts and unsettled(fitted) is None, counts, weight
+    return counts and unsettled(fitted, effect) is None, counts, weight
 
 
 def contested(base: Fit, current: Fit, effects: Sequence[Effect], prior: Noise, gates: Gates) -> Contest:

@@ -10,20 +10,16 @@ import numpy as np
 from metro.effects.effect import Effect
 from metro.loop.checks import signature as residual
 from metro.loop.checks.evidence import Evidence, compare, hold_out, leave_out, missed, weights
-from metro.loop.checks.left_out import left_out
-from metro.loop.checks.phases import tied
-from metro.loop.fitting.candidate import Candidate, unpredicted
+from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import Fit, cost_under, fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.nuisances import search_nuisance
 from metro.loop.fitting.race import raced
 from metro.loop.fitting.system import State, ahead, linearised, normal_equations
+from metro.loop.search.settled import beyond, beyond_left_out, unsettled
 from metro.loop.statement import Statement
-from metro.observables.problem import Block
-from metro.units import Array
 
 LEAST_BETTER = 0.4  # share of the left-out conditions that an effect must predict better
-HALF_INTERVAL = 2.0  # standard deviations: half a 95 % interval
 HOPELESS = 12.0  # log-likelihood on the runs of the fit by which an effect may be behind and still be weighed
 OF_THE_RESIDUAL = 0.5  # an effect smaller than this share of what stays unexplained may be part of that
 
@@ -160,7 +156,7 @@ def _refused(trial: Trial, gates: Gates, least: float) -> Statement | None:
     if by_evidence and trial.evidence.statistic < len(trial.effect.parameters):
         return by_evidence
     return (
-        unsettled(trial.fit)
+        unsettled(trial.fit, trial.effect)
         or by_evidence
         or (Statement("unlike") if unlike(trial.effect, trial.fit) else None)
     )
@@ -213,80 +209,6 @@ def _held_out(current: Fit, trials: list[Trial], prior: Noise, gates: Gates) -> 
         )
         for trial in trials
     ]
-
-
-def unsettled(fitted: Fit) -> Statement | None:
-    """Return why a fit is no result; None where it is one.
-
-    Its model does not hold there, or it did not converge, or determines no parameter of an effect, or these
-    would have to be larger than they may be, or what should begin at any time begins at the same one in every
-    repeat.
-    """
-    # Where nothing is predicted a descent could not leave, and did not converge.
-    if nothing := beyond(fitted, fitted.blocks):
-        return nothing
-    if not fitted.converged:
-        return Statement("not_converged", {"step": fitted.step})
-    variance = np.diag(fitted.covariance)[len(fitted.beta) :] * fitted.dispersion
-    half = HALF_INTERVAL * np.sqrt(np.maximum(variance, 0.0))
-    beyond_bound = fitted.pressed > HALF_INTERVAL * np.sqrt(fitted.dispersion)
-    parts = fitted.candidate.parts(fitted.theta)
-    for effect, place in parts:
-        why = _undetermined(effect, fitted.theta[place], half[place], beyond_bound[place])
-        if why is not None:  # of the one that was tried last, or of one that was there already
-            tried_last = effect is fitted.candidate.effects[-1]
-            return why if tried_last else Statement("beside", {"effect": effect.name, "why": why})
-    if repeated := tied(fitted):
-        return Statement("tied", vars(repeated))
-    return None
-
-
-def _undetermined(effect: Effect, value: Array, half: Array, pressed: np.ndarray) -> Statement | None:
-    """Return why the parameters of an effect are no result; None where they are one.
-
-    The interval of each is as wide as its bounds, or an identified one is at a bound that the runs place it
-    beyond: freed, its interval would not hold the bound. One that would is an estimate like any other. A
-    group of parameters counts where those that are decisive for it are determined.
-
-    Parameters
-    ----------
-    value, half : (k,) estimates and half of their intervals. pressed : (k,) which are beyond a bound.
-    """
-    settled: set[int] = set()
-    open_ended: set[int] = set()
-    for parameter, at, width, out in zip(
-        effect.parameters, value.tolist(), half.tolist(), pressed.tolist(), strict=True
-    ):
-        if parameter.period is not None:
-            identified = 2.0 * width < parameter.period
-        else:
-            identified = at - width > parameter.lower or at + width < parameter.upper
-            below = at == parameter.lower and not parameter.nothing_below
-            above = at == parameter.upper and not parameter.nothing_above
-            if identified and out and (below or above) and at != parameter.neutral:
-                return Statement("implausible", {"parameter": parameter.name, "bound": at})
-        if identified:
-            settled.add(parameter.group)
-        elif parameter.decisive:
-            open_ended.add(parameter.group)
-    return None if settled - open_ended else Statement("undetermined")
-
-
-def beyond(fitted: Fit, blocks: Sequence[Block]) -> Statement | None:
-    """Name the first of ``blocks`` for which a fitted model has no prediction, and why; None: it has all."""
-    model = fitted.candidate.model(fitted.theta)
-    reasons = ((block.run, unpredicted(model, block, fitted.beta)) for block in blocks)
-    return next((Statement("no_prediction", {"run": run, "why": why}) for run, why in reasons if why), None)
-
-
-def beyond_left_out(fitted: Fit, prior: Noise) -> Statement | None:
-    """Return why conditions that are left out have no prediction; None: they have one.
-
-    A model that holds where it was fitted, and nowhere else, is no cause (a tool so soft that no other cut
-    would be steady).
-    """
-    parts = (part for each in left_out(fitted, prior).values() for part in each)
-    return next(filter(None, (beyond(part.others, part.blocks) for part in parts)), None)
 
 
 def _why_not(evidence: Evidence, q: float, gates: Gates, least: float) -> Statement | None:

@@ -10,7 +10,8 @@ from metro.loop.checks.left_out import unseen
 from metro.loop.checks.signature import Line, places, unseen_signature
 from metro.loop.fitting.fit import Fit
 from metro.loop.search.outcome import Outcome
-from metro.loop.search.trial import Gates, unsettled
+from metro.loop.search.settled import unsettled
+from metro.loop.search.trial import Gates
 from metro.loop.statement import Statement
 from metro.observables.problem import Block, Problem
 from metro.units import JSON, Array

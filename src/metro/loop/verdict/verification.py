@@ -10,7 +10,7 @@ import pandas as pd
 from metro.loop.checks.floor import ABOVE, against_floor
 from metro.loop.checks.left_out import scored_unseen, unseen
 from metro.loop.search.outcome import Outcome
-from metro.loop.search.trial import beyond
+from metro.loop.search.settled import beyond
 from metro.loop.statement import Statement
 from metro.observables.problem import Block, Problem
 from metro.units import JSON
