@@ -8,7 +8,7 @@ from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, problem
 
 from metro.loop.fitting import fit as fit_room
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import cost_under, fit
+from metro.loop.fitting.fit import Race, cost_under, fit
 from metro.loop.fitting.noise import first_noise
 from metro.loop.fitting.race import raced
 from metro.loop.search import forward as forward_room
@@ -74,10 +74,10 @@ def test_a_fit_is_given_up_above_its_bound_and_followed_to_its_end_below(base, m
     start = replace(base, noise=base.noise.sound)  # it hides nothing of what is missed
     whole = fit(Candidate(base.candidate.base, (BEND,)), base.blocks, prior, start)
     bound = cost_under(whole, start.noise) + 2.0 * HOPELESS
-    near = fit(Candidate(base.candidate.base, (TWIN,)), base.blocks, prior, start, bound)
+    near = fit(Candidate(base.candidate.base, (TWIN,)), base.blocks, prior, start, Race(bound))
     estimated, estimate = [], fit_room._reestimated
     monkeypatch.setattr(fit_room, "_reestimated", lambda *a: estimated.append(a) or estimate(*a))
-    hopeless = fit(Candidate(base.candidate.base, (RIPPLE,)), base.blocks, prior, start, bound)
+    hopeless = fit(Candidate(base.candidate.base, (RIPPLE,)), base.blocks, prior, start, Race(bound))
     assert len(estimated) == 1  # where it was given up
     assert hopeless.total < whole.total - HOPELESS
     assert near.noise is not start.noise
@@ -91,7 +91,7 @@ def test_what_is_behind_under_the_noise_of_the_smaller_model_alone_is_followed_t
     whole = fit(candidate, base.blocks, prior, base)
     bound = cost_under(whole, base.noise) - 1.0  # nobody comes below it
     for least in (whole.total + 1.0, whole.total - HOPELESS):
-        fitted, given_up = raced(candidate, base, prior, bound, least)
+        fitted, given_up = raced(candidate, base, prior, Race(bound, least))
         assert given_up == (least > whole.total)
     assert fitted.total == pytest.approx(whole.total, abs=0.01)
     assert fitted.converged
@@ -129,9 +129,9 @@ def test_what_is_given_up_is_said_to_be_far_behind_and_not_followed(base, monkey
     clear = replace(base, noise=base.noise.sound)  # it hides nothing of what is missed
     followed, refine = [], fit_room._refined
 
-    def counted(candidate, *arguments, rounds):
+    def counted(candidate, *arguments, rounds, **least):
         followed.extend((effect.name, rounds) for effect in candidate.effects)
-        return refine(candidate, *arguments, rounds=rounds)
+        return refine(candidate, *arguments, rounds=rounds, **least)
 
     monkeypatch.setattr(fit_room, "_refined", counted)
     found = {one.effect.name: one for one in tried(clear, (RIPPLE, BEND), prior, GATES, 0.001)}

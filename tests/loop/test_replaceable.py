@@ -10,7 +10,7 @@ from toy import BEND, GAIN, GATES, RIPPLE, TWIN, Wave, effect, problem
 
 from metro.loop.fitting import fit as fit_room
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import cost_under, fit, refit
+from metro.loop.fitting.fit import Race, cost_under, fit, refit
 from metro.loop.fitting.noise import first_noise
 from metro.loop.fitting.race import raced
 from metro.loop.search import rivals as rivals_room
@@ -149,7 +149,7 @@ def test_a_fit_below_its_bound_serves_any_and_one_above_serves_lower_ones(monkey
     monkeypatch.setattr(fit_room, "_fitted", counted)
 
     def fit_of(one, bound):
-        return fit(Candidate(base.candidate.base, (one,)), base.blocks, prior, start, bound)
+        return fit(Candidate(base.candidate.base, (one,)), base.blocks, prior, start, Race(bound))
 
     cost = cost_under(fit_of(BEND, np.inf), start.noise)
     assert fit_of(BEND, cost + 5.0) is fit_of(BEND, np.inf)

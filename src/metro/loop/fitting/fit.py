@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate, predicting, started
-from metro.loop.fitting.descent import ITERATIONS, descend, polish
+from metro.loop.fitting.descent import HOPE, ITERATIONS, descend, polish
 from metro.loop.fitting.end import CONVERGED, End, end_of
-from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
-from metro.loop.fitting.nuisances import costs, search_nuisance
+from metro.loop.fitting.nuisances import costs, first_beta, search_nuisance
 from metro.loop.fitting.system import (
     State,
     effect_slopes,
@@ -97,34 +97,48 @@ class Fit:
         return offset + matrix @ self.beta
 
 
+class Race(NamedTuple):
+    """What a fit must come to: a cost of at most ``bound``, and a log-likelihood of ``least``.
+
+    The cost is under the noise to begin with, the log-likelihood under the fit's own.
+    """
+
+    bound: float = np.inf
+    least: float = -np.inf
+
+
+NO_RACE = Race()
+
+
 def fit(
     candidate: Candidate,
     blocks: tuple[Block, ...],
     prior: Noise,
     start: Fit | None = None,
-    bound: float = np.inf,
+    race: Race = NO_RACE,
 ) -> Fit:
     """Fit a candidate to blocks: base parameters, effect parameters and nuisances jointly.
 
     ``start``, a fit of the same or of a simpler candidate, gives the base parameters and the noise to begin
     with; effect parameters that it lacks are started from all combinations of their starting values, group
-    after group, and the best few are followed. A fit whose cost would stay above ``bound``, under the noise
-    to begin with, is given up where that is seen, with the noise of that place. Fits are kept: one that was
-    followed to its end is as good as any, and one that was given up at a bound would be at a lower one.
+    after group, and the best few are followed. One that stays behind in a ``race`` is given up where that is
+    seen, with the noise of that place. Fits are kept: one that was followed to its end is as good as any, and
+    one that was given up in a race would be given up in one that asks for more.
     """
     kept = _kept(candidate, blocks, prior, start)
     for known, fitted in kept.items():
-        if bound <= known or _below(fitted, known, start, prior):
+        in_bound = race.bound <= known.bound or _below(fitted, known.bound, start, prior)
+        if in_bound and (race.least >= known.least or fitted.total >= known.least):
             return fitted
-    kept[bound] = _fitted(candidate, blocks, prior, start, bound)
-    return kept[bound]
+    kept[race] = _fitted(candidate, blocks, prior, start, race)
+    return kept[race]
 
 
 @lru_cache(maxsize=256)
 def _kept(
     candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fit | None
-) -> dict[float, Fit]:
-    """Return the place where fits are kept, by their bounds."""
+) -> dict[Race, Fit]:
+    """Return the place where fits are kept, by what they were to come to."""
     del candidate, blocks, prior, start
     return {}
 
@@ -135,14 +149,14 @@ def _below(fitted: Fit, bound: float, start: Fit | None, prior: Noise) -> bool:
 
 
 def _fitted(
-    candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fit | None, bound: float
+    candidate: Candidate, blocks: tuple[Block, ...], prior: Noise, start: Fit | None, race: Race
 ) -> Fit:
     """Fit as :func:`fit` says."""
-    noise = start.noise if start else prior
+    noise, bound = start.noise if start else prior, race.bound
     known = start.theta if start else np.zeros(0)
     fresh = candidate.parameters[len(known) :]
     theta = np.concatenate([known, [parameter.neutral for parameter in fresh]])
-    beta = start.beta if start else _first_beta(candidate, blocks, noise)
+    beta = start.beta if start else first_beta(candidate, blocks, noise)
     around = start.nuisance if start and fresh else None
     best = [State(theta, beta, {})]
     for places in candidate.groups(len(known)) or [[]]:
@@ -165,7 +179,8 @@ def _fitted(
         noise = _reestimated(candidate, blocks, prior, noise, state)
         return _refined(candidate, blocks, prior, noise, state, rounds=0)
     near = _distinct([one for one in reached if one[0] < reached[0][0] + UNDECIDED], SAME)
-    refined = [_refined(candidate, blocks, prior, noise, state, rounds=ROUNDS) for state in near]
+    refine = partial(_refined, candidate, blocks, prior, noise, rounds=ROUNDS, least=race.least)
+    refined = [refine(state) for state in near]
     return max(refined, key=lambda fitted: fitted.total)
 
 
@@ -285,36 +300,25 @@ def _own_lowest(candidate: Candidate, block: Block, noise: Noise, states: Sequen
     return best
 
 
-def _first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> Array:
-    """Fit the base parameters, each block's nuisance at the start that fits the block alone best."""
-    theta = np.array([parameter.starts[0] for parameter in candidate.parameters])
-    model = candidate.model(theta)
-    rows, right = [], []
-    for block in blocks:
-        weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
-        best, kept = np.inf, None
-        for nuisance in model.nuisance_starts(block):
-            matrix, offset = model.design(block, nuisance, None)
-            scaled, target = matrix * weight[:, None], (block.measured - offset) * weight
-            solution = np.linalg.lstsq(scaled, target, rcond=None)[0]
-            cost = float(np.sum((target - scaled @ solution) ** 2))
-            if cost < best:
-                best, kept = cost, (scaled, target)
-        if kept is not None:
-            rows.append(kept[0])
-            right.append(kept[1])
-    return least_squares(np.vstack(rows), np.concatenate(right))
-
-
 def _refined(
-    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State, *, rounds: int
+    candidate: Candidate,
+    blocks: Sequence[Block],
+    prior: Noise,
+    noise: Noise,
+    state: State,
+    *,
+    rounds: int,
+    least: float = -np.inf,
 ) -> Fit:
-    """Re-estimate the noise from the residual and descend, in turn, until that gains next to nothing."""
-    before = np.inf
+    """Re-estimate the noise from the residual and descend, in turn, until that gains next to nothing.
+
+    Or until it gains so little that the log-likelihood would stay below ``least`` if it went on like that.
+    """
+    before, rival = np.inf, -2.0 * least
     for _ in range(rounds):
         noise = _reestimated(candidate, blocks, prior, noise, state)
-        state, cost = descend(candidate, blocks, noise, state)
-        if before - cost < SETTLED:
+        state, cost = descend(candidate, blocks, noise, state, rival=rival)
+        if before - cost < max(SETTLED, (cost - rival) / HOPE):
             break
         before = cost
     return _finished(candidate, blocks, noise, state, end_of(candidate, blocks, noise, state))

@@ -1,4 +1,4 @@
-"""The runs' own unknowns: the best of their starts, for given base and effect parameters."""
+"""The runs' own unknowns: the best of their starts, for given base and effect parameters or for none."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
+from metro.loop.fitting.least_squares import least_squares
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.system import State
 from metro.observables.problem import Block, Model, predictions
@@ -51,3 +52,24 @@ def _images(block: Block, nuisance: Array, starts: Array) -> Array:
     if not lacking.size:
         return images
     return np.hstack([np.repeat(images, len(lacking), axis=0), np.tile(lacking, (len(images), 1))])
+
+
+def first_beta(candidate: Candidate, blocks: Sequence[Block], noise: Noise) -> Array:
+    """Fit the base parameters, each block's nuisance at the start that fits the block alone best: (p,)."""
+    theta = np.array([parameter.starts[0] for parameter in candidate.parameters])
+    model = candidate.model(theta)
+    rows, right = [], []
+    for block in blocks:
+        weight = 1.0 / np.sqrt(noise_room.diagonal(block, noise))
+        best, kept = np.inf, None
+        for nuisance in model.nuisance_starts(block):
+            matrix, offset = model.design(block, nuisance, None)
+            scaled, target = matrix * weight[:, None], (block.measured - offset) * weight
+            solution = np.linalg.lstsq(scaled, target, rcond=None)[0]
+            cost = float(np.sum((target - scaled @ solution) ** 2))
+            if cost < best:
+                best, kept = cost, (scaled, target)
+        if kept is not None:
+            rows.append(kept[0])
+            right.append(kept[1])
+    return least_squares(np.vstack(rows), np.concatenate(right))

@@ -108,8 +108,13 @@ def _promising(effects: list[Effect], trials: Mapping[tuple[str, str], Trial]) -
         for effect in effects
         if effect.key not in trials
         or trials[effect.key].evidence.statistic > len(effect.parameters)
-        or getattr(trials[effect.key].why_not, "code", "") == "far_behind"
+        or _given_up(trials[effect.key])
     ]
+
+
+def _given_up(trial: Trial) -> bool:
+    """Whether an effect was not followed to its end, since another one was far ahead."""
+    return getattr(trial.why_not, "code", "") == "far_behind" and not trial.fit.converged
 
 
 def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str, str], Statement]]:

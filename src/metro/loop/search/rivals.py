@@ -15,7 +15,7 @@ import numpy as np
 from metro.effects.effect import Effect
 from metro.loop.checks.evidence import by_condition, leave_out, most_left_out, weights
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import Fit, cost_under, fit
+from metro.loop.fitting.fit import Fit, Race, cost_under, fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.race import raced
 from metro.loop.search.replaceable import Change
@@ -168,7 +168,7 @@ def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Nois
     One that cannot make what that one makes is not fitted, and one that stays far behind is not followed to
     its end.
     """
-    bound = cost_under(current, smaller.noise) + 2.0 * HOPELESS
+    race = Race(cost_under(current, smaller.noise) + 2.0 * HOPELESS, current.total - HOPELESS)
     others = {effect.name for effect in smaller.candidate.effects}
     present = set(_keys(current))
     change = Change(smaller, current)
@@ -176,8 +176,7 @@ def _replaced(current: Fit, smaller: Fit, effects: Sequence[Effect], prior: Nois
     for effect in effects:
         if effect.name not in others and effect.key not in present and change.could_be(effect):
             candidate = Candidate(current.candidate.base, (*smaller.candidate.effects, effect))
-            fitted, stopped = raced(candidate, smaller, prior, bound, current.total - HOPELESS)
-            near = not stopped and fitted.total > current.total - HOPELESS and not unlike(effect, fitted)
-            if near and not beyond_left_out(fitted, prior):
+            fitted, behind = raced(candidate, smaller, prior, race)
+            if not (behind or unlike(effect, fitted) or beyond_left_out(fitted, prior)):
                 fits.append(fitted)
     return fits

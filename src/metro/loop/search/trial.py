@@ -11,7 +11,7 @@ from metro.effects.effect import Effect
 from metro.loop.checks import signature as residual
 from metro.loop.checks.evidence import Evidence, compare, hold_out, leave_out, missed, weights
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import Fit, cost_under, fit
+from metro.loop.fitting.fit import Fit, Race, cost_under, fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.nuisances import search_nuisance
 from metro.loop.fitting.race import raced
@@ -110,7 +110,7 @@ def _made(
     bound, foremost = np.inf, -np.inf
     for effect in sorted(effects, key=lambda each: _promised(current, each)):
         candidate = Candidate(current.candidate.base, (*current.candidate.effects, effect))
-        larger, stopped = raced(candidate, current, prior, bound, foremost - behind)
+        larger, stopped = raced(candidate, current, prior, Race(bound, foremost - behind))
         given_up |= {effect.key} if stopped else set()
         trials[effect] = Trial(effect, larger, compare(current, larger))
         cautious = replace(trials[effect], q_value=len(effects) * trials[effect].evidence.p_value)
