@@ -97,6 +97,31 @@ def test_what_is_behind_under_the_noise_of_the_smaller_model_alone_is_followed_t
     assert fitted.converged
 
 
+def test_what_gains_too_little_to_come_up_is_not_refined_to_its_end(base, monkeypatch):
+    """It is given up where it gains less than a thirtieth of what it lacks; else all is followed."""
+    monkeypatch.setattr(fit_room, "SETTLED", -np.inf)  # no gain is too small
+    prior = first_noise(GATES.model_form_budget, np.full(2, 0.01), base.blocks)
+    candidate, rounds = Candidate(base.candidate.base, (RIPPLE,)), []
+    descend = fit_room.descend
+
+    def counted(*arguments, **options):
+        rounds.append(options)
+        return descend(*arguments, **options)
+
+    monkeypatch.setattr(fit_room, "descend", counted)
+    given_up = fit(candidate, base.blocks, prior, base, Race(least=1000.0))
+    short = len(rounds)
+    rounds.clear()
+    whole = fit(candidate, base.blocks, prior, base)
+    assert whole is not given_up
+    assert given_up.total <= whole.total + 0.01
+    assert short <= len(rounds) - fit_room.ROUNDS + 2
+    assert fit(candidate, base.blocks, prior, base, Race(least=1000.0)) is given_up
+    rounds.clear()
+    assert fit(candidate, base.blocks, prior, base, Race(least=whole.total - 1.0)) is whole
+    assert not rounds
+
+
 def test_rivals_are_the_same_as_without_a_bound(base, monkeypatch):
     prior = first_noise(GATES.model_form_budget, np.full(2, 0.01), base.blocks)
     current = fit(Candidate(base.candidate.base, (BEND,)), base.blocks, prior, base)
