@@ -107,15 +107,12 @@ class Race(NamedTuple):
     least: float = -np.inf
 
 
-NO_RACE = Race()
-
-
 def fit(
     candidate: Candidate,
     blocks: tuple[Block, ...],
     prior: Noise,
     start: Fit | None = None,
-    race: Race = NO_RACE,
+    race: Race | None = None,
 ) -> Fit:
     """Fit a candidate to blocks: base parameters, effect parameters and nuisances jointly.
 
@@ -125,7 +122,7 @@ def fit(
     seen, with the noise of that place. Fits are kept: one that was followed to its end is as good as any, and
     one that was given up in a race would be given up in one that asks for more.
     """
-    kept = _kept(candidate, blocks, prior, start)
+    race, kept = race or Race(), _kept(candidate, blocks, prior, start)
     for known, fitted in kept.items():
         in_bound = race.bound <= known.bound or _below(fitted, known.bound, start, prior)
         if in_bound and (race.least >= known.least or fitted.total >= known.least):
