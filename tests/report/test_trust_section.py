@@ -97,6 +97,16 @@ def test_a_sure_cause_is_a_finding_and_a_likely_one_a_lead():
     assert "the predictions with the effects found are accurate" in said
 
 
+def test_the_probability_that_causes_share_is_stated_once():
+    effects = [
+        {"effect": name, "probability": chance, "parameters": {}}
+        for name, chance in (("tool_runout", 0.9999), ("tool_end", 0.97), ("uneven_teeth", 0.9999))
+    ]
+    said = trust_in(results(force=entry("explained", effects=effects)), "force")
+    expected = "tool runout and uneven teeth (each with probability > 0.999); tool end (probability 0.970)."
+    assert f"Identified causes: {expected}" in said
+
+
 def test_verdicts_that_the_same_cuts_tested_share_a_paragraph():
     both = trust(results(force=entry(), waviness=entry(unit="um")))
     assert len(both) == 1

@@ -186,15 +186,25 @@ def _range(values: list[float]) -> str:
 
 def _causes(entry: JSON) -> str:
     """Distinguish the causes that are almost certain from those that are only the likeliest."""
-    certain: dict[bool, list[str]] = {True: [], False: []}
+    certain: dict[bool, dict[str, list[str]]] = {True: {}, False: {}}
     for (name, sure), effects in _alike(entry.get("effects") or []).items():
         chances = [effect.get("probability") for effect in effects]
         least = min((chance for chance in chances if chance is not None), default=None)
-        certain[sure].append(f"{words(name)} (probability {probability(least)})")
-    finding = f"Identified cause: {listing(certain[True])}." if certain[True] else ""
-    lead = f"Possible cause: {listing(certain[False])}." if certain[False] else ""
+        certain[sure].setdefault(probability(least), []).append(words(name))
+    finding, lead = _named("Identified", certain[True]), _named("Possible", certain[False])
     lowered = LOWERED if any(effect.get("lowered") for effect in entry.get("effects") or []) else ""
     return " ".join(filter(None, [finding, lead, lowered]))
+
+
+def _named(how: str, causes: dict[str, list[str]]) -> str:
+    """Name causes by their probability in words, which is stated once for those that share it."""
+    if not causes:
+        return ""
+    parts = [
+        f"{listing(names)} ({'each with ' if len(names) > 1 else ''}probability {chance})"
+        for chance, names in causes.items()
+    ]
+    return f"{how} cause{'s' if sum(map(len, causes.values())) > 1 else ''}: {'; '.join(parts)}."
 
 
 def _alike(effects: list[JSON]) -> dict[tuple[str, bool], list[JSON]]:
