@@ -42,14 +42,19 @@ def _gain(filtered: LowPass, speed: float, orders: int) -> ComplexArray:
 
 
 def butterworth(ratio: Array, order: float) -> ComplexArray:
-    """Return the response at frequencies over the corner's; between two orders the mean of their logarithms.
+    """Return the response at frequencies over the corner's, for orders from one.
 
     That of an order n is the product of −p/(s − p) over the poles p = exp iπ(2k + n + 1)/2n, k = 0…n − 1.
+    Between two orders its logarithm is a cubic in the order, with the slope at either as between its
+    neighbours: along straight lines a descent would meet a bend at each filter that there is.
     """
     below = math.floor(order)
     share = order - below
-    logarithm = (1.0 - share) * _logarithm(ratio, below)
-    return np.asarray(np.exp(logarithm + share * _logarithm(ratio, below + 1)))
+    rest = 1.0 - share
+    near, low, high, far = (_logarithm(ratio, below + step) for step in (-1, 0, 1, 2))
+    straight = rest * low + share * high
+    bent = rest * (2.0 * low - near - high) + share * (2.0 * high - low - far)
+    return np.asarray(np.exp(straight + 0.5 * share * rest * bent))
 
 
 def _logarithm(ratio: Array, order: int) -> ComplexArray:
