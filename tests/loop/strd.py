@@ -10,8 +10,9 @@ import numpy as np
 
 from metro.loop.fitting import descent
 from metro.loop.fitting.candidate import Candidate
-from metro.loop.fitting.fit import UNDECIDED, _first_beta
+from metro.loop.fitting.fit import UNDECIDED
 from metro.loop.fitting.noise import Noise
+from metro.loop.fitting.nuisances import first_beta
 from metro.loop.fitting.system import State, ahead, condition, inverse, linearised, normal_equations
 from metro.observables.problem import Block, Parameter
 
@@ -82,7 +83,7 @@ def reached(problem, start=None):
     )
     noise = Noise(0.0, np.zeros(p), {"c": 1.0})
     candidate = Candidate(Curve(problem.function, p))
-    beta = _first_beta(candidate, [block], noise) if start is None else np.array(start)
+    beta = first_beta(candidate, [block], noise) if start is None else np.array(start)
     state = State(np.zeros(0), beta, {"r": np.zeros(0)})
     with np.errstate(all="ignore"):
         try:
