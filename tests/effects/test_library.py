@@ -11,10 +11,11 @@ from metro.cutting.engagement import Engagement
 from metro.cutting.force import Cut
 from metro.cutting.law import EdgeLaw
 from metro.effects.effect import fitted_to
-from metro.effects.library import library, not_modelled, with_declared
+from metro.effects.library import described, library, not_modelled, with_declared
 from metro.observables.force.dynamometer import Recording, Resonance
 from metro.observables.force.model import ForceModel, ForceSetting
 from metro.observables.problem import Problem, Refusal
+from metro.report.results import with_facts
 
 RECORDING = Recording((0.5,), 1.0, 50.0)
 
@@ -94,3 +95,20 @@ def test_what_is_declared_of_stability_but_not_in_its_model_is_said():
     known = {"process_damping": {}, "tool_runout": {}, "stiffness_scale": {}}
     (note,) = not_modelled("lobes", known)  # runout is in the tool, and the scale is nothing of stability
     assert "process damping" in note
+
+
+@pytest.mark.parametrize(
+    ("parameter", "meaning"),
+    [
+        ("slope_n_s", "The zero of a piezoelectric sensor drifts during the measurement."),
+        (
+            "time_constant_s",
+            "A piezoelectric sensor discharges, so that a steady force fades from its signal.",
+        ),
+    ],
+)
+def test_the_report_states_the_meaning_of_the_form_that_was_found(parameter, meaning):
+    effect = {"effect": "charge_drift", "probability": 1.0, "parameters": {parameter: [1.0, 2.0, 3.0]}}
+    verdict = {"observables": {"force": {"status": "explained", "effects": [effect]}}}
+    told = with_facts(verdict, {"effects": described()})
+    assert told["observables"]["force"]["effects"][0]["meaning"].startswith(meaning)

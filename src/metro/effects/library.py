@@ -36,7 +36,8 @@ def described() -> JSON:
     """Return what a campaign and a report need to know of each effect of the library, by its name.
 
     ``meaning``, ``belongs_to``, ``comparable`` and ``per`` of :class:`Effect`; the last one as a list, since
-    the forms of an effect may differ in it. The meaning is that of the first form.
+    the forms of an effect may differ in it. The meaning is that of the first form; ``meanings`` has that of
+    the form with each parameter.
     """
     facts: JSON = {}
     for effect in library():
@@ -45,8 +46,12 @@ def described() -> JSON:
             "belongs_to": list(effect.belongs_to),
             "comparable": effect.comparable,
             "per": [],
+            "meanings": {},
         }
-        kinds = facts.setdefault(effect.name, known)["per"]
+        fact = facts.setdefault(effect.name, known)
+        for name in effect.names:
+            fact["meanings"].setdefault(name, effect.meaning)
+        kinds = fact["per"]
         kinds += [effect.per] if effect.per and effect.per not in kinds else []
     return facts
 

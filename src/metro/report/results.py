@@ -96,8 +96,14 @@ def with_facts(verdict: JSON, loop: JSON) -> JSON:
 
 
 def with_own(entry: JSON, key: str, facts: JSON) -> JSON:
-    """Return an entry with the facts about the effect that ``key`` of it names."""
-    return {**(facts.get(str(entry[key])) or {}), **entry}
+    """Return an entry with the facts about the effect that ``key`` of it names.
+
+    The meaning is that of the form whose parameters the entry has.
+    """
+    own = facts.get(str(entry[key])) or {}
+    known = own.get("meanings") or {}
+    of_form = [known[name] for name in entry.get("parameters") or {} if name in known]
+    return {**own, **({"meaning": of_form[0]} if of_form else {}), **entry}
 
 
 def heading(observable: str) -> str:
