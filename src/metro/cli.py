@@ -204,9 +204,9 @@ def explain(
 
     Example: `metro explain kr160-side deformation`
     """
-    from metro.commands.explain import explain as tell
+    from metro.commands.explain import explain as explained
 
-    tell(batch, observable, processed, reports, as_json)
+    explained(batch, observable, processed, reports, as_json)
 
 
 @app.command("next")

@@ -192,8 +192,8 @@ def _item(item: Item, name: str, folder: Path) -> JSON:
         return {"kind": kind, "items": parts}
     if isinstance(item, Picture):
         (folder / name).write_bytes(item.svg)
-        told = {"caption": item.caption, "alt": item.alt}
-        return {"kind": kind, "file": name, "height": svg_height(item.svg), **told}
+        described = {"caption": item.caption, "alt": item.alt}
+        return {"kind": kind, "file": name, "height": svg_height(item.svg), **described}
     if isinstance(item, Paragraph):
         return {"kind": kind, "text": _whole(item.text), "look": item.look}
     if isinstance(item, Bullets):

@@ -42,8 +42,8 @@ class Results:
 
     def verdicts(self) -> dict[str, JSON]:
         """Verdict by observable, in the contract's order; of one held-out condition without intervals."""
-        told = without_lone_intervals(with_facts(self.verdict, self.loop), self.batch.runs)
-        entries = told.get("observables") or {}
+        shown_verdict = without_lone_intervals(with_facts(self.verdict, self.loop), self.batch.runs)
+        entries = shown_verdict.get("observables") or {}
         return {
             name: entries[name]
             for name in [*names(), *sorted(set(entries) - set(names()))]

@@ -122,10 +122,10 @@ def flat_tops(
     ``ends``: as of :func:`metro.signals.clipping.flat_top`.
     """
     extremes = float(np.min(values)), float(np.max(values))
-    stands = [(flat_top(values, level, ends), level) for level in extremes]
+    flat = [(flat_top(values, level, ends), level) for level in extremes]
     if full_scale is not None:
-        stands.append((longest_run(np.abs(values) >= full_scale), full_scale))
-    longest, level = max(stands)
+        flat.append((longest_run(np.abs(values) >= full_scale), full_scale))
+    longest, level = max(flat)
     ok = longest < FLAT_TOP_SAMPLES
     message = f"{name} is not clipped"
     if not ok:

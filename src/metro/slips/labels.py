@@ -57,11 +57,11 @@ def _above(first: Array, second: Array) -> tuple[float, float]:
 
 
 def _by_record(chatter: pd.DataFrame) -> list[str]:
-    told = chatter[chatter["labelled"].isin([0, 1]) & chatter["probability"].notna()]
-    told = told[(told["probability"] - 0.5).abs() > 0.4]
-    against = int(((told["probability"] > 0.5).astype(int) != told["labelled"].astype(int)).sum())
-    if not len(told) or (2 * against - len(told)) / math.sqrt(len(told)) <= SURE:
+    judged = chatter[chatter["labelled"].isin([0, 1]) & chatter["probability"].notna()]
+    judged = judged[(judged["probability"] - 0.5).abs() > 0.4]
+    against = int(((judged["probability"] > 0.5).astype(int) != judged["labelled"].astype(int)).sum())
+    if not len(judged) or (2 * against - len(judged)) / math.sqrt(len(judged)) <= SURE:
         return []
     return [
-        f"of {len(told)} labelled cuts whose record shows chatter or none, {against} have the other label"
+        f"of {len(judged)} labelled cuts whose record shows chatter or none, {against} have the other label"
     ]

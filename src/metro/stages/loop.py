@@ -214,8 +214,8 @@ def _close(state: Closing, observable: Observable[Any], posed: Posed, *, anew: b
     if closure.outcome and isinstance(posed.task, Problem):
         state.closed[observable.name] = Closed(posed.task, closure.outcome)
         fitted = identified_fit(posed.task, closure.outcome.final)
-    tells = bool(fitted) or (observable.reported_without_fit and not posed.unobserved)
-    if (state.upstream or closure.redrawn) and tells:
+    has_result = bool(fitted) or (observable.reported_without_fit and not posed.unobserved)
+    if (state.upstream or closure.redrawn) and has_result:
         blocks = observable.report(state.batch, state.observed, state.identified, posed.task, fitted)
         state.identified = merged(state.identified, blocks)
     if closure.outcome and fitted:

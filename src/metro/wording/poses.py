@@ -105,25 +105,25 @@ def _ceiling(values: JSON) -> str:
 
 def _of_ceiling(one: JSON, where: str) -> str:
     """Say how much any cause could explain, and of which kind it is."""
-    told = {name: share for name, share in one["parts"].items() if share >= LEAST_PART and name != "alone"}
+    largest = {name: share for name, share in one["parts"].items() if share >= LEAST_PART and name != "alone"}
     low, high = (100 * max(end, 0.0) for end in one["ci95"])
     noise = one["noise_share"]
     instrument = (
         "" if noise is None else f" The stated noise of the instrument makes {100 * noise:.0f} % of it."
     )
-    if not told or one["ci95"][0] <= 0.0:
+    if not largest or one["ci95"][0] <= 0.0:
         return (
             f"The residual {where}repeats with no joint, pose, time or temperature as far as these poses "
             f"show, so that no cause of these kinds can explain it.{instrument}"
         )
-    joints = {name.split()[1]: share for name, share in told.items() if name.startswith("joint")}
-    parts = [f"{100 * share:.0f} % {PARTS[name]}" for name, share in told.items() if name in PARTS]
+    joints = {name.split()[1]: share for name, share in largest.items() if name.startswith("joint")}
+    parts = [f"{100 * share:.0f} % {PARTS[name]}" for name, share in largest.items() if name in PARTS]
     parts = [_of_joints(joints), *parts] if joints else parts
     alone = f"{100 * one['parts']['alone']:.0f} % does not repeat"
     return (
         f"Of the residual {where}{listed([*parts, alone])}. Whatever the cause, other poses predict "
         f"{100 * max(one['share'], 0.0):.0f} % ({low:.0f} to {high:.0f} %) of it at one that is left out."
-        f"{instrument} This points to {_kind(next(iter(told)))}."
+        f"{instrument} This points to {_kind(next(iter(largest)))}."
     )
 
 

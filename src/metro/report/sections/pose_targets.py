@@ -27,8 +27,8 @@ def corrected_targets(results: Results, one: JSON) -> list[Item]:
     if table is None:
         return []
     items: list[Item] = []
-    for run, told in (one.get("targets") or {}).items():
-        items += [Paragraph(_told(run, told)), _table(table[table["run"] == run], run)]
+    for run, gain in (one.get("targets") or {}).items():
+        items += [Paragraph(_words(run, gain)), _table(table[table["run"] == run], run)]
     return items
 
 
@@ -37,14 +37,14 @@ def joint_titles(joints: Sequence[str]) -> list[str]:
     return [name.replace("_", ", ").replace("deg", "°") for name in joints]
 
 
-def _told(run: str, told: JSON) -> str:
+def _words(run: str, gain: JSON) -> str:
     text = (
-        f"Corrected targets of {run}: the predicted error falls from {number(told['before']['value'], 2)} mm "
-        f"to {quantity(told['after'])} (medians of {told['targets']} targets, with the interval of 95 % of "
-        f"errors); the flange is turned by {number(told['turned']['value'], 2)} mrad at most."
+        f"Corrected targets of {run}: the predicted error falls from {number(gain['before']['value'], 2)} mm "
+        f"to {quantity(gain['after'])} (medians of {gain['targets']} targets, with the interval of 95 % of "
+        f"errors); the flange is turned by {number(gain['turned']['value'], 2)} mrad at most."
     )
-    beyond = f" {told['outside']} targets are beyond where joints were measured: their errors may be larger."
-    return text + (beyond if told["outside"] else "")
+    beyond = f" {gain['outside']} targets are beyond where joints were measured: their errors may be larger."
+    return text + (beyond if gain["outside"] else "")
 
 
 def _table(mine: pd.DataFrame, run: str) -> Table:
