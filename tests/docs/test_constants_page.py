@@ -40,6 +40,8 @@ SINGLE = (
     "observables/waviness/observable.py",
     "observables/arm/tip_force.py",
     "effects/joint_backlash.py",
+    "effects/tool_offset_error.py",
+    "robot/kinematics.py",
     "observables/stability/boundary.py",
     "robot/drive_torques.py",
     "robot/presliding.py",

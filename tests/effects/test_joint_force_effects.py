@@ -18,6 +18,7 @@ from metro.observables.arm.tip_force import FORCE
 from metro.observables.joint_force import observable as joint_force
 from metro.robot.kinematics import arm_of_cell, forward
 from metro.robot.statics import driven_jacobian, joint_torque
+from metro.slips.joints import joint_slips
 from metro.stages.identify import base_fit
 from metro.stages.ingest import ingest
 
@@ -112,10 +113,10 @@ def test_a_dynamometer_that_is_turned_by_a_degree_is_no_tool_elsewhere(cell, axi
     assert found(cell, force=force) == []
 
 
-def elsewhere(cell):
-    """The torques of a tool whose tip is 120 mm from where it was declared to be."""
+def elsewhere(cell, offset=(0.0, 0.12, 0.0)):
+    """The torques of a tool whose tip is 120 mm, or an ``offset`` in m, from where it was declared to be."""
     model = joint_force.problem(*cell, {}).base
-    away = replace(model, arm=replace(model.arm, tool=model.arm.tool + np.array([0.0, 0.12, 0.0])))
+    away = replace(model, arm=model.arm.with_tip_moved(np.array(offset)))
     torque = cell[1]["joint_torque"].copy()
     forces = dict(tuple(cell[1]["tool_force"].groupby("run")))
     for run, rows in torque.groupby("run"):
@@ -130,6 +131,25 @@ def test_a_tool_that_is_far_elsewhere_is_still_named(cell):
     ((name, _, values),) = found(cell, elsewhere(cell))
     assert name == "tool_offset_error"
     assert values["dy_mm"] == pytest.approx(120.0, abs=30.0)
+
+
+# The row of another tool: as long as the one that was declared, but it points elsewhere.
+@pytest.mark.parametrize("offset", [(-0.35, 0.08, 0.1), (0.3, 0.13, -0.07), (-0.36, -0.04, 0.06)])
+def test_the_row_of_another_tool_is_named_and_no_torque_is_taken_for_another_joints(cell, offset):
+    torque = elsewhere(cell, offset)
+    assert joint_slips(joint_force.problem(cell[0], cell[1] | {"joint_torque": torque}, {})) == ()
+    ((name, _, values),) = found(cell, torque)
+    assert name == "tool_offset_error"
+    found_at = [values[f"d{axis}_mm"] for axis in "xyz"]
+    np.testing.assert_allclose(found_at, 1e3 * np.array(offset), atol=60.0)
+
+
+def test_torques_of_other_joints_stay_a_mistake_where_the_tip_could_be_elsewhere(cell):
+    """No tip makes of the torques of two joints each other's, although it explains more than the declared."""
+    torque = cell[1]["joint_torque"].copy()
+    torque[AXES.torques[2]], torque[AXES.torques[4]] = torque[AXES.torques[4]], torque[AXES.torques[2]].copy()
+    (slip,) = joint_slips(joint_force.problem(cell[0], cell[1] | {"joint_torque": torque}, {}))
+    assert "tau3_nm holds the torque of joint 5" in slip.text
 
 
 def test_the_strain_that_an_effect_takes_from_the_instruments_counts_for_it(cell):

@@ -15,7 +15,7 @@ from metro.loop.fitting.fit import fit
 from metro.loop.fitting.noise import first_noise, missed
 from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
-from metro.observables.arm.give import GivingArm, give_per_newton
+from metro.observables.arm.give import GivingArm, give_per_newton, giving_arm
 from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall
 from metro.observables.cut import conditions as cutting_force
@@ -51,13 +51,25 @@ def test_the_give_is_the_compliance_of_the_tip_along_the_wall_normal(cell):
     softness = np.array([5e-7, 4e-7, 7e-7, 3e-6, 2e-6, 4e-6])
     q, newton = np.radians([[-20.3, -13.9, -4.4, -61.7, 34.9, 56.7]]), np.array([30.0, -110.0, 45.0])
     normal = np.array([0.0, 1.0, 0.0])
-    known = GivingArm(DeformationModel(arm), pd.DataFrame(), softness)
+    known = GivingArm(DeformationModel(arm), pd.DataFrame(), softness, DeformationModel(arm))
     log, face = Log(q, q, 0 * q, arm.tip(q)), Wall(np.array([1.0, 0, 0]), normal, 0.0, 0.1, 0.0)
     expected = normal @ tip_compliance(arm, q[0], softness) @ newton
     assert known.give(log, face, newton) == pytest.approx(expected, rel=1e-9)
     slot = Wall(face.along, 0 * normal, 0.0, 0.1, 0.0)  # has two walls
     assert known.give(log, slot, newton) == 0.0
     assert known.give(Refusal("no log"), face, newton) == 0.0
+
+
+def test_a_tip_that_was_declared_wrong_gives_way_as_the_load_tests_measured(cell):
+    """The load tests and the cut are of one tip, wherever the cell file puts it."""
+    batch, read = cell
+    wrong = dict(batch.manifest)
+    x, y, z = wrong["tool_in_flange_mm"]
+    wrong["tool_in_flange_mm"] = [-z, x, y]  # the row of another tool, as long, that points elsewhere
+    declared = replace(batch, manifest=wrong)
+    for run in SIDE:
+        true, found = (give_per_newton(each, run, read, giving_arm(each, read)) for each in (batch, declared))
+        assert np.abs(found - true).max() < 0.1 * np.abs(true).max()
 
 
 def test_a_machine_that_is_no_arm_gives_nothing(cell):

@@ -7,7 +7,14 @@ import pandas as pd
 import pytest
 
 from metro.batch.batch import Batch
-from metro.observables.arm.load_tests import calibration, fitted_loads, in_words, joint_observability, usable
+from metro.observables.arm.load_tests import (
+    calibration,
+    fitted_loads,
+    in_words,
+    joint_observability,
+    lacking,
+    usable,
+)
 from metro.observables.deformation.model import DeformationModel, LoadTest
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import arm_of_cell
@@ -19,23 +26,32 @@ MODEL = DeformationModel(ARM)
 STIFFNESS = np.array([1.8e6, 2.1e6, 1.3e6, 3.1e5, 3.9e5, 2.3e5])
 NEAR = np.radians([-20.3, -13.9, -4.4, -61.7, 34.9, 56.7])
 MOVED = ["dx_mm", "dy_mm", "dz_mm"]
+FORCES = ["fx_n", "fy_n", "fz_n"]
+QS = [f"q{i}_deg" for i in range(1, 7)]
 
 
-def table(sigma_mm, poses=5, replicates=2, seed=0):
-    """Loads along every axis both ways; each row's readings scatter by its own ``sigma_mm`` of the cycle."""
+def table(sigma_mm, poses=5, replicates=2, seed=0, *, arm=ARM, link=0.0):
+    """Loads along every axis both ways; each row's readings scatter by its own ``sigma_mm`` of the cycle.
+
+    ``arm``: with its tip where it is. ``link``: of a link that bends, m/N: in each pose the tip gives way by
+    a compliance of its own, symmetric and positive, beside that of the joints.
+    """
     rng = np.random.default_rng(seed)
     rows = []
     for pose, q in enumerate(NEAR + rng.uniform(-0.5, 0.5, (poses, 6))):
         step = 1e-6
         moves = np.stack(
-            [(ARM.tip(q + step * e) - ARM.tip(q - step * e)) / (2 * step) for e in np.eye(6)], axis=-1
+            [(arm.tip(q + step * e) - arm.tip(q - step * e)) / (2 * step) for e in np.eye(6)], axis=-1
         )
+        root = rng.normal(size=(3, 3))
+        bent = link * root @ root.T
         for force in 400 * np.vstack([np.eye(3), -np.eye(3)]):
             for replicate in range(1, replicates + 1):
                 sigma = sigma_mm[len(rows) % len(sigma_mm)]
-                moved = moves @ ((moves.T @ force) / STIFFNESS) / MM + sigma * rng.normal(size=3)
+                given = moves @ ((moves.T @ force) / STIFFNESS) + bent @ force
+                moved = given / MM + sigma * rng.normal(size=3)
                 rows.append([f"p{pose}", *(q / DEG), *force, *moved, replicate, sigma])
-    names = ["pose", *(f"q{i}_deg" for i in range(1, 7)), "fx_n", "fy_n", "fz_n", *MOVED, "replicate"]
+    names = ["pose", *QS, *FORCES, *MOVED, "replicate"]
     return pd.DataFrame(rows, columns=[*names, "sigma_mm"])
 
 
@@ -50,7 +66,7 @@ def test_any_components_of_the_displacement_tell_the_joints(kept):
     found = fitted_loads(MODEL, loads)
     assert found.seen.all()
     assert (np.abs(found.value - 1 / STIFFNESS) < 4 * found.sd).all()
-    blocks, _ = calibration(batch(), MODEL, loads)
+    blocks, _ = calibration(batch(), MODEL, loads, lacking(MODEL, loads))
     assert sum(len(block.measured) for block in blocks) == len(kept) * len(loads)
 
 
@@ -58,7 +74,7 @@ def test_blanks_that_differ_from_row_to_row_leave_the_other_readings():
     loads = table([0.002])
     for i in range(len(loads)):
         loads.loc[i, MOVED[i % 3]] = np.nan
-    blocks, _ = calibration(batch(), MODEL, loads)
+    blocks, _ = calibration(batch(), MODEL, loads, lacking(MODEL, loads))
     for block in blocks:
         setting: LoadTest = block.setting
         assert len(block.measured) == setting.measured.sum() == 2 * len(setting.force)
@@ -87,7 +103,8 @@ def test_readings_with_a_larger_stated_error_weigh_less():
     rms = {name: np.sqrt(np.mean(np.square(values))) for name, values in errors.items()}
     assert rms["told"] < 0.4 * rms["not told"]
     assert rms["told"] == pytest.approx(rms["good half"], rel=0.25)
-    blocks, _ = calibration(batch(), MODEL, table(sigma))
+    loads = table(sigma)
+    blocks, _ = calibration(batch(), MODEL, loads, lacking(MODEL, loads))
     ratio = [block.sigma.max() / block.sigma.min() for block in blocks]
     np.testing.assert_allclose(ratio, 20.0)
 
@@ -129,7 +146,7 @@ def test_loads_that_tell_every_joint_name_the_one_they_tell_least():
     np.testing.assert_allclose(told.relative, found.sd / found.value, rtol=1e-6)
     assert load.joint == told.worst
     assert f"joint {told.worst + 1} is the least certain" in in_words(told, load, MODEL.arm.axes)
-    blocks, notes = calibration(batch(), MODEL, loads)
+    blocks, notes = calibration(batch(), MODEL, loads, lacking(MODEL, loads))
     assert in_words(told, load, MODEL.arm.axes) in notes
     assert len(blocks) == 5
 
@@ -139,3 +156,30 @@ def test_no_usable_load_is_a_refusal_with_its_reason():
     refused = joint_observability(MODEL, usable(loads, MODEL.arm))
     assert isinstance(refused, Refusal)
     assert "loads.csv" in refused.reason
+
+
+def missed(loads):
+    """Residual of the joints with the declared tip, m."""
+    joints, force, moved = (loads[names].to_numpy() for names in (QS, FORCES, MOVED))
+    known = MODEL.contributions(joints * DEG, force) @ fitted_loads(MODEL, loads).value
+    return np.linalg.norm(moved * MM - known)
+
+
+FAR = np.array([-0.35, 0.08, 0.1])  # the row of another tool
+
+
+@pytest.mark.parametrize("offset", [FAR, -FAR, FAR[[1, 2, 0]], np.array([0.0, 0.0, -0.28])])
+def test_a_tip_that_is_elsewhere_is_no_lack_of_elastic_joints(offset):
+    """The levers of the joints are others; where the tip is, the joints explain the tests to their noise."""
+    right, wrong = (table([0.003], seed=3, arm=arm) for arm in (ARM, ARM.with_tip_moved(offset)))
+    assert lacking(MODEL, wrong).share == pytest.approx(lacking(MODEL, right).share, abs=0.01)
+    assert missed(wrong) > 3.0 * missed(right)  # as declared
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_links_that_bend_stay_a_lack_of_elastic_joints(seed):
+    """No tip makes the compliance of links, another in each pose: it takes a part of it at most."""
+    rigid, bending = (table([0.003], poses=6, seed=seed, link=link) for link in (0.0, 1e-7))
+    made = bending[MOVED].to_numpy() - rigid[MOVED].to_numpy()
+    true = np.sqrt(np.mean(made**2) / np.mean(bending[MOVED].to_numpy() ** 2))
+    assert 0.5 * true < lacking(MODEL, bending).share < 1.1 * true

@@ -29,7 +29,8 @@ def torques(monkeypatch, change):
         flat = {"measured": measured.ravel(), "sigma": np.full(asked.size, 0.5)}
         blocks.append(SimpleNamespace(**flat, setting=SimpleNamespace(asked=asked.ravel()[:, None])))
     monkeypatch.setattr(joints, "carried", lambda _arm, run, _offset: run.asked)
-    base = SimpleNamespace(arm=None, offset=0.0, joints=tuple(range(6)))
+    arm = SimpleNamespace(with_tip_moved=lambda _offset: None)
+    base = SimpleNamespace(arm=arm, offset=0.0, joints=tuple(range(6)))
     return SimpleNamespace(base=base, blocks=tuple(blocks))
 
 

@@ -9,22 +9,29 @@ import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter
 from metro.effects.parts import WithArm
+from metro.robot.kinematics import FARTHEST_TIP
 from metro.units import MM
 
 AXES = ("dx_mm", "dy_mm", "dz_mm")
+# Of two tips 0.3 m from the flange in directions that have nothing to do with each other, one component
+# differs by 0.3 m √(2/3) rms.
+WRONG_ROW_MM = 250.0
 
 
 def apply(model: WithArm, values: Mapping[str, float]) -> WithArm:
     """Put the tip of the tool elsewhere in the flange frame."""
-    moved = model.arm.tool + np.array([values[name] for name in AXES]) * MM
-    return replace(model, arm=replace(model.arm, tool=moved))
+    offset = np.array([values[name] for name in AXES]) * MM
+    return replace(model, arm=model.arm.with_tip_moved(offset))
 
 
 EFFECT = Effect(
     name="tool_offset_error",
     observables=("joint_force", "deformation"),
     parameters=tuple(
-        EffectParameter(name, "mm", -200.0, 200.0, 1.0, starts=(0.0,), plausible=60.0) for name in AXES
+        EffectParameter(
+            name, "mm", -FARTHEST_TIP / MM, FARTHEST_TIP / MM, 1.0, starts=(0.0,), plausible=WRONG_ROW_MM
+        )
+        for name in AXES
     ),
     apply=apply,
     part="arm",

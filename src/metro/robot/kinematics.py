@@ -6,7 +6,7 @@ conventions, linear axes and URDF are a :class:`metro.robot.chain.Chain` in thei
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,6 +17,10 @@ from metro.same import Same
 from metro.units import DEG, JSON, MM, Array
 
 Geometry = Array | Chain
+
+# m, along each axis of the flange, by which a declared tip may be wrong: spindle, holder and tool put it up
+# to half a metre from the flange, and the row of another tool points anywhere.
+FARTHEST_TIP = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +52,10 @@ class Arm:
     def flange_axes(self, q: Array) -> Array:
         """Axes of the flange in the work frame, columns of (..., 3, 3)."""
         return np.asarray(self.work[:3, :3].T @ forward(self.dh, q)[..., :3, :3])
+
+    def with_tip_moved(self, offset: Array) -> Arm:
+        """Return the arm with its tip elsewhere by ``offset`` (3,), m, frame of the flange."""
+        return replace(self, tool=self.tool + offset)
 
     def lever(self, q: Array) -> Array:
         """Vector from the flange's origin to the tip, base frame, m, shape (..., 3)."""

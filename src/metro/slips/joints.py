@@ -6,6 +6,7 @@ has the other sign, fits the prediction of that joint and not its own.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import cast
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from metro.observables.joint_force.model import Instruments, JointForceModel, carried
 from metro.observables.problem import Block, Problem
+from metro.robot.kinematics import Arm
 from metro.slips.slip import Slip
 from metro.units import Array
 
@@ -57,7 +59,7 @@ def joint_slips(problem: Problem) -> tuple[Slip, ...]:
     moved = ((place != joints) | (sign[joints, place] < 0.0)) & (strong | strong[place])
     best = np.where(moved, cost[joints, place], declared)
     before, after = (float(np.sqrt(each.sum() / max(sums.own.sum(), 1e-300))) for each in (declared, best))
-    if moved.any() and after < BETTER * before:
+    if moved.any() and after < BETTER * min(before, _with_best_tip(model, blocks)):
         return (_moved(np.array(model.joints) + 1, place, sign[joints, place], moved, (before, after)),)
     return _gain(sums)
 
@@ -102,13 +104,39 @@ def _gain(sums: _Moments) -> tuple[Slip, ...]:
     return (Slip(OBSERVABLES, found, remedy, "runs.csv", "robot_log"),)
 
 
+def _with_best_tip(model: JointForceModel, blocks: list[Block]) -> float:
+    """Residual over the torque, if the tip is where the torques ask for it: their levers depend on it alone.
+
+    A tip that is not where it is declared changes the order and signs of torques in the wrist, too.
+    """
+    rows, right = [], []
+    for block in blocks:
+        asked, *moved = (
+            _asked(model.arm.with_tip_moved(offset), model, block).ravel()
+            for offset in (np.zeros(3), *np.eye(3))  # a torque is linear in its lever
+        )
+        sigma = _by_joint(block.sigma, len(model.joints)).ravel()
+        measured = _by_joint(block.measured, len(model.joints)).ravel()
+        rows.append((np.stack(moved, axis=1) - asked[:, None]) / sigma[:, None])
+        right.append(np.stack([measured - asked, measured], axis=1) / sigma[:, None])
+    residual, whole = np.concatenate(right).T
+    matrix = np.concatenate(rows)
+    left = residual - matrix @ np.linalg.lstsq(matrix, residual)[0]
+    return math.sqrt(float(left @ left) / max(float(whole @ whole), 1e-300))
+
+
+def _asked(arm: Arm, model: JointForceModel, block: Block) -> Array:
+    """Waves (k, m - 1) of the torque of each joint that the dynamometer's force asks for."""
+    return _by_joint(carried(arm, block.setting, model.offset)[:, 0], len(model.joints))
+
+
 def _moments(model: JointForceModel, blocks: list[Block]) -> _Moments:
     joints = len(model.joints)
     across, own, predicted = np.zeros((joints, joints)), np.zeros(joints), np.zeros((joints, joints))
     count = 0
     for block in blocks:
         measured = _by_joint(block.measured, joints)
-        asked = _by_joint(carried(model.arm, block.setting, model.offset)[:, 0], joints)
+        asked = _asked(model.arm, model, block)
         sigma = _by_joint(block.sigma, joints)
         across += (measured / sigma**2) @ asked.T
         own += np.sum((measured / sigma) ** 2, axis=1)

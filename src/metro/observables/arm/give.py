@@ -10,7 +10,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
-from metro.observables.arm.load_tests import best_compliance, joint_places, usable
+from metro.observables.arm.load_tests import best_compliance, joint_places, usable, with_best_tip
 from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall, wall
@@ -23,11 +23,16 @@ from metro.units import Array
 
 @dataclass(frozen=True, eq=False)
 class GivingArm:
-    """An arm as it is known before any cut: its model, load tests, and joint compliances (n,) rad/(N m)."""
+    """An arm as it is known before any cut: its model, load tests, and joint compliances (n,) rad/(N m).
+
+    ``tested``: the model with the tip where the load tests put it, which the compliances belong to. How far
+    that tip gives way is what they measured, wherever the tip was declared, and with it the path.
+    """
 
     model: DeformationModel
     loads: pd.DataFrame
     compliance: Array
+    tested: DeformationModel
 
     def log(self, batch: Batch, run: str, cut: Log, face: Wall) -> Log | Refusal:
         """Return the log of the arm in a cut; without a log, the pose is that of the run's load tests."""
@@ -46,7 +51,7 @@ class GivingArm:
         if isinstance(log, Refusal) or not face.normal.any():
             return 0.0
         middle = log.commanded[len(log.commanded) // 2]
-        return float(face.normal @ self.model.contributions(middle, force) @ self.compliance)
+        return float(face.normal @ self.tested.contributions(middle, force) @ self.compliance)
 
 
 def giving_arm(batch: Batch, read: Tables) -> GivingArm | Refusal:
@@ -55,7 +60,8 @@ def giving_arm(batch: Batch, read: Tables) -> GivingArm | Refusal:
     if arm is None:
         return Refusal(no_arm(batch.cell))
     model, loads = DeformationModel(arm), usable(read("loads"), arm)
-    return GivingArm(model, loads, best_compliance(batch, model, loads))
+    tested, _ = with_best_tip(model, loads)
+    return GivingArm(model, loads, best_compliance(batch, tested, loads), tested)
 
 
 def give_per_newton(batch: Batch, run: str, read: Tables, arm: GivingArm | Refusal) -> Array:

@@ -15,12 +15,13 @@ from metro.observables.deformation.model import DeformationModel, KnownParameter
 from metro.observables.problem import Block, Refusal
 from metro.robot import identifiability
 from metro.robot.identifiability import Identifiability, NextLoad
-from metro.robot.kinematics import Arm, prismatic
+from metro.robot.kinematics import FARTHEST_TIP, Arm, prismatic
 from metro.robot.stiffness import Compliances, joint_compliances
 from metro.units import MM, UM, Array
 
 KNOWN = 0.02  # assumed relative uncertainty of joint stiffnesses that the cell file states without one
 GAUGE = 0.1 * UM
+TIP_STEP = 0.1  # m, scale of the search for the tip
 LOAD_FORCE, MOVED = ["fx_n", "fy_n", "fz_n"], ["dx_mm", "dy_mm", "dz_mm"]
 
 
@@ -35,11 +36,12 @@ def joint_places(table: pd.DataFrame, arm: Arm) -> Array:
 
 
 def calibration(
-    batch: Batch, model: DeformationModel, loads: pd.DataFrame
+    batch: Batch, model: DeformationModel, loads: pd.DataFrame, beside: LackOfFit
 ) -> tuple[list[Block], tuple[str, ...]] | Refusal:
     """Gather the evidence on the joints: load tests, and the cell file for joints they do not identify.
 
     A joint without any evidence is taken as rigid; its uncertainty is the compliance of the softest joint.
+    ``beside``: what the load tests show beside elastic joints.
     """
     known = batch.cell.get("joint_stiffness_nm_rad")
     tests = fitted_loads(model, loads)
@@ -49,7 +51,6 @@ def calibration(
         value = 1.0 / np.asarray(known, dtype=float)
         note = f"Joint stiffnesses are those of the cell file, taken to be within {KNOWN:.0%}."
         return [_known_block(np.arange(len(value)), value, KNOWN * value)], (note,)
-    beside = lacking(model, loads)
     sigma = max(beside.scatter, GAUGE) * _relative(loads)
     _, force, moved = _load_arrays(loads, model.arm)
     per_newton = beside.share * math.sqrt(np.nanmean(moved**2) / np.mean(np.sum(force**2, axis=1)))
@@ -113,13 +114,54 @@ def fitted_loads(model: DeformationModel, loads: pd.DataFrame) -> Compliances | 
 
 def lacking(model: DeformationModel, loads: pd.DataFrame) -> LackOfFit:
     """Return what load tests show beside elastic joints; zero where they identify no joint."""
+    return with_best_tip(model, loads)[1]
+
+
+def with_best_tip(model: DeformationModel, loads: pd.DataFrame) -> tuple[DeformationModel, LackOfFit]:
+    """Return the model with the tip where load tests put it, and what they show beside its joints.
+
+    A tip that is not where it is declared is no lack of elastic joints, but makes one of tenths of the
+    displacement. It would hide itself and all else there. The tip is as declared where that shows no more
+    beside the joints, or as much for the parameters that another tip takes.
+    """
+    declared = _lacking(model, loads, 0)
+    if declared.share == 0.0:
+        return model, declared
+    elsewhere = _at_best_tip(model, loads)
+    moved = _lacking(elsewhere, loads, len(model.arm.tool))
+    return (elsewhere, moved) if moved.share < declared.share else (model, declared)
+
+
+def _lacking(model: DeformationModel, loads: pd.DataFrame, more: int) -> LackOfFit:
+    """Return what load tests show beside the joints of a model with ``more`` fitted parameters than these."""
     tests = fitted_loads(model, loads)
     if isinstance(tests, Refusal):
         return LackOfFit(0.0, 0.0)
     joints, force, moved = _load_arrays(loads, model.arm)
     relative = _relative(loads)
     residual = moved - model.contributions(joints, force) @ tests.value
-    return lack_of_fit(_poses(loads), force, residual / relative, moved / relative, int(tests.seen.sum()))
+    unknowns = int(tests.seen.sum()) + more
+    return lack_of_fit(_poses(loads), force, residual / relative, moved / relative, unknowns)
+
+
+def _at_best_tip(model: DeformationModel, loads: pd.DataFrame) -> DeformationModel:
+    """Return the model with the tip that the load tests fit best, as far away as it may be."""
+    from scipy.optimize import least_squares
+
+    joints, force, moved = _load_arrays(loads, model.arm)
+    measured, relative = np.isfinite(moved), _relative(loads)
+
+    def at(offset: Array) -> DeformationModel:
+        return replace(model, arm=model.arm.with_tip_moved(offset))
+
+    def residual(offset: Array) -> Array:
+        tip = at(offset)
+        tests = fitted_loads(tip, loads)
+        known = 0.0 if isinstance(tests, Refusal) else tip.contributions(joints, force) @ tests.value
+        return np.asarray(((moved - known) / relative)[measured])
+
+    bounds = (-FARTHEST_TIP, FARTHEST_TIP)
+    return at(least_squares(residual, np.zeros(3), bounds=bounds, x_scale=TIP_STEP).x)
 
 
 def _poses(loads: pd.DataFrame) -> list[np.ndarray]:

@@ -120,12 +120,12 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         return Refusal(no_arm(batch.cell))
     model = DeformationModel(arm)
     softness = best_compliance(batch, model, observed["arm_loads"])
-    missed = lacking(model, observed["arm_loads"]).share
-    errors = WallErrors(partial(model.per_newton, compliance=softness), model.per_radian, missed)
+    beside = lacking(model, observed["arm_loads"])
+    errors = WallErrors(partial(model.per_newton, compliance=softness), model.per_radian, beside.share)
     walls, notes = wall_blocks(batch, observed, errors)
     if not walls:
         return Refusal("; ".join(note.rstrip(".") for note in notes) or "no run has a profile")
-    evidence = calibration(batch, model, observed["arm_loads"])
+    evidence = calibration(batch, model, observed["arm_loads"], beside)
     if isinstance(evidence, Refusal):
         return evidence
     calibrate, said = evidence
@@ -149,8 +149,8 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
     )
     scatter = np.array([0.0 if one in base.believed else SCATTER for one in base.parameters])
     return Problem(
-        NAME, "mm", MM, base, (believed_block(base), *calibrate, *walls), scatter, missed / math.sqrt(3.0),
-        tuple(notes), feasible(walls, calibrate, model.arm, errors),
+        NAME, "mm", MM, base, (believed_block(base), *calibrate, *walls), scatter,
+        beside.share / math.sqrt(3.0), tuple(notes), feasible(walls, calibrate, model.arm, errors),
     )  # fmt: skip
 
 
