@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from metro.batch.processed import Processed, read_batch
+from metro.effects.effect import fitted_to
 from metro.effects.library import library
+from metro.effects.tool_offset_error import EFFECT
 from metro.joint_columns import Axes
 from metro.loop.checks.evidence import leave_out
 from metro.loop.fitting.held_out import identified_fit
@@ -142,6 +144,24 @@ def test_the_row_of_another_tool_is_named_and_no_torque_is_taken_for_another_joi
     assert name == "tool_offset_error"
     found_at = [values[f"d{axis}_mm"] for axis in "xyz"]
     np.testing.assert_allclose(found_at, 1e3 * np.array(offset), atol=60.0)
+
+
+@pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), (-0.35, 0.08, 0.1), (-0.5, 0.1, -0.5)])
+def test_the_search_for_a_tip_starts_where_the_torques_of_the_fitted_runs_put_it(cell, offset):
+    """From the declared tip it had ended at the bounds: gains had made up for another one."""
+    torque = elsewhere(cell, offset)
+
+    def start(table):
+        task = joint_force.problem(cell[0], cell[1] | {"joint_torque": table}, {})
+        (effect,), _ = fitted_to((EFFECT,), task)
+        return [at for parameter in effect.parameters for at in parameter.starts]
+
+    np.testing.assert_allclose(start(torque), 1e3 * np.array(offset), atol=20.0)
+    held_out = torque["run"].map(cell[0].runs["role"]) == "validate"
+    assert held_out.any()
+    spoiled = torque.copy()
+    spoiled.loc[held_out, AXES.torques] *= 3.0
+    assert start(spoiled) == start(torque)
 
 
 def test_torques_of_other_joints_stay_a_mistake_where_the_tip_could_be_elsewhere(cell):

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from metro.batch.batch import Batch
-from metro.slips import joints
+from metro.observables.joint_force import tip
 from metro.slips.copies import HIT, copies
 from metro.slips.joints import joint_slips
 from metro.slips.labels import label_slips
@@ -28,7 +28,7 @@ def torques(monkeypatch, change):
         measured = change(asked) + 0.5 * RNG.normal(size=asked.shape)
         flat = {"measured": measured.ravel(), "sigma": np.full(asked.size, 0.5)}
         blocks.append(SimpleNamespace(**flat, setting=SimpleNamespace(asked=asked.ravel()[:, None])))
-    monkeypatch.setattr(joints, "carried", lambda _arm, run, _offset: run.asked)
+    monkeypatch.setattr(tip, "carried", lambda _arm, run, _offset: run.asked)
     arm = SimpleNamespace(with_tip_moved=lambda _offset: None)
     base = SimpleNamespace(arm=arm, offset=0.0, joints=tuple(range(6)))
     return SimpleNamespace(base=base, blocks=tuple(blocks))

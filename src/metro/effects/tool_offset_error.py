@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter
 from metro.effects.parts import WithArm
+from metro.observables.joint_force.model import JointForceModel
+from metro.observables.joint_force.tip import best_tip
 from metro.robot.kinematics import FARTHEST_TIP
 from metro.units import MM
 
@@ -24,6 +27,19 @@ def apply(model: WithArm, values: Mapping[str, float]) -> WithArm:
     return replace(model, arm=model.arm.with_tip_moved(offset))
 
 
+def adapt(effect: Effect, problem: Any) -> Effect:
+    """Start where the torques put the tip, with the gains of the joints as they should be.
+
+    From the declared tip, gains that had to make up for another one may lead astray.
+    """
+    if not isinstance(problem.base, JointForceModel):
+        return effect
+    offset, _ = best_tip(problem.base, problem.role("identify"))
+    start = np.clip(offset, -FARTHEST_TIP, FARTHEST_TIP) / MM
+    parameters = zip(effect.parameters, start.tolist(), strict=True)
+    return replace(effect, parameters=tuple(replace(one, starts=(at,)) for one, at in parameters))
+
+
 EFFECT = Effect(
     name="tool_offset_error",
     observables=("joint_force", "deformation"),
@@ -34,6 +50,7 @@ EFFECT = Effect(
         for name in AXES
     ),
     apply=apply,
+    adapt=adapt,
     part="arm",
     signature=(
         "Torques of the wrist off in proportion to the force, by its lever arm: as large as the offset "

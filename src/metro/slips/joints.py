@@ -6,15 +6,14 @@ has the other sign, fits the prediction of that joint and not its own.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 
-from metro.observables.joint_force.model import Instruments, JointForceModel, carried
+from metro.observables.joint_force.model import Instruments, JointForceModel
+from metro.observables.joint_force.tip import asked, best_tip, by_joint
 from metro.observables.problem import Block, Problem
-from metro.robot.kinematics import Arm
 from metro.slips.slip import Slip
 from metro.units import Array
 
@@ -59,7 +58,8 @@ def joint_slips(problem: Problem) -> tuple[Slip, ...]:
     moved = ((place != joints) | (sign[joints, place] < 0.0)) & (strong | strong[place])
     best = np.where(moved, cost[joints, place], declared)
     before, after = (float(np.sqrt(each.sum() / max(sums.own.sum(), 1e-300))) for each in (declared, best))
-    if moved.any() and after < BETTER * min(before, _with_best_tip(model, blocks)):
+    # A tip that is not where it is declared changes order and signs of the torques in the wrist, too.
+    if moved.any() and after < BETTER * min(before, best_tip(model, blocks)[1]):
         return (_moved(np.array(model.joints) + 1, place, sign[joints, place], moved, (before, after)),)
     return _gain(sums)
 
@@ -104,47 +104,15 @@ def _gain(sums: _Moments) -> tuple[Slip, ...]:
     return (Slip(OBSERVABLES, found, remedy, "runs.csv", "robot_log"),)
 
 
-def _with_best_tip(model: JointForceModel, blocks: list[Block]) -> float:
-    """Residual over the torque, if the tip is where the torques ask for it: their levers depend on it alone.
-
-    A tip that is not where it is declared changes the order and signs of torques in the wrist, too.
-    """
-    rows, right = [], []
-    for block in blocks:
-        asked, *moved = (
-            _asked(model.arm.with_tip_moved(offset), model, block).ravel()
-            for offset in (np.zeros(3), *np.eye(3))  # a torque is linear in its lever
-        )
-        sigma = _by_joint(block.sigma, len(model.joints)).ravel()
-        measured = _by_joint(block.measured, len(model.joints)).ravel()
-        rows.append((np.stack(moved, axis=1) - asked[:, None]) / sigma[:, None])
-        right.append(np.stack([measured - asked, measured], axis=1) / sigma[:, None])
-    residual, whole = np.concatenate(right).T
-    matrix = np.concatenate(rows)
-    left = residual - matrix @ np.linalg.lstsq(matrix, residual)[0]
-    return math.sqrt(float(left @ left) / max(float(whole @ whole), 1e-300))
-
-
-def _asked(arm: Arm, model: JointForceModel, block: Block) -> Array:
-    """Waves (k, m - 1) of the torque of each joint that the dynamometer's force asks for."""
-    return _by_joint(carried(arm, block.setting, model.offset)[:, 0], len(model.joints))
-
-
 def _moments(model: JointForceModel, blocks: list[Block]) -> _Moments:
     joints = len(model.joints)
     across, own, predicted = np.zeros((joints, joints)), np.zeros(joints), np.zeros((joints, joints))
     count = 0
     for block in blocks:
-        measured = _by_joint(block.measured, joints)
-        asked = _asked(model.arm, model, block)
-        sigma = _by_joint(block.sigma, joints)
-        across += (measured / sigma**2) @ asked.T
+        measured, sigma = by_joint(block.measured, model), by_joint(block.sigma, model)
+        expected = asked(model.arm, model, block)
+        across += (measured / sigma**2) @ expected.T
         own += np.sum((measured / sigma) ** 2, axis=1)
-        predicted += (1.0 / sigma**2) @ (asked**2).T
+        predicted += (1.0 / sigma**2) @ (expected**2).T
         count += measured.shape[1]
     return _Moments(across, own, predicted, count)
-
-
-def _by_joint(values: Array, joints: int) -> Array:
-    """Waves (k, m - 1) without the first one, which holds the friction's change."""
-    return np.asarray(values.reshape(joints, -1)[:, 1:])
