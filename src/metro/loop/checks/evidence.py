@@ -20,6 +20,7 @@ from metro.loop.fitting.fit import Fit
 from metro.loop.fitting.noise import PRIOR_RUNS, Noise
 from metro.loop.fitting.system import (
     State,
+    inverse,
     linearised,
     normal_equations,
     solution,
@@ -149,16 +150,42 @@ def leave_out(fitted: Fit, prior: Noise, moved: Callable[[Fit], Fit] | None = No
 
     An unknown of a run itself is fitted to the run that is predicted, which gains that much by chance: one is
     taken off for each. ``moved`` puts the fit of all others where something else than these runs wants it.
-    What is believed of the base parameters beforehand counts by how likely the whole fit leaves it.
+    What is believed of the base parameters beforehand counts by how likely the whole fit leaves it, and what
+    was measured without a cut as :func:`_without_cut` says.
     """
     known, chance = (moved(fitted) if moved else fitted).noise, _own(fitted)
     believed = {b.condition: fitted.log_likelihood[b.run] for b in fitted.blocks if b.belief}
-    return believed | {
-        name: sum(_log_likelihood(part, moved, known) - len(part.blocks) * chance for part in parts)
-        if parts
-        else -math.inf
-        for name, parts in left_out(fitted, prior).items()
-    }
+    return (
+        believed
+        | _without_cut(fitted)
+        | {
+            name: sum(_log_likelihood(part, moved, known) - len(part.blocks) * chance for part in parts)
+            if parts
+            else -math.inf
+            for name, parts in left_out(fitted, prior).items()
+        }
+    )
+
+
+def _without_cut(fitted: Fit) -> dict[str, float]:
+    """Log-likelihood of what was measured without a cut (load tests), as if each of them were left out.
+
+    That is to first order: a fit makes a block likelier by its part of the fit's parameters, which is the
+    trace of their covariance with the block's normal matrix (Stone 1977, J. R. Stat. Soc. B 39, 44).
+    """
+    if all(block.role != "calibrate" or block.belief for block in fitted.blocks):
+        return {}
+    state = State(fitted.theta, fitted.beta, dict(fitted.nuisance))
+    system = linearised(fitted.candidate, fitted.blocks, fitted.noise, state)
+    covariance = inverse(normal_equations(system)[0])
+    covariance = np.where(np.isfinite(covariance), covariance, 0.0)  # of what no block says anything
+    likelihood = {}
+    for block, (_, base, effects, _) in zip(fitted.blocks, system.rows, strict=True):
+        if block.role == "calibrate" and not block.belief:
+            rows = np.hstack([base, effects])
+            part = float(np.sum((rows @ covariance) * rows))
+            likelihood[block.condition] = fitted.log_likelihood[block.run] - part
+    return likelihood
 
 
 def most_left_out(fitted: Fit, like: Mapping[str, float]) -> dict[str, float]:
