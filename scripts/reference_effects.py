@@ -62,6 +62,7 @@ def _cause(forms: list[Effect], meanings: Mapping[str, str]) -> list[str]:
         lines += [row(["parameter", "unit", "sought between", "meaning"]), row(["---"] * 4)]
         lines += [_parameter(first, name, meanings[f"{first.name}.{name}"]) for name in first.names]
         lines += ["", f"- *Seen:* {first.signature}", f"- *Measure:* {first.experiment}."]
+        lines += [f"- *Remedy:* {first.remedy}."] if first.remedy else []
         lines += [f"- *Belongs to:* {_owners(first)}.", f"- *Source:* {first.literature}.", ""]
     return lines
 

@@ -32,6 +32,15 @@ def test_an_observable_gets_the_effects_that_change_its_model():
     assert "stiffness_scale" in {effect.name for effect in library("flatness")}
 
 
+@pytest.mark.parametrize("effect", library(), ids=lambda effect: effect.title)
+def test_a_cause_of_the_library_has_a_remedy_that_is_one_short_instruction(effect):
+    if effect.resembled:  # it is never identified as a cause
+        return
+    assert effect.remedy[:1].islower()
+    assert effect.remedy[-1] != "."
+    assert len(effect.remedy.split()) <= 25
+
+
 @pytest.mark.parametrize("effect", library(), ids=lambda effect: effect.name)
 def test_every_effect_is_described_and_can_be_started(effect):
     assert effect.signature

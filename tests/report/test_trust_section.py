@@ -10,7 +10,7 @@ from metro.report.content import Picture, Table
 from metro.report.results import Results, without_lone_intervals
 from metro.report.sections.summary import first_words, summary
 from metro.report.sections.trust import IDENTIFIED, MEASURED, PRINTED, UNTESTED, trust, trust_in, untested
-from metro.report.sections.verdict import next_words
+from metro.report.sections.verdict import next_words, remedies
 
 RUNS = pd.DataFrame(
     {
@@ -140,6 +140,21 @@ def test_what_to_measure_next_says_where_the_verdict_does_without():
     )
     assert next_words(entry("unexplained", next_experiment="a slot.")) == "a slot"
     assert next_words(entry("clean", next_experiment=None)) == ""
+
+
+def test_a_remedy_is_given_for_causes_that_are_identified_and_for_no_others():
+    causes = [
+        {
+            "effect": "gear_ripple",
+            "probability": 0.97,
+            "parameters": {"joint": 4},
+            "remedy": "check it",
+        },
+        {"effect": "tool_runout", "probability": 0.9, "parameters": {}, "remedy": "clamp the tool anew"},
+        {"effect": "helix_error", "probability": 1.0, "parameters": {}, "remedy": ""},
+    ]
+    assert remedies(entry("explained", effects=causes)) == ["gear ripple of joint 4: check it"]
+    assert remedies(entry("clean", effects=[])) == []
 
 
 def test_the_first_page_of_a_batch_without_a_verdict_gives_the_mode_that_yields_most():

@@ -23,7 +23,7 @@ from metro.report.sections.measured import measured_words
 from metro.report.sections.quality import with_flags
 from metro.report.sections.summary import advice, no_verdict, print_check
 from metro.report.sections.trust import trust, trust_in
-from metro.report.sections.verdict import STATUS, left_words, next_words, verdict_words
+from metro.report.sections.verdict import STATUS, left_words, next_words, remedies, verdict_words
 from metro.units import JSON
 
 if TYPE_CHECKING:
@@ -144,6 +144,8 @@ def _parts(
         yield from error_bars(entry, width)
         yield from _candidates(results, name, entry, most)
         yield Text(f"To trust: {trust_in(results, name).partition(': ')[2]}")
+        for remedy in remedies(entry):
+            yield Text(f"What to do about it: {remedy}.", style="bold")
         if measurement := next_words(entry):
             yield Text(f"What to do next: {measurement}.", style="bold")
     yield from _shown(_causes(results, "" if most else next(iter(chosen))))

@@ -97,4 +97,8 @@ EFFECT = Effect(
     ),
     literature="Butterworth, Experimental Wireless and the Wireless Engineer 7 (1930) 536",
     experiment="read the filter's setting on the amplifier, or record the same cut with the filter off",
+    remedy=(
+        "set the filter of the amplifier well above the tooth passing frequency, "
+        "or declare it under known in batch.yaml"
+    ),
 )

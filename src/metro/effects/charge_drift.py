@@ -91,5 +91,6 @@ EFFECT = Effect(
     ),
     literature="Kistler, Piezoelectric Measurement: drift of charge amplifiers",
     experiment="an air cut before and after the same run, as long as the run itself",
+    remedy="let the charge amplifier warm up, dry its connectors, and zero it before every run",
     form="slope",
 )

@@ -41,5 +41,8 @@ EFFECT = Effect(
     signature="A mean that fades along every record in proportion to itself, and undershoots after the cut.",
     literature="Kistler, Piezoelectric Measurement: time constant of a charge amplifier",
     experiment="a cut of at least half the time constant, with air before and after it",
+    remedy=(
+        "set the charge amplifier to its long time constant, dry its connectors, and zero it before every run"
+    ),
     form="discharge",
 )

@@ -48,4 +48,5 @@ EFFECT = Effect(
     ),
     literature="Kienzle, VDI-Z 94 (1952) 299; Altintas, Manufacturing Automation, 2nd ed. (2012)",
     experiment="slots at four or more feeds over a factor of five, and side cuts whose chips begin at zero",
+    remedy="use these coefficients with their exponent, and do not extrapolate linear ones to thinner chips",
 )

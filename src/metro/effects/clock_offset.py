@@ -30,4 +30,5 @@ EFFECT = Effect(
     ),
     literature="[K] section 3.1: logs of controller and data acquisition without a common clock",
     experiment="a cut with several entries (a stepped block) at the highest feed, force and log together",
+    remedy="start the robot's log and the dynamometer by one trigger, or synchronise their clocks",
 )

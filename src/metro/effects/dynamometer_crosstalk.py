@@ -47,4 +47,7 @@ EFFECT = Effect(
     ),
     literature="Kistler, data sheets of multicomponent dynamometers: crosstalk of up to 2 to 3 %",
     experiment="a known force along each axis of the table in turn, all channels recorded",
+    remedy=(
+        "calibrate the dynamometer with the work on it, or declare the crosstalk under known in batch.yaml"
+    ),
 )

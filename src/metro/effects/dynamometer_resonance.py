@@ -47,4 +47,8 @@ EFFECT = Effect(
     ),
     literature="Castro, Viéville and Lipinski, Int. J. Mach. Tools Manuf. 46 (2006) 1707",
     experiment="a hammer test on the dynamometer with the work on it; slots at speeds that differ by a fifth",
+    remedy=(
+        "choose speeds at which no harmonic of the tooth passing is near this "
+        "frequency, or mount the dynamometer more stiffly"
+    ),
 )

@@ -27,4 +27,7 @@ EFFECT = Effect(
     ),
     literature="a turn of (K_t, K_r) and a turn of (F_x, F_y) are the same thing in a linear force law",
     experiment="a known force along the table's x axis: push the dynamometer with a load cell along a slot",
+    remedy=(
+        "align the dynamometer with the work, or correct instruments.dynamometer.rotation_deg in batch.yaml"
+    ),
 )

@@ -88,6 +88,8 @@ class Effect:
     signature : one sentence: where it is seen, and what resembles it.
     literature : where the model of the effect comes from.
     experiment : the measurement that would show it best, for "measure this next".
+    remedy : what to do about it once it is identified: an instruction that begins with a verb, for the first
+        page. Empty: nothing is said.
     adapt : what makes it fit a batch: ``adapt(effect, problem)`` is the effect with the parameters that the
         batch calls for (one per tooth), or why this batch cannot show it. None: as it is.
     mixing : rows that make the values of the contract from the parameters of the search, where these are
@@ -132,6 +134,7 @@ class Effect:
     own: int = 0
     timed: bool = False
     sought: float = 1.0
+    remedy: str = ""
     belongs_to: tuple[Owner, ...] = ("cell",)
     comparable: bool = True
     slow: bool = False

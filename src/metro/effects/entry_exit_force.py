@@ -33,4 +33,5 @@ EFFECT = Effect(
         "the same slot with an air blast or flood coolant, which clears the chips; cuts at half immersion, "
         "up and down, at two feeds"
     ),
+    remedy="clear the chips from the slot by air or coolant, or declare this force under known in batch.yaml",
 )

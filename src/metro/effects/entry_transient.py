@@ -67,4 +67,5 @@ EFFECT = Effect(
     ),
     literature="Altintas et al., CIRP Ann. 60 (2011) 779: feed drives under load",
     experiment="the same pass at two feeds and at two depths: a drive that droops does so with the force",
+    remedy="begin each pass further outside the block, or lower the feed where the tool enters",
 )

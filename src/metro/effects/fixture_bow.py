@@ -38,4 +38,5 @@ EFFECT = Effect(
     ),
     literature="Nee, Tao and Kumar, An Advanced Treatise on Fixture Design and Planning (2004)",
     experiment="the face scanned clamped and released; or faces at a third and three times the depth of cut",
+    remedy="support the work beneath where it is clamped, clamp it less, and release it before the last cut",
 )

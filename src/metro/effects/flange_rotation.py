@@ -34,5 +34,6 @@ EFFECT = Effect(
     ),
     literature="[K] equations 16 to 18: the tip moves by the flange's displacement and by ω × p",
     experiment="load tests with displacements read at the flange and at the tip",
+    remedy="measure the displacements of load tests at the tip of the tool",
     adapt=_adapted,
 )

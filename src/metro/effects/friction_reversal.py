@@ -58,6 +58,7 @@ def _of(joint: int) -> Effect:
         ),
         literature="[K] section 4: waviness and force error at the reversal of joint 6",
         experiment="a path on which the joint turns round in the middle of the cut, cut and idle, both ways",
+        remedy="make the idle run right before or after the cut, along the same path, with warm joints",
     )
 
 

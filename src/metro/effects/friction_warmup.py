@@ -25,6 +25,9 @@ def _of(joint: int) -> Effect:
         ),
         literature="Bittencourt and Gunnarsson, J. Dyn. Sys. Meas. Control 134 (2012) 051013",
         experiment="a long idle run of the same path from cold, and the same after a quarter of an hour",
+        remedy=(
+            "warm the joints up before the first cut, and make an idle run right before and after each cut"
+        ),
     )
 
 

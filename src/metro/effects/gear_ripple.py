@@ -71,6 +71,7 @@ def _of(joint: int) -> Effect:
         ),
         literature="Taghirad and Belanger, J. Dyn. Sys. Meas. Control 120 (1998) 496: harmonic drives",
         experiment="the same path at half and at twice the feed: a ripple stays where it is along the path",
+        remedy="have the gear of this joint checked, or place the work where this joint turns less",
         adapt=adapt,
     )
 

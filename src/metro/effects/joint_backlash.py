@@ -50,6 +50,9 @@ def _of(joint: int) -> Effect:
         experiment=(
             "two cuts of different depth in a pose in which the joint's torque has the other sign than here"
         ),
+        remedy=(
+            "have the gear of this joint adjusted, or place the cut so that the joint's torque keeps its sign"
+        ),
         adapt=adapt,
     )
 

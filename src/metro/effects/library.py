@@ -35,22 +35,25 @@ def library(observable: str | None = None) -> tuple[Effect, ...]:
 def described() -> JSON:
     """Return what a campaign and a report need to know of each effect of the library, by its name.
 
-    ``meaning``, ``belongs_to``, ``comparable`` and ``per`` of :class:`Effect`; the last one as a list, since
-    the forms of an effect may differ in it. The meaning is that of the first form; ``meanings`` has that of
-    the form with each parameter.
+    ``meaning``, ``remedy``, ``belongs_to``, ``comparable`` and ``per`` of :class:`Effect`; the last one as a
+    list, since the forms of an effect may differ in it. Meaning and remedy are those of the first form;
+    ``meanings`` and ``remedies`` have those of the form with each parameter.
     """
     facts: JSON = {}
     for effect in library():
         known = {
             "meaning": effect.meaning,
+            "remedy": effect.remedy,
             "belongs_to": list(effect.belongs_to),
             "comparable": effect.comparable,
             "per": [],
             "meanings": {},
+            "remedies": {},
         }
         fact = facts.setdefault(effect.name, known)
         for name in effect.names:
             fact["meanings"].setdefault(name, effect.meaning)
+            fact["remedies"].setdefault(name, effect.remedy)
         kinds = fact["per"]
         kinds += [effect.per] if effect.per and effect.per not in kinds else []
     return facts

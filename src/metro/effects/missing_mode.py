@@ -61,5 +61,6 @@ EFFECT = Effect(
         "the chatter frequency of one unstable cut (microphone or dynamometer), and an impact test with a "
         "softer and with a harder tip, on the tool and on the work"
     ),
+    remedy="find this mode by an impact test with a hammer tip that excites its frequency, on tool and work",
     adapt=adapt,
 )

@@ -36,4 +36,5 @@ EFFECT = Effect(
     ),
     literature="Pan et al., J. Mater. Process. Technol. 173 (2006) 301: mode coupling of a milling robot",
     experiment="impact tests with the cross receptances xy; tests of up and of down milling at one speed",
+    remedy="measure the cross receptances xy, and predict stability with them",
 )

@@ -50,4 +50,5 @@ EFFECT = Effect(
     signature="Axial force of helical runs that rises and falls once per orbit, the same way in each hole.",
     literature="a parallel kinematic machine is not equally stiff all over its workspace",
     experiment="a hole at each of two places of the workspace, and one with the orbit reversed",
+    remedy="place the hole where the arm is stiffer, or declare this change under known in batch.yaml",
 )

@@ -161,6 +161,10 @@ ON_WALLS = Effect(
     ),
     literature="Schneider et al., Prod. Eng. 8 (2014) 59: structural modes of industrial robots in milling",
     experiment="the same cut at two feeds that differ by a third, with an accelerometer on the spindle",
+    remedy=(
+        "find what vibrates at this frequency with an accelerometer on spindle and "
+        "arm, and change feed or speed"
+    ),
 )
 ON_FACES = replace(
     ON_WALLS,

@@ -34,4 +34,8 @@ EFFECT = Effect(
     ),
     literature="Swevers, Verdonck and De Schutter, IEEE Control Systems 27 (2007) 58",
     experiment="an idle run with the tool and chips as in the cut, in two orientations of the wrist",
+    remedy=(
+        "make the idle run with the same tool, hoses and chips as the cut, "
+        "and correct the payload in the controller"
+    ),
 )

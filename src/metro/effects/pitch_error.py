@@ -59,4 +59,5 @@ EFFECT = Effect(
     ),
     literature="Altintas, Engin and Budak, J. Manuf. Sci. Eng. 121 (1999) 173: cutters with variable pitch",
     experiment="runs at two feeds that differ by a factor of three or more, and the pitch under a microscope",
+    remedy="measure the pitch under a microscope, and enter it as tool.pitch_deg in batch.yaml",
 )

@@ -33,4 +33,5 @@ EFFECT = Effect(
         "Altintas, Eynian and Onozuka, CIRP Ann. 57 (2008) 371; Budak and Tunc, CIRP Ann. 59 (2010) 407"
     ),
     experiment="tests at a third of the lowest speed, above the boundary that is predicted there",
+    remedy="count on the deeper cuts at low speed only with edges as worn as these",
 )

@@ -89,5 +89,6 @@ EFFECT = Effect(
     experiment=(
         "the chatter frequency at the slowest and at the fastest speed; an impact test on the turning spindle"
     ),
+    remedy="measure the receptance at speed, on the turning spindle, and predict stability with it",
     adapt=adapt,
 )

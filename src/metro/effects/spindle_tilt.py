@@ -33,4 +33,5 @@ EFFECT = Effect(
     ),
     literature="Gu et al., J. Manuf. Sci. Eng. 119 (1997) 476: flatness with spindle tilt",
     experiment="a dial gauge in the spindle swept over a ground plate; or one face cut in both directions",
+    remedy="tram the spindle: correct its orientation to the table by these angles",
 )

@@ -40,6 +40,7 @@ def _of(joint: int) -> Effect:
         ),
         literature="Tuttle and Seering, IEEE Trans. Robot. Autom. 12 (1996) 368: harmonic drives harden",
         experiment="load tests at a third and at three times the force, where they twist the joint most",
+        remedy="make load tests at the forces of the cut, and use the stiffness that the joint has there",
         adapt=adapt,
     )
 

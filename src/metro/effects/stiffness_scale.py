@@ -35,6 +35,10 @@ OF_MACHINE = Effect(
         "load tests at the force level of the cut, and a dynamometer in one cut to separate force and "
         "stiffness"
     ),
+    remedy=(
+        "predict cuts with the stiffness found here, and repeat the load tests with "
+        "the preload and warmth of the cut"
+    ),
 )
 
 

@@ -33,4 +33,5 @@ EFFECT = Effect(
         "a displacement sensor at the tool while the spindle warms up; or faces whose passes follow each "
         "other along x in some and along y in others, scanned with a declared scanner-to-work transform"
     ),
+    remedy="let the spindle warm up before the first pass, or measure the length of the tool between passes",
 )

@@ -40,4 +40,5 @@ EFFECT = Effect(
         "side cuts both ways at the largest depth and feed, along x and along y; "
         "or push the tool's tip with a load cell and a dial gauge"
     ),
+    remedy="clamp the tool shorter or take a stiffer one; otherwise lower the radial depth or the feed",
 )

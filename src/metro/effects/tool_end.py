@@ -65,4 +65,5 @@ EFFECT = Effect(
     experiment=(
         "slots at three or more depths, the least below the corner radius; or the tool under a microscope"
     ),
+    remedy="check the end of the tool, and enter tool.corner_radius_mm in batch.yaml",
 )

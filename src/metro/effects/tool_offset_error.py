@@ -58,4 +58,5 @@ EFFECT = Effect(
     ),
     literature="[K] eq. 13: the lever arms of the tool in the wrench at the flange",
     experiment="the tip measured by four touches of one point in four orientations",
+    remedy="measure the tip of the tool, and correct tool_in_flange_mm in batch.yaml and in the controller",
 )

@@ -53,4 +53,5 @@ EFFECT = Effect(
         "runs at two feeds that differ by a factor of two or more, "
         "at a sampling rate above ten tooth passings"
     ),
+    remedy="clean and clamp the tool anew, check it with a dial gauge, and change the holder if it remains",
 )

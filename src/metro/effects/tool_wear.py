@@ -36,4 +36,5 @@ EFFECT = Effect(
     ),
     literature="Teitenberg, Bayoumi and Yucesan, Wear 154 (1992) 287",
     experiment="the first condition again at the end of the session, with an air cut before and after",
+    remedy="change the tool earlier, and do not cut with worn and with new edges in one batch",
 )

@@ -49,4 +49,5 @@ EFFECT = Effect(
         "Fu, DeVor and Kapoor, J. Eng. Ind. 106 (1984) 81: throws of the single inserts of a face mill"
     ),
     experiment="runs at two feeds that differ by a factor of two or more, and each tooth under a dial gauge",
+    remedy="have the tool reground or its inserts set, and check each tooth on a presetter",
 )

@@ -98,12 +98,15 @@ def with_facts(verdict: JSON, loop: JSON) -> JSON:
 def with_own(entry: JSON, key: str, facts: JSON) -> JSON:
     """Return an entry with the facts about the effect that ``key`` of it names.
 
-    The meaning is that of the form whose parameters the entry has.
+    Meaning and remedy are those of the form whose parameters the entry has.
     """
     own = facts.get(str(entry[key])) or {}
-    known = own.get("meanings") or {}
-    of_form = [known[name] for name in entry.get("parameters") or {} if name in known]
-    return {**own, **({"meaning": of_form[0]} if of_form else {}), **entry}
+    form: JSON = {}
+    for one, several in (("meaning", "meanings"), ("remedy", "remedies")):
+        known = own.get(several) or {}
+        of_form = [known[name] for name in entry.get("parameters") or {} if name in known]
+        form[one] = of_form[0] if of_form else own.get(one, "")
+    return {**own, **form, **entry}
 
 
 def heading(observable: str) -> str:

@@ -32,6 +32,7 @@ from metro.report.sections.verdict import (
     known_interval,
     left_words,
     next_words,
+    remedies,
     unit_after,
     verdict_words,
 )
@@ -64,7 +65,8 @@ def first_words(results: Results) -> list[Item]:
     """Give the results, then the verdicts, what to trust and what to do next."""
     verdicts = results.verdicts()
     texts = [verdict_words(name, entry, left_words(results, name)) for name, entry in verdicts.items()]
-    nexts = [f"{title(n)}: {words_next}" for n, e in verdicts.items() if (words_next := next_words(e))]
+    nexts = list(dict.fromkeys(remedy for entry in verdicts.values() for remedy in remedies(entry)))
+    nexts += [f"{title(n)}: {words_next}" for n, e in verdicts.items() if (words_next := next_words(e))]
     lacking = (results.identified.get("not_identified") or {}).get("lobes")
     if not verdicts and lacking and results.identified.get("modes"):
         nexts = [f"For a verdict on {title('lobes')}: {lacking}"]

@@ -218,6 +218,18 @@ def _rivals(entry: JSON) -> str:
     return f"Possible causes: {'; or '.join(groups)}. {further}" if groups else ""
 
 
+def remedies(entry: JSON) -> list[str]:
+    """Say of each identified cause what to do about it, where the library has that."""
+    sure = [one for one in entry.get("effects") or [] if (one.get("probability") or 0.0) >= SURE]
+    return [f"{_named(one)}: {one['remedy']}" for one in sure if one.get("remedy")]
+
+
+def _named(effect: JSON) -> str:
+    """Name of an effect, and of its joint."""
+    joint = (effect.get("parameters") or {}).get("joint", "all")
+    return words(str(effect["effect"])) + (f" of joint {joint}" if joint != "all" else "")
+
+
 def next_words(entry: JSON) -> str:
     """Say what to measure next, and whether the verdict does not need it; empty if there is nothing."""
     text = plain(str(entry.get("next_experiment") or "")).rstrip(".")
