@@ -8,6 +8,7 @@ import pytest
 from scipy import stats
 from toy import ANGLE, BEND, GATES, TWIN, Wave, problem
 
+from metro.loop.causes import causes as room
 from metro.loop.causes.causes import _updated, judged
 from metro.loop.causes.witnesses import Closed, ask, key_of, material, weighed
 from metro.loop.search.search import search
@@ -135,6 +136,35 @@ def test_further_evidence_multiplies_the_odds():
     assert _updated(0.5, math.log(3.0)) == pytest.approx(0.75)
     assert _updated(0.75, -math.log(9.0)) == pytest.approx(0.25)
     assert (_updated(1.0, -5.0), _updated(0.4, math.inf)) == (1.0, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("value", "variance", "status"),
+    [(0.0, 0.01, "denied"), (2.0, 0.01, "alone"), (0.0, 9.0, "alone"), (-6.0, 0.01, "contradiction")],
+    ids=["shows that it is not there", "agrees", "cannot tell", "contradicts"],
+)
+def test_who_would_show_a_cause_and_does_not_speaks_against_it(monkeypatch, value, variance, status):
+    """The estimates of both share their parameter: its cost is charged once, and what it costs to agree."""
+    task = replace(problem(1, truth=Wave(bend=0.2), phased=False), observable="one")
+    found = replace(search(task, (BEND,), GATES), weight={"bend": 0.7})
+    both = {"one": Closed(task, found), "two": unsearched("two", 0.0, 1001)}
+    said = {"one": (2.2, 1.0), "two": (value, variance)}
+
+    def put(closed, key, start=None):
+        estimate, spread = said[closed.problem.observable]
+        witness = ask(closed, key, start)
+        return replace(
+            witness, value=np.array([estimate]), covariance=np.array([[spread]]), doubt=np.zeros(1)
+        )
+
+    monkeypatch.setattr(room, "ask", put)
+    (one,) = judged(both, GATES)
+    assert one.status == status
+    if status != "contradiction":
+        chi2 = (2.2 - value) ** 2 / (1.0 + variance)
+        gain = one.cause.witnesses[1].evidence.gain
+        assert one.probability == pytest.approx(_updated(found.probability("bend"), gain + 1.0 - 0.5 * chi2))
+        assert (one.probability < 0.5 * found.probability("bend")) == (status == "denied")
 
 
 def test_the_surest_cause_comes_first_and_what_too_few_runs_say_is_not_asked(bent):

@@ -14,6 +14,7 @@ ENDS = {
     "contradiction": "the estimates differ by more than their uncertainties, so they are not one common "
     "cause",
     "confirmed": "and the estimates agree",
+    "denied": "another observable would show it at that size, and does not",
     "alone": "the other observables are not sensitive enough to confirm it",
     "one_observable": "no other observable of this batch could show it",
 }
@@ -73,5 +74,6 @@ SENTENCES: Mapping[str, Sentence] = {
     "cause": _cause,
     "names_it": "identified it",
     "sees_it": "shows it",
+    "denies_it": "does not show it, although it would",
     "cannot_tell": "is not sensitive enough",
 }

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from metro.loop.causes.witnesses import Cause, Closed, Key, ask, key_of, material, weighed
+from metro.loop.causes.witnesses import Cause, Closed, Key, ask, denial, key_of, material, weighed
 from metro.loop.checks.evidence import Evidence, weights
 from metro.loop.checks.signature import q_values
 from metro.loop.search.trial import LEAST_BETTER, Gates
@@ -27,8 +27,8 @@ class Judged:
     """A cause and its standing: what all witnesses say, and how sure it is.
 
     ``status``: ``together`` (named by none alone), ``contradiction``, ``confirmed`` (by another observable
-    than the one that named it), ``alone`` (the others do not determine it). ``or_else``: causes that explain
-    the same as well.
+    than the one that named it), ``denied`` (another one would show it, and does not), ``alone`` (the others
+    do not determine it). ``or_else``: causes that explain the same as well.
     """
 
     cause: Cause
@@ -53,7 +53,11 @@ def _open_to_several(closed: Mapping[str, Closed]) -> list[Key]:
 
 
 def _put_to_all(key: Key, closed: Mapping[str, Closed]) -> Judged:
-    """Put a cause that one named to all that could show it."""
+    """Put a cause that one named to all that could show it.
+
+    What they say together counts: what each gains by itself, less what it costs them to agree. Each has been
+    charged for its parameters, of which the shared ones are the same for all.
+    """
     finders = [one for one in closed.values() if key in map(key_of, one.outcome.final.candidate.effects)]
     first = max(
         (witness for one in finders if (witness := ask(one, key))), key=lambda witness: witness.statistic
@@ -66,8 +70,11 @@ def _put_to_all(key: Key, closed: Mapping[str, Closed]) -> Judged:
     if cause.differ < CONTRADICTION:
         return Judged(cause, "contradiction", sure)
     seconded = any(witness.names_it or witness.evidence.p_value < SPEAKS for witness in others)
+    denied = any(denial(witness, first) < SPEAKS for witness in others)
     gain = sum(witness.evidence.gain for witness in cause.witnesses[1:])
-    return Judged(cause, "confirmed" if seconded else "alone", _updated(sure, gain))
+    gain += cause.together.freedom - 0.5 * cause.together.chi2
+    status = "confirmed" if seconded else "denied" if denied else "alone"
+    return Judged(cause, status, _updated(sure, gain))
 
 
 def _updated(probability: float, gain: float) -> float:

@@ -250,6 +250,19 @@ def agreement(values: Sequence[Array], covariances: Sequence[Array]) -> Agreemen
     return Agreement(mean, inverse(total), chi2, freedom)
 
 
+def denial(witness: Witness, first: Witness) -> float:
+    """P-value of what an observable says, were the cause as large there as where another one saw it first.
+
+    It is small where the observable would show that and does not, and one where it determines nothing.
+    """
+    seen, own = _unwound([first, witness])
+    weight = _precision(witness.covariance + np.diag(witness.doubt**2))
+    determined = int((np.diag(weight) > 0.0).sum())
+    runs = sum(block.role != "calibrate" for block in witness.larger.blocks)
+    away = own - seen
+    return tail(float(away @ weight @ away), determined, runs) if determined else 1.0
+
+
 def _precision(covariance: Array) -> Array:
     """Invert a covariance; what has an infinite variance has no weight."""
     known = np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from metro.loop.causes.causes import SPEAKS, Judged, judged
-from metro.loop.causes.witnesses import Closed, Witness, shared
+from metro.loop.causes.witnesses import Closed, Witness, denial, shared
 from metro.loop.search.trial import Gates
 from metro.loop.statement import Statement
 from metro.loop.verdict.verdict import bounded, finite, parameters
@@ -76,7 +76,7 @@ def _entry(one: Judged) -> JSON:
         "seen_in": seen,
         "statistic": cause.statistic,
         "p_value": cause.p_value,
-        "witnesses": [_witness(witness) for witness in cause.witnesses],
+        "witnesses": [_witness(witness, first) for witness in cause.witnesses],
         "agreement": agreement,
         "or_else": [Statement("cause", {"name": name, "joint": joint}) for name, joint in one.or_else],
     }
@@ -98,18 +98,20 @@ def _bears_witness(witness: Witness) -> bool:
     return witness.names_it or witness.evidence.p_value < SPEAKS
 
 
-def _says(witness: Witness) -> Statement:
+def _says(witness: Witness, first: Witness) -> Statement:
     if witness.names_it:
         return Statement("names_it")
-    return Statement("sees_it" if _bears_witness(witness) else "cannot_tell")
+    if _bears_witness(witness):
+        return Statement("sees_it")
+    return Statement("denies_it" if denial(witness, first) < SPEAKS else "cannot_tell")
 
 
-def _witness(witness: Witness) -> JSON:
+def _witness(witness: Witness, first: Witness) -> JSON:
     gain = witness.evidence.gain if witness.evidence.held_out else math.nan
     return {
         "observable": witness.observable,
         "found": witness.names_it,
-        "says": _says(witness),
+        "says": _says(witness, first),
         "statistic": witness.statistic,
         "p_value": witness.evidence.p_value,
         "held_out_gain": finite(gain),

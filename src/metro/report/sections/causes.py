@@ -16,6 +16,7 @@ STATUS = {
     "together": "significant only together",
     "contradiction": "contradiction",
     "confirmed": "confirmed",
+    "denied": "another would show it, and does not",
     "alone": "others not sensitive enough",
     "one_observable": "no other could show it",
 }
