@@ -45,11 +45,11 @@ def end_stiffness(read: Callable[..., pd.DataFrame]) -> dict[str, pd.DataFrame]:
         return {}
     stations = stations_of(table)
     errors = 100.0 * left_out(stations)
-    told = table[["position", *PLACE, *STIFFNESS]].assign(method=stations.method)
+    stations_table = table[["position", *PLACE, *STIFFNESS]].assign(method=stations.method)
     for k, axis in enumerate(AXES):
-        told[f"error_{axis}_percent"] = errors[:, k, k]
+        stations_table[f"error_{axis}_percent"] = errors[:, k, k]
     return {
-        "end_stations": told,
+        "end_stations": stations_table,
         "end_errors": _errors(stations),
         "end_surface": _surface(stations),
         "end_region": _region(stations),

@@ -11,6 +11,7 @@ from metro.report.phrases import plain, residual_words
 from metro.report.results import Results, heading
 from metro.report.sections.trust import HOLDS, SURE
 from metro.units import JSON, printed
+from metro.wording.causes import named_cause
 
 NOTHING_SEEN = 0.9  # error over signal, above which the model predicts next to nothing of it
 STATUS = {
@@ -221,13 +222,14 @@ def _rivals(entry: JSON) -> str:
 def remedies(entry: JSON) -> list[str]:
     """Say of each identified cause what to do about it, where the library has that."""
     sure = [one for one in entry.get("effects") or [] if (one.get("probability") or 0.0) >= SURE]
-    return [f"{_named(one)}: {one['remedy']}" for one in sure if one.get("remedy")]
+    return [
+        f"{named_cause(one['effect'], _where(one))}: {one['remedy']}" for one in sure if one.get("remedy")
+    ]
 
 
-def _named(effect: JSON) -> str:
-    """Name of an effect, and of its joint."""
+def _where(effect: JSON) -> JSON:
     joint = (effect.get("parameters") or {}).get("joint", "all")
-    return words(str(effect["effect"])) + (f" of joint {joint}" if joint != "all" else "")
+    return {} if joint == "all" else {"joint": joint}
 
 
 def next_words(entry: JSON) -> str:
