@@ -18,6 +18,11 @@ def effect_words(effect: JSON) -> str:
     return f"{words(name)} ({parameters})" if parameters else words(name)
 
 
+def of_joint(name: str, joint: Any) -> str:
+    """Name a cause, and the joint where it is of one: gear ripple of joint 4."""
+    return words(name) + (f" of joint {joint}" if joint not in (None, "all") else "")
+
+
 def parameter_words(effect: JSON) -> list[str]:
     """Return each parameter of an effect with its value and interval: radius 9.80 ± 0.30 µm.
 

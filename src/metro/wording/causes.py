@@ -22,7 +22,7 @@ ENDS = {
 
 def cause_in_words(cause: JSON) -> str:
     """Name a cause, what each observable says of it, and what follows from that."""
-    named = named_cause(cause["cause"], cause["where"])
+    named = _named(cause["cause"], cause["where"])
     if cause["status"] == "one_observable":
         return f"{named}: seen in {plain(cause['seen_in'][0])}; {ENDS['one_observable']}."
     witnesses = "; ".join(f"{plain(one['observable'])} {_says(one)}" for one in cause["witnesses"])
@@ -62,13 +62,12 @@ def _value(name: str, entry: JSON) -> str:
     return f"{printed_name(name, unit)} {value:.3g} ± {(high - low) / 2:.2g} {printed(unit)}".rstrip()
 
 
-def named_cause(cause: str, where: JSON) -> str:
-    """Name a cause, and the joint where it is of one."""
+def _named(cause: str, where: JSON) -> str:
     return plain(cause) + (f" of joint {where['joint']}" if "joint" in where else "")
 
 
 def _cause(values: JSON) -> str:
-    return named_cause(values["name"], {} if values["joint"] == "all" else {"joint": values["joint"]})
+    return _named(values["name"], {} if values["joint"] == "all" else {"joint": values["joint"]})
 
 
 SENTENCES: Mapping[str, Sentence] = {

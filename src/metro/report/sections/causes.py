@@ -7,7 +7,7 @@ from dataclasses import replace
 from metro.observables.catalogue import title
 from metro.report.content import Item, Paragraph, Section, Table
 from metro.report.numbers import listing, number, percent, probability, words
-from metro.report.parameters import parameter_words
+from metro.report.parameters import of_joint, parameter_words
 from metro.report.phrases import sentence
 from metro.report.results import Results, with_own
 from metro.units import JSON, printed
@@ -64,8 +64,7 @@ NORMAL = {"doubt": 1.96}  # from a standard deviation to half of a 95 % interval
 
 def cause_name(cause: JSON) -> str:
     """Name of a cause, and of its joint."""
-    joint = (cause.get("where") or {}).get("joint", "all")
-    return words(str(cause["cause"])) + (f", joint {joint}" if joint != "all" else "")
+    return of_joint(str(cause["cause"]), (cause.get("where") or {}).get("joint"))
 
 
 def _values(cause: JSON) -> str:

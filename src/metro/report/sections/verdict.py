@@ -6,12 +6,11 @@ import math
 
 from metro.report.figures.verdicts import Change
 from metro.report.numbers import listing, percent, with_interval, words
-from metro.report.parameters import effect_words
+from metro.report.parameters import effect_words, of_joint
 from metro.report.phrases import plain, residual_words
 from metro.report.results import Results, heading
 from metro.report.sections.trust import HOLDS, SURE
 from metro.units import JSON, printed
-from metro.wording.causes import named_cause
 
 NOTHING_SEEN = 0.9  # error over signal, above which the model predicts next to nothing of it
 STATUS = {
@@ -223,13 +222,10 @@ def remedies(entry: JSON) -> list[str]:
     """Say of each identified cause what to do about it, where the library has that."""
     sure = [one for one in entry.get("effects") or [] if (one.get("probability") or 0.0) >= SURE]
     return [
-        f"{named_cause(one['effect'], _where(one))}: {one['remedy']}" for one in sure if one.get("remedy")
+        f"{of_joint(str(one['effect']), (one.get('parameters') or {}).get('joint'))}: {one['remedy']}"
+        for one in sure
+        if one.get("remedy")
     ]
-
-
-def _where(effect: JSON) -> JSON:
-    joint = (effect.get("parameters") or {}).get("joint", "all")
-    return {} if joint == "all" else {"joint": joint}
 
 
 def next_words(entry: JSON) -> str:
