@@ -53,7 +53,7 @@ def joint_force(model):
     t = np.linspace(0.0, 3.0, 90)
     q = 0.3 + np.outer(np.sin(t), [0.2, -0.3, 0.25, 0.4, -0.2, 0.3]) + np.outer(t, [0.01] * 6)
     log = running(t, np.outer(np.sin(2.0 * t), [100.0, 150.0, 40.0]))
-    run = TorqueRun(q, np.gradient(q, t, axis=0), t, t, np.full(90, t[1]), log)
+    run = TorqueRun(q, np.gradient(q, t, axis=0), t, t, np.full(90, t[1]), log, np.zeros((90, 6)))
     matrix, offset = model.design(SimpleNamespace(setting=run), np.zeros(0))
     return matrix[:, 0] + offset
 

@@ -115,6 +115,15 @@ def test_a_dynamometer_that_is_turned_by_a_degree_is_no_tool_elsewhere(cell, axi
     assert found(cell, force=force) == []
 
 
+@pytest.mark.parametrize("change", [-0.012, 0.012])
+def test_motors_that_are_warmer_in_the_cut_hang_no_mass_on_the_flange(cell, change):
+    """A torque constant that has changed since the idle run shows in the torque of the weight, too."""
+    table = cell[1]["joint_torque"].copy()
+    idle = [f"idle{joint}_nm" for joint in range(1, 7)]
+    table[AXES.torques] += change * (table[idle].to_numpy() + table[AXES.torques].to_numpy())
+    assert found(cell, table) == []
+
+
 def elsewhere(cell, offset=(0.0, 0.12, 0.0)):
     """The torques of a tool whose tip is 120 mm, or an ``offset`` in m, from where it was declared to be."""
     model = joint_force.problem(*cell, {}).base

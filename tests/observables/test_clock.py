@@ -28,7 +28,8 @@ def block(offset, drift, rng):
     fine = np.arange(0.0, 12.0, 0.005)
     t = WIDTH * (np.arange(BINS) + 0.5)
     q = np.tile(Q, (BINS, 1))
-    run = TorqueRun(q, np.ones((BINS, 6)), t, t, np.full(BINS, WIDTH), running(fine, force(fine)))
+    idle = np.zeros((BINS, 6))
+    run = TorqueRun(q, np.ones((BINS, 6)), t, t, np.full(BINS, WIDTH), running(fine, force(fine)), idle)
     inner = (np.arange(20) + 0.5) / 20 - 0.5
     true = t - offset - drift * (t - t.mean())
     mean = np.mean([force(true + WIDTH * part) for part in inner], axis=0)

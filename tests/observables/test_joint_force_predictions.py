@@ -35,6 +35,7 @@ RUN = TorqueRun(
     T,
     np.full(81, 0.05),
     running(T, 50.0 * np.column_stack([np.sin(3 * T), np.cos(2 * T), T])),
+    np.outer(T, np.arange(1.0, 7.0)),
 )
 DRIVES = DriveTorques(
     reversal=(0.0, 3.0), warmup=(0.0, 0.0, 0.5), viscous=(4.0,), ripple=(Ripple(4, 60.0, 2.0, 1.0),)
@@ -56,7 +57,8 @@ def test_the_prediction_is_that_of_the_design(setting, parts):
 
 
 def test_a_design_changes_nothing_that_others_are_given():
-    block, beta = SimpleNamespace(setting=RUN), np.full(23, 0.1)
+    block = SimpleNamespace(setting=RUN)
+    beta = np.full(len(JointForceModel(ARM).parameters), 0.1)
     before = JointForceModel(ARM).predictions(block, np.zeros((1, 0)), beta).copy()
     JointForceModel(ARM, drives=DRIVES, payload=LADEN).design(block, np.zeros(0), beta)
     np.testing.assert_array_equal(JointForceModel(ARM).predictions(block, np.zeros((1, 0)), beta), before)

@@ -28,7 +28,7 @@ def test_a_lag_of_the_drives_is_a_clock_that_is_late_by_as_much():
     t = np.linspace(0.0, 4.0, 81)
     force = np.column_stack([np.sin(3 * t), np.cos(2 * t), t]) * 50.0
     still = np.tile([0.1, -0.4, 0.2, 0.3, 0.8, 0.2], (81, 1))
-    run = TorqueRun(still, np.zeros_like(still), t, t, np.full(81, 0.05), running(t, force))
+    run = TorqueRun(still, np.zeros_like(still), t, t, np.full(81, 0.05), running(t, force), still)
     block = SimpleNamespace(setting=run)
     names = [one.name for one in model.parameters]
     beta = np.where(np.array(names) == "torque_gain", 1.0, 0.0)

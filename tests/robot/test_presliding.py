@@ -1,5 +1,7 @@
 """The turn over which friction follows a joint, and its state at the start of a path, from idle runs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -102,3 +104,19 @@ def test_torques_that_do_not_change_are_no_friction():
     found = presliding([still])
     assert np.isnan(found.turn)
     assert found.start == pytest.approx([1.0])
+
+
+@pytest.mark.parametrize("before", [-0.9, -0.4, 0.5, 1.0])
+def test_a_joint_that_hardly_moves_begins_in_the_state_that_is_seen_where_its_weight_is_known(before):
+    """Along the path nothing of its torque changes, so that only the weight tells friction from it."""
+    rng = np.random.default_rng(9)
+
+    def hardly(at):
+        return 1e-6 * (1.0 + at / SLOW)
+
+    others = [_path(rng, 3e-4, 1.0, _turning_round) for _ in range(3)]
+    path = _path(rng, 3e-4, before, hardly)
+    t = np.linspace(0.0, SLOW, COUNT)
+    weight = 40.0 - 3.0 * t / SLOW + 0.5 * (t / SLOW) ** 2
+    seen = replace(path, rubbed=(path.torque - weight) / LEVEL)
+    assert presliding([*others, seen]).start[-1] == pytest.approx(before, abs=0.05)

@@ -35,11 +35,13 @@ class Estimate:
 
     Attributes
     ----------
-    value : (k,). replicates : (g, k) without one stretch each. known : (k,) whether the data determine it.
+    value : (k,). others : (p,) of the columns beside them.
+    replicates : (g, k) without one stretch each. known : (k,) whether the data determine it.
     residual : (m, n) of all samples, N m. noise : (n,) its rms where joints move.
     """
 
     value: Array
+    others: Array
     replicates: Array
     known: np.ndarray
     residual: Array
@@ -58,6 +60,7 @@ class Friction:
     Attributes
     ----------
     value : (n, 3) Coulomb, viscous, offset. sd : (n, 3) their standard errors. dof : of their t-intervals.
+    others : (p,) coefficients of whatever else the torques hold, as weight.
     residual : (m, n) of the torques, N m. noise : (n,) its rms where joints move.
     forward, backward : (n,) bool, whether a joint turns that way fast enough at all.
     """
@@ -65,6 +68,7 @@ class Friction:
     value: Array
     sd: Array
     dof: int
+    others: Array
     residual: Array
     noise: Array
     forward: np.ndarray
@@ -163,7 +167,9 @@ def identify(log: Motion, others: Array) -> Friction:
     shape = (len(TERMS), n)
     dof = len(fit.replicates) - 1
     ways = [np.asarray((log.moving & (sign * log.rate > 0)).any(axis=0)) for sign in (1, -1)]
-    return Friction(value.reshape(shape).T, sd.reshape(shape).T, dof, fit.residual, fit.noise, *ways)
+    return Friction(
+        value.reshape(shape).T, sd.reshape(shape).T, dof, fit.others, fit.residual, fit.noise, *ways
+    )
 
 
 def curvature(log: Motion, others: Array) -> Curvature:
@@ -233,4 +239,6 @@ def _fit(log: Motion, own: Array, others: Array) -> Estimate:
         mean_square = np.sum(residual**2, axis=0, where=log.moving) / np.maximum(log.moving.sum(axis=0), 1)
         noise = np.maximum(np.sqrt(mean_square), LEAST_NOISE * spread)
     k = own.shape[-1]
-    return Estimate(found.value[:k], found.replicates[:, :k], found.known[:k], residual, noise)
+    return Estimate(
+        found.value[:k], found.value[k:], found.replicates[:, :k], found.known[:k], residual, noise
+    )

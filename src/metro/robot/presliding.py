@@ -24,6 +24,7 @@ TRIED = 9
 # Of -2 log-likelihood, two standard deviations: a turn is identified where half and twice of it are this much
 # worse, and a joint came from elsewhere than as it moves at its start where that is this much better.
 IDENTIFIED = 4.0
+SEEN = 0.4  # of the level: twice what friction is seen to, beyond which a joint came from elsewhere
 LEAST_CHANGE = 1e-3  # of the level and of the logarithm of the turn, to which they are sought
 
 
@@ -31,13 +32,15 @@ LEAST_CHANGE = 1e-3  # of the level and of the logarithm of the turn, to which t
 class IdlePath:
     """One joint along the path of one idle run.
 
-    ``q``, ``rate`` (m,) rad, rad/s; ``torque`` (m,) N m; ``sd`` (m,) N m of the noise of its waves.
+    ``q``, ``rate`` (m,) rad, rad/s; ``torque`` (m,) N m; ``sd`` (m,) N m of the noise of its waves;
+    ``rubbed`` (m,) what of the torque is friction, over its Coulomb level; None where that is not known.
     """
 
     q: Array
     rate: Array
     torque: Array
     sd: Array
+    rubbed: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +115,21 @@ def presliding(paths: Sequence[IdlePath]) -> Presliding:
     turn = math.exp(float(found.x)) if beside > float(found.fun) + IDENTIFIED else math.nan
     used = turn if math.isfinite(turn) else PRESLIDING
     level, _ = _level(paths, used)
-    return Presliding(turn, np.array([_whitened(path, used).state(level) for path in paths]))
+    return Presliding(turn, np.array([_start(path, used, level) for path in paths]))
+
+
+def _start(path: IdlePath, turn: float, level: float) -> float:
+    """Return the state of friction where a path begins: as it was seen, else the likeliest for a ``level``.
+
+    A joint that hardly moves keeps its state along the path, where only its weight tells friction from it.
+    """
+    if path.rubbed is None:
+        return _whitened(path, turn).state(level)
+    rest, from_one = (slid(path.q, path.rate, turn, start) for start in (0.0, 1.0))
+    by_state = from_one - rest
+    seen = float(by_state @ (path.rubbed - rest)) / max(float(by_state @ by_state), np.finfo(float).tiny)
+    moved = float(slid(path.q, path.rate, turn)[0])
+    return float(np.clip(seen, -1.0, 1.0)) if abs(seen - moved) > SEEN else moved
 
 
 def _level(paths: Sequence[IdlePath], turn: float) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from metro.units import MM, Array
 LEAST_BIN = 0.5 * MM
 LEAST_SHARE = 0.5
 STANDSTILL = 0.1
+ASIDE = 2  # bins to either side, between which a slope is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +147,17 @@ def bin_means(s: Array, values: Array, edges: Array) -> Array:
     count = np.bincount(place[inside], minlength=len(edges) - 1).astype(float)
     sums = np.stack([np.bincount(place[inside], v, len(edges) - 1) for v in values[inside].T], axis=1)
     return np.asarray(sums / np.where(count > 0, count, np.nan)[:, None])
+
+
+def slopes(values: Array, time: Array) -> Array:
+    """Slopes (m, k) of ``values`` (m, k) of bins over their ``time`` (m,), across four bins.
+
+    Stamps of single samples are late by several periods, which makes the mean of their slopes too steep.
+    """
+    place = np.arange(len(time))
+    first, last = np.maximum(place - ASIDE, 0), np.minimum(place + ASIDE, len(time) - 1)
+    lasted = np.maximum(time[last] - time[first], np.finfo(float).tiny)
+    return np.asarray((values[last] - values[first]) / lasted[:, None])
 
 
 def _range(s: Array) -> tuple[float, float]:

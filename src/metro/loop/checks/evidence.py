@@ -75,7 +75,7 @@ def compare(smaller: Fit, larger: Fit) -> Evidence:
     parameters = len(larger.theta) - len(smaller.theta) + runs * (_own(larger) - _own(smaller))
     sought = _sought(larger) / _sought(smaller)
     p_value = -math.expm1(sought * math.log1p(-min(tail(statistic, parameters, runs), 1.0 - 1e-16)))
-    size = math.hypot(change(smaller, larger), _taken(smaller, larger))
+    size = math.hypot(change(smaller, larger), relieved(smaller, larger))
     return Evidence(statistic, p_value, {}, size, missed(larger), sought)
 
 
@@ -103,25 +103,26 @@ def tail(statistic: float, parameters: int, runs: int) -> float:
     return float(f.sf(max(statistic, 0.0) / parameters, parameters, runs + PRIOR_RUNS))
 
 
-def _taken(smaller: Fit, larger: Fit) -> float:
-    """Rms change by base parameters of which something is believed, over the rms measured, over the runs.
+def relieved(smaller: Fit, larger: Fit) -> float:
+    """Rms by which base parameters stray less from what is believed of them, over that measured.
 
     An effect that they stand in for changes no prediction, but spares them a strain: it is as large as that.
     """
-    model, believed = smaller.candidate.model(smaller.theta), np.zeros(len(smaller.beta), dtype=bool)
-    for block in smaller.blocks:
-        if block.belief:
-            believed |= model.design(block, smaller.nuisance[block.run], smaller.beta)[0].any(axis=0)
-    if not believed.any():
+    model, beliefs = smaller.candidate.model(smaller.theta), [b for b in smaller.blocks if b.belief]
+    if not beliefs:
         return 0.0
-    moved = np.where(believed, smaller.beta - larger.beta, 0.0)
+    rows = [model.design(b, smaller.nuisance[b.run], smaller.beta)[0] for b in beliefs]
+    of, right = np.vstack(rows), np.concatenate([b.measured for b in beliefs])
+    known, believed = np.linalg.lstsq(of, right)[0], of.any(axis=0)
+    strains = [np.where(believed, fitted.beta - known, 0.0) for fitted in (smaller, larger)]
     taken, signal = 0.0, 0.0
     for block in smaller.blocks:
         if block.role != "calibrate":
             design, _ = model.design(block, smaller.nuisance[block.run], smaller.beta)
-            taken += float(np.sum((design @ moved) ** 2))
+            before, after = (float(np.sum((design @ strain) ** 2)) for strain in strains)
+            taken += before - after
             signal += float(np.sum(block.measured**2))
-    return math.sqrt(taken / signal)
+    return math.sqrt(max(taken, 0.0) / signal)
 
 
 def change(smaller: Fit, larger: Fit) -> float:

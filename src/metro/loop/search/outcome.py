@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from metro.effects.effect import Effect
 from metro.loop.checks import signature as residual
 from metro.loop.checks.between import Between
-from metro.loop.checks.evidence import missed
+from metro.loop.checks.evidence import missed, relieved
 from metro.loop.checks.restless import Restless
 from metro.loop.checks.session import Step
 from metro.loop.fitting.fit import Fit
@@ -64,11 +64,12 @@ class Outcome:
         Differences between conditions or runs that only came to light as the effects took the rest away were
         there all the same: they are held neither for nor against these. So it is with places within the runs
         that a large misfit hid, as a vibration does whose phase is another in every run: what effects took of
-        the misfit is explained, whether or not the base model showed it at any one place.
+        the misfit is explained, whether or not the base model showed it at any one place; and what base
+        parameters had stood in for, against what is believed of them.
         """
         before, after = (residual.share_left(lines) ** 2 for lines in (self.base_lines, self.lines))
         taken = missed(self.base) ** 2 - missed(self.final) ** 2
-        before = max(before, after + taken)
+        before = max(before, after + taken + relieved(self.base, self.final) ** 2)
         for base, final in ((self.base_between, self.between), (self.base_restless, self.restless)):
             shown = base.relative**2 if base else 0.0
             before += shown

@@ -42,14 +42,14 @@ def _course(log: Log, cut: Log, arm: Arm, face: Wall) -> pd.DataFrame:
     error = tracking_error(arm, log.actual, log.commanded)
     moves = np.einsum("a,mai->mi", across, tip_jacobian(arm, log.commanded))
     strayed = log.actual - log.commanded
-    rate = np.gradient(log.commanded, log.time, axis=0)
     place = align.along_path(log.tip, cut.tip)
     step = float(np.median(np.abs(np.diff(place[np.isfinite(place)]))))
     edges: Array = np.arange(np.nanmin(place), np.nanmax(place), max(BIN, 3 * step))
     x = (log.tip @ face.along - face.start) / MM
     joints = range(1, len(arm.axes) + 1)
+    rates = [RATE.format(i) for i in joints]
     columns = ["x_mm", "flange_um", "tip_um", *(BY_JOINT.format(i) for i in joints)]
-    columns += [ERROR.format(i) for i in joints] + arm.axes.driven(TORQUE) + [RATE.format(i) for i in joints]
+    columns += [ERROR.format(i) for i in joints] + arm.axes.driven(TORQUE) + rates
     values = np.column_stack(
         [
             x,
@@ -58,10 +58,15 @@ def _course(log: Log, cut: Log, arm: Arm, face: Wall) -> pd.DataFrame:
             moves * strayed / UM,
             strayed / UM,
             log.torque,
-            rate,
+            log.commanded,
+            log.time,
         ]
     )
-    return pd.DataFrame(align.bin_means(place, values, edges), columns=columns).dropna(ignore_index=True)
+    means = align.bin_means(place, values, edges)
+    means = means[np.isfinite(means).all(axis=1)]
+    _, angles, time = np.split(means, [-1 - len(rates), -1], axis=1)
+    turned = align.slopes(angles, time[:, 0])
+    return pd.DataFrame(means[:, :-1], columns=columns).assign(**dict(zip(rates, turned.T, strict=True)))
 
 
 def _sizes(courses: dict[str, pd.DataFrame]) -> pd.DataFrame:

@@ -2,56 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
+from metro.batch.processed import Tables
 from metro.joint_columns import Axes
 from metro.observables.arm.load_tests import joint_places
 from metro.observables.problem import Refusal
 from metro.robot.drives import declared, drives_of_cell
 from metro.robot.friction import Friction, of_idle_runs
-from metro.robot.kinematics import arm_of_cell
+from metro.robot.kinematics import Geometry, arm_of_cell
 from metro.robot.motion import Motion
+from metro.robot.rigid_body import gravity_regressor
+from metro.same import Same
 from metro.units import DEG, JSON, Array
 
-Read = Callable[..., pd.DataFrame]
 UNITS = {"coulomb": "N m", "viscous": "N m s/rad"}
 LINEAR = "a linear axis, whose drive is not evaluated"
 FALLING = "friction falls with the speed here, as it does just above rest: no viscous friction is seen"
 BINS = 12  # of speed, per direction, in the figure
 LEAST_SAMPLES = 100
+CLEAR = 0.2  # of a Coulomb level, the residual of the idle runs below which the state of friction is seen
 
 
-def observe(batch: Batch, read: Read) -> dict[str, pd.DataFrame] | Refusal:
-    """Identify the friction of all idle runs together.
+@lru_cache(maxsize=1)
+def of_idle_logs(batch: Same[Batch], read: Same[Tables]) -> tuple[Friction, Motion] | Refusal:
+    """Identify the friction of all idle runs together; with their motion. It is asked for twice."""
+    arm = arm_of_cell(batch.value.cell, batch.value.manifest)
+    if arm is None:
+        return Refusal("")  # without an arm there is nothing to report as missing
+    table = read.value("robot")
+    idle = [rows for _, rows in table[table["log"] == "idle"].groupby("run") if len(rows) >= LEAST_SAMPLES]
+    if not idle:
+        return Refusal("no run has an idle_log")
+    runs = [(r["t_s"].to_numpy(), joint_places(r, arm), _torques(r, arm.axes)) for r in idle]
+    try:
+        return of_idle_runs(arm.dh, runs)
+    except ValueError as error:
+        return Refusal(f"idle runs: {error}")
+
+
+def observe(batch: Batch, read: Tables) -> dict[str, pd.DataFrame] | Refusal:
+    """Tabulate the friction that all idle runs together identify.
 
     Tables ``joint_friction`` (a row per joint: Coulomb and viscous friction, N m and N m s/rad, with their
     95 % intervals; blank where the runs do not identify it, and ``remark`` gives the reason) and
     ``joint_friction_curve`` (mean of the torque less that of the weight, by joint and speed).
     """
     arm = arm_of_cell(batch.cell, batch.manifest)
-    if arm is None:
-        return Refusal("")  # without an arm there is nothing to report as missing
-    table = read("robot")
-    idle = [rows for _, rows in table[table["log"] == "idle"].groupby("run") if len(rows) >= LEAST_SAMPLES]
-    if not idle:
-        return Refusal("no run has an idle_log")
-    axes = arm.axes
-    runs = [(r["t_s"].to_numpy(), joint_places(r, arm), _torques(r, axes)) for r in idle]
-    try:
-        friction, log = of_idle_runs(arm.dh, runs)
-    except ValueError as error:
-        return Refusal(f"idle runs: {error}")
-    drives = drives_of_cell(batch.cell, len(axes))
-    relative = drives.relative if declared(batch.cell) else np.zeros(len(axes))
+    found = of_idle_logs(Same(batch), Same(read))
+    if arm is None or isinstance(found, Refusal):
+        return found if isinstance(found, Refusal) else Refusal("")
+    friction, log = found
+    drives = drives_of_cell(batch.cell, len(arm.axes))
+    relative = drives.relative if declared(batch.cell) else np.zeros(len(arm.axes))
     return {
-        "joint_friction": _table(friction, log, relative, axes),
+        "joint_friction": _table(friction, log, relative, arm.axes),
         "joint_friction_curve": _curve(friction, log),
     }
+
+
+def rubbed(found: tuple[Friction, Motion] | Refusal, dh: Geometry, q: Array, torque: Array) -> Array:
+    """Return what friction was in idle torques (m, n), N m, over its Coulomb level.
+
+    NaN for a joint whose level is not identified, or not well above what the identification leaves.
+    """
+    if isinstance(found, Refusal):
+        return np.full(q.shape, np.nan)
+    friction = found[0]
+    level, _, offset = friction.value.T
+    clear = friction.noise < CLEAR * np.nan_to_num(level)
+    weight = gravity_regressor(dh, q) @ friction.others
+    return np.asarray((torque - weight - np.nan_to_num(offset)) / np.where(clear, level, np.nan))
 
 
 def _torques(log: pd.DataFrame, axes: Axes) -> Array:

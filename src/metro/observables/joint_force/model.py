@@ -4,9 +4,11 @@ Per joint and bin of the path: torque = gain × (−Jᵀ f) + drives + payload (
 dynamometer's force, averaged over a revolution of the spindle and over the bin. Each joint's torque, whatever
 makes it, and each axis of the dynamometer may have a small additional gain, and each axis may show some of
 the force along the others (crosstalk, a turned mounting), to first order, within the accuracy of the
-instruments. The torques may follow the force late, by the filters of the drives and the clock of the log. The
-rows of the comparison are forces: that of the dynamometer, and the sensorless force, which is that of the
-dynamometer plus the force at the tip that belongs to the residual torques.
+instruments. Joints may be warmer in the cut than in the idle run: their friction has changed by a share of
+it, and a motor shows all of its torque, that of the arm's weight, too, by another torque constant. The
+torques may follow the force late, by the filters of the drives and the clock of the log. The rows of the
+comparison are forces: that of the dynamometer, and the sensorless force, which is that of the dynamometer
+plus the force at the tip that belongs to the residual torques.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ from metro.signals.waves import waves
 from metro.units import MS, Array
 
 AXES = "xyz"
-UNDER_LOAD = "friction_under_load_joint_"
+# What each joint may have otherwise in the cut than in the idle run.
+CONSTANT, LEVEL, VISCOUS = "torque_constant_of_joint_", "friction_of_joint_", "viscous_friction_of_joint_"
 LAG_STEP = 5 * MS  # over which the torques are differentiated
 LAG_GRID = 1 * MS
 CROSS = tuple(permutations(range(3), 2))  # axis that shows it, axis along which the force is
@@ -68,6 +71,8 @@ class TorqueRun:
     t, width : (m,) middle and length of the bin's time, s, by the dynamometer's clock. since : (m,) the same
         from the start of the log.
     force : the dynamometer's record.
+    idle : (m, k) torques of the idle run at the same places without their noise, N m, of the k joints that
+        turn.
     start : (n,) friction of the joints over its level where the path begins, −1 … 1; without it they moved
         before as they do there. turn : (n,) over which it follows, rad; NaN where it is not identified.
     """
@@ -78,6 +83,7 @@ class TorqueRun:
     since: Array
     width: Array
     force: ForceRecord
+    idle: Array
     start: Array | None = None
     turn: Array | None = None
 
@@ -106,12 +112,17 @@ class JointForceModel:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """A gain that all torques share, one of each joint and axis, crosstalk, friction under load, lag."""
+        """A gain that all torques share, one of each joint and axis, crosstalk, and what a cut changes.
+
+        That is each joint's torque constant, its friction and viscous friction, against the idle run; a lag.
+        """
         names = ["torque_gain", *(f"gain_of_joint_{i + 1}" for i in self.joints)]
         names += [f"gain_of_{a}" for a in AXES]
         names += [f"crosstalk_of_{AXES[along]}_in_{AXES[seen]}" for seen, along in CROSS]
-        friction = [Parameter(f"{UNDER_LOAD}{i + 1}", "N m") for i in self.joints]
-        return (*(Parameter(name, "1") for name in names), *friction, Parameter("drive_lag", "ms", MS))
+        names += [f"{CONSTANT}{i + 1}" for i in self.joints]
+        level = [Parameter(f"{LEVEL}{i + 1}", "N m") for i in self.joints]
+        viscous = [Parameter(f"{VISCOUS}{i + 1}", "N m s/rad") for i in self.joints]
+        return (*(Parameter(name, "1") for name in names), *level, *viscous, Parameter("drive_lag", "ms", MS))
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -123,9 +134,9 @@ class JointForceModel:
         return np.zeros((1, 0))
 
     def design(self, block: Block, _nuisance: Array, beta: Array | None = None) -> tuple[Array, Array]:
-        """Waves of the torque (k m, 2 k + 11) per base parameter, and those without a force (k m,), N m.
+        """Waves of the torque (k m, 4 k + 11) per base parameter, and those without a force (k m,), N m.
 
-        For :class:`Instruments` they are all but the first (2 k + 10, 2 k + 11) themselves; k joints turn.
+        For :class:`Instruments` they are all but the first (4 k + 10, 4 k + 11) themselves; k joints turn.
         The torques of drives and payload are read with the gains of the joints, too. The lag is linear about
         that of ``beta``, to a grid.
         """
@@ -192,12 +203,15 @@ def held(dh: Same[Geometry], run: TorqueRun) -> Array:
 
 @lru_cache(maxsize=256)
 def basis(arm: Arm, run: TorqueRun, offset: float) -> Array:
-    """Waves (k m, 2 k + 11) per base parameter without the torques of drives and payload; not to be changed.
+    """Waves (k m, 4 k + 11) per base parameter without the torques of drives and payload; not to be changed.
 
     The log stamps the force ``offset`` s later than the dynamometer.
     """
-    rubbed = rubbing(run, tuple(arm.axes.turning))
-    return np.column_stack([carried(arm, run, offset), rubbed, late(arm, run, offset)])
+    joints = tuple(arm.axes.turning)
+    rubbed = rubbing(run, joints), _one_by_one(run.rate[:, joints])
+    return np.column_stack(
+        [carried(arm, run, offset), _one_by_one(run.idle), *rubbed, late(arm, run, offset)]
+    )
 
 
 @lru_cache(maxsize=256)
@@ -225,7 +239,7 @@ def rubbing(run: TorqueRun, joints: tuple[int, ...]) -> Array:
     turn = () if run.turn is None else tuple(run.turn.tolist())
     one = DriveTorques((1.0,) * run.q.shape[1], presliding=turn)
     states = one.at(run.q, run.rate, run.since, start=run.start)[:, joints]
-    return np.stack([in_waves(states * joint) for joint in np.eye(len(joints))], axis=1)
+    return _one_by_one(states)
 
 
 @lru_cache(maxsize=256)
@@ -239,6 +253,11 @@ def late(arm: Arm, run: TorqueRun, offset: float) -> Array:
 def _driven_jacobian(arm: Arm, run: TorqueRun) -> Array:
     """Tip velocity per rate of each joint that turns, along a run, (m, 3, k)."""
     return np.asarray(tip_jacobian_of(arm, along(Same(arm.dh), run))[..., arm.axes.turning])
+
+
+def _one_by_one(torque: Array) -> Array:
+    """Return torques (m, k) as waves along the path of one joint at a time (k m, k)."""
+    return np.stack([in_waves(torque * joint) for joint in np.eye(torque.shape[1])], axis=1)
 
 
 def in_waves(torque: Array) -> Array:

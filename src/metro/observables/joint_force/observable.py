@@ -29,7 +29,7 @@ from metro.observables.joint_force.model import (
     rubbing,
     running,
 )
-from metro.observables.joint_force.tables import NOISE, START, TURN, observe, slow_noise
+from metro.observables.joint_force.tables import IDLE, NOISE, START, TURN, observe, slow_noise, smooth
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
@@ -38,13 +38,18 @@ from metro.robot.drives import declared, drives_of_cell
 from metro.robot.kinematics import Arm, arm_of_cell
 from metro.robot.statics import driven_jacobian
 from metro.signals.waves import variance, waves
-from metro.units import JSON, MRAD, MS, Array
+from metro.units import DEG, JSON, MRAD, MS, Array
 
 SCATTER = 0.01
 CALIBRATED = 0.01  # relative error of an axis of the dynamometer, in all runs
 DRIVEN = 0.03  # of the torque of a joint, in all runs: torque constants are stated to some 5 %
+# Of a torque constant, against the idle run: magnets lose 0.11 % per kelvin, and motors differ by some 10 K.
+WARMED = 0.011
+# Of the friction of a joint, against the idle run: viscous friction halves while an arm warms up, all
+# of it changes by some 5 % (at the fastest speed, where the idle runs do not separate the two).
+WEARING, THINNING = 0.05, 0.25
 BY_LOAD = 0.015  # of the torque of the cut: what the friction of a joint has more, under load (0.3 to 2 %)
-LEAST_FRICTION = 0.1  # N m, of a joint that no cut loads
+LEAST_FRICTION, LEAST_VISCOUS = 0.1, 1.0  # N m and N m s/rad, of a joint that shows none
 LAG = 10 * MS  # of all torques behind the force: filters of the drives (20 to 60 Hz), clock of the log
 SHIFT = 4 * MS  # of the log of one run: it is stamped in cycles of 4 to 12 ms
 # Of the force along one axis that another one shows: makers state up to 2 % of crosstalk, and a mounting is
@@ -98,7 +103,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         "N",
         1.0,
         model,
-        (_instruments(batch, arm, blocks), *blocks),
+        (_instruments(batch, arm, blocks, observed.get("joint_friction")), *blocks),
         scatter,
         notes=notes,
         basis_unit="N m",
@@ -112,15 +117,21 @@ def _turns(torques: pd.DataFrame, arm: Arm) -> tuple[float, ...]:
     return tuple(turns.tolist())
 
 
-def _instruments(batch: Batch, arm: Arm, blocks: Sequence[Block]) -> Block:
-    """Return what is known of gains, crosstalk and friction; of joints, what the cell declares of each."""
+def _instruments(batch: Batch, arm: Arm, blocks: Sequence[Block], friction: pd.DataFrame | None) -> Block:
+    """Return what is known of gains, crosstalk and friction; of joints, what the cell declares of each.
+
+    ``friction`` : table of the friction by the idle runs; None without one.
+    """
     joints, names = arm.axes.turning, arm.axes.driven("joint {}")
-    axis = np.array([*names, *WORK, *(WORK[seen] for seen, _ in CROSS), *names, "time"])
+    axis = np.array([*names, *WORK, *(WORK[seen] for seen, _ in CROSS), *names, *names, *names, "time"])
     count = len(axis)
     zeros, known, sigma = np.zeros((count, 0)), np.zeros(count), np.full(count, CALIBRATED)
     sigma[: len(joints)] = DRIVEN
     sigma[len(joints) + len(WORK) : -1] = CROSSTALK
-    sigma[-1 - len(joints) : -1] = np.maximum(BY_LOAD * _largest(arm, blocks), LEAST_FRICTION)
+    level, viscous = _friction(arm, friction)
+    own = np.hypot(BY_LOAD * _largest(arm, blocks), WEARING * level)
+    each = np.repeat(WARMED, len(joints)), np.maximum(own, LEAST_FRICTION), viscous
+    sigma[-1 - 3 * len(joints) : -1] = np.concatenate(each)
     sigma[-1] = LAG
     if declared(batch.cell):
         drives = drives_of_cell(batch.cell, len(arm.axes)).covariance
@@ -131,6 +142,23 @@ def _instruments(batch: Batch, arm: Arm, blocks: Sequence[Block]) -> Block:
         *(known[:0], {}),
         belief=True,
     )
+
+
+def _friction(arm: Arm, table: pd.DataFrame | None) -> tuple[Array, Array]:
+    """Return the friction of each joint that turns (k,), N m, and by how much its viscous part may change.
+
+    That is in N m s/rad; friction that no idle run identifies is none.
+    """
+    joints = arm.axes.turning
+    if table is None:
+        return np.zeros(len(joints)), np.full(len(joints), LEAST_VISCOUS)
+    rows = table.set_index("joint").loc[[joint + 1 for joint in joints]]
+    level = np.nan_to_num(np.abs(rows["coulomb"].to_numpy()))
+    fastest = np.maximum(rows["fastest_deg_s"].to_numpy() * DEG, np.finfo(float).tiny)
+    half = 0.5 * (rows["viscous_high"] - rows["viscous_low"]).to_numpy()
+    known = THINNING * np.hypot(rows["viscous"].to_numpy(), half / 2.0)
+    change = np.where(np.isfinite(known), known, WEARING * level / fastest)
+    return level, np.maximum(change, LEAST_VISCOUS)
 
 
 def _largest(arm: Arm, blocks: Sequence[Block]) -> Array:
@@ -183,7 +211,8 @@ def torque_run(table: pd.DataFrame, force: pd.DataFrame) -> TorqueRun:
     start, turn = np.zeros(len(axes)), np.full(len(axes), np.nan)
     start[axes.turning] = table[axes.driven(START)].to_numpy()[0]
     turn[axes.turning] = table[axes.driven(TURN)].to_numpy()[0] * MRAD
-    return TorqueRun(q, rate, time, since, width, record, start, turn)
+    idle = smooth(table[axes.driven(IDLE)].to_numpy(), table["s_mm"].to_numpy(), rate[:, axes.turning])
+    return TorqueRun(q, rate, time, since, width, record, idle, start, turn)
 
 
 def _lengths(s_mm: Array) -> np.ndarray:

@@ -16,14 +16,18 @@ from metro.observables.arm import tip_force
 from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import wall
+from metro.observables.joint_force import friction
 from metro.observables.joint_force.model import ForceRecord, running
 from metro.observables.problem import Refusal
 from metro.robot.drive_torques import TURNING
+from metro.robot.friction import Friction
 from metro.robot.kinematics import Arm, arm_of_cell
+from metro.robot.motion import Motion
 from metro.robot.presliding import IdlePath, presliding
+from metro.same import Same
 from metro.signals import align, kalman
 from metro.signals.intervals import uneven
-from metro.signals.waves import variance, wandering
+from metro.signals.waves import SMOOTH, variance, wandering
 from metro.units import JSON, MM, MRAD, MS, Array
 
 # After a start from rest the joints' friction first winds up, over 1e-4 to 1e-3 rad: some millimetres of the
@@ -39,7 +43,8 @@ LEAST_BINS = 8  # of the path
 def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataFrame] | Refusal:
     """Torques of each cut less those of its idle run, and the dynamometer's force beside them.
 
-    Tables ``joint_torque`` (per bin of the path), ``tool_force`` (per 5 ms), ``joint_force_refused``.
+    Tables ``joint_torque`` (per bin of the path), ``tool_force`` (per 5 ms), ``joint_force_refused``, and
+    those of :func:`metro.observables.joint_force.friction.observe`.
     """
     arm = arm_of_cell(batch.cell, batch.manifest)
     if arm is None:
@@ -56,9 +61,11 @@ def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataF
             forces.append(force.assign(run=run))
     if not torques and not refused:
         return Refusal("no run has a robot_log, an idle_log and a dynamometer record")
+    rubbed, of_idle = friction.observe(batch, read), friction.of_idle_logs(Same(batch), Same(read))
     return {
-        **({"joint_torque": _with_presliding(torques, arm.axes)} if torques else {}),
+        **({"joint_torque": _with_presliding(torques, arm, of_idle)} if torques else {}),
         **({"tool_force": pd.concat(forces, ignore_index=True)} if forces else {}),
+        **({} if isinstance(rubbed, Refusal) else rubbed),
         "joint_force_refused": pd.DataFrame(refused, columns=["run", "reason"], dtype=str),
     }
 
@@ -106,12 +113,11 @@ def _torque(
     if len(cut.tip) < 2:
         return Refusal("the log of the cut does not move")
     step = float(np.median(np.linalg.norm(np.diff(cut.tip, axis=0), axis=1)))
-    rate = np.gradient(cut.commanded, cut.time, axis=0)
     begun = float(table["t_s"][table["log"] == "cut"].min())
     meet = cut.time[0] < force["t_s"].iloc[-1] and cut.time[-1] > 0.0
     time = cut.time if meet else cut.time - begun
     channels = [
-        np.column_stack([cut.torque, cut.actual, rate, time, cut.tip @ wall(batch, run).along]),
+        np.column_stack([cut.torque, cut.actual, cut.commanded, time, cut.tip @ wall(batch, run).along]),
         np.column_stack([idle.torque, np.zeros((len(idle.torque), 2 * len(arm.axes) + 2))]),
     ]
     places = [align.along_path(log.tip, cut.tip) for log in (cut, idle)]
@@ -133,7 +139,8 @@ def _torque(
     ]
     # what wanders in the idle run wanders as much in the cut, where the force hides it
     axes, parts = arm.axes, np.cumsum([len(arm.axes.turning), len(arm.axes), len(arm.axes)])
-    torque, actual, rates, rest = np.split(pair.first, parts, axis=1)
+    torque, actual, commanded, rest = np.split(pair.first, parts, axis=1)
+    rates = align.slopes(commanded, rest[:, 0])
     idle_torque = pair.second[:, : parts[0]]
     turning = np.tanh(rates[:, axes.turning] / TURNING)
     idling = wandering(idle_torque, white[1] / samples, turning, uneven(pair.s) if gaps else None)
@@ -150,35 +157,58 @@ def _torque(
     return pd.DataFrame(columns)
 
 
-def _with_presliding(runs: list[pd.DataFrame], axes: Axes) -> pd.DataFrame:
+def _with_presliding(
+    runs: list[pd.DataFrame], arm: Arm, found: tuple[Friction, Motion] | Refusal
+) -> pd.DataFrame:
     """Put all runs into one table, with the state of friction at the start of each and how it follows.
 
-    The torques of the idle runs, from which both are identified, are not kept.
+    Both are identified from the torques of the idle runs, of which ``found`` is the friction.
     """
+    axes = arm.axes
+    states = [_rubbed(table, arm, found) for table in runs]
     wander = slow_noise(runs, axes)
     columns = zip(*(axes.driven(name) for name in (IDLE, NOISE, START, TURN)), strict=True)
-    found: list[dict[str, float]] = [{} for _ in runs]
+    rows: list[dict[str, float]] = [{} for _ in runs]
     for joint, slow, (own, noise, start, turn) in zip(axes.turning, wander, columns, strict=True):
         paths = []
-        for table in runs:
+        for table, state in zip(runs, states, strict=True):
             q, rate = (table[names[joint]].to_numpy() for names in (axes.positions, axes.rates))
             # Of the noise of the difference, half of its variance is that of the idle run.
             white = 0.5 * table[noise].iloc[0] ** 2 / table["samples"].iloc[0]
             sd = np.sqrt(variance(len(table), np.array([white]), np.array([0.5 * slow**2])))[:, 0]
             unit = axes.units[joint]
-            paths.append(IdlePath(q * unit, rate * unit, table[own].to_numpy(), sd))
-        friction = presliding(paths)
-        for row, state in zip(found, friction.start, strict=True):
-            row |= {start: float(state), turn: friction.turn / MRAD}
-    idle = axes.driven(IDLE)
-    kept = [table.drop(columns=idle).assign(**row) for table, row in zip(runs, found, strict=True)]
-    return pd.concat(kept, ignore_index=True)
+            seen = state[:, joint] if np.isfinite(state[:, joint]).all() else None
+            paths.append(IdlePath(q * unit, rate * unit, table[own].to_numpy(), sd, seen))
+        following = presliding(paths)
+        for row, began in zip(rows, following.start, strict=True):
+            row |= {start: float(began), turn: following.turn / MRAD}
+    whole = [table.assign(**row) for table, row in zip(runs, rows, strict=True)]
+    return pd.concat(whole, ignore_index=True)
+
+
+def _rubbed(table: pd.DataFrame, arm: Arm, found: tuple[Friction, Motion] | Refusal) -> Array:
+    axes = arm.axes
+    torque = np.zeros((len(table), len(axes)))
+    torque[:, axes.turning] = table[axes.driven(IDLE)].to_numpy()
+    return friction.rubbed(found, arm.dh, table[axes.positions].to_numpy() * axes.units, torque)
 
 
 def slow_noise(runs: Sequence[pd.DataFrame], axes: Axes) -> Array:
     """Return the level of the slow noise (k,), N m, rms over the runs: each says little of it."""
     levels = np.array([table[axes.driven(WANDER)].iloc[0] for table in runs], dtype=float)
     return np.asarray(np.sqrt((levels**2).mean(axis=0)))
+
+
+def smooth(torque: Array, s: Array, rate: Array) -> Array:
+    """Return the torques (m, k) of an idle run along its path ``s`` (m,), without what is noise in them.
+
+    Their noise is in the difference of cut and idle run, too, where a share of it would pass for theirs.
+    ``rate`` (m, k), rad/s.
+    """
+    place = 2.0 * (s - s[0]) / (s[-1] - s[0]) - 1.0
+    steps = np.tanh(rate / TURNING)
+    shapes = np.column_stack([np.polynomial.legendre.legvander(place, SMOOTH - 1), steps])
+    return np.asarray(shapes @ np.linalg.lstsq(shapes, torque)[0])
 
 
 def _settled(pair: align.Aligned, x: Array) -> align.Aligned:
