@@ -71,7 +71,14 @@ class DriveTorques:
         return [PRESLIDING if math.isnan(turn) else turn for turn in known.tolist()]
 
     def at(
-        self, q: Array, rate: Array, t: Array, width: Array | float = 0.0, start: Array | None = None
+        self,
+        q: Array,
+        rate: Array,
+        t: Array,
+        width: Array | float = 0.0,
+        *,
+        start: Array | None = None,
+        peak: Array | None = None,
     ) -> Array:
         """Torque (m, n), N m, on top of that of the idle run, each the mean over ``width`` s.
 
@@ -79,6 +86,7 @@ class DriveTorques:
         ----------
         q, rate : (m, n) angles, rad, and speeds, rad/s, of the joints. t : (m,) s from the log's start.
         start : (n,) friction over its level where the path begins, −1 … 1; else the joints moved as there.
+        peak : (m, n) Coulomb friction at these speeds over its level; else it is that at all speeds.
         """
         reversal, warmup, viscous = (
             of_joints(each, rate.shape[1]) for each in (self.reversal, self.warmup, self.viscous)
@@ -86,7 +94,7 @@ class DriveTorques:
         torque = rate * viscous if viscous.any() else np.zeros_like(rate)
         turns = self.turns(rate.shape[1])
         for joint in np.flatnonzero((reversal != 0.0) | (warmup != 0.0)):
-            level = reversal[joint] + t * warmup[joint]
+            level = (reversal[joint] + t * warmup[joint]) * (1.0 if peak is None else peak[:, joint])
             first = None if start is None else float(start[joint])
             torque[:, joint] += level * _slid(Same(q), Same(rate), int(joint), turns[joint], first)
         for one in self.ripple:

@@ -75,6 +75,7 @@ class TorqueRun:
         turn.
     start : (n,) friction of the joints over its level where the path begins, −1 … 1; without it they moved
         before as they do there. turn : (n,) over which it follows, rad; NaN where it is not identified.
+    peak : (m, n) its level at these speeds over that of all cuts (Stribeck); without it that is one.
     """
 
     q: Array
@@ -86,6 +87,7 @@ class TorqueRun:
     idle: Array
     start: Array | None = None
     turn: Array | None = None
+    peak: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +192,8 @@ def along(dh: Same[Geometry], run: TorqueRun) -> Flange:
 @lru_cache(maxsize=256)
 def driven(drives: DriveTorques, dh: Same[Geometry], run: TorqueRun) -> Array:
     """Waves (k m,), N m, of the torques of the drives; not to be changed."""
-    torque = drives.at(run.q, run.rate, run.since, run.width, run.start)[:, axes(dh.value).turning]
+    torque = drives.at(run.q, run.rate, run.since, run.width, start=run.start, peak=run.peak)
+    torque = torque[:, axes(dh.value).turning]
     return in_waves(torque) if torque.any() else np.zeros(torque.size)
 
 
@@ -238,7 +241,7 @@ def rubbing(run: TorqueRun, joints: tuple[int, ...]) -> Array:
     """Waves (k m, k) of the friction of each joint that turns, over its level."""
     turn = () if run.turn is None else tuple(run.turn.tolist())
     one = DriveTorques((1.0,) * run.q.shape[1], presliding=turn)
-    states = one.at(run.q, run.rate, run.since, start=run.start)[:, joints]
+    states = one.at(run.q, run.rate, run.since, start=run.start, peak=run.peak)[:, joints]
     return _one_by_one(states)
 
 

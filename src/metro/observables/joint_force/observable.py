@@ -29,7 +29,7 @@ from metro.observables.joint_force.model import (
     rubbing,
     running,
 )
-from metro.observables.joint_force.tables import IDLE, NOISE, START, TURN, observe, slow_noise, smooth
+from metro.observables.joint_force.tables import IDLE, NOISE, PEAK, START, TURN, observe, slow_noise, smooth
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
@@ -211,8 +211,10 @@ def torque_run(table: pd.DataFrame, force: pd.DataFrame) -> TorqueRun:
     start, turn = np.zeros(len(axes)), np.full(len(axes), np.nan)
     start[axes.turning] = table[axes.driven(START)].to_numpy()[0]
     turn[axes.turning] = table[axes.driven(TURN)].to_numpy()[0] * MRAD
+    peak = np.ones(q.shape)
+    peak[:, axes.turning] = table[axes.driven(PEAK)].to_numpy()
     idle = smooth(table[axes.driven(IDLE)].to_numpy(), table["s_mm"].to_numpy(), rate[:, axes.turning])
-    return TorqueRun(q, rate, time, since, width, record, idle, start, turn)
+    return TorqueRun(q, rate, time, since, width, record, idle, start, turn, peak)
 
 
 def _lengths(s_mm: Array) -> np.ndarray:

@@ -24,6 +24,7 @@ from metro.robot.friction import Friction
 from metro.robot.kinematics import Arm, arm_of_cell
 from metro.robot.motion import Motion
 from metro.robot.presliding import IdlePath, presliding
+from metro.robot.stribeck import Stribeck
 from metro.same import Same
 from metro.signals import align, kalman
 from metro.signals.intervals import uneven
@@ -35,7 +36,7 @@ from metro.units import JSON, MM, MRAD, MS, Array
 SETTLED, OF_AIR = 5 * MM, 1.0 / 3.0
 GRID = 5 * MS
 NOISE, WANDER, IDLE = "noise{}_nm", "wander{}_nm", "idle{}_nm"
-START, TURN = "start{}", "presliding{}_mrad"
+START, TURN, PEAK = "start{}", "presliding{}_mrad", "peak{}"
 AT_AN_END = 0.1  # s by which the clocks of log and dynamometer may be apart, of a record that ends in the cut
 LEAST_BINS = 8  # of the path
 
@@ -183,7 +184,17 @@ def _with_presliding(
         for row, began in zip(rows, following.start, strict=True):
             row |= {start: float(began), turn: following.turn / MRAD}
     whole = [table.assign(**row) for table, row in zip(runs, rows, strict=True)]
-    return pd.concat(whole, ignore_index=True)
+    return _with_peaks(pd.concat(whole, ignore_index=True), axes, found)
+
+
+def _with_peaks(table: pd.DataFrame, axes: Axes, found: tuple[Friction, Motion] | Refusal) -> pd.DataFrame:
+    """Add by how much the friction of each joint is above its mean over all cuts, by its speed."""
+    peaks = {}
+    for joint, name in zip(axes.turning, axes.driven(PEAK), strict=True):
+        rate = table[axes.rates[joint]].to_numpy() * axes.units[joint]
+        curve = Stribeck() if isinstance(found, Refusal) else friction.by_speed(*found, joint)
+        peaks[name] = curve.at(rate) / curve.at(rate).mean()
+    return table.assign(**peaks)
 
 
 def _rubbed(table: pd.DataFrame, arm: Arm, found: tuple[Friction, Motion] | Refusal) -> Array:
