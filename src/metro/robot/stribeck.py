@@ -29,26 +29,24 @@ class Stribeck:
         return np.asarray(1.0 + self.above * np.exp(-((rate / self.creep) ** 2)))
 
 
-def stribeck(rate: Array, torque: Array, noise: float) -> Stribeck:
-    """Fit the curve to means of friction.
+def stribeck(rate: Array, state: Array, friction: Array, noise: float) -> Stribeck:
+    """Fit the curve to friction along paths.
 
     Parameters
     ----------
-    rate : (k,) rad/s. torque : (k,) N m that resist there. noise : of each mean, N m.
+    rate : (k,) rad/s. state : (k,) of presliding, −1 … 1. friction : (k,) over its level. noise : of it.
     """
-    if len(rate) < 2:
-        return Stribeck()
-    size, speed = np.sign(rate) * torque, np.abs(rate)
-    tried = [_fitted(size, speed, float(creep), noise) for creep in CREEPS]
+    tried = [_fitted(rate, state, friction, float(creep), noise) for creep in CREEPS]
     return min(tried, key=lambda one: one[0])[1]
 
 
-def _fitted(size: Array, speed: Array, creep: float, noise: float) -> tuple[float, Stribeck]:
+def _fitted(rate: Array, state: Array, friction: Array, creep: float, noise: float) -> tuple[float, Stribeck]:
     """Return -2 log-likelihood and the curve of one ``creep``: least squares, with what is believed of it."""
-    columns = np.column_stack([np.ones_like(speed), np.exp(-((speed / creep) ** 2)), speed])
-    belief = np.array([[0.0, 1.0 / (ABOVE_SD * max(float(np.median(size)), noise)), 0.0]])
-    rows, right = np.vstack([columns / noise, belief]), np.append(size / noise, 0.0)
-    found = np.linalg.lstsq(rows, right)[0]
-    if found[0] <= 0.0 or found[1] <= 0.0:
-        return float(np.sum((size - np.median(size)) ** 2)) / noise**2, Stribeck()
-    return float(np.sum((right - rows @ found) ** 2)), Stribeck(float(found[1] / found[0]), creep)
+    columns = np.column_stack([state, state * np.exp(-((rate / creep) ** 2)), rate])
+    rows = np.vstack([columns / noise, [[0.0, 1.0 / ABOVE_SD, 0.0]]])
+    right = np.append(friction / noise, 0.0)
+    level, above, viscous = np.linalg.lstsq(rows, right)[0]
+    if level <= 0.0 or above <= 0.0:
+        (level, viscous), above = np.linalg.lstsq(rows[:, [0, 2]], right)[0], 0.0
+    left = right - rows @ (level, above, viscous)
+    return float(left @ left), Stribeck(float(above / level) if level > 0.0 else 0.0, creep)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 
@@ -19,7 +18,6 @@ from metro.robot.friction import Friction, of_idle_runs
 from metro.robot.kinematics import Geometry, arm_of_cell
 from metro.robot.motion import Motion
 from metro.robot.rigid_body import gravity_regressor
-from metro.robot.stribeck import Stribeck, stribeck
 from metro.same import Same
 from metro.units import DEG, JSON, Array
 
@@ -127,31 +125,17 @@ def _remark(friction: Friction, joint: int, value: Array) -> str:
 
 def _curve(friction: Friction, log: Motion) -> pd.DataFrame:
     """Friction torque by speed: mean and standard deviation of bins with equal numbers of samples."""
-    rows = [
-        (j + 1, rate / DEG, mean, spread)
-        for j in range(log.rate.shape[1])
-        for rate, mean, spread in _means(friction, log, j)
-    ]
+    known = np.nan_to_num(friction.value)
+    resists = friction.residual + known[:, 0] * log.direction + known[:, 1] * log.rate
+    rows = []
+    for j in range(log.rate.shape[1]):
+        for sign in (1, -1):
+            inside = log.moving[:, j] & (sign * log.rate[:, j] > 0)
+            rate, torque = log.rate[inside, j], resists[inside, j]
+            for part in np.array_split(np.argsort(rate), min(BINS, len(rate))) if len(rate) else ():
+                mean, spread = torque[part].mean(), torque[part].std()
+                rows.append((j + 1, rate[part].mean() / DEG, mean, spread))
     return pd.DataFrame(rows, columns=["joint", "speed_deg_s", "friction_nm", "sd_nm"])
-
-
-def _means(friction: Friction, log: Motion, joint: int) -> Iterator[tuple[float, float, float]]:
-    """Yield speed, rad/s, mean of what resists there and its standard deviation, N m, of a joint, from 0."""
-    coulomb, viscous, _ = np.nan_to_num(friction.value[joint])
-    resists = friction.residual[:, joint] + coulomb * log.direction[:, joint] + viscous * log.rate[:, joint]
-    for sign in (1, -1):
-        inside = log.moving[:, joint] & (sign * log.rate[:, joint] > 0)
-        rate, torque = log.rate[inside, joint], resists[inside]
-        for part in np.array_split(np.argsort(rate), min(BINS, len(rate))) if len(rate) else ():
-            yield float(rate[part].mean()), float(torque[part].mean()), float(torque[part].std())
-
-
-def by_speed(friction: Friction, log: Motion, joint: int) -> Stribeck:
-    """Return how the friction of a joint, from 0, falls with its speed; not at all where that is not seen."""
-    if not np.isfinite(friction.value[joint, 0]):
-        return Stribeck()
-    rate, torque, _ = np.array([*_means(friction, log, joint)]).T
-    return stribeck(rate, torque, float(friction.noise[joint]))
 
 
 def report(observed: dict[str, pd.DataFrame] | Refusal) -> JSON:

@@ -19,12 +19,12 @@ from metro.observables.arm.wall import wall
 from metro.observables.joint_force import friction
 from metro.observables.joint_force.model import ForceRecord, running
 from metro.observables.problem import Refusal
-from metro.robot.drive_torques import TURNING
+from metro.robot.drive_torques import PRESLIDING, TURNING, slid
 from metro.robot.friction import Friction
 from metro.robot.kinematics import Arm, arm_of_cell
 from metro.robot.motion import Motion
-from metro.robot.presliding import IdlePath, presliding
-from metro.robot.stribeck import Stribeck
+from metro.robot.presliding import IdlePath, Presliding, presliding
+from metro.robot.stribeck import Stribeck, stribeck
 from metro.same import Same
 from metro.signals import align, kalman
 from metro.signals.intervals import uneven
@@ -118,8 +118,8 @@ def _torque(
     meet = cut.time[0] < force["t_s"].iloc[-1] and cut.time[-1] > 0.0
     time = cut.time if meet else cut.time - begun
     channels = [
-        np.column_stack([cut.torque, cut.actual, cut.commanded, time, cut.tip @ wall(batch, run).along]),
-        np.column_stack([idle.torque, np.zeros((len(idle.torque), 2 * len(arm.axes) + 2))]),
+        np.column_stack([cut.torque, cut.commanded, time, cut.tip @ wall(batch, run).along]),
+        np.column_stack([idle.torque, np.zeros((len(idle.torque), len(arm.axes) + 2))]),
     ]
     places = [align.along_path(log.tip, cut.tip) for log in (cut, idle)]
     width = max(tip_force.BIN, 3 * step)
@@ -139,8 +139,9 @@ def _torque(
         for log in (cut, idle)
     ]
     # what wanders in the idle run wanders as much in the cut, where the force hides it
-    axes, parts = arm.axes, np.cumsum([len(arm.axes.turning), len(arm.axes), len(arm.axes)])
-    torque, actual, commanded, rest = np.split(pair.first, parts, axis=1)
+    # Angles are those that were commanded: the noise of those measured would make friction follow it.
+    axes, parts = arm.axes, np.cumsum([len(arm.axes.turning), len(arm.axes)])
+    torque, commanded, rest = np.split(pair.first, parts, axis=1)
     rates = align.slopes(commanded, rest[:, 0])
     idle_torque = pair.second[:, : parts[0]]
     turning = np.tanh(rates[:, axes.turning] / TURNING)
@@ -150,7 +151,7 @@ def _torque(
     columns |= {"since_s": columns["t_s"] - (begun if meet else 0.0), "meet": np.full(len(pair.s), meet)}
     columns |= {"width_s": np.full(len(pair.s), samples * period), "samples": np.full(len(pair.s), samples)}
     columns |= dict(zip(axes.torques, (torque - idle_torque).T, strict=True))
-    columns |= dict(zip(axes.positions, (actual / axes.units).T, strict=True))
+    columns |= dict(zip(axes.positions, (commanded / axes.units).T, strict=True))
     columns |= dict(zip(axes.rates, (rates / axes.units).T, strict=True))
     columns |= dict(zip(axes.driven(NOISE), np.sqrt(white[0] + white[1]), strict=True))
     columns |= dict(zip(axes.driven(WANDER), np.sqrt(2.0 * idling), strict=True))
@@ -168,9 +169,9 @@ def _with_presliding(
     axes = arm.axes
     states = [_rubbed(table, arm, found) for table in runs]
     wander = slow_noise(runs, axes)
-    columns = zip(*(axes.driven(name) for name in (IDLE, NOISE, START, TURN)), strict=True)
-    rows: list[dict[str, float]] = [{} for _ in runs]
-    for joint, slow, (own, noise, start, turn) in zip(axes.turning, wander, columns, strict=True):
+    columns = zip(*(axes.driven(name) for name in (IDLE, NOISE, START, TURN, PEAK)), strict=True)
+    rows: list[dict[str, Any]] = [{} for _ in runs]
+    for joint, slow, (own, noise, start, turn, peak) in zip(axes.turning, wander, columns, strict=True):
         paths = []
         for table, state in zip(runs, states, strict=True):
             q, rate = (table[names[joint]].to_numpy() for names in (axes.positions, axes.rates))
@@ -183,18 +184,27 @@ def _with_presliding(
         following = presliding(paths)
         for row, began in zip(rows, following.start, strict=True):
             row |= {start: float(began), turn: following.turn / MRAD}
-    whole = [table.assign(**row) for table, row in zip(runs, rows, strict=True)]
-    return _with_peaks(pd.concat(whole, ignore_index=True), axes, found)
+        curve = _by_speed(paths, following)
+        levels = [curve.at(path.rate) for path in paths]
+        mean = float(np.concatenate(levels).mean())
+        for row, level in zip(rows, levels, strict=True):
+            row |= {peak: level / mean}
+    return pd.concat([run.assign(**row) for run, row in zip(runs, rows, strict=True)], ignore_index=True)
 
 
-def _with_peaks(table: pd.DataFrame, axes: Axes, found: tuple[Friction, Motion] | Refusal) -> pd.DataFrame:
-    """Add by how much the friction of each joint is above its mean over all cuts, by its speed."""
-    peaks = {}
-    for joint, name in zip(axes.turning, axes.driven(PEAK), strict=True):
-        rate = table[axes.rates[joint]].to_numpy() * axes.units[joint]
-        curve = Stribeck() if isinstance(found, Refusal) else friction.by_speed(*found, joint)
-        peaks[name] = curve.at(rate) / curve.at(rate).mean()
-    return table.assign(**peaks)
+def _by_speed(paths: Sequence[IdlePath], following: Presliding) -> Stribeck:
+    """Return how the friction of a joint falls with its speed; not at all where its friction is not seen."""
+    turn = following.turn if math.isfinite(following.turn) else PRESLIDING
+    seen = [
+        (path.rate, slid(path.q, path.rate, turn, float(start)), path.rubbed)
+        for path, start in zip(paths, following.start, strict=True)
+        if path.rubbed is not None
+    ]
+    if not seen:
+        return Stribeck()
+    rate, state, rubbed = (np.concatenate(parts) for parts in zip(*seen, strict=True))
+    # The weight that was fitted is off by a smooth curve along each path: it has no more values than that.
+    return stribeck(rate, state, rubbed, friction.CLEAR * math.sqrt(len(rate) / (SMOOTH * len(seen))))
 
 
 def _rubbed(table: pd.DataFrame, arm: Arm, found: tuple[Friction, Motion] | Refusal) -> Array:
