@@ -207,7 +207,9 @@ def test_instruments_that_are_off_as_stated_are_no_effect_and_their_gains_are_to
     assert sd.min() < 0.75 * joint_force.DRIVEN  # else the runs told nothing
 
 
-@pytest.mark.parametrize(("joint", "size"), [pytest.param(2, 6.0, marks=pytest.mark.slow), (6, -10.0)])
+# Joint 2 keeps its direction, so that no idle run shows its friction: of one that holds 2000 N m some 10 N m
+# are within what warmth does.
+@pytest.mark.parametrize(("joint", "size"), [pytest.param(2, 60.0, marks=pytest.mark.slow), (6, -10.0)])
 def test_friction_that_differs_from_the_idle_run_is_found_in_its_joint(cell, joint, size):
     ((name, where, values),) = found(cell, torques(cell, joint, lambda t: size * turning(t, joint)))
     assert (name, where) == ("friction_reversal", {"joint": joint})

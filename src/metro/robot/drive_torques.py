@@ -10,10 +10,11 @@ import numpy as np
 
 from metro.robot.by_joint import of_joints, put, raised
 from metro.same import Same
-from metro.units import Array
+from metro.units import MRAD, Array
 
 TURNING = 2e-4  # rad/s: below it a joint is turning round, and its friction is between its two levels
 PRESLIDING = 3e-4  # rad: asperities and grease give way by 0.1 to 1 mrad before a joint slides
+LEAST_TURN = 0.05 * MRAD  # half of the least turn that is found: below it friction goes over to that by speed
 STARTED = 0.1  # of that turn: from which on a path has a direction
 
 
@@ -116,15 +117,18 @@ def slid(q: Array, rate: Array, presliding: float, start: float | None = None) -
 
     It follows the way, whatever the speed: once a joint turns round, it tends to the other level over the
     turn of ``presliding`` (Dahl, AIAA J. 14 (1976) 1675, exactly for each step). Without presliding it
-    follows the speed, and is between its levels where that is near none.
+    follows the speed, and is between its levels where that is near none; a turn that is less than joints
+    have is between the two, so that no fit meets a jump.
 
     Parameters
     ----------
     q, rate : (m,) rad and rad/s along the path; no friction where no speed is known. presliding : rad.
     start : of it where the path begins, −1 … 1; without it the joint moved before as it does there.
     """
-    if presliding <= 0.0 or not rate.any():
-        return np.tanh(rate / TURNING)
+    if presliding < LEAST_TURN or not rate.any():
+        by_way = max(presliding, 0.0) / LEAST_TURN if rate.any() else 0.0
+        by_speed = (1.0 - by_way) * np.tanh(rate / TURNING)
+        return by_speed + by_way * slid(q, rate, LEAST_TURN, start) if by_way else by_speed
     state = _as_it_moves(q, presliding) if start is None else start
     steps = np.diff(q)
     kept = np.exp(-np.abs(steps) / presliding)

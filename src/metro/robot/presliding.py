@@ -13,13 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from metro.robot.drive_torques import PRESLIDING, slid
+from metro.robot.drive_torques import LEAST_TURN, PRESLIDING, slid
 from metro.signals.waves import SMOOTH, waves
 from metro.units import MRAD, Array
 
-# Turns that are tried, rad: 0.1 to 1 mrad is what is found of joints with gears (docs/robot.md); half the
-# least and twice the largest of them.
-LEAST, MOST = 0.05 * MRAD, 2.0 * MRAD
+MOST = 2.0 * MRAD  # turn that is tried: twice the largest that is found of joints with gears (docs/robot.md)
 TRIED = 9
 # Of -2 log-likelihood, two standard deviations: a turn is identified where half and twice of it are this much
 # worse, and a joint came from elsewhere than as it moves at its start where that is this much better.
@@ -106,7 +104,7 @@ def presliding(paths: Sequence[IdlePath]) -> Presliding:
     def cost(logarithm: float) -> float:
         return _level(paths, math.exp(logarithm))[1]
 
-    grid = np.linspace(math.log(LEAST), math.log(MOST), TRIED)
+    grid = np.linspace(math.log(LEAST_TURN), math.log(MOST), TRIED)
     costs = [cost(one) for one in grid]
     best = int(np.argmin(costs))
     around = grid[max(best - 1, 0)], grid[min(best + 1, TRIED - 1)]

@@ -48,6 +48,7 @@ WARMED = 0.011
 # Of the friction of a joint, against the idle run: viscous friction halves while an arm warms up, all
 # of it changes by some 5 % (at the fastest speed, where the idle runs do not separate the two).
 WEARING, THINNING = 0.05, 0.25
+USUAL = 0.1  # friction over the torque of the weight, of a joint whose friction the idle runs do not show
 BY_LOAD = 0.015  # of the torque of the cut: what the friction of a joint has more, under load (0.3 to 2 %)
 LEAST_FRICTION, LEAST_VISCOUS = 0.1, 1.0  # N m and N m s/rad, of a joint that shows none
 LAG = 10 * MS  # of all torques behind the force: filters of the drives (20 to 60 Hz), clock of the log
@@ -128,7 +129,7 @@ def _instruments(batch: Batch, arm: Arm, blocks: Sequence[Block], friction: pd.D
     zeros, known, sigma = np.zeros((count, 0)), np.zeros(count), np.full(count, CALIBRATED)
     sigma[: len(joints)] = DRIVEN
     sigma[len(joints) + len(WORK) : -1] = CROSSTALK
-    level, viscous = _friction(arm, friction)
+    level, viscous = _friction(arm, friction, blocks)
     own = np.hypot(BY_LOAD * _largest(arm, blocks), WEARING * level)
     each = np.repeat(WARMED, len(joints)), np.maximum(own, LEAST_FRICTION), viscous
     sigma[-1 - 3 * len(joints) : -1] = np.concatenate(each)
@@ -144,16 +145,18 @@ def _instruments(batch: Batch, arm: Arm, blocks: Sequence[Block], friction: pd.D
     )
 
 
-def _friction(arm: Arm, table: pd.DataFrame | None) -> tuple[Array, Array]:
+def _friction(arm: Arm, table: pd.DataFrame | None, blocks: Sequence[Block]) -> tuple[Array, Array]:
     """Return the friction of each joint that turns (k,), N m, and by how much its viscous part may change.
 
-    That is in N m s/rad; friction that no idle run identifies is none.
+    That is in N m s/rad. ``table`` : by the idle runs; where they show none it is as usual beside the weight.
     """
     joints = arm.axes.turning
+    held = np.sqrt(np.mean([np.mean(block.setting.idle**2, axis=0) for block in blocks], axis=0))
     if table is None:
-        return np.zeros(len(joints)), np.full(len(joints), LEAST_VISCOUS)
+        return USUAL * held, np.full(len(joints), LEAST_VISCOUS)
     rows = table.set_index("joint").loc[[joint + 1 for joint in joints]]
-    level = np.nan_to_num(np.abs(rows["coulomb"].to_numpy()))
+    seen = np.abs(rows["coulomb"].to_numpy())
+    level = np.where(np.isfinite(seen), seen, USUAL * held)
     fastest = np.maximum(rows["fastest_deg_s"].to_numpy() * DEG, np.finfo(float).tiny)
     half = 0.5 * (rows["viscous_high"] - rows["viscous_low"]).to_numpy()
     known = THINNING * np.hypot(rows["viscous"].to_numpy(), half / 2.0)
