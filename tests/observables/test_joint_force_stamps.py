@@ -1,4 +1,4 @@
-"""How fast joints turn by a log of which some packets are stamped late."""
+"""How joints turn by a log of which some packets are stamped late, and whose encoders are noisy."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from metro.observables.joint_force import observable as joint_force
 from metro.stages.ingest import ingest
 
 ROOT = Path(__file__).parents[2]
-RATES = Axes((False,) * 6).rates
+AXES = Axes((False,) * 6)
 
 
 def stamped(times, rng):
@@ -45,7 +45,30 @@ class Late(Processed):
 def test_a_packet_that_comes_late_makes_no_joint_faster(folder):
     batch = read_batch(folder)
     even, late = (
-        joint_force.observe(batch, read(folder), {})["joint_torque"].groupby("run")[RATES].mean()
+        joint_force.observe(batch, read(folder), {})["joint_torque"].groupby("run")[AXES.rates].mean()
         for read in (Processed, Late)
     )
     np.testing.assert_allclose(late, even, atol=0.01 * even.abs().to_numpy().max())
+
+
+class Noisy(Processed):
+    """The tables of the folder, with angles that are measured with the noise of an encoder, 5 µrad."""
+
+    def __call__(self, name, run=None):
+        table = super().__call__(name, run).copy()
+        if name == "robot":
+            noise = np.degrees(5e-6) * np.random.default_rng(2).normal(size=(len(table), 6))
+            table[AXES.positions] += noise
+        return table
+
+
+def test_the_noise_of_the_encoders_is_no_way_that_friction_follows(folder):
+    """Along a path on which a joint hardly moves it had added up to more than the turn of its friction."""
+    batch = read_batch(folder)
+    ways = [
+        joint_force.observe(batch, read(folder), {})["joint_torque"]
+        .groupby("run")[AXES.positions]
+        .agg(lambda angle: np.abs(np.diff(angle)).sum())
+        for read in (Processed, Noisy)
+    ]
+    np.testing.assert_allclose(ways[1], ways[0], rtol=1e-3)
