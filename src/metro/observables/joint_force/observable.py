@@ -18,6 +18,7 @@ from metro.observables.arm.force_by_torques import force_without_dynamometer
 from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import FORCE, REPEATABLE
 from metro.observables.joint_force import NAME, TABLES, friction
+from metro.observables.joint_force.along_path import IDLE, NOISE, PEAK, START, TURN, slow_noise, smooth
 from metro.observables.joint_force.model import (
     CROSS,
     Instruments,
@@ -29,7 +30,7 @@ from metro.observables.joint_force.model import (
     rubbing,
     running,
 )
-from metro.observables.joint_force.tables import IDLE, NOISE, PEAK, START, TURN, observe, slow_noise, smooth
+from metro.observables.joint_force.tables import observe
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
