@@ -36,6 +36,7 @@ PRINTED = {
     "N/mm2": "N/mm²",
     "N mm2": "N mm²",
     "kg m2": "kg m²",
+    "ms2": "ms²",
     "um/min": "µm/min",
     "N/um": "N/µm",
     "N*m/rad": "N m/rad",

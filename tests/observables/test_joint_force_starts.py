@@ -10,6 +10,7 @@ from metro.observables.joint_force.model import JointForceModel, TorqueRun, runn
 from metro.observables.joint_force.tables import _covered, _settled
 from metro.robot.kinematics import arm_of_cell
 from metro.signals.align import Aligned
+from metro.signals.waves import waves
 
 DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
 
@@ -53,3 +54,36 @@ def test_a_record_that_ends_in_the_cut_says_nothing_of_the_force_beyond(ends, ke
         assert found.first.max() <= 3.95 < found.first.max() + 0.1
     if not ends[0]:
         assert found.first.min() >= 0.05 > found.first.min() - 0.1
+
+
+def test_what_spreads_the_force_in_time_is_half_of_its_variance_times_the_curvature():
+    """A filter of the drives that averages over 40 ms, against one that does not, both made in the test."""
+    model = JointForceModel(arm_of_cell({"arm": {"dh": DH}}, {}))
+    t, fine = np.linspace(0.0, 4.0, 81), np.linspace(0.0, 4.0, 4001)
+    still = np.tile([0.1, -0.4, 0.2, 0.3, 0.8, 0.2], (81, 1))
+
+    def force(at):
+        return np.column_stack([np.sin(6 * at), np.cos(5 * at), np.sin(4 * at)]) * 50.0
+
+    spread_over = 0.04 * (np.arange(41) - 20.0) / 41.0
+    filtered = np.mean([force(fine + one) for one in spread_over], axis=0)
+    sharp, soft = (
+        SimpleNamespace(
+            setting=TorqueRun(still, 0.0 * still, t, t, np.full(81, 0.05), running(fine, record), still)
+        )
+        for record in (force(fine), filtered)
+    )
+    names = [one.name for one in model.parameters]
+    beta = np.where(np.array(names) == "torque_gain", 1.0, 0.0)
+    spread = np.where(np.array(names) == "drive_smoothing", 0.5 * np.var(spread_over), 0.0)
+    matrix, _ = model.design(sharp, np.zeros(0), beta)
+    other, _ = model.design(soft, np.zeros(0), beta)
+    inside = np.tile((t > 0.2) & (t < 3.8), 6)
+    back = waves(np.eye(81)).T
+
+    def along(waves_of_joints):
+        return (back @ waves_of_joints.reshape(6, -1).T).T.ravel()[inside]
+
+    changed, expected = along(matrix @ spread), along(other @ beta - matrix @ beta)
+    assert np.abs(expected).max() > 0.01
+    np.testing.assert_allclose(changed, expected, atol=0.05 * np.abs(expected).max())

@@ -21,6 +21,7 @@ BELIEFS = {
     r"ringing_off_(.+)": "frequencies of the tip at pose {}",
     r"swing_(\d+)_([xyz])_(.+)": "mode {} beside those of the tip, by the force along {}, at pose {}",
     r"drive_lag": "lag of all torques behind the force",
+    r"drive_smoothing": "spread in time of all torques against the force",
     r"torque_gain": "gain of all torques",
     r"friction_of_joint_(\d)": "friction of joint {} against the idle run",
     r"viscous_friction_of_joint_(\d)": "viscous friction of joint {} against the idle run",

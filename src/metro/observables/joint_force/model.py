@@ -116,7 +116,8 @@ class JointForceModel:
     def parameters(self) -> tuple[Parameter, ...]:
         """A gain that all torques share, one of each joint and axis, crosstalk, and what a cut changes.
 
-        That is each joint's torque constant, its friction and viscous friction, against the idle run; a lag.
+        That is each joint's torque constant, its friction and viscous friction, against the idle run; and by
+        how much the torques spread the force in time, and follow it late.
         """
         names = ["torque_gain", *(f"gain_of_joint_{i + 1}" for i in self.joints)]
         names += [f"gain_of_{a}" for a in AXES]
@@ -124,7 +125,8 @@ class JointForceModel:
         names += [f"{CONSTANT}{i + 1}" for i in self.joints]
         level = [Parameter(f"{LEVEL}{i + 1}", "N m") for i in self.joints]
         viscous = [Parameter(f"{VISCOUS}{i + 1}", "N m s/rad") for i in self.joints]
-        return (*(Parameter(name, "1") for name in names), *level, *viscous, Parameter("drive_lag", "ms", MS))
+        drives = Parameter("drive_smoothing", "ms2", MS**2), Parameter("drive_lag", "ms", MS)
+        return (*(Parameter(name, "1") for name in names), *level, *viscous, *drives)
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -136,9 +138,9 @@ class JointForceModel:
         return np.zeros((1, 0))
 
     def design(self, block: Block, _nuisance: Array, beta: Array | None = None) -> tuple[Array, Array]:
-        """Waves of the torque (k m, 4 k + 11) per base parameter, and those without a force (k m,), N m.
+        """Waves of the torque (k m, 4 k + 12) per base parameter, and those without a force (k m,), N m.
 
-        For :class:`Instruments` they are all but the first (4 k + 10, 4 k + 11) themselves; k joints turn.
+        For :class:`Instruments` they are all but the first (4 k + 11, 4 k + 12) themselves; k joints turn.
         The torques of drives and payload are read with the gains of the joints, too. The lag is linear about
         that of ``beta``, to a grid.
         """
@@ -206,15 +208,14 @@ def held(dh: Same[Geometry], run: TorqueRun) -> Array:
 
 @lru_cache(maxsize=256)
 def basis(arm: Arm, run: TorqueRun, offset: float) -> Array:
-    """Waves (k m, 4 k + 11) per base parameter without the torques of drives and payload; not to be changed.
+    """Waves (k m, 4 k + 12) per base parameter without the torques of drives and payload; not to be changed.
 
     The log stamps the force ``offset`` s later than the dynamometer.
     """
     joints = tuple(arm.axes.turning)
     rubbed = rubbing(run, joints), _one_by_one(run.rate[:, joints])
-    return np.column_stack(
-        [carried(arm, run, offset), _one_by_one(run.idle), *rubbed, late(arm, run, offset)]
-    )
+    drives = spread(arm, run, offset), late(arm, run, offset)
+    return np.column_stack([carried(arm, run, offset), _one_by_one(run.idle), *rubbed, *drives])
 
 
 @lru_cache(maxsize=256)
@@ -250,6 +251,18 @@ def late(arm: Arm, run: TorqueRun, offset: float) -> Array:
     """Waves (k m,), N m/s, of the torque that balances the force, per second by which it comes later."""
     after, before = (run.force.mean(run.t - offset - step, run.width) for step in (LAG_STEP, -LAG_STEP))
     return in_waves(joint_torque(_driven_jacobian(arm, run), (after - before) / (2.0 * LAG_STEP)))
+
+
+@lru_cache(maxsize=256)
+def spread(arm: Arm, run: TorqueRun, offset: float) -> Array:
+    """Waves (k m,), N m/s², of the torque that balances the force, per variance in time over two, s².
+
+    A filter that spreads the force over times of a variance changes it by half of that times its curvature.
+    """
+    after, now, before = (
+        run.force.mean(run.t - offset - step, run.width) for step in (LAG_STEP, 0.0, -LAG_STEP)
+    )
+    return in_waves(joint_torque(_driven_jacobian(arm, run), (after - 2.0 * now + before) / LAG_STEP**2))
 
 
 @lru_cache(maxsize=256)

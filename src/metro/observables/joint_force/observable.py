@@ -125,16 +125,17 @@ def _instruments(batch: Batch, arm: Arm, blocks: Sequence[Block], friction: pd.D
     ``friction`` : table of the friction by the idle runs; None without one.
     """
     joints, names = arm.axes.turning, arm.axes.driven("joint {}")
-    axis = np.array([*names, *WORK, *(WORK[seen] for seen, _ in CROSS), *names, *names, *names, "time"])
+    seen = (WORK[one] for one, _ in CROSS)
+    axis = np.array([*names, *WORK, *seen, *3 * [*names], "time", "time"])
     count = len(axis)
     zeros, known, sigma = np.zeros((count, 0)), np.zeros(count), np.full(count, CALIBRATED)
     sigma[: len(joints)] = DRIVEN
-    sigma[len(joints) + len(WORK) : -1] = CROSSTALK
+    sigma[len(joints) + len(WORK) : -2] = CROSSTALK
     level, viscous = _friction(arm, friction, blocks)
     own = np.hypot(BY_LOAD * _largest(arm, blocks), WEARING * level)
     each = np.repeat(WARMED, len(joints)), np.maximum(own, LEAST_FRICTION), viscous
-    sigma[-1 - 3 * len(joints) : -1] = np.concatenate(each)
-    sigma[-1] = LAG
+    sigma[-2 - 3 * len(joints) : -2] = np.concatenate(each)
+    sigma[-2:] = 0.5 * LAG**2, LAG
     if declared(batch.cell):
         drives = drives_of_cell(batch.cell, len(arm.axes)).covariance
         own = np.diag(drives)[joints] - drives[0, 1]  # what joints share is the gain of all torques
