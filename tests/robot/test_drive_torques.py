@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from metro.robot.drive_torques import TURNING, DriveTorques, slid
+from metro.robot.drive_torques import LEAST_TURN, TURNING, DriveTorques, slid
 
 RATE, T = np.array([[0.2], [-0.1], [0.3]]) * np.ones(6), np.array([0.0, 1.0, 4.0])
 Q = np.array([[0.0], [-0.05], [0.25]]) * np.ones(6)
@@ -46,3 +46,23 @@ def test_a_joint_of_which_something_else_is_believed_keeps_it():
     q[:, 3] = 2e-3 * np.cos(2 * np.pi * t)
     rate = np.gradient(q, t, axis=0)
     np.testing.assert_allclose(told.at(q, rate, t)[:, 3], slid(q[:, 3], rate[:, 3], 1e-3))
+
+
+@pytest.mark.parametrize("turn", [0.0, LEAST_TURN])
+def test_a_turn_near_none_goes_over_to_friction_by_speed_without_a_jump(turn):
+    q = 0.01 * np.sin(np.linspace(0.0, 3.0, 200))
+    rate = np.gradient(q, 0.05)
+    beside = slid(q, rate, turn + 1e-9), slid(q, rate, max(turn - 1e-9, 0.0))
+    np.testing.assert_allclose(beside[0], beside[1], atol=1e-4)
+    assert np.abs(slid(q, rate, 0.0) - slid(q, rate, LEAST_TURN)).max() > 0.01
+
+
+def test_friction_that_changes_is_more_where_a_joint_creeps_and_what_is_viscous_is_not():
+    q = np.column_stack([np.linspace(0.0, 0.1, 50)] * 2)
+    rate = np.full((50, 2), 0.01)
+    peak = np.column_stack([np.linspace(1.4, 0.9, 50), np.ones(50)])
+    drives = DriveTorques().with_friction(0, reversal=3.0).with_friction(1, viscous=50.0)
+    t = np.zeros(50)
+    even, peaked = drives.at(q, rate, t), drives.at(q, rate, t, peak=peak)
+    np.testing.assert_allclose(peaked[:, 0], even[:, 0] * peak[:, 0])
+    np.testing.assert_array_equal(peaked[:, 1], even[:, 1])

@@ -153,7 +153,8 @@ def _friction(arm: Arm, table: pd.DataFrame | None, blocks: Sequence[Block]) -> 
     That is in N m s/rad. ``table`` : by the idle runs; where they show none it is as usual beside the weight.
     """
     joints = arm.axes.turning
-    held = np.sqrt(np.mean([np.mean(block.setting.idle**2, axis=0) for block in blocks], axis=0))
+    squares = [np.mean(block.setting.idle**2, axis=0) for block in blocks]
+    held = np.sqrt(np.mean(squares, axis=0)) if squares else np.zeros(len(joints))
     if table is None:
         return USUAL * held, np.full(len(joints), LEAST_VISCOUS)
     rows = table.set_index("joint").loc[[joint + 1 for joint in joints]]
