@@ -22,9 +22,9 @@ from metro.loop.labels.evidence import (
     STRAY_WIDTH,
     Errors,
     Labels,
+    Likelihood,
     drawn_errors,
     log_evidence,
-    log_likelihood,
     unstable_probability,
 )
 from metro.loop.labels.hypotheses import LabelEvidence, hypothesis
@@ -134,7 +134,7 @@ def _boundary_of(task: LabelProblem, known: Mapping[str, Effect], hidden: Mappin
             model = one(model)
         return model
 
-    return _Boundary(*task.boundaries(change))
+    return _Boundary(*(part[0] for part in task.boundaries([change])))
 
 
 def _change(effect: Effect, values: JSON) -> Callable[[StabilityModel], StabilityModel]:
@@ -143,7 +143,7 @@ def _change(effect: Effect, values: JSON) -> Callable[[StabilityModel], Stabilit
 
 
 def _evidence(tests: Labels, boundary: _Boundary, errors: Errors) -> float:
-    likelihood = log_likelihood(tests, boundary.depth[None], boundary.chatter[None], errors)
+    likelihood = Likelihood.of(tests, errors)(boundary.depth[None], boundary.chatter[None])
     return log_evidence(likelihood, np.ones(1))
 
 

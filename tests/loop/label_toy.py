@@ -63,19 +63,18 @@ class Made:
     def point_cut(self):
         return np.zeros(len(self.point_rpm), dtype=int)
 
-    def boundaries(self, change):
-        model = change(Line(shift=self.moved))
-        return model.boundary(self.point_rpm), np.full(len(self.point_rpm), model.hz)
+    def boundaries(self, changes):
+        models = [change(Line(shift=self.moved)) for change in changes]
+        depth = np.stack([model.boundary(self.point_rpm) for model in models])
+        return depth, np.outer([model.hz for model in models], np.ones(len(self.point_rpm)))
 
     def estimates(self, changes):
         """In error by a little that differs from speed to speed and grows with the change."""
-        models = [change(Line(shift=self.moved)) for change in changes]
-        depth = np.stack([model.boundary(self.point_rpm) for model in models])
-        error = 0.2 * np.cos(self.point_rpm / 700.0) * (1.0 + depth - np.log(1e-3))
-        return depth + error, np.outer([model.hz for model in models], np.ones(len(self.point_rpm)))
+        depth, hz = self.boundaries(changes)
+        return depth + 0.2 * np.cos(self.point_rpm / 700.0) * (1.0 + depth - np.log(1e-3)), hz
 
-    def boundary_at(self, change, rpm):
-        return change(Line()).boundary(rpm)
+    def boundaries_at(self, changes, rpm):
+        return np.stack([change(Line()).boundary(rpm) for change in changes])
 
     def deviations(self, draws, seed):
         return 0.02 * np.random.default_rng(seed).standard_normal((draws, len(self.point_rpm)))

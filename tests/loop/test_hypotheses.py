@@ -8,7 +8,7 @@ from label_toy import GATES, SHIFT, SLOPE, Line, problem
 from scipy.special import logsumexp
 
 from metro.loop.labels import hypotheses
-from metro.loop.labels.evidence import Errors, log_likelihood
+from metro.loop.labels.evidence import Errors
 from metro.loop.labels.hypotheses import LabelEvidence, changed, hypothesis, quantile
 from metro.loop.labels.problem import tests_of as told_by
 
@@ -25,7 +25,7 @@ def grid(effects, count):
     theta = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
     models = [Line(**{e.name: v for e, v in zip(effects, row, strict=True)}) for row in theta]
     depth = np.stack([model.boundary(TASK.point_rpm) for model in models])
-    found = log_likelihood(TESTS, depth, np.full_like(depth, 300.0), EVIDENCE.errors)
+    found = EVIDENCE.likelihood(depth, np.full_like(depth, 300.0))
     return theta, found.sum(axis=2)[:, 0]
 
 
@@ -52,7 +52,7 @@ def test_enough_points_are_left_for_the_ends_of_an_interval(effects):
 
 def test_what_is_not_solved_is_learnt_and_its_error_is_as_told():
     found = hypothesis((SHIFT, SLOPE), EVIDENCE)
-    exact = np.stack([TASK.boundaries(changed(found, i))[0] for i in range(len(found.theta))])
+    exact = TASK.boundaries([changed(found, i) for i in range(len(found.theta))])[0]
     error = found.depth - EVIDENCE.testable(exact)
     weight = found.weights[:, None] * np.ones_like(error)
     rough = np.stack([TASK.estimates([changed(found, i)])[0][0] for i in range(len(found.theta))]) - exact
@@ -87,16 +87,17 @@ def test_nothing_has_one_prediction():
 def test_where_the_boundary_jumps_it_is_solved_until_the_interval_is_that_of_a_fine_grid(step):
     """Beyond ``step`` of the slope another lobe is the lowest; what is quickly estimated does not know it."""
 
-    def solved(change):
-        model = change(Line())
-        jump = 0.8 * np.tanh((model.slope - step) / 0.02)
-        return model.boundary(TASK.point_rpm) + jump, np.full(len(TASK.point_rpm), 300.0)
+    def solved(changes):
+        models = [change(Line()) for change in changes]
+        jump = 0.8 * np.tanh((np.array([[model.slope] for model in models]) - step) / 0.02)
+        depth = np.stack([model.boundary(TASK.point_rpm) for model in models]) + jump
+        return depth, np.full_like(depth, 300.0)
 
     evidence = LabelEvidence(solved, TASK.estimates, TESTS, NONE, GATES.seed)
     found = hypothesis((SLOPE,), evidence)
     theta = quantile(SLOPE.parameters[0], (np.arange(2000) + 0.5) / 2000)
-    depth = np.stack([solved(lambda _, v=v: Line(slope=v))[0] for v in theta])
-    log = log_likelihood(TESTS, depth, np.full_like(depth, 300.0), evidence.errors).sum(axis=2)[:, 0]
+    depth, _ = solved([lambda _, v=v: Line(slope=v) for v in theta])
+    log = evidence.likelihood(depth, np.full_like(depth, 300.0)).sum(axis=2)[:, 0]
     below = np.cumsum(np.exp(log - logsumexp(log)))
     told = found.parameters("slope")["size"]["ci95"]
     assert told == pytest.approx(np.interp([0.025, 0.975], below, theta), abs=0.12)

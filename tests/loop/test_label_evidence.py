@@ -10,10 +10,10 @@ from metro.loop.labels import evidence as room
 from metro.loop.labels.evidence import (
     Errors,
     Labels,
+    Likelihood,
     drawn_errors,
     left_out,
     log_evidence,
-    log_likelihood,
     posterior,
 )
 
@@ -42,7 +42,7 @@ def at(tests, boundary, chatter=300.0):
     """Log-likelihood (j,) of one boundary, the same at both points."""
     depth = np.full((1, 2), boundary)
     errors = Errors(np.zeros((1, 2)), np.array([0.15]))
-    return log_likelihood(tests, depth, np.full((1, 2), chatter), errors)[0, 0]
+    return Likelihood.of(tests, errors)(depth, np.full((1, 2), chatter))[0, 0]
 
 
 @pytest.mark.parametrize("unstable", [0.0, 1.0])
@@ -127,7 +127,7 @@ def test_labels_far_from_the_boundary_say_that_the_errors_are_large():
     for tests in (near, far):
         errors = drawn_errors(tests, np.zeros((700, 2)), 5)
         flat = np.zeros((1, 2))
-        likelihood = log_likelihood(tests, flat, np.full((1, 2), np.nan), errors)
+        likelihood = Likelihood.of(tests, errors)(flat, np.full((1, 2), np.nan))
         weights.append(room.of_errors(likelihood, np.ones(1), errors) @ errors.sd)
     assert weights[0] < 0.25
     assert weights[1] > 0.35

@@ -101,13 +101,12 @@ def test_what_moves_deep_boundaries_most_is_found_as_such():
     task = replace(task, unstable=np.tile([False] * 3 + [True] * 3, len(RPM)), depth=np.exp(log_depth))
     tests, _ = told_by(task, "identify")
     boundary = lobes(tests.rpm)
-    evidence = LabelEvidence(
-        lambda _: (boundary, np.full(len(boundary), 300.0)),
-        lambda changes: (np.tile(boundary, (len(changes), 1)), np.full((len(changes), len(boundary)), 300.0)),
-        tests,
-        Errors(np.zeros((1, len(boundary))), np.array([0.15])),
-        GATES.seed,
-    )
+
+    def predict(changes):
+        return np.tile(boundary, (len(changes), 1)), np.full((len(changes), len(boundary)), 300.0)
+
+    errors = Errors(np.zeros((1, len(boundary))), np.array([0.15]))
+    evidence = LabelEvidence(predict, predict, tests, errors, GATES.seed)
     found = unknown(hypothesis((), evidence), evidence)
     told = found.weights @ curves(found, (tests.rpm, boundary), (RPM, lobes(RPM)))
     assert np.corrcoef(told, -0.6 * height)[0, 1] > 0.9

@@ -44,7 +44,7 @@ def test_cuts_of_one_kind_share_a_case_and_speeds_a_point():
 
 
 def test_the_boundary_is_that_of_the_structure_and_the_cut():
-    depth, chatter = PROBLEM.boundaries(lambda model: model)
+    (depth,), (chatter,) = PROBLEM.boundaries([lambda model: model])
     swept = np.arccos(1 - 3.0 / 6.0)
     down = stability_boundary(STRUCTURE, Cut(4, np.pi - swept, np.pi, 1e9, 4e8), np.array([700.0, 900.0]))
     up = stability_boundary(STRUCTURE, Cut(4, 0.0, swept, 1e9, 4e8), np.array([700.0]))
@@ -54,8 +54,9 @@ def test_the_boundary_is_that_of_the_structure_and_the_cut():
 
 def test_a_change_reaches_every_case():
     softer = replace(STRUCTURE, stiffness=STRUCTURE.stiffness / 2)
-    before, _ = PROBLEM.boundaries(lambda model: model)
-    after, _ = PROBLEM.boundaries(lambda model: replace(model, structure=softer))
+    (before, after), _ = PROBLEM.boundaries(
+        [lambda model: model, lambda model: replace(model, structure=softer)]
+    )
     np.testing.assert_allclose(after - before, np.log(0.5), rtol=1e-3)
 
 
@@ -72,7 +73,7 @@ def test_deviations_are_those_of_what_is_uncertain():
 
 def test_the_diagram_after_a_change_is_the_boundary_of_the_changed_model():
     rpm = np.array([700.0, 800.0])
-    depth = np.exp(boundaries([CASES[0].at(rpm)], lambda model: model)[0]) * 1e3
+    depth = np.exp(boundaries([CASES[0].at(rpm)], [lambda model: model])[0][0]) * 1e3
     diagram = pd.DataFrame(
         {"position": ["1", "1", "9"], "rpm": [*rpm, 700.0], "depth_mm": [*depth, 1.0], "chatter_hz": 50.0}
     )

@@ -40,7 +40,8 @@ class Arc:
     weight : (n,) Gauss weights.
     chip : (n, 2) direction in which the unknown is measured: the chip thickness where one tooth cuts, the
         displacements in x and in y (two channels) where several do.
-    force : (n, 2) force on the tool per depth and unit of the unknown, N/m².
+    force : (n, 2) force on the tool per depth and unit of the unknown, N/m²; (k, n, 2) where it is another
+        one at each of k speeds.
     rate : (n,) whether the unknown is the displacement's change per tooth period, not itself.
     panels : slices of points in which everything is smooth, one per panel and channel, and the panel's
         (start, length).
@@ -52,6 +53,10 @@ class Arc:
     force: Array
     rate: np.ndarray
     panels: tuple[tuple[slice, int, float, float], ...]
+
+    def at(self, speeds: np.ndarray) -> Arc:
+        """Return it at speeds of some indices, or under a mask; an arc of all speeds as it is."""
+        return replace(self, force=self.force[speeds]) if self.force.ndim > 2 else self
 
 
 @dataclass(frozen=True)
@@ -99,7 +104,8 @@ def panels_of(cut: Cut) -> list[tuple[float, float, int]]:
 
 def collocate(structure: Structure, cut: Cut, points: tuple[int, ...]) -> Arc:
     """Place ``points[i]`` Gauss points in panel i of the tooth period and evaluate the cut there."""
-    flexible = np.flatnonzero(np.any(np.abs(structure.directions[structure.axis]) > _NO_MOTION, axis=0))
+    flexible = np.flatnonzero(np.any(np.abs(structure.along.reshape(-1, 2)) > _NO_MOTION, axis=0))
+    damping = np.asarray(cut.damping)
     time, weight, chip, force, rate, panels = [], [], [], [], [], []
     first = 0
     for (start, end, teeth), n in zip(panels_of(cut), points, strict=True):
@@ -108,8 +114,8 @@ def collocate(structure: Structure, cut: Cut, points: tuple[int, ...]) -> Arc:
         phi = cut.entry + cut.pitch * (tau[:, None] + np.arange(teeth))
         directions = chip_direction(phi)
         channels = _channels(directions, cut.force_direction(phi), flexible, False)
-        if cut.damping:
-            rubs = -cut.damping / cut.pitch * cut.acting(phi)[0][..., None] * directions
+        if np.any(damping):
+            rubs = -damping[..., None, None, None] / cut.pitch * cut.acting(phi)[0][..., None] * directions
             channels += _channels(directions, rubs, flexible, True)
         for unit, density, is_rate in channels:
             time.append(tau)
@@ -119,27 +125,30 @@ def collocate(structure: Structure, cut: Cut, points: tuple[int, ...]) -> Arc:
             rate.append(np.full(n, is_rate))
             panels.append((slice(first, first + n), n, start, end - start))
             first += n
-    joined = [np.concatenate(part) for part in (time, weight, chip, force)]
-    return Arc(joined[0], joined[1], joined[2], joined[3], np.concatenate(rate), tuple(panels))
+    of_speeds = [np.broadcast_to(part, (*damping.shape, *part.shape[-2:])) for part in force]
+    joined = [np.concatenate(part) for part in (time, weight, chip, rate)]
+    return Arc(joined[0], joined[1], joined[2], np.concatenate(of_speeds, axis=-2), joined[3], tuple(panels))
 
 
 def _channels(
     directions: Array, forces: Array, flexible: np.ndarray, rate: bool
 ) -> list[tuple[Array, Array, bool]]:
-    """Directions (n, 2) of the unknowns and force (n, 2) per unit of each, of teeth (n, j, 2)."""
+    """Directions (n, 2) of the unknowns and force (..., n, 2) per unit of each, of teeth (..., n, j, 2)."""
     n, teeth, _ = directions.shape
     if teeth == 1:
-        return [(directions[:, 0], forces[:, 0], rate)]
-    total = np.einsum("nji,njk->nki", forces, directions)  # (n, chip axis, force axis)
-    return [(np.tile(np.eye(2)[axis], (n, 1)), total[:, axis], rate) for axis in flexible]
+        return [(directions[:, 0], forces[..., 0, :], rate)]
+    total = np.einsum("...nji,njk->...nki", forces, directions)  # (..., n, chip axis, force axis)
+    return [(np.tile(np.eye(2)[axis], (n, 1)), total[..., axis, :], rate) for axis in flexible]
 
 
 def kernel(structure: Structure, arc: Arc, period: Array) -> Kernel:
     """Assemble the equation at tooth periods ``period`` (k,), s."""
-    chip, force = arc.chip @ structure.directions.T, arc.force @ structure.directions.T
+    across = structure.directions.swapaxes(-1, -2)
+    chip, force = arc.chip @ across, arc.force @ across
     volterra = np.zeros((len(period), len(arc.time), len(arc.time)))
     for axis in np.unique(structure.axis):
-        volterra += chip[:, None, axis] * _volterra(structure, axis, arc, period) * force[:, axis]
+        response = _volterra(structure, axis, arc, period)
+        volterra += chip[..., axis, None] * response * force[..., None, :, axis]
     poles = np.concatenate([structure.poles, structure.poles.conj()], axis=-1)
     residues = np.concatenate([structure.residues, structure.residues.conj()], axis=-1)
     if structure.of_speeds:
@@ -147,11 +156,10 @@ def kernel(structure: Structure, arc: Arc, period: Array) -> Kernel:
     direction = np.concatenate([structure.axis, structure.axis])
     growth = np.exp(period[:, None, None] * arc.time[:, None] * poles)
     per_period = np.where(arc.rate[:, None], period[:, None, None] * poles, 1.0)
-    states = chip[:, direction] * growth * per_period
+    states = chip[..., direction] * growth * per_period
     decay = np.exp(period[:, None, None] * poles)[:, 0]
-    drive = (residues * force[:, direction] * arc.weight[:, None] * period[:, None, None] / growth).transpose(
-        0, 2, 1
-    )
+    acting = residues * force[..., direction] * arc.weight[:, None] * period[:, None, None] / growth
+    drive = acting.transpose(0, 2, 1)
     delayed = np.where(arc.rate, 0.0, 1.0)
     return Kernel(period, volterra, states, drive, decay, delayed)
 

@@ -62,7 +62,7 @@ class Boundary:
 def stability_boundary(structure: Structure, cut: Cut, rpm: Array, *, scan: bool = True) -> Boundary:
     """Find the lowest axial depth at which the cut is unstable, at spindle speeds ``rpm`` (k,), rev/min.
 
-    The structure may have modes of its own at each of them.
+    The structure may have modes of its own at each of them, and the process a damping.
 
     Zero helix, linear regeneration: edge forces are not in it. Without a ``scan`` of all multiplier angles it
     takes half the time, and in about one case of a hundred an island of instability is missed (by up to a
@@ -78,7 +78,7 @@ def stability_boundary(structure: Structure, cut: Cut, rpm: Array, *, scan: bool
     for members in groups(structure, cut, rpm):
         group, hints = members, estimates.among(members)
         for effort in efforts:
-            part, missed, hints = _solve(structure.at(group), cut, rpm[group], effort, hints)
+            part, missed, hints = _solve(structure.at(group), cut.at(group), rpm[group], effort, hints)
             _enter(result, group, part)
             last = effort is efforts[-1]
             done = part.crossings.take(~missed[part.crossings.speed] | last)
@@ -91,9 +91,10 @@ def stability_boundary(structure: Structure, cut: Cut, rpm: Array, *, scan: bool
 
 def _estimates(structure: Structure, cut: Cut, rpm: Array) -> Candidates:
     """Where the boundary to zeroth order has its crossings, and flips at the same depths."""
-    if structure.of_speeds:
-        each = [structure.at(np.array(i)) for i in range(len(rpm))]
-        depth, hz = (part[:, 0] for part in zero_order_boundary(each, [cut] * len(rpm), rpm[:, None]))
+    if structure.of_speeds or np.ndim(cut.damping):
+        each = [np.array(i) for i in range(len(rpm))]
+        structures, cuts = [structure.at(i) for i in each], [cut.at(i) for i in each]
+        depth, hz = (part[:, 0] for part in zero_order_boundary(structures, cuts, rpm[:, None]))
     else:
         (depth,), (hz,) = zero_order_boundary([structure], [cut], rpm[None])
     known = np.flatnonzero(np.isfinite(depth))
@@ -161,7 +162,7 @@ def _solve(
         before = before.take(before.distinct())
         extra += _EXTRA_POINTS
         here = structure.at(speeds)
-        arc, equation = discretised(here, cut, rpm[speeds], effort[0], extra)
+        arc, equation = discretised(here, cut.at(speeds), rpm[speeds], effort[0], extra)
         refined = crossings.refine(equation, before, 2)
         part = _lowest(here, (arc, equation), rpm[speeds], refined, before)
         settled = (part.error <= _TOLERANCE * part.depth) | (resolution == _RESOLUTIONS - 1)
@@ -205,7 +206,7 @@ def _lowest(
     result.error[hit] = np.abs(refined.at.inverse[best] / before.inverse[best] - 1.0) * result.depth[hit]
     result.kind[hit] = kind(theta)
     result.chatter_hz[hit] = chatter_hz(
-        structure.at(hit), arc, equation.period[hit], theta, refined.shape[best]
+        structure.at(hit), arc.at(hit), equation.period[hit], theta, refined.shape[best]
     )
     return result
 
@@ -263,17 +264,15 @@ def _missed(equation: Kernel, boundary: Boundary, asked: np.ndarray) -> tuple[np
     missed = asked & ~known
     # where nothing was found, the cut may be unstable at the depths of other speeds
     tried = np.where(known, boundary.depth, boundary.depth[known].max(initial=0.0))
-    speeds = np.flatnonzero(asked)
-    outside = [boundary.crossings.take(np.zeros(0, dtype=int))]
-    for share in _BELOW:
-        depth = share * tried[speeds]
-        doubt = ~collocation.surely_stable(equation.take(speeds), depth)
-        multipliers = collocation.multipliers(equation.take(speeds[doubt]), depth[doubt])
-        largest = multipliers[np.arange(len(multipliers)), np.abs(multipliers).argmax(axis=1)]
-        beyond = np.abs(largest) > 1.0 + 1e-6
-        speed = speeds[doubt][beyond]
-        theta, inverse = np.abs(np.angle(largest[beyond])), 1.0 / depth[doubt][beyond]
-        # to either side too: an island starts with one crossing and ends with another
-        outside += [Candidates(speed, theta + aside, inverse) for aside in (-_ASIDE, 0.0, _ASIDE)]
-        missed[speed] = True
-    return missed, Candidates.join(outside)
+    speeds = np.tile(np.flatnonzero(asked), len(_BELOW))
+    depth = np.repeat(_BELOW, np.count_nonzero(asked)) * tried[speeds]
+    doubt = ~collocation.surely_stable(equation.take(speeds), depth)
+    speeds, depth = speeds[doubt], depth[doubt]
+    multipliers = collocation.multipliers(equation.take(speeds), depth)
+    largest = multipliers[np.arange(len(multipliers)), np.abs(multipliers).argmax(axis=1)]
+    beyond = np.abs(largest) > 1.0 + 1e-6
+    speeds, theta, inverse = speeds[beyond], np.abs(np.angle(largest[beyond])), 1.0 / depth[beyond]
+    missed[speeds] = True
+    # to either side too: an island starts with one crossing and ends with another
+    asides = (-_ASIDE, 0.0, _ASIDE)
+    return missed, Candidates.join([Candidates(speeds, theta + aside, inverse) for aside in asides])

@@ -99,7 +99,7 @@ def period_map(
 def state_space(structure: Structure) -> tuple[Array, Array, Array]:
     """Matrices (2m, 2m), (2m, 2), (2, 2m) of z' = A z + B F, displacement = C z; z is q, then q' / omega."""
     m = len(structure.omega)
-    direction = structure.directions[structure.axis]
+    direction = structure.along
     omega = np.diag(structure.omega)
     free = np.block([[np.zeros((m, m)), omega], [-omega, -2.0 * structure.zeta * omega]])
     force_in = np.concatenate(

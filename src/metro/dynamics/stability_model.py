@@ -10,8 +10,9 @@ more the deeper it cuts is solved for several ``f``: its boundary is where a dep
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -46,6 +47,12 @@ class StabilityModel:
     softening: tuple[Softening, ...] = ()
     yielding: float = 0.0
 
+    @property
+    def form(self) -> Hashable:
+        """What models that are solved as one stack have in common."""
+        cuts = [(replace(cut, damping=0.0), bool(cut.damping)) for cut in self.cuts]
+        return (*self.structure.axis.tolist(), self.structure.directions.shape, *cuts)
+
     def boundary(self, rpm: Array, *, scan: bool = True) -> tuple[Array, Array]:
         """Lowest depths (k,), m, and chatter frequencies there (k,), Hz, at speeds (k,), rev/min.
 
@@ -56,27 +63,8 @@ class StabilityModel:
         ValueError
             When the stiffness vanishes at one of the speeds.
         """
-        factor, ratio = self._factors(rpm)
-        if self.yielding:
-            count = len(COMPLIANCES)
-            softer = (factor / COMPLIANCES[:, None]).ravel()
-            depth, hz = self._at(np.tile(rpm, count), softer, np.tile(ratio, (count, 1)), scan=scan)
-            shape = (count, len(rpm))
-            return _agreed(depth.reshape(shape), hz.reshape(shape), self.yielding)
-        return self._at(rpm, factor, ratio, scan=scan)
-
-    def _at(self, rpm: Array, factor: Array, ratio: Array, *, scan: bool) -> tuple[Array, Array]:
-        """Return the boundary (k,) at speeds (k,) with ``factor`` (k,) times the stiffness of the first mode.
-
-        ``ratio`` (k, m): of the factors of the modes to that.
-        """
-        structure = self.structure if _alike(ratio) else self.structure.stiffer(ratio)
-        slowed = rpm / np.sqrt(factor)
-        boundaries = [boundary_of_edge(structure, cut, slowed, factor, scan=scan) for cut in self.cuts]
-        depth = np.stack([one.depth for one in boundaries])
-        least = (depth.argmin(axis=0), np.arange(depth.shape[1]))
-        chatter = np.stack([one.chatter_hz for one in boundaries])[least]
-        return depth[least], np.sqrt(factor) * chatter
+        depth, hz = boundaries([self], rpm, scan=scan)
+        return depth[0], hz[0]
 
     def _factors(self, rpm: Array) -> tuple[Array, Array]:
         """Return the factor (k,) on the stiffness of the first mode, and those of all over it (k, m)."""
@@ -95,23 +83,85 @@ def _alike(ratio: Array) -> bool:
     return bool(np.all(np.abs(ratio - 1.0) < _ROUNDING))
 
 
+Solver = Callable[[Sequence[StabilityModel], Array, Array, Array], tuple[Array, Array]]
+
+
+def boundaries(models: Sequence[StabilityModel], rpm: Array, *, scan: bool = True) -> tuple[Array, Array]:
+    """Lowest depths (t, k), m, and chatter frequencies there (t, k), Hz, of t models at speeds (k,), rev/min.
+
+    Models that differ by numbers alone are solved as one stack.
+
+    ``scan``: see :func:`metro.dynamics.lobes.stability_boundary`.
+
+    Raises
+    ------
+    ValueError
+        When the stiffness of a model vanishes at one of the speeds.
+    """
+    alike: dict[Hashable, list[int]] = {}
+    for i, model in enumerate(models):
+        alike.setdefault(model.form, []).append(i)
+    depth, hz = np.zeros((2, len(models), len(rpm)))
+    for which in alike.values():
+        depth[which], hz[which] = _yielding([models[i] for i in which], rpm, partial(_solved, scan=scan))
+    return depth, hz
+
+
 def estimated(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Array]:
     """Lowest depths (t, k) and chatter frequencies there (t, k) of t models, to zeroth order.
 
     The models have equally many modes, and cuts that differ in process damping alone.
     """
+    return _yielding(models, rpm, _estimated)
+
+
+def _yielding(models: Sequence[StabilityModel], rpm: Array, solve: Solver) -> tuple[Array, Array]:
+    """Solve models of which some may yield the more, the deeper they cut."""
     factor, ratio = (np.stack(part) for part in zip(*(one._factors(rpm) for one in models), strict=True))
     if not any(model.yielding for model in models):
-        return _estimated(models, rpm, factor, ratio)
+        return solve(models, rpm, factor, ratio)
     count = len(COMPLIANCES)
     softer = (factor[:, None] / COMPLIANCES[:, None]).reshape(len(models), -1)
-    depth, hz = _estimated(models, np.tile(rpm, count), softer, np.tile(ratio, (1, count, 1)))
+    depth, hz = solve(models, np.tile(rpm, count), softer, np.tile(ratio, (1, count, 1)))
     shape = (len(models), count, len(rpm))
-    boundaries = [
+    agreed = [
         _agreed(d, c, model.yielding)
         for d, c, model in zip(depth.reshape(shape), hz.reshape(shape), models, strict=True)
     ]
-    return np.stack([d for d, _ in boundaries]), np.stack([c for _, c in boundaries])
+    return np.stack([d for d, _ in agreed]), np.stack([c for _, c in agreed])
+
+
+def _solved(
+    models: Sequence[StabilityModel], rpm: Array, factor: Array, ratio: Array, *, scan: bool
+) -> tuple[Array, Array]:
+    """Solve models (t) of one form, with ``factor`` (t, k) times the stiffness of the first mode.
+
+    ``ratio`` (t, k, m): of the factors of the modes to that.
+    """
+    slowed = (rpm / np.sqrt(factor)).ravel()
+    structure = _stacked([one.structure for one in models], ratio)
+    solved = []
+    for own in zip(*(one.cuts for one in models), strict=True):
+        damping = np.repeat([cut.damping for cut in own], len(rpm))
+        cut = replace(own[0], damping=damping) if damping.any() else own[0]
+        one = boundary_of_edge(structure, cut, slowed, factor.ravel(), scan=scan)
+        solved.append((one.depth, one.chatter_hz))
+    depth, hz = _least(solved)
+    return depth.reshape(factor.shape), np.sqrt(factor) * hz.reshape(factor.shape)
+
+
+def _stacked(structures: Sequence[Structure], ratio: Array) -> Structure:
+    """Structure with the modes of t structures at k speeds each, which ``ratio`` (t, k, m) stiffens."""
+    if len(structures) == 1 and _alike(ratio):
+        return structures[0]
+    modes = len(structures[0].axis)
+    each = [one.stiffer(rows) for one, rows in zip(structures, ratio, strict=True)]
+    omega, zeta, stiffness = (
+        np.stack([getattr(one, part) for one in each]).reshape(-1, modes)
+        for part in ("omega", "zeta", "stiffness")
+    )
+    directions = np.repeat([one.directions for one in structures], ratio.shape[1], axis=0)
+    return Structure(structures[0].axis, omega, zeta, stiffness, directions)
 
 
 def _estimated(
@@ -123,11 +173,16 @@ def _estimated(
     if not _alike(ratio):  # every speed has a structure of its own
         structures = [one.stiffer(row) for one, rows in zip(structures, ratio, strict=True) for row in rows]
         cuts, slowed = [own for own in cuts for _ in rpm], slowed.reshape(-1, 1)
-    boundaries = [zero_order_boundary(structures, own, slowed) for own in zip(*cuts, strict=True)]
-    depth, chatter = (np.stack(part).reshape(-1, *factor.shape) for part in zip(*boundaries, strict=True))
+    depth, hz = _least([zero_order_boundary(structures, own, slowed) for own in zip(*cuts, strict=True)])
+    return factor * depth.reshape(factor.shape), np.sqrt(factor) * hz.reshape(factor.shape)
+
+
+def _least(boundaries: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Depths and chatter frequencies of the least stable of several cuts."""
+    depth, hz = (np.stack(part) for part in zip(*boundaries, strict=True))
     least = depth.argmin(axis=0)[None]
-    lowest, hz = (np.take_along_axis(part, least, axis=0)[0] for part in (depth, chatter))
-    return factor * lowest, np.sqrt(factor) * hz
+    lowest, there = (np.take_along_axis(part, least, axis=0)[0] for part in (depth, hz))
+    return lowest, there
 
 
 def _agreed(depth: Array, hz: Array, yielding: float) -> tuple[Array, Array]:

@@ -29,7 +29,7 @@ class Structure:
         along neither couple the two.
 
     A direction without modes is rigid. For a boundary at k speeds, frequencies, damping ratios and
-    stiffnesses may be those at each of them, (k, m).
+    stiffnesses may be those at each of them, (k, m), and with them the directions, (k, d, 2).
     """
 
     axis: np.ndarray
@@ -48,7 +48,13 @@ class Structure:
         if not self.of_speeds:
             return self
         omega, zeta, stiffness = (part[speeds] for part in (self.omega, self.zeta, self.stiffness))
-        return replace(self, omega=omega, zeta=zeta, stiffness=stiffness)
+        directions = self.directions[speeds] if self.directions.ndim > 2 else self.directions
+        return Structure(self.axis, omega, zeta, stiffness, directions)
+
+    @property
+    def along(self) -> Array:
+        """(..., m, 2) unit vector along which each mode moves."""
+        return self.directions[..., self.axis, :]
 
     @property
     def poles(self) -> ComplexArray:
@@ -70,13 +76,13 @@ class Structure:
 
         Of modes of k speeds: at frequencies (k, f).
         """
-        own, zeta, stiffness = self.omega, self.zeta, self.stiffness
+        own, zeta, stiffness, along = self.omega, self.zeta, self.stiffness, self.along
         if self.of_speeds:
             own, zeta, stiffness = own[:, None], zeta[:, None], stiffness[:, None]
+            along = along[:, None] if along.ndim > 2 else along
         ratio = np.asarray(omega)[..., None] / own
         modal = 1.0 / (stiffness * (1.0 - ratio**2 + 2j * zeta * ratio))
-        along = self.directions[self.axis]
-        full: ComplexArray = np.einsum("...m,mi,mj->...ij", modal, along, along)
+        full: ComplexArray = np.einsum("...m,...mi,...mj->...ij", modal, along, along)
         return full
 
     def turned(self, angle: float) -> Structure:
@@ -204,7 +210,8 @@ class Cut:
     face : that a side cut removes, where the edge is not straight; None of a slot.
     engaged : what of the edge is engaged at each immersion, at the one depth that this is the cut of.
     damping : of the process, coefficient over the tool's radius, N/m²: a tooth that moves into the work at a
-        speed v is pushed back by ``damping * depth * v / spindle's angular speed``.
+        speed v is pushed back by ``damping * depth * v / spindle's angular speed``. For a boundary at k
+        speeds it may be that at each of them, (k,).
     """
 
     teeth: int
@@ -212,10 +219,15 @@ class Cut:
     exit: float
     ktc: float
     krc: float
-    damping: float = 0.0
+    damping: float | Array = 0.0
     edge: Edge | None = None
     face: RawFace | None = None
     engaged: Engaged | None = None
+
+    def at(self, speeds: np.ndarray) -> Cut:
+        """Return the cut at speeds of some indices, or under a mask; one of all speeds as it is."""
+        damping = np.asarray(self.damping)
+        return replace(self, damping=damping[speeds]) if damping.ndim else self
 
     def at_depth(self, depth: float) -> Cut:
         """Return the cut with what an axial depth, m, makes of its edge, at all depths.

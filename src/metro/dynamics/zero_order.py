@@ -61,7 +61,7 @@ def _solved(structures: Sequence[Structure], cuts: Sequence[Cut], rpm: Array) ->
         np.stack([one.omega for one in structures]),
         np.stack([one.zeta for one in structures]),
         np.stack([one.stiffness for one in structures]),
-        np.stack([one.directions[one.axis] for one in structures]),
+        np.stack([one.along for one in structures]),
     )
     factors = mean_directional_factors(equal_teeth(cuts[0]), np.zeros(1), 1)[0][0, 0, 0]
     unit = equal_teeth(replace(cuts[0], damping=1.0))

@@ -85,16 +85,16 @@ class Labelled(Protocol):
         """Probability that a label is wrong whatever the depth."""
         ...
 
-    def boundaries(self, change: Change) -> tuple[Array, Array]:
-        """Log depth and chatter frequency of the boundary at all points after a change of the models."""
+    def boundaries(self, changes: Sequence[Change]) -> tuple[Array, Array]:
+        """Log depths and chatter frequencies (t, p) of the boundary after each of t changes of the models."""
         ...
 
     def estimates(self, changes: Sequence[Change]) -> tuple[Array, Array]:
-        """Return the same (t, p), roughly and quickly, after each of t changes."""
+        """Return the same, roughly and quickly."""
         ...
 
-    def boundary_at(self, change: Change, rpm: Array) -> Array:
-        """Log depth of the boundary of the cut of most tests at speeds ``rpm`` after a change."""
+    def boundaries_at(self, changes: Sequence[Change], rpm: Array) -> Array:
+        """Log depths (t, k) of the boundary of the cut of most tests at speeds ``rpm`` after each change."""
         ...
 
     def deviations(self, draws: int, seed: int) -> Array:

@@ -13,6 +13,7 @@ say which sizes are likely.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -115,30 +116,74 @@ def unstable_probability(tests: Labels, boundary: Array, sd: Array | float) -> A
     return tests.label_error + (1.0 - 2.0 * tests.label_error) * chance
 
 
-def log_likelihood(
-    tests: Labels, depth: Array, chatter: Array, errors: Errors, unsure: Array | None = None
-) -> Array:
-    """Log-likelihood (t, s, j) of the tests at each of j speeds.
+class Grids(NamedTuple):
+    """Tables at q places for z sizes of the error, at evenly spaced depths.
 
-    Parameters
-    ----------
-    depth, chatter : (t, p) log depth and chatter frequency (Hz) of t boundaries at all points.
-    unsure : (t, p) standard deviations of ``depth``, where it is not known exactly.
+    ``point``, ``speed`` (q,): index of each place's point and speed. ``start``, ``step`` (q, z): first log
+    depth and the distance of two. ``value`` (q, z, g): what is read there.
     """
-    deviations = errors.deviations
-    own = np.random.default_rng(0).standard_normal(deviations.shape)  # the same for all boundaries
-    total = np.zeros((len(depth), len(deviations), len(tests.speeds)))
-    for point in np.unique(tests.point):
-        here = tests.take(tests.point == point)
-        at = depth[:, None, point] + deviations[None, :, point]
-        if unsure is not None:
-            at = at + unsure[:, None, point] * own[None, :, point]
+
+    point: np.ndarray
+    speed: np.ndarray
+    start: Array
+    step: Array
+    value: Array
+
+
+class Draws(NamedTuple):
+    """Deviations (s, p) of the log depth, index (s,) of the size of each, and normal numbers (s, p)."""
+
+    deviations: Array
+    size: np.ndarray
+    own: Array
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """What labels say of boundaries, tabulated for the sizes of the errors that are drawn.
+
+    Attributes
+    ----------
+    tests : with their labels. errors : that were drawn.
+    grids, draws : tables at the places where there are tests, and what is read there.
+    """
+
+    tests: Labels
+    errors: Errors
+    grids: Grids
+    draws: Draws
+
+    @classmethod
+    def of(cls, tests: Labels, errors: Errors) -> Likelihood:
+        """Tabulate what tests say."""
+        point, (sizes, size) = np.unique(tests.point), np.unique(errors.sd, return_inverse=True)
+        here = [tests.take(tests.point == each) for each in point]
+        tables = [[_table(each, float(sd)) for sd in sizes] for each in here]
+        grid, value = np.moveaxis(np.reshape(tables, (len(point), len(sizes), 2, _GRID)), 2, 0)
+        start, step = grid[..., 0], grid[..., 1] - grid[..., 0]
         speed = np.searchsorted(tests.speeds, tests.rpm[point])
-        for sd in np.unique(errors.sd):
-            alike = errors.sd == sd
-            total[:, alike, speed] += np.interp(at[:, alike], *_table(here, float(sd)))
-        total[:, :, speed] += _frequency(here, chatter[:, point], tests.tooth_hz[point])[:, None]
-    return total
+        own = np.random.default_rng(0).standard_normal(errors.deviations.shape)  # the same for all boundaries
+        grids = Grids(point, speed, start.copy(), step, value.copy())
+        return cls(tests, errors, grids, Draws(errors.deviations, size, own))
+
+    def __call__(self, depth: Array, chatter: Array, unsure: Array | None = None) -> Array:
+        """Log-likelihood (t, s, j) of the tests at each of j speeds.
+
+        Parameters
+        ----------
+        depth, chatter : (t, p) log depth and chatter frequency (Hz) of t boundaries at all points.
+        unsure : (t, p) standard deviations of ``depth``, where it is not known exactly.
+        """
+        from metro.loop.labels.lookup import read
+
+        tests = self.tests
+        total = np.zeros((len(depth), len(self.draws.size), len(tests.speeds)))
+        for point, speed in zip(self.grids.point, self.grids.speed, strict=True):
+            here = tests.take(tests.point == point)
+            total[:, :, speed] += _frequency(here, chatter[:, point], tests.tooth_hz[point])[:, None]
+        doubt = np.zeros_like(depth) if unsure is None else unsure
+        read(self.grids, self.draws, np.ascontiguousarray(depth), np.ascontiguousarray(doubt), total)
+        return total
 
 
 def _table(here: Labels, sd: float) -> tuple[Array, Array]:

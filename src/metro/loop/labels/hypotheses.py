@@ -15,13 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from metro.effects.effect import Effect, EffectParameter, by_name
 from metro.kriging import krige
-from metro.loop.labels.evidence import Errors, Labels, log_evidence, log_likelihood, of_errors, posterior
+from metro.loop.labels.evidence import Errors, Labels, Likelihood, log_evidence, of_errors, posterior
 from metro.units import JSON, Array
 
 _MOST, _MOST_EACH = 256, 64  # points of a set, and of each parameter
@@ -32,6 +33,7 @@ _SPREAD, _SPREAD_EACH = 8, 4  # points of the first set where the boundary is so
 _BEYOND = 1.0  # natural logarithm of depth beyond those tested, at which boundaries are all alike
 _CENTRES, _LEAST_WIDTH = 64, 0.02  # of clouds, in the unit cube
 Change = Callable[[Any], Any]
+Predict = Callable[[Sequence[Change]], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -40,18 +42,23 @@ class LabelEvidence:
 
     Attributes
     ----------
-    predict : ``predict(change)`` is the log depth (p,) and the chatter frequency (p,) at the boundary at all
-        points, once ``change`` has been made to the models.
-    estimate : the same (t, p), roughly and quickly, for t changes.
+    predict : ``predict(changes)`` are the log depths and the chatter frequencies (t, p) of the boundary at
+        all points, after each of t changes of the models.
+    estimate : the same, roughly and quickly.
     tests : with their labels. errors : of the models.
     seed : of the draws.
     """
 
-    predict: Callable[[Change], tuple[Array, Array]]
-    estimate: Callable[[Sequence[Change]], tuple[Array, Array]]
+    predict: Predict
+    estimate: Predict
     tests: Labels
     errors: Errors
     seed: int
+
+    @cached_property
+    def likelihood(self) -> Likelihood:
+        """What the tests say of boundaries."""
+        return Likelihood.of(self.tests, self.errors)
 
     def testable(self, log_depth: Array) -> Array:
         """Return log depths, within the range in which the tests can distinguish them."""
@@ -132,9 +139,9 @@ def hypothesis(
 
     size = sum(not parameter.given for _, parameter in _parameters(effects))
     if not size:
-        depth, chatter = (part[None] for part in evidence.predict(_change((), np.zeros(0))))
+        depth, chatter = evidence.predict([_change((), np.zeros(0))])
         sure = np.zeros_like(depth)
-        likelihood = log_likelihood(evidence.tests, depth, chatter, evidence.errors)
+        likelihood = evidence.likelihood(depth, chatter)
         none = np.zeros((1, 0))
         return Hypothesis((), none, none, np.ones(1), depth, chatter, sure, likelihood)
     rng = np.random.default_rng(evidence.seed)
@@ -172,14 +179,16 @@ def _thinned(weights: Array, count: int, rng: np.random.Generator) -> np.ndarray
 class _Drawn:
     """Points (t, d) of the cube, the clouds that some were drawn from, and those that are solved.
 
-    ``estimate``: log depth and frequency (t, p) at all; ``at`` (n,) indices and ``exact`` log depth and
-    frequency (n, p) of those solved.
+    ``density`` (t,): sum of those of all sets, which have equally many points; 1 of the first. ``estimate``:
+    log depth and frequency (t, p) at all; ``at`` (n,) indices and ``exact`` log depth and frequency (n, p) of
+    those solved.
     """
 
     effects: tuple[Effect, ...]
     evidence: LabelEvidence
     cube: Array
     clouds: tuple[_Nearby, ...] = ()
+    density: Array = field(default_factory=lambda: np.zeros(0))
     estimate: tuple[Array, ...] = ()
     at: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     exact: tuple[Array, ...] = ()
@@ -189,15 +198,19 @@ class _Drawn:
         estimate = self.evidence.estimate(
             [_change(self.effects, row) for row in _theta(self.effects, points)]
         )
+        density = 1.0 + sum((cloud.density(points) for cloud in self.clouds), np.zeros(len(points)))
         return replace(
-            self, cube=np.concatenate([self.cube, points]), estimate=_longer(self.estimate, estimate)
+            self,
+            cube=np.concatenate([self.cube, points]),
+            density=np.concatenate([self.density, density]),
+            estimate=_longer(self.estimate, estimate),
         )
 
     def about(self, centre: Hypothesis, rng: np.random.Generator) -> _Drawn:
         """Draw more points about the heavy ones of a hypothesis."""
         cloud = _about(centre, rng)
-        points = cloud.drawn(rng, self.cube.shape[1])
-        return replace(self.longer(points), clouds=(*self.clouds, cloud))
+        known = replace(self, clouds=(*self.clouds, cloud), density=self.density + cloud.density(self.cube))
+        return known.longer(cloud.drawn(rng, self.cube.shape[1]))
 
     def solved_at(self, which: np.ndarray) -> _Drawn:
         """Solve the boundary at some of the points."""
@@ -205,8 +218,7 @@ class _Drawn:
         if not len(fresh):
             return self
         changes = [_change(self.effects, row) for row in _theta(self.effects, self.cube[fresh])]
-        boundaries = [self.evidence.predict(change) for change in changes]
-        solved = tuple(np.stack(part) for part in zip(*boundaries, strict=True))
+        solved = self.evidence.predict(changes)
         return replace(self, at=np.append(self.at, fresh), exact=_longer(self.exact, solved))
 
     def weighed(self) -> Hypothesis:
@@ -217,11 +229,8 @@ class _Drawn:
         correction, unsure = learnt(cube)
         depth = rough + correction
         chatter = hz * (solved_hz / hz[self.at])[learnt.nearest(cube)]
-        likelihood = log_likelihood(self.evidence.tests, depth, chatter, self.evidence.errors, unsure)
-        density = np.ones(len(cube))  # that of the first set; all sets have equally many points
-        for cloud in self.clouds:
-            density += cloud.density(cube)
-        prior = (1.0 / density) / np.sum(1.0 / density)
+        likelihood = self.evidence.likelihood(depth, chatter, unsure)
+        prior = (1.0 / self.density) / np.sum(1.0 / self.density)
         theta = _theta(self.effects, cube)
         return Hypothesis(self.effects, cube, theta, prior, depth, chatter, unsure, likelihood)
 

@@ -74,10 +74,10 @@ def _chance(problem: Labelled, one: Weighed, rpm: Array, depth: Array, outcome: 
     tests, mine = outcome.evidence.tests, one.hypothesis
     heavy = _drawn(mine, outcome.evidence.seed)
     if one.names == (UNKNOWN,):
-        base = problem.boundary_at(lambda model: model, rpm)
+        (base,) = problem.boundaries_at([lambda model: model], rpm)
         boundary = base + curves(mine, outcome.base_boundary, (rpm, outcome.evidence.testable(base)))[heavy]
     else:
-        boundary = np.stack([problem.boundary_at(changed(mine, which), rpm) for which in heavy])
+        boundary = problem.boundaries_at([changed(mine, which) for which in heavy], rpm)
     errors = outcome.evidence.errors
     sd = float(np.sqrt(mine.of_errors(errors) @ errors.sd**2))
     chance: Array = ndtr((np.log(depth) - boundary[:, :, None]) / sd).mean(axis=0)

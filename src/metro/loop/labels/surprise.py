@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from metro.loop.labels.evidence import OF_SPEED, OF_TEST, Errors, Labels, log_evidence, log_likelihood
+from metro.loop.labels.evidence import OF_SPEED, OF_TEST, Errors, Labels, Likelihood, log_evidence
 from metro.loop.labels.hypotheses import Hypothesis
 from metro.units import Array
 
@@ -52,9 +52,8 @@ def surprise(tests: Labels, mine: Hypothesis, errors: Errors, seed: int) -> floa
         for key in here:
             if key not in known:
                 place = silent.take(places[key[0]])
-                known[key] = log_likelihood(
-                    replace(place, unstable=labels[places[key[0]]]), depth, depth, errors
-                )
+                labelled = replace(place, unstable=labels[places[key[0]]])
+                known[key] = Likelihood.of(labelled, errors)(depth, depth)
         total = np.sum([known[key] for key in here], axis=0)
         return log_evidence(total, np.full(len(depth), 1.0 / len(depth)))
 

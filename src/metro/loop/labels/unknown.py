@@ -60,14 +60,11 @@ def unknown(nothing: Hypothesis, evidence: LabelEvidence) -> Hypothesis:
     tested = evidence.tests.rpm, evidence.testable(depth)
     shape = _shape(tested, tested)
 
-    def predict(change: Callable[[Curve], Curve]) -> tuple[Array, Array]:
-        return depth + shape @ np.array(change(Curve()).coefficients), chatter
+    def predict(changes: Sequence[Callable[[Curve], Curve]]) -> tuple[Array, Array]:
+        off = np.array([change(Curve()).coefficients for change in changes]) @ shape.T
+        return depth + off, np.broadcast_to(chatter, off.shape)
 
-    def estimate(changes: Sequence[Callable[[Curve], Curve]]) -> tuple[Array, Array]:
-        boundaries = [predict(change) for change in changes]
-        return np.stack([one for one, _ in boundaries]), np.stack([one for _, one in boundaries])
-
-    return hypothesis((EFFECT,), replace(evidence, predict=predict, estimate=estimate))
+    return hypothesis((EFFECT,), replace(evidence, predict=predict, estimate=predict))
 
 
 Boundary = tuple[Array, Array]  # speeds and the base model's log depth there, (k,) each

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
 
+from metro.dynamics import stability_model
 from metro.dynamics.by_depth import boundary_of_edge
-from metro.dynamics.stability_model import StabilityModel, estimated
+from metro.dynamics.stability_model import StabilityModel
 from metro.observables.stability import boundary as stability
 from metro.observables.stability.boundary import Cutting
 from metro.observables.stability.positions import Tip
@@ -21,6 +23,7 @@ from metro.units import Array
 NOWHERE = -1  # point of a test at a place where no modes were measured
 
 Change = Callable[[StabilityModel], StabilityModel]
+Solver = Callable[[Sequence[StabilityModel], Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -57,19 +60,22 @@ class Case:
         return np.log(np.where(known, sampled, 1.0) / np.where(known, lowest, 1.0))
 
 
-def boundaries(cases: Sequence[Case], change: Change, *, scan: bool = True) -> tuple[Array, Array]:
-    """Log depth and chatter frequency (Hz) at the speeds of all cases, one after another, after a change.
+def boundaries(cases: Sequence[Case], changes: Sequence[Change], *, scan: bool = True) -> tuple[Array, Array]:
+    """Log depths and chatter frequencies (t, p), Hz, at all points, after each of t changes.
 
     ``scan``: see :func:`metro.dynamics.lobes.stability_boundary`.
     """
-    solved = [change(case.model).boundary(case.rpm, scan=scan) for case in cases]
-    depth, chatter = (np.concatenate(part) for part in zip(*solved, strict=True))
-    return np.log(depth), chatter
+    return _at_all_points(partial(stability_model.boundaries, scan=scan), cases, changes)
 
 
 def estimates(cases: Sequence[Case], changes: Sequence[Change]) -> tuple[Array, Array]:
     """Log depths and chatter frequencies (t, p), to zeroth order, after each of t changes."""
-    solved = [estimated([change(case.model) for change in changes], case.rpm) for case in cases]
+    return _at_all_points(stability_model.estimated, cases, changes)
+
+
+def _at_all_points(solve: Solver, cases: Sequence[Case], changes: Sequence[Change]) -> tuple[Array, Array]:
+    """Solve the models of all cases, whose points come one after another."""
+    solved = [solve([change(case.model) for change in changes], case.rpm) for case in cases]
     depth, chatter = (np.concatenate(part, axis=1) for part in zip(*solved, strict=True))
     return np.log(depth), chatter
 

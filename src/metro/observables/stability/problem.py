@@ -66,15 +66,15 @@ class LabelProblem:
         """(p,) case of each point: a cut at a place."""
         return np.repeat(np.arange(len(self.cases)), [len(case.rpm) for case in self.cases])
 
-    def boundaries(self, change: Change) -> tuple[Array, Array]:
-        """Log depth (p,) and chatter frequency (p,), Hz, of the boundary once the models are changed.
+    def boundaries(self, changes: Sequence[Change]) -> tuple[Array, Array]:
+        """Log depths and chatter frequencies (t, p), Hz, of the boundary after each of t changes.
 
         For hypotheses, of which hundreds are solved: found without a scan.
         """
-        return boundaries(self.cases, change, scan=False)
+        return boundaries(self.cases, changes, scan=False)
 
     def estimates(self, changes: Sequence[Change]) -> tuple[Array, Array]:
-        """Return the same (t, p), to zeroth order, after each of t changes."""
+        """Return the same, to zeroth order."""
         return estimates(self.cases, changes)
 
     def case_at(self, position: str | None = None) -> Case | None:
@@ -83,11 +83,11 @@ class LabelProblem:
         there = [i for i, case in enumerate(self.cases) if position in (None, case.position)]
         return self.cases[max(there, key=lambda i: int(tests[i]))] if there else None
 
-    def boundary_at(self, change: Change, rpm: Array) -> Array:
-        """Log depth (k,) of the boundary at speeds (k,), rev/min, in the case with most of the tests."""
+    def boundaries_at(self, changes: Sequence[Change], rpm: Array) -> Array:
+        """Log depths (t, k) of boundaries at speeds (k,), rev/min, in the case with most of the tests."""
         case = self.case_at()
         assert case is not None
-        return boundaries([case.at(rpm)], change)[0]
+        return boundaries([case.at(rpm)], changes)[0]
 
     def deviations(self, draws: int, seed: int) -> Array:
         """(draws, p) deviations of the log depth by what modes and coefficients are uncertain of."""
@@ -121,8 +121,7 @@ class LabelProblem:
                 parts.append(rows)
                 continue
             here = case.at(rows["rpm"].to_numpy(float))
-            before, _ = boundaries([here], lambda model: model)
-            after, chatter = boundaries([here], change)
+            (before, after), (_, chatter) = boundaries([here], [lambda model: model, change])
             depths = [name for name in rows.columns if str(name).startswith(("depth", "error"))]
             scaled = rows[depths].mul(np.exp(after - before), axis=0)
             parts.append(rows.assign(**scaled, chatter_hz=chatter)[np.isfinite(after)])
