@@ -68,12 +68,8 @@ class OfEdge:
         return depths
 
 
-def boundary_of_edge(
-    structure: Structure, cut: Cut, rpm: Array, factor: Array | float = 1.0, *, scan: bool = True
-) -> OfEdge:
+def boundary_of_edge(structure: Structure, cut: Cut, rpm: Array, factor: Array | float = 1.0) -> OfEdge:
     """Find the lowest depths at which a cut is unstable; ``factor`` (k,): of the depths, as the stiffness.
-
-    ``scan``: see :func:`metro.dynamics.lobes.stability_boundary`.
 
     Of a flat end, and of a straight flank without a corner, the coefficients are the same at all depths, and
     one solution is all there is.
@@ -81,7 +77,7 @@ def boundary_of_edge(
     rpm = np.asarray(rpm, dtype=float)
     tried = _depths(structure, cut, rpm, factor)
     cuts = tuple(cut.at_depth(depth) for depth in tried)
-    solved = tuple(stability_boundary(structure, one, rpm, scan=scan) for one in cuts)
+    solved = tuple(stability_boundary(structure, one, rpm) for one in cuts)
     found = np.stack([factor * one.depth for one in solved])
     lowest, gain = (found[0], np.ones(len(rpm))) if len(tried) == 1 else _agreed(np.array(tried), found)
     near = np.abs(np.log(np.array(tried))[:, None] - np.log(np.where(np.isfinite(lowest), lowest, tried[-1])))

@@ -231,27 +231,45 @@ def _product_weights(n: int) -> Array:
 def reduced(equation: Kernel, share: float = 0.6) -> Kernel:
     """Project the equation on ``share`` as many functions, or little more, that carry its large eigenvalues.
 
-    With process damping it is returned as it is: its eigenvalues fade more slowly.
-
     They are the free vibrations and what the response to the cut makes of them, again and again: as that
-    response is a Volterra operator, its powers fade faster than geometrically.
+    response is a Volterra operator, its powers fade faster than geometrically. Displacements and rates have
+    functions of their own, since the force depends on their past in different ways.
     """
-    if not equation.delayed.all():
-        return equation
-    n, poles = equation.states.shape[1:]
-    free = equation.states[:, :, : poles // 2]
-    u, s, _ = np.linalg.svd(np.concatenate([free.real, free.imag], axis=2), full_matrices=False)
-    basis = last = u[:, :, : int(np.sum(s > _NEGLIGIBLE * s[:, :1], axis=1).max())]
-    while basis.shape[2] < share * n:
-        image = equation.volterra @ last
-        for _ in range(2):  # once leaves rounding errors of the parts taken away
-            image -= basis @ (basis.transpose(0, 2, 1) @ image)
-        last = np.linalg.qr(image)[0]
-        basis = np.concatenate([basis, last], axis=2)[:, :, :n]
-    onto = basis.transpose(0, 2, 1)
-    volterra, states = onto @ equation.volterra @ basis, onto @ equation.states
-    delayed = np.ones(basis.shape[2])
-    return Kernel(equation.period, volterra, states, equation.drive @ basis, equation.decay, delayed)
+    rows = [np.flatnonzero(equation.delayed == kind) for kind in np.unique(equation.delayed)]
+    free = equation.states[:, :, : equation.states.shape[2] // 2]
+    basis = last = [_spanned(np.concatenate([free[:, at].real, free[:, at].imag], axis=2)) for at in rows]
+    while any(own.shape[2] < share * len(at) for own, at in zip(basis, rows, strict=True)):
+        image = np.concatenate(
+            [equation.volterra[:, :, at] @ own for own, at in zip(last, rows, strict=True)], axis=2
+        )
+        last = [_beside(own, image[:, at]) for own, at in zip(basis, rows, strict=True)]
+        basis = [
+            np.concatenate(pair, axis=2)[:, :, : len(at)] for *pair, at in zip(basis, last, rows, strict=True)
+        ]
+    whole = np.zeros((*equation.volterra.shape[:2], sum(own.shape[2] for own in basis)))
+    first = 0
+    for own, at in zip(basis, rows, strict=True):
+        whole[:, at, first : first + own.shape[2]] = own
+        first += own.shape[2]
+    onto = whole.transpose(0, 2, 1)
+    delayed = np.repeat(np.unique(equation.delayed), [own.shape[2] for own in basis])
+    volterra, states = onto @ equation.volterra @ whole, onto @ equation.states
+    return Kernel(equation.period, volterra, states, equation.drive @ whole, equation.decay, delayed)
+
+
+def _spanned(vectors: Array) -> Array:
+    """Orthonormal vectors (k, n, q) that span all but a negligible part of others (k, n, p)."""
+    u, s, _ = np.linalg.svd(vectors, full_matrices=False)
+    spanned: Array = u[:, :, : int(np.sum(s > _NEGLIGIBLE * s[:, :1], axis=1).max())]
+    return spanned
+
+
+def _beside(basis: Array, vectors: Array) -> Array:
+    """Orthonormal vectors for what of others (k, n, p) is orthogonal to a basis (k, n, q)."""
+    for _ in range(2):  # once leaves rounding errors of the parts taken away
+        vectors = vectors - basis @ (basis.transpose(0, 2, 1) @ vectors)
+    beside: Array = np.linalg.qr(vectors)[0]
+    return beside
 
 
 def period_map(equation: Kernel, depth: Array) -> Array:

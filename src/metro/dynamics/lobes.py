@@ -16,7 +16,6 @@ from metro.dynamics import collocation, crossings
 from metro.dynamics.collocation import Arc, Kernel
 from metro.dynamics.crossings import Candidates, Refined
 from metro.dynamics.system import Cut, Structure
-from metro.dynamics.zero_order import zero_order_boundary
 from metro.units import Array, ComplexArray
 
 # Points per radian of the fastest vibration, further points per panel, multiplier angles of the scan, and
@@ -26,9 +25,6 @@ from metro.units import Array, ComplexArray
 # second does not scan: it follows the multipliers that were found outside the unit circle.
 _EFFORTS = ((0.65, 4, 5, 0.5), (0.65, 4, 0, 0.6), (0.75, 9, 30, 0.6), (0.9, 12, 120, 0.6))
 _Effort = tuple[float, int, int, float]
-# A scan takes half the time of a boundary. Where hundreds are wanted, it comes second: Newton's method starts
-# from the boundary to zeroth order, and speeds at which the cut is unstable below what it finds are scanned.
-_ESTIMATED_FIRST = (_EFFORTS[1], _EFFORTS[0], *_EFFORTS[2:])
 _EXTRA_POINTS = 5  # from one resolution to the next; the difference is the error
 _RESOLUTIONS, _TOLERANCE = 3, 1e-4  # at most, and the relative error that is good enough
 _BELOW = (0.999, 0.88, 0.5)  # shares of a boundary at which the cut must be stable
@@ -59,50 +55,30 @@ class Boundary:
     crossings: Candidates
 
 
-def stability_boundary(structure: Structure, cut: Cut, rpm: Array, *, scan: bool = True) -> Boundary:
+def stability_boundary(structure: Structure, cut: Cut, rpm: Array) -> Boundary:
     """Find the lowest axial depth at which the cut is unstable, at spindle speeds ``rpm`` (k,), rev/min.
 
     The structure may have modes of its own at each of them, and the process a damping.
 
-    Zero helix, linear regeneration: edge forces are not in it. Without a ``scan`` of all multiplier angles it
-    takes half the time, and in about one case of a hundred an island of instability is missed (by up to a
-    fifth of the depth in 1500 boundaries of ``docs/performance.md``).
+    Zero helix, linear regeneration: edge forces are not in it.
     """
     rpm = np.asarray(rpm, dtype=float)
     result = _nothing(rpm)
     if not collocation.panels_of(cut) or not len(structure.axis):
         return result
     parts: list[Candidates] = []
-    efforts = _EFFORTS if scan else _ESTIMATED_FIRST
-    estimates = result.crossings if scan else _estimates(structure, cut, rpm)
     for members in groups(structure, cut, rpm):
-        group, hints = members, estimates.among(members)
-        for effort in efforts:
+        group, hints = members, result.crossings
+        for effort in _EFFORTS:
             part, missed, hints = _solve(structure.at(group), cut.at(group), rpm[group], effort, hints)
             _enter(result, group, part)
-            last = effort is efforts[-1]
+            last = effort is _EFFORTS[-1]
             done = part.crossings.take(~missed[part.crossings.speed] | last)
             parts.append(replace(done, speed=group[done.speed]))
             group = group[missed]
             if not len(group):
                 break
     return replace(result, crossings=Candidates.join(parts))
-
-
-def _estimates(structure: Structure, cut: Cut, rpm: Array) -> Candidates:
-    """Where the boundary to zeroth order has its crossings, and flips at the same depths."""
-    if structure.of_speeds or np.ndim(cut.damping):
-        each = [np.array(i) for i in range(len(rpm))]
-        structures, cuts = [structure.at(i) for i in each], [cut.at(i) for i in each]
-        depth, hz = (part[:, 0] for part in zero_order_boundary(structures, cuts, rpm[:, None]))
-    else:
-        (depth,), (hz,) = zero_order_boundary([structure], [cut], rpm[None])
-    known = np.flatnonzero(np.isfinite(depth))
-    turned = 2.0 * np.pi * hz[known] * cut.tooth_period(rpm[known])
-    theta = np.abs((turned + np.pi) % (2.0 * np.pi) - np.pi)
-    inverse = 1.0 / depth[known]
-    flips = Candidates(known, np.full(len(known), np.pi), inverse)
-    return Candidates.join([Candidates(known, theta, inverse), flips])
 
 
 def spectral_radius(structure: Structure, cut: Cut, rpm: Array, depth: Array) -> Array:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -53,17 +52,15 @@ class StabilityModel:
         cuts = [(replace(cut, damping=0.0), bool(cut.damping)) for cut in self.cuts]
         return (*self.structure.axis.tolist(), self.structure.directions.shape, *cuts)
 
-    def boundary(self, rpm: Array, *, scan: bool = True) -> tuple[Array, Array]:
+    def boundary(self, rpm: Array) -> tuple[Array, Array]:
         """Lowest depths (k,), m, and chatter frequencies there (k,), Hz, at speeds (k,), rev/min.
-
-        ``scan``: see :func:`metro.dynamics.lobes.stability_boundary`.
 
         Raises
         ------
         ValueError
             When the stiffness vanishes at one of the speeds.
         """
-        depth, hz = boundaries([self], rpm, scan=scan)
+        depth, hz = boundaries([self], rpm)
         return depth[0], hz[0]
 
     def _factors(self, rpm: Array) -> tuple[Array, Array]:
@@ -86,12 +83,10 @@ def _alike(ratio: Array) -> bool:
 Solver = Callable[[Sequence[StabilityModel], Array, Array, Array], tuple[Array, Array]]
 
 
-def boundaries(models: Sequence[StabilityModel], rpm: Array, *, scan: bool = True) -> tuple[Array, Array]:
+def boundaries(models: Sequence[StabilityModel], rpm: Array) -> tuple[Array, Array]:
     """Lowest depths (t, k), m, and chatter frequencies there (t, k), Hz, of t models at speeds (k,), rev/min.
 
     Models that differ by numbers alone are solved as one stack.
-
-    ``scan``: see :func:`metro.dynamics.lobes.stability_boundary`.
 
     Raises
     ------
@@ -103,7 +98,7 @@ def boundaries(models: Sequence[StabilityModel], rpm: Array, *, scan: bool = Tru
         alike.setdefault(model.form, []).append(i)
     depth, hz = np.zeros((2, len(models), len(rpm)))
     for which in alike.values():
-        depth[which], hz[which] = _yielding([models[i] for i in which], rpm, partial(_solved, scan=scan))
+        depth[which], hz[which] = _yielding([models[i] for i in which], rpm, _solved)
     return depth, hz
 
 
@@ -131,9 +126,7 @@ def _yielding(models: Sequence[StabilityModel], rpm: Array, solve: Solver) -> tu
     return np.stack([d for d, _ in agreed]), np.stack([c for _, c in agreed])
 
 
-def _solved(
-    models: Sequence[StabilityModel], rpm: Array, factor: Array, ratio: Array, *, scan: bool
-) -> tuple[Array, Array]:
+def _solved(models: Sequence[StabilityModel], rpm: Array, factor: Array, ratio: Array) -> tuple[Array, Array]:
     """Solve models (t) of one form, with ``factor`` (t, k) times the stiffness of the first mode.
 
     ``ratio`` (t, k, m): of the factors of the modes to that.
@@ -144,7 +137,7 @@ def _solved(
     for own in zip(*(one.cuts for one in models), strict=True):
         damping = np.repeat([cut.damping for cut in own], len(rpm))
         cut = replace(own[0], damping=damping) if damping.any() else own[0]
-        one = boundary_of_edge(structure, cut, slowed, factor.ravel(), scan=scan)
+        one = boundary_of_edge(structure, cut, slowed, factor.ravel())
         solved.append((one.depth, one.chatter_hz))
     depth, hz = _least(solved)
     return depth.reshape(factor.shape), np.sqrt(factor) * hz.reshape(factor.shape)

@@ -54,7 +54,7 @@ def zero_order_boundary(
 
 
 def _solved(structures: Sequence[Structure], cuts: Sequence[Cut], rpm: Array) -> tuple[Array, Array]:
-    # It takes numba, which a boundary that is scanned does without.
+    # It takes numba, which a boundary does without.
     from metro.dynamics.zero_order_lines import Acting, Modes, Scratch, lowest
 
     modes = Modes(

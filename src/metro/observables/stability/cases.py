@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -60,12 +59,9 @@ class Case:
         return np.log(np.where(known, sampled, 1.0) / np.where(known, lowest, 1.0))
 
 
-def boundaries(cases: Sequence[Case], changes: Sequence[Change], *, scan: bool = True) -> tuple[Array, Array]:
-    """Log depths and chatter frequencies (t, p), Hz, at all points, after each of t changes.
-
-    ``scan``: see :func:`metro.dynamics.lobes.stability_boundary`.
-    """
-    return _at_all_points(partial(stability_model.boundaries, scan=scan), cases, changes)
+def boundaries(cases: Sequence[Case], changes: Sequence[Change]) -> tuple[Array, Array]:
+    """Log depths and chatter frequencies (t, p), Hz, at all points, after each of t changes."""
+    return _at_all_points(stability_model.boundaries, cases, changes)
 
 
 def estimates(cases: Sequence[Case], changes: Sequence[Change]) -> tuple[Array, Array]:

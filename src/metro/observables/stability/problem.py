@@ -67,11 +67,8 @@ class LabelProblem:
         return np.repeat(np.arange(len(self.cases)), [len(case.rpm) for case in self.cases])
 
     def boundaries(self, changes: Sequence[Change]) -> tuple[Array, Array]:
-        """Log depths and chatter frequencies (t, p), Hz, of the boundary after each of t changes.
-
-        For hypotheses, of which hundreds are solved: found without a scan.
-        """
-        return boundaries(self.cases, changes, scan=False)
+        """Log depths and chatter frequencies (t, p), Hz, of the boundary after each of t changes."""
+        return boundaries(self.cases, changes)
 
     def estimates(self, changes: Sequence[Change]) -> tuple[Array, Array]:
         """Return the same, to zeroth order."""
