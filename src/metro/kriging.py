@@ -58,35 +58,45 @@ class Kriged:
 
 def krige(at: Array, values: Array) -> Kriged:
     """Learn values (n, p) that are known at points (n, d) of the unit cube."""
+    apart = (at[:, None] - at[None]) ** 2
     lengths = np.full(at.shape[1], 0.5)
     for _ in range(_SWEEPS):
         for i in range(len(lengths)):
             tried = [np.where(np.arange(len(lengths)) == i, length, lengths) for length in _LENGTHS]
-            lengths = max(tried, key=lambda one: _log_likelihood(at, values, one))
-    inverse, trend, variance, _ = _solved(at, values, lengths)
-    return Kriged(at, lengths, trend, variance, inverse @ (values - trend), inverse)
+            lengths = max(tried, key=lambda one: _whitened(apart, values, one).log_likelihood)
+    found = _whitened(apart, values, lengths)
+    inverse = found.whitening.T @ found.whitening
+    return Kriged(at, lengths, found.trend, found.variance, inverse @ (values - found.trend), inverse)
 
 
-def _log_likelihood(at: Array, values: Array, lengths: Array) -> float:
-    _, _, variance, log_determinant = _solved(at, values, lengths)
-    return -0.5 * float(len(at) * np.log(variance).sum() + len(variance) * log_determinant)
+@dataclass(frozen=True)
+class _Whitened:
+    """What makes independent numbers of the values (n, n), their trend and variance (p,), log-likelihood."""
+
+    whitening: Array
+    trend: Array
+    variance: Array
+    log_likelihood: float
 
 
-def _solved(at: Array, values: Array, lengths: Array) -> tuple[Array, Array, Array, float]:
-    """Inverse covariance, trend and variance of each value, log determinant."""
-    covariance = _covariance(at, at, lengths) + _NUGGET * np.eye(len(at))
-    inverse: Array = np.asarray(np.linalg.inv(covariance), dtype=float)
-    total = inverse.sum(axis=0)
-    trend = total @ values / total.sum()
-    residual = values - trend
-    variance = np.maximum(
-        np.einsum("np,nm,mp->p", residual, inverse, residual, optimize=True) / len(at), _LEAST_SD**2
-    )
-    return inverse, trend, variance, float(np.linalg.slogdet(covariance)[1])
+def _whitened(apart: Array, values: Array, lengths: Array) -> _Whitened:
+    """Whiten values (n, p) at points whose coordinates are ``apart`` (n, n, d), squared."""
+    lower = np.linalg.cholesky(_matern(apart @ lengths**-2.0) + _NUGGET * np.eye(len(values)))
+    whitening = np.linalg.inv(lower)
+    one, white = whitening.sum(axis=1), whitening @ values
+    trend = one @ white / (one @ one)
+    variance = np.maximum(np.mean((white - np.outer(one, trend)) ** 2, axis=0), _LEAST_SD**2)
+    log_determinant = 2.0 * np.log(np.diag(lower)).sum()
+    log_likelihood = -0.5 * float(len(values) * np.log(variance).sum() + len(variance) * log_determinant)
+    return _Whitened(whitening, trend, variance, log_likelihood)
 
 
 def _covariance(first: Array, second: Array, lengths: Array) -> Array:
-    squared = np.sum(((first[:, None] - second[None]) / lengths) ** 2, axis=2)
+    return _matern(np.sum(((first[:, None] - second[None]) / lengths) ** 2, axis=2))
+
+
+def _matern(squared: Array) -> Array:
+    """Covariance at squared distances, in lengths."""
     distance = np.sqrt(3.0 * squared)
     covariance: Array = (1.0 + distance) * np.exp(-distance)
     return covariance

@@ -7,9 +7,9 @@ import pytest
 from label_toy import GATES, SHIFT, SLOPE, Line, problem
 from scipy.special import logsumexp
 
-from metro.loop.labels import hypotheses
 from metro.loop.labels.evidence import Errors
-from metro.loop.labels.hypotheses import LabelEvidence, changed, hypothesis, quantile
+from metro.loop.labels.hypotheses import LabelEvidence, changed, hypothesis, pursued
+from metro.loop.labels.points import Nearby, quantile
 from metro.loop.labels.problem import tests_of as told_by
 
 TASK = problem(Line(slope=0.8, shift=-0.4), 5)
@@ -106,9 +106,19 @@ def test_where_the_boundary_jumps_it_is_solved_until_the_interval_is_that_of_a_f
 
 @pytest.mark.parametrize("width", [0.02, 0.5])
 def test_points_drawn_about_others_are_folded_back_into_the_cube(width):
-    cloud = hypotheses._Nearby(np.array([[0.01, 1.0], [0.5, 0.0]]), np.full(2, width))
+    cloud = Nearby(np.array([[0.01, 1.0], [0.5, 0.0]]), np.full(2, width))
     points = np.concatenate([cloud.drawn(np.random.default_rng(seed), 3) for seed in range(40)])
     assert points.min() >= 0.0
     assert points.max() <= 1.0
     near = np.abs(points[:, None, :2] - cloud.centres).max(axis=2).min(axis=1)
     assert np.quantile(near, 0.9) < 3.0 * width
+
+
+def test_what_is_pursued_ends_where_it_would_have_ended_at_once():
+    first = hypothesis((SHIFT, SLOPE), EVIDENCE, rounds=1)
+    whole = hypothesis((SHIFT, SLOPE), EVIDENCE, rounds=4)
+    assert len(first.theta) < len(whole.theta)
+    ended = pursued(first, 4)
+    np.testing.assert_array_equal(ended.theta, whole.theta)
+    np.testing.assert_array_equal(ended.weights, whole.weights)
+    assert pursued(ended, 4) is ended

@@ -6,8 +6,8 @@ from label_toy import GATES, IDLE, LOUD, SHIFT, SLOPE, TWIN, Line, problem
 from scipy.stats import norm
 
 from metro.effects.effect import EffectParameter
-from metro.loop.labels.hypotheses import quantile
 from metro.loop.labels.next_test import next_tests
+from metro.loop.labels.points import quantile
 from metro.loop.labels.search import NOTHING, search_labels, tried
 from metro.loop.statement import Statement
 

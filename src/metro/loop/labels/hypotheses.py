@@ -23,15 +23,14 @@ import numpy as np
 from metro.effects.effect import Effect, EffectParameter, by_name
 from metro.kriging import krige
 from metro.loop.labels.evidence import Errors, Labels, Likelihood, log_evidence, of_errors, posterior
+from metro.loop.labels.points import Nearby, about, count_of, thinned, values
 from metro.units import JSON, Array
 
-_MOST, _MOST_EACH = 256, 64  # points of a set, and of each parameter
-_ROUNDS = 12  # sets after the first, at most
+ROUNDS = 12  # sets after the first, at most
 _ENOUGH, _ENOUGH_JOINED = 100.0, 50.0  # effective points at which no more are drawn
 _SURE = 0.04  # mean deviation of the log depth that is learnt, at which no more are solved
 _SPREAD, _SPREAD_EACH = 8, 4  # points of the first set where the boundary is solved, and of each parameter
 _BEYOND = 1.0  # natural logarithm of depth beyond those tested, at which boundaries are all alike
-_CENTRES, _LEAST_WIDTH = 64, 0.02  # of clouds, in the unit cube
 Change = Callable[[Any], Any]
 Predict = Callable[[Sequence[Change]], tuple[Array, Array]]
 
@@ -79,6 +78,7 @@ class Hypothesis:
     depth, chatter : (t, p) log depth (m) and chatter frequency (Hz) at the boundary, at all points.
     unsure : (t, p) standard deviation of ``depth``, as far as it is not solved but learnt.
     likelihood : (t, s, j) log-likelihood of the tests at each speed, for s draws of the errors.
+    drawn : how the values were drawn; None where there are none.
     """
 
     effects: tuple[Effect, ...]
@@ -89,6 +89,7 @@ class Hypothesis:
     chatter: Array
     unsure: Array
     likelihood: Array
+    drawn: _Drawn | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -129,11 +130,15 @@ class Hypothesis:
 
 
 def hypothesis(
-    effects: tuple[Effect, ...], evidence: LabelEvidence, known: Hypothesis | None = None
+    effects: tuple[Effect, ...],
+    evidence: LabelEvidence,
+    known: Hypothesis | None = None,
+    rounds: int = ROUNDS,
 ) -> Hypothesis:
     """Draw the parameters of the effects and weigh them by the tests.
 
     ``known``: the hypothesis that the first of the effects act alone, about whose parameters more are drawn.
+    ``rounds``: how many sets are drawn after the first, at most (:func:`pursued`).
     """
     from scipy.stats import qmc
 
@@ -144,35 +149,22 @@ def hypothesis(
         likelihood = evidence.likelihood(depth, chatter)
         none = np.zeros((1, 0))
         return Hypothesis((), none, none, np.ones(1), depth, chatter, sure, likelihood)
-    rng = np.random.default_rng(evidence.seed)
-    drawn = _Drawn(effects, evidence, np.zeros((0, size))).longer(
-        qmc.Sobol(size, seed=evidence.seed).random(_count(size))
-    )
+    first = qmc.Sobol(size, seed=evidence.seed).random(count_of(size))
+    drawn = _Drawn(effects, evidence, np.zeros((0, size)), joined=known is not None).longer(first)
     if known:
-        drawn = drawn.about(known, rng)
-    spread = (_SPREAD + _SPREAD_EACH * size) // (2 if known else 1)
-    enough = _ENOUGH_JOINED if known else _ENOUGH
-    drawn = drawn.solved_at(np.linspace(0, len(drawn.cube) - 1, spread).astype(int))
-    weighed = drawn.weighed()
-    for _ in range(_ROUNDS):
-        drawn = drawn.solved_at(_thinned(weighed.in_doubt, spread // 2, rng)).about(weighed, rng)
-        weighed = drawn.weighed()
-        enough_points = 1.0 / np.sum(weighed.weights**2) >= enough
-        if enough_points and float((weighed.weights @ weighed.unsure).mean()) < _SURE:
-            break
-    return weighed
+        drawn = drawn.about(known)
+    drawn = drawn.solved_at(np.linspace(0, len(drawn.cube) - 1, drawn.spread).astype(int))
+    return pursued(drawn.weighed(), rounds)
 
 
-def _count(size: int) -> int:
-    """Points of a set, for so many parameters."""
-    return min(_MOST, _MOST_EACH * size)
+def pursued(one: Hypothesis, rounds: int = ROUNDS) -> Hypothesis:
+    """Draw more points, and solve more boundaries, until that is enough or there are so many sets.
 
-
-def _thinned(weights: Array, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Return indices (count,) of points, evenly by weight."""
-    share = (np.arange(count) + rng.random()) / count
-    thinned: np.ndarray = np.searchsorted(np.cumsum(weights), share).clip(max=len(weights) - 1)
-    return thinned
+    It ends where it would have ended had it been drawn with so many sets at once.
+    """
+    while one.drawn and one.drawn.sets < rounds and not one.drawn.enough(one):
+        one = one.drawn.further(one).weighed()
+    return one
 
 
 @dataclass(frozen=True)
@@ -181,13 +173,15 @@ class _Drawn:
 
     ``density`` (t,): sum of those of all sets, which have equally many points; 1 of the first. ``estimate``:
     log depth and frequency (t, p) at all; ``at`` (n,) indices and ``exact`` log depth and frequency (n, p) of
-    those solved.
+    those solved. ``sets``: drawn after the first. ``joined``: about what is known of one of two effects.
     """
 
     effects: tuple[Effect, ...]
     evidence: LabelEvidence
     cube: Array
-    clouds: tuple[_Nearby, ...] = ()
+    joined: bool
+    sets: int = 0
+    clouds: tuple[Nearby, ...] = ()
     density: Array = field(default_factory=lambda: np.zeros(0))
     estimate: tuple[Array, ...] = ()
     at: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
@@ -196,7 +190,7 @@ class _Drawn:
     def longer(self, points: Array) -> _Drawn:
         """Estimate the boundary at more points."""
         estimate = self.evidence.estimate(
-            [_change(self.effects, row) for row in _theta(self.effects, points)]
+            [_change(self.effects, row) for row in _values(self.effects, points)]
         )
         density = 1.0 + sum((cloud.density(points) for cloud in self.clouds), np.zeros(len(points)))
         return replace(
@@ -206,18 +200,38 @@ class _Drawn:
             estimate=_longer(self.estimate, estimate),
         )
 
-    def about(self, centre: Hypothesis, rng: np.random.Generator) -> _Drawn:
+    def about(self, centre: Hypothesis) -> _Drawn:
         """Draw more points about the heavy ones of a hypothesis."""
-        cloud = _about(centre, rng)
+        cloud = about(centre.weights, centre.cube, self._rng(1))
         known = replace(self, clouds=(*self.clouds, cloud), density=self.density + cloud.density(self.cube))
-        return known.longer(cloud.drawn(rng, self.cube.shape[1]))
+        return known.longer(cloud.drawn(self._rng(2), self.cube.shape[1]))
+
+    def further(self, mine: Hypothesis) -> _Drawn:
+        """Solve the boundary at more of the points, and draw one more set of these."""
+        solved = self.solved_at(thinned(mine.in_doubt, self.spread // 2, self._rng(0)))
+        return replace(solved.about(mine), sets=self.sets + 1)
+
+    @property
+    def spread(self) -> int:
+        """At how many points of the first set the boundary is solved."""
+        every: int = _SPREAD + _SPREAD_EACH * self.cube.shape[1]
+        return every // 2 if self.joined else every
+
+    def enough(self, mine: Hypothesis) -> bool:
+        """Whether points were drawn again, many have a weight, and the boundary is known at these."""
+        effective = 1.0 / np.sum(mine.weights**2)
+        many = effective >= (_ENOUGH_JOINED if self.joined else _ENOUGH)
+        return bool(self.sets and many and (mine.weights @ mine.unsure).mean() < _SURE)
+
+    def _rng(self, purpose: int) -> np.random.Generator:
+        return np.random.default_rng([self.evidence.seed, len(self.clouds), purpose])
 
     def solved_at(self, which: np.ndarray) -> _Drawn:
         """Solve the boundary at some of the points."""
         fresh = np.setdiff1d(which, self.at)
         if not len(fresh):
             return self
-        changes = [_change(self.effects, row) for row in _theta(self.effects, self.cube[fresh])]
+        changes = [_change(self.effects, row) for row in _values(self.effects, self.cube[fresh])]
         solved = self.evidence.predict(changes)
         return replace(self, at=np.append(self.at, fresh), exact=_longer(self.exact, solved))
 
@@ -231,21 +245,16 @@ class _Drawn:
         chatter = hz * (solved_hz / hz[self.at])[learnt.nearest(cube)]
         likelihood = self.evidence.likelihood(depth, chatter, unsure)
         prior = (1.0 / self.density) / np.sum(1.0 / self.density)
-        theta = _theta(self.effects, cube)
-        return Hypothesis(self.effects, cube, theta, prior, depth, chatter, unsure, likelihood)
+        theta = _values(self.effects, cube)
+        return Hypothesis(self.effects, cube, theta, prior, depth, chatter, unsure, likelihood, self)
 
 
 def _longer(first: tuple[Array, ...], second: tuple[Array, ...]) -> tuple[Array, ...]:
     return tuple(np.concatenate(pair) for pair in zip(first, second, strict=True)) if first else second
 
 
-def _theta(effects: tuple[Effect, ...], cube: Array) -> Array:
-    """Parameters (t, n) at points (t, d) of the cube, which has no coordinate for what is given."""
-    sought = iter(cube.T)
-    columns = [
-        np.full(len(cube), p.lower) if p.given else quantile(p, next(sought)) for _, p in _parameters(effects)
-    ]
-    return np.stack(columns, axis=1)
+def _values(effects: tuple[Effect, ...], cube: Array) -> Array:
+    return values([parameter for _, parameter in _parameters(effects)], cube)
 
 
 def _applied(model: Any, effects: tuple[Effect, ...], theta: Array) -> Any:
@@ -264,59 +273,6 @@ def _change(effects: tuple[Effect, ...], theta: Array) -> Callable[[Any], Any]:
 def changed(chosen: Hypothesis, which: int) -> Callable[[Any], Any]:
     """Return what the effects do to a model with their parameters of index ``which``."""
     return _change(chosen.effects, chosen.theta[which])
-
-
-@dataclass(frozen=True)
-class _Nearby:
-    """Normal clouds about points (h, c), folded back at the faces of the cube; ``width`` (c,).
-
-    They determine its first c coordinates; the others are uniform.
-    """
-
-    centres: Array
-    width: Array
-
-    def drawn(self, rng: np.random.Generator, size: int) -> Array:
-        """Points (n, size)."""
-        points = rng.random((_count(size), size))
-        near = self.centres[rng.integers(len(self.centres), size=len(points))]
-        near = near + self.width * rng.standard_normal(near.shape)
-        points[:, : near.shape[1]] = 1.0 - np.abs(1.0 - near % 2.0)
-        return points
-
-    def density(self, cube: Array) -> Array:
-        """Density (t,) at points (t, d)."""
-        at = cube[:, None, : self.centres.shape[1]]
-        images = (self.centres, -self.centres, 2.0 - self.centres)
-        near = sum((np.exp(-0.5 * ((at - image) / self.width) ** 2) for image in images), np.zeros(1))
-        peak = np.prod(self.width * np.sqrt(2.0 * np.pi))
-        density: Array = near.prod(axis=2).mean(axis=1) / peak
-        return density
-
-
-def _about(centre: Hypothesis, rng: np.random.Generator) -> _Nearby:
-    weights, cube = centre.weights, centre.cube
-    spread = np.sqrt(weights @ (cube - weights @ cube) ** 2)
-    width = spread * (np.sum(weights**2)) ** (1.0 / (4 + cube.shape[1]))  # Silverman's rule
-    return _Nearby(cube[_thinned(weights, _CENTRES, rng)], np.clip(width, _LEAST_WIDTH, 0.5))
-
-
-def quantile(parameter: EffectParameter, share: Array) -> Array:
-    """Value of a parameter below which its prior has a ``share`` (n,).
-
-    A choice: each alike. Plausible about zero: normal within the bounds. Positive: flat in the logarithm.
-    """
-    from scipy.special import ndtr, ndtri
-
-    low, high = parameter.lower, parameter.upper
-    if parameter.choices:
-        return np.minimum(np.floor(share * len(parameter.choices)), len(parameter.choices) - 1.0)
-    if parameter.plausible is not None:
-        below, above = ndtr(np.array([low, high]) / parameter.plausible)
-        return np.asarray(parameter.plausible * ndtri(below + share * (above - below)))
-    if low > 0.0:
-        return np.asarray(low * (high / low) ** share)
-    return low + share * (high - low)
 
 
 def _parameters(effects: tuple[Effect, ...]) -> list[tuple[Effect, EffectParameter]]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from metro.effects.effect import Effect, fitted_to
 from metro.loop.labels.evidence import Errors, Labels, drawn_errors, left_out, unstable_probability
-from metro.loop.labels.hypotheses import Hypothesis, LabelEvidence, hypothesis
+from metro.loop.labels.hypotheses import Hypothesis, LabelEvidence, hypothesis, pursued
 from metro.loop.labels.problem import tests_of
 from metro.loop.labels.unknown import unknown
 from metro.loop.search.rivals import RIVAL_WEIGHT
@@ -30,6 +30,8 @@ PAIR_TESTS, PAIR_SPEEDS = 16, 5  # fewer cannot bear two effects at once
 PRIOR_NOTHING, PRIOR_PAIRS = 0.5, 0.1  # probabilities before any test: of no effect, of all pairs together
 PRIOR_LACKING = 0.08  # of each cause that the library lacks, times its own prior
 SURE = 1.0 - RIVAL_WEIGHT  # probability from which an effect is believed: no rival has a weight that counts
+FIRST = 3  # sets of parameters after which a hypothesis is weighed for the first time
+LIKELY = RIVAL_WEIGHT / 10.0  # probability then from which it is pursued: it may yet come to count
 WORTH = 0.25  # of the likeliest hypothesis: below it, effects that are sure are not enough by themselves
 MATERIAL = 0.05  # least change of a predicted probability, rms over the tests
 DEVIATIONS = 128  # errors of the base model that are drawn
@@ -138,8 +140,8 @@ def search_labels(problem: Labelled, library: Sequence[Effect], gates: Gates) ->
     errors = drawn_errors(tests, problem.deviations(DEVIATIONS, gates.seed), gates.seed)
     evidence = LabelEvidence(problem.boundaries, problem.estimates, tests, errors, gates.seed)
     nothing = hypothesis((), evidence)
-    singles = [hypothesis((effect,), evidence) for effect in effects if not effect.resembled]
-    lacking = [hypothesis((effect,), evidence) for effect in effects if effect.resembled]
+    singles = [hypothesis((effect,), evidence, rounds=FIRST) for effect in effects if not effect.resembled]
+    lacking = [hypothesis((effect,), evidence, rounds=FIRST) for effect in effects if effect.resembled]
     lacking.append(unknown(nothing, evidence))
     hidden: dict[str, Statement | str] = {
         one.names[0]: Statement("hidden_in_labels", {"least": MATERIAL})
@@ -147,18 +149,20 @@ def search_labels(problem: Labelled, library: Sequence[Effect], gates: Gates) ->
         if _largest(one, nothing, evidence) < MATERIAL
     }
     seen = [one for one in singles if one.names[0] not in hidden]
-    weighed = _probabilities([nothing, *seen], [], lacking)
+    weighed = _likely_pursued([nothing, *seen], [], lacking)
     if _worth_pairs(weighed, tests):
+        singles = [one.hypothesis for one in weighed[: 1 + len(seen)]]
+        lacking = [one.hypothesis for one in weighed[1 + len(seen) :]]
         first = max(weighed[1 : 1 + len(seen)], key=lambda one: one.probability).hypothesis
-        others = [one for one in seen if one is not first]
-        joined = [hypothesis(first.effects + two.effects, evidence, first) for two in others]
+        others = [one for one in singles[1:] if one is not first]
+        joined = [hypothesis(first.effects + two.effects, evidence, first, FIRST) for two in others]
         best = max(joined, key=lambda one: one.log_evidence)
         if best.log_evidence > first.log_evidence:  # the other of the two may have led instead
             (second,) = (one for one in others if one.effects == best.effects[1:])
             remaining = [one for one in others if one is not second]
             beside = replace(best, effects=second.effects, cube=best.cube[:, first.cube.shape[1] :])
-            joined += [hypothesis(second.effects + two.effects, evidence, beside) for two in remaining]
-        weighed = _probabilities([nothing, *seen], joined, lacking)
+            joined += [hypothesis(second.effects + two.effects, evidence, beside, FIRST) for two in remaining]
+        weighed = _likely_pursued(singles, joined, lacking)
     judged = tuple(_judged(one, nothing, evidence, gates) for one in weighed)
     outcome = LabelOutcome(judged, evidence, None, unable | hidden)
     return replace(outcome, lead=_lead(outcome))
@@ -168,6 +172,19 @@ def _worth_pairs(weighed: list[Weighed], tests: Labels) -> bool:
     many = len(tests.depth) >= PAIR_TESTS and len(tests.speeds) >= PAIR_SPEEDS
     effects = sum(not one.lacking for one in weighed[1:])
     return many and effects > 1 and weighed[0].probability < PRIOR_NOTHING
+
+
+def _likely_pursued(
+    singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], lacking: Sequence[Hypothesis]
+) -> list[Weighed]:
+    """Posterior probabilities once those that may come to count have been pursued to their ends."""
+    every, parts = [*singles, *pairs, *lacking], (len(singles), len(singles) + len(pairs))
+    while True:
+        weighed = _probabilities(every[: parts[0]], every[parts[0] : parts[1]], every[parts[1] :])
+        ended = [pursued(one.hypothesis) if one.probability > LIKELY else one.hypothesis for one in weighed]
+        if all(new is old for new, old in zip(ended, every, strict=True)):
+            return weighed
+        every = ended
 
 
 def _probabilities(
