@@ -6,9 +6,10 @@ from label_toy import GATES, IDLE, LOUD, SHIFT, SLOPE, TWIN, Line, problem
 from scipy.stats import norm
 
 from metro.effects.effect import EffectParameter
+from metro.loop.labels.hypotheses import ROUNDS, pursued
 from metro.loop.labels.next_test import next_tests
 from metro.loop.labels.points import quantile
-from metro.loop.labels.search import NOTHING, search_labels, tried
+from metro.loop.labels.search import FIRST, LIKELY, NOTHING, search_labels, tried
 from metro.loop.statement import Statement
 
 
@@ -123,3 +124,15 @@ def test_priors_have_the_distribution_that_their_bounds_say():
     assert weak[100] == pytest.approx(norm.ppf(share[100]), rel=1e-3)
     choice = EffectParameter("c", "", 0.0, 1.0, 1.0, (0.0,), choices=("x", "y"))
     assert list(quantile(choice, np.array([0.2, 0.7, 1.0]))) == [0.0, 1.0, 1.0]
+
+
+def test_what_may_come_to_count_is_drawn_to_the_end_and_nothing_else_is():
+    outcome = search_labels(problem(Line(slope=0.8), 3), (SHIFT, SLOPE), GATES)
+    drawn = [one for one in outcome.weighed if one.hypothesis.drawn]
+    likely = [one for one in drawn if one.probability > LIKELY]
+    assert likely
+    for one in likely:
+        assert pursued(one.hypothesis) is one.hypothesis
+    unlikely = [one for one in drawn if one.probability <= LIKELY]
+    assert unlikely
+    assert max(one.hypothesis.drawn.sets for one in unlikely) <= FIRST < ROUNDS
