@@ -56,6 +56,26 @@ def test_the_prediction_is_that_of_the_design(setting, parts):
     np.testing.assert_allclose(found, np.tile(offset + matrix @ beta, (2, 1)), rtol=1e-12, atol=1e-10)
 
 
+@pytest.mark.parametrize("setting", [RUN, Instruments()])
+@pytest.mark.parametrize("late", [0.0, 0.0123])
+def test_models_differ_by_what_their_predictions_differ(setting, late):
+    beta = np.random.default_rng(2).normal(0.0, 0.05, len(JointForceModel(ARM).parameters))
+    beta[-1] = late
+    block, model = SimpleNamespace(setting=setting), JointForceModel(ARM, drives=DRIVES)
+    others = [
+        JointForceModel(ARM),
+        replace(model, payload=LADEN),
+        replace(model, offset=0.02),
+        replace(model, arm=ARM.with_tip_moved(np.array([0.1, -0.05, 0.2]))),
+    ]
+    predicted = [one.predictions(block, np.zeros((1, 0)), beta)[0] for one in (model, *others)]
+    moved, beside = model.differences(others, block, np.zeros((2, 0)), beta)
+    np.testing.assert_allclose(moved, np.array(predicted[1:]) - predicted[0], rtol=1e-9, atol=1e-8)
+    assert beside.shape == (1, len(predicted[0]))
+    same, _ = model.differences([replace(model)], block, np.zeros((1, 0)), beta)
+    np.testing.assert_array_equal(same, 0.0)
+
+
 def test_a_design_changes_nothing_that_others_are_given():
     block = SimpleNamespace(setting=RUN)
     beta = np.full(len(JointForceModel(ARM).parameters), 0.1)

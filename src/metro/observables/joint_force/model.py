@@ -13,6 +13,7 @@ plus the force at the tip that belongs to the residual torques.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise, permutations
@@ -171,6 +172,39 @@ class JointForceModel:
             predicted = basis(self.arm, run, at) @ beta + (1.0 + each) * read - lag * late(self.arm, run, at)
         return np.broadcast_to(predicted, (len(nuisances), len(predicted)))
 
+    def differences(
+        self, others: Sequence[JointForceModel], block: Block, nuisances: Array, beta: Array
+    ) -> tuple[Array, Array]:
+        """Return by how much predictions differ (:class:`metro.observables.problem.Differing`).
+
+        Where the arm or the clock is another one, the torques are added up before they become waves.
+        """
+        run: Any = block.setting
+        size = len(beta) - 1 if isinstance(run, Instruments) else len(self.joints) * len(run.t)
+        moved, others_own = np.zeros((len(others), size)), np.zeros((len(nuisances) - 1, size))
+        if isinstance(run, Instruments):
+            return moved, others_own
+        read, each = self._beside(run), 1.0 + np.repeat(beta[1 : 1 + len(self.joints)], len(run.t))
+        for row, other in zip(moved, others, strict=True):
+            row += each * (other._beside(run) - read)
+            if other.arm is not self.arm or other.offset != self.offset:
+                row += other._asked(run, beta) - self._asked(run, beta)
+        return moved, others_own
+
+    def _asked(self, run: TorqueRun, beta: Array) -> Array:
+        """Waves (k m,), N m, of the torques that balance the force, with all gains.
+
+        It is what :func:`basis` makes of the force, in one transform of k torques instead of one of 11 k.
+        """
+        at, lag = self._lagged(beta)
+        force, later, curved = _forces(run, at)
+        of_joints, by_axis, across = np.split(beta[1:], np.cumsum([len(self.joints), 3, len(CROSS)]))[:3]
+        gains = np.diag(beta[0] + by_axis)
+        gains[tuple(np.transpose(CROSS))] = across
+        jacobian = _driven_jacobian(self.arm, run)
+        acting = force @ gains.T + beta[-2] * curved + (beta[-1] - lag) * later
+        return in_waves(joint_torque(jacobian, acting) + of_joints * joint_torque(jacobian, force))
+
     def _lagged(self, beta: Array | None) -> tuple[float, float]:
         """By how much the log is late and the lag on the grid about which that is linear, both s."""
         lag = 0.0 if beta is None else LAG_GRID * round(float(beta[-1]) / LAG_GRID)
@@ -212,29 +246,15 @@ def basis(arm: Arm, run: TorqueRun, offset: float) -> Array:
 
     The log stamps the force ``offset`` s later than the dynamometer.
     """
-    joints = tuple(arm.axes.turning)
-    rubbed = rubbing(run, joints), _one_by_one(run.rate[:, joints])
     drives = spread(arm, run, offset), late(arm, run, offset)
-    return np.column_stack([carried(arm, run, offset), _one_by_one(run.idle), *rubbed, *drives])
+    return np.column_stack([carried(arm, run, offset), beside(run, tuple(arm.axes.turning)), *drives])
 
 
 @lru_cache(maxsize=256)
-def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
-    """Waves (k m, k + 10), N m, of the torque that balances the force: whole, by joint, by axis, crosstalk.
-
-    The log stamps it ``offset`` s later than the dynamometer.
-    """
-    force = run.force.mean(run.t - offset, run.width)
-    jacobian = _driven_jacobian(arm, run)
-    # Of a force along each axis as each axis shows it: (m, seen, along, k), all in one transform.
-    torque = -jacobian[:, :, None, :] * force[:, None, :, None]
-    moved = np.moveaxis(waves(torque.reshape(len(force), -1)).reshape(torque.shape), 0, -1)
-    each = moved.reshape(3, 3, -1)
-    by_axis = [each[i, i] for i in range(3)]
-    across = [each[seen, along] for seen, along in CROSS]
-    whole = np.sum(by_axis, axis=0)
-    by_joint = np.kron(np.eye(jacobian.shape[-1]), np.ones((len(force), 1))) * whole[:, None]
-    return np.column_stack([whole, by_joint, *by_axis, *across])
+def beside(run: TorqueRun, joints: tuple[int, ...]) -> Array:
+    """Waves (k m, 3 k) of each joint's idle torque, of its friction over its level, and of its speed."""
+    idle, speed = (_one_by_one(waves(each)) for each in (run.idle, run.rate[:, joints]))
+    return np.column_stack([idle, rubbing(run, joints), speed])
 
 
 @lru_cache(maxsize=256)
@@ -243,26 +263,58 @@ def rubbing(run: TorqueRun, joints: tuple[int, ...]) -> Array:
     turn = () if run.turn is None else tuple(run.turn.tolist())
     one = DriveTorques((1.0,) * run.q.shape[1], presliding=turn)
     states = one.at(run.q, run.rate, run.since, start=run.start, peak=run.peak)[:, joints]
-    return _one_by_one(states)
+    return _one_by_one(waves(states))
 
 
-@lru_cache(maxsize=256)
+def carried(arm: Arm, run: TorqueRun, offset: float) -> Array:
+    """Waves (k m, k + 10), N m, of the torque that balances the force: whole, by joint, by axis, crosstalk.
+
+    The log stamps it ``offset`` s later than the dynamometer.
+    """
+    each = _balanced(arm, run, offset)[0]
+    whole = np.sum([each[i, i] for i in range(3)], axis=0)
+    by_axis, across = [each[i, i].ravel() for i in range(3)], [each[pair].ravel() for pair in CROSS]
+    return np.column_stack([whole.ravel(), _one_by_one(whole.T), *by_axis, *across])
+
+
 def late(arm: Arm, run: TorqueRun, offset: float) -> Array:
     """Waves (k m,), N m/s, of the torque that balances the force, per second by which it comes later."""
-    after, before = (run.force.mean(run.t - offset - step, run.width) for step in (LAG_STEP, -LAG_STEP))
-    return in_waves(joint_torque(_driven_jacobian(arm, run), (after - before) / (2.0 * LAG_STEP)))
+    return _balanced(arm, run, offset)[1].ravel()
 
 
-@lru_cache(maxsize=256)
 def spread(arm: Arm, run: TorqueRun, offset: float) -> Array:
     """Waves (k m,), N m/s², of the torque that balances the force, per variance in time over two, s².
 
     A filter that spreads the force over times of a variance changes it by half of that times its curvature.
     """
+    return _balanced(arm, run, offset)[2].ravel()
+
+
+@lru_cache(maxsize=256)
+def _balanced(arm: Arm, run: TorqueRun, offset: float) -> tuple[Array, Array, Array]:
+    """Waves of the torques that balance the force, and of those per second and second squared of it.
+
+    Returns
+    -------
+    (3, 3, k, m), N m, of a force along each axis (the second) as each axis shows it (the first); (k, m),
+    N m/s and N m/s²: all in one transform.
+    """
+    force, later, curved = _forces(run, offset)
+    jacobian = _driven_jacobian(arm, run)
+    m, _, k = jacobian.shape
+    crossed = -jacobian[:, :, None, :] * force[:, None, :, None]
+    changes = [joint_torque(jacobian, each) for each in (later, curved)]
+    moved = np.ascontiguousarray(waves(np.concatenate([crossed.reshape(m, -1), *changes], axis=1)).T)
+    return moved[: 9 * k].reshape(3, 3, k, m), moved[9 * k : 10 * k], moved[10 * k :]
+
+
+@lru_cache(maxsize=256)
+def _forces(run: TorqueRun, offset: float) -> tuple[Array, Array, Array]:
+    """Mean force (m, 3), N, as the log stamps it, and its differences by the offset, N/s and N/s²."""
     after, now, before = (
         run.force.mean(run.t - offset - step, run.width) for step in (LAG_STEP, 0.0, -LAG_STEP)
     )
-    return in_waves(joint_torque(_driven_jacobian(arm, run), (after - 2.0 * now + before) / LAG_STEP**2))
+    return now, (after - before) / (2.0 * LAG_STEP), (after - 2.0 * now + before) / LAG_STEP**2
 
 
 @lru_cache(maxsize=256)
@@ -271,9 +323,12 @@ def _driven_jacobian(arm: Arm, run: TorqueRun) -> Array:
     return np.asarray(tip_jacobian_of(arm, along(Same(arm.dh), run))[..., arm.axes.turning])
 
 
-def _one_by_one(torque: Array) -> Array:
-    """Return torques (m, k) as waves along the path of one joint at a time (k m, k)."""
-    return np.stack([in_waves(torque * joint) for joint in np.eye(torque.shape[1])], axis=1)
+def _one_by_one(moved: Array) -> Array:
+    """Return waves (m, k) of joints as those along the path of one joint at a time (k m, k)."""
+    m, k = moved.shape
+    each = np.zeros((k, m, k))
+    each[np.arange(k), :, np.arange(k)] = moved.T
+    return each.reshape(k * m, k)
 
 
 def in_waves(torque: Array) -> Array:
