@@ -1,5 +1,7 @@
 """Waviness from raw logs and traces to blocks and report, on the batch that the deformation's tests make."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_deformation import Cell, moves
@@ -7,8 +9,12 @@ from test_deformation import Cell, moves
 from metro.observables.arm.wall import wall
 from metro.observables.problem import BaseFit, Problem
 from metro.observables.waviness import observable as waviness
+from metro.observables.waviness.model import Vibration, WavinessModel
 from metro.observables.waviness.points import ENCODER
 from metro.observables.waviness.report import joint_share
+from metro.robot.amplified import AmplifiedRipple, Structure
+from metro.robot.drive_torques import DriveTorques, Ripple
+from metro.robot.torsion import Torsion
 from metro.units import DEG, MM
 
 JOINTS = range(1, 7)
@@ -110,3 +116,29 @@ def test_waviness_that_the_tip_strayed_is_recognised():
     found = waviness.report(cell.batch, observed, {}, task, fit)["arm"]["waviness"]["r1"]
     assert found["correlation"]["value"] > 0.95
     assert found["wa_predicted"]["value"] == pytest.approx(found["wa_measured"]["value"], rel=0.15)
+
+
+def test_the_wall_shows_the_sum_of_all_that_no_encoder_sees(made):
+    """What is kept of each part, as waves, adds up to the filtered sum of all at the points themselves."""
+    _, _, task = made
+    block = task.role("identify")[0]
+    load = 300.0 * np.sin(np.outer(block.setting.t, range(1, 7)))
+    run = replace(block.setting, load=load, compliance=np.full(6, 1e-6))
+    ripple = AmplifiedRipple(0, 700.0, (30.0, -8.0), (5.0, 2.0), Structure(9.0, 0.06))
+    drives = DriveTorques((40.0, 40.0), (0.0, 0.0, 2.0), ripple=(Ripple(2, 900.0, 60.0, -40.0),))
+    torsion = Torsion(gap=(2e-5,) * 6)
+    swings = (Vibration(6.0, 1e-6), Vibration(13.0, 2e-6))
+    model = WavinessModel(tuple(range(6)), drives, torsion, swings, (ripple,))
+    phases = np.array([0.4, 2.0])
+    _, unseen = model.design(replace(block, setting=run), phases)
+    torque = run.load - drives.at(run.q, run.rate, run.t)
+    torque[:, 0] -= ripple.at(run.q, run.pace)
+    height = (run.moves * (run.compliance * torque + torsion.passed(run.load))).sum(axis=1)
+    for swing, phase in zip(swings, phases, strict=True):
+        height += swing.amplitude * np.sin(2 * np.pi * swing.frequency * run.t + phase)
+    np.testing.assert_allclose(unseen, run.filtered @ height, rtol=1e-9, atol=1e-15)
+    for part in ("drives", "torsion", "vibration", "amplified"):
+        _, without = replace(model, **{part: type(getattr(model, part))()}).design(
+            replace(block, setting=run), phases
+        )
+        assert np.linalg.norm(without - unseen) > 1e-3 * np.linalg.norm(unseen), part

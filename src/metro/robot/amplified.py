@@ -27,6 +27,33 @@ class Structure:
 
 
 @dataclass(frozen=True)
+class Shape:
+    """What a ripple does at each place, but for its size.
+
+    ``joint`` from 0; ``order`` in cycles per revolution of the joint; ``structure`` that follows it.
+    """
+
+    joint: int
+    order: float
+    structure: Structure
+
+    def following(self, q: Array, pace: Array, times: int) -> ComplexArray:
+        """Complex amplitude (m,), of the cosine, of what the tip makes of 1 N m at so many times the order.
+
+        It is of the torque that would twist the joint without masses as far as the tip goes with them. Where
+        the speed changes little within a cycle of the structure, each place has the gain of its own
+        frequency.
+
+        Parameters
+        ----------
+        q, pace : (m, n) angles of the joints, rad, and their mean speeds around each place, rad/s.
+        """
+        angle = self.order * q[:, self.joint]
+        frequency = self.order * pace[:, self.joint] / (2.0 * math.pi)
+        return np.asarray(np.exp(1j * times * angle) * self.structure.gain(times * frequency))
+
+
+@dataclass(frozen=True)
 class AmplifiedRipple:
     """A gear's ripple, and how the structure follows it: twice an order has another frequency and gain.
 
@@ -42,21 +69,21 @@ class AmplifiedRipple:
     second: tuple[float, float]
     structure: Structure
 
+    @property
+    def shape(self) -> Shape:
+        """What it does at each place, but for its size."""
+        return Shape(self.joint, self.order, self.structure)
+
+    @property
+    def multiples(self) -> tuple[tuple[int, tuple[float, float]], ...]:
+        """The multiples of the order that there are, each with its torques, N m."""
+        return tuple(
+            (times, torque) for times, torque in enumerate((self.first, self.second), start=1) if any(torque)
+        )
+
     def at(self, q: Array, pace: Array) -> Array:
-        """Torque (m,), N m, that would twist the joint without masses as far as the tip goes with them.
-
-        Where the speed changes little within a cycle of the structure, each place has the gain of its own
-        frequency.
-
-        Parameters
-        ----------
-        q, pace : (m, n) angles of the joints, rad, and their mean speeds around each place, rad/s.
-        """
-        angle = self.order * q[:, self.joint]
-        frequency = self.order * pace[:, self.joint] / (2.0 * math.pi)
+        """Torque (m,), N m, as of :meth:`Shape.following`."""
         torque = np.zeros(len(q))
-        for times, (sine, cosine) in enumerate((self.first, self.second), start=1):
-            if sine or cosine:
-                wave = (cosine - 1j * sine) * np.exp(1j * times * angle)
-                torque += (wave * self.structure.gain(times * frequency)).real
+        for times, (sine, cosine) in self.multiples:
+            torque += ((cosine - 1j * sine) * self.shape.following(q, pace, times)).real
         return torque

@@ -23,9 +23,9 @@ def raised(values: Sequence[float], joint: int, by: float) -> tuple[float, ...]:
 
 def put(values: Sequence[float], joint: int, value: float, none: float = 0.0) -> tuple[float, ...]:
     """Return values with another one at one joint, from 0; those of joints that had none are ``none``."""
-    whole = of_joints(values, max(len(values), joint + 1), none)
+    whole = [*values, *[none] * (joint + 1 - len(values))]
     whole[joint] = value
-    return tuple(whole.tolist())
+    return tuple(whole)
 
 
 def scaled(values: Sequence[float], joint: int, by: float) -> tuple[float, ...]:

@@ -185,10 +185,10 @@ class JointForceModel:
         if isinstance(run, Instruments):
             return moved, others_own
         read, each = self._beside(run), 1.0 + np.repeat(beta[1 : 1 + len(self.joints)], len(run.t))
-        for row, other in zip(moved, others, strict=True):
-            row += each * (other._beside(run) - read)
+        for i, other in enumerate(others):
+            moved[i] = each * (other._beside(run) - read)
             if other.arm is not self.arm or other.offset != self.offset:
-                row += other._asked(run, beta) - self._asked(run, beta)
+                moved[i] += other._asked(run, beta) - self._asked(run, beta)
         return moved, others_own
 
     def _asked(self, run: TorqueRun, beta: Array) -> Array:

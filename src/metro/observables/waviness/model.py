@@ -13,16 +13,19 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from metro.observables.problem import Block, Parameter
-from metro.robot.amplified import AmplifiedRipple
+from metro.robot.amplified import AmplifiedRipple, Shape
 from metro.robot.drive_torques import DriveTorques
 from metro.robot.torsion import Torsion
-from metro.units import Array
+from metro.units import Array, ComplexArray
 
+KEPT = 1024  # waves of runs: those of every run for some ten changes of a fit
+NO_DRIVES = DriveTorques()
 PHASES = tuple(2 * math.pi * third / 3 for third in range(3))  # of a vibration: starts of the fit to a run
 
 
@@ -58,7 +61,7 @@ class WavyCut:
     filtered: Array
     longer: Array
 
-    @property
+    @cached_property
     def tracking(self) -> Array:
         """Tracking error (n,), m, without the share that is noise."""
         return np.asarray((self.share * self.by_joint).sum(axis=1))
@@ -71,14 +74,13 @@ class BelievedSetting:
 
 @dataclass(frozen=True)
 class Vibration:
-    """A vibration of the tip along the wall's normal: amplitude sin(2π frequency t + phase); m, Hz."""
+    """A vibration of the tip along the wall's normal: amplitude sin(2π frequency t + phase); m, Hz.
+
+    A run has a ``phase`` of its own.
+    """
 
     frequency: float = 0.0
     amplitude: float = 0.0
-
-    def at(self, t: Array, phase: float) -> Array:
-        """Displacement (m,) at times ``t`` (m,), s; a run has a ``phase`` of its own, rad."""
-        return np.asarray(self.amplitude * np.sin(2.0 * math.pi * self.frequency * t + phase))
 
 
 def phase_starts(vibration: Sequence[Vibration]) -> Array:
@@ -137,11 +139,51 @@ class WavinessModel:
         run: Any = block.setting
         if isinstance(run, BelievedSetting):
             return np.ones((1, 1)), np.zeros(1)
-        torque = run.load - self.drives.at(run.q, run.rate, run.t)
+        unseen = loaded(run, self.torsion)
+        if self.drives != NO_DRIVES:
+            unseen = unseen - driven(run, self.drives)
         for ripple in self.amplified:
-            torque[:, ripple.joint] -= ripple.at(run.q, run.pace)
-        twist = run.compliance * torque + self.torsion.passed(run.load)
-        unseen = (run.moves * twist).sum(axis=1)
+            for times, (sine, cosine) in ripple.multiples:
+                unseen = unseen - ((cosine - 1j * sine) * rippling(run, ripple.shape, times)).real
         for swing, phase in zip(self.vibration, phases_of(self.vibration, nuisance), strict=True):
-            unseen = unseen + swing.at(run.t, phase)
-        return run.tracking[:, None], run.filtered @ unseen
+            if swing.amplitude:
+                turned = np.exp(1j * phase) * swinging(run, swing.frequency)
+                unseen = unseen + swing.amplitude * turned.imag
+        return run.tracking[:, None], unseen
+
+
+# A fit asks for each of these again and again: of what acts on the wall, few numbers change at a time.
+@lru_cache(maxsize=KEPT)
+def loaded(run: WavyCut, torsion: Torsion) -> Array:
+    """Waves (n,), m, that the steady cut makes with the springs and gaps of the joints; not to be changed."""
+    return _of_twist(run, run.compliance * run.load + torsion.passed(run.load))
+
+
+@lru_cache(maxsize=KEPT)
+def driven(run: WavyCut, drives: DriveTorques) -> Array:
+    """Waves (n,), m, of the torques of the drives; not to be changed."""
+    return _of_twist(run, run.compliance * drives.at(run.q, run.rate, run.t))
+
+
+@lru_cache(maxsize=KEPT)
+def rippling(run: WavyCut, shape: Shape, times: int) -> ComplexArray:
+    """Waves (n,), m per N m, of a ripple of so many times its order, as complex amplitudes of a cosine."""
+    torque = shape.following(run.q, run.pace, times)
+    return _filtered(run, run.moves[:, shape.joint] * run.compliance[shape.joint] * torque)
+
+
+@lru_cache(maxsize=KEPT)
+def swinging(run: WavyCut, frequency: float) -> ComplexArray:
+    """Waves (n,) of a vibration of amplitude 1, as complex amplitudes of a cosine."""
+    return _filtered(run, np.exp(2j * math.pi * frequency * run.t))
+
+
+def _filtered(run: WavyCut, height: ComplexArray) -> ComplexArray:
+    """Waves (n,) of complex heights (m,): both parts in one product, else the map becomes complex."""
+    parts = run.filtered @ height.view(float).reshape(-1, 2)
+    return np.asarray(parts.view(complex)[:, 0])
+
+
+def _of_twist(run: WavyCut, twist: Array) -> Array:
+    """Waves (n,), m, of twists of the joints (m, n), rad."""
+    return np.asarray(run.filtered @ (run.moves * twist).sum(axis=1))
