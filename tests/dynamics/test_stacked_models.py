@@ -79,3 +79,13 @@ def test_what_each_model_is_in_a_stack_does_not_depend_on_its_place():
     depth, _ = boundaries(models, RPM)
     backwards, _ = boundaries(models[::-1], RPM)
     np.testing.assert_allclose(depth, backwards[::-1], rtol=1e-9)
+
+
+def test_models_without_a_mode_are_stable_at_any_depth():
+    none = replace(
+        TWO, axis=TWO.axis[:0], omega=TWO.omega[:0], zeta=TWO.zeta[:0], stiffness=TWO.stiffness[:0]
+    )
+    rigid = replace(MODEL, structure=none)
+    depth, _ = boundaries([rigid, rigid, MODEL], RPM)
+    assert np.all(np.isinf(depth[:2]))
+    assert np.all(np.isfinite(depth[2]))

@@ -147,11 +147,9 @@ def _stacked(structures: Sequence[Structure], ratio: Array) -> Structure:
     """Structure with the modes of t structures at k speeds each, which ``ratio`` (t, k, m) stiffens."""
     if len(structures) == 1 and _alike(ratio):
         return structures[0]
-    modes = len(structures[0].axis)
     each = [one.stiffer(rows) for one, rows in zip(structures, ratio, strict=True)]
     omega, zeta, stiffness = (
-        np.stack([getattr(one, part) for one in each]).reshape(-1, modes)
-        for part in ("omega", "zeta", "stiffness")
+        np.concatenate([getattr(one, part) for one in each]) for part in ("omega", "zeta", "stiffness")
     )
     directions = np.repeat([one.directions for one in structures], ratio.shape[1], axis=0)
     return Structure(structures[0].axis, omega, zeta, stiffness, directions)
