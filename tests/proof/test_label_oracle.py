@@ -35,11 +35,12 @@ class Problem(LabelProblem):
     def point_tooth_hz(self):
         return np.full(len(RPM), 100.0)
 
-    def boundaries(self, change):
-        return np.log(1e-3) + np.full(len(RPM), change(0.0)), np.full(len(RPM), 300.0)
+    def boundaries(self, changes):
+        raised = np.array([[change(0.0)] for change in changes])
+        return np.log(1e-3) + np.tile(raised, len(RPM)), np.full((len(changes), len(RPM)), 300.0)
 
     def estimates(self, changes):
-        return tuple(np.stack(part) for part in zip(*map(self.boundaries, changes), strict=True))
+        return self.boundaries(changes)
 
 
 def effect(name):
