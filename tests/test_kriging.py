@@ -54,3 +54,13 @@ def test_values_left_out_are_told_as_without_them():
         np.testing.assert_allclose(error[i], told - smooth(at)[i], atol=1e-8)
         left = covariance[i, i] - weights @ covariance[rest, i]
         np.testing.assert_allclose(sd[i], np.sqrt(left * learnt.variance), rtol=1e-6)
+
+
+def test_the_trend_is_the_mean_of_least_variance():
+    """Weighted by the inverse covariance (generalised least squares), not the plain mean."""
+    at = np.random.default_rng(4).random((12, 2)) ** 3
+    found = krige(at, np.column_stack([np.exp(2.0 * at[:, 0]), at[:, 1]]))
+    weights = found.inverse.sum(axis=0) / found.inverse.sum()
+    values = np.column_stack([np.exp(2.0 * at[:, 0]), at[:, 1]])
+    np.testing.assert_allclose(found.trend, weights @ values, rtol=1e-6)
+    assert np.abs(values.mean(axis=0) - found.trend).max() > 1e-3

@@ -131,3 +131,14 @@ def test_labels_far_from_the_boundary_say_that_the_errors_are_large():
         weights.append(room.of_errors(likelihood, np.ones(1), errors) @ errors.sd)
     assert weights[0] < 0.25
     assert weights[1] > 0.35
+
+
+def test_what_is_not_known_of_a_boundary_moves_it_by_so_much_in_each_draw():
+    tests, draws = labelled([0, 0, 1], [-0.2, 0.3, 0.1], [0, 1, 1]), 40
+    errors = Errors(np.zeros((draws, 2)), np.full(draws, 0.15))
+    likelihood = Likelihood.of(tests, errors)
+    boundary, hz, unsure = np.zeros((1, 2)), np.full((1, 2), 300.0), np.array([[0.3, 0.1]])
+    found = likelihood(boundary, hz, unsure)
+    each = [likelihood(boundary + unsure * own, hz)[0, 0] for own in likelihood.draws.own]
+    np.testing.assert_allclose(found[0], each, atol=1e-12)
+    assert np.ptp(found, axis=1).min() > 0.1

@@ -56,7 +56,11 @@ def test_the_prediction_is_that_of_the_design(setting, parts):
     np.testing.assert_allclose(found, np.tile(offset + matrix @ beta, (2, 1)), rtol=1e-12, atol=1e-10)
 
 
-@pytest.mark.parametrize("setting", [RUN, Instruments()])
+FINE = np.linspace(0.0, 4.0, 1601)  # on a grid as coarse as the path's, a record is straight about each place
+CURVED = replace(RUN, force=running(FINE, 50.0 * np.column_stack([np.sin(3 * FINE), np.cos(2 * FINE), FINE])))
+
+
+@pytest.mark.parametrize("setting", [CURVED, Instruments()])
 @pytest.mark.parametrize("late", [0.0, 0.0123])
 def test_models_differ_by_what_their_predictions_differ(setting, late):
     beta = np.random.default_rng(2).normal(0.0, 0.05, len(JointForceModel(ARM).parameters))
