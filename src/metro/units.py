@@ -27,6 +27,7 @@ N_MM2 = 1e6
 N_MM = 1e3
 N_UM = 1e6
 
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PRINTED = {
     "1": "",
     "um": "µm",
@@ -40,6 +41,7 @@ PRINTED = {
     "um/min": "µm/min",
     "N/um": "N/µm",
     "N*m/rad": "N m/rad",
+    "N m/rad3": "N m/rad³",
 }
 
 

@@ -97,3 +97,17 @@ def test_the_wording_uses_no_package_but_the_standard_library():
     names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     names |= {str(node.module) for node in nodes if isinstance(node, ast.ImportFrom)}
     assert {name.partition(".")[0] for name in names} <= {"metro", *sys.stdlib_module_names}
+
+
+@pytest.mark.parametrize(
+    ("least", "unit", "words"),
+    [
+        (7.13e10, "N m/rad3", "from a size of 7.1·10¹⁰ N m/rad³ on"),
+        (2.4e-6, "N m", "from a size of 2.4·10⁻⁶ N m on"),
+        (152.0, "ms", "from a size of 150 ms on"),
+        (0.034, "1", "from a size of 0.034 on"),
+    ],
+)
+def test_the_least_size_that_shows_is_written_as_in_print(least, unit, words):
+    content = {"share": 0.02, "least": least, "unit": unit}
+    assert in_words(Statement("hidden_by_zeros", content)).endswith(words)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from metro.units import printed
+from metro.units import SUPERSCRIPTS, printed
 
-SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SKEW = 0.25
 
 

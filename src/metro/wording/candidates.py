@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from metro.units import JSON, printed
+from metro.units import JSON, SUPERSCRIPTS, printed
 from metro.wording.names import plain
 
 Sentence = str | Callable[[JSON], str]
@@ -76,8 +76,11 @@ def _absorbed(values: JSON) -> str:
 
 
 def _hidden_by_zeros(values: JSON) -> str:
-    least = float(f"{values['least']:.2g}")  # without an exponent, which two digits of 150 would have
-    size = f"{least:g} {printed(values['unit'])}".rstrip()
+    # Two digits of 150 are written with an exponent by .2g, but not by g; those of 7e10 have one either way.
+    least = float(f"{values['least']:.2g}")
+    digits, _, power = f"{least:g}".partition("e")
+    exponent = f"·10{str(int(power)).translate(SUPERSCRIPTS)}" if power else ""
+    size = f"{digits}{exponent} {printed(values['unit'])}".rstrip()
     return (
         "the offset and the position that are fitted in each run absorb all but "
         f"{100 * values['share']:.1f} % "

@@ -134,7 +134,10 @@ def _candidates(candidates: list[JSON], shown: str | None) -> list[Item]:
 
 
 def _why(candidate: JSON) -> str:
+    """Return the outcome of a candidate, without the p-value that has a column of its own."""
     verdict, why = candidate.get("verdict"), candidate.get("why_not")
+    if candidate.get("p_value") is not None:
+        why = str(why or "").partition(": p = ")[0]
     return ": ".join(str(x) for x in (verdict, why) if x) or "–"
 
 

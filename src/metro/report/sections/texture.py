@@ -19,6 +19,10 @@ MOST_FACTS = 3
 NESTING = re.compile(r"λc = ([\d.]+) mm")
 BANDS = {"W": "all waves longer than λc = {} mm", "R": "waves shorter than λc = {} mm"}
 TITLES = {"P": "primary profile", "W": "waviness", "R": "roughness"}
+FEW = 3  # runs that are columns; of more each is a row
+# Of many runs the parameters that drawings and tolerances state come first, in a table of their own: with all
+# ten in one, every interval takes three lines.
+STATED = ("a", "q", "z", "t", "Sm")
 
 
 def texture(results: Results) -> Section | None:
@@ -61,16 +65,27 @@ def _parameters(part: pd.DataFrame, letter: str) -> list[Item]:
     names = list(dict.fromkeys(part["parameter"]))
     cells = {(row["run"], row["parameter"]): row for _, row in part.iterrows()}
     about = _about(part, letter)
-    if len(runs) <= 3:
+    if len(runs) <= FEW:
         rows = [
             [name, _unit(cells[runs[0], name]), *(_text(cells[run, name]) for run in runs)] for name in names
         ]
         header = ["parameter", "unit", *runs]
         return [Table(header, rows, about, [0.8, 0.5, *([2] * len(runs))], small=True)]
-    rows = [[run, *(_text(cells[run, name]) for name in names)] for run in runs[:LONGEST]]
-    header = ["run", *(_header(cells[runs[0], name], name) for name in names)]
     more = f" The first {LONGEST} of {len(runs)} runs." if len(runs) > LONGEST else ""
-    return [Table(header, rows, about + more, [0] * len(header), small=True)]
+    stated = [name for name in names if name[1:] in STATED]
+    others = [name for name in names if name not in stated]
+    said = f"{_title(letter)}: further parameters, likewise.{more}"
+    return [
+        Table(
+            ["run", *(_header(cells[runs[0], name], name) for name in group)],
+            [[run, *(_text(cells[run, name]) for name in group)] for run in runs[:LONGEST]],
+            caption,
+            [0.5, *([1] * len(group))],
+            small=True,
+        )
+        for group, caption in ((stated, about + more), (others, said))
+        if group
+    ]
 
 
 def _about(part: pd.DataFrame, letter: str) -> str:
@@ -80,8 +95,11 @@ def _about(part: pd.DataFrame, letter: str) -> str:
         if sources
         else "without intervals: one trace, of which the noise (instruments.profiler.sigma_mm) is not stated"
     )
-    title = f"{TITLES[letter][0].upper()}{TITLES[letter][1:]}"
-    return f"{title}, {_band(part, letter)}parameters by ISO 21920-2; {intervals}."
+    return f"{_title(letter)}, {_band(part, letter)}parameters by ISO 21920-2; {intervals}."
+
+
+def _title(letter: str) -> str:
+    return f"{TITLES[letter][0].upper()}{TITLES[letter][1:]}"
 
 
 def _band(part: pd.DataFrame, letter: str) -> str:
