@@ -116,22 +116,23 @@ def _curves(frame: pd.DataFrame, name: str, words: str, *, alone: bool) -> list[
 
 
 def errors(frame: pd.DataFrame) -> Table:
-    """Tabulate the rms of signal and residuals by run and axis."""
+    """Tabulate the rms of signal and residuals by run and axis; of one model if nothing was added."""
     shown = printed(str(frame["unit"].iloc[0]))
+    drawn = figures.predictions(frame)
     rows = []
     for (run, axis), part in frame.assign(axis=figures.axis_labels(frame)).groupby(
         ["run", "axis"], sort=False
     ):
         measured = part["measured"].to_numpy(float)
-        before, after = (float(np.sqrt(np.mean((measured - part[k]) ** 2))) for k in ("before", "after"))
+        missed = [float(np.sqrt(np.mean((measured - part[kind.column]) ** 2))) for kind in drawn]
         signal = float(np.sqrt(np.mean(measured**2)))
-        gain = percent(1 - after / before) if before > 0 and after != before else "–"
-        rows.append(
-            [str(run), str(axis) or "–", number(signal), number(before), number(after), gain, str(len(part))]
-        )
+        gain = [percent(1 - missed[1] / missed[0]) if missed[0] > 0 else "–"] if len(drawn) > 1 else []
+        rows.append([str(run), str(axis) or "–", number(signal), *map(number, missed), *gain, str(len(part))])
     caption = f"Errors on held-out runs, rms{f' ({shown})' if shown else ''}."
     if len(rows) > LONGEST:
         caption += f" The first {LONGEST} of {len(rows)} rows; comparison.parquet has all."
-    header = ["run", "axis", "measured", "base model", "with effects", "gain", "values"]
-    widths = [2, 0.6, 1, 1, 1, 0.8, 0.8]
-    return Table(header, rows[:LONGEST], caption, widths, numeric=[2, 3, 4, 5, 6], small=len(rows) > SHORT)
+    compared = ["base model", "with effects", "gain"] if len(drawn) > 1 else [drawn[0].label]
+    header = ["run", "axis", "measured", *compared, "values"]
+    widths = [2, 0.6, 1, *([1, 1, 0.8] if len(drawn) > 1 else [1.6]), 0.8]
+    numeric = list(range(2, len(header)))
+    return Table(header, rows[:LONGEST], caption, widths, numeric=numeric, small=len(rows) > SHORT)

@@ -8,6 +8,7 @@ import pandas as pd
 from metro.report.content import Bullets, Heading, Item, Picture, Table
 from metro.report.cuts import deepest_cut, not_drawn
 from metro.report.figures import lobes as figures
+from metro.report.figures.comparison import predictions
 from metro.report.numbers import listing, number, probability, quantity
 from metro.report.results import Results
 from metro.report.sections import findings
@@ -207,15 +208,14 @@ def _stations(stations: pd.DataFrame) -> Table:
 
 def cut_items(results: Results, frame: pd.DataFrame) -> list[Item]:
     """Draw the held-out test cuts on the boundary and tabulate the probability of each."""
-    tests = placed(results, frame)
+    tests, drawn = placed(results, frame), predictions(frame)
     rows = [
         [
             str(r["run"]),
             number(r["rpm"]),
             number(r["depth_mm"]),
             "chatter" if r["measured"] > 0.5 else "stable",
-            probability(r["before"]),
-            probability(r["after"]),
+            *(probability(r[kind.column]) for kind in drawn),
         ]
         for _, r in tests.head(LONGEST).iterrows()
     ]
@@ -224,12 +224,12 @@ def cut_items(results: Results, frame: pd.DataFrame) -> list[Item]:
         "speed (rpm)",
         "depth (mm)",
         "found",
-        "P(chatter), base model",
-        "P(chatter), with effects",
+        *(f"P(chatter), {kind.label}" for kind in drawn),
     ]
     more = f" The first {LONGEST} of {len(tests)}." if len(tests) > LONGEST else ""
-    caption, widths = f"Held-out test cuts.{more}", [1.4, 1, 1, 1, 1.4, 1.4]
-    table = Table(header, rows, caption, widths, numeric=[1, 2, 4, 5], small=len(rows) > SHORT)
+    caption, widths = f"Held-out test cuts.{more}", [1.4, 1, 1, 1, *([1.6] * len(drawn))]
+    numeric = [1, 2, *range(4, len(header))]
+    table = Table(header, rows, caption, widths, numeric=numeric, small=len(rows) > SHORT)
     return [*tested_boundary(results, frame), table]
 
 

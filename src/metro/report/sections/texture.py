@@ -23,6 +23,7 @@ FEW = 3  # runs that are columns; of more each is a row
 # Of many runs the parameters that drawings and tolerances state come first, in a table of their own: with all
 # ten in one, every interval takes three lines.
 STATED = ("a", "q", "z", "t", "Sm")
+SMALL = ("dq",)  # numbers of many digits
 
 
 def texture(results: Results) -> Section | None:
@@ -80,7 +81,7 @@ def _parameters(part: pd.DataFrame, letter: str) -> list[Item]:
             ["run", *(_header(cells[runs[0], name], name) for name in group)],
             [[run, *(_text(cells[run, name]) for name in group)] for run in runs[:LONGEST]],
             caption,
-            [0.5, *([1] * len(group))],
+            [0.5, *(1.3 if name[1:] in SMALL else 1 for name in group)],
             small=True,
         )
         for group, caption in ((stated, about + more), (others, said))
