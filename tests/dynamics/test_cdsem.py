@@ -95,3 +95,22 @@ def test_the_lowest_of_modes_alone_bounds_the_modes_together_from_neither_side()
 def test_where_a_mode_alone_never_chatters_there_is_nothing_to_find():
     exact = np.full((2, 3), np.inf)
     assert np.all(np.isinf(cdsem.cdsem_depths(TWO, Cut(4, 0.0, 1.0, 2e9, 8e8), np.full(3, 900.0), exact)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_governing_modes_are_the_lowest_of_all_modes_and_stiff_ones_are_not_solved(seed):
+    rng = np.random.default_rng(seed)
+    many = Structure(
+        rng.integers(0, 2, size=6),
+        2 * np.pi * rng.uniform(40.0, 160.0, size=6),
+        rng.uniform(0.02, 0.06, size=6),
+        np.array([4e6, 5e6, 7e6, 9e6, 3e8, 5e8]),
+    )
+    cut = Cut(int(rng.integers(2, 5)), *immersion("up", rng.uniform(0.3, 0.9), 1.0), 2e9, 8e8)
+    rpm = np.linspace(500, 2500, 23)
+    every, governing = (solve(many, cut, rpm) for solve in (cdsem.single_mode_depths, cdsem.governing_depths))
+    np.testing.assert_allclose(governing.min(axis=0), every.min(axis=0), rtol=1e-3)
+    np.testing.assert_array_equal(governing.argmin(axis=0), every.argmin(axis=0))
+    assert np.isinf(governing[4:]).all()
+    safe = cdsem.surely_stable_alone(many, cut)
+    assert np.all(every >= safe[:, None])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metro.dynamics.periodmap import PeriodMap, spectral_radius, unit_radius
+from metro.dynamics.periodmap import PeriodMap, spectral_radius, stacks, unit_radius
 
 
 def some_map(seed, k=3, steps=9, lags=(3, 5)):
@@ -43,6 +43,35 @@ def test_the_largest_multiplier_is_that_of_the_matrix(seed):
     np.testing.assert_allclose(spectral_radius(one), expected, rtol=1e-8)
 
 
+def crowded(steps):
+    """Return a map whose multipliers are 1 − 0.1 (i/steps)², many of them next to the largest, 1.
+
+    What is remembered returns after one period, each place weighed by its own factor.
+    """
+    factor = 1.0 - 0.1 * (np.arange(steps) / steps) ** 2
+    delayed = np.zeros((2, steps, 1, 1, 1))
+    delayed[:, :, 0, 0, 0] = factor * np.array([[1.0], [0.5]])
+    return PeriodMap(np.zeros((2, steps, 1, 1)), delayed, np.array([steps]), np.ones((1, 1)))
+
+
+def test_multipliers_of_almost_one_modulus_need_more_vectors():
+    np.testing.assert_allclose(spectral_radius(crowded(200)), [1.0, 0.5], rtol=1e-9)
+
+
+def test_where_it_does_not_converge_the_radius_is_unknown():
+    """It was an error, which ended a whole batch at a depth that only a check of methods asked for."""
+    assert np.all(np.isnan(spectral_radius(crowded(4000))))
+
+
+def test_secants_through_what_is_unknown_find_nothing_and_the_others_all():
+    def radius(depth):
+        return np.where([True, False], np.exp(3.0 * (depth - 1.0)), np.nan)
+
+    found = unit_radius(radius, np.array([1.1, 1.1]))
+    assert found[0] == pytest.approx(1.0, rel=1e-6)
+    assert np.isnan(found[1])
+
+
 def test_secants_find_where_the_radius_is_one():
     depths = unit_radius(lambda a: np.exp(3.0 * (a - np.array([1.0, 2.0]))), np.array([1.1, 1.9]))
     np.testing.assert_allclose(depths, [1.0, 2.0], rtol=1e-6)
@@ -50,3 +79,10 @@ def test_secants_find_where_the_radius_is_one():
 
 def test_secants_that_find_nothing_say_so():
     assert np.isnan(unit_radius(lambda a: np.full(1, 0.5) + 0 * a, np.array([1.0]))[0])
+
+
+def test_rows_are_stacked_with_those_that_need_about_as_many_steps():
+    steps = np.array([900, 100, 130, 1000, 199, 201, 40_000, 30_000])
+    made = stacks(steps, 2.0)
+    assert sorted(np.concatenate(made)) == list(range(8))
+    assert [sorted(stack) for stack in made] == [[1, 2, 4], [5], [0, 3], [7], [6]]

@@ -6,16 +6,16 @@ taken sample by sample, so that a lobe may give way to its neighbour.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from metro.dynamics import crossings
+from metro.dynamics.collocation import Kernel, kernel
 from metro.dynamics.crossings import Candidates
-from metro.dynamics.lobes import Boundary, fine_kernel, groups
+from metro.dynamics.lobes import Boundary, finely_discretised, groups
 from metro.dynamics.system import Cut, Structure
-from metro.units import Array
+from metro.units import Array, ComplexArray
 
 _STEP = 1e-4
 _LIMIT = 0.5  # of a shift in log depth: beyond it, and near a fold, first order does not hold
@@ -45,23 +45,35 @@ def depth_samples(structure: Structure, cut: Cut, boundary: Boundary, deviations
 
 
 def _log_slopes(structure: Structure, cut: Cut, rpm: Array, at: Candidates) -> Array:
-    """(c, 3 m + 2) derivatives of log(1/depth) of each crossing by the logarithms of the parameters."""
-    base = np.log(_followed(structure, cut, rpm, at))
-    columns = [np.log(_followed(*changed, rpm, at)) - base for changed in _perturbed(structure, cut)]
-    slopes = np.stack(columns, axis=1) / _STEP
-    return np.where(np.isfinite(slopes), slopes, 0.0)
+    """(c, 3 m + 2) derivatives of log(1/depth) of each crossing by the logarithms of the parameters.
 
+    By perturbation of the eigenvalue that is 1/depth, which has to stay real: the angle gives way. The matrix
+    is a sum over the modes, so that a change of one mode costs what that mode alone does.
+    """
+    arc, equation = finely_discretised(structure, cut, rpm)
+    here = crossings.refine(equation, at, 2)
 
-def _followed(structure: Structure, cut: Cut, rpm: Array, at: Candidates) -> Array:
-    refined = crossings.refine(fine_kernel(structure, cut, rpm), at, 2)
-    return np.where(refined.converged, refined.at.inverse, np.nan)
+    def value(part: Kernel) -> ComplexArray:
+        image = crossings.applied(part.take(here.at.speed), here.at.theta, here.shape)
+        share: ComplexArray = (here.left * image).sum(axis=1)
+        return share
 
-
-def _perturbed(structure: Structure, cut: Cut) -> Iterator[tuple[Structure, Cut]]:
-    for name in ("omega", "zeta", "stiffness"):
-        for mode in range(len(structure.omega)):
-            values = getattr(structure, name).copy()
-            values[mode] *= np.exp(_STEP)
-            yield replace(structure, **{name: values}), cut
-    yield structure, replace(cut, ktc=cut.ktc * np.exp(_STEP))
-    yield structure, replace(cut, krc=cut.krc * np.exp(_STEP))
+    columns = {}
+    for mode in range(len(structure.omega)):
+        alone = structure.mode(mode)
+        base = value(kernel(alone, arc, equation.period))
+        for name in ("omega", "zeta"):
+            changed = replace(alone, **{name: getattr(alone, name) * np.exp(_STEP)})
+            columns[name, mode] = (value(kernel(changed, arc, equation.period)) - base) / _STEP
+        columns["stiffness", mode] = -base  # what a mode contributes is in proportion to its compliance
+    whole = value(equation)
+    for name in ("ktc", "krc"):
+        other = replace(cut, **{name: getattr(cut, name) * np.exp(_STEP)})
+        columns[name, 0] = (value(finely_discretised(structure, other, rpm)[1]) - whole) / _STEP
+    ordered = [
+        columns[name, mode] for name in ("omega", "zeta", "stiffness") for mode in range(len(structure.omega))
+    ]
+    change = np.stack([*ordered, columns["ktc", 0], columns["krc", 0]], axis=1)
+    turn = -change.imag / np.where(here.rate.imag == 0.0, np.inf, here.rate.imag)[:, None]
+    slopes = (change + here.rate[:, None] * turn).real / here.at.inverse[:, None]
+    return np.where(here.converged[:, None] & np.isfinite(slopes), slopes, 0.0)

@@ -18,6 +18,7 @@ from metro.dynamics.system import Cut, Structure, chip_direction
 from metro.units import Array
 
 MIDPOINT = 0.5
+_NODES, _BETWEEN_NODES = 720, 1.05  # nodes per pitch, and how much a factor may exceed the largest at a node
 
 
 def single_mode_depths(structure: Structure, cut: Cut, rpm: Array) -> Array:
@@ -26,27 +27,62 @@ def single_mode_depths(structure: Structure, cut: Cut, rpm: Array) -> Array:
     return np.stack([stability_boundary(one, cut, rpm).depth for one in alone])
 
 
+def governing_depths(structure: Structure, cut: Cut, rpm: Array) -> Array:
+    """Return the same, but infinite where another mode alone is surely lower: stiff modes cost nothing."""
+    safe = surely_stable_alone(structure, cut)
+    depths = np.full((len(safe), len(rpm)), np.inf)
+    for mode in np.argsort(safe):
+        asked = safe[mode] < depths.min(axis=0)
+        if asked.any():
+            depths[mode, asked] = stability_boundary(structure.mode(mode), cut, rpm[asked]).depth
+    return depths
+
+
+def surely_stable_alone(structure: Structure, cut: Cut) -> Array:
+    """Depths (m,) in metres below which each mode alone is stable at any speed, by the small-gain theorem.
+
+    A mode answers a force by its resonance peak at most, and the chip by twice its displacement at most.
+    """
+    zeta = np.minimum(structure.zeta, math.sqrt(0.5))
+    peak = 1.0 / (2.0 * structure.stiffness * zeta * np.sqrt(1.0 - zeta**2))
+    factor = np.abs(_node_factors(cut, _NODES, structure.directions)).max(axis=0)[structure.axis]
+    safe: Array = 1.0 / (2.0 * _BETWEEN_NODES * factor * peak)
+    return safe
+
+
 def steps_for_stability(structure: Structure, cut: Cut, rpm: float) -> int:
     """Return the steps per tooth period above which explicit Euler steps do not make free vibration grow."""
-    ratio = structure.omega * float(cut.tooth_period(np.array(rpm))) / (2.0 * structure.zeta)
-    return math.floor(float(ratio.max())) + 1
+    return int(_steps_needed(structure, cut, np.array(rpm)).max())
 
 
 def cdsem_depths(structure: Structure, cut: Cut, rpm: Array, exact: Array) -> Array:
     """Depths (m, k) in metres at which CDSEM has each mode alone become unstable, near ``exact`` (m, k).
 
-    By the midpoint rule, with as many steps as the explicit rule would need to be stable; infinite where
-    ``exact`` is.
+    By the midpoint rule, with as many steps as the explicit rule would need to be stable, or up to twice as
+    many; infinite where ``exact`` is.
     """
     mode, speed = np.nonzero(np.isfinite(exact))
     depths = np.full(exact.shape, np.inf)
-    steps = steps_for_stability(structure, cut, float(np.min(rpm)))
-    if len(mode):
-        depths[mode, speed] = periodmap.unit_radius(
-            lambda depth: spectral_radius(structure, cut, mode, rpm[speed], depth, steps=steps),
-            exact[mode, speed],
-        )
+    needed = _steps_needed(structure, cut, rpm[speed])[mode, np.arange(len(mode))]
+    for rows in periodmap.stacks(needed, 2.0):
+        i, k = mode[rows], speed[rows]
+        depths[i, k] = _depths(structure, cut, i, rpm[k], exact[i, k], steps=int(needed[rows].max()))
     return depths
+
+
+def _depths(
+    structure: Structure, cut: Cut, mode: np.ndarray, rpm: Array, near: Array, *, steps: int
+) -> Array:
+    """Depths (c,) at which modes ``mode`` (c,) alone become unstable at speeds (c,), near ``near`` (c,)."""
+    return periodmap.unit_radius(
+        lambda depth: spectral_radius(structure, cut, mode, rpm, depth, steps=steps), near
+    )
+
+
+def _steps_needed(structure: Structure, cut: Cut, rpm: Array) -> np.ndarray:
+    """(m, k) or (m,) steps per tooth period that explicit Euler steps need for each mode to decay."""
+    ratio = np.multiply.outer(structure.omega / (2.0 * structure.zeta), cut.tooth_period(rpm))
+    return np.floor(ratio).astype(int) + 1
 
 
 def spectral_radius(

@@ -70,12 +70,14 @@ class Refined:
     ----------
     at : the c crossings.
     shape : (c, n) eigenvectors: the vibration along the arc.
+    left : (c, n) left eigenvectors, of which the product with the shape is 1.
     rate : (c,) derivative of the eigenvalue by theta, 1/m.
     converged : (c,) whether it is one.
     """
 
     at: Candidates
     shape: ComplexArray
+    left: ComplexArray
     rate: ComplexArray
     converged: np.ndarray
 
@@ -182,7 +184,17 @@ def refine(equation: Kernel, start: Candidates, steps: int) -> Refined:
         shift = np.where(lost, start.inverse, value + rate * change)
         converged &= ~lost
     converged &= shift.real > 0.0
-    return Refined(Candidates(start.speed, theta, shift.real), x[:, :, 0], rate, converged)
+    left = (y / (y @ x))[:, 0]
+    return Refined(Candidates(start.speed, theta, shift.real), x[:, :, 0], left, rate, converged)
+
+
+def applied(equation: Kernel, theta: Array, x: ComplexArray) -> ComplexArray:
+    """Apply S(theta) to ``x`` (c, n), a speed of the equation for each."""
+    mu = np.exp(1j * theta)[:, None]
+    acting = (x * (1.0 - equation.delayed / mu))[:, :, None]
+    gain = (equation.decay / (mu - equation.decay))[:, :, None]
+    image: ComplexArray = equation.volterra @ acting + equation.states @ (gain * (equation.drive @ acting))
+    return image[:, :, 0]
 
 
 def _slope(equation: Kernel, theta: Array, x: ComplexArray) -> ComplexArray:

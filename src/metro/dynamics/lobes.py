@@ -114,10 +114,10 @@ def discretised(
     return arc, collocation.kernel(structure, arc, cut.tooth_period(rpm))
 
 
-def fine_kernel(structure: Structure, cut: Cut, rpm: Array) -> Kernel:
+def finely_discretised(structure: Structure, cut: Cut, rpm: Array) -> tuple[Arc, Kernel]:
     """Discretise at the second resolution of the boundary's first effort, for speeds of one group."""
     share, extra, *_ = _EFFORTS[0]
-    return discretised(structure, cut, rpm, share, extra + _EXTRA_POINTS)[1]
+    return discretised(structure, cut, rpm, share, extra + _EXTRA_POINTS)
 
 
 def _solve(

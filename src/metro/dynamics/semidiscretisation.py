@@ -48,14 +48,16 @@ def lowest_boundary(
 ) -> Array:
     """Lowest depths (k,) m at which the cut turns unstable, sought from 0.4 to 2.5 times ``around`` (k,).
 
-    NaN where it does not within these.
+    NaN where it does not within these, or where that is not known of one of the depths tried.
     """
     shares = np.geomspace(0.4, 2.5, 14)
-    radius = [spectral_radius(structure, engagement, rpm, share * around, steps) for share in shares]
-    first = (np.stack(radius) > 1.0).argmax(axis=0)
+    radius = np.stack(
+        [spectral_radius(structure, engagement, rpm, share * around, steps) for share in shares]
+    )
+    first = (radius > 1.0).argmax(axis=0)
     start = around * np.sqrt(shares[first] * shares[np.maximum(first - 1, 0)])
     depth = boundary_near(structure, engagement, rpm, start, steps)
-    return np.where(first > 0, depth, np.nan)
+    return np.where((first > 0) & np.isfinite(radius).all(axis=0), depth, np.nan)
 
 
 def period_map(
