@@ -77,11 +77,37 @@ def test_no_cut_is_deeper_than_the_runs_and_the_work_tell():
 
 
 def test_no_cut_is_named_where_the_teeth_pass_faster_than_the_hammer_reached():
-    frf = pd.DataFrame({"position": ["1", "1", "2"], "frequency_hz": [20.0, 130.0, 900.0]})
+    frf = pd.DataFrame({"position": ["1", "1", "2"], "frequency_hz": [20.0, 130.0, 900.0], "reference": "1x"})
     highest = Reach.of({}, pd.DataFrame({"axial_depth_mm": [1.0]}), frf).highest_hz
     assert highest == {"1": 130.0, "2": 900.0}
     assert all(cut["spindle_rpm"] * 3 / 60.0 <= 130.0 for cut in cuts(highest_hz=highest))
     assert cuts(highest_hz={"1": 40.0}) == []
+
+
+def test_no_cut_is_recommended_for_a_tool_that_was_struck_in_one_direction():
+    """Of a real slot, with receptances along x alone, 6 mm were recommended at a probability of 0.975."""
+    rows = [("1", "1x"), ("1", "2x"), ("2", "1x"), ("2", "1y"), ("3", "1z"), ("3", "2x")]
+    frf = pd.DataFrame(rows, columns=["position", "reference"]).assign(frequency_hz=900.0)
+    struck = Reach.of({}, pd.DataFrame({"axial_depth_mm": [1.0]}), frf).struck
+    assert struck == {"1": "x", "2": "xy", "3": "xz"}
+    assert {(cut["advice"], cut["why"]) for cut in cuts(struck={"1": "x"})} == {
+        ("do_not", "struck_in_one_direction")
+    }
+    assert cuts(struck={"1": "xz"}) == cuts()
+
+
+def test_no_cut_is_recommended_by_a_coefficient_that_may_be_zero():
+    coefficients = {"krc": {"value": 1.0}, "kte": {"value": 1.0}, "kre": {"value": 1.0}}
+    known = {"force": {"waveform": {**coefficients, "ktc": {"value": 900.0, "ci95": [400.0, 1400.0]}}}}
+    unsure = {"force": {"waveform": {**coefficients, "ktc": {"value": 900.0, "ci95": [-400.0, 2200.0]}}}}
+    tool = {"tool": MANIFEST["tool"]}
+    assert Milling.of(tool, known).sure
+    assert not Milling.of(tool, unsure).sure
+    assert Milling.of(MANIFEST, unsure).sure  # declared
+    found = recommended_cuts(
+        boundary(np.full(len(RPM), 1.0)), table_of([], []), None, Milling.of(tool, unsure), Reach({})
+    )
+    assert {(cut["advice"], cut["why"]) for cut in found} == {("do_not", "force_not_known")}
 
 
 @pytest.mark.parametrize(("direction", "side"), [("down", "down"), ("up", "up")])

@@ -65,7 +65,8 @@ class Lateral:
 class Milling:
     """Tool and coefficients of a batch, SI; ``hole_radius`` of helical cuts.
 
-    ``lateral``: what bends the tool, where that is known.
+    ``lateral``: what bends the tool, where that is known. ``sure``: whether the interval of K_tc is above
+    zero; else no depth follows from it.
     """
 
     radius: float
@@ -74,6 +75,7 @@ class Milling:
     kte: float
     hole_radius: float = 0.0
     lateral: Lateral | None = None
+    sure: bool = True
 
     @classmethod
     def of(cls, manifest: JSON, identified: JSON) -> Milling | None:
@@ -95,7 +97,9 @@ class Milling:
         if krc is not None and kre is not None and "overhang_mm" in tool:
             coefficients = (shear, krc * N_MM2, sharp, kre / edge * N_MM)
             lateral = Lateral(cutter_of(tool), tool["overhang_mm"] * MM, coefficients)
-        return cls(radius, teeth, shear, sharp, hole, lateral)
+        low = ((waveform.get("ktc") or {}).get("ci95") or [None])[0]
+        sure = "ktc_n_mm2" in declared or low is None or low > 0.0
+        return cls(radius, teeth, shear, sharp, hole, lateral, sure)
 
     def width(self, operation: str, radial_depth: float) -> float:
         """Width of the chip's section, m: volume over depth and feed. A hole is removed as a whole."""
@@ -136,11 +140,13 @@ class Reach:
     limits : of ``batch.yaml``: least and greatest, by column of ``runs.csv``.
     deepest_mm : of the cuts made, times :data:`DEEPER`, and of the work; NaN where neither is known.
     highest_hz : highest frequency that a hammer excited, by position; none where modes are declared.
+    struck : directions of the hits, such as ``xy``, by position; none where modes are declared.
     """
 
     limits: Mapping[str, Any]
     deepest_mm: float = math.nan
     highest_hz: Mapping[str, float] = field(default_factory=dict)
+    struck: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, manifest: JSON, runs: pd.DataFrame, frf: pd.DataFrame) -> Reach:
@@ -148,10 +154,11 @@ class Reach:
         made = pd.to_numeric(runs["axial_depth_mm"], errors="coerce").max()
         size = (manifest.get("work") or {}).get("size_mm") or [math.nan] * 3
         bounds = [one for one in (DEEPER * float(made), float(size[2])) if math.isfinite(one)]
-        highest = {
-            str(position): float(rows.max()) for position, rows in frf.groupby("position")["frequency_hz"]
-        }
-        return cls(manifest.get("limits") or {}, min(bounds, default=math.nan), highest)
+        highest, struck = {}, {}
+        for position, rows in frf.groupby("position"):
+            highest[str(position)] = float(rows["frequency_hz"].max())
+            struck[str(position)] = "".join(sorted(set(rows["reference"].str[-1])))
+        return cls(manifest.get("limits") or {}, min(bounds, default=math.nan), highest, struck)
 
 
 def recommended_cuts(
@@ -184,9 +191,10 @@ def recommended_cuts(
         below, chattered = _below(line, known)
         highest = reach.highest_hz.get(str(position), math.inf)
         pockets = sorted(_pockets(line, milling, reach, highest), key=lambda cut: -cut["removal_cm3_min"])
+        lacking = _lacking(milling, reach.struck.get(str(position)))
         for cut in pockets[:MOST]:
             near = known["rpm"].min() <= cut["spindle_rpm"] <= known["rpm"].max()
-            advice, why = _advice(status, below, chattered, within=bool(near))
+            advice, why = lacking or _advice(status, below, chattered, within=bool(near))
             found.append({"position": position, **cut, "advice": advice, "why": why})
     return found
 
@@ -254,6 +262,17 @@ def _below(line: pd.DataFrame, known: pd.DataFrame) -> tuple[int, int]:
     low = np.interp(known["rpm"].to_numpy(float), line["rpm"], line["depth_lo_mm"])
     below = known["depth_mm"].to_numpy(float) <= low
     return int(below.sum()), int((below & (known["unstable"].to_numpy() > 0)).sum())
+
+
+def _lacking(milling: Milling, struck: str | None) -> tuple[str, str] | None:
+    """Return advice against any cut where what the boundary is made of is not known, and why, as codes.
+
+    A tool bends in two directions. One that was struck in a single one is taken as rigid in the other, which
+    makes the boundary too high by any factor.
+    """
+    if struck is not None and len(struck) < 2:
+        return "do_not", "struck_in_one_direction"
+    return None if milling.sure else ("do_not", "force_not_known")
 
 
 def _advice(status: str | None, below: int, chattered: int, *, within: bool) -> tuple[str, str]:

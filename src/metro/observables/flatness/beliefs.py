@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -37,9 +38,14 @@ def parameters(*, placed: bool, beside: Sequence[Beside], ringing: Sequence[str]
     return (*place, Parameter(FORCE, "%", 0.01), *swings, *tuned)
 
 
-def believed_block(believed: Sequence[Parameter], beside: Sequence[Beside]) -> Block:
-    """Return what is believed of parameters beforehand as evidence on them."""
-    known = dict.fromkeys(PLACE, PLACE_SD) | dict.fromkeys(FORM, FORM_SD) | {FORCE: FORCE_SD}
+def believed_block(believed: Sequence[Parameter], beside: Sequence[Beside], held: float) -> Block:
+    """Return what is believed of parameters beforehand as evidence on them.
+
+    ``held``: share of the force in a cut that may move the tip by less, or by more, than load tests say.
+    """
+    known = (
+        dict.fromkeys(PLACE, PLACE_SD) | dict.fromkeys(FORM, FORM_SD) | {FORCE: math.hypot(FORCE_SD, held)}
+    )
     swings = [one.name for each in beside for one in each.parameters]
     along = {name: name.split("_")[2] == "z" for name in swings}
     known |= {name: REACH_SD if of_z else SIGN_SD for name, of_z in along.items()}

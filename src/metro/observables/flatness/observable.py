@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from metro.observables.flatness.beliefs import FORM_SD, believed_block
 from metro.observables.flatness.beside import Beside
 from metro.observables.flatness.blocks import LOADS, Pose, face_block, pose_of_loads
 from metro.observables.flatness.dynamics import tip_block
+from metro.observables.flatness.held import held_back
 from metro.observables.flatness.model import FlatnessModel
 from metro.observables.flatness.noise import without_what_repeats
 from metro.observables.flatness.pairing import paired
@@ -27,7 +28,7 @@ from metro.observables.flatness.repeats import cloud_of, noise_by_repeats, scann
 from metro.observables.flatness.scan import FACE_TABLES, measured_run
 from metro.observables.flatness.scenes import faces_of
 from metro.observables.observable import Observable
-from metro.observables.problem import BaseFit, Problem, Refusal
+from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.surface.face_noise import Noise
 from metro.surface.tip_damping import Rayleigh
@@ -135,12 +136,19 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], identified: JSON
     model = FlatnessModel(fields, placed=placed, ringing=rung, beside=beside)
     scatter = np.array([0.0 if one in model.believed else SCATTER for one in model.parameters])
     evidence = (
-        believed_block(model.believed, beside),
+        believed_block(model.believed, beside, _held(known, blocks)),
         *(pose.block for pose in known),
         *without_what_repeats(blocks),
     )
     said = tuple(dict.fromkeys(notes))
     return Problem(NAME, "mm", MM, model, evidence, scatter, SYSTEMATIC, said, unresolved=UNRESOLVED)
+
+
+def _held(poses: Sequence[Pose], faces: Sequence[Block]) -> float:
+    """Return what the arm may hold back of a load, over the force of a cut; 0 where no face was cut."""
+    forces = [float(np.linalg.norm(face.setting.force)) for face in faces]
+    held = [held_back(one.field, one.block.setting.rows, float(one.block.sigma[0])) for one in poses]
+    return max(held) / float(np.median(forces)) if forces else 0.0
 
 
 def _what_it_needs(

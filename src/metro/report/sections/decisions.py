@@ -25,6 +25,11 @@ MOST = 16  # rows
 LISTEN = " Begin at half the depth and listen."
 WHY = {
     "tests_confirm_the_band": "The test cuts below the limit of this boundary were stable.",
+    "struck_in_one_direction": (
+        "Do not use these cuts: the tool was struck in one direction only, and the boundary takes it as "
+        "rigid in the other. Strike it in both."
+    ),
+    "force_not_known": "Do not use these cuts: the interval of K_tc includes zero.",
     "no_test_below_the_band": f"No test cut confirms this boundary.{LISTEN}",
     "no_test_at_such_a_speed": f"The test cuts were made at other speeds.{LISTEN}",
     "too_few_tests": f"Too few test cuts confirm this boundary.{LISTEN}",
