@@ -152,7 +152,7 @@ def test_a_stage_does_nothing_when_the_code_is_not_the_planned_one(tmp_path, mon
         "ingest", tmp_path, "--cells", tmp_path, "--out", tmp_path, "--settings", "{}", "--code", "0"
     )
     assert result.exit_code == 1
-    assert "call snakemake again" in result.stderr
+    assert "call metro run again" in result.stderr
 
 
 @pytest.mark.parametrize(

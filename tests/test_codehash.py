@@ -144,7 +144,7 @@ def test_a_stage_that_is_not_there_is_an_error(package):
 
 def test_code_other_than_planned_is_refused(package):
     codehash.require_code("weigh", codehash.code_hash("weigh"))
-    with pytest.raises(codehash.ChangedCodeError, match="call snakemake again"):
+    with pytest.raises(codehash.ChangedCodeError, match="call metro run again"):
         codehash.require_code("weigh", codehash.code_hash("rest"))
 
 

@@ -85,7 +85,7 @@ def require_code(stage: str, planned: str) -> None:
         The stage's own hash differs from ``planned``.
     """
     if code_hash(stage) != planned:
-        raise ChangedCodeError("the code changed since the workflow was planned: call snakemake again")
+        raise ChangedCodeError("the code changed since the workflow was planned: call metro run again")
 
 
 def imported_modules(*starts: str) -> dict[str, Path]:

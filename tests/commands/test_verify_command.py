@@ -133,7 +133,7 @@ def test_a_report_without_provenance_says_what_to_do(own_campaign):
     (own_campaign / "reports/late/provenance.json").unlink()
     result = verify()
     assert result.exit_code == 1
-    assert "call snakemake" in result.stderr
+    assert "call metro run" in result.stderr
 
 
 @pytest.mark.parametrize("content", ["", '{"raw": {', "[]", "7", '{"raw": {}}', "\x00\ud83d"])

@@ -80,9 +80,9 @@ def test_a_batch_that_was_not_computed_is_an_error_of_the_input_not_of_the_call(
         lambda: processed_folder("new"),
     )
     for ask in asked:
-        with pytest.raises(ContractError, match="call snakemake") as caught:
+        with pytest.raises(ContractError, match="call metro run") as caught:
             ask()
         assert not isinstance(caught.value, CallError)
-    with pytest.raises(ContractError, match="holds no batch yet: call snakemake") as caught:
+    with pytest.raises(ContractError, match="holds no batch yet: call metro run") as caught:
         batch_name("late", own_campaign / "nothing", own_campaign / "reports")
     assert not isinstance(caught.value, CallError)

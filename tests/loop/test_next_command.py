@@ -142,4 +142,4 @@ def test_an_observable_without_a_verdict_is_refused(ask):
 def test_a_batch_that_has_not_been_through_the_loop_is_refused(tmp_path):
     result = CliRunner().invoke(cli.app, ["next", "none", "--processed", str(tmp_path)])
     assert result.exit_code == 1
-    assert "call snakemake" in result.stderr
+    assert "call metro run" in result.stderr

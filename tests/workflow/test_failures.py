@@ -86,7 +86,7 @@ def test_a_stage_refuses_to_run_code_other_than_planned(checkout):
         check=False,
     )
     assert done.returncode == 1
-    assert done.stderr == "the code changed since the workflow was planned: call snakemake again\n"
+    assert done.stderr == "the code changed since the workflow was planned: call metro run again\n"
 
 
 def test_a_killed_run_leaves_nothing_half_written_and_the_next_call_finishes(checkout):

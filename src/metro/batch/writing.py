@@ -12,7 +12,7 @@ from typing import IO
 
 from metro.batch.findings import ContractError, Finding
 
-_FULL = "make room on this disk, then call snakemake again: what is finished is kept"
+_FULL = "make room on this disk, then call metro run again: what is finished is kept"
 _FORBIDDEN = "make the folder writable, or work in another one (snakemake --directory)"
 _IN_THE_WAY = "something else has its name or that of a folder above it: move it away"
 REMEDIES = {

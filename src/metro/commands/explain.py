@@ -78,7 +78,7 @@ def read(batch: str, processed: Path, reports: Path) -> Results:
     files = [processed / batch / name for name in ("batch.json", "runs.parquet", "loop.json")]
     files += [reports / batch / name for name in ("identified.json", "verdict.json")]
     missing = [
-        Finding("error", str(file), "is not there: call snakemake") for file in files if not file.is_file()
+        Finding("error", str(file), "is not there: call metro run") for file in files if not file.is_file()
     ]
     if missing:
         raise ContractError(missing)

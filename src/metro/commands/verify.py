@@ -44,7 +44,7 @@ def verify_command(
         raise wrong_call("--raw" if raw else "--processed", "is the folder of one batch: name that batch")
     all_of_them = given or [str(REPORTS / name) for name in names([REPORTS], REPORTS_FILE)]
     if not all_of_them:
-        raise ContractError([Finding("error", str(REPORTS), "holds no results yet: call snakemake")])
+        raise ContractError([Finding("error", str(REPORTS), "holds no results yet: call metro run")])
     folders = [reports_folder(one) for one in all_of_them]  # a wrong name before anything is computed
     contents: list[JSON] = []
     for folder in folders:
@@ -112,7 +112,7 @@ def verify(reports: Path, raw: Path, processed: Path, config: Path) -> tuple[JSO
     """
     file = reports / provenance.FILE
     if not file.is_file():
-        message = "is not there: the report was not finished, or made by an earlier version; call snakemake"
+        message = "is not there: the report was not finished, or made by an earlier version; call metro run"
         raise ContractError([Finding("error", str(file), message)])
     if not raw.is_dir():
         message = "is not there: name the folder of the raw files with --raw"
@@ -136,7 +136,7 @@ def _recorded(file: Path) -> JSON:
             return made
     except (ValueError, TypeError):
         pass
-    message = "is damaged, nothing can be compared with it: remove it and call snakemake"
+    message = "is damaged, nothing can be compared with it: remove it and call metro run"
     raise ContractError([Finding("error", str(file), message)])
 
 

@@ -56,9 +56,9 @@ def batch_name(given: str, processed: Path, reports: Path) -> str:
     if name in known:
         return name
     if not known:
-        raise ContractError([Finding("error", str(processed), "holds no batch yet: call snakemake")])
+        raise ContractError([Finding("error", str(processed), "holds no batch yet: call metro run")])
     if name in names(raw, RAW_FILE):
-        raise ContractError([Finding("error", name, "has no results yet: call snakemake")])
+        raise ContractError([Finding("error", name, "has no results yet: call metro run")])
     raise _no_such_batch(given, name, known)
 
 
@@ -107,7 +107,7 @@ def _folder(given: str, root: Path, file: str) -> Path:
     if folder is not None:
         return folder
     if name in names(raw, RAW_FILE):
-        raise ContractError([Finding("error", str(root / name), "is not there: call snakemake")])
+        raise ContractError([Finding("error", str(root / name), "is not there: call metro run")])
     raise _no_such_batch(given, name, names([root], file))
 
 

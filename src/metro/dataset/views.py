@@ -57,7 +57,7 @@ def view_names(processed: Path) -> list[str]:
     """Return the names of all views: those of the results first, then every table that some batch has."""
     tables = {path.stem for path in _files(processed, "*")}
     if not tables:
-        message = "holds no batch with tables: call snakemake first, or name the folder with --processed"
+        message = "holds no batch with tables: call metro run first, or name the folder with --processed"
         raise ContractError([Finding("error", str(processed), message)])
     return [*COLUMNS, *sorted(tables - set(COLUMNS))]
 

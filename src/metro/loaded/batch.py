@@ -65,7 +65,7 @@ def load(batch: str | Path, project: str | Path = ".") -> LoadedBatch:
     processed, reports = project / "data/processed", project / "reports"
     name = batch_name(str(batch), processed, reports)
     if not (reports / name / REPORTS_FILE).is_file():
-        raise ContractError([Finding("error", name, "has no verdict yet: call snakemake")])
+        raise ContractError([Finding("error", name, "has no verdict yet: call metro run")])
     return LoadedBatch(name, processed / name, reports / name)
 
 

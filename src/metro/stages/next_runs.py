@@ -108,7 +108,7 @@ def _gates(processed: Path, reports: Path) -> Gates:
     """Return the settings that the loop stage ran with."""
     for file in (processed / "comparison.parquet", reports / "verdict.json"):
         if not file.is_file():
-            raise ContractError([Finding("error", str(file), "is not there: call snakemake")])
+            raise ContractError([Finding("error", str(file), "is not there: call metro run")])
     return Gates(**made_by(processed, "loop")["settings"])
 
 

@@ -59,7 +59,7 @@ def proposed(processed: Path, reports: Path) -> tuple[JSON, Search | None, Probl
     """
     for file in (processed / FILE, processed / "loop.made.json", reports / "verdict.json"):
         if not file.is_file():
-            raise ContractError([Finding("error", str(file), "is not there: call snakemake")])
+            raise ContractError([Finding("error", str(file), "is not there: call metro run")])
     verdict = read_json(reports / "verdict.json")["observables"][OBSERVABLE]
     if verdict["unexplained"] is None or verdict.get("contradicted"):
         return {"status": "explained", "verdict": verdict["status"], "proposal": None}, None, None

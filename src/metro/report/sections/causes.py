@@ -52,7 +52,7 @@ def _story(causes: list[JSON]) -> list[Item]:
         for cause in causes
     ]
     header = ["cause", "seen in", "combined estimate", "probability", "other observables"]
-    caption = "Causes identified in this batch, with parameters from all observables and 95 % intervals."
+    caption = "Causes in this batch, with parameters from all observables and 95 % intervals."
     table = Table(header, rows, caption, [1.5, 1.9, 2.0, 0.9, 1.4], numeric=[3])
     notes = [str(cause["words"]) for cause in causes if cause["status"] in SAID]
     return [table, *(Paragraph(sentence(note), "warning") for note in notes)]

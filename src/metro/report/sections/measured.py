@@ -5,6 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from metro.batch.entries import UNKNOWN
+from metro.batch.files import OWN_TO_A_RUN
 from metro.report.numbers import listing
 from metro.report.results import Results
 
@@ -87,11 +88,13 @@ def _run_words(runs: pd.DataFrame) -> str:
     operations = listing([str(o) for o in runs["operation"].dropna().unique() if str(o)])
     one = len(runs) == 1
     made = f"{count_of(len(runs), 'cutting run')} ({operations or 'operation not stated'})"
-    recorded = int(runs["role"].isin(["identify", "validate"]).sum())
+    judged = bool(runs["role"].isin(["identify", "validate"]).any())
     held = int((runs["role"] == "validate").sum())
-    if not recorded:
+    if not judged:
         return (
             f"{made} {'was' if one else 'were'} made; no record of {'it' if one else 'them'} is in the batch."
             f"{logs}"
         )
-    return f"{made}, {recorded} of them recorded and {held} held out from all fits.{logs}"
+    named = runs[[name for name in OWN_TO_A_RUN if name in runs]]
+    recorded = int((named.notna() & (named != "")).any(axis=1).sum())
+    return f"{made}, {recorded or 'none'} of them recorded and {held} held out from all fits.{logs}"
