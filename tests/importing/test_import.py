@@ -247,6 +247,23 @@ def two_columns(path, seed):
     path.write_text("".join(f"{k / 1000:.4f} {value:.12f}\n" for k, value in enumerate(values)))
 
 
+def test_of_a_record_with_the_columns_of_the_contract_the_unit_of_the_response_is_asked(tmp_path):
+    """It was not, and the batch that was written could not be run."""
+    hit = np.exp(-(((np.arange(2000) - 100) / 8.0) ** 2))
+    ring = np.exp(-np.arange(2000) / 300.0) * np.sin(np.arange(2000) / 5.0)
+    table = pd.DataFrame({"t_s": np.arange(2000) / 4000.0, "force_n": 200.0 * hit, "response": ring})
+    table.to_csv(tmp_path / "hit.csv", index=False)
+    places = {"reference": "1x", "response": "1x"}
+    without = called(tmp_path / "without", tmp_path / "hit.csv", **places)
+    assert without.exit_code != 0
+    assert "unit.response" in without.output
+    assert not (tmp_path / "without").exists()
+    done = called(tmp_path / "with", tmp_path / "hit.csv", **places, **{"unit.response": "g"})
+    assert done.exit_code == 0, done.output
+    assert pd.read_csv(tmp_path / "with/impacts.csv")["response_unit"].tolist() == ["g"]
+    assert check(tmp_path / "with").ok
+
+
 def test_a_hammer_record_without_its_sensor_is_named_with_both_counts(tmp_path):
     names = ["impact_p3.txt", "impact_p8.txt", "impact_p9.txt", "accel_p3.txt"]
     for seed, name in enumerate(names):

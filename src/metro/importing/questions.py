@@ -71,7 +71,10 @@ def questions(proposals: Sequence[Proposal]) -> Iterator[Question]:
         what = f"columns of the measured currents or torques of the {count} joints, as 14-{13 + count}"
         yield Question(joints.DRIVE, what, partial(_span, count))
         yield _choice("unit.drive", "unit of these", ("A", "mA", "Nm", "kNm"))
-    for quantity in dict.fromkeys(_quantity(column) for each in proposals for column in _without_unit(each)):
+    unstated = [_quantity(column) for each in proposals for column in _without_unit(each)]
+    if any(each.kind == "record" and not each.columns and not each.placed for each in proposals):
+        unstated.append("response")  # of a record with the contract's own columns
+    for quantity in dict.fromkeys(unstated):
         words = f"unit of the {quantity} in the files, as {EXAMPLES[quantity]}"
         yield Question(f"unit.{quantity}", words, partial(_unit, quantity))
     if not all(each.timed for each in proposals):
