@@ -46,3 +46,15 @@ def test_harder_work_lowers_every_depth_in_proportion():
     deviations[0, 9:] = 0.05
     lower = depth_samples(STRUCTURE, CUT, boundary, deviations)[0]
     np.testing.assert_allclose(np.log(lower / boundary.depth), -0.05, atol=1e-4)
+
+
+def test_each_slope_is_that_of_boundaries_solved_to_either_side():
+    """One parameter at a time: a small change of it, and the boundary that is solved anew with it."""
+    step = 1e-3
+    each = np.eye(11) * step
+    boundary = stability_boundary(STRUCTURE, CUT, RPM)
+    slopes = np.log(depth_samples(STRUCTURE, CUT, boundary, each) / boundary.depth) / step
+    above, below = (np.log(depths_anew(STRUCTURE, CUT, RPM, sign * each)) for sign in (1.0, -1.0))
+    solved = (above - below) / (2.0 * step)
+    assert np.abs(solved[:3]).max() > 3.0  # frequencies move the lobes
+    np.testing.assert_allclose(slopes, solved, atol=0.03)

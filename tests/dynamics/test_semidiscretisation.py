@@ -149,3 +149,17 @@ def test_modal_matrices_give_the_receptance():
     omega = np.array([100.0, 260.0, 400.0])
     told = [out @ np.linalg.solve(1j * w * np.eye(len(free)) - free, force_in) for w in omega]
     np.testing.assert_allclose(told, TWO.receptance(omega), rtol=1e-9, atol=1e-20)
+
+
+def test_a_depth_at_which_the_radius_is_unknown_leaves_the_lowest_boundary_open(monkeypatch):
+    """What lies below the crossing that is found may be another one, which was not seen."""
+    engagement = teeth.equal_teeth(Cut(2, *immersion("down", 0.5, 1.0), 6e8, 2e8))
+    rpm, around = np.array([5000.0, 6000.0]), np.array([1e-3, 1e-3])
+
+    def unknown_of_the_second(_structure, _engagement, _rpm, depth, _steps):
+        return np.where([False, True] & (depth < 0.5e-3), np.nan, depth / around)
+
+    monkeypatch.setattr(semidiscretisation, "spectral_radius", unknown_of_the_second)
+    found = semidiscretisation.lowest_boundary(BENCH, engagement, rpm, around, 40)
+    assert found[0] == pytest.approx(1e-3, rel=1e-6)
+    assert np.isnan(found[1])

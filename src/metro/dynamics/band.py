@@ -17,7 +17,7 @@ from metro.dynamics.lobes import Boundary, finely_discretised, groups
 from metro.dynamics.system import Cut, Structure
 from metro.units import Array, ComplexArray
 
-_STEP = 1e-4
+_STEP = 1e-6  # of a logarithm: a mode that turns by hundreds of radians in a period bends within 1e-4
 _LIMIT = 0.5  # of a shift in log depth: beyond it, and near a fold, first order does not hold
 
 
