@@ -11,6 +11,8 @@ from metro.batch.ranges import number_in_words, range_of
 from metro.joint_columns import MOVED, SHIFTS, TORQUES, TURNS
 
 Kind = Literal["text", "number", "integer", "file", "time"]
+# Columns of runs.csv that name a file of that run alone.
+OWN_TO_A_RUN = ("dynamometer", "robot_log", "joint_log", "scan", "profile", "slopes", "poses")
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from metro.batch.columns import OWN_TO_A_RUN
 from metro.batch.findings import Finding, shown
 from metro.batch.sources import Files, files_of, parted, source
 from metro.batch.tables import Table, records
@@ -24,7 +25,6 @@ RUN_FILES = {
     "targets": "targets",
 }
 LONGEST_NAME = 255  # bytes, of every file system
-OWN_TO_A_RUN = ("dynamometer", "robot_log", "joint_log", "scan", "profile", "slopes", "poses")
 # What describes a cut in a row of runs.csv: settings as text, as numbers, and records of it.
 OF_A_CUT = (
     *("operation", "direction", "spindle_rpm", "feed_per_tooth_mm", "axial_depth_mm", "radial_depth_mm"),

@@ -24,7 +24,7 @@ from metro.batch.canonical import Part, write_parts
 from metro.batch.capabilities import Stock, nothing_computed
 from metro.batch.cell import CELLS
 from metro.batch.check import HOLDOUT, CheckReport, Examined, Loaded, examine
-from metro.batch.files import OWN_TO_A_RUN
+from metro.batch.columns import OWN_TO_A_RUN
 from metro.batch.findings import Finding, errors
 from metro.batch.processed import COLUMNS, Processed, Tables
 from metro.batch.sources import SECTION, files_of, parted

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pandas as pd
 
+from metro.batch.columns import OWN_TO_A_RUN
 from metro.batch.entries import UNKNOWN
-from metro.batch.files import OWN_TO_A_RUN
 from metro.report.numbers import listing
 from metro.report.results import Results
 
