@@ -77,7 +77,8 @@ def test_no_cut_is_deeper_than_the_runs_and_the_work_tell():
 
 
 def test_no_cut_is_named_where_the_teeth_pass_faster_than_the_hammer_reached():
-    frf = pd.DataFrame({"position": ["1", "1", "2"], "frequency_hz": [20.0, 130.0, 900.0], "reference": "1x"})
+    frf = pd.DataFrame({"position": ["1", "1", "2"], "frequency_hz": [20.0, 130.0, 900.0]})
+    frf = frf.assign(reference="1x", response="1x")
     highest = Reach.of({}, pd.DataFrame({"axial_depth_mm": [1.0]}), frf).highest_hz
     assert highest == {"1": 130.0, "2": 900.0}
     assert all(cut["spindle_rpm"] * 3 / 60.0 <= 130.0 for cut in cuts(highest_hz=highest))
@@ -86,8 +87,9 @@ def test_no_cut_is_named_where_the_teeth_pass_faster_than_the_hammer_reached():
 
 def test_no_cut_is_recommended_for_a_tool_that_was_struck_in_one_direction():
     """Of a real slot, with receptances along x alone, 6 mm were recommended at a probability of 0.975."""
-    rows = [("1", "1x"), ("1", "2x"), ("2", "1x"), ("2", "1y"), ("3", "1z"), ("3", "2x")]
-    frf = pd.DataFrame(rows, columns=["position", "reference"]).assign(frequency_hz=900.0)
+    rows = [("1", "1x", "1x"), ("1", "2x", "1x"), ("1", "1y", "1x"), ("2", "1x", "1x"), ("2", "1y", "1y")]
+    rows += [("3", "1z", "1z"), ("3", "2x", "1x")]
+    frf = pd.DataFrame(rows, columns=["position", "reference", "response"]).assign(frequency_hz=900.0)
     struck = Reach.of({}, pd.DataFrame({"axial_depth_mm": [1.0]}), frf).struck
     assert struck == {"1": "x", "2": "xy", "3": "xz"}
     assert {(cut["advice"], cut["why"]) for cut in cuts(struck={"1": "x"})} == {

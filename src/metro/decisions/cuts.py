@@ -157,7 +157,8 @@ class Reach:
         highest, struck = {}, {}
         for position, rows in frf.groupby("position"):
             highest[str(position)] = float(rows["frequency_hz"].max())
-            struck[str(position)] = "".join(sorted(set(rows["reference"].str[-1])))
+            along = rows["reference"].str[-1]  # a response across the hit makes no mode of its direction
+            struck[str(position)] = "".join(sorted(set(along[along == rows["response"].str[-1]])))
         return cls(manifest.get("limits") or {}, min(bounds, default=math.nan), highest, struck)
 
 

@@ -36,7 +36,7 @@ def held_back(field: PoseField, rows: Rows, noise: float) -> float:
     ]
     held = -(towards @ compliance)
     share, _, _, _ = np.linalg.lstsq(design, np.column_stack([held, rows.displacement]))
-    # What the compliance cannot imitate says how large h is; beforehand it is none, within LOST.
+    # Only what is not confounded with the compliance says how large h is; beforehand it is 0, within LOST.
     seen, left = (np.column_stack([held, rows.displacement]) - design @ share).T
     precision = float(seen @ seen) / noise**2 + 1.0 / (LOST * float(size.max())) ** 2
     mean = float(seen @ left) / noise**2 / precision
