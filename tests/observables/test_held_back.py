@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from metro.observables.flatness.beliefs import FORCE, FORCE_SD, believed_block
 from metro.observables.flatness.held import LOST, held_back
 from metro.observables.flatness.pose_field import PoseField
+from metro.observables.problem import Parameter
 from metro.surface.tip_stiffness import Rows, basis_over
 
 COMPLIANCE = 1.5e-6  # m/N
@@ -47,3 +49,11 @@ def test_where_nothing_is_held_it_is_the_uncertainty_that_counts():
     narrowed = 1.0 / np.hypot(1.0 / spread, 1.0 / (LOST * 250.0))
     # one draw's own mean comes on top of its standard deviation
     assert np.sqrt(np.mean(np.square(said))) == pytest.approx(np.sqrt(2.0) * narrowed, rel=0.15)
+
+
+def test_what_may_be_held_back_widens_what_is_believed_of_the_force_and_of_nothing_else():
+    believed = (Parameter("form_xx", "um", 1e-6), Parameter(FORCE, "%", 0.01))
+    exact, held = (believed_block(believed, (), share).sigma for share in (0.0, 0.03))
+    assert exact[1] == FORCE_SD
+    assert held[1] == pytest.approx(np.sqrt(FORCE_SD**2 + 0.03**2))
+    assert held[0] == exact[0]
