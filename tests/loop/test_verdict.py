@@ -19,8 +19,10 @@ from metro.loop.checks.signature import Line, share_left
 from metro.loop.fitting.held_out import COMPARISON, comparison, held_out, identified_fit, run_dof
 from metro.loop.search.search import search
 from metro.loop.statement import Statement
+from metro.loop.verdict.believable import contradicted
 from metro.loop.verdict.story import story
-from metro.loop.verdict.verdict import bounded, error, judge, widened
+from metro.loop.verdict.verdict import bounded, error, judge, traces, widened
+from metro.report.sections.verdict import verdict_words
 from metro.wording.batch import STATUSES as SENTENCES
 from metro.wording.batch import verdict_in_words
 
@@ -201,6 +203,31 @@ def test_every_candidate_that_is_not_taken_has_its_own_error_on_held_out_runs():
     assert verdict["before"]["rms"] == pytest.approx(wave, rel=0.05)
     assert found["ripple"] == pytest.approx(wave, rel=0.05)
     assert SIGMA / 2 < found["bend"] < 0.2 * wave
+
+
+def test_what_errors_of_the_inputs_may_look_like_is_named_as_a_trace_and_not_claimed():
+    task = replace(problem(3, truth=Wave(bend=0.2)), systematic=0.3)
+    outcome, _, verdict = closed(task, (BEND, RIPPLE))
+    assert verdict["status"] == "clean"
+    (size,) = [trial.evidence.size for trial in outcome.trials if trial.effect.name == "bend"]
+    assert verdict["traces"] == (
+        f"Bend ({100 * size:.2g} % of the signal) improves the fit significantly, but errors of the model's "
+        "inputs may cause up to 60 %, so it is not claimed."
+    )
+    assert verdict_words("force", verdict).count(verdict["traces"]) == 1
+    assert "no larger effect is missing" in verdict_words("force", verdict)
+    assert verdict["traces"] in verdict_in_words(verdict)
+    assert "traces" not in contradicted(verdict)
+
+
+def test_there_is_no_trace_where_nothing_is_significant_or_all_is_smaller_than_what_matters():
+    _, _, clean = closed(replace(problem(20), systematic=0.3), (BEND, RIPPLE))
+    assert clean["status"] == "clean"
+    assert "traces" not in clean
+    task = replace(problem(3, truth=Wave(bend=0.2)), systematic=0.3)
+    outcome = search(task, (BEND,), replace(GATES, materiality=0.5))
+    assert traces(outcome, 0.5) is None
+    assert traces(outcome, 0.01) is not None
 
 
 def test_the_unexplained_rest_has_the_size_of_what_the_library_lacks():

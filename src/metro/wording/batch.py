@@ -88,6 +88,7 @@ def verdict_in_words(verdict: JSON) -> str:
     if status == "undetermined" and proven:
         sentence = f"Part of the residual is explained by {listed(proven)}. {sentence}"
     sentence += "".join(f" {one['lowered']}." for one in verdict["effects"] if one.get("lowered"))
+    sentence += f" {verdict['traces']}" if verdict.get("traces") else ""
     before, after = verdict["before"], verdict["after"]
     if before and after:
         unit = f" {printed(verdict['unit'])}".rstrip()

@@ -43,6 +43,18 @@ def _lowered(values: JSON) -> str:
     )
 
 
+def _traces(values: JSON) -> str:
+    """Name the effects that are significant but no larger than what errors of the inputs may cause."""
+    seen = sorted(values["seen"], key=lambda one: -float(one["size"]))
+    named = listed([f"{plain(one['effect'])} ({100 * one['size']:.2g} % of the signal)" for one in seen])
+    least = max(one["least"] for one in seen)
+    verb, none = ("improves", "it is not") if len(seen) == 1 else ("each improve", "none of them is")
+    return (
+        f"{named[:1].upper()}{named[1:]} {verb} the fit significantly, but errors of the model's inputs may "
+        f"cause up to {100 * least:.2g} %, so {none} claimed."
+    )
+
+
 def _step(values: JSON) -> str:
     return f"a step of {values['parameter']} by {100 * values['relative']:+.1f} % after run {values['after']}"
 
@@ -235,6 +247,7 @@ SENTENCES: Mapping[str, Sentence] = {
     "residual_and_likeness": _residual_and_likeness,
     "places": _places,
     "lowered": _lowered,
+    "traces": _traces,
     "step": _step,
     "between": _between,
     "restless": _restless,

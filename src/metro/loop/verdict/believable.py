@@ -39,7 +39,7 @@ def with_share(verdict: JSON) -> JSON:
 def contradicted(verdict: JSON) -> JSON:
     """Return an observable's verdict where a contradiction was found: no cause, correct the batch first."""
     return {
-        **verdict,
+        **{name: value for name, value in verdict.items() if name != "traces"},
         "status": "unexplained",
         "effects": [],
         "indistinguishable": [],

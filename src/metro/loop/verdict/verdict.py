@@ -23,6 +23,7 @@ from metro.observables.quantity import quantity
 from metro.units import JSON, Array
 
 DRAWS = 2000  # of runs, for intervals of errors; of labels, for the p-value of those held out
+SETTLED = ("clean", "explained")  # statuses by which nothing more is missing
 LOWERED = 0.01  # by which an unexplained residual lowers a probability: below, no printed digit shows it
 
 
@@ -61,8 +62,10 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         widened(error(rows, name, gates.seed), verified["freedom"]) if verified else None
         for name in ("before", "after")
     )
+    status = _status(outcome, bool(residual.parts), enough)
+    below = traces(outcome, gates.materiality) if status in SETTLED else None
     return {
-        "status": _status(outcome, bool(residual.parts), enough),
+        "status": status,
         "unit": problem.unit,
         "noise_floor": floor if math.isfinite(floor) else None,
         "held_out_runs": [block.run for block in problem.role("validate")],
@@ -78,7 +81,23 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         "indistinguishable": [list(pair) for pair in dict.fromkeys(rival.pair for rival in outcome.rivals)],
         "next_experiment": (next_experiment(problem, outcome, residual) if enough else more_runs(problem)),
         "unexplained": _unexplained(problem, outcome, rows, residual) if residual.parts else None,
+        **({"traces": below} if below else {}),
     }
+
+
+def traces(outcome: Outcome, materiality: float) -> Statement | None:
+    """Return which effects are significant but smaller than what errors of the model's inputs may cause.
+
+    None of them is claimed, since such an error may look like any of them: where nothing was hidden, they
+    are significant, too. That they are there is said all the same. ``materiality``: below it, nothing is.
+    """
+    small = {
+        trial.effect.name: trial.why_not.values
+        for trial in outcome.trials
+        if trial.why_not and trial.why_not.code == "immaterial" and not trial.effect.resembled
+    }
+    seen = [{"effect": name, **sizes} for name, sizes in small.items() if sizes["size"] >= materiality]
+    return Statement("traces", {"seen": seen}) if seen else None
 
 
 def why_not(outcome: Outcome, trial: Trial) -> Statement:

@@ -34,7 +34,7 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
     tested = " ".join([verified, _fall(entry)] if _dimensionless(entry) else [_fall(entry), verified])
     says = {
         "clean": f"{start}: {_clean(entry)} {tested}",
-        "explained": f"{start}: {whole} {tested}{_within_floor(entry)}",
+        "explained": f"{start}: {whole} {tested}{_within_floor(entry)} {entry.get('traces', '')}",
         "partly_explained": f"{start}: {part} {tested} A significant residual remains. "
         f"{_residual(entry, left)}",
         "undetermined": f"{start}: {_undetermined(entry)} {_rivals(entry)}{tested}",
@@ -56,6 +56,10 @@ def _clean(entry: JSON) -> str:
     share = (entry.get("before") or {}).get("nrmse")
     if share is not None and share > NOTHING_SEEN and not _dimensionless(entry):
         return "what was measured is no larger than the noise, so that it does not test the base model."
+    if entry.get("traces"):
+        return (
+            f"the base model explains the identification runs; no larger effect is missing. {entry['traces']}"
+        )
     return "the base model explains the identification runs; no effect is missing."
 
 
