@@ -14,13 +14,14 @@ import yaml
 from typer.testing import CliRunner
 
 from metro.batch.check import check, load
+from metro.batch.file_names import settings_in
 from metro.batch.sources import source
 from metro.cli import app
 from metro.formats.registry import read, read_frfs
 from metro.formats.uff import FRF, Function
 from metro.formats.uff_writer import universal_file
 from metro.importing.look import copies, look, sparkline
-from metro.importing.propose import from_name, propose
+from metro.importing.propose import propose
 
 FIELD = Path(os.environ.get("METRO_REAL_DATA", Path(__file__).parents[2] / "../shared/real")).parent / "field"
 field = pytest.mark.skipif(not FIELD.is_dir(), reason="the field files are not there")
@@ -131,12 +132,12 @@ def test_files_that_are_none_of_what_can_be_used_are_named_with_what_they_have(t
 
 
 def test_a_name_says_what_it_says_and_no_more():
-    assert from_name("6-n6000f300ap3ae25.csv") == {
+    assert settings_in("6-n6000f300ap3ae25.csv") == {
         "spindle_rpm": "6000",
         "axial_depth_mm": "3",
         "radial_depth_mm": "25",
     }
-    assert from_name("wrapping2.csv") == {}
+    assert settings_in("wrapping2.csv") == {}
 
 
 def test_a_sparkline_rises_with_its_values():

@@ -29,7 +29,7 @@ def record(rpm=RPM, runout=0.0, noise=0.05, seconds=0.6, ring_hz=None):
 
 def passes(signal, declared):
     found = period(signal, RATE, 60.0 / declared)
-    return None if found is None else repeats_per_revolution(found, 60.0 / declared)
+    return None if found is None else repeats_per_revolution(found, 60.0 / declared, TEETH)
 
 
 @pytest.mark.parametrize("runout", [0.0, 0.6])
@@ -46,6 +46,16 @@ def test_a_speed_that_is_off_is_measured(declared):
 
 def test_sixty_for_six_thousand_repeats_more_often_than_a_tool_has_teeth():
     assert passes(record(seconds=1.2), 60.0) == pytest.approx(300.0, rel=0.01)
+
+
+@pytest.mark.parametrize("runout", [0.0, 0.6])
+def test_a_tenth_of_the_speed_repeats_more_often_than_so_many_teeth_do(runout):
+    found = passes(record(runout=runout, seconds=1.2), 600.0)
+    assert found == pytest.approx(10.0 if runout else 30.0, rel=0.01)
+
+
+def test_twice_as_many_teeth_as_declared_are_a_matter_of_counting_and_not_of_speed():
+    assert passes(record(), RPM / 2.0) is None
 
 
 def test_a_resonance_that_rings_between_the_teeth_is_no_speed():
@@ -70,8 +80,8 @@ def with_chatter(order, seconds=2.0):
 def test_chatter_that_drowns_the_teeth_is_no_other_speed(order):
     signal = with_chatter(order)
     found = period(signal, RATE, 60.0 / RPM)
-    assert repeats_per_revolution(found, 60.0 / RPM) == pytest.approx(order, rel=0.01)
-    assert turns_as_declared(signal, RATE, 60.0 / RPM, found)
+    assert repeats_per_revolution(found, 60.0 / RPM, TEETH) == pytest.approx(order, rel=0.01)
+    assert turns_as_declared(signal, RATE, 60.0 / RPM, found, TEETH)
 
 
 @pytest.mark.parametrize("runout", [0.0, 0.6])
@@ -79,7 +89,7 @@ def test_chatter_that_drowns_the_teeth_is_no_other_speed(order):
 def test_a_speed_that_is_off_leaves_no_line_at_the_declared_orders(declared, runout):
     signal = record(runout=runout, seconds=2.0)
     found = period(signal, RATE, 60.0 / declared)
-    assert not turns_as_declared(signal, RATE, 60.0 / declared, found)
+    assert not turns_as_declared(signal, RATE, 60.0 / declared, found, TEETH)
 
 
 @pytest.mark.parametrize(("stable", "slips"), [("yes", 1), ("undecided", 1), (None, 1), ("no", 0)])

@@ -19,6 +19,7 @@ from metro.batch.capabilities import Capability, Stock, nothing_computed
 from metro.batch.cell import CELLS, cells_findings, read_cell, shared_cells, stations_path
 from metro.batch.discover import NAME, NAME_IN_WORDS
 from metro.batch.entries import FILE
+from metro.batch.file_names import name_findings
 from metro.batch.files import file_findings
 from metro.batch.findings import BatchError, Finding, errors, linked_outside
 from metro.batch.holdout import plan
@@ -156,7 +157,8 @@ def examine(folder: Path, cells: Path, holdout: JSON) -> Examined:
     faulty = {finding.column.split(".")[0] for finding in errors(findings) if finding.file == FILE}
     sound = {key: value for key, value in manifest.items() if key not in faulty}
     unread = not manifest or HOLE in faulty
-    findings += [*run_findings(tables["runs"], sound, unread), *rules.impact_findings(tables["impacts"])]
+    findings += [*run_findings(tables["runs"], sound, unread), *name_findings(tables["runs"], _teeth(sound))]
+    findings += rules.impact_findings(tables["impacts"])
     tables["loads"], more = rules.with_their_load(tables["loads"])
     findings += more
     findings += [*rules.load_findings(tables["loads"]), *rules.mass_findings(tables["mass"])]
@@ -174,6 +176,12 @@ def examine(folder: Path, cells: Path, holdout: JSON) -> Examined:
         impacts = tables["impacts"].frame
         impacts["response_unit"] = impacts["response_unit"].mask(impacts["response_unit"] == "", "m")
     return Examined(folder, manifest, cell, tables, runs, roles, tuple(findings))
+
+
+def _teeth(manifest: JSON) -> float | None:
+    """Return the number of teeth, where the manifest has a tool with one."""
+    tool = manifest.get("tool") or {}
+    return tool.get("teeth") if isinstance(tool.get("teeth"), int) else None
 
 
 def _cell(folder: Path, cells: Path, manifest: JSON) -> tuple[JSON, Path | None, list[Finding]]:

@@ -17,13 +17,6 @@ _AXIS = re.compile(
 )
 _TIME = re.compile(r"t|time|timestamp|zeit|stamp", re.IGNORECASE)
 _NUMBER = re.compile(r"(\d+)(?!.*\d)")
-_RUN_COLUMNS = {
-    "spindle_rpm": r"(?:n|rpm|s)",
-    "feed_per_tooth_mm": r"fz",
-    "axial_depth_mm": r"ap",
-    "radial_depth_mm": r"ae",
-}
-_VALUE = r"[_-]?(\d+(?:[.p]\d+)?)"
 LEAST_RUN = 3  # rows that count
 
 
@@ -241,24 +234,3 @@ def _reason(seen: Seen) -> str:
         "t_s, q1_deg …, tau1_nm … (or current1_a …), q1_set_deg …"
     )
     return f"{message}; {logs}: write its mapping by hand, as docs/data-contract.md says"
-
-
-def from_name(name: str) -> dict[str, str]:
-    """Return what a file's name says of its run: n6000, fz0.1, ap3, ae25."""
-    stem = name.rsplit(".", 1)[0].lower()
-    found = {}
-    for column, mark in _RUN_COLUMNS.items():
-        match = re.search(rf"(?<![a-z]){mark}{_VALUE}", stem)
-        if match:
-            found[column] = match[1].replace("p", ".")
-    return found
-
-
-def told_by_names(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return by column of runs.csv what every file's name says of its run."""
-    said = [from_name(name) for name in names]
-    return {
-        column: [each[column] for each in said]
-        for column in _RUN_COLUMNS
-        if all(column in each for each in said)
-    }

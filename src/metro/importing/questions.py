@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from functools import partial
 
 from metro.batch.discover import NAME, NAME_IN_WORDS
+from metro.batch.file_names import stated_by_all
 from metro.formats.measures import OF_COLUMN, RESPONSES, MeasureError, first_spellings, measure
 from metro.importing import joints
-from metro.importing.propose import Proposal, told_by_names
+from metro.importing.propose import Proposal
 
 NONE = "none"  # the answer to a question that leaves a key of batch.yaml out
 RECORD = ("{record}", "{number}")  # stand for the record's name, and the number in the file's name
@@ -129,7 +130,7 @@ def _of_cuts(names: Sequence[str]) -> Iterator[Question]:
         ("axial_depth_mm", "axial depth, mm"),
         ("radial_depth_mm", "radial depth, mm"),
     ):
-        if column not in told_by_names(names):
+        if column not in stated_by_all(names):
             each = f"{words}: one value, one for each run by commas, or {{record}}"
             yield Question(column, each, _numbers)
 

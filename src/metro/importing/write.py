@@ -12,11 +12,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from metro.batch.cell import CELLS, shared_cells
+from metro.batch.file_names import settings_in, stated_by_all
 from metro.batch.whole_folder import whole_folder
 from metro.formats.measures import OF_COLUMN
 from metro.importing.joints import with_drive
 from metro.importing.look import Seen
-from metro.importing.propose import Proposal, from_name, told_by_names
+from metro.importing.propose import Proposal
 from metro.importing.questions import needs_sensitivity
 
 RUN_COLUMN = {
@@ -105,7 +106,7 @@ def _manifest(name: str, proposals: Sequence[Proposal], answers: Answers) -> Ite
     if any(each.kind == "force" for each in proposals):
         yield from _dynamometer(answers)
     names = [row for each in proposals if each.kind == "force" for row, _ in each.rows]
-    for column in told_by_names(names) if names else ():
+    for column in stated_by_all(names) if names else ():
         if column not in answers:
             yield f"# {column} of runs.csv: guessed from the files' names"
     mapped = [each for each in proposals if each.columns]
@@ -174,7 +175,7 @@ def _runs(proposals: Sequence[Proposal], answers: Answers) -> str:
         for at, (name, record) in enumerate(each.rows):
             row = {"run": f"r{len(rows) + 1:02d}", RUN_COLUMN[each.kind]: name}
             if each.kind == "force":
-                row |= from_name(name.partition("#")[0])
+                row |= settings_in(name.partition("#")[0])
             row |= {
                 key: _of_run(key, answers[key], at, len(each.rows), record)
                 for key in _RUN_KEYS

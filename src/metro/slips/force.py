@@ -175,8 +175,11 @@ def _fits(fitted: WaveFit, declared: WaveFit, chip: float) -> str:
 def speed_slips(batch: Batch, read: Tables) -> tuple[Slip, ...]:
     """Compare the speed in each force record with the run table."""
     teeth = (batch.manifest.get("tool") or {}).get("teeth")
-    found = {run: passes for run in batch.with_files("dynamometer") if (passes := _passes(batch, read, run))}
-    if not found or not teeth:
+    if not teeth:
+        return ()
+    runs = batch.with_files("dynamometer")
+    found = {run: passes for run in runs if (passes := _passes(batch, read, run, teeth))}
+    if not found:
         return ()
     named = ", ".join(list(found)[:MOST_NAMED]) + (
         f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
@@ -184,15 +187,15 @@ def speed_slips(batch: Batch, read: Tables) -> tuple[Slip, ...]:
     first, passes = next(iter(found.items()))
     rpm = float(batch.runs["spindle_rpm"][first])
     text = (
-        f"run {named}: the force of {first} repeats {passes:.4g} times in a revolution of {rpm:g} rpm, which "
-        f"no cutter does"
+        f"run{'s' * (len(found) > 1)} {named}: the force of {first} repeats {passes:.4g} times in a "
+        f"revolution of {rpm:g} rpm, which no cutter of {teeth} teeth does"
     )
     rates = {"once in a revolution": passes}
     if teeth > 1:
         rates = {f"with each of {teeth} teeth, which are alike": passes / teeth} | rates
     speeds = " or ".join(f"{rpm * ratio:.5g} (it repeats {how})" for how, ratio in rates.items())
     remedy = f"Likely in runs.csv: spindle_rpm is {speeds}"
-    if len(found) == len(batch.with_files("dynamometer")) and _spread(found) < 0.02:
+    if len(found) == len(runs) and _spread(found) < 0.02:
         factors = " or ".join(f"{ratio:.3g}" for ratio in rates.values())
         remedy += f"; or the time of the records (rate_hz, column t_s) runs {factors} times too fast"
     return (Slip(OBSERVABLES, text, remedy, "runs.csv", "spindle_rpm", first),)
@@ -203,7 +206,7 @@ def _spread(found: Mapping[str, float]) -> float:
     return float(np.ptp(values) / values.mean())
 
 
-def _passes(batch: Batch, read: Tables, run: str) -> float | None:
+def _passes(batch: Batch, read: Tables, run: str, teeth: int) -> float | None:
     """Repeats per declared revolution of a run's record, where no cutter has as many; None else."""
     row: Any = batch.runs.loc[run]
     if row["stable"] == "no":  # the force of a cut that chatters repeats as the vibration does
@@ -217,7 +220,8 @@ def _passes(batch: Batch, read: Tables, run: str) -> float | None:
     if np.isfinite(stretch.tacho).all():
         return None
     found = period(stretch.signal, record.rate, 60.0 / rpm)
-    passes = None if found is None else repeats_per_revolution(found, 60.0 / rpm)
+    passes = None if found is None else repeats_per_revolution(found, 60.0 / rpm, teeth)
     if found is None or passes is None:
         return None
-    return None if turns_as_declared(stretch.signal, record.rate, 60.0 / rpm, found) else passes
+    as_declared = turns_as_declared(stretch.signal, record.rate, 60.0 / rpm, found, teeth)
+    return None if as_declared else passes

@@ -18,9 +18,9 @@ MOST_SAMPLES = 1 << 17
 REPEATS = 0.9  # of the best repetition: lags from which on a period counts as one
 PERIODIC = 0.8  # autocorrelation of a record that repeats; noise and resonance reach 0.78, at a vague lag
 MISSED = 0.5  # of the best repetition: at the declared revolution, a record of that speed has far more
-MOST_TEETH = 12
+MISCOUNTED = 2.0  # declared teeth that are one: who counts teeth takes pairs for single ones, and no more
 ALL_OF_IT = 0.97  # of the best repetition, at a period too short for teeth: ringing between teeth has less
-LINES = 12  # orders of the declared revolution at which the teeth or runout would be seen
+LINES = 12  # orders of the declared revolution at which the teeth or runout would be seen, or one per tooth
 FALSE_ALARM = 1e-4  # probability that noise makes lines at these orders as strong
 TOLERANCE = 0.015  # of the speed: 0.6 % by which a spindle may differ, and as much again for rounding of lags
 
@@ -68,7 +68,7 @@ def period(signal: Array, rate: float, revolution: float) -> Period | None:
     return Period(length / rate, best, float(match[first]), float(near.max(initial=-1.0)))
 
 
-def turns_as_declared(signal: Array, rate: float, revolution: float, found: Period) -> bool:
+def turns_as_declared(signal: Array, rate: float, revolution: float, found: Period, teeth: int) -> bool:
     """Whether a record has lines at orders of the declared revolution besides those of the period found.
 
     Then the spindle turns as declared, and the period is that of a vibration that is stronger than the force
@@ -78,7 +78,7 @@ def turns_as_declared(signal: Array, rate: float, revolution: float, found: Peri
 
     Parameters
     ----------
-    signal, rate, revolution : as of :func:`period`, which gave ``found``.
+    signal, rate, revolution : as of :func:`period`, which gave ``found``. teeth : of the tool.
     """
     from scipy.stats import gamma
 
@@ -87,10 +87,10 @@ def turns_as_declared(signal: Array, rate: float, revolution: float, found: Peri
     power = (np.abs(np.fft.rfft((signal - signal.mean(axis=0)) * taper, axis=0)) ** 2).sum(axis=1)
     turns = len(signal) / (rate * revolution)  # bins from order to order
     about = max(3, round(0.5 * turns))
-    best = 0.0
-    speeds = np.arange(1.0 - TOLERANCE, 1.0 + TOLERANCE, 0.25 / (LINES * turns))
+    best, lines = 0.0, max(LINES, teeth)
+    speeds = np.arange(1.0 - TOLERANCE, 1.0 + TOLERANCE, 0.25 / (lines * turns))
     for speed in speeds:
-        place = np.rint(np.arange(1, LINES + 1) * turns * speed).astype(int)
+        place = np.rint(np.arange(1, lines + 1) * turns * speed).astype(int)
         multiples = place * found.length * rate / len(signal)
         own = np.abs(multiples - np.round(multiples)) * len(signal) / (found.length * rate) > 2.0 * _LEAK
         place = place[own & (place > _LEAK) & (place + about < len(power))]
@@ -137,12 +137,14 @@ def _window(lag: float, count: int, share: float = TOLERANCE) -> slice:
     return slice(max(0, round(lag - half)), min(count, round(lag + half) + 1))
 
 
-def repeats_per_revolution(found: Period, revolution: float) -> float | None:
+def repeats_per_revolution(found: Period, revolution: float, teeth: int) -> float | None:
     """Return how often a record repeats in a declared revolution; None where a cutter may repeat so often.
 
-    It may where the record repeats after the revolution, and not more often in it than a tool has teeth.
+    It may where the record repeats after the revolution, and not more often in it than a tool of so many
+    teeth may have, were they miscounted.
     """
     passes = revolution / found.length
     if found.at_revolution <= MISSED * found.repeats:
         return passes
-    return passes if passes > MOST_TEETH and found.at_length >= ALL_OF_IT * found.repeats else None
+    too_often = passes > (MISCOUNTED + TOLERANCE) * teeth
+    return passes if too_often and found.at_length >= ALL_OF_IT * found.repeats else None
