@@ -50,6 +50,16 @@ def test_an_effect_without_its_parameters_is_left_out_and_named():
     assert "not all of its parameters" in notes[0]
 
 
+def test_a_verdict_that_forbids_its_predictions_says_so_first():
+    after = {"rms": 4.0, "nrmse": 0.2, "ci95": [3.0, 5.0]}
+    entry = {"status": "unexplained", "unit": "N", "after": after, "noise_floor": 1.0, "effects": [ROTATED]}
+    _, notes = found(entry, "force")
+    assert notes[0].startswith("do not use the predictions, which have an error of up to 5")
+    assert "dynamometer rotation is not included" in notes[1]
+    _, notes = found({**entry, "status": "explained"}, "force")
+    assert len(notes) == 1
+
+
 def test_a_form_of_one_joint_is_that_of_the_joint_in_the_verdict():
     scale = {"effect": "stiffness_scale", "parameters": {"joint": "all", "factor": q(0.85, 0.02)}}
     (taken,), _ = found({"effects": [scale]}, "deformation")

@@ -51,7 +51,12 @@ def general_orders(cutter: Cutter, law: EdgeLaw, cut: Cut, highest: int, *, true
     if float((high - low)[:count].max()) <= 0.0:
         return waves
     good = replace(
-        cutter, tooth_angles=evenly_pitched(cutter.teeth), runout_radius=0.0, runout_angle=0.0, reach=()
+        cutter,
+        tooth_angles=evenly_pitched(cutter.teeth),
+        runout_radius=0.0,
+        runout_angle=0.0,
+        reach=(),
+        corner=round(cutter.corner / cutter.radius) * cutter.radius,
     )
     longest = _longest_arc(good, law, cut, true_path=true_path)
     place, weight = _crowded(math.ceil(max(NODES * 360.0, PER_ORDER * highest) * longest / TURN))
@@ -77,7 +82,6 @@ def _longest_arc(good: Cutter, law: EdgeLaw, cut: Cut, *, true_path: bool) -> fl
     teeth or a corner grows, and the force would jump by the difference of two quadratures. A descent with
     steps below that ends there.
     """
-    good = replace(good, corner=round(good.corner / good.radius) * good.radius)
     span = abs(good.lag_per_depth * cut.axial_depth)
     low, high = _arcs(good, in_cut(good, law, cut, span / cut.axial_depth, true_path=true_path), span)
     # A tooth that reaches farther meets the path of a turn ago, half of that travel over the radius earlier.

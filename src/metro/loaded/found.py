@@ -10,6 +10,7 @@ import numpy as np
 
 from metro.effects.effect import Effect
 from metro.effects.library import library
+from metro.report.sections.trust import do_not_use
 from metro.units import JSON
 
 COVERAGE = 1.959963984540054  # half of a 95 % interval in standard deviations
@@ -44,9 +45,10 @@ class Found:
 
 
 def found(entry: JSON, observable: str) -> tuple[list[Found], list[str]]:
-    """Return the effects of a verdict that a prediction has, and why others are left out, in words.
+    """Return the effects of a verdict that a prediction has, and notes: why others are left out.
 
     An effect of the instrument alone changes what is measured and not what happens: a prediction has none.
+    The first note is that predictions are not to be used, where the verdict says so.
 
     Parameters
     ----------
@@ -54,7 +56,8 @@ def found(entry: JSON, observable: str) -> tuple[list[Found], list[str]]:
     """
     known = library(observable)
     taken: list[Found] = []
-    left_out: list[str] = []
+    warning = do_not_use(entry)
+    left_out = [warning] if warning else []
     for each in entry.get("effects") or []:
         name, parameters = str(each["effect"]), each.get("parameters") or {}
         effect = next(

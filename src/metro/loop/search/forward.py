@@ -9,11 +9,12 @@ made idle is dropped for good. Then each is weighed against its rivals.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
 from metro.effects.effect import Effect
-from metro.loop.checks.evidence import compare, hold_out, leave_out
+from metro.loop.checks.evidence import Evidence, compare, hold_out, leave_out
 from metro.loop.fitting.fit import Fit
 from metro.loop.search.replaceable import is_needed
 from metro.loop.search.rivals import Contest, believed, contested
@@ -26,6 +27,7 @@ SIGNIFICANT = (
     0.05  # p-value of an effect by its own interval, above which that holds none: the 95 % of intervals
 )
 MUCH = 0.1  # of the signal, by which an effect moves the prediction whatever its interval holds
+WORST = 2.0  # standard deviations: all that is missed has the shape of the effect, in every condition
 MOST_EFFECTS = 6  # of a model: four that every machine has (runout, end, resonance, crosstalk), and two
 # Trials by what a model has, in whatever order it was added, and what was tried on top of that.
 Known = dict[tuple[frozenset[Effect], tuple[tuple[str, str], ...]], list[Trial]]
@@ -121,8 +123,9 @@ def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str
     """Drop effects that are not significant by their own intervals, or small beside what stays unexplained.
 
     The least significant goes first, then the smallest; it is said why of each. The intervals of few runs
-    that a model misses by a fifth hold almost anything: an effect stays that moves the prediction by much,
-    and by more than all that is missed.
+    that a model misses by a fifth hold almost anything, since what is missed counts there as a dozen equal
+    pieces: an effect stays that moves the prediction by more than all that the model misses and may get
+    wrong could, were it of the effect's own shape.
     """
     dropped: dict[tuple[str, str], Statement] = {}
     while current.candidate.effects:
@@ -132,7 +135,7 @@ def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str
         }
         least, p_value = least_significant(current)
         why: Statement | None = Statement("holds_nothing", {"p_value": p_value})
-        if p_value <= SIGNIFICANT or evidences[least].size > max(MUCH, evidences[least].missed):
+        if p_value <= SIGNIFICANT or _exceeds_all_missed(evidences[least], current.noise.budget):
             least = min(evidences, key=lambda effect: evidences[effect].size)
             why = small_beside_residual(evidences[least])
         if why is None:
@@ -141,6 +144,17 @@ def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str
         kept = tuple(e for e in current.candidate.effects if e is not least)
         current = without(space.base, kept, space.prior)
     return current, dropped
+
+
+def _exceeds_all_missed(evidence: Evidence, budget: float) -> bool:
+    """Whether an effect is larger than what is missed could make it, if it is the same in all conditions.
+
+    What is missed, of a share m of the signal, and the ``budget`` b of what no model gets right, have at most
+    an effect of the size √(m² + b²), where they have its shape and nothing else; spread over other shapes,
+    they have less. An effect that moves the prediction by much need only exceed what is missed.
+    """
+    largest = math.hypot(evidence.missed, budget)
+    return evidence.size > min(WORST * largest, max(MUCH, evidence.missed))
 
 
 def _open(current: Fit, barred: set[str], space: SearchSpace) -> list[Effect]:

@@ -16,6 +16,7 @@ from metro.report.page.curves import HELP
 from metro.report.page.packing import decimals
 from metro.report.results import Results
 from metro.report.sections.key_results import FORCE_SETS
+from metro.report.sections.trust import do_not_use
 from metro.units import DEG, JSON, MM
 
 COEFFICIENTS = ("ktc", "krc", "kac", "kte", "kre", "kae")
@@ -183,10 +184,12 @@ def _said(row: Mapping[str, Any]) -> str:
 
 
 def _error(results: Results) -> list[str]:
-    """Say how far the whole model is from held-out runs, where there are any, and what is drawn."""
-    share, said, sources = _share(results), [], ["the errors of the coefficients"]
+    """Say whether to use it, how far the whole model is from held-out runs, if any, and what is drawn."""
+    share, sources = _share(results), ["the errors of the coefficients"]
+    warning = do_not_use(results.verdicts().get("force") or {})
+    said = [f"{warning[:1].upper()}{warning[1:]}"] if warning else []
     if share is not None:
-        said = [f"On held-out runs the whole model has an error of {percent(share)} of the signal."]
+        said += [f"On held-out runs the whole model has an error of {percent(share)} of the signal."]
         sources.append("that error")
     if _covariance(results.identified.get("force") or {}) is not None:
         said.append(f"The bands are 95 % intervals; they contain {listing(sources)}.")

@@ -100,20 +100,35 @@ def _reach(observable: str, entry: JSON) -> str:
     size = _size(entry)
     if "held_out" in entry:
         return f"{name}: the predictions of poses among those that were measured are accurate to {size}."
-    if status in HOLDS and verification.get("holds", True):
+    if not (warning := do_not_use(entry)):
         model = "predictions with the effects found" if entry.get("effects") else "predictions"
         return f"{name}: the {model} are accurate to {size}."
+    return f"{name}: {warning}"
+
+
+def do_not_use(entry: JSON) -> str:
+    """Say that the predictions of a verdict are not to be used, and how far off they are; "" where they are.
+
+    Parameters
+    ----------
+    entry : of the observable in ``verdict.json``; empty: there is no verdict.
+    """
+    status, verification, size = str(entry.get("status")), entry.get("verification") or {}, _size(entry)
+    if not entry.get("status") or (status in HOLDS and verification.get("holds", True)):
+        return ""
+    if status == "insufficient":
+        return "" if verification.get("holds") else f"{_undecided(verification)}."
     after, floor = (entry.get("after") or {}).get("rms"), entry.get("noise_floor")
     within = verification.get("holds") and (verification.get("ratio") or math.inf) <= 1.0
     if within and status in ("unexplained", "partly_explained"):
         return (
-            f"{name}: on the held-out runs the predictions are accurate to {size}, but the identification "
-            "runs have an error that is not explained: do not use the predictions for other cuts than those."
+            f"on the held-out runs the predictions are accurate to {size}, but the identification runs have "
+            "an error that is not explained: do not use the predictions for other cuts than those."
         )
     times = f", {number(after / floor, 2)} times the noise floor" if after and floor and after > floor else ""
     return (
-        f"{name}: do not use the predictions, which have an error of up to {size}{times}. The measured "
-        "values are usable."
+        f"do not use the predictions, which have an error of up to {size}{times}. The measured values are "
+        "usable."
     )
 
 
