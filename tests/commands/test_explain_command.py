@@ -32,6 +32,20 @@ def test_it_says_what_the_report_says(explain, campaign):
     assert "a slot at twice the feed" in printed
 
 
+def test_the_recommended_cut_of_page_one_is_there(explain, campaign):
+    file = campaign / "reports/late/verdict.json"
+    verdict = json.loads(file.read_text())
+    cut = {
+        **{"position": "1", "spindle_rpm": 2500.0, "axial_depth_mm": 0.061, "removal_cm3_min": 1.2},
+        **{"torque_nm": 2.3, "probability_stable": 0.975, "advice": "use", "why": "tests_confirm_the_band"},
+    }
+    write_json(file, {**verdict, "recommended_cuts": [cut]})
+    try:
+        assert "Recommended cut: 2500 rpm, 0.061 mm deep" in explain("late").stdout
+    finally:
+        write_json(file, verdict)
+
+
 def test_errors_are_drawn_to_one_scale_with_the_floor(explain):
     lines = explain("late").stdout.splitlines()
     before = next(line for line in lines if line.startswith("base model"))

@@ -73,6 +73,31 @@ def test_what_to_do_is_said_once_whatever_the_reasons():
     assert "The test cuts were made at other speeds." in told
 
 
+def test_where_cuts_have_several_reasons_each_is_said_of_its_rows():
+    used = {**CUT, "advice": "use", "why": "tests_confirm_the_band", "spindle_rpm": 3000.0}
+    not_used = {**CUT, "advice": "do_not", "why": "tests_chatter_below_the_band"}
+    other = {**not_used, "position": "2"}
+    section = decisions(with_verdict(recommended_cuts=[used, not_used, other]))
+    (told,) = [item.text for item in section.items if isinstance(item, Paragraph)]
+    assert told == (
+        f"Position 1 at 3000 rpm: {WHY['tests_confirm_the_band']} "
+        f"Position 1 at 2500 rpm and 2: {WHY['tests_chatter_below_the_band']}"
+    )
+
+
+def test_the_summary_of_a_campaign_lists_the_best_cut_of_each_batch():
+    forbidden = {**CUT, "advice": "do_not", "why": "verdict_unexplained"}
+    verdicts = {
+        "b1": {"observables": {}, "recommended_cuts": [forbidden]},
+        "b2": {"observables": {}, "recommended_cuts": [CUT]},
+    }
+    sections = {section.title: section for section in campaign_sections(verdicts, {})}
+    (bullets,) = sections["Recommended cuts"].items
+    assert list(bullets.items) == [f"b2: {best_cut(verdicts['b2'])[0]}"]
+    del verdicts["b2"]
+    assert "Recommended cuts" not in {section.title for section in campaign_sections(verdicts, {})}
+
+
 def test_the_table_begins_with_what_does_not_conform():
     section = decisions(with_verdict(decisions=JUDGED))
     (table,) = [item for item in section.items if isinstance(item, Table)]

@@ -18,6 +18,7 @@ from metro.report.content import Item, Paragraph, Section, Table
 from metro.report.numbers import number, probability, words
 from metro.report.results import Results
 from metro.report.sections.causes import with_causes
+from metro.report.sections.decisions import best_cut, decided
 from metro.report.sections.key_results import key_results
 from metro.report.sections.measured import measured_words
 from metro.report.sections.quality import with_flags
@@ -106,9 +107,10 @@ def _content(results: Results, chosen: dict[str, JSON]) -> JSON:
 
 
 def _notes(results: Results) -> list[str]:
-    """Return the other sentences of the first page: advice, and the check of printed errors."""
+    """Return the other sentences of the first page: decisions, advice, and the check of printed errors."""
     items = [*advice(results.identified), *print_check(results)]
-    return [item.text for item in items if isinstance(item, Paragraph)]
+    said = [item.text for item in items if isinstance(item, Paragraph)]
+    return [*decided(results.verdict), *best_cut(results.verdict), *said]
 
 
 def _flags(results: Results) -> list[Item]:

@@ -16,7 +16,7 @@ from metro.report.numbers import listing, number, words
 from metro.report.parameters import effect_words
 from metro.report.phrases import plain
 from metro.report.sections import findings
-from metro.report.sections.decisions import decided
+from metro.report.sections.decisions import best_cut, decided
 from metro.report.sections.memory import memory_section
 from metro.report.sections.standings import largest_residuals, rankings
 from metro.report.sections.trust import HOLDS
@@ -87,12 +87,14 @@ def campaign_sections(
     entries = _entries(verdicts)
     nexts = _nexts(entries)
     judged = [f"{batch}: {line}" for batch, each in sorted(verdicts.items()) for line in decided(each)]
+    cuts = [f"{batch}: {line}" for batch, each in sorted(verdicts.items()) for line in best_cut(each)]
     return [
         *_failed(failed or {}),
         Section(
             "Verdicts", [Paragraph(_overview(verdicts), "verdict"), *_verdicts(entries), *_pictures(entries)]
         ),
         *([Section("Conformity with tolerances", [Bullets(judged)])] if judged else []),
+        *([Section("Recommended cuts", [Bullets(cuts)])] if cuts else []),
         *([Section("What to measure next", [Bullets(nexts)])] if nexts else []),
         *largest_residuals(entries),
         *rankings(identified),

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from metro.report.content import Heading, Item, Paragraph, Section, Table
-from metro.report.numbers import number, probability, quantity
+from metro.report.numbers import listing, number, probability, quantity
 from metro.report.results import Results
 from metro.units import JSON, printed
 
@@ -168,10 +168,31 @@ def _cuts(verdict: JSON) -> list[Item]:
         [1, 0.8, 0.8, 0.8, 1.2, 1.3, 0.9, 0.9, 1.3],
         numeric=list(range(1, 8)),
     )
-    given = dict.fromkeys(WHY[str(cut["why"])] for cut in cuts)
-    reasons = " ".join(text.removesuffix(LISTEN) for text in given)
-    reasons += LISTEN if any(text.endswith(LISTEN) for text in given) else ""
-    return [Heading("Recommended cuts"), Paragraph(reasons), table]
+    return [Heading("Recommended cuts"), Paragraph(_reasons(cuts)), table]
+
+
+def _reasons(cuts: Sequence[Mapping[str, object]]) -> str:
+    """Say why cuts have their advice; of which rows, where they have several."""
+    given: dict[str, list[Mapping[str, object]]] = {}
+    for cut in cuts:
+        given.setdefault(WHY[str(cut["why"])].removesuffix(LISTEN), []).append(cut)
+    listen = LISTEN if any(WHY[str(cut["why"])].endswith(LISTEN) for cut in cuts) else ""
+    if len(given) == 1:
+        return f"{next(iter(given))}{listen}"
+    said = [f"Position {listing(_rows_of(of, cuts))}: {text}" for text, of in given.items()]
+    return f"{' '.join(said)}{listen}"
+
+
+def _rows_of(some: Sequence[Mapping[str, object]], cuts: Sequence[Mapping[str, object]]) -> list[str]:
+    """Name the rows of some cuts: their positions, with the speeds where these are not all of a position."""
+    rows = []
+    for position in dict.fromkeys(str(cut["position"]) for cut in some):
+        mine, every = (
+            [number(cut["spindle_rpm"], 4) for cut in each if str(cut["position"]) == position]
+            for each in (some, cuts)
+        )
+        rows.append(position if len(mine) == len(every) else f"{position} at {listing(mine)} rpm")
+    return rows
 
 
 TORQUE, BENT = "torque (N m)", "torque, bending (N m)"
