@@ -36,8 +36,14 @@ def test_the_recommended_cut_of_page_one_is_there(explain, campaign):
     file = campaign / "reports/late/verdict.json"
     verdict = json.loads(file.read_text())
     cut = {
-        **{"position": "1", "spindle_rpm": 2500.0, "axial_depth_mm": 0.061, "removal_cm3_min": 1.2},
-        **{"torque_nm": 2.3, "probability_stable": 0.975, "advice": "use", "why": "tests_confirm_the_band"},
+        "position": "1",
+        "spindle_rpm": 2500.0,
+        "axial_depth_mm": 0.061,
+        "removal_cm3_min": 1.2,
+        "torque_nm": 2.3,
+        "probability_stable": 0.975,
+        "advice": "use",
+        "why": "tests_confirm_the_band",
     }
     write_json(file, {**verdict, "recommended_cuts": [cut]})
     try:

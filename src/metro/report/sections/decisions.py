@@ -144,7 +144,7 @@ def _conformity(verdict: JSON) -> list[Item]:
 
 
 def _cuts(verdict: JSON) -> list[Item]:
-    cuts: Sequence[Mapping[str, object]] = verdict.get("recommended_cuts") or []
+    cuts: Sequence[JSON] = verdict.get("recommended_cuts") or []
     if not cuts:
         return []
     bent = any(cut.get("bending_nm") is not None for cut in cuts[:MOST])
@@ -171,9 +171,9 @@ def _cuts(verdict: JSON) -> list[Item]:
     return [Heading("Recommended cuts"), Paragraph(_reasons(cuts)), table]
 
 
-def _reasons(cuts: Sequence[Mapping[str, object]]) -> str:
+def _reasons(cuts: Sequence[JSON]) -> str:
     """Say why cuts have their advice; of which rows, where they have several."""
-    given: dict[str, list[Mapping[str, object]]] = {}
+    given: dict[str, list[JSON]] = {}
     for cut in cuts:
         given.setdefault(WHY[str(cut["why"])].removesuffix(LISTEN), []).append(cut)
     listen = LISTEN if any(WHY[str(cut["why"])].endswith(LISTEN) for cut in cuts) else ""
@@ -183,7 +183,7 @@ def _reasons(cuts: Sequence[Mapping[str, object]]) -> str:
     return f"{' '.join(said)}{listen}"
 
 
-def _rows_of(some: Sequence[Mapping[str, object]], cuts: Sequence[Mapping[str, object]]) -> list[str]:
+def _rows_of(some: Sequence[JSON], cuts: Sequence[JSON]) -> list[str]:
     """Name the rows of some cuts: their positions, with the speeds where these are not all of a position."""
     rows = []
     for position in dict.fromkeys(str(cut["position"]) for cut in some):
