@@ -23,6 +23,10 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 STREAM = "DefaultStreamHandler"  # the name of snakemake's handler that writes to the terminal
 # Parts of the messages without an event that are shown: what was asked for, and where jobs were submitted.
 SAID = ("Nothing to be done", "Congratulations", "has been submitted")
+NOTHING_SAID = (
+    "its log is empty: the system ended it, most often because the memory was full. Run fewer steps at once "
+    "(--cores 1)"
+)
 SAID_LAST = (
     "Exiting because",
     "CalledProcessError",
@@ -120,7 +124,7 @@ class ProgressHandler(logging.Handler):
             self._say(f"\n{words}: failed")
             for log in map(Path, logs):
                 said = log.read_text(errors="replace").strip() if log.is_file() else ""
-                lines = self._shorten(said.splitlines()) or ["its log is empty"]
+                lines = self._shorten(said.splitlines()) or [NOTHING_SAID]
                 self._say("\n".join([*lines, f"({log})"]))
         self._failures = {}
         super().close()

@@ -1,6 +1,7 @@
 """Lobes at settings of a user: one mode in closed form, probabilities, and what is refused."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -91,3 +92,13 @@ def test_an_effect_found_moves_boundary_band_and_probability_together():
 def test_what_cannot_be_predicted_is_refused(call, words):
     with pytest.raises(ContractError, match=words):
         lobes(**call)
+
+
+def test_the_picture_reaches_to_the_best_lobe_unless_that_has_no_end():
+    from matplotlib.figure import Figure
+
+    predicted = lobes(rpm=np.linspace(2000.0, 9500.0, 200))
+    top = predicted.plot(Figure().add_subplot()).get_ylim()[1]
+    assert top > predicted.table["depth_mm"].max()
+    endless = replace(predicted, table=predicted.table.assign(depth_mm=np.append(np.ones(199), 1e6)))
+    assert 4.0 < endless.plot(Figure().add_subplot()).get_ylim()[1] < 5.0

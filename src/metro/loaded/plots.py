@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from metro.loaded.lobes import LobePrediction
 
 
+HIGHEST = 4.0  # times the depth that nine speeds of ten do not exceed: lobes are drawn up to it
+
+
 def axes_or_new(axes: Axes | None) -> Axes:
     """Return axes to draw on: those that are given, or the current ones of pyplot."""
     if axes is not None:
@@ -46,7 +49,9 @@ def lobe_axes(predicted: LobePrediction, axes: Axes | None) -> Axes:
     axes.fill_between(table["rpm"], *band, color=style.AFTER, alpha=0.22, lw=0, label="95 %")
     axes.plot(table["rpm"], table["depth_mm"], color=style.AFTER, label="boundary")
     axes.set(xlabel="spindle speed (rpm)", ylabel="axial depth (mm)")
-    axes.set_ylim(0.0, 1.15 * float(table["depth_mm"].quantile(0.9)))
+    # The best lobe is among the highest; a pocket between two flips may be without end.
+    highest = min(float(table["depth_mm"].max()), HIGHEST * float(table["depth_mm"].quantile(0.9)))
+    axes.set_ylim(0.0, 1.08 * highest)
     axes.legend()
     return axes
 
