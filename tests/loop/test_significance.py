@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from toy import BEND, GATES, RIPPLE, Wave, problem
 
+from metro.loop.checks.evidence import Evidence
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import fit
 from metro.loop.fitting.noise import first_noise
@@ -45,12 +46,30 @@ def test_what_is_significant_stays_and_what_is_not_goes(monkeypatch):
     assert search(task, (BEND, RIPPLE), GATES).names == ("bend",)
     monkeypatch.setattr(forward, "SIGNIFICANT", 0.0)
     assert search(task, (BEND, RIPPLE), GATES).names == ("bend",)  # it moves the prediction by much
+    monkeypatch.setattr(forward, "WORST", np.inf)
+    assert search(task, (BEND, RIPPLE), GATES).names == ("bend",)
     monkeypatch.setattr(forward, "MUCH", np.inf)
     found = search(task, (BEND, RIPPLE), GATES)
     assert found.names == ()
     assert {one.effect.name: one.why_not and one.why_not.code for one in found.trials}[
         "bend"
     ] == "holds_nothing"
+
+
+@pytest.mark.parametrize(
+    ("size", "missed", "budget", "stays"),
+    [
+        (0.05, 0.022, 0.007, True),  # √(2.2² + 0.7²) % = 2.3 %: twice that is 4.6 %
+        (0.045, 0.022, 0.007, False),
+        (0.015, 0.0, 0.007, True),
+        (0.013, 0.0, 0.007, False),  # what no model gets right may make 1.4 %
+        (0.11, 0.1, 0.007, True),  # much, and more than all that is missed
+        (0.11, 0.12, 0.007, False),
+    ],
+)
+def test_an_effect_stays_that_all_that_is_missed_could_not_make(size, missed, budget, stays):
+    evidence = Evidence(0.0, 0.0, {}, size, missed)
+    assert forward._exceeds_all_missed(evidence, budget) == stays
 
 
 @pytest.mark.parametrize(

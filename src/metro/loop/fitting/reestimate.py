@@ -19,16 +19,13 @@ def reestimated(
 ) -> Noise:
     """Estimate the noise from the residual: from what it was, or from no misfit on, whichever is likelier.
 
-    A misfit hides from what whole runs share what that would explain, and may then never come down. It stays
-    what it was where both estimates are less likely: they go by the elements that are measured best, and a
-    condition that these leave out would count against a model that predicts all of them better.
+    A misfit hides from what whole runs share what that would explain, and may then never come down.
     """
-    if not noise_room.misses(noise):
-        return _expected(candidate, blocks, prior, noise, state)
-    reached = [_expected(candidate, blocks, prior, start, state) for start in (noise, noise.sound)]
-    return min(
-        (*reached, noise), key=lambda one: linearised(candidate, blocks, one, state, derivatives="none").cost
-    )
+    starts = [noise, noise.sound] if noise_room.misses(noise) else [noise]
+    reached = [_expected(candidate, blocks, prior, start, state) for start in starts]
+    if len(reached) == 1:
+        return reached[0]
+    return min(reached, key=lambda one: linearised(candidate, blocks, one, state, derivatives="none").cost)
 
 
 def _expected(
