@@ -124,3 +124,28 @@ def test_repeats_that_are_spread_over_the_session_are_not_complained_of(tmp_path
     rows = [f"r{i},{name},,,slot,{speed},,,,," for i, (name, speed) in enumerate([("x", 1), ("y", 2)] * 2)]
     read = table(tmp_path, *rows)
     assert list(design_findings(filled(read.frame, MANIFEST), read.file)) == []
+
+
+@pytest.mark.parametrize(
+    ("tool", "depth", "wide", "reaches"),
+    [
+        ({"end": "ball"}, 0.4, 3.0, False),  # √(0.4 · 9.6) = 1.96 mm from the axis; the work begins at 2 mm
+        ({"end": "ball"}, 0.4, 3.1, True),
+        ({"end": "ball"}, 5.0, 0.1, True),
+        ({"corner_radius_mm": 2.0}, 0.1, 1.3, False),  # 3 + √(0.1 · 3.9) = 3.62; the work begins at 3.7 mm
+        ({"corner_radius_mm": 2.0}, 0.1, 1.4, True),
+        ({"corner_radius_mm": 2.0}, 2.0, 0.1, True),
+        ({}, 0.4, 0.1, True),
+    ],
+)
+def test_a_wall_that_a_rounded_end_does_not_reach_is_warned_of(tmp_path, tool, depth, wide, reaches):
+    (tmp_path / "runs.csv").write_text(
+        "run,operation,direction,axial_depth_mm,radial_depth_mm\n"
+        f"r1,side,up,{depth},{wide}\nr2,slot,slot,{depth},10\n"
+    )
+    read, _ = read_table(tmp_path, "runs")
+    found = list(run_findings(read, {"tool": {"diameter_mm": 10, **tool}}))
+    assert [(one.severity, one.column, one.row) for one in found] == (
+        [] if reaches else [("warning", "radial_depth_mm", 2)]
+    )
+    assert reaches or "the tool cuts nothing here" in found[0].message

@@ -51,6 +51,8 @@ def run_findings(table: Table, manifest: JSON, hole_unread: bool = False) -> Ite
             *(_helical(row, diameter, hole, hole_unread) if row["operation"] == "helical" else []),
         ]
         yield from (table.finding(position, column, message) for column, message in faults)
+        for column, message in _out_of_reach(row, manifest.get("tool") or {}):
+            yield table.finding(position, column, message, "warning")
 
 
 def filled(frame: pd.DataFrame, manifest: JSON) -> pd.DataFrame:
@@ -199,6 +201,24 @@ def _immersion(row: Mapping[str, Any], diameter: float | None) -> Iterator[tuple
         yield "direction", f'found "{direction}", expected slot, as the operation is {operation}'
     if operation in {"side", "face"} and direction == "slot" and diameter is not None and radial < diameter:
         yield "direction", 'found "slot", expected up or down, as the tool\'s width is not fully engaged'
+
+
+def _out_of_reach(row: Mapping[str, Any], tool: JSON) -> Iterator[tuple[str, str]]:
+    """Report a wall that a rounded tool does not reach: it is narrower than its diameter near the tip."""
+    diameter, depth, wide = _length(tool.get("diameter_mm")), row["axial_depth_mm"], row["radial_depth_mm"]
+    if diameter is None or row["operation"] != "side" or not (depth > 0.0 and wide > 0.0):
+        return
+    corner = 0.5 * diameter if tool.get("end") == "ball" else _length(tool.get("corner_radius_mm")) or 0.0
+    if depth >= corner:
+        return
+    radius = 0.5 * diameter - corner + math.sqrt(depth * (2.0 * corner - depth))
+    if radius <= 0.5 * diameter - wide:
+        yield (
+            "radial_depth_mm",
+            f"the tool cuts nothing here: up to axial_depth_mm, {depth:g}, its rounded end reaches "
+            f"{radius:.3g} mm from the axis, and the work begins at {0.5 * diameter - wide:.3g} mm (half of "
+            f"tool.diameter_mm less {wide:g})",
+        )
 
 
 def _helical(
