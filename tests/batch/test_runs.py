@@ -131,6 +131,7 @@ def test_repeats_that_are_spread_over_the_session_are_not_complained_of(tmp_path
     [
         ({"end": "ball"}, 0.4, 3.0, False),  # √(0.4 · 9.6) = 1.96 mm from the axis; the work begins at 2 mm
         ({"end": "ball"}, 0.4, 3.1, True),
+        ({"end": "ball"}, 2.0, 0.8, False),  # √(2 · 8) = 4 mm; 4.2 mm
         ({"end": "ball"}, 5.0, 0.1, True),
         ({"corner_radius_mm": 2.0}, 0.1, 1.3, False),  # 3 + √(0.1 · 3.9) = 3.62; the work begins at 3.7 mm
         ({"corner_radius_mm": 2.0}, 0.1, 1.4, True),

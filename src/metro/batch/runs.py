@@ -206,7 +206,7 @@ def _immersion(row: Mapping[str, Any], diameter: float | None) -> Iterator[tuple
 def _out_of_reach(row: Mapping[str, Any], tool: JSON) -> Iterator[tuple[str, str]]:
     """Report a wall that a rounded tool does not reach: it is narrower than its diameter near the tip."""
     diameter, depth, wide = _length(tool.get("diameter_mm")), row["axial_depth_mm"], row["radial_depth_mm"]
-    if diameter is None or row["operation"] != "side" or not (depth > 0.0 and wide > 0.0):
+    if diameter is None or not (depth > 0.0 and wide > 0.0):
         return
     corner = 0.5 * diameter if tool.get("end") == "ball" else _length(tool.get("corner_radius_mm")) or 0.0
     if depth >= corner:
