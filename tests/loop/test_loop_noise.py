@@ -96,6 +96,22 @@ def test_what_the_model_misses_is_measured_relative_to_the_signal():
     )
 
 
+@pytest.mark.parametrize("repeats", [1, 3, 5])
+def test_what_is_missed_beyond_the_budget_is_the_same_however_often_it_is_repeated(repeats):
+    """A budget of half of it: of what is missed, three quarters of the square are left."""
+    waves = 0.3 * np.sqrt(2.0) * np.cos(5 * np.arange(POINTS))
+    parts = []
+    for one, matrix, rest in runs(60, 0.0, repeats=repeats):
+        if one.setting.feed == 3.0 or repeats > 1:
+            parts.append((replace(one, measured=matrix @ BETA + rest + waves), matrix, rest + waves))
+    parts = [part for part in parts if part[0].setting.feed == 3.0]
+    rms = np.sqrt(np.mean([np.mean(one.measured**2) for one, *_ in parts]))
+    prior = first_noise(0.15 / rms, np.full(2, 0.001), [part[0] for part in parts])
+    prior = replace(prior, repeats=dict.fromkeys(prior.repeats, float(repeats)))
+    found = estimated(parts, prior)
+    assert found.misfit["x"] * rms == pytest.approx(0.3 * np.sqrt(0.75), rel=0.1)
+
+
 @pytest.mark.parametrize(("share", "level"), [(0.2, 0.0), (0.0, 2.0), (0.15, 2.0)])
 def test_what_is_missed_whatever_the_signal_is_told_from_what_grows_with_it(share, level):
     """Else runs with a small signal would make those with a large one count for nothing."""

@@ -57,7 +57,10 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         variance = known + MISFIT_CORRELATION * wrong
         names, number, rms = axes(block)
         # The misfit as it is, not as it weighs: else it takes what the shared directions explain.
-        expected, left, found = _expected(residual, directions, (known, known + wrong, variance), rms, number)
+        # The budget counts for all runs that share it, so that it does not average out; but the residual of
+        # each is no larger by that.
+        own = sound(block, noise, once=True)
+        expected, left, found = _expected(residual, directions, (own, known + wrong, variance), rms, number)
         amplitudes["scatter"] += [float(size**2 * expected[:p].mean())] if p else []
         of_zeros = expected[p : p + block.zeros.shape[1]]
         amplitudes["zero"] += [float(noise.zero_factor**2 * of_zeros.mean())] if len(of_zeros) else []
@@ -100,7 +103,8 @@ def _expected(
     Parameters
     ----------
     residual : (n,). directions : (n, k) of what the whole run shares, each of one standard deviation.
-    variances : each (n,): where the model misses nothing, with the misfit as it is, and as it weighs.
+    variances : each (n,): of a run by itself where the model misses nothing; and as it counts beside its
+        repeats, with the misfit as it is, and as that weighs.
     rms : (n,) of the axis's signal. number : (n,) of the axis.
 
     Returns
@@ -109,7 +113,7 @@ def _expected(
     (n,) the residual without them, where the misfit is as it is.
     (axes, 2, 3) normal equations with their right side for relative misfit² and level².
     """
-    known, once, variance = variances
+    own, once, variance = variances
     deviation, covariance = amplitude(directions, residual, variance)
     expected = deviation**2 + np.diag(covariance)
     deviation, covariance = amplitude(directions, residual, once)
@@ -123,7 +127,7 @@ def _expected(
             for k in range(j):
                 spread += 2.0 * directions[i, j] * covariance[j, k] * directions[i, k]
         left[i] = residual[i] - taken
-        excess = (left[i] ** 2 + spread - known[i]) / variance[i]
+        excess = (left[i] ** 2 + spread - own[i]) / variance[i]
         first, second = rms[i] ** 2 / variance[i], 1.0 / variance[i]
         at = moments[number[i]]
         at[0, 0] += first * first

@@ -114,12 +114,17 @@ def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION
     return np.asarray(variance)
 
 
-def sound(block: Block, noise: Noise) -> Array:
-    """Variance of each element that nothing else shares where the model misses nothing, (n,)."""
+def sound(block: Block, noise: Noise, *, once: bool = False) -> Array:
+    """Variance of each element that nothing else shares where the model misses nothing, (n,).
+
+    ``once``: with the budget of a run by itself; else it counts for all runs that share what a model gets
+    wrong.
+    """
     scale = axes(block)[2] if block.scale is None else block.scale
     repeats = noise.repeats.get(block.condition, 1) * block.repeats
     alike = 0.0 if block.alike is None else block.alike**2 * (1.0 + noise.alike * (repeats - 1.0))
-    return np.asarray(block.sigma**2 + alike + apart(block, noise) * (noise.budget * scale) ** 2)
+    times = 1.0 if once else apart(block, noise)
+    return np.asarray(block.sigma**2 + alike + times * (noise.budget * scale) ** 2)
 
 
 def apart(block: Block, noise: Noise) -> float:
