@@ -2,6 +2,7 @@ import pytest
 import yaml
 from conftest import edit
 
+from metro.batch.capabilities import plural
 from metro.batch.check import check
 from metro.observables.catalogue import capabilities
 
@@ -143,3 +144,8 @@ def test_what_an_entry_that_is_refused_is_needed_for_cannot_be_computed(batch):
     can = {each.name: each for each in check(batch, batch, able=capabilities).capabilities}
     assert can["force"].source == ""
     assert can["force"].missing == ("tool.teeth in batch.yaml",)
+
+
+def test_what_is_counted_is_singular_once():
+    assert [plural(n, "batch") for n in (0, 1, 2)] == ["0 batches", "1 batch", "2 batches"]
+    assert [plural(n, "run") for n in (1, 3)] == ["1 run", "3 runs"]

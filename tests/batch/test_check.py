@@ -124,6 +124,18 @@ def test_a_dynamometer_that_is_not_declared_is_assumed_and_said_to_be(batch):
     assert load(batch, batch).batch.instrument("dynamometer")["reads"] == "work"
 
 
+def test_a_check_warns_of_files_whose_names_state_another_feed(batch):
+    for i, feed in enumerate((480, 960, 1440, 1920), 1):  # mm/min of four teeth at 6000 rpm
+        named = f"dyno/n6000f{feed}ap1ae10.csv"
+        (batch / f"dyno/r{i}.csv").rename(batch / named)
+        edit(batch / "runs.csv", f"dyno/r{i}.csv", named)
+    assert not [one for one in check(batch, batch).problems if one.column == "feed_per_tooth_mm"]
+    edit(batch / "runs.csv", "r1,slot,6000,0.02", "r1,slot,6000,0.04")
+    (found,) = [one for one in check(batch, batch).problems if one.column == "feed_per_tooth_mm"]
+    assert (found.severity, found.row) == ("warning", 2)
+    assert load(batch, batch).batch.runs.loc["r1", "feed_per_tooth_mm"] == 0.04
+
+
 def test_a_batch_without_runs_is_read_but_nothing_can_be_computed(batch):
     (batch / "runs.csv").unlink()
     assert load(batch, batch).batch.runs.empty

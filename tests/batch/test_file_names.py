@@ -70,6 +70,10 @@ def test_one_column_alone_is_too_little(tmp_path):
     assert findings(tmp_path, [("n6000.csv", 600, 0.1, 3, 25), ("n6000b.csv", 6000, 0.1, 3, 25)]) == []
 
 
+def test_the_folder_of_a_file_states_nothing():
+    assert settings_in("s1500-ap9/ae2.n1/n6000.tdms") == {"spindle_rpm": "6000"}
+
+
 def test_a_decimal_in_a_name_may_be_a_p():
     assert settings_in("S4500_fz0p08_ap1.5-ae6.csv") == {
         "spindle_rpm": "4500",

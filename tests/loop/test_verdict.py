@@ -220,6 +220,14 @@ def test_what_errors_of_the_inputs_may_look_like_is_named_as_a_trace_and_not_cla
     assert "traces" not in contradicted(verdict)
 
 
+def test_several_traces_are_named_the_largest_first():
+    seen = [{"effect": name, "size": size, "least": 0.04} for name, size in (("bend", 0.01), ("big", 0.03))]
+    assert in_words(Statement("traces", {"seen": seen})) == (
+        "Big (3 % of the signal) and bend (1 % of the signal) each improve the fit significantly, but errors "
+        "of the model's inputs may cause up to 4 %, so none of them is claimed."
+    )
+
+
 def test_there_is_no_trace_where_nothing_is_significant_or_all_is_smaller_than_what_matters():
     _, _, clean = closed(replace(problem(20), systematic=0.3), (BEND, RIPPLE))
     assert clean["status"] == "clean"

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from metro.observables.stability import modal_notes
-from metro.report.numbers import count, listing, number, percent, probability, quantity, with_interval
+from metro.report.numbers import listing, number, percent, probability, quantity, with_interval
 from metro.report.parameters import parameter_name
 
 
@@ -81,8 +81,3 @@ def test_shares_probabilities_and_lists_read_as_one_says_them():
 def test_notes_of_the_modal_test_write_an_interval_as_the_report_does(value, sd):
     half = 1.96 * sd
     assert modal_notes._with_interval(value, sd) == with_interval(value, [value - half, value + half])
-
-
-def test_what_is_counted_is_singular_once():
-    assert [count(n, "batch") for n in (0, 1, 2)] == ["0 batches", "1 batch", "2 batches"]
-    assert [count(n, "verdict") for n in (1, 3)] == ["1 verdict", "3 verdicts"]

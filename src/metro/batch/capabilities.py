@@ -153,5 +153,6 @@ def count(runs: pd.DataFrame, what: str) -> str:
 
 
 def plural(number: int, name: str) -> str:
-    """Return a number with what it counts."""
-    return f"{number} {name}{'' if number == 1 else 's'}"
+    """Return a number with what it counts: 1 run, 2 runs, 3 batches."""
+    ending = "" if number == 1 else "es" if name.endswith("ch") else "s"
+    return f"{number} {name}{ending}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import PurePosixPath
 from typing import Any
 
 from metro.batch.findings import Finding
@@ -82,7 +83,7 @@ def _one_agrees(stated: Sequence[Mapping[str, float]], rows: Sequence[tuple[int,
 
 def _marked(mark: str, name: str) -> str:
     """Return the number that stands behind a mark in a name; empty: there is none."""
-    match = re.search(rf"(?<![a-z]){mark}{_VALUE}", name.rsplit(".", 1)[0].lower())
+    match = re.search(rf"(?<![a-z]){mark}{_VALUE}", PurePosixPath(name).stem.lower())
     return match[1].replace("p", ".") if match else ""
 
 

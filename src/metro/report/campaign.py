@@ -8,11 +8,12 @@ from collections.abc import Mapping
 import pandas as pd
 
 from metro import __version__
+from metro.batch.capabilities import plural
 from metro.observables.catalogue import names, title
 from metro.report.content import Bullets, Item, Paragraph, Picture, Section, Table
 from metro.report.document import Cover, compile_pdf
 from metro.report.figures import verdicts as figures
-from metro.report.numbers import count, listing, number, words
+from metro.report.numbers import listing, number, words
 from metro.report.parameters import effect_words
 from metro.report.phrases import plain
 from metro.report.sections import findings
@@ -73,7 +74,7 @@ def campaign_report(
     ``memory``: content of ``memory.json``; ``failed``: batches without a result, and why; ``links``: path to
     the report of each batch, relative to the summary.
     """
-    cover = Cover(TITLE, count(len(verdicts), "batch"), f"metro {__version__}")
+    cover = Cover(TITLE, plural(len(verdicts), "batch"), f"metro {__version__}")
     return compile_pdf(cover, campaign_sections(verdicts, identified, memory, failed), links or {})
 
 
@@ -126,7 +127,7 @@ def _failed(failed: Mapping[str, str]) -> list[Section]:
         ]
         for batch, reasons in sorted(lines.items())
     ]
-    text = f"{count(len(failed), 'batch')} failed; the summary is of the others."
+    text = f"{plural(len(failed), 'batch')} failed; the summary is of the others."
     table = Table(["batch", "what stopped it"], rows, "Batches without a result.", [1, 4])
     return [Section("Batches that failed", [Paragraph(text, "warning"), table])]
 
@@ -173,7 +174,7 @@ def _overview(verdicts: Mapping[str, JSON]) -> str:
         counts[name] = counts.get(name, 0) + 1
     silent = [batch for batch, verdict in sorted(verdicts.items()) if not verdict.get("observables")]
     total = sum(counts.values())
-    text = f"{count(len(verdicts), 'batch')}, {count(total, 'verdict')}"
+    text = f"{plural(len(verdicts), 'batch')}, {plural(total, 'verdict')}"
     text += f": {listing([f'{n} {name}' for name, n in counts.items()])}." if counts else "."
     return text + (f" Nothing could be compared in {listing(silent)}." if silent else "")
 

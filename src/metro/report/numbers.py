@@ -81,12 +81,6 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def count(number_of: int, name: str) -> str:
-    """Write a number with what it counts: 1 batch, 2 batches, 1 verdict."""
-    ending = "" if number_of == 1 else "es" if name.endswith("ch") else "s"
-    return f"{number_of} {name}{ending}"
-
-
 def listing(items: list[str]) -> str:
     """Join items as in a sentence: a; a and b; a, b and c."""
     return " and ".join(filter(None, [", ".join(items[:-1]), *items[-1:]]))

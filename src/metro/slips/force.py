@@ -188,7 +188,7 @@ def speed_slips(batch: Batch, read: Tables) -> tuple[Slip, ...]:
     rpm = float(batch.runs["spindle_rpm"][first])
     text = (
         f"run{'s' * (len(found) > 1)} {named}: the force of {first} repeats {passes:.4g} times in a "
-        f"revolution of {rpm:g} rpm, which no cutter of {teeth} teeth does"
+        f"revolution of {rpm:g} rpm, which no cutter of {teeth} {'tooth' if teeth == 1 else 'teeth'} does"
     )
     rates = {"once in a revolution": passes}
     if teeth > 1:

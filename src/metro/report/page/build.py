@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from urllib.parse import quote
 
 from metro import __version__
+from metro.batch.capabilities import plural
 from metro.report.campaign import TITLE
 from metro.report.content import Section
-from metro.report.numbers import count
 from metro.report.page.batch import anchor, batch_section
 from metro.report.page.compare import compare_section, quantities
 from metro.report.page.frame import contents, document, named, section
@@ -47,7 +47,7 @@ def campaign_page(sections: Sequence[Section], batches: Iterable[Results], links
     without = tag("noscript", tag("p", "The plots need JavaScript; all else is here without it."))
     head = tag("p", *buttons, class_="tools")
     parts = [*summary, *(part for _, part in comparing), section(BATCHES, head, without, *unfolding)]
-    below = f"{count(len(links), 'batch')} · metro {__version__} · "
+    below = f"{plural(len(links), 'batch')} · metro {__version__} · "
     header = tag(
         "header",
         tag("h1", TITLE),
