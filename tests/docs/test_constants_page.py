@@ -32,6 +32,7 @@ SINGLE = (
     "observables/joint_force/friction.py",
     "observables/joint_force/observable.py",
     "observables/flatness/beliefs.py",
+    "observables/flatness/beside.py",
     "observables/flatness/held.py",
     "observables/flatness/blocks.py",
     "observables/flatness/dynamics.py",

@@ -9,13 +9,14 @@ from scipy.signal import lsim
 
 from metro.batch.batch import Batch
 from metro.observables.cut import conditions as cutting_force
-from metro.observables.flatness.beside import Beside
+from metro.observables.flatness.beside import AT_ONCE_SD, REACH_SD, SIGN_SD, Beside
 from metro.observables.flatness.doubt import damping_doubt
 from metro.observables.flatness.dynamics import ArmMode, TipDynamics
 from metro.observables.flatness.model import FaceSetting, FlatnessModel
 from metro.observables.flatness.path import Pace, force_over_period, make_path, passages
 from metro.observables.flatness.pose_field import PoseField
 from metro.observables.flatness.ringing import Ringing, make_ringing
+from metro.observables.flatness.rung import LOSSIER, lossier
 from metro.observables.problem import Block
 from metro.structure import Structure
 from metro.surface.tip_damping import Rayleigh, SharedRatio
@@ -276,3 +277,67 @@ def test_a_face_changes_smoothly_with_the_frequencies_of_the_tip() -> None:
     assert np.abs(change).max() > 1e-3 * UM  # it does change
     # A jump would differ from its neighbours by all of itself, however small the steps.
     assert np.abs(np.diff(change, axis=0)).max() < 0.2 * np.abs(change).max()
+
+
+def test_what_follows_a_force_at_once_is_taken_from_what_swings_slowly() -> None:
+    rung, _ = ringing(make_batch(), dynamics())
+    swing = rung.swung(ArmMode(np.inf, 0.0, (1e-4, 3e-4, 2e-4)))
+    step, force = rung.step, np.vstack([rung.force[:, :-1].reshape(-1, 3), rung.force[-1, -1:]])
+    time, lowest = step * np.arange(len(force)), float(rung.modes.frequency[:, 0].mean())
+    ratio = float(rung.damping.ratio(np.array(lowest)))
+    system = ([lowest**2], [1.0, 2.0 * ratio * lowest, lowest**2])
+    for axis, reach in enumerate((1e-4, 3e-4, 2e-4)):
+        apart = force[:, axis] - lsim(system, force[:, axis], time)[1]
+        truth = 2e-4 * reach * np.convolve(apart[:-1], rung.weights, mode="same")
+        np.testing.assert_allclose(swing[axis].ravel(), truth, atol=5e-3 * np.abs(truth).max())
+
+
+def test_a_tip_without_blows_may_follow_in_part_at_once_and_one_with_blows_only_as_these_say() -> None:
+    said = Beside("A", (ArmMode(np.inf, 0.0, (2e-4, 2e-4, 2e-4)),)).believed
+    assert [(one.name, value, sd) for one, value, sd in said] == [
+        (f"at_once_{axis}_A", 0.0, AT_ONCE_SD) for axis in "xyz"
+    ]
+    said = Beside("A", (ArmMode(50.0, 0.03, (2e-4, 0.0, 2e-4)),)).believed
+    assert [(one.name, value, sd) for one, value, sd in said] == [
+        ("swing_1_x_A", 0.0, SIGN_SD),
+        ("swing_1_z_A", 1.0, REACH_SD),
+    ]
+
+
+def test_a_tip_loses_more_by_what_a_higher_damping_ratio_makes_of_its_ringing() -> None:
+    rung, full = ringing(make_batch(), replace(dynamics(), damping=None))
+    setting, _ = face_of(rung, full)
+    for tuning in (1.0, 1.07):
+        tuned = rung.tuned(tuning)
+        known, more = (replace(tuned, damping=SharedRatio(ratio)) for ratio in (0.05, 0.05 + LOSSIER))
+        truth = (more.at(more.moved(), setting.middle) - known.at(known.moved(), setting.middle)) / LOSSIER
+        found = lossier(setting, tuning)
+        assert np.abs(truth).max() > 10 * UM
+        np.testing.assert_allclose(found, truth, atol=2e-3 * np.abs(truth).max())
+
+
+def test_a_face_does_not_jump_where_another_passage_becomes_the_lowest() -> None:
+    """What decides are the heights by the parameters at hand, however far from those of the load tests."""
+    rung, full = ringing(make_batch(), dynamics())
+    setting, field = face_of(rung, full)
+    model = FlatnessModel((field,), ringing=("A",))
+    names = [one.name for one in model.parameters]
+    count, none = len(setting.first), np.zeros(0)
+    zeros, axis = np.zeros((count, 0)), np.full(count, "z")
+    block = Block("r1", "c", "identify", 0, np.zeros(count), np.ones(count), setting, axis, zeros, none, {})
+    at = [names.index(one) for one in ("force_off", "loss_off_A", "ringing_off_A")]
+    beta = np.zeros(len(names))
+    beta[at] = 0.4, 0.03, 0.02
+    beta[len(model.believed) :] = setting.loaded[field.used]
+    step = np.zeros(len(names))
+    step[at[0]] = 1e-3
+    change, switched = [], 0
+    for number in range(200):
+        here = beta + number * step
+        matrix, offset = model.design(block, np.zeros(1), here)
+        predicted = model.predictions(block, np.zeros((1, 1)), here + step)[0]
+        change.append(predicted - offset - matrix @ (here + step))
+        share, _ = model.finished(setting, np.zeros(1), here)
+        switched += int(((share > 0.1) & (share < 0.9)).any())
+    assert switched > 5  # else the test shows nothing
+    assert np.abs(change).max() < 0.05 * UM

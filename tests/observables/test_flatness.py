@@ -21,13 +21,13 @@ from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness import observable as flatness
-from metro.observables.flatness.model import KINK, FaceSetting, FlatnessModel
+from metro.observables.flatness.model import FaceSetting
 from metro.observables.flatness.path import force_over_period, make_path, passages
 from metro.observables.flatness.pose_field import LoadSetting
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.structure import Structure
+from metro.surface.lowest_cut import KINK
 from metro.surface.tip_damping import Rayleigh, SharedRatio
-from metro.units import UM
 
 ROOT = Path(__file__).resolve().parents[2]
 SIMULATED = ROOT / "data/raw/irb6640-face"
@@ -208,27 +208,6 @@ def test_load_tests_are_calibration_that_the_factor_does_not_touch(plate: tuple)
     heights = stiff[:, beside:] @ known
     assert np.abs(heights).max() > 20 * KINK
     np.testing.assert_allclose(yielding[:, beside:] @ known, 2 * heights, atol=KINK, rtol=0.0)
-
-
-def test_a_face_changes_with_a_passage_by_its_share_and_a_place_without_one_is_finite(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    cuts = np.array([[0.0, 0.03, 9.0], [0.02, 0.0, np.inf], [np.inf, np.inf, np.inf]]) * UM
-    above = np.where(np.isfinite(cuts), cuts, 0.0)
-
-    def shares_and_heights(moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        monkeypatch.setattr(FlatnessModel, "_heights", lambda *_: (cuts + moved, above + moved))
-        share, higher = FlatnessModel(()).finished(None, np.zeros(0))
-        return share, (share * higher).sum(axis=1)
-
-    step = 1e-4 * UM * np.eye(3)[0]
-    share, before = shares_and_heights(np.zeros(3))
-    assert np.isfinite(before).all()
-    assert share.sum(axis=1) == pytest.approx(1.0)
-    assert (before[:2] <= 0.0).all()  # no higher than the lowest cut, and
-    assert (before[:2] > -KINK).all()  # lower by less than a kink
-    slope = (shares_and_heights(step)[1] - shares_and_heights(-step)[1]) / (2.0 * step[0])
-    assert slope[:2] == pytest.approx(share[:2, 0], abs=1e-4)
 
 
 def test_an_error_of_the_place_that_all_scans_share_is_found_and_softens_nothing() -> None:

@@ -51,9 +51,16 @@ def test_where_nothing_is_held_it_is_the_uncertainty_that_counts():
     assert np.sqrt(np.mean(np.square(said))) == pytest.approx(np.sqrt(2.0) * narrowed, rel=0.15)
 
 
-def test_what_may_be_held_back_widens_what_is_believed_of_the_force_and_of_nothing_else():
-    believed = (Parameter("form_xx", "um", 1e-6), Parameter(FORCE, "%", 0.01))
-    exact, held = (believed_block(believed, (), share).sigma for share in (0.0, 0.03))
-    assert exact[1] == FORCE_SD
-    assert held[1] == pytest.approx(np.sqrt(FORCE_SD**2 + 0.03**2))
+def test_friction_widens_what_is_believed_of_force_damping_and_frequencies_and_of_nothing_else():
+    names = ("form_xx", FORCE, "loss_off_far", "ringing_off_far")
+    believed = tuple(Parameter(name, "1", 1.0) for name in names)
+    exact, held = (believed_block(believed, (), share).sigma for share in (0.0, 0.1))
     assert held[0] == exact[0]
+    # An oscillator that friction slows: each cycle of amplitude a loses 4 h a of an energy of k a²/2.
+    amplitude, stiffness, friction = 2.0, 5.0, 0.1 * 2.0 * 5.0
+    ratio = 4.0 * friction * amplitude / (0.5 * stiffness * amplitude**2) / (4.0 * np.pi)
+    # And before it slips, a spring beside that of the tip which reaches h at that amplitude.
+    higher = np.sqrt(1.0 + friction / amplitude / stiffness) - 1.0
+    for at, known, by_friction in ((1, FORCE_SD, 0.1), (2, exact[2], ratio), (3, exact[3], higher)):
+        assert exact[at] == pytest.approx(known)
+        assert held[at] == pytest.approx(np.hypot(known, by_friction), rel=0.03)

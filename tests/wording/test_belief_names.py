@@ -10,6 +10,8 @@ from metro.wording.names import BELIEFS, belief
     [
         ("ringing_off_far left", "frequencies of the tip at pose far left"),
         ("swing_12_x_pose-2", "mode 12 beside those of the tip, by the force along x, at pose pose-2"),
+        ("loss_off_near", "damping ratio of the tip at pose near, over the known one"),
+        ("at_once_z_B2", "share of the compliance that follows a force along z at once, at pose B2"),
         ("force_off_dyno_z", "force by the dyno, along z and relative to its size"),
         ("softer_joint_3", "compliance of joint 3 in the cut, against the load tests"),
         ("drag_of_a_hose", "drag of a hose"),

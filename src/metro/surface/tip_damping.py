@@ -75,7 +75,23 @@ class SharedRatio:
         ]
 
 
-Damping = Rayleigh | SharedRatio
+@dataclass(frozen=True, eq=False)
+class Raised:
+    """Another ``damping`` whose ratios are higher by ``more``, as friction makes them."""
+
+    damping: Damping
+    more: float
+
+    def ratio(self, frequency: Array) -> Array:
+        """Damping ratio at undamped ``frequency``, rad/s."""
+        return self.damping.ratio(frequency) + self.more
+
+    def doubts(self) -> list[tuple[float, Raised]]:
+        """Return what it may be instead, as that of the other damping."""
+        return [(weight, Raised(other, self.more)) for weight, other in self.damping.doubts()]
+
+
+Damping = Rayleigh | SharedRatio | Raised
 
 
 def damping_rows(frequency: Array) -> Array:

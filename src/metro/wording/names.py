@@ -19,6 +19,8 @@ BELIEFS = {
     r"place_tilt_([xy])": "tilt of the scanner along {}, at the edges of the work",
     r"form_(xx|xy|yy)": "curvature {} of the scanner's field, at the edges of the work",
     r"ringing_off_(.+)": "frequencies of the tip at pose {}",
+    r"loss_off_(.+)": "damping ratio of the tip at pose {}, over the known one",
+    r"at_once_([xyz])_(.+)": "share of the compliance that follows a force along {} at once, at pose {}",
     r"swing_(\d+)_([xyz])_(.+)": "mode {} beside those of the tip, by the force along {}, at pose {}",
     r"drive_lag": "lag of all torques behind the force",
     r"drive_smoothing": "spread in time of all torques against the force",

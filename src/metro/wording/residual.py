@@ -50,8 +50,8 @@ def _traces(values: JSON) -> str:
     least = max(one["least"] for one in seen)
     verb, none = ("improves", "it is not") if len(seen) == 1 else ("each improve", "none of them is")
     return (
-        f"{named[:1].upper()}{named[1:]} {verb} the fit significantly, but errors of the model's inputs may "
-        f"cause up to {100 * least:.2g} %, so {none} claimed."
+        f"{named[:1].upper()}{named[1:]} {verb} the fit significantly, but errors of the model's inputs or "
+        f"of the instrument may cause up to {100 * least:.2g} %, so {none} claimed."
     )
 
 

@@ -55,7 +55,7 @@ def search(
     prior = first_noise(gates.model_form_budget, problem.scatter, blocks)
     base = base or fit(Candidate(problem.base), blocks, prior)
     visible, absorbed = _visible(effects, base)
-    space = SearchSpace(base, visible, prior, gates, max(gates.materiality, 2.0 * problem.systematic))
+    space = SearchSpace(base, visible, prior, gates, problem.least_residual(gates.materiality))
     floor = problem.least_residual(max(gates.materiality, gates.model_form_budget))
     return _described(space, strategy(space), tuple(library), unable | absorbed, floor)
 

@@ -28,7 +28,8 @@ class ArmMode:
 
     Attributes
     ----------
-    frequency : undamped, rad/s. ratio : damping ratio.
+    frequency : undamped, rad/s; infinite where no blow shows any mode: what follows the force at once.
+    ratio : damping ratio.
     reach : by axis x, y, z the root of its static compliance, (m/N)^½, without its sign, which blows along
         one axis at a time do not show; 0 where they do not show the mode.
     """
@@ -42,7 +43,8 @@ class ArmMode:
 class TipDynamics:
     """M(P), C(P) = K(P)⁻¹ and the damping of the tip; ``damping`` is None if no impacts show any.
 
-    ``beside``: the modes that impacts show along z and that M and K do not have.
+    ``beside``: the modes that impacts show along z and that M and K do not have; without impacts, what may
+    follow the force at once.
     """
 
     mass: MatrixField
@@ -96,7 +98,18 @@ def tip_dynamics(
     if others[:1].any():  # then M or K is in doubt, and the measured modes may be theirs
         others = np.zeros_like(others)
     damping, said = _damping(pose, of_arm[~others])
-    return TipDynamics(own, compliance, damping, _beside(of_arm[others])), [*notes, *said]
+    beside = (_at_once(matrices),) if of_arm.empty else _beside(of_arm[others])
+    return TipDynamics(own, compliance, damping, beside), [*notes, *said]
+
+
+def _at_once(matrices: Array) -> ArmMode:
+    """Return a mode above all of M and K that takes the whole compliance along z, and a force across as much.
+
+    Load tests hold all modes of an arm, M and K three. Where no blow shows the others it is not known how
+    much of the compliance is theirs.
+    """
+    reach = math.sqrt(float(np.mean(matrices[:, 2, 2])))
+    return ArmMode(math.inf, 0.0, (reach, reach, reach))
 
 
 def _indefinite(

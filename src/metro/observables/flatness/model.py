@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from metro.observables.flatness.beliefs import FORCE, BelievedSetting, parameters
+from metro.observables.flatness.beliefs import FORCE, LOSS, BelievedSetting, parameters
 from metro.observables.flatness.beside import Beside
 from metro.observables.flatness.beside import swung as swung_beside
 from metro.observables.flatness.path import Pace, Passages
@@ -20,12 +20,13 @@ from metro.observables.flatness.pose_field import (
     own_columns,
 )
 from metro.observables.flatness.ringing import Ringing
-from metro.observables.flatness.rung import rung, sharper
+from metro.observables.flatness.rung import lossier, rung, sharper
 from metro.observables.flatness.setup import Setup, swung
 from metro.observables.flatness.tip import static, terms, tip
 from metro.observables.problem import Block, Parameter
 from metro.observables.waviness.model import Vibration, phase_starts, phases_of
 from metro.structure import Structure
+from metro.surface.lowest_cut import lowest_cut
 from metro.surface.tip_stiffness import POWERS, Basis
 from metro.units import UM, Array
 
@@ -38,9 +39,6 @@ FORM = ("form_xx", "form_xy", "form_yy")  # of the scanner: curvatures, as the h
 # Places across and along the feed, in radii of a disc, whose mean equals that over the disc: exactly for a
 # cubic, and to 0.2 % for a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
-KINK = 0.1 * UM  # passages whose cuts differ by less finish a place together: teeth are less even than that
-
-NO_SHARE = math.log(1e-30)  # logarithm of the share of a passage that finishes nothing, were it metres high
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,10 +179,11 @@ class FlatnessModel:
         if isinstance(setting, LoadSetting):
             loaded = loaded_columns(self.fields, setting)
             return np.hstack([np.zeros((count, len(self.believed))), loaded]), np.zeros(count)
-        off = self._off(setting, beta)
-        shared, offset, harder, rising, swings = _shaped(
-            self._cutting, setting, phases_of(self.vibration, nuisance), off
+        known = None if beta is None else tuple(beta.tolist())
+        shared, offset, changes, swings = _shaped(
+            self._cutting, setting, phases_of(self.vibration, nuisance), known
         )
+        harder, rising, lossy = changes.T
         offset = offset + setting.mean(self.setup.bowed(setting.x, setting.y, setting.size))
         columns = self.structure.in_cut(
             (setting.force[:, None] * shared[:, None, :]).reshape(len(shared), -1)
@@ -195,9 +194,10 @@ class FlatnessModel:
             swings if each.pose == setting.pose else np.zeros((len(shared), len(each.parameters)))
             for each in self.beside
         ]
-        parts += [np.outer(rising, np.array(self.ringing) == setting.pose)]
+        here = np.array(self.ringing) == setting.pose
+        parts += [np.outer(lossy, here), np.outer(rising, here)]
         parts += [own_columns(part, setting.pose, columns) for part in self.fields]
-        return setting.shape(np.hstack(parts)), setting.shape(offset - off * rising)
+        return setting.shape(np.hstack(parts)), setting.shape(offset - self._off(setting, beta) * rising)
 
     def predictions(self, block: Block, nuisances: Array, beta: Array) -> Array:
         """Heights (k, n) m at each of ``nuisances`` (k, m), as :meth:`design` gives them.
@@ -209,18 +209,13 @@ class FlatnessModel:
         if not isinstance(setting, FaceSetting):
             matrix, offset = self.design(block, np.zeros(0), beta)
             return np.tile(offset + matrix @ beta, (len(nuisances), 1))
-        off = self._off(setting, beta)
-        height = self.structure.in_cut(self._tip(setting, beta, off))
         form = np.hstack([*([setting.plane] if self.placed else []), setting.form])
         common = form @ beta[: form.shape[1]]
         common = common + setting.mean(self.setup.bowed(setting.x, setting.y, setting.size))
-        predicted = []
-        for nuisance in nuisances:
-            share, above = _finished(self._cutting, setting, phases_of(self.vibration, nuisance), off)
-            predicted.append(common + setting.mean((share * (above + height)).sum(axis=1)))
+        predicted = [common + setting.mean(self.finished(setting, each, beta)[1]) for each in nuisances]
         return setting.shape(np.reshape(predicted, (-1, len(common))).T).T
 
-    def _tip(self, setting: FaceSetting, beta: Array, off: float) -> Array:
+    def _tip(self, setting: FaceSetting, beta: Array) -> Array:
         """Return the height of the tip at each passage by ``beta``, (n, k) m, as stiff as in load tests."""
         believed, first = [one.name for one in self.believed], len(self.believed)
         for part in self.fields:
@@ -230,7 +225,10 @@ class FlatnessModel:
                 coefficients[part.used] = beta[first : first + count]
             first += count
         harder = float(beta[believed.index(FORCE)])
-        height = tip(self._basis(setting), setting, tuple(coefficients.tolist()), harder, self.tuning(off))
+        loss = f"{LOSS}{setting.pose}"
+        lossy = float(beta[believed.index(loss)]) if loss in believed else 0.0
+        ringing = self.tuning(self._off(setting, beta)), lossy
+        height = tip(self._basis(setting), setting, tuple(coefficients.tolist()), harder, ringing)
         for each in self._beside(setting):
             place = [believed.index(one.name) for one in each.parameters]
             height = height + swung_beside(each.modes, setting) @ beta[place]
@@ -265,34 +263,27 @@ class FlatnessModel:
             float(self.structure.in_cut(np.ones(1))[0])
         )
 
-    def finished(self, setting: FaceSetting, nuisance: Array, off: float = 0.0) -> tuple[Array, Array]:
-        """Share of each passage in finishing each place, and heights over the static one, (n, k) m.
+    def finished(
+        self, setting: FaceSetting, nuisance: Array, beta: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Share of each passage in finishing each place, (n, k), and the height of the places, (n,) m.
 
-        The passage with the lowest cut finishes a place. Where two are nearly as low both do, and the place
-        is a little lower than the mean of both, −KINK log Σ exp(−height / KINK): so a face changes smoothly,
-        and by the shares of the passages, with every parameter. For ``nuisance`` see :meth:`nuisance_starts`;
-        ``off`` is the relative error of the tip's frequencies.
+        What decides which passage is the lowest are the heights of the face itself, by ``beta``: by those of
+        the load tests, a face would jump by what the two differ, wherever another passage becomes the lowest.
+        For ``nuisance`` see :meth:`nuisance_starts`; without ``beta`` the tip is that of the load tests.
         """
-        height, above_static = self._heights(setting, nuisance, off)
-        with np.errstate(invalid="ignore"):  # a place that no pass reaches: all passages finish it alike
-            exponent = np.fmax((height.min(axis=1, keepdims=True) - height) / KINK, NO_SHARE)
-        share = np.exp(exponent)
-        total = share.sum(axis=1, keepdims=True)
-        return share / total, above_static + KINK * (exponent - np.log(total))
+        above = _above(self._cutting, setting, phases_of(self.vibration, nuisance), self._off(setting, beta))
+        return lowest_cut(above + self._deflected(setting, beta), setting.passages.valid)
 
     def heights(self, setting: FaceSetting, nuisance: Array) -> Array:
         """Height of the cut at each passage by the load tests, (n, k) m; infinite if there is no passage."""
-        return self._heights(setting, nuisance)[0]
+        above = _above(self._cutting, setting, phases_of(self.vibration, nuisance), 0.0)
+        return np.where(setting.passages.valid, above + self._deflected(setting, None), np.inf)
 
-    def _heights(self, setting: FaceSetting, nuisance: Array, off: float = 0.0) -> tuple[Array, Array]:
-        passages = setting.passages
-        above_static = self.setup.cuts(setting.x, setting.y, passages, setting.pace)
-        for swing, phase in zip(self.vibration, phases_of(self.vibration, nuisance), strict=True):
-            above_static = above_static + swung(swing, phase, passages, setting.pace)
-        if setting.ringing is not None:
-            above_static = above_static + self.structure.in_cut(rung(setting, self.tuning(off)))
-        static = self.structure.in_cut(self._static(setting))
-        return np.where(passages.valid, static + above_static, np.inf), above_static
+    def _deflected(self, setting: FaceSetting, beta: Array | None) -> Array:
+        """Height of the tip at each passage by what is linear in ``beta``, (n, k) m; None: by load tests."""
+        loaded = self._static(setting) if beta is None else self._tip(setting, beta)
+        return self.structure.in_cut(loaded)
 
     def _static(self, setting: FaceSetting) -> Array:
         return static(self._basis(setting), setting)
@@ -301,32 +292,39 @@ class FlatnessModel:
         return next(part.basis for part in self.fields if part.pose == setting.pose)
 
 
-# A step that is tried is asked for its prediction, and then for its design where it is taken.
+# A search tries one phase after another with the same setup, and one setup after another with the same phase.
 @lru_cache(maxsize=64)
-def _finished(
-    model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], off: float
-) -> tuple[Array, Array]:
-    return model.finished(setting, np.array(phases), off)
+def _above(model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], off: float) -> Array:
+    """Height of the cut over the static one at each passage, (n, k) m; ``off`` of the tip's frequencies."""
+    above = model.setup.cuts(setting.x, setting.y, setting.passages, setting.pace)
+    for swing, phase in zip(model.vibration, phases, strict=True):
+        above = above + swung(swing, phase, setting.passages, setting.pace)
+    if setting.ringing is not None:
+        above = above + model.structure.in_cut(rung(setting, model.tuning(off)))
+    return above
 
 
 @lru_cache(maxsize=512)
 def _shaped(
-    model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], off: float
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Return means over each bin: terms of the basis, (bins, terms); heights, (bins,) m, whatever these are.
+    model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], known: tuple[float, ...] | None
+) -> tuple[Array, Array, Array, Array]:
+    """Return means over each bin: terms of the basis, (bins, terms), and heights that are added to theirs.
 
-    The heights are the offset, and what is gained per relative rise of the force and of the frequencies. Both
-    gains hold for the compliance of the load tests alone, so that they are linear in the base parameters.
-    Last, (bins, parameters), what other modes give. The result is cached because noise and parameters are
-    estimated in turn, many times over.
+    These are an offset, (bins,) m; what is gained per relative rise of the force and of the frequencies, and
+    per damping ratio, (bins, 3) m; and what other modes give, (bins, parameters). The gains hold for the
+    compliance of the load tests alone, so that they are linear in the base parameters. The result is cached
+    because noise and parameters are estimated in turn, many times over.
     """
-    share, above_static = _finished(model, setting, phases, off)
-    basis, tuning = model._basis(setting), model.tuning(off)
+    beta = None if known is None else np.array(known)
+    share, lowest = model.finished(setting, np.array(phases), beta)
+    basis, tuning = model._basis(setting), model.tuning(model._off(setting, beta))
     shared = np.einsum("nk,nkt->nt", share, terms(basis, setting))
     harder = static(basis, setting) + rung(setting, tuning)
-    heights = [above_static, *(model.structure.in_cut(one) for one in (harder, sharper(setting, tuning)))]
-    offset, forced, rising = setting.mean(np.stack([(share * one).sum(axis=1) for one in heights], axis=1)).T
+    gained = harder, sharper(setting, tuning), lossier(setting, tuning)
+    heights = [model._deflected(setting, beta), *(model.structure.in_cut(one) for one in gained)]
+    of_tip, *gains = [np.einsum("nk,nk->n", share, one) for one in heights]
+    means = setting.mean(np.stack([lowest - of_tip, *gains], axis=1))
     others = [swung_beside(each.modes, setting) for each in model._beside(setting)]
     swings = np.concatenate([*others, np.zeros((*share.shape, 0))], axis=-1)
     swings = model.structure.in_cut(setting.mean(np.einsum("nk,nkt->nt", share, swings)))
-    return setting.mean(shared), offset, forced, rising, swings
+    return setting.mean(shared), means[:, 0], means[:, 1:], swings

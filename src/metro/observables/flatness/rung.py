@@ -8,11 +8,13 @@ alike. Other effects on a face do not change its ringing: it is kept.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from metro.surface.tip_damping import Raised
 from metro.units import Array
 
 if TYPE_CHECKING:
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from metro.observables.flatness.ringing import Ringing
 
 FINE = 0.002  # relative change of the frequencies by which the slope of the ringing is taken
+LOSSIER = 0.05  # damping ratio by which the slope of the ringing is taken: what arms have once more
 NODES = 0.01  # spacing of nodes in the logarithm of the tuning, between which ringing is interpolated
 
 
@@ -42,6 +45,20 @@ def sharper(setting: FaceSetting, tuning: float) -> Array:
     """Return what the heights of :func:`rung` gain per relative rise of the tip's frequencies, (n, k) m."""
     high, low = (rung(setting, tuning * math.exp(step)) for step in (FINE, -FINE))
     return np.asarray((high - low) / (2.0 * FINE))
+
+
+def lossier(setting: FaceSetting, tuning: float) -> Array:
+    """Return what the heights of :func:`rung` gain per damping ratio above the known one, (n, k) m."""
+    return np.asarray((rung(_damped(setting), tuning) - rung(setting, tuning)) / LOSSIER)
+
+
+@lru_cache(maxsize=64)
+def _damped(setting: FaceSetting) -> FaceSetting:
+    """Return a face with more damping; it is kept, because what is known of its ringing is kept with it."""
+    ringing = setting.ringing
+    if ringing is None:
+        return setting
+    return replace(setting, ringing=replace(ringing, damping=Raised(ringing.damping, LOSSIER)))
 
 
 def _cubic(place: float) -> list[tuple[int, float]]:

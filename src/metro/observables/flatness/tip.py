@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from metro.observables.flatness.rung import rung
+from metro.observables.flatness.rung import lossier, rung
 from metro.surface.tip_stiffness import Basis, heights_design
 from metro.units import Array
 
@@ -37,14 +37,17 @@ def tip(
     setting: FaceSetting,
     coefficients: tuple[float, ...],
     harder: float,
-    tuning: float,
+    ringing: tuple[float, float],
 ) -> Array:
     """Return the height of the tip at each passage, (n, k) m, of one as stiff as in the load tests.
 
     Parameters
     ----------
     coefficients : (3 · terms,) of the compliance, m/N. harder : relative rise of the force, of which the
-        compliance of the load tests says what it makes.
+        compliance of the load tests says what it makes. ringing : tuning, and damping ratio over the known
+        one.
     """
+    tuning, loss = ringing
     height = terms(basis, setting) @ (setting.force @ np.reshape(coefficients, (3, -1)))
-    return np.asarray(height + harder * (static(basis, setting) + rung(setting, tuning)))
+    height = height + harder * (static(basis, setting) + rung(setting, tuning))
+    return np.asarray(height + loss * lossier(setting, tuning))
