@@ -341,3 +341,27 @@ def test_a_face_does_not_jump_where_another_passage_becomes_the_lowest() -> None
         switched += int(((share > 0.1) & (share < 0.9)).any())
     assert switched > 5  # else the test shows nothing
     assert np.abs(change).max() < 0.05 * UM
+
+
+def test_the_columns_of_a_face_are_the_slopes_of_its_heights() -> None:
+    """Of every base parameter, away from where all are zero: a descent ends early on any other slopes."""
+    rung, full = ringing(make_batch(), replace(dynamics(), damping=None))
+    setting, field = face_of(rung, full)
+    modes = (ArmMode(np.inf, 0.0, (3e-4, 3e-4, 2e-4)),)
+    model = FlatnessModel((field,), placed=True, ringing=("A",), beside=(Beside("A", modes),))
+    names = [one.name for one in model.parameters]
+    count, none = len(setting.first), np.zeros(0)
+    zeros, axis = np.zeros((count, 0)), np.full(count, "z")
+    block = Block("r1", "c", "identify", 0, np.zeros(count), np.ones(count), setting, axis, zeros, none, {})
+    beta = np.zeros(len(names))
+    beta[[names.index(one) for one in ("force_off", "loss_off_A", "ringing_off_A")]] = -0.2, 0.05, 0.04
+    beta[[names.index(f"at_once_{axis}_A") for axis in "xyz"]] = 0.1, -0.2, 0.3
+    beta[len(model.believed) :] = 0.9 * setting.loaded[field.used]
+    matrix, _ = model.design(block, np.zeros(1), beta)
+    for place, name in enumerate(names):
+        step = np.zeros(len(names))
+        step[place] = 1e-7 * UM / max(float(np.abs(matrix[:, place]).max()), 1e-12)
+        high, low = (model.predictions(block, np.zeros((1, 1)), beta + by)[0] for by in (step, -step))
+        slope = (high - low) / (2.0 * step[place])
+        error = np.linalg.norm(slope - matrix[:, place]) / max(np.linalg.norm(matrix[:, place]), 1e-12)
+        assert error < 0.01, name

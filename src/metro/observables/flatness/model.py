@@ -224,15 +224,22 @@ class FlatnessModel:
                 coefficients = np.zeros(len(part.used))
                 coefficients[part.used] = beta[first : first + count]
             first += count
-        harder = float(beta[believed.index(FORCE)])
-        loss = f"{LOSS}{setting.pose}"
-        lossy = float(beta[believed.index(loss)]) if loss in believed else 0.0
-        ringing = self.tuning(self._off(setting, beta)), lossy
+        harder, loss = self._rings(setting, beta)
+        ringing = self.tuning(self._off(setting, beta)), loss
         height = tip(self._basis(setting), setting, tuple(coefficients.tolist()), harder, ringing)
         for each in self._beside(setting):
             place = [believed.index(one.name) for one in each.parameters]
             height = height + swung_beside(each.modes, setting) @ beta[place]
         return height
+
+    def _rings(self, setting: FaceSetting, beta: Array | None) -> tuple[float, float]:
+        """Return by how much the force is larger, relative, and the damping ratio higher, than is known."""
+        known = (
+            {}
+            if beta is None
+            else dict(zip((one.name for one in self.believed), beta.tolist(), strict=False))
+        )
+        return known.get(FORCE, 0.0), known.get(f"{LOSS}{setting.pose}", 0.0)
 
     def _beside(self, setting: FaceSetting) -> list[Beside]:
         """Return the modes that swing beside those of the tip in a face, if there are any."""
@@ -311,16 +318,18 @@ def _shaped(
     """Return means over each bin: terms of the basis, (bins, terms), and heights that are added to theirs.
 
     These are an offset, (bins,) m; what is gained per relative rise of the force and of the frequencies, and
-    per damping ratio, (bins, 3) m; and what other modes give, (bins, parameters). The gains hold for the
-    compliance of the load tests alone, so that they are linear in the base parameters. The result is cached
-    because noise and parameters are estimated in turn, many times over.
+    per damping ratio, (bins, 3) m; and what other modes give, (bins, parameters). The gains by force and
+    damping hold for the compliance of the load tests alone, so that they are linear in the base parameters.
+    The result is cached because noise and parameters are estimated in turn, many times over.
     """
     beta = None if known is None else np.array(known)
     share, lowest = model.finished(setting, np.array(phases), beta)
     basis, tuning = model._basis(setting), model.tuning(model._off(setting, beta))
     shared = np.einsum("nk,nkt->nt", share, terms(basis, setting))
     harder = static(basis, setting) + rung(setting, tuning)
-    gained = harder, sharper(setting, tuning), lossier(setting, tuning)
+    share_of_force, loss = model._rings(setting, beta)
+    rising = sharper(setting, tuning, harder=share_of_force, loss=loss)
+    gained = harder, rising, lossier(setting, tuning)
     heights = [model._deflected(setting, beta), *(model.structure.in_cut(one) for one in gained)]
     of_tip, *gains = [np.einsum("nk,nk->n", share, one) for one in heights]
     means = setting.mean(np.stack([lowest - of_tip, *gains], axis=1))

@@ -41,10 +41,18 @@ def rung(setting: FaceSetting, tuning: float) -> Array:
     return np.asarray(moved + of_teeth)
 
 
-def sharper(setting: FaceSetting, tuning: float) -> Array:
-    """Return what the heights of :func:`rung` gain per relative rise of the tip's frequencies, (n, k) m."""
-    high, low = (rung(setting, tuning * math.exp(step)) for step in (FINE, -FINE))
-    return np.asarray((high - low) / (2.0 * FINE))
+def sharper(setting: FaceSetting, tuning: float, *, harder: float = 0.0, loss: float = 0.0) -> Array:
+    """Return what the ringing gains per relative rise of the tip's frequencies, (n, k) m.
+
+    It is that of :func:`rung` under a force that is ``harder`` by a share, with a damping ratio that is
+    higher by ``loss``.
+    """
+
+    def ringing(step: float) -> Array:
+        tuned = tuning * math.exp(step)
+        return (1.0 + harder) * rung(setting, tuned) + (loss * lossier(setting, tuned) if loss else 0.0)
+
+    return np.asarray((ringing(FINE) - ringing(-FINE)) / (2.0 * FINE))
 
 
 def lossier(setting: FaceSetting, tuning: float) -> Array:
